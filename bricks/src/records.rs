@@ -1,0 +1,345 @@
+//! The records of a scene file, as they lie on disk and, where a kernel reads them, on the device.
+//!
+//! Every record is `#[repr(C)]`, little-endian, without implicit padding and valid for every bit pattern; what its
+//! values must satisfy is checked by [`crate::validate`] before anything indexes with them.
+
+use bytemuck::{Pod, Zeroable};
+
+/// "No such thing", in every index field that may be absent.
+pub const NONE: u32 = u32::MAX;
+
+/// Children of a wide node.
+pub const NODE_WIDTH: usize = 8;
+
+/// Most triangles of one leaf child of a wide node.
+pub const LEAF_TRIANGLES: u32 = 3;
+
+/// Most levels of wide nodes in one brick, the root counted. Kernels reserve a stack of this depth.
+pub const MAX_BRICK_HEIGHT: u32 = 24;
+
+/// Most levels of wide nodes of the top-level tree, the root counted.
+pub const MAX_TOP_HEIGHT: u32 = 24;
+
+/// Brick origins and frame reference points are multiples of this many lattice steps (numerics.md, "Positions").
+pub const ORIGIN_STEPS: i64 = 1 << 20;
+
+/// Largest magnitude, in lattice steps, of a vertex coordinate relative to the origin of a *near* brick.
+pub const NEAR_STEPS: i64 = 1 << 24;
+
+/// The high part of a *wide* vertex coordinate is a multiple of this many lattice steps.
+pub const WIDE_HIGH_STEPS: i64 = 1 << 23;
+
+/// Largest magnitude, in lattice steps, of a vertex coordinate relative to the origin of a *wide* brick.
+pub const WIDE_STEPS: i64 = 1 << 46;
+
+/// An 8-wide node with quantised child boxes (CWBVH: Ylitie, Karras, Laine 2017), 80 bytes.
+///
+/// Child `i` spans `origin[k] + lo[k][i] * 2^exponent[k] ..= origin[k] + hi[k][i] * 2^exponent[k]` on axis `k`, in
+/// device units of the object and relative to the brick's origin. Origin and scale lie on the object's lattice, so the
+/// expressions are exact but for the rounding of `origin` in wide bricks, which is outward.
+///
+/// `meta[i]` is 0 for an absent child; `0b001_00000 | (24 + i)` for an inner child, whose node index is `child_base` +
+/// the number of inner children in slots below `i`; otherwise a leaf: the three high bits are the unary count of
+/// its triangles (1, 3 or 7), the five low bits the first triangle relative to `triangle_base`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Node {
+    /// Lower corner of the quantisation grid, device units of the object, relative to the brick's origin.
+    pub origin: [f32; 3],
+    /// log2 of the grid step per axis, in device units, biased by 127: the exponent field of an f32.
+    pub exponent: [u8; 3],
+    /// Bit `i` is set when child `i` is an inner node.
+    pub inner_mask: u8,
+    /// Index of the first inner child within the brick's nodes.
+    pub child_base: u32,
+    /// Index of the first triangle of the leaf children within the brick.
+    pub triangle_base: u32,
+    /// What each child is.
+    pub meta: [u8; 8],
+    /// Lower child bounds per axis, in grid steps.
+    pub lo: [[u8; 8]; 3],
+    /// Upper child bounds per axis, in grid steps.
+    pub hi: [[u8; 8]; 3],
+}
+
+/// Bytes of one kind of payload of a brick within the file. All zero when the brick has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Span {
+    /// Offset in the file, a multiple of 4096.
+    pub offset: u64,
+    /// Length in bytes, a multiple of 16.
+    pub bytes: u64,
+    /// xxh3-64 of the bytes.
+    pub checksum: u64,
+}
+
+/// [`Brick::flags`]: vertices have a high and a low part (24 bytes).
+pub const BRICK_WIDE: u32 = 1;
+/// [`Brick::flags`]: indices are u32, not u16.
+pub const BRICK_INDEX32: u32 = 2;
+
+/// A brick: the always-resident facts about one BVH subtree and where its payloads lie.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Brick {
+    /// The object it is part of.
+    pub object: u32,
+    /// `BRICK_*` bits.
+    pub flags: u32,
+    /// Number of nodes; node 0 is the root.
+    pub node_count: u32,
+    /// Number of triangles.
+    pub triangle_count: u32,
+    /// Number of positions.
+    pub vertex_count: u32,
+    /// Number of attribute vertices (distinct normal, UV and colour).
+    pub attribute_vertex_count: u32,
+    /// Levels of wide nodes, the root counted.
+    pub height: u32,
+    /// Zero; for levels of detail.
+    pub _reserved0: u32,
+    /// Origin in steps of the object's lattice; each a multiple of [`ORIGIN_STEPS`].
+    pub origin: [i64; 3],
+    /// Least vertex coordinates in steps of the object's lattice.
+    pub min: [i64; 3],
+    /// Greatest vertex coordinates in steps of the object's lattice.
+    pub max: [i64; 3],
+    /// What traversal reads: see [`GeometryLayout`].
+    pub geometry: Span,
+    /// What shading of hits reads: see [`AttributeLayout`].
+    pub attributes: Span,
+    /// Zero; for occupancy maps, visibility and displacement fields.
+    pub proxies: Span,
+    /// Area-weighted mean linear base colour.
+    pub mean_albedo: [f32; 3],
+    /// Area-weighted mean linear emission.
+    pub mean_emission: [f32; 3],
+    /// Copy of node 0.
+    pub root: Node,
+    /// Zero.
+    pub _reserved1: [u32; 4],
+}
+
+/// An object: triangles on one lattice, placed by one or more instances. Object 0 is the world: everything baked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Object {
+    /// log2 of the lattice step in object units.
+    pub step_log2: i32,
+    /// log2 of the device unit in object units: device length = object length / 2^unit_log2.
+    pub unit_log2: i32,
+    /// First brick; an object's bricks are contiguous.
+    pub first_brick: u32,
+    /// Number of bricks.
+    pub brick_count: u32,
+    /// Triangles of the source, dropped ones counted: ids of one instance span `base .. base + triangle_ids`.
+    pub triangle_ids: u32,
+    /// Triangles stored (a triangle split over bricks counts once).
+    pub triangle_count: u32,
+    /// Zero.
+    pub _reserved: [u32; 2],
+}
+
+/// [`Instance::flags`]: the matrix is the identity and object units are world units (always instance 0).
+pub const INSTANCE_IDENTITY: u32 = 1;
+/// [`Instance::flags`]: the determinant of the matrix is negative.
+pub const INSTANCE_MIRRORED: u32 = 2;
+
+/// An object placed in the world.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Instance {
+    /// The object.
+    pub object: u32,
+    /// Global id of the object's triangle 0 in this instance.
+    pub base: u32,
+    /// `INSTANCE_*` bits.
+    pub flags: u32,
+    /// Zero.
+    pub _reserved: u32,
+    /// world_from_object, row-major 3x4, world units from object units.
+    pub world_from_object: [f64; 12],
+}
+
+/// A leaf of the top-level tree: one brick of one instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Leaf {
+    /// The instance.
+    pub instance: u32,
+    /// The brick.
+    pub brick: u32,
+}
+
+/// [`TopNode2::right`]: the node is a leaf and [`TopNode2::left`] the index of a [`Leaf`].
+pub const TOP_LEAF: u32 = NONE;
+
+/// A node of the binary top-level tree, in steps of the world's lattice, bounds outward. Node 0 is the root;
+/// children follow their parent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TopNode2 {
+    /// Least coordinates, world lattice steps.
+    pub min: [i64; 3],
+    /// Greatest coordinates, world lattice steps.
+    pub max: [i64; 3],
+    /// Left child, or the leaf.
+    pub left: u32,
+    /// Right child, or [`TOP_LEAF`].
+    pub right: u32,
+}
+
+/// A node of the 8-wide top-level tree: like [`Node`], with an exact origin and scales in steps of the world's lattice;
+/// each leaf child holds exactly one [`Leaf`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TopNode8 {
+    /// Lower corner of the quantisation grid, world lattice steps.
+    pub origin: [i64; 3],
+    /// log2 of the grid step per axis, in world lattice steps, ≥ 0.
+    pub exponent: [u8; 3],
+    /// Bit `i` is set when child `i` is an inner node.
+    pub inner_mask: u8,
+    /// Index of the first inner child.
+    pub child_base: u32,
+    /// Index of the first leaf.
+    pub leaf_base: u32,
+    /// As [`Node::meta`], leaves in place of triangles.
+    pub meta: [u8; 8],
+    /// Lower child bounds per axis, in grid steps.
+    pub lo: [[u8; 8]; 3],
+    /// Upper child bounds per axis, in grid steps.
+    pub hi: [[u8; 8]; 3],
+    /// Zero.
+    pub _reserved: u32,
+}
+
+/// [`Material::flags`]: alpha MASK with [`Material::alpha_cutoff`].
+pub const MATERIAL_MASK: u32 = 1;
+/// [`Material::flags`]: alpha BLEND.
+pub const MATERIAL_BLEND: u32 = 2;
+/// [`Material::flags`]: both sides are drawn.
+pub const MATERIAL_DOUBLE_SIDED: u32 = 4;
+/// [`Material::flags`]: KHR_materials_unlit.
+pub const MATERIAL_UNLIT: u32 = 8;
+
+/// A glTF metallic-roughness material. Texture fields are indices of [`Texture`], or [`NONE`].
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Material {
+    /// Linear RGBA factor.
+    pub base_color: [f32; 4],
+    /// Linear emission factor, strength included.
+    pub emission: [f32; 3],
+    /// Metallic factor.
+    pub metallic: f32,
+    /// Roughness factor.
+    pub roughness: f32,
+    /// Cutoff of MASK.
+    pub alpha_cutoff: f32,
+    /// `MATERIAL_*` bits.
+    pub flags: u32,
+    /// Base colour texture (sRGB).
+    pub base_color_texture: u32,
+    /// Zero; for normal, metallic-roughness, occlusion and emissive textures and their transforms.
+    pub _reserved: [u32; 4],
+}
+
+/// [`Texture::wrap`]: repeat.
+pub const WRAP_REPEAT: u32 = 0;
+/// [`Texture::wrap`]: clamp to edge.
+pub const WRAP_CLAMP: u32 = 1;
+/// [`Texture::wrap`]: mirrored repeat.
+pub const WRAP_MIRROR: u32 = 2;
+
+/// A texture: an RGBA8 sRGB image with a full chain of mip levels, level 0 first, rows top to bottom, tightly packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Texture {
+    /// Width of level 0 in texels.
+    pub width: u32,
+    /// Height of level 0 in texels.
+    pub height: u32,
+    /// Number of levels; level l is max(1, width >> l) by max(1, height >> l).
+    pub levels: u32,
+    /// `WRAP_*` of s in the low half, of t in the high half.
+    pub wrap: u32,
+    /// The texels.
+    pub texels: Span,
+}
+
+/// A vertex of the attributes of a brick, 16 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct AttributeVertex {
+    /// Unit normal in object space, octahedral, two snorm16: x in the low half.
+    pub normal: u32,
+    /// Texture coordinates of set 0.
+    pub uv: [f32; 2],
+    /// Linear RGBA vertex colour, unorm8, red lowest; all ones when the source has none.
+    pub color: u32,
+}
+
+/// Rounds `bytes` up to a multiple of 16.
+const fn pad16(bytes: u64) -> u64 {
+    bytes.next_multiple_of(16)
+}
+
+/// Byte offsets of the arrays in a brick's geometry payload, each 16-aligned, in this order: [`Node`]s; vertices (f32
+/// x y z in device units of the object relative to the brick's origin; wide: high x y z, low x y z); mesh-local triangle
+/// ids (u32); indices (three u16 or u32 a triangle, lexicographically smallest position first, winding kept).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GeometryLayout {
+    /// Offset of the vertices.
+    pub vertices: u64,
+    /// Offset of the mesh-local ids.
+    pub ids: u64,
+    /// Offset of the indices.
+    pub indices: u64,
+    /// Length of the payload.
+    pub bytes: u64,
+}
+
+impl GeometryLayout {
+    /// The layout that the counts and flags of `brick` imply.
+    pub fn of(brick: &Brick) -> Self {
+        let vertex_bytes = if brick.flags & BRICK_WIDE != 0 { 24 } else { 12 };
+        let index_bytes = if brick.flags & BRICK_INDEX32 != 0 { 12 } else { 6 };
+        let vertices = brick.node_count as u64 * size_of::<Node>() as u64;
+        let ids = vertices + pad16(brick.vertex_count as u64 * vertex_bytes);
+        let indices = ids + pad16(brick.triangle_count as u64 * 4);
+        let bytes = indices + pad16(brick.triangle_count as u64 * index_bytes);
+        Self { vertices, ids, indices, bytes }
+    }
+}
+
+/// Bits of a triangle's surface word that hold its material.
+pub const SURFACE_MATERIAL: u32 = (1 << 30) - 1;
+/// Shift of the rotation in a triangle's surface word.
+pub const SURFACE_ROTATION_SHIFT: u32 = 30;
+
+/// Byte offsets of the arrays in a brick's attribute payload, each 16-aligned, in this order: [`AttributeVertex`]s;
+/// surface words (u32 a triangle: the material in the low 30 bits, above it the rotation r, such that stored vertex i is
+/// source vertex (i + r) mod 3); indices of attribute vertices (three u16 or u32 a triangle, in stored, rotated order;
+/// u32 under the same flag as the geometry's indices).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AttributeLayout {
+    /// Offset of the surface words.
+    pub surfaces: u64,
+    /// Offset of the indices.
+    pub indices: u64,
+    /// Length of the payload.
+    pub bytes: u64,
+}
+
+impl AttributeLayout {
+    /// The layout that the counts and flags of `brick` imply.
+    pub fn of(brick: &Brick) -> Self {
+        let index_bytes = if brick.flags & BRICK_INDEX32 != 0 { 12 } else { 6 };
+        let surfaces = brick.attribute_vertex_count as u64 * size_of::<AttributeVertex>() as u64;
+        let indices = surfaces + pad16(brick.triangle_count as u64 * 4);
+        let bytes = indices + pad16(brick.triangle_count as u64 * index_bytes);
+        Self { surfaces, indices, bytes }
+    }
+}

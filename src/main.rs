@@ -1,0 +1,2 @@
+//! The command `brickwalk`.
+fn main() {}

@@ -1,0 +1,4 @@
+//! Converts scenes of common formats into `.bricks`: importers produce a [`source::SourceScene`], the builder cuts it into bricks.
+
+pub mod progress;
+pub mod source;

@@ -1,0 +1,1 @@
+//! Turns the records of a walk into one offline HTML page.

@@ -1,0 +1,1 @@
+//! Generated scenes of any size, and camera paths through them.
