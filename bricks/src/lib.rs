@@ -1,7 +1,38 @@
 //! The `.bricks` scene file: records, reader, writer, validation. See `FORMAT.md` for the byte maps.
+//!
+//! One file holds a whole scene: a header, the payloads (geometry, attributes, texels), and the resident part that says
+//! where they lie. Whatever is read is checked once, at the file's edge, and may be indexed freely from then on:
+//!
+//! * [`SceneFile::open`] checks the header, the directory and every section of the resident part (checksums, then
+//!   [`validate::resident`]). Its cost does not depend on the payloads.
+//! * [`SceneFile::copy`] checks a payload while it is copied out: its checksum, then every index in it.
+//! * [`verify_file`] reads every byte of the file, padding included, and lists all that is wrong.
+//!
+//! Numbers on disk are little-endian and of fixed width; offsets and lengths are `u64`.
 
+#[cfg(target_endian = "big")]
+compile_error!("the records of a scene file are used as they lie on disk, which is little-endian");
+#[cfg(not(target_pointer_width = "64"))]
+compile_error!("scene files are mapped whole, which takes a 64-bit address space");
+
+mod error;
+mod file;
+pub mod layout;
 pub mod manifest;
+mod payload;
 pub mod records;
+mod resident;
+mod source;
+pub mod validate;
+mod verify;
+mod writer;
 
+pub use error::{Error, Flaw, Part};
+pub use file::{Access, SceneFile};
+pub use layout::Section;
 pub use manifest::{Manifest, Provenance, Source};
+pub use payload::Payload;
 pub use records::*;
+pub use resident::Resident;
+pub use verify::{VerifyReport, verify_file};
+pub use writer::Writer;

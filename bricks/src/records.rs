@@ -20,6 +20,27 @@ pub const MAX_BRICK_HEIGHT: u32 = 24;
 /// Most levels of wide nodes of the top-level tree, the root counted.
 pub const MAX_TOP_HEIGHT: u32 = 24;
 
+/// Most levels of the binary top-level tree, the root counted.
+pub const MAX_TOP2_HEIGHT: u32 = 96;
+
+/// Largest grid exponent of the 8-wide top-level tree: 255 grid steps stay within [`LATTICE_LIMIT`].
+pub const MAX_TOP_EXPONENT: u8 = 53;
+
+/// Largest magnitude of a lattice coordinate, so that differences and sums of two fit an i64.
+pub const LATTICE_LIMIT: i64 = 1 << 61;
+
+/// Largest magnitude of [`Object::step_log2`] and [`Object::unit_log2`].
+pub const MAX_LATTICE_LOG2: u32 = 256;
+
+/// log2 of the lattice steps allowed, in device units: coordinates of wide vertices and of nodes are normal f32.
+pub const STEP_UNIT_LOG2: std::ops::RangeInclusive<i32> = -64..=32;
+
+/// Most triangle ids of a scene; [`NONE`] and the id before it are never given.
+pub const MAX_TRIANGLE_IDS: u64 = u32::MAX as u64 - 1;
+
+/// Most texels of a texture each way. Level 0 is then 1 GiB, all levels less than [`crate::layout::MAX_PAYLOAD_BYTES`].
+pub const MAX_TEXTURE_SIZE: u32 = 1 << 14;
+
 /// Brick origins and frame reference points are multiples of this many lattice steps (numerics.md, "Positions").
 pub const ORIGIN_STEPS: i64 = 1 << 20;
 
@@ -162,6 +183,17 @@ pub struct Instance {
     pub world_from_object: [f64; 12],
 }
 
+impl Instance {
+    /// The identity as a row-major 3x4 matrix.
+    pub const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+    /// Determinant of the linear part of [`Self::world_from_object`]. Its sign decides [`INSTANCE_MIRRORED`].
+    pub fn determinant(&self) -> f64 {
+        let m = &self.world_from_object;
+        m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8])
+    }
+}
+
 /// A leaf of the top-level tree: one brick of one instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
@@ -267,6 +299,17 @@ pub struct Texture {
     pub wrap: u32,
     /// The texels.
     pub texels: Span,
+}
+
+impl Texture {
+    /// Bytes of the texels of all levels, without the padding of the payload to 16; `None` if the sizes are too large for
+    /// a number.
+    pub fn texel_bytes(&self) -> Option<u64> {
+        (0..self.levels.min(32)).try_fold(0u64, |bytes, level| {
+            let (width, height) = ((self.width >> level).max(1), (self.height >> level).max(1));
+            bytes.checked_add((u64::from(width) * u64::from(height)).checked_mul(4)?)
+        })
+    }
 }
 
 /// A vertex of the attributes of a brick, 16 bytes.

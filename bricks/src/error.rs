@@ -1,0 +1,177 @@
+//! What can be wrong with a scene file, said so that the reader knows which part it is and what to do.
+
+use crate::layout::{MAGIC, Section, VERSION};
+use crate::payload::Payload;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A part of a scene file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// The header page.
+    Header,
+    /// The directory of the sections.
+    Directory,
+    /// A section of the resident part.
+    Section(Section),
+    /// A record of a section, by index.
+    Record(Section, u32),
+    /// A payload.
+    Payload(Payload),
+    /// The zeros between the directory and the first section.
+    PaddingAfterDirectory,
+    /// The zeros between a section and the next.
+    PaddingAfterSection(Section),
+    /// The zeros between a payload and what follows.
+    PaddingAfterPayload(Payload),
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Part::Header => write!(f, "the header"),
+            Part::Directory => write!(f, "the directory"),
+            Part::Section(section) => write!(f, "section {section}"),
+            Part::Record(Section::Bricks, index) => write!(f, "brick {index} (section bricks)"),
+            Part::Record(section, index) => write!(f, "record {index} of section {section}"),
+            Part::Payload(payload) => write!(f, "{payload}"),
+            Part::PaddingAfterDirectory => write!(f, "the padding after the directory"),
+            Part::PaddingAfterSection(section) => write!(f, "the padding after section {section}"),
+            Part::PaddingAfterPayload(payload) => write!(f, "the padding after {payload}"),
+        }
+    }
+}
+
+/// A rule of the format that some data breaks; the file it is in, if any, is known to the caller.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{part}: found {found}, expected {expected}")]
+pub struct Flaw {
+    /// Where.
+    pub part: Part,
+    /// What is there.
+    pub found: String,
+    /// What the format asks for.
+    pub expected: String,
+}
+
+/// Why a scene file could not be opened, read or written. Every message names the file, the part of it, what was found
+/// and expected, and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was being done: "open the file", "read brick 17 geometry".
+        action: String,
+        /// Where it was being done, when in a part of the file.
+        part: Option<Part>,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The file does not start like a scene file.
+    #[error(
+        "{}: not a .bricks scene file: it starts with \"{}\", expected \"{}\"; give a file that `convert` wrote",
+        path.display(), found.escape_ascii(), MAGIC.escape_ascii()
+    )]
+    NotSceneFile {
+        /// The file.
+        path: PathBuf,
+        /// Its first bytes, up to 8.
+        found: Vec<u8>,
+    },
+    /// The file has a version of the format that this program does not read.
+    #[error(
+        "{}: the header says format version {found}, {} than version {VERSION}, the one this program reads; \
+         convert again with this program",
+        path.display(), if *found < VERSION { "older" } else { "newer" }
+    )]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// The file is shorter or longer than its header says.
+    #[error(
+        "{}: the file is {} than the header says: found {found} bytes, expected {expected}; \
+         copy the file again from where it is whole, or convert again",
+        path.display(), if found < expected { "shorter" } else { "longer" }
+    )]
+    Length {
+        /// The file.
+        path: PathBuf,
+        /// Length of the file in bytes.
+        found: u64,
+        /// Length that the header states; for a file shorter than a header, the header's length.
+        expected: u64,
+    },
+    /// Bytes of the file are not those that were written.
+    #[error(
+        "{}: {part} is damaged: found checksum {found:016x}, expected {expected:016x}; \
+         copy the file again from where it is whole, or convert again",
+        path.display()
+    )]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// The damaged part.
+        part: Part,
+        /// Checksum of the bytes.
+        found: u64,
+        /// Checksum that the file states.
+        expected: u64,
+    },
+    /// The bytes are those that were written, but they break a rule of the format.
+    #[error(
+        "{}: {} is not valid: found {}, expected {}; convert again",
+        path.display(), flaw.part, flaw.found, flaw.expected
+    )]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        flaw: Flaw,
+    },
+    /// A payload was asked for that the scene does not have, or with a buffer of the wrong length.
+    #[error("{}: {payload}: found a request for {found}, expected {expected}; this is an error of the caller", path.display())]
+    Request {
+        /// The file.
+        path: PathBuf,
+        /// The payload.
+        payload: Payload,
+        /// What was asked for.
+        found: String,
+        /// What can be asked for.
+        expected: String,
+    },
+}
+
+impl Error {
+    /// The part of the file that is at fault, if one is.
+    pub fn part(&self) -> Option<Part> {
+        match self {
+            Error::Io { part, .. } => *part,
+            Error::NotSceneFile { .. } | Error::Version { .. } | Error::Length { .. } => Some(Part::Header),
+            Error::Corrupt { part, .. } => Some(*part),
+            Error::Invalid { flaw, .. } => Some(flaw.part),
+            Error::Request { payload, .. } => Some(Part::Payload(*payload)),
+        }
+    }
+
+    /// The file that the error is about.
+    pub fn path(&self) -> &Path {
+        match self {
+            Error::Io { path, .. }
+            | Error::NotSceneFile { path, .. }
+            | Error::Version { path, .. }
+            | Error::Length { path, .. }
+            | Error::Corrupt { path, .. }
+            | Error::Invalid { path, .. }
+            | Error::Request { path, .. } => path,
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Byte map of the file as a whole: header, directory, sections. See `FORMAT.md`.
+//!
+//! The parts of a file follow each other without gaps but for zero padding up to the next multiple of an alignment:
+//! header page, payloads (each on a multiple of [`PAGE_BYTES`]), directory (on a multiple of [`PAGE_BYTES`]), sections in
+//! the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
+
+use crate::records::{Brick, Instance, Leaf, Material, Object, Texture, TopNode2, TopNode8};
+use bytemuck::{Pod, Zeroable};
+use std::fmt;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// First bytes of every scene file. The control characters are spoiled by transfers in text mode.
+pub const MAGIC: [u8; 8] = *b"BRICKS\x1a\n";
+
+/// The version of the format that this crate writes and reads. No other version is read.
+pub const VERSION: u32 = 1;
+
+/// Alignment of payloads and of the directory, and length of the header page.
+pub const PAGE_BYTES: u64 = 4096;
+
+/// Alignment of the sections of the resident part.
+pub const SECTION_ALIGN: u64 = 64;
+
+/// Longest payload: byte offsets within one fit the signed and unsigned 32-bit integers of a kernel.
+pub const MAX_PAYLOAD_BYTES: u64 = 1 << 31;
+
+/// First fields of the header page. The rest of the page is zero.
+///
+/// [`Self::magic`] and [`Self::version`] keep their place in every version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Header {
+    /// [`MAGIC`].
+    pub magic: [u8; 8],
+    /// [`VERSION`].
+    pub version: u32,
+    /// [`PAGE_BYTES`].
+    pub page_bytes: u32,
+    /// Length of the file.
+    pub file_bytes: u64,
+    /// Offset of the directory, a multiple of [`PAGE_BYTES`].
+    pub directory_offset: u64,
+    /// Length of the directory.
+    pub directory_bytes: u64,
+    /// xxh3-64 of the directory.
+    pub directory_checksum: u64,
+    /// xxh3-64 of the header page with this field zero.
+    pub checksum: u64,
+}
+
+impl Header {
+    /// The header page: the fields with their checksum, then zeros.
+    pub fn page(&self) -> [u8; PAGE_BYTES as usize] {
+        let mut page = [0; PAGE_BYTES as usize];
+        page[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&Header { checksum: 0, ..*self }));
+        let checksum = xxh3_64(&page);
+        page[size_of::<Header>() - 8..size_of::<Header>()].copy_from_slice(&checksum.to_le_bytes());
+        page
+    }
+
+    /// The fields of a header page and the checksum that the page should state.
+    pub fn read(page: &[u8; PAGE_BYTES as usize]) -> (Header, u64) {
+        let header = bytemuck::pod_read_unaligned::<Header>(&page[..size_of::<Header>()]);
+        let mut zeroed = *page;
+        zeroed[size_of::<Header>() - 8..size_of::<Header>()].fill(0);
+        (header, xxh3_64(&zeroed))
+    }
+}
+
+/// An entry of the directory: where a section lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct DirectoryEntry {
+    /// A [`Section`] as a number.
+    pub kind: u32,
+    /// Bytes of one record; 1 for the manifest.
+    pub record_bytes: u32,
+    /// Number of records; bytes for the manifest.
+    pub count: u64,
+    /// Offset in the file, a multiple of [`SECTION_ALIGN`].
+    pub offset: u64,
+    /// Length: `count * record_bytes`.
+    pub bytes: u64,
+    /// xxh3-64 of the bytes.
+    pub checksum: u64,
+}
+
+/// Kind kept for brick occupancy maps. Not in files of this version.
+pub const KIND_OCCUPANCY: u32 = 16;
+/// Kind kept for directional visibility fields. Not in files of this version.
+pub const KIND_VISIBILITY_FIELDS: u32 = 17;
+/// Kind kept for displacement fields. Not in files of this version.
+pub const KIND_DISPLACEMENT_FIELDS: u32 = 18;
+/// Kind kept for levels of detail. Not in files of this version.
+pub const KIND_LEVELS_OF_DETAIL: u32 = 19;
+
+/// What a directory kind is called that this version does not have.
+pub(crate) fn unread_kind(kind: u32) -> &'static str {
+    match kind {
+        KIND_OCCUPANCY => "kept for occupancy maps",
+        KIND_VISIBILITY_FIELDS => "kept for visibility fields",
+        KIND_DISPLACEMENT_FIELDS => "kept for displacement fields",
+        KIND_LEVELS_OF_DETAIL => "kept for levels of detail",
+        _ => "unknown",
+    }
+}
+
+/// A section of the resident part. Every file has each exactly once, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum Section {
+    /// The [`crate::Manifest`] as JSON.
+    Manifest = 1,
+    /// [`Object`]s.
+    Objects = 2,
+    /// [`Instance`]s.
+    Instances = 3,
+    /// [`Leaf`]s.
+    Leaves = 4,
+    /// [`TopNode2`]s.
+    Top2 = 5,
+    /// [`TopNode8`]s.
+    Top8 = 6,
+    /// [`Brick`]s.
+    Bricks = 7,
+    /// [`Material`]s.
+    Materials = 8,
+    /// [`Texture`]s.
+    Textures = 9,
+}
+
+impl Section {
+    /// All sections in the order of the file.
+    pub const ALL: [Section; 9] = [
+        Section::Manifest,
+        Section::Objects,
+        Section::Instances,
+        Section::Leaves,
+        Section::Top2,
+        Section::Top8,
+        Section::Bricks,
+        Section::Materials,
+        Section::Textures,
+    ];
+
+    /// The section's number in the directory.
+    pub fn kind(self) -> u32 {
+        self as u32
+    }
+
+    /// Bytes of one record; 1 for the manifest.
+    pub fn record_bytes(self) -> u32 {
+        let bytes = match self {
+            Section::Manifest => 1,
+            Section::Objects => size_of::<Object>(),
+            Section::Instances => size_of::<Instance>(),
+            Section::Leaves => size_of::<Leaf>(),
+            Section::Top2 => size_of::<TopNode2>(),
+            Section::Top8 => size_of::<TopNode8>(),
+            Section::Bricks => size_of::<Brick>(),
+            Section::Materials => size_of::<Material>(),
+            Section::Textures => size_of::<Texture>(),
+        };
+        bytes as u32
+    }
+
+    /// The section's name, as messages print it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Section::Manifest => "manifest",
+            Section::Objects => "objects",
+            Section::Instances => "instances",
+            Section::Leaves => "leaves",
+            Section::Top2 => "top2",
+            Section::Top8 => "top8",
+            Section::Bricks => "bricks",
+            Section::Materials => "materials",
+            Section::Textures => "textures",
+        }
+    }
+}
+
+impl fmt::Display for Section {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// Length of the directory.
+pub const DIRECTORY_BYTES: u64 = (Section::ALL.len() * size_of::<DirectoryEntry>()) as u64;

@@ -1,0 +1,24 @@
+//! Names of the things that are read on demand.
+
+use std::fmt;
+
+/// A payload of the file: what is read on demand, by index of its [`crate::Brick`] or [`crate::Texture`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Payload {
+    /// What traversal of a brick reads, laid out as [`crate::GeometryLayout`] says.
+    Geometry(u32),
+    /// What shading of hits in a brick reads, laid out as [`crate::AttributeLayout`] says.
+    Attributes(u32),
+    /// The texels of a texture, all levels.
+    Texture(u32),
+}
+
+impl fmt::Display for Payload {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Payload::Geometry(brick) => write!(f, "brick {brick} geometry"),
+            Payload::Attributes(brick) => write!(f, "brick {brick} attributes"),
+            Payload::Texture(texture) => write!(f, "texture {texture}"),
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! The part of a scene that is always in memory.
+
+use crate::layout::Section;
+use crate::manifest::Manifest;
+use crate::payload::Payload;
+use crate::records::{Brick, Instance, Leaf, Material, Object, Span, Texture, TopNode2, TopNode8};
+
+/// The always-resident part of a scene file: everything but the payloads.
+///
+/// `objects[0]` is the world object, `instances[0]` places it by the identity; both always exist. A scene without
+/// triangles has no bricks, leaves or top-level nodes. A `Resident` that came out of a [`crate::SceneFile`] satisfies
+/// [`crate::validate::resident`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Resident {
+    /// What the scene has.
+    pub manifest: Manifest,
+    /// Objects; the first is the world.
+    pub objects: Vec<Object>,
+    /// Instances; the first is the world's.
+    pub instances: Vec<Instance>,
+    /// Leaves of both top-level trees: one for every brick of every instance.
+    pub leaves: Vec<Leaf>,
+    /// The binary top-level tree.
+    pub top2: Vec<TopNode2>,
+    /// The 8-wide top-level tree over the same leaves.
+    pub top8: Vec<TopNode8>,
+    /// Bricks, those of one object together.
+    pub bricks: Vec<Brick>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Textures.
+    pub textures: Vec<Texture>,
+}
+
+impl Resident {
+    /// Number of records of a section; 0 for the manifest, which has none.
+    pub fn count(&self, section: Section) -> usize {
+        match section {
+            Section::Manifest => 0,
+            Section::Objects => self.objects.len(),
+            Section::Instances => self.instances.len(),
+            Section::Leaves => self.leaves.len(),
+            Section::Top2 => self.top2.len(),
+            Section::Top8 => self.top8.len(),
+            Section::Bricks => self.bricks.len(),
+            Section::Materials => self.materials.len(),
+            Section::Textures => self.textures.len(),
+        }
+    }
+
+    /// Where a payload lies, or `None` if there is no such brick or texture.
+    pub fn span(&self, payload: Payload) -> Option<Span> {
+        match payload {
+            Payload::Geometry(brick) => self.bricks.get(brick as usize).map(|brick| brick.geometry),
+            Payload::Attributes(brick) => self.bricks.get(brick as usize).map(|brick| brick.attributes),
+            Payload::Texture(texture) => self.textures.get(texture as usize).map(|texture| texture.texels),
+        }
+    }
+
+    /// Every payload with its span: the bricks' geometry and attributes in order of bricks, then the textures.
+    pub fn payloads(&self) -> impl Iterator<Item = (Payload, Span)> + '_ {
+        let bricks = (0u32..).zip(&self.bricks);
+        let bricks = bricks.flat_map(|(index, brick)| {
+            [(Payload::Geometry(index), brick.geometry), (Payload::Attributes(index), brick.attributes)]
+        });
+        let textures = (0u32..).zip(&self.textures);
+        bricks.chain(textures.map(|(index, texture)| (Payload::Texture(index), texture.texels)))
+    }
+}

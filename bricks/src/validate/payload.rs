@@ -1,0 +1,124 @@
+//! Checks of a payload that has just been copied: every index in it, on the way from the disk to a cache.
+//!
+//! This lies on the path of every brick that is streamed, so it is one pass of a few instructions per node and a maximum
+//! per array of indices, which compilers vectorise.
+
+use super::node::NodeView;
+use super::rule;
+use crate::error::{Flaw, Part};
+use crate::payload::Payload;
+use crate::records::{AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Node};
+use crate::records::{SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
+use crate::resident::Resident;
+
+/// Checks the bytes of a payload against the resident part, which satisfies [`super::resident`]: every index that
+/// traversal or shading follows lies in its array, nodes form a tree no higher than the brick says with children after
+/// their parents, node 0 is the brick's root, padding is zero. `bytes` needs no alignment.
+pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(), Flaw> {
+    let part = Part::Payload(payload);
+    let span = resident.span(payload);
+    rule(span.is_some_and(|span| span.bytes == bytes.len() as u64), part, || {
+        (format!("{} bytes", bytes.len()), span.map_or("no such payload".to_owned(), |span| span.bytes.to_string()))
+    })?;
+    match payload {
+        Payload::Geometry(index) => {
+            let brick = &resident.bricks[index as usize];
+            geometry(part, brick, resident.objects[brick.object as usize].triangle_ids, bytes)
+        }
+        Payload::Attributes(index) => {
+            attributes(part, &resident.bricks[index as usize], resident.materials.len() as u32, bytes)
+        }
+        Payload::Texture(index) => {
+            padding(part, bytes, resident.textures[index as usize].texel_bytes().unwrap_or(0), bytes.len() as u64)
+        }
+    }
+}
+
+fn geometry(part: Part, brick: &Brick, triangle_ids: u32, bytes: &[u8]) -> Result<(), Flaw> {
+    let layout = GeometryLayout::of(brick);
+    let vertex_bytes = if brick.flags & BRICK_WIDE != 0 { 24 } else { 12 };
+    let ids_end = layout.ids + u64::from(brick.triangle_count) * 4;
+    nodes(part, brick, &bytes[..layout.vertices as usize])?;
+    padding(part, bytes, layout.vertices + u64::from(brick.vertex_count) * vertex_bytes, layout.ids)?;
+    let id = max_u32(&bytes[layout.ids as usize..ids_end as usize]);
+    rule(id < triangle_ids, part, || {
+        (format!("triangle id {id}"), format!("less than {triangle_ids}, as its object says"))
+    })?;
+    padding(part, bytes, ids_end, layout.indices)?;
+    indices(part, brick, brick.vertex_count, bytes, layout.indices)
+}
+
+fn attributes(part: Part, brick: &Brick, materials: u32, bytes: &[u8]) -> Result<(), Flaw> {
+    let layout = AttributeLayout::of(brick);
+    let surfaces_end = layout.surfaces + u64::from(brick.triangle_count) * 4;
+    let vertices_end = u64::from(brick.attribute_vertex_count) * size_of::<AttributeVertex>() as u64;
+    padding(part, bytes, vertices_end, layout.surfaces)?;
+    let surfaces = &bytes[layout.surfaces as usize..surfaces_end as usize];
+    let material = max_u32_by(surfaces, |surface| surface & SURFACE_MATERIAL);
+    rule(material < materials, part, || (format!("material {material}"), format!("less than {materials}")))?;
+    let rotation = max_u32(surfaces) >> SURFACE_ROTATION_SHIFT;
+    rule(rotation < 3, part, || (format!("rotation {rotation}"), "0, 1 or 2"))?;
+    padding(part, bytes, surfaces_end, layout.indices)?;
+    indices(part, brick, brick.attribute_vertex_count, bytes, layout.indices)
+}
+
+/// Checks that the nodes are a tree: every node but the root is the child of exactly one node before it. Then a
+/// traversal ends, and its stack is as deep as the brick's height at most.
+fn nodes(part: Part, brick: &Brick, bytes: &[u8]) -> Result<(), Flaw> {
+    let (nodes, _) = bytes.as_chunks::<{ size_of::<Node>() }>();
+    rule(nodes[0] == bytemuck::bytes_of(&brick.root), part, || ("a node 0", "the brick's root, which it is not"))?;
+    // Level of each node, the root's 1; 0 while no parent was met.
+    let mut levels = vec![0u8; nodes.len()];
+    levels[0] = 1;
+    for (index, bytes) in nodes.iter().enumerate() {
+        let node = NodeView::of_bytes(bytes);
+        node.check(index as u32, brick.node_count, brick.triangle_count, "triangles")
+            .map_err(|flaw| flaw.of_node(part, format_args!("node {index}")))?;
+        let level = levels[index];
+        rule(level != 0, part, || (format!("node {index} without a parent"), "a tree"))?;
+        if node.inner_mask == 0 {
+            continue;
+        }
+        rule(u32::from(level) < brick.height, part, || {
+            (format!("node {index} with children on level {}", level + 1), format!("at most {} levels", brick.height))
+        })?;
+        // Inside `levels`: the check above compared them with the number of nodes.
+        for child in &mut levels[node.child_base as usize..][..node.inner_count() as usize] {
+            rule(*child == 0, part, || (format!("node {index} with another node's child"), "a tree"))?;
+            *child = level + 1;
+        }
+    }
+    Ok(())
+}
+
+/// Checks that indices of vertices are less than `vertices`, and the padding after them.
+fn indices(part: Part, brick: &Brick, vertices: u32, bytes: &[u8], offset: u64) -> Result<(), Flaw> {
+    let wide = brick.flags & BRICK_INDEX32 != 0;
+    let end = offset + u64::from(brick.triangle_count) * if wide { 12 } else { 6 };
+    let indices = &bytes[offset as usize..end as usize];
+    let index = if wide { max_u32(indices) } else { u32::from(max_u16(indices)) };
+    rule(index < vertices, part, || (format!("index {index} of a vertex"), format!("less than {vertices}")))?;
+    padding(part, bytes, end, bytes.len() as u64)
+}
+
+/// Checks that `bytes[start..end]` is zero.
+fn padding(part: Part, bytes: &[u8], start: u64, end: u64) -> Result<(), Flaw> {
+    let at = bytes[start as usize..end as usize].iter().position(|&byte| byte != 0);
+    rule(at.is_none(), part, || {
+        let at = start + at.unwrap_or(0) as u64;
+        (format!("{:#04x} at its byte {at}", bytes[at as usize]), "zero padding")
+    })
+}
+
+fn max_u32(bytes: &[u8]) -> u32 {
+    max_u32_by(bytes, |value| value)
+}
+
+#[inline]
+fn max_u32_by(bytes: &[u8], of: impl Fn(u32) -> u32) -> u32 {
+    bytes.as_chunks::<4>().0.iter().fold(0, |max, &value| max.max(of(u32::from_le_bytes(value))))
+}
+
+fn max_u16(bytes: &[u8]) -> u16 {
+    bytes.as_chunks::<2>().0.iter().fold(0, |max, &value| max.max(u16::from_le_bytes(value)))
+}

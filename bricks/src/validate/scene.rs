@@ -1,0 +1,216 @@
+//! Checks of objects, instances, leaves, materials, textures and the manifest.
+
+use super::{length, rule};
+use crate::error::{Flaw, Part};
+use crate::layout::Section;
+use crate::payload::Payload;
+use crate::records::{
+    BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED,
+};
+use crate::records::{MATERIAL_MASK, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE, MAX_TRIANGLE_IDS, NONE};
+use crate::records::{STEP_UNIT_LOG2, WRAP_MIRROR};
+use crate::resident::Resident;
+
+/// Every brick belongs to one object, whose bricks are contiguous.
+pub(super) fn objects(resident: &Resident) -> Result<(), Flaw> {
+    let bricks = resident.bricks.len() as u64;
+    rule(!resident.objects.is_empty(), Part::Section(Section::Objects), || ("no object", "the world's at least"))?;
+    let mut brick_count = 0;
+    for (index, object) in (0u32..).zip(&resident.objects) {
+        let part = Part::Record(Section::Objects, index);
+        rule(object._reserved == [0; 2], part, || ("reserved words", "zero in them"))?;
+        let logs = [object.step_log2, object.unit_log2];
+        rule(logs.iter().all(|log2| log2.unsigned_abs() <= MAX_LATTICE_LOG2), part, || {
+            (format!("step 2^{} and unit 2^{}", logs[0], logs[1]), format!("exponents within ±{MAX_LATTICE_LOG2}"))
+        })?;
+        rule(STEP_UNIT_LOG2.contains(&(logs[0] - logs[1])), part, || {
+            let expected = format!("2^{} to 2^{} units", STEP_UNIT_LOG2.start(), STEP_UNIT_LOG2.end());
+            (format!("a lattice step of 2^{} device units", logs[0] - logs[1]), expected)
+        })?;
+        let (first, count) = (u64::from(object.first_brick), u64::from(object.brick_count));
+        rule(first + count <= bricks, part, || {
+            (format!("bricks {first} to {}", first + count), format!("at most {bricks}"))
+        })?;
+        brick_count += count;
+        let range = first as usize..(first + count) as usize;
+        let stranger = resident.bricks[range.clone()].iter().position(|brick| brick.object != index);
+        rule(stranger.is_none(), part, || {
+            (format!("brick {}, which is not of it", range.start + stranger.unwrap_or(0)), "bricks of this object")
+        })?;
+        let stored: u64 = resident.bricks[range].iter().map(|brick| u64::from(brick.triangle_count)).sum();
+        rule(object.triangle_count <= object.triangle_ids && u64::from(object.triangle_count) <= stored, part, || {
+            let found = format!("{} triangles, {} ids, {stored} in bricks", object.triangle_count, object.triangle_ids);
+            (found, "as many ids as triangles, each in a brick")
+        })?;
+        rule(count == 0 || object.triangle_count > 0, part, || {
+            (format!("{count} bricks without triangles"), "triangles")
+        })?;
+    }
+    // No brick is in the ranges of two objects, so with equal counts each is in one.
+    rule(brick_count == bricks, Part::Section(Section::Objects), || {
+        (format!("{brick_count} bricks in all objects"), format!("all {bricks}"))
+    })
+}
+
+/// Instances place objects by finite, invertible matrices; the first is the world.
+pub(super) fn instances(resident: &Resident) -> Result<(), Flaw> {
+    let world = resident.instances.first();
+    let identity = |instance: &Instance| {
+        instance.object == 0
+            && instance.base == 0
+            && instance.flags == INSTANCE_IDENTITY
+            && instance.world_from_object == Instance::IDENTITY
+    };
+    rule(world.is_some_and(identity), Part::Record(Section::Instances, 0), || {
+        (format!("{world:?}"), "object 0 with base 0 and the identity, so flagged")
+    })?;
+    for (index, instance) in (0u32..).zip(&resident.instances) {
+        let part = Part::Record(Section::Instances, index);
+        rule(instance._reserved == 0, part, || ("a reserved word", "zero in it"))?;
+        let flags = if index == 0 { INSTANCE_IDENTITY } else { INSTANCE_MIRRORED };
+        rule(instance.flags & !flags == 0, part, || {
+            (format!("flags {:#x}", instance.flags), "the world's flag or mirrored")
+        })?;
+        let object = resident.objects.get(instance.object as usize);
+        rule(object.is_some(), part, || {
+            (format!("object {}", instance.object), format!("less than {}", resident.objects.len()))
+        })?;
+        let ids = object.map_or(0, |object| object.triangle_ids);
+        let end = u64::from(instance.base) + u64::from(ids);
+        rule(end <= resident.manifest.triangle_ids, part, || {
+            let all = resident.manifest.triangle_ids;
+            (format!("triangle ids {} to {end}", instance.base), format!("at most {all}, as the manifest says"))
+        })?;
+        let finite = instance.world_from_object.iter().all(|value| value.is_finite());
+        let determinant = instance.determinant();
+        rule(finite && determinant.is_finite() && determinant != 0.0, part, || {
+            (format!("matrix {:?}", instance.world_from_object), "finite numbers and an inverse")
+        })?;
+        rule((determinant < 0.0) == (instance.flags & INSTANCE_MIRRORED != 0), part, || {
+            (
+                format!("determinant {determinant}, flags {:#x}", instance.flags),
+                "the mirrored flag if and only if negative",
+            )
+        })?;
+    }
+    Ok(())
+}
+
+/// There is one leaf for every brick of every instance.
+pub(super) fn leaves(resident: &Resident) -> Result<(), Flaw> {
+    // Leaves of one instance are numbered by brick from `starts[instance]`, to see that none comes twice.
+    let mut starts = Vec::with_capacity(resident.instances.len());
+    let mut count = 0u64;
+    for instance in &resident.instances {
+        starts.push(count);
+        count += u64::from(resident.objects[instance.object as usize].brick_count);
+    }
+    rule(count == resident.leaves.len() as u64, Part::Section(Section::Leaves), || {
+        (format!("{} leaves", resident.leaves.len()), format!("{count}, the bricks of all instances"))
+    })?;
+    let mut met = vec![false; resident.leaves.len()];
+    for (index, leaf) in (0u32..).zip(&resident.leaves) {
+        let part = Part::Record(Section::Leaves, index);
+        let instance = resident.instances.get(leaf.instance as usize);
+        let object = instance.map(|instance| &resident.objects[instance.object as usize]);
+        let brick = object
+            .and_then(|object| leaf.brick.checked_sub(object.first_brick).filter(|&brick| brick < object.brick_count));
+        rule(brick.is_some(), part, || {
+            (format!("brick {} of instance {}", leaf.brick, leaf.instance), "a brick of the instance's object")
+        })?;
+        let met = &mut met[(starts[leaf.instance as usize] + u64::from(brick.unwrap_or(0))) as usize];
+        rule(!*met, part, || {
+            (format!("brick {} of instance {} again", leaf.brick, leaf.instance), "every brick of an instance once")
+        })?;
+        *met = true;
+    }
+    Ok(())
+}
+
+pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
+    for (index, material) in (0u32..).zip(&resident.materials) {
+        let part = Part::Record(Section::Materials, index);
+        rule(material._reserved == [0; 4], part, || ("reserved words", "zero in them"))?;
+        let both = MATERIAL_MASK | MATERIAL_BLEND;
+        let known = both | MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT;
+        rule(material.flags & !known == 0 && material.flags & both != both, part, || {
+            (format!("flags {:#x}", material.flags), "known flags, not both MASK and BLEND")
+        })?;
+        let factors = [material.metallic, material.roughness, material.alpha_cutoff];
+        let mut values = material.base_color.iter().chain(&material.emission).chain(&factors);
+        rule(values.all(|value| value.is_finite() && *value >= 0.0), part, || {
+            (format!("{material:?}"), "finite factors, not negative")
+        })?;
+        let texture = material.base_color_texture;
+        rule(texture == NONE || (texture as usize) < resident.textures.len(), part, || {
+            (format!("texture {texture}"), format!("none or less than {}", resident.textures.len()))
+        })?;
+    }
+    Ok(())
+}
+
+pub(super) fn textures(resident: &Resident) -> Result<(), Flaw> {
+    for (index, texture) in (0u32..).zip(&resident.textures) {
+        let part = Part::Record(Section::Textures, index);
+        let sizes = [texture.width, texture.height];
+        rule(sizes.iter().all(|size| (1..=MAX_TEXTURE_SIZE).contains(size)), part, || {
+            (format!("{} by {} texels", sizes[0], sizes[1]), format!("1 to {MAX_TEXTURE_SIZE} each way"))
+        })?;
+        let levels = sizes[0].max(sizes[1]).ilog2() + 1;
+        rule(texture.levels == levels, part, || {
+            (format!("{} levels", texture.levels), format!("{levels}, down to 1 by 1"))
+        })?;
+        rule(texture.wrap & 0xffff <= WRAP_MIRROR && texture.wrap >> 16 <= WRAP_MIRROR, part, || {
+            (format!("wrap {:#x}", texture.wrap), "known ways of wrapping")
+        })?;
+        let bytes = texture.texel_bytes().map_or(0, |bytes| bytes.next_multiple_of(16));
+        length(Payload::Texture(index), texture.texels, bytes)?;
+    }
+    Ok(())
+}
+
+/// The manifest says what the records say.
+pub(super) fn manifest(resident: &Resident) -> Result<(), Flaw> {
+    let part = Part::Section(Section::Manifest);
+    let manifest = &resident.manifest;
+    rule(manifest.triangle_ids <= MAX_TRIANGLE_IDS, part, || {
+        (format!("{} triangle ids", manifest.triangle_ids), format!("at most {MAX_TRIANGLE_IDS}"))
+    })?;
+    let stored: u64 = resident.objects.iter().map(|object| u64::from(object.triangle_count)).sum();
+    rule(manifest.triangles_stored == stored, part, || {
+        (format!("{} triangles stored", manifest.triangles_stored), format!("{stored}, as the objects say"))
+    })?;
+    let objects = resident.instances.iter().map(|instance| &resident.objects[instance.object as usize]);
+    let instanced: u64 = objects.map(|object| u64::from(object.triangle_count)).sum();
+    rule(manifest.triangles_instanced == instanced, part, || {
+        (
+            format!("{} triangles with instances", manifest.triangles_instanced),
+            format!("{instanced}, as the records say"),
+        )
+    })?;
+    rule(manifest.has_instances == (resident.instances.len() > 1), part, || {
+        (format!("has_instances {}", manifest.has_instances), format!("as of {} instances", resident.instances.len()))
+    })?;
+    let wide = resident.bricks.iter().any(|brick| brick.flags & BRICK_WIDE != 0);
+    rule(manifest.has_wide_bricks == wide, part, || (format!("has_wide_bricks {}", manifest.has_wide_bricks), wide))?;
+    let empty = resident.leaves.is_empty();
+    let bounds = manifest.min.iter().zip(&manifest.max);
+    let right = bounds.clone().all(|(min, max)| min.is_finite() && max.is_finite() && (min <= max) != empty);
+    rule(right, part, || {
+        (format!("bounds {:?} to {:?}", manifest.min, manifest.max), "finite bounds in order, or min > max if empty")
+    })?;
+    let ratio = manifest.instance_scale_ratio;
+    rule(ratio.is_finite() && ratio >= 1.0, part, || (format!("ratio of scales {ratio}"), "a number from 1"))?;
+    let mut end = 0u64;
+    for (index, provenance) in manifest.provenance.iter().enumerate() {
+        let right = u64::from(provenance.first_id) == end && (provenance.source as usize) < manifest.sources.len();
+        rule(right, part, || {
+            let found = format!("provenance {index} from id {} in source {}", provenance.first_id, provenance.source);
+            (found, format!("id {end} in one of {} sources", manifest.sources.len()))
+        })?;
+        end += u64::from(provenance.count);
+    }
+    rule(end == manifest.triangle_ids, part, || {
+        (format!("provenance of {end} ids"), format!("all {}", manifest.triangle_ids))
+    })
+}

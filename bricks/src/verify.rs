@@ -1,0 +1,209 @@
+//! Reads a whole file and lists everything that is wrong with it.
+
+use crate::error::{Error, Flaw, Part};
+use crate::file::{Directory, Reader, length_of, open_file, read_source};
+use crate::layout::{Header, MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
+use crate::manifest::Manifest;
+use crate::records::{Brick, Texture};
+use crate::resident::Resident;
+use crate::source::Source;
+use crate::validate;
+use std::path::Path;
+
+/// What [`verify_file`] found.
+#[derive(Debug)]
+pub struct VerifyReport {
+    /// Length of the file in bytes.
+    pub file_bytes: u64,
+    /// Payloads that were checked.
+    pub payloads: u64,
+    /// All that is wrong, in order of reading. [`Error::part`] names the part of the file.
+    pub problems: Vec<Error>,
+}
+
+impl VerifyReport {
+    /// Whether every byte is as it was written and the file obeys the format.
+    pub fn is_ok(&self) -> bool {
+        self.problems.is_empty()
+    }
+}
+
+/// Reads every byte of a file and checks it: header, directory, sections, payloads and their contents
+/// ([`validate::contents`]), and that all padding is zero. A flip of any byte is found and named.
+///
+/// What depends on a damaged part cannot be checked: behind a damaged header or directory nothing; if a section is
+/// damaged, the other sections, and the checksums of the payloads that the sections of bricks and textures name.
+///
+/// `progress` is called with the bytes done and in all, first with 0 and last with all of them.
+///
+/// # Errors
+///
+/// Only if the file cannot be opened. Parts that cannot be read are problems in the report.
+pub fn verify_file(path: impl AsRef<Path>, progress: &mut dyn FnMut(u64, u64)) -> Result<VerifyReport, Error> {
+    let (path, file) = open_file(path.as_ref())?;
+    Ok(verify_source(&path, &read_source(&path, &file)?, length_of(&path, &file)?, progress))
+}
+
+/// As [`verify_file`], for a file of `length` bytes.
+pub(crate) fn verify_source(
+    path: &Path,
+    source: &dyn Source,
+    length: u64,
+    progress: &mut dyn FnMut(u64, u64),
+) -> VerifyReport {
+    progress(0, length);
+    let mut verifier = Verifier {
+        reader: Reader { path, source },
+        report: VerifyReport { file_bytes: length, payloads: 0, problems: Vec::new() },
+        progress,
+        done: 0,
+        buffer: Vec::new(),
+    };
+    if let Some((header, directory)) = verifier.frame(length) {
+        verifier.body(&header, &directory);
+    }
+    (verifier.progress)(length, length);
+    verifier.report
+}
+
+struct Verifier<'a> {
+    reader: Reader<'a>,
+    report: VerifyReport,
+    progress: &'a mut dyn FnMut(u64, u64),
+    done: u64,
+    buffer: Vec<u8>,
+}
+
+impl Verifier<'_> {
+    /// The value, or a problem in the report.
+    fn keep<T>(&mut self, result: Result<T, Error>) -> Option<T> {
+        result.map_err(|problem| self.report.problems.push(problem)).ok()
+    }
+
+    fn keep_flaw(&mut self, result: Result<(), Flaw>) -> bool {
+        let result = result.map_err(|flaw| self.reader.invalid(flaw));
+        self.keep(result).is_some()
+    }
+
+    fn advance(&mut self, bytes: u64) {
+        self.done += bytes;
+        (self.progress)(self.done.min(self.report.file_bytes), self.report.file_bytes);
+    }
+
+    /// Header and directory, without which nothing is found.
+    fn frame(&mut self, length: u64) -> Option<(Header, Directory)> {
+        let header = self.reader.header(length);
+        let header = self.keep(header)?;
+        self.advance(PAGE_BYTES);
+        let directory = self.reader.directory(&header);
+        let directory = self.keep(directory)?;
+        self.advance(header.directory_bytes);
+        Some((header, directory))
+    }
+
+    /// Sections, payloads and padding.
+    fn body(&mut self, header: &Header, directory: &Directory) {
+        let manifest: Option<Manifest> = {
+            let manifest = self.reader.manifest(directory);
+            self.keep(manifest)
+        };
+        let objects = self.section(directory, Section::Objects);
+        let instances = self.section(directory, Section::Instances);
+        let leaves = self.section(directory, Section::Leaves);
+        let top2 = self.section(directory, Section::Top2);
+        let top8 = self.section(directory, Section::Top8);
+        let bricks: Option<Vec<Brick>> = self.section(directory, Section::Bricks);
+        let materials = self.section(directory, Section::Materials);
+        let textures: Option<Vec<Texture>> = self.section(directory, Section::Textures);
+        self.advance(directory.iter().map(|entry| entry.bytes).sum());
+
+        let whole = manifest.is_some()
+            && objects.is_some()
+            && instances.is_some()
+            && leaves.is_some()
+            && top2.is_some()
+            && top8.is_some()
+            && bricks.is_some()
+            && materials.is_some()
+            && textures.is_some();
+        let resident = Resident {
+            manifest: manifest.unwrap_or_default(),
+            objects: objects.unwrap_or_default(),
+            instances: instances.unwrap_or_default(),
+            leaves: leaves.unwrap_or_default(),
+            top2: top2.unwrap_or_default(),
+            top8: top8.unwrap_or_default(),
+            bricks: bricks.unwrap_or_default(),
+            materials: materials.unwrap_or_default(),
+            textures: textures.unwrap_or_default(),
+        };
+        let valid = whole && self.keep_flaw(validate::resident(&resident));
+        let tiled = whole && self.keep_flaw(validate::spans(&resident, header.directory_offset));
+        self.payloads(&resident, header.directory_offset, valid && tiled);
+        if tiled {
+            self.payload_padding(&resident, header.directory_offset);
+        }
+        self.section_padding(header, directory);
+    }
+
+    fn section<T: bytemuck::Pod>(&mut self, directory: &Directory, section: Section) -> Option<Vec<T>> {
+        let records = self.reader.section(directory, section);
+        self.keep(records)
+    }
+
+    /// Every payload in order of the file; what is in it only if the resident part is `valid`.
+    fn payloads(&mut self, resident: &Resident, payload_end: u64, valid: bool) {
+        let mut payloads: Vec<_> = resident.payloads().collect();
+        payloads.sort_unstable_by_key(|(payload, span)| (span.offset, *payload));
+        for (payload, span) in payloads {
+            let inside = span.offset.checked_add(span.bytes).is_some_and(|end| end <= payload_end);
+            if !inside || span.bytes > MAX_PAYLOAD_BYTES {
+                // Reported by the checks of the resident part, or by those of the section that made them impossible.
+                continue;
+            }
+            self.buffer.resize(span.bytes as usize, 0);
+            let read = self.reader.payload(payload, span, &mut self.buffer);
+            if self.keep(read).is_some() && valid {
+                let checked = validate::payload(resident, payload, &self.buffer)
+                    .and_then(|()| validate::contents(resident, payload, &self.buffer));
+                self.keep_flaw(checked);
+            }
+            self.report.payloads += 1;
+            self.advance(span.bytes);
+        }
+    }
+
+    /// Zeros between payloads that tile the file.
+    fn payload_padding(&mut self, resident: &Resident, payload_end: u64) {
+        for (payload, span) in resident.payloads() {
+            let end = span.offset + span.bytes;
+            debug_assert!(end.next_multiple_of(PAGE_BYTES) <= payload_end);
+            self.padding(Part::PaddingAfterPayload(payload), end, end.next_multiple_of(PAGE_BYTES));
+        }
+    }
+
+    /// Zeros between directory and sections, which tile the rest of the file.
+    fn section_padding(&mut self, header: &Header, directory: &Directory) {
+        let mut part = Part::PaddingAfterDirectory;
+        let mut end = header.directory_offset + header.directory_bytes;
+        for (entry, section) in directory.iter().zip(Section::ALL) {
+            self.padding(part, end, entry.offset);
+            part = Part::PaddingAfterSection(section);
+            end = entry.offset + entry.bytes;
+        }
+    }
+
+    /// Checks that less than a page of bytes is zero.
+    fn padding(&mut self, part: Part, start: u64, end: u64) {
+        let mut page = [0; PAGE_BYTES as usize];
+        let page = &mut page[..(end - start) as usize];
+        let read = self.reader.bytes(part, start, page);
+        if self.keep(read).is_some()
+            && let Some(at) = page.iter().position(|&byte| byte != 0)
+        {
+            let found = format!("{:#04x} at byte {}", page[at], start + at as u64);
+            self.keep_flaw(Err(Flaw { part, found, expected: "zero".to_owned() }));
+        }
+        self.advance(end - start);
+    }
+}
