@@ -1,0 +1,7 @@
+//! What a frame looks at and from where: cameras and camera paths, in f64 world space.
+
+pub mod camera;
+pub mod path;
+
+pub use camera::{Camera, RayBasis};
+pub use path::{CameraPath, Keyframe, PathError, path_from_bounds};

@@ -1,0 +1,307 @@
+//! Camera paths: keyframes in a JSON file, a non-uniform Catmull–Rom spline between them.
+//!
+//! The spline is the one of Barry and Goldman (SIGGRAPH 1988) with the keyframes' times as knots, in Hermite form: the
+//! tangent at an inner keyframe is that of the parabola through it and its two neighbours, at the first and the last
+//! one-sided. Quadratic motion is therefore reproduced exactly between inner keyframes, and two keyframes make a line at
+//! constant speed.
+
+use super::camera::{Camera, CameraError, check_fov_y_degrees};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A camera path. Valid by construction: at least one keyframe, times strictly ascending, every keyframe a camera.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CameraPath {
+    /// Vertical field of view, degrees.
+    fov_y_degrees: f64,
+    /// Up vector, world space.
+    up: [f64; 3],
+    /// Keyframes by time.
+    keyframes: Vec<Keyframe>,
+}
+
+/// A point of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Keyframe {
+    /// Time, seconds.
+    pub time: f64,
+    /// Position of the camera, world units.
+    pub position: [f64; 3],
+    /// What the camera looks at, world units.
+    pub target: [f64; 3],
+}
+
+/// Why a camera path was refused.
+#[derive(Debug, Error)]
+pub enum PathError {
+    /// The file cannot be read.
+    #[error("{}: {source}; check the path of the camera path", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is no JSON object of the expected form.
+    #[error("{}: not a camera path: {source}", file.display())]
+    Json {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, with line and column.
+        source: serde_json::Error,
+    },
+    /// A value of the whole path is wrong.
+    #[error("{}: {what}", file.display())]
+    Path {
+        /// The file, or what made the path.
+        file: PathBuf,
+        /// What is wrong and what to do.
+        what: String,
+    },
+    /// A keyframe is wrong.
+    #[error("{}: keyframe {keyframe}: {what}", file.display())]
+    Keyframe {
+        /// The file, or what made the path.
+        file: PathBuf,
+        /// Its number, from 0.
+        keyframe: usize,
+        /// What is wrong and what to do.
+        what: String,
+    },
+}
+
+/// The file as serde sees it; keyframes stay values so that an error can name the one it is in.
+#[derive(Deserialize)]
+struct Raw {
+    #[serde(default = "default_fov")]
+    fov_y_degrees: f64,
+    #[serde(default = "default_up")]
+    up: [f64; 3],
+    keyframes: Vec<serde_json::Value>,
+}
+
+fn default_fov() -> f64 {
+    60.0
+}
+
+fn default_up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+impl CameraPath {
+    /// Reads a path file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not JSON of the documented form, or breaks a rule of [`Self::new`].
+    pub fn read(file: &Path) -> Result<Self, PathError> {
+        let text = std::fs::read_to_string(file).map_err(|source| PathError::Read { file: file.into(), source })?;
+        Self::parse(&text, file)
+    }
+
+    /// Parses the text of a path file; `file` names it in errors. `fov_y_degrees` (60) and `up` ([0, 1, 0]) may be absent.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(text: &str, file: &Path) -> Result<Self, PathError> {
+        let raw: Raw = serde_json::from_str(text).map_err(|source| PathError::Json { file: file.into(), source })?;
+        let keyframes = raw
+            .keyframes
+            .into_iter()
+            .enumerate()
+            .map(|(keyframe, value)| {
+                serde_json::from_value(value).map_err(|error| PathError::Keyframe {
+                    file: file.into(),
+                    keyframe,
+                    what: format!("{error}; it needs time, position [x, y, z] and target [x, y, z]"),
+                })
+            })
+            .collect::<Result<Vec<Keyframe>, _>>()?;
+        Self::new(raw.fov_y_degrees, raw.up, keyframes, file)
+    }
+
+    /// A path of these keyframes; `name` names it in errors.
+    ///
+    /// # Errors
+    /// No keyframe, a non-finite value, times that do not ascend strictly, a position equal to its target, a zero up
+    /// vector, a field of view out of range.
+    pub fn new(fov_y_degrees: f64, up: [f64; 3], keyframes: Vec<Keyframe>, name: &Path) -> Result<Self, PathError> {
+        let whole = |what: String| PathError::Path { file: name.into(), what };
+        check_fov_y_degrees(fov_y_degrees).map_err(|e| whole(e.to_string()))?;
+        if keyframes.is_empty() {
+            return Err(whole("it has no keyframes; add at least one".into()));
+        }
+        let path = Self { fov_y_degrees, up, keyframes };
+        for (keyframe, k) in path.keyframes.iter().enumerate() {
+            let refuse = |what: String| PathError::Keyframe { file: name.into(), keyframe, what };
+            if !k.time.is_finite() {
+                return Err(refuse("time is not finite".into()));
+            }
+            if let Some(before) = keyframe.checked_sub(1).map(|i| path.keyframes[i].time)
+                && k.time <= before
+            {
+                return Err(refuse(format!("its time {} is not after {before}; sort the keyframes by time", k.time)));
+            }
+            path.camera_of(k.position.into(), k.target.into()).check().map_err(|e| match e {
+                CameraError::NoUp | CameraError::NotFinite("up") => whole(e.to_string()),
+                e => refuse(e.to_string()),
+            })?;
+        }
+        if !(path.keyframes[path.keyframes.len() - 1].time - path.keyframes[0].time).is_finite() {
+            return Err(whole("its times span more than a number can hold".into()));
+        }
+        Ok(path)
+    }
+
+    /// The keyframes, at least one, times strictly ascending.
+    pub fn keyframes(&self) -> &[Keyframe] {
+        &self.keyframes
+    }
+
+    /// Vertical field of view, degrees.
+    pub fn fov_y_degrees(&self) -> f64 {
+        self.fov_y_degrees
+    }
+
+    /// The same path with another vertical field of view, degrees.
+    ///
+    /// # Errors
+    /// The field of view is out of range.
+    pub fn with_fov_y_degrees(mut self, degrees: f64) -> Result<Self, CameraError> {
+        check_fov_y_degrees(degrees)?;
+        self.fov_y_degrees = degrees;
+        Ok(self)
+    }
+
+    /// The path as the text of a path file.
+    pub fn to_json(&self) -> String {
+        // Serialising numbers, arrays and structs into a string has no failing case.
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// The camera of frame `k` of `frames`: time k/(frames − 1) of the range, the first keyframe when `frames` is 1;
+    /// frames at and beyond the last stand at the last keyframe.
+    pub fn frame(&self, k: u32, frames: u32) -> Camera {
+        let (first, last) = (self.keyframes[0].time, self.keyframes[self.keyframes.len() - 1].time);
+        let time = if frames <= 1 || k == 0 {
+            first
+        } else if k >= frames - 1 {
+            last
+        } else {
+            first + (last - first) * (f64::from(k) / f64::from(frames - 1))
+        };
+        self.at(time)
+    }
+
+    /// The camera at a time, clamped to the range of the keyframes.
+    pub fn at(&self, time: f64) -> Camera {
+        let keys = &self.keyframes;
+        // The segment [i, i + 1] that holds the time: the number of inner keyframes not after it.
+        let i = keys.partition_point(|k| k.time <= time).saturating_sub(1);
+        if i + 1 >= keys.len() || time <= keys[0].time {
+            let k = &keys[i];
+            return self.camera_of(k.position.into(), k.target.into());
+        }
+        self.camera_of(self.spline(i, time, |k| k.position.into()), self.spline(i, time, |k| k.target.into()))
+    }
+
+    fn camera_of(&self, position: DVec3, target: DVec3) -> Camera {
+        Camera { position, target, up: self.up.into(), fov_y: self.fov_y_degrees.to_radians() }
+    }
+
+    /// `value` of the keyframes at `time` within segment `[i, i + 1]`.
+    fn spline(&self, i: usize, time: f64, value: impl Fn(&Keyframe) -> DVec3 + Copy) -> DVec3 {
+        let (a, b) = (&self.keyframes[i], &self.keyframes[i + 1]);
+        let span = b.time - a.time;
+        let s = (time - a.time) / span;
+        let (m_a, m_b) = (self.tangent(i, value) * span, self.tangent(i + 1, value) * span);
+        let (s2, s3) = (s * s, s * s * s);
+        value(a) * (2.0 * s3 - 3.0 * s2 + 1.0)
+            + m_a * (s3 - 2.0 * s2 + s)
+            + value(b) * (3.0 * s2 - 2.0 * s3)
+            + m_b * (s3 - s2)
+    }
+
+    /// Velocity at keyframe `i`.
+    fn tangent(&self, i: usize, value: impl Fn(&Keyframe) -> DVec3) -> DVec3 {
+        let slope = |a: usize, b: usize| {
+            let (a, b) = (&self.keyframes[a], &self.keyframes[b]);
+            (value(b) - value(a)) / (b.time - a.time)
+        };
+        let last = self.keyframes.len() - 1;
+        match i {
+            0 => slope(0, 1),
+            i if i == last => slope(last - 1, last),
+            i => slope(i - 1, i) - slope(i - 1, i + 1) + slope(i, i + 1),
+        }
+    }
+}
+
+/// A path through a scene of which only the world bounds are known, 60° high, 10 s long:
+///
+/// - longer than wide and not taller than long (a hall, a street, a nave): a walk inside, along the longer horizontal axis
+///   from 1/5 to 4/5 of it, at a quarter of the height, looking ahead;
+/// - flatter than a quarter of its width (a city, a landscape): a flight inward above it, looking at the middle;
+/// - else (an object): a quarter turn around it from outside, a third of the height above the middle.
+///
+/// Bounds that are empty (`min > max`), not finite or a single point are taken as a unit cube around their middle or the
+/// origin.
+pub fn path_from_bounds(min: [f64; 3], max: [f64; 3]) -> CameraPath {
+    let (mut min, mut max) = (DVec3::from(min), DVec3::from(max));
+    if !(min.is_finite() && max.is_finite() && min.cmple(max).all() && (max - min).is_finite()) {
+        (min, max) = (DVec3::splat(-0.5), DVec3::splat(0.5));
+    }
+    let centre = min + (max - min) * 0.5;
+    // A size that moves the camera by more than the rounding of its coordinates.
+    let least = (centre.abs().max_element() * 1e-6).max(f64::MIN_POSITIVE * 1e6);
+    let mut size = max - min;
+    if size.max_element() < least {
+        size = DVec3::splat(least.max(1.0));
+        min = centre - size * 0.5;
+    }
+    let x_is_longer = size.x >= size.z;
+    let (along, across) = if x_is_longer { (DVec3::X, DVec3::Z) } else { (DVec3::Z, DVec3::X) };
+    let (length, width) = if x_is_longer { (size.x, size.z) } else { (size.z, size.x) };
+
+    let key = |time: f64, position: DVec3, target: DVec3| Keyframe {
+        time,
+        position: position.to_array(),
+        target: target.to_array(),
+    };
+    let keyframes = if size.y < 0.25 * width {
+        let above = size.y + 0.15 * length;
+        let from = centre.with_y(min.y + above) - along * (0.5 * length) - across * (0.3 * width);
+        let to = centre.with_y(min.y + 0.6 * above + 0.4 * size.y) - along * (0.15 * length) - across * (0.1 * width);
+        let middle = centre.with_y(min.y + 0.5 * size.y);
+        vec![key(0.0, from, middle), key(10.0, to, middle + along * (0.1 * length))]
+    } else if length > 1.25 * width && size.y <= length {
+        let at = |s: f64| centre.with_y(min.y + 0.25 * size.y) + along * ((s - 0.5) * length);
+        let sway = across * (0.04 * width);
+        let ahead = along * (0.4 * length) + DVec3::Y * (0.03 * size.y);
+        vec![
+            key(0.0, at(0.2), at(0.2) + ahead),
+            key(5.0, at(0.5) + sway, at(0.5) + ahead + sway),
+            key(10.0, at(0.8), at(0.8) + ahead - sway),
+        ]
+    } else {
+        // Far enough that the sphere around the box fills the 60° between 2/3 and all.
+        let distance = 1.1 * size.length();
+        let keys = 5;
+        (0..keys)
+            .map(|i| {
+                let share = f64::from(i) / f64::from(keys - 1);
+                let angle = (30.0 + 90.0 * share).to_radians();
+                let away = DVec3::new(angle.cos(), 0.0, angle.sin()) * distance + DVec3::Y * (size.y / 3.0);
+                key(10.0 * share, centre + away, centre)
+            })
+            .collect()
+    };
+    CameraPath { fov_y_degrees: 60.0, up: [0.0, 1.0, 0.0], keyframes }
+}
+
+#[cfg(test)]
+#[path = "path_tests.rs"]
+mod tests;
