@@ -1,0 +1,471 @@
+//! The command line: every subcommand, every option with its unit and default. Values are validated here, so that commands
+//! receive only what they can use; what is wrong ends as usage with exit status 2.
+
+use super::sizes::{CacheSize, Direction, ImageSize, non_negative, positive_count, positive_count32, size_bytes};
+use crate::scene::camera::check_fov_y_degrees;
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Said at the end of every help text.
+const UNITS: &str = "Sizes are bytes and take K, M, G (powers of 1024); counts take K, M (powers of 1000).\n\
+     Exit status: 0 done, 1 the input is bad (one line says what and what to do), 2 wrong usage.";
+
+/// Walks by ray tracing through scenes that do not fit in GPU memory.
+///
+/// A scene is converted once into bricks, in one file; rendering streams the bricks that rays need through a small cache.
+#[derive(Debug, Parser)]
+#[command(name = "brickwalk", version, after_help = UNITS, max_term_width = 110)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Generate a city larger than the demo's cache, convert it, walk through it, write a report
+    Demo(DemoArgs),
+    /// Convert scenes (.gltf, .glb) into one .bricks file
+    Convert(ConvertArgs),
+    /// Generate a scene and camera paths through it
+    Scene(SceneArgs),
+    /// Show what a .bricks file holds, or where a triangle comes from
+    Info(InfoArgs),
+    /// Check every checksum and reference of a .bricks file
+    Verify(VerifyArgs),
+    /// Render a camera path to images, records and a report, without a window
+    Walk(WalkArgs),
+    /// Find the closest hits of given rays
+    Trace(TraceArgs),
+    /// Measure how far an image is from a reference: RMSE, relMSE, bias, FLIP
+    Compare(CompareArgs),
+}
+
+/// Options of `demo`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct DemoArgs {
+    /// Folder for the scene, the frames and the report; created when missing
+    #[arg(short, long, value_name = "DIR", default_value = "brickwalk-demo")]
+    pub output: PathBuf,
+    /// Triangles of the city, about
+    #[arg(long, value_name = "COUNT", default_value = "2M", value_parser = positive_count)]
+    pub triangles: u64,
+    /// Frames of the walk
+    #[arg(long, value_name = "N", default_value = "12", value_parser = frames)]
+    pub frames: u32,
+    /// Width and height of the frames in pixels, each 1 to 16384
+    #[arg(long, value_name = "WxH", default_value = "640x360")]
+    pub size: ImageSize,
+    /// Device memory for bricks: a size, or a share P% of all bricks
+    #[arg(long, value_name = "SIZE|P%", default_value = "25%")]
+    pub cache: CacheSize,
+    /// Seed of the city and of random sampling
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Use the graphics adapter whose name contains NAME, upper and lower case alike
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+}
+
+/// Options of `convert`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct ConvertArgs {
+    /// Scene files (.gltf, .glb) or folders of them; triangle ids count through them in this order
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
+    /// The file to write
+    #[arg(short, long, value_name = "S.bricks")]
+    pub output: PathBuf,
+    /// How to cut and round.
+    #[command(flatten)]
+    pub build: BuildArgs,
+    /// Drop triangles with a vertex that is not a finite number instead of refusing the input
+    #[arg(long)]
+    pub drop_non_finite: bool,
+    /// Instances of a mesh that is used twice or more are stored once if it has at least this many triangles; smaller ones
+    /// are copied into the world
+    #[arg(long, value_name = "COUNT", default_value = "1K", value_parser = positive_count32)]
+    pub instance_min_triangles: u32,
+    /// Most triangles that copying small instances may add
+    #[arg(long, value_name = "COUNT", default_value = "16M", value_parser = positive_count)]
+    pub bake_budget: u64,
+    /// Bounded memory for the conversion; comes with a later version.
+    #[arg(long, hide = true, value_parser = not_built)]
+    pub memory: Option<String>,
+}
+
+/// Options of everything that writes a `.bricks` file.
+#[derive(Clone, Debug, Args)]
+pub struct BuildArgs {
+    /// Most triangles of a brick, 1 to 1M; larger is faster in core, smaller reads less out of core
+    #[arg(long, value_name = "COUNT", default_value = "16384", value_parser = brick_triangles)]
+    pub brick_triangles: u32,
+    /// Threads that convert [default: one per core]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<u32>,
+    /// log2 of the step that positions are rounded to, in world units [default: from the sizes of the bricks]
+    #[arg(long, value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-200..=200))]
+    pub lattice: Option<i32>,
+}
+
+/// Options of `scene`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct SceneArgs {
+    /// What to generate: city (blocks of houses along streets)
+    #[arg(value_name = "KIND")]
+    pub kind: SceneKind,
+    /// The file to write; S.near.json and S.far.json, camera paths, are written beside it
+    #[arg(short, long, value_name = "S.bricks")]
+    pub output: PathBuf,
+    /// Triangles of the scene, about
+    #[arg(long, value_name = "COUNT", default_value = "1M", value_parser = positive_count)]
+    pub triangles: u64,
+    /// Seed; the same seed and count make the same scene
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// How to cut and round.
+    #[command(flatten)]
+    pub build: BuildArgs,
+}
+
+/// Options of `info`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct InfoArgs {
+    /// The scene
+    #[arg(value_name = "S.bricks")]
+    pub scene: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Say which file, node, mesh, primitive and triangle the triangle with this id comes from
+    #[arg(long, value_name = "N")]
+    pub id: Option<u32>,
+}
+
+/// Options of `verify`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct VerifyArgs {
+    /// The scene
+    #[arg(value_name = "S.bricks")]
+    pub scene: PathBuf,
+}
+
+/// Options of what streams bricks to a device.
+#[derive(Clone, Debug, Args)]
+pub struct StreamArgs {
+    /// Device memory for bricks: a size, or a share P% of all bricks; it must hold the two largest
+    #[arg(long, value_name = "SIZE|P%", default_value = "25%")]
+    pub cache: CacheSize,
+    /// Host memory for verified bricks
+    #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = size_bytes)]
+    pub host_cache: u64,
+    /// How bricks to intersect are found: chc (tiles against the top level, loading what rays need), plain (everything
+    /// resident, one traversal per ray; the cache must hold the scene), auto (the cheaper one)
+    #[arg(long, value_name = "NAME", default_value = "auto")]
+    pub schedule: Schedule,
+    /// Width and height of a screen tile in pixels, a power of two from 8 to 512
+    #[arg(long, value_name = "PIXELS", default_value = "64", value_parser = tile)]
+    pub tile: u32,
+    /// Threads that read bricks and check them [default: one per core, at most 4]
+    #[arg(long, value_name = "N", alias = "hash-threads", value_parser = threads)]
+    pub workers: Option<u32>,
+    /// Keep query pairs from frame to frame: off
+    #[arg(long, value_name = "off", default_value = "off", hide = true, value_parser = |s: &str| only(s, "off"))]
+    pub fronts: String,
+    /// Pixels a query may lose: 0 (exact)
+    #[arg(long, value_name = "0", default_value = "0", hide = true, value_parser = |s: &str| only(s, "0"))]
+    pub query_threshold: String,
+    /// Which brick makes room: round-robin
+    #[arg(long, value_name = "NAME", default_value = "round-robin", hide = true,
+        value_parser = |s: &str| only(s, "round-robin"))]
+    pub evict: String,
+    /// Bricks to load ahead: 0
+    #[arg(long, value_name = "N", default_value = "0", hide = true, value_parser = |s: &str| only(s, "0"))]
+    pub prefetch: String,
+    /// File for the trace of requests; comes with a later version.
+    #[arg(long, hide = true, value_parser = not_built)]
+    pub requests_out: Option<String>,
+    /// Use the graphics adapter whose name contains NAME, upper and lower case alike [default: a GPU, else software]
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+}
+
+impl StreamArgs {
+    /// Threads that read bricks, at least 1.
+    pub fn worker_count(&self) -> usize {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        self.workers.map_or(cores.min(4), |n| n as usize)
+    }
+}
+
+/// Options of `walk`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct WalkArgs {
+    /// The scene
+    #[arg(value_name = "S.bricks")]
+    pub scene: PathBuf,
+    /// Folder for frames, records and report; created when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Camera path (JSON) [default: one made from the scene's bounds]
+    #[arg(long, value_name = "P.json")]
+    pub path: Option<PathBuf>,
+    /// Frames along the path
+    #[arg(long, value_name = "N", default_value = "30", value_parser = frames)]
+    pub frames: u32,
+    /// Width and height of the frames in pixels, each 1 to 16384
+    #[arg(long, value_name = "WxH", default_value = "1280x720")]
+    pub size: ImageSize,
+    /// Vertical field of view in degrees, 1e-6 to 179.99 [default: the path's]
+    #[arg(long, value_name = "DEG", value_parser = fov)]
+    pub fov: Option<f64>,
+    /// What to trace, separated by commas: primary, shadow; shadow includes primary
+    #[arg(long, value_name = "LIST", default_value = "primary,shadow")]
+    pub effects: Effects,
+    /// How secondary rays are answered: exact
+    #[arg(long, value_name = "METHOD", default_value = "exact")]
+    pub secondary: Secondary,
+    /// Samples per pixel
+    #[arg(long, value_name = "N", default_value = "1", value_parser = samples)]
+    pub spp: u32,
+    /// Seed of random sampling
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Write an EXR with radiance, depth, normal, triangle id and albedo beside each PNG
+    #[arg(long)]
+    pub aov: bool,
+    /// Print the records on standard output too, one JSON object a line
+    #[arg(long)]
+    pub json: bool,
+    /// Light.
+    #[command(flatten)]
+    pub light: LightArgs,
+    /// Streaming.
+    #[command(flatten)]
+    pub stream: StreamArgs,
+    /// Environment image; comes with a later version.
+    #[arg(long, hide = true, value_parser = not_built)]
+    pub environment: Option<String>,
+}
+
+/// Options of the light.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct LightArgs {
+    /// Direction towards the sun, world space, any length
+    #[arg(long, value_name = "X,Y,Z", default_value = "0.4,0.8,0.45", allow_hyphen_values = true)]
+    pub sun: Direction,
+    /// Angular diameter of the sun in degrees, 0 (hard shadows) to 90
+    #[arg(long, value_name = "DEG", default_value = "0.53", value_parser = sun_angle)]
+    pub sun_angle: f64,
+    /// Irradiance of the sun on a surface that faces it; a white surface then reflects 1/pi of it
+    #[arg(long, value_name = "X", default_value = "2.4", value_parser = non_negative)]
+    pub sun_intensity: f64,
+    /// Radiance of the sky, the same in all directions; unshadowed
+    #[arg(long, value_name = "X", default_value = "0.35", value_parser = non_negative)]
+    pub sky_intensity: f64,
+}
+
+/// Options of `trace`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct TraceArgs {
+    /// The scene
+    #[arg(value_name = "S.bricks")]
+    pub scene: PathBuf,
+    /// Rays: a NumPy array, float64, shape (N, 8): origin xyz, direction xyz, t_min, t_max; world space
+    #[arg(long, value_name = "R.npy")]
+    pub rays: PathBuf,
+    /// Hits: a NumPy structured array, one row a ray: t (f8, +inf on a miss, in lengths of the direction), triangle (u4),
+    /// u (f4), v (f4)
+    #[arg(short, long, value_name = "H.npy")]
+    pub output: PathBuf,
+    /// Ask only whether anything is hit; the output is an array of bool
+    #[arg(long)]
+    pub any: bool,
+    /// Print what was loaded as a JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    /// Streaming.
+    #[command(flatten)]
+    pub stream: StreamArgs,
+}
+
+/// Options of `compare`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct CompareArgs {
+    /// The image (PNG or EXR)
+    #[arg(value_name = "A")]
+    pub image: PathBuf,
+    /// The reference, of the same size (PNG or EXR)
+    #[arg(value_name = "B")]
+    pub reference: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Declares an enum of named values some of which this version only knows by name.
+macro_rules! named_values {
+    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* } later $later:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name { $($(#[$vdoc])* $variant,)* }
+
+        impl $name {
+            const NAMES: &[&str] = &[$($text),*];
+
+            /// The value's name on the command line.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $text,)* }
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = String;
+
+            fn from_str(text: &str) -> Result<Self, String> {
+                match text {
+                    $($text => Ok(Self::$variant),)*
+                    other => Err(unknown(other, Self::NAMES, $later)),
+                }
+            }
+        }
+    };
+}
+
+fn unknown(text: &str, known: &[&str], later: &[&str]) -> String {
+    let known = known.join(", ");
+    if later.contains(&text) {
+        format!("{text} is not in this version; it has: {known}")
+    } else {
+        format!("there is no '{text}'; known: {known}")
+    }
+}
+
+named_values! {
+    /// How the bricks to intersect are found.
+    Schedule {
+        /// Tiles against the top level; loads what rays need.
+        Chc = "chc",
+        /// Everything resident, one traversal per ray.
+        Plain = "plain",
+        /// The cheaper one.
+        Auto = "auto",
+    } later &["demand"]
+}
+
+named_values! {
+    /// How secondary rays are answered.
+    Secondary {
+        /// By tracing them.
+        Exact = "exact",
+    } later &["roma", "df", "dvf", "displacement", "auto"]
+}
+
+named_values! {
+    /// A pass.
+    Effect {
+        /// Rays of the camera.
+        Primary = "primary",
+        /// Rays towards the sun.
+        Shadow = "shadow",
+    } later &["ao", "diffuse", "environment"]
+}
+
+/// The passes of a frame; primary rays are always among them, as every other pass starts where they end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effects {
+    /// Rays towards the sun.
+    pub shadow: bool,
+}
+
+impl FromStr for Effects {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut effects = Self { shadow: false };
+        for name in text.split(',') {
+            match name.trim().parse::<Effect>()? {
+                Effect::Primary => {}
+                Effect::Shadow => effects.shadow = true,
+            }
+        }
+        Ok(effects)
+    }
+}
+
+impl std::fmt::Display for Effects {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(if self.shadow { "primary,shadow" } else { "primary" })
+    }
+}
+
+named_values! {
+    /// What `scene` generates.
+    SceneKind {
+        /// Blocks of houses along streets.
+        City = "city",
+    } later &["pipes", "terrain", "stadium"]
+}
+
+/// Accepts exactly one value: the one that this version does.
+fn only(text: &str, value: &'static str) -> Result<String, String> {
+    if text == value { Ok(text.into()) } else { Err(format!("this version has only {value}")) }
+}
+
+/// Refuses an option that this version only knows by name.
+fn not_built(_: &str) -> Result<String, String> {
+    Err("this option is not in this version; leave it out".into())
+}
+
+/// Parses a whole number or count and checks its range.
+fn ranged(text: &str, least: u64, most: u64) -> Result<u32, String> {
+    let n = super::sizes::count(text)?;
+    match u32::try_from(n) {
+        Ok(n32) if (least..=most).contains(&n) => Ok(n32),
+        _ => Err(format!("it must be from {least} to {most}")),
+    }
+}
+
+fn frames(text: &str) -> Result<u32, String> {
+    ranged(text, 1, 1_000_000)
+}
+
+fn samples(text: &str) -> Result<u32, String> {
+    ranged(text, 1, 65_536)
+}
+
+fn threads(text: &str) -> Result<u32, String> {
+    ranged(text, 1, 1024)
+}
+
+fn brick_triangles(text: &str) -> Result<u32, String> {
+    ranged(text, 1, 1_000_000)
+}
+
+fn tile(text: &str) -> Result<u32, String> {
+    let wrong = || "a tile is a power of two from 8 to 512 pixels".to_string();
+    ranged(text, 8, 512).ok().filter(|n| n.is_power_of_two()).ok_or_else(wrong)
+}
+
+fn fov(text: &str) -> Result<f64, String> {
+    let degrees: f64 = text.parse().map_err(|_| "it must be a number of degrees".to_string())?;
+    check_fov_y_degrees(degrees).map(|()| degrees).map_err(|e| e.to_string())
+}
+
+fn sun_angle(text: &str) -> Result<f64, String> {
+    non_negative(text).ok().filter(|deg| *deg <= 90.0).ok_or_else(|| "it must be from 0 to 90 degrees".into())
+}
+
+#[cfg(test)]
+#[path = "args_tests.rs"]
+mod tests;

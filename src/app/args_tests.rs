@@ -1,0 +1,183 @@
+use super::*;
+use clap::CommandFactory;
+use clap::error::ErrorKind;
+
+fn parse(line: &str) -> Result<Command, clap::Error> {
+    Cli::try_parse_from(std::iter::once("brickwalk").chain(line.split_whitespace())).map(|cli| cli.command)
+}
+
+fn walk(options: &str) -> Result<WalkArgs, clap::Error> {
+    parse(&format!("walk s.bricks -o out {options}")).map(|command| match command {
+        Command::Walk(args) => args,
+        other => panic!("{other:?}"),
+    })
+}
+
+#[test]
+fn the_definition_is_consistent() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn defaults_of_walk_are_the_documented_ones() {
+    let w = walk("").unwrap();
+    assert_eq!(w.frames, 30);
+    assert_eq!(w.size, ImageSize { width: 1280, height: 720 });
+    assert_eq!(w.effects, Effects { shadow: true });
+    assert_eq!((w.spp, w.seed), (1, 0));
+    assert_eq!(w.stream.cache, CacheSize::Percent(25.0));
+    assert_eq!(w.stream.host_cache, 1 << 30);
+    assert_eq!(w.secondary, Secondary::Exact);
+    let Direction(sun) = "0.4,0.8,0.45".parse().unwrap();
+    assert_eq!(w.light.sun.0, sun);
+    assert_eq!(w.light.sun_angle, 0.53);
+    assert!(w.path.is_none() && !w.aov && !w.json && w.fov.is_none());
+}
+
+#[test]
+fn options_arrive() {
+    let w = walk(
+        "--path p.json --frames 3 --size 64x32 --cache 12M --host-cache 2G --schedule plain --effects primary --spp 4 \
+         --seed 9 --aov --json --sun -1,2,-3 --sun-angle 0 --sun-intensity 5 --sky-intensity 0 --tile 32 --workers 2 \
+         --fov 1e-6 --adapter llvm --secondary exact --fronts off --query-threshold 0 --evict round-robin --prefetch 0",
+    )
+    .unwrap();
+    assert_eq!(w.path, Some("p.json".into()));
+    assert_eq!((w.frames, w.spp, w.seed, w.stream.tile), (3, 4, 9, 32));
+    assert_eq!(w.stream.cache, CacheSize::Bytes(12 << 20));
+    assert_eq!(w.stream.host_cache, 2 << 30);
+    assert_eq!(w.stream.schedule, Schedule::Plain);
+    assert_eq!(w.effects.to_string(), "primary");
+    assert!(w.aov && w.json && w.light.sun.0[0] < 0.0);
+    assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
+    assert_eq!(w.stream.adapter.as_deref(), Some("llvm"));
+    assert_eq!(walk("--hash-threads 3").unwrap().stream.worker_count(), 3);
+    assert!(walk("").unwrap().stream.worker_count() >= 1);
+}
+
+#[test]
+fn wrong_values_are_usage_errors_that_say_what_is_right() {
+    for (options, part) in [
+        ("--frames 0", "1 to 1000000"),
+        ("--frames 1.5", "whole number"),
+        ("--size 0x720", "1 to 16384"),
+        ("--size 99999x1", "1 to 16384"),
+        ("--cache 0", "at least 1"),
+        ("--cache 101%", "100 %"),
+        ("--cache 99999999999G", "64 bits"),
+        ("--host-cache 0", "at least 1"),
+        ("--schedule demand", "not in this version"),
+        ("--schedule fastest", "known: chc, plain, auto"),
+        ("--effects primary,ao", "ao is not in this version"),
+        ("--effects diffuse", "not in this version"),
+        ("--effects environment", "not in this version"),
+        ("--effects glitter", "no 'glitter'"),
+        ("--effects=", "known: primary, shadow"),
+        ("--secondary roma", "roma is not in this version"),
+        ("--spp 0", "from 1"),
+        ("--seed -1", "-1"),
+        ("--sun 0,0,0", "not all 0"),
+        ("--sun-angle 91", "90 degrees"),
+        ("--sun-intensity nan", "finite"),
+        ("--sky-intensity=-1", "at least 0"),
+        ("--tile 48", "power of two"),
+        ("--tile 1024", "power of two"),
+        ("--workers 0", "from 1"),
+        ("--fov 180", "179.99"),
+        ("--fov nan", "179.99"),
+        ("--fronts on", "only off"),
+        ("--query-threshold 20", "only 0"),
+        ("--evict lru", "only round-robin"),
+        ("--requests-out f", "not in this version"),
+        ("--environment f.hdr", "not in this version"),
+        ("--nonsense", "--nonsense"),
+    ] {
+        let error = walk(options).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{options}");
+        assert!(error.to_string().contains(part), "{options}: {error}");
+    }
+}
+
+#[test]
+fn other_commands_check_too() {
+    for (line, part) in [
+        ("", "Usage"),
+        ("fly", "fly"),
+        ("convert -o s.bricks", "INPUT"),
+        ("convert a.gltf", "--output"),
+        ("convert a.gltf -o s.bricks --brick-triangles 0", "from 1"),
+        ("convert a.gltf -o s.bricks --memory 1G", "not in this version"),
+        ("convert a.gltf -o s.bricks --lattice 999", "999"),
+        ("scene pipes -o s.bricks", "pipes is not in this version"),
+        ("scene castle -o s.bricks", "castle"),
+        ("scene city -o s.bricks --triangles 0", "at least 1"),
+        ("info", "S.bricks"),
+        ("info s.bricks --id -1", "-1"),
+        ("info s.bricks --id 4294967296", "4294967296"),
+        ("verify", "S.bricks"),
+        ("trace s.bricks -o h.npy", "--rays"),
+        ("compare a.png", "<B>"),
+        ("walk s.bricks", "--output"),
+    ] {
+        let error = parse(line).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{line}");
+        assert!(error.to_string().contains(part), "{line}: {error}");
+    }
+}
+
+#[test]
+fn convert_and_scene_arrive() {
+    let Command::Convert(c) =
+        parse("convert a.gltf b.glb -o s.bricks --brick-triangles 4K --threads 2 --lattice -12 --drop-non-finite")
+            .unwrap()
+    else {
+        panic!()
+    };
+    assert_eq!(c.inputs.len(), 2);
+    assert_eq!((c.build.brick_triangles, c.build.threads, c.build.lattice), (4000, Some(2), Some(-12)));
+    assert!(c.drop_non_finite);
+    let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
+    assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (SceneKind::City, 200_000, 7, 16384));
+    let Command::Demo(d) = parse("demo").unwrap() else { panic!() };
+    assert_eq!(d.output, PathBuf::from("brickwalk-demo"));
+}
+
+/// Every subcommand's help explains units and names a default where an option with a value has one.
+#[test]
+fn help_explains_units_and_defaults() {
+    let top = parse("--help").unwrap_err();
+    assert_eq!((top.kind(), top.exit_code()), (ErrorKind::DisplayHelp, 0));
+    let cli = Cli::command();
+    let mut names: Vec<_> = cli.get_subcommands().map(|c| c.get_name().to_string()).collect();
+    names.sort();
+    assert_eq!(names, ["compare", "convert", "demo", "info", "scene", "trace", "verify", "walk"]);
+    for name in names {
+        let help = parse(&format!("{name} --help")).unwrap_err();
+        assert_eq!(help.exit_code(), 0, "{name}");
+        let text = help.to_string();
+        assert!(text.contains("powers of 1024") && text.contains("Exit status"), "{name}: {text}");
+        for argument in cli.find_subcommand(&name).unwrap().get_arguments().filter(|a| !a.is_hide_set()) {
+            let described = argument.get_help().is_some_and(|h| h.to_string().len() > 5);
+            assert!(described, "{name}: {} has no help", argument.get_id());
+            let long = argument.get_long().map(|l| format!("--{l}"));
+            if let Some(long) = long {
+                assert!(text.contains(&long), "{name}: {long}");
+            }
+            let optional = !argument.is_required_set() && argument.get_action().takes_values();
+            let has_default = !argument.get_default_values().is_empty()
+                || argument.get_help().is_some_and(|h| h.to_string().contains("[default:"));
+            let filter = ["path", "adapter", "id"].contains(&argument.get_id().as_str());
+            assert!(!optional || has_default || filter, "{name}: {} states no default", argument.get_id());
+        }
+    }
+    let help = parse("walk --help").unwrap_err().to_string();
+    for part in ["1280x720", "[default: 25%]", "[default: 30]", "degrees", "pixels", "[default: 1G]", "0.4,0.8,0.45"] {
+        assert!(help.contains(part), "walk --help lacks {part}");
+    }
+}
+
+#[test]
+fn version_is_printed() {
+    let version = parse("--version").unwrap_err();
+    assert_eq!((version.kind(), version.exit_code()), (ErrorKind::DisplayVersion, 0));
+}
