@@ -1,0 +1,107 @@
+//! Errors of importing: one line each, naming the file, the thing in it and the remedy.
+
+use std::path::Path;
+
+/// What is read, as error messages list it.
+pub(super) const ACCEPTED: &str = ".gltf and .glb";
+
+/// The usual remedy for a defect that only the producer of a file can repair.
+pub(super) const EXPORT_AGAIN: &str = "export the file again";
+
+/// Most characters of a name or foreign message that a line repeats.
+const LINE_CHARS: usize = 200;
+
+/// Why an input could not be imported. The text is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The extension is not one that is read.
+    #[error("{file}: files of this kind are not read; give {ACCEPTED}")]
+    Format {
+        /// The input as given.
+        file: String,
+    },
+    /// A file is missing or cannot be read.
+    #[error("{file}: cannot be read: {reason}; check the path and its permissions")]
+    Read {
+        /// The input as given.
+        file: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// The bytes are not glTF JSON, or not a GLB container around it.
+    #[error("{file}: not a readable glTF 2.0 file: {problem}; {remedy}")]
+    Syntax {
+        /// The input as given.
+        file: String,
+        /// What is wrong, with line and column where known.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The file requires extensions without which its geometry cannot be read.
+    #[error("{file}: requires {extensions}, which is not supported; export the file without it")]
+    Extensions {
+        /// The input as given.
+        file: String,
+        /// Names, comma-separated.
+        extensions: String,
+    },
+    /// Something within the file is wrong.
+    #[error("{file}: {place}: {problem}; {remedy}")]
+    Content {
+        /// The input as given.
+        file: String,
+        /// The thing: kind, index and name.
+        place: String,
+        /// What is wrong with it.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The triangles of all placements do not fit global ids of 32 bits.
+    #[error(
+        "{file}: the scene has {triangles} triangles up to here, more than the 4294967294 that ids can number; convert it in parts"
+    )]
+    TooManyTriangles {
+        /// The input with which the limit is passed.
+        file: String,
+        /// Triangles of all inputs up to and including `file`, placements multiplied out.
+        triangles: u64,
+    },
+    /// The worker threads could not be started.
+    #[error("cannot start {threads} worker threads: {reason}; use fewer threads")]
+    Threads {
+        /// The number asked for.
+        threads: usize,
+        /// What the system says.
+        reason: String,
+    },
+}
+
+/// `text` without control characters and of bounded length, fit for one line.
+pub(super) fn one_line(text: &str) -> String {
+    let mut line: String = text.chars().take(LINE_CHARS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if text.chars().nth(LINE_CHARS).is_some() {
+        line.push('…');
+    }
+    line
+}
+
+/// `path` as messages show it.
+pub(super) fn show(path: &Path) -> String {
+    path.to_string_lossy().chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_one_line_and_bounded() {
+        assert_eq!(one_line("a\nb\tc"), "a b c");
+        let long = one_line(&"é".repeat(1000));
+        assert_eq!(long.chars().count(), LINE_CHARS + 1);
+        assert!(long.ends_with('…'));
+        assert_eq!(one_line(&"é".repeat(LINE_CHARS)).chars().count(), LINE_CHARS);
+    }
+}

@@ -1,0 +1,308 @@
+//! The parts of the glTF JSON that importing reads (glTF 2.0, section 5).
+//!
+//! These are our own structures rather than those of `gltf-json` because that crate keeps node matrices in f32 and
+//! truncates indices to 32 bits, so that index 4294967296 would pass for 0. What is not listed here is skipped without
+//! being kept, so that a defect of a camera or an animation cannot spoil the geometry.
+
+use serde::de::{Error, IgnoredAny, Unexpected, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// An index into one of the lists of [`Document`]; not yet checked.
+pub(super) type Index = Uint;
+
+/// An unsigned integer, which JSON may also write as 3.0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Uint(pub u64);
+
+impl<'de> Deserialize<'de> for Uint {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Digits;
+        impl Visitor<'_> for Digits {
+            type Value = Uint;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a non-negative integer")
+            }
+
+            fn visit_u64<E: Error>(self, value: u64) -> Result<Uint, E> {
+                Ok(Uint(value))
+            }
+
+            fn visit_f64<E: Error>(self, value: f64) -> Result<Uint, E> {
+                // Beyond 2^53 a float is no exact integer any more.
+                if value >= 0.0 && value <= 9007199254740992.0 && value.fract() == 0.0 {
+                    Ok(Uint(value as u64))
+                } else {
+                    Err(E::invalid_value(Unexpected::Float(value), &self))
+                }
+            }
+        }
+        deserializer.deserialize_u64(Digits)
+    }
+}
+
+impl fmt::Display for Uint {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Document {
+    pub asset: Asset,
+    pub scene: Option<Index>,
+    #[serde(default)]
+    pub scenes: Vec<Scene>,
+    #[serde(default)]
+    pub nodes: Vec<Node>,
+    #[serde(default)]
+    pub meshes: Vec<Mesh>,
+    #[serde(default)]
+    pub accessors: Vec<Accessor>,
+    #[serde(default)]
+    pub buffer_views: Vec<BufferView>,
+    #[serde(default)]
+    pub buffers: Vec<Buffer>,
+    #[serde(default)]
+    pub materials: Vec<Material>,
+    #[serde(default)]
+    pub textures: Vec<Texture>,
+    #[serde(default)]
+    pub images: Vec<Image>,
+    #[serde(default)]
+    pub samplers: Vec<Sampler>,
+    #[serde(default)]
+    pub animations: Vec<IgnoredAny>,
+    #[serde(default)]
+    pub extensions_used: Vec<String>,
+    #[serde(default)]
+    pub extensions_required: Vec<String>,
+}
+
+/// The version alone, for files of other versions, whose other parts have other types.
+#[derive(Debug, Deserialize)]
+pub(super) struct VersionOnly {
+    pub asset: Asset,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Asset {
+    pub version: String,
+    pub min_version: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Scene {
+    pub name: Option<String>,
+    #[serde(default)]
+    pub nodes: Vec<Index>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Node {
+    pub name: Option<String>,
+    pub mesh: Option<Index>,
+    pub skin: Option<Index>,
+    #[serde(default)]
+    pub children: Vec<Index>,
+    /// Column-major; boxed because few nodes have one.
+    pub matrix: Option<Box<[f64; 16]>>,
+    pub translation: Option<[f64; 3]>,
+    /// Quaternion x, y, z, w.
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
+    #[serde(default)]
+    pub extensions: NodeExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct NodeExtensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub instancing: Option<Instancing>,
+}
+
+/// EXT_mesh_gpu_instancing: accessors of one transformation an instance.
+#[derive(Debug, Deserialize)]
+pub(super) struct Instancing {
+    #[serde(default)]
+    pub attributes: BTreeMap<String, Index>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Mesh {
+    pub name: Option<String>,
+    pub primitives: Vec<Primitive>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Primitive {
+    pub attributes: BTreeMap<String, Index>,
+    pub indices: Option<Index>,
+    pub material: Option<Index>,
+    pub mode: Option<Uint>,
+    #[serde(default)]
+    pub targets: Vec<IgnoredAny>,
+    #[serde(default)]
+    pub extensions: PrimitiveExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct PrimitiveExtensions {
+    #[serde(rename = "KHR_draco_mesh_compression")]
+    pub draco: Option<IgnoredAny>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    pub buffer_view: Option<Index>,
+    #[serde(default)]
+    pub byte_offset: Uint,
+    pub component_type: Uint,
+    #[serde(default)]
+    pub normalized: bool,
+    pub count: Uint,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub sparse: Option<Box<Sparse>>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Sparse {
+    pub count: Uint,
+    pub indices: SparseIndices,
+    pub values: SparseValues,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SparseIndices {
+    pub buffer_view: Index,
+    #[serde(default)]
+    pub byte_offset: Uint,
+    pub component_type: Uint,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SparseValues {
+    pub buffer_view: Index,
+    #[serde(default)]
+    pub byte_offset: Uint,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BufferView {
+    pub buffer: Index,
+    #[serde(default)]
+    pub byte_offset: Uint,
+    pub byte_length: Uint,
+    pub byte_stride: Option<Uint>,
+    #[serde(default)]
+    pub extensions: BufferViewExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct BufferViewExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    pub meshopt: Option<IgnoredAny>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    pub uri: Option<String>,
+    pub byte_length: Uint,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Material {
+    pub name: Option<String>,
+    #[serde(default)]
+    pub pbr_metallic_roughness: MetallicRoughness,
+    #[serde(default)]
+    pub emissive_factor: [f64; 3],
+    pub emissive_texture: Option<IgnoredAny>,
+    pub alpha_mode: Option<String>,
+    pub alpha_cutoff: Option<f64>,
+    #[serde(default)]
+    pub double_sided: bool,
+    #[serde(default)]
+    pub extensions: MaterialExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct MetallicRoughness {
+    pub base_color_factor: Option<[f64; 4]>,
+    pub base_color_texture: Option<TextureInfo>,
+    pub metallic_factor: Option<f64>,
+    pub roughness_factor: Option<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct MaterialExtensions {
+    #[serde(rename = "KHR_materials_unlit")]
+    pub unlit: Option<IgnoredAny>,
+    #[serde(rename = "KHR_materials_emissive_strength")]
+    pub emissive_strength: Option<EmissiveStrength>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct EmissiveStrength {
+    pub emissive_strength: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct TextureInfo {
+    pub index: Index,
+    #[serde(default)]
+    pub tex_coord: Uint,
+    #[serde(default)]
+    pub extensions: TextureInfoExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct TextureInfoExtensions {
+    #[serde(rename = "KHR_texture_transform")]
+    pub transform: Option<TextureTransform>,
+}
+
+/// KHR_texture_transform.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct TextureTransform {
+    pub offset: Option<[f64; 2]>,
+    pub rotation: Option<f64>,
+    pub scale: Option<[f64; 2]>,
+    pub tex_coord: Option<Uint>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Texture {
+    pub source: Option<Index>,
+    pub sampler: Option<Index>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Image {
+    pub name: Option<String>,
+    pub uri: Option<String>,
+    pub buffer_view: Option<Index>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Sampler {
+    pub wrap_s: Option<Uint>,
+    pub wrap_t: Option<Uint>,
+}

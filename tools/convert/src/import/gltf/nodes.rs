@@ -1,0 +1,194 @@
+//! The node hierarchy (glTF 2.0, section 3.5): checked to be a forest, then walked depth first.
+
+use super::accessor::{Accessor, Component, Shape};
+use super::document::{Document, Index, Uint};
+use super::file::{File, Problem, item};
+use super::label;
+use super::transform::{Affine, from_columns, from_parts, multiply};
+use crate::import::error::ImportError;
+use crate::import::warnings::Warnings;
+use crate::source::IDENTITY;
+
+/// A node with a mesh, placed in the world.
+pub(super) struct Use<'a> {
+    /// The node.
+    pub node: usize,
+    /// The mesh, in range.
+    pub mesh: usize,
+    /// world_from_node.
+    pub world: Affine,
+    /// EXT_mesh_gpu_instancing: transformations between node and mesh; `None`: one placement.
+    pub instances: Option<Instances<'a>>,
+}
+
+/// Accessors of instance transformations, all of the same count.
+pub(super) struct Instances<'a> {
+    /// Number of instances.
+    pub count: usize,
+    translation: Option<Accessor<'a>>,
+    rotation: Option<Accessor<'a>>,
+    scale: Option<Accessor<'a>>,
+}
+
+impl Instances<'_> {
+    /// node_from_mesh of instance `i`.
+    pub fn matrix(&self, i: usize) -> Result<Affine, Problem> {
+        let get = |accessor: &Option<Accessor>| accessor.as_ref().map(|a| a.get::<3>(i));
+        from_parts(get(&self.translation), self.rotation.as_ref().map(|a| a.get::<4>(i)), get(&self.scale))
+    }
+}
+
+/// "node 3 \"door\"".
+pub(super) fn node_place(document: &Document, node: usize) -> String {
+    label("node", node, document.nodes.get(node).and_then(|n| n.name.as_deref()))
+}
+
+/// Every use of a mesh in the default scene (else scene 0, else all root nodes), depth first.
+pub(super) fn uses<'a>(file: &'a File, warnings: &mut Warnings) -> Result<Vec<Use<'a>>, ImportError> {
+    let document = &file.document;
+    let parents = parents(file)?;
+    check_acyclic(file, &parents)?;
+    let roots = roots(file, &parents)?;
+
+    let mut uses = Vec::new();
+    let mut visited = 0;
+    let mut stack: Vec<(usize, Affine)> = roots.iter().rev().map(|&root| (root, IDENTITY)).collect();
+    while let Some((index, parent)) = stack.pop() {
+        visited += 1;
+        let node = &document.nodes[index];
+        let fault = |problem| file.fault(node_place(document, index), problem);
+        let local = match &node.matrix {
+            Some(matrix) => from_columns(matrix),
+            None => from_parts(node.translation, node.rotation, node.scale),
+        };
+        let world = multiply(&parent, &local.map_err(fault)?);
+        if !world.iter().all(|c| c.is_finite()) {
+            return Err(fault(Problem::new("its transformation is too large")));
+        }
+        if let Some(mesh) = node.mesh {
+            if node.skin.is_some() {
+                warnings.add("skinned; its geometry is taken at rest", || node_place(document, index));
+            }
+            let instances = instances(file, index).map_err(fault)?;
+            // In range: `parents` checked it.
+            uses.push(Use { node: index, mesh: mesh.0 as usize, world, instances });
+        }
+        // In range: `parents` checked them.
+        stack.extend(node.children.iter().rev().map(|&child| (child.0 as usize, world)));
+    }
+    let left_out = document.nodes.len() - visited;
+    if left_out > 0 && document.nodes.iter().any(|node| node.mesh.is_some()) {
+        warnings.add(format!("{left_out} nodes outside the default scene are left out"), String::new);
+    }
+    if uses.is_empty() && !document.meshes.is_empty() {
+        warnings.add("no node of the scene has a mesh", String::new);
+    }
+    Ok(uses)
+}
+
+/// The parent of every node; also checks every index that nodes hold.
+fn parents(file: &File) -> Result<Vec<Option<usize>>, ImportError> {
+    let document = &file.document;
+    let mut parents: Vec<Option<usize>> = vec![None; document.nodes.len()];
+    for (index, node) in document.nodes.iter().enumerate() {
+        let fault = |problem| file.fault(node_place(document, index), problem);
+        if let Some(mesh) = node.mesh {
+            item(&document.meshes, mesh, "mesh").map_err(fault)?;
+        }
+        for &child in &node.children {
+            item(&document.nodes, child, "node").map_err(fault)?;
+            let parent = &mut parents[child.0 as usize];
+            if let Some(other) = *parent {
+                let what = format!("node {child} is its child, but is already a child of node {other}");
+                return Err(fault(Problem { what, remedy: "give every node one parent" }));
+            }
+            *parent = Some(index);
+        }
+    }
+    Ok(parents)
+}
+
+/// With one parent each, nodes form trees and cycles. A node from which walking up never ends is in or below a cycle.
+fn check_acyclic(file: &File, parents: &[Option<usize>]) -> Result<(), ImportError> {
+    // 0: unknown; n > 0: reached first by the walk that began at node n - 1.
+    let mut walk = vec![0usize; parents.len()];
+    for start in 0..parents.len() {
+        let mut node = start;
+        while walk[node] == 0 {
+            walk[node] = start + 1;
+            match parents[node] {
+                Some(parent) => node = parent,
+                None => break,
+            }
+        }
+        // The walk ended at a node of its own that has a parent: it went round.
+        if walk[node] == start + 1 && parents[node].is_some() {
+            let what = "is its own ancestor".to_owned();
+            let problem = Problem { what, remedy: "make the node hierarchy a tree" };
+            return Err(file.fault(node_place(&file.document, node), problem));
+        }
+    }
+    Ok(())
+}
+
+/// The nodes at which the walk begins, each once.
+fn roots(file: &File, parents: &[Option<usize>]) -> Result<Vec<usize>, ImportError> {
+    let document = &file.document;
+    let place = |index: usize| label("scene", index, document.scenes[index].name.as_deref());
+    for (index, scene) in document.scenes.iter().enumerate() {
+        for &node in &scene.nodes {
+            item(&document.nodes, node, "node").map_err(|problem| file.fault(place(index), problem))?;
+        }
+    }
+    let chosen: Index = match document.scene {
+        Some(scene) => {
+            item(&document.scenes, scene, "scene").map_err(|problem| file.fault("default scene".into(), problem))?;
+            scene
+        }
+        None if document.scenes.is_empty() => {
+            return Ok((0..parents.len()).filter(|&node| parents[node].is_none()).collect());
+        }
+        None => Uint(0),
+    };
+    let chosen = chosen.0 as usize;
+    let mut listed = vec![false; parents.len()];
+    let mut roots = Vec::with_capacity(document.scenes[chosen].nodes.len());
+    for &node in &document.scenes[chosen].nodes {
+        let node = node.0 as usize;
+        let problem = match parents[node] {
+            Some(parent) => format!("lists node {node}, which is a child of node {parent}"),
+            None if listed[node] => format!("lists node {node} twice"),
+            None => {
+                listed[node] = true;
+                roots.push(node);
+                continue;
+            }
+        };
+        let problem = Problem { what: problem, remedy: "list every root node once and no other" };
+        return Err(file.fault(place(chosen), problem));
+    }
+    Ok(roots)
+}
+
+/// The accessors of EXT_mesh_gpu_instancing, if the node has it.
+fn instances(file: &File, node: usize) -> Result<Option<Instances<'_>>, Problem> {
+    const VECTOR: Shape = Shape { kinds: &[("VEC3", 3)], components: &[Component::F32], always_normalized: false };
+    const ROTATION: Shape = Shape {
+        kinds: &[("VEC4", 4)],
+        components: &[Component::F32, Component::I8, Component::I16],
+        always_normalized: true,
+    };
+    let Some(extension) = &file.document.nodes[node].extensions.instancing else { return Ok(None) };
+    let get = |name: &str, shape: &Shape| {
+        extension.attributes.get(name).map(|&index| Accessor::resolve(file, index, shape)).transpose()
+    };
+    let translation = get("TRANSLATION", &VECTOR)?;
+    let rotation = get("ROTATION", &ROTATION)?;
+    let scale = get("SCALE", &VECTOR)?;
+    let counts = [&translation, &rotation, &scale].map(|accessor| accessor.as_ref().map(|a| a.count));
+    let Some(count) = counts.into_iter().flatten().next() else { return Ok(None) };
+    if counts.into_iter().flatten().any(|other| other != count) {
+        return Err(Problem::new("its instance attributes differ in count"));
+    }
+    Ok(Some(Instances { count, translation, rotation, scale }))
+}
