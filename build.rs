@@ -1,1 +1,103 @@
-fn main() {}
+//! Parses and validates every kernel, so that a typo is a build error, and writes the assertions that hold the WGSL
+//! structures and constants to their Rust mirrors.
+
+#[path = "src/gpu/wgsl.rs"]
+#[allow(dead_code)]
+mod wgsl;
+
+use std::fmt::Write;
+use std::path::Path;
+use std::{env, fs};
+
+fn main() {
+    println!("cargo::rerun-if-changed=shaders");
+    println!("cargo::rerun-if-changed=src/gpu/wgsl.rs");
+    println!("cargo::rustc-env=BRICKWALK_COMMIT={}", commit());
+    let shaders = Path::new("shaders");
+    let read = |name: &str| fs::read_to_string(shaders.join(name)).ok();
+    let mut names: Vec<String> = fs::read_dir(shaders)
+        .expect("the folder shaders/")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.ends_with(".wgsl"))
+        .collect();
+    names.sort();
+    let mut structures = None;
+    for name in &names {
+        for pages in [wgsl::Pages { cache: 1, texels: 1 }, wgsl::Pages { cache: 3, texels: 2 }] {
+            let text = wgsl::assemble(name, pages, &read).unwrap_or_else(|| panic!("{name}: an included file is missing"));
+            let module =
+                naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(&text)));
+            naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default())
+                .validate(&module)
+                .unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(&text)));
+            if name == "resolve.wgsl" {
+                structures = Some(module);
+            }
+        }
+    }
+    let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    let out = Path::new(&out);
+    fs::write(out.join("shaders.rs"), embedded(&names)).expect("write shaders.rs");
+    let module = structures.expect("shaders/resolve.wgsl declares every shared structure");
+    fs::write(out.join("layout_checks.rs"), layout_checks(&module)).expect("write layout_checks.rs");
+}
+
+/// The commit of the sources, or "unknown" outside a checkout.
+fn commit() -> String {
+    println!("cargo::rerun-if-changed=.git/HEAD");
+    println!("cargo::rerun-if-changed=.git/refs/heads");
+    let output = std::process::Command::new("git").args(["rev-parse", "--short=12", "HEAD"]).output();
+    match output {
+        Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).trim().to_string(),
+        _ => "unknown".to_string(),
+    }
+}
+
+/// A table of all shader files, kernels and shared ones.
+fn embedded(names: &[String]) -> String {
+    let mut files: Vec<String> = names.to_vec();
+    for entry in fs::read_dir("shaders/shared").expect("the folder shaders/shared").flatten() {
+        files.push(format!("shared/{}", entry.file_name().to_string_lossy()));
+    }
+    files.sort();
+    let mut s = String::from("const FILES: &[(&str, &str)] = &[\n");
+    for file in files {
+        let _ = writeln!(s, "({file:?}, include_str!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/shaders/{file}\"))),");
+    }
+    s.push_str("];\n");
+    s
+}
+
+/// Compile-time assertions: size and member offsets of every structure that `layout` mirrors, values of its constants.
+fn layout_checks(module: &naga::Module) -> String {
+    let mirrored = [
+        "Params", "Ray", "Hit", "Surface", "TileBounds", "TileList", "TopNode2", "Leaf", "Instance", "Brick", "Slot",
+        "Demand", "Material", "Texture", "GBuffer",
+    ];
+    let mut s = String::new();
+    for name in mirrored {
+        let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
+        let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+            panic!("shaders/shared/types.wgsl lacks the structure {name}");
+        };
+        let _ = writeln!(s, "const _: () = assert!(size_of::<layout::{name}>() == {span}, \"size of {name}\");");
+        for member in members {
+            let field = member.name.as_deref().unwrap_or_default();
+            let _ = writeln!(
+                s,
+                "const _: () = assert!(std::mem::offset_of!(layout::{name}, {field}) == {}, \"{name}.{field}\");",
+                member.offset
+            );
+        }
+    }
+    for (_, constant) in module.constants.iter() {
+        let Some(name) = constant.name.as_deref() else { continue };
+        let prefixes = ["PARAM_", "STATE_", "COUNTER_", "INSTANCE_", "BRICK_", "NONE"];
+        if prefixes.iter().any(|p| name.starts_with(p))
+            && let naga::Expression::Literal(naga::Literal::U32(value)) = module.global_expressions[constant.init]
+        {
+            let _ = writeln!(s, "const _: () = assert!(layout::{name} == {value}, \"{name}\");");
+        }
+    }
+    s
+}

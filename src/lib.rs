@@ -1,1 +1,11 @@
-//! brickwalk.
+//! brickwalk walks by ray tracing through scenes that do not fit in GPU memory.
+//!
+//! See `ARCHITECTURE.md` for the house: math → scene → stream → schedule → gpu → render → app.
+
+pub mod gpu;
+pub mod math;
+pub mod render;
+pub mod scene;
+pub mod schedule;
+pub mod stats;
+pub mod stream;

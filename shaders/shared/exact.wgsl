@@ -240,7 +240,7 @@ fn shear(f: RayFrame, v: vec3<f32>) -> vec3<f32> {
 }
 
 // Closest-hit candidate of the ray (0, d), f = ray_frame(d), with a triangle whose vertices are relative to the ray's origin.
-// Closed on its edges, two-sided, t >= t_min. Accept it when t < best.t, or t == best.t and its id is lower.
+// Closed on its edges, two-sided, t >= t_min >= 0. Accept it when t < best.t, or t == best.t and its id is lower.
 fn intersect_triangle(f: RayFrame, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, d: vec3<f32>, t_min: f32) -> TriangleHit {
     let miss = TriangleHit(false, 0.0, 0.0, 0.0, 0.0, 0.0);
     let sa = shear(f, a);
@@ -281,7 +281,9 @@ fn intersect_triangle(f: RayFrame, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, d: 
     if x < t_min {
         return miss;
     }
-    return TriangleHit(true, max(min(t, x), max(n, t_min)), u, v, w, det);
+    // Without the sign of a zero, which max leaves open.
+    let clamped = bitcast<u32>(max(min(t, x), max(n, t_min))) & ~SIGN;
+    return TriangleHit(true, bitcast<f32>(clamped), u, v, w, det);
 }
 
 // A point on a triangle from which rays can start, in the frame of the vertices.

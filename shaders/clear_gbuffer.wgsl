@@ -1,0 +1,17 @@
+// Empties the G-buffer before a sample, and the radiance before the first.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/shading.wgsl"
+
+// One thread a pixel.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    gbuffer[index] = GBuffer(vec3<f32>(0.0), 0u, vec3<f32>(0.0), 0u, vec3<f32>(0.0), 0u, vec2<f32>(0.0), vec2<f32>(0.0));
+    if params.sample == 0u {
+        radiance[index] = vec4<f32>(0.0);
+    }
+}

@@ -1,0 +1,64 @@
+// Ray-by-ray queries of the selected (tile, leaf) pairs: how many rays of the tile enter a child box of the brick's root
+// at or before their present hit, and where the nearest does. With PARAM_NEEDED the hits are final and the rays of
+// an any-hit pass that ended occluded ask only for the brick that holds their hit.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/tiles.wgsl"
+#include "shared/exact.wgsl"
+#include "shared/node.wgsl"
+#include "shared/leaf.wgsl"
+
+// One thread a ray; workgroups are squares of 8 x 8 rays.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let tile = (global.y / params.tile) * params.tiles_x + global.x / params.tile;
+    let entry = tile_lists[tile];
+    if entry.selected == 0u {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let ray = rays[index];
+    if !(ray.t_min <= ray.t_max) {
+        return;
+    }
+    let hit = hits[index];
+    let occluded = (params.flags & PARAM_ANY_HIT) != 0u && hit.id != NONE;
+    let needed = (params.flags & PARAM_NEEDED) != 0u;
+    if occluded && !needed {
+        return;
+    }
+    let world = box_ray(ray.origin, ray.direction, ray.t_min);
+    let world_frame = ray_frame(ray.direction);
+    var r: BrickRay;
+    for (var next = entry.first; next < entry.first + entry.selected; next++) {
+        let position = selection[next];
+        let leaf = list[position];
+        if occluded {
+            if surfaces[index].leaf == leaf {
+                atomicAdd(&pair_demand[position].rays, 1u);
+                atomicMin(&pair_demand[position].nearest, 0u);
+            }
+            continue;
+        }
+        enter_leaf(&r, world, ray.direction, world_frame, leaf);
+        let at = 5u * leaves[leaf].brick;
+        let n1 = roots[at + 1u];
+        let entered = node_hits(r.box, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, hit.t);
+        var near = T_INFINITE;
+        var any = false;
+        for (var i = 0u; i < 8u; i++) {
+            let what = (select(n1.z, n1.w, i >= 4u) >> (8u * (i & 3u))) & 255u;
+            if (entered.mask & (1u << i)) != 0u && what != 0u {
+                near = min(near, entered.near[i >> 2u][i & 3u]);
+                any = true;
+            }
+        }
+        if any {
+            atomicAdd(&pair_demand[position].rays, 1u);
+            atomicMin(&pair_demand[position].nearest, bitcast<u32>(max(near, 0.0)));
+        }
+    }
+}

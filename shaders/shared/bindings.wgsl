@@ -1,0 +1,25 @@
+// Bindings of group 0, the resident part of the scene in the frame, and of group 1, the rays of a pass.
+
+@group(0) @binding(0) var<storage, read> top8: array<vec4<u32>>;
+@group(0) @binding(1) var<storage, read> top2: array<TopNode2>;
+@group(0) @binding(2) var<storage, read> leaves: array<Leaf>;
+@group(0) @binding(3) var<storage, read> instances: array<Instance>;
+@group(0) @binding(4) var<storage, read> bricks: array<Brick>;
+@group(0) @binding(5) var<storage, read> roots: array<vec4<u32>>;
+@group(0) @binding(6) var<storage, read> slots: array<Slot>;
+
+@group(1) @binding(0) var<uniform> params: Params;
+@group(1) @binding(1) var<storage, read_write> rays: array<Ray>;
+@group(1) @binding(2) var<storage, read_write> hits: array<Hit>;
+@group(1) @binding(3) var<storage, read_write> surfaces: array<Surface>;
+@group(1) @binding(4) var<storage, read_write> demand: array<BrickDemand>;      // per brick
+@group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>, 16>;
+
+struct BrickDemand {
+    rays: atomic<u32>,
+    nearest: atomic<u32>,
+}
+
+fn zero_bits() -> u32 {
+    return params.zero;
+}

@@ -1,0 +1,12 @@
+// Bindings of group 3 for the kernels that work on tiles: their bounds and their lists of leaves.
+
+@group(3) @binding(0) var<storage, read_write> tile_bounds: array<TileBounds>;
+@group(3) @binding(1) var<storage, read_write> tile_lists: array<TileList>;
+@group(3) @binding(2) var<storage, read_write> list: array<u32>;                // leaves per tile, near first
+@group(3) @binding(3) var<storage, read_write> selection: array<u32>;           // positions in `list`, per tile
+@group(3) @binding(4) var<storage, read_write> pair_demand: array<PairDemand>;  // per position in `list`
+
+struct PairDemand {
+    rays: atomic<u32>,
+    nearest: atomic<u32>,
+}

@@ -1,0 +1,180 @@
+// Structures shared by all kernels. Each mirrors a #[repr(C)] struct of src/gpu/layout.rs; the build compares the two.
+
+struct Params {
+    zero: u32,            // 0; what barrier() ors in, unknown to the compiler
+    width: u32,           // rays per row
+    height: u32,          // rows
+    tile: u32,            // edge of a tile in rays
+    tiles_x: u32,         // tiles per row
+    tiles: u32,           // number of tiles
+    flags: u32,           // PARAM_* bits
+    list_capacity: u32,   // entries of the tile lists
+    select_mask: u32,     // tile_select takes leaves with (state & select_mask) == select_want
+    select_want: u32,
+    threshold: u32,       // a (tile, leaf) query with at most so many rays is not visible; 0 = exact
+    top_count: u32,       // nodes of the binary top-level tree
+    sample: u32,          // index of the sample of this frame
+    seed: u32,
+    instance_pad: f32,    // relative padding of top-level boxes for the rounding of instance rays
+    sun_radius: f32,      // tangent of the sun's angular radius
+    origin: vec4<f32>,    // camera position in the frame, device units
+    base: vec4<f32>,      // direction of pixel coordinate (0, 0)
+    step_x: vec4<f32>,    // change of direction per pixel in x
+    step_y: vec4<f32>,    // change of direction per pixel in y; w: pixel angle in radians
+    sun: vec4<f32>,       // unit vector to the sun; w: cosine-weighted irradiance scale
+    sun_color: vec4<f32>,
+    sky_color: vec4<f32>,
+    ground_color: vec4<f32>,
+    jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
+}
+
+const PARAM_ANY_HIT: u32 = 1u;
+const PARAM_NEEDED: u32 = 2u;   // queries ask what a pass needed, from its final hits, whatever was resident
+
+struct Ray {
+    origin: vec3<f32>,    // in the frame, device units
+    t_min: f32,
+    direction: vec3<f32>, // not normalised
+    t_max: f32,           // below t_min: the ray is not traced; T_INFINITE: unbounded
+}
+
+struct Hit {
+    t: f32,               // distance in units of the direction; t_max while there is no hit
+    id: u32,              // global triangle id, NONE while there is no hit
+    u: f32,               // weight of stored vertex 1
+    v: f32,               // weight of stored vertex 2
+}
+
+struct Surface {
+    point: vec3<f32>,     // origin for secondary rays, offset toward the ray's side, in the frame
+    leaf: u32,            // leaf of the hit, NONE without one
+    normal: vec3<f32>,    // geometric unit normal toward the ray's side, world space
+    triangle: u32,        // triangle within the brick
+    area: f32,            // twice the triangle's area in the world, device units
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
+}
+
+struct TileBounds {       // over the traced rays of a tile
+    origin_min: vec3<f32>,
+    t_min: f32,
+    origin_max: vec3<f32>,
+    t_max: f32,
+    direction_min: vec3<f32>,
+    rays: u32,
+    direction_max: vec3<f32>,
+    padding: u32,
+}
+
+struct TileList {         // where a tile's entries lie in the lists
+    first: u32,
+    count: u32,
+    selected: u32,        // entries of the selection, from `first` on
+    padding: u32,
+}
+
+struct TopNode2 {
+    min: vec3<f32>,
+    left: u32,
+    max: vec3<f32>,
+    right: u32,           // NONE: `left` is a leaf
+}
+
+struct Leaf {
+    offset_high: vec3<f32>, // brick origin - reference point, in the object's device units: high part
+    instance: u32,
+    offset_low: vec3<f32>,  // low part; zero for near bricks
+    brick: u32,
+}
+
+struct Instance {
+    object_from_world: array<vec4<f32>, 3>, // rows; w: translation in the frame
+    world_from_object: array<vec4<f32>, 3>, // rows; w: translation in the frame
+    base: u32,            // global id of triangle 0
+    flags: u32,           // INSTANCE_* bits
+    scale: f32,           // bound of the ratio of scales
+    padding: u32,
+}
+
+struct Brick {
+    vertices: u32,        // word offsets within the geometry payload
+    ids: u32,
+    indices: u32,
+    flags: u32,           // BRICK_* bits
+    surfaces: u32,        // word offsets within the attribute payload
+    attribute_indices: u32,
+    padding0: u32,
+    padding1: u32,
+}
+
+struct Slot {             // where a brick lies in the cache, and its part in the pass
+    geometry_page: u32,
+    geometry_offset: u32, // in 16-byte units
+    attributes_page: u32,
+    attributes_offset: u32,
+    state: u32,           // STATE_* bits
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
+}
+
+struct Demand {           // what rays still ask of a brick
+    rays: u32,
+    nearest: u32,         // bits of the least entry distance, a non-negative f32
+}
+
+struct Material {
+    base_color: vec4<f32>,
+    emission: vec3<f32>,
+    metallic: f32,
+    roughness: f32,
+    alpha_cutoff: f32,
+    flags: u32,
+    base_color_texture: u32,
+    padding: vec4<u32>,
+}
+
+struct Texture {
+    width: u32,
+    height: u32,
+    levels: u32,
+    wrap: u32,            // WRAP_* of s in the low half, of t in the high half
+    page: u32,            // of the texels
+    offset: u32,          // words within the page
+    padding0: u32,
+    padding1: u32,
+}
+
+struct GBuffer {          // what shading reads of a primary hit
+    albedo: vec3<f32>,    // linear base colour
+    state: u32,           // 0: attributes not read yet
+    normal: vec3<f32>,    // interpolated unit normal, world space, on the side of the geometric one
+    material: u32,
+    emission: vec3<f32>,
+    padding: u32,
+    weights: vec2<f32>,   // barycentric weights of source vertices 1 and 2
+    uv: vec2<f32>,
+}
+
+const NONE: u32 = 0xffffffffu;
+const T_INFINITE: f32 = 3.4028234e38;
+const INSTANCE_IDENTITY: u32 = 1u;
+const BRICK_WIDE: u32 = 1u;
+const BRICK_INDEX32: u32 = 2u;
+const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
+const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
+const STATE_BATCH: u32 = 4u;       // geometry arrived with the current batch
+const STATE_ATTRIBUTES: u32 = 8u;  // attributes are resident
+const COUNTER_PAIRS_TESTED: u32 = 0u;
+const COUNTER_PAIRS_CULLED: u32 = 1u;
+const COUNTER_PAIRS_VISIBLE: u32 = 2u;
+const COUNTER_PAIRS_INVISIBLE: u32 = 3u;
+const COUNTER_PAIRS_INTERSECTED: u32 = 4u;
+const COUNTER_LIST_ENTRIES: u32 = 5u;
+const COUNTER_STACK_OVERFLOW: u32 = 6u;
+const COUNTER_NON_FINITE: u32 = 7u;
+const COUNTER_RAYS: u32 = 8u;
+const COUNTER_NODES: u32 = 9u;
+const COUNTER_TRIANGLES: u32 = 10u;
+const COUNTER_HITS: u32 = 11u;

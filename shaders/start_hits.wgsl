@@ -1,0 +1,14 @@
+// Starts the hits of rays that came from outside: nothing found within their range.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+
+// One thread a ray.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    hits[index] = Hit(rays[index].t_max, NONE, 0.0, 0.0);
+    surfaces[index] = Surface(vec3<f32>(0.0), NONE, vec3<f32>(0.0), 0u, 0.0, 0u, 0u, 0u);
+}

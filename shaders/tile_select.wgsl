@@ -1,0 +1,28 @@
+// Picks from each tile's list the leaves whose brick is in the wanted state, keeping their order.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/tiles.wgsl"
+
+override INTERSECT: bool = false; // the selection is intersected next: counted as such
+
+// One thread a tile.
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    let tile = global.x;
+    if tile >= params.tiles {
+        return;
+    }
+    let entry = tile_lists[tile];
+    var selected = 0u;
+    for (var i = entry.first; i < entry.first + entry.count; i++) {
+        let state = slots[leaves[list[i]].brick].state;
+        if (state & params.select_mask) == params.select_want {
+            selection[entry.first + selected] = i;
+            selected += 1u;
+        }
+    }
+    tile_lists[tile].selected = selected;
+    if INTERSECT && selected > 0u {
+        atomicAdd(&counters[COUNTER_PAIRS_INTERSECTED], selected);
+    }
+}

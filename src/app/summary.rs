@@ -1,0 +1,154 @@
+//! `summary.json`: what was asked for, on what it ran, and what came of it.
+
+use super::args::WalkArgs;
+use crate::render::{Renderer, Schedule};
+use crate::stats::Record;
+use serde_json::{Map, Value, json};
+
+/// Raised when a field changes its meaning.
+const FORMAT: u32 = 1;
+
+/// The summary of a walk of `frames` finished frames.
+pub fn of_walk(args: &WalkArgs, renderer: &Renderer, records: &[Record], frames: u32) -> Value {
+    let gpu = renderer.executor.gpu();
+    let resident = renderer.scene.resident();
+    let manifest = &resident.manifest;
+    let brick_bytes: u64 = renderer.cache.bytes.iter().map(|b| b.geometry + b.attributes).sum();
+    json!({
+        "format": FORMAT,
+        "version": env!("CARGO_PKG_VERSION"),
+        "commit": env!("BRICKWALK_COMMIT"),
+        "adapter": {
+            "name": gpu.info.name,
+            "driver": gpu.info.driver,
+            "driver_info": gpu.info.driver_info,
+            "backend": gpu.info.backend.to_string(),
+            "upload": gpu.upload.name(),
+            "timestamps": gpu.timestamps,
+        },
+        "scene": {
+            "file": args.scene.file_name().map(|n| n.to_string_lossy()),
+            "file_bytes": renderer.scene.file_bytes(),
+            "resident_bytes": renderer.scene.resident_bytes(),
+            "bricks": resident.bricks.len(),
+            "brick_bytes": brick_bytes,
+            "leaves": resident.leaves.len(),
+            "triangles": manifest.triangles_instanced,
+        },
+        "settings": {
+            "frames": args.frames,
+            "width": args.size.width,
+            "height": args.size.height,
+            "effects": args.effects.to_string(),
+            "schedule": match renderer.settings.schedule { Schedule::Chc => "chc", Schedule::Plain => "plain" },
+            "fronts": args.stream.fronts,
+            "query_threshold": args.stream.query_threshold,
+            "tile": args.stream.tile,
+            "evict": renderer.cache.residency.policy().name(),
+            "cache_bytes": renderer.cache.residency.budget_bytes(),
+            "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / brick_bytes.max(1) as f64,
+            "host_cache_bytes": args.stream.host_cache,
+            "secondary": "exact",
+            "spp": args.spp,
+            "seed": args.seed,
+            "sun": args.light.sun.0,
+            "sun_angle_degrees": args.light.sun_angle,
+        },
+        "frames": frames,
+        "left_out": left_out(renderer),
+        "texture_bytes_resident": renderer.executor.texture_bytes(),
+        "memory": memory(),
+        "passes": passes(records),
+        "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
+        "non_finite": records.iter().map(|r| r.non_finite).sum::<u64>(),
+    })
+}
+
+/// What rendering left out because the scene does not need it, and why.
+pub fn left_out(renderer: &Renderer) -> Vec<Value> {
+    let manifest = &renderer.scene.resident().manifest;
+    let mut out = Vec::new();
+    let mut add = |what: &str, why: &str| out.push(json!({ "what": what, "why": why }));
+    if renderer.cache.residency.budget_bytes() >= renderer.cache.bytes.iter().map(|b| b.geometry + b.attributes).sum() {
+        add("queries for missing bricks", "the cache holds every brick");
+    }
+    if !manifest.has_textures {
+        add("texture lookups", "no material has a texture");
+    }
+    if !manifest.has_instances {
+        add("instance transforms", "everything is baked into the world");
+    }
+    if !manifest.has_wide_bricks {
+        add("two-part vertices", "every brick is near");
+    }
+    out
+}
+
+/// Totals, medians and 95th percentiles of every numeric field, per pass.
+fn passes(records: &[Record]) -> Value {
+    let mut names: Vec<&str> = records.iter().map(|r| r.pass).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut out = Map::new();
+    for name in names {
+        let rows: Vec<Value> =
+            records.iter().filter(|r| r.pass == name).filter_map(|r| serde_json::to_value(r).ok()).collect();
+        out.insert(name.to_string(), statistics(&rows));
+    }
+    Value::Object(out)
+}
+
+fn statistics(rows: &[Value]) -> Value {
+    let (mut totals, mut medians, mut p95) = (Map::new(), Map::new(), Map::new());
+    let Some(Value::Object(first)) = rows.first() else { return Value::Null };
+    for key in first.keys().filter(|k| *k != "frame" && *k != "pass") {
+        if rows.iter().all(|row| row[key].is_u64()) {
+            let total: u64 = rows.iter().filter_map(|row| row[key].as_u64()).sum();
+            totals.insert(key.clone(), total.into());
+        } else {
+            totals.insert(key.clone(), rows.iter().filter_map(|row| row[key].as_f64()).sum::<f64>().into());
+        }
+        let mut values: Vec<f64> = rows.iter().filter_map(|row| row[key].as_f64()).collect();
+        values.sort_by(f64::total_cmp);
+        medians.insert(key.clone(), quantile(&values, 0.5).into());
+        p95.insert(key.clone(), quantile(&values, 0.95).into());
+    }
+    json!({ "total": totals, "median": medians, "p95": p95 })
+}
+
+/// The quantile `q` of ascending values, between neighbours linearly. 0 of none.
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let Some(last) = values.len().checked_sub(1) else { return 0.0 };
+    let at = q * last as f64;
+    let (low, high) = (at.floor() as usize, at.ceil() as usize);
+    values[low] + (values[high] - values[low]) * (at - low as f64)
+}
+
+/// Memory of the process in bytes at its peak, mapped pages apart; null where the system does not tell.
+fn memory() -> Value {
+    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return Value::Null };
+    let field = |name: &str| -> Option<u64> {
+        let line = status.lines().find(|l| l.starts_with(name))?;
+        Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+    };
+    match (field("VmHWM:"), field("RssFile:")) {
+        (Some(peak), Some(mapped)) => json!({
+            "peak_bytes": peak.saturating_sub(mapped),
+            "mapped_bytes": mapped,
+        }),
+        _ => Value::Null,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantile;
+
+    #[test]
+    fn quantiles_are_exact_on_small_sets() {
+        assert_eq!(quantile(&[], 0.5), 0.0);
+        assert_eq!(quantile(&[3.0], 0.95), 3.0);
+        assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.5), 2.0);
+        assert_eq!(quantile(&[1.0, 2.0], 0.5), 1.5);
+    }
+}

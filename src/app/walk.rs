@@ -1,0 +1,135 @@
+//! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
+
+use super::args::WalkArgs;
+use super::output::{atomic, exr, png};
+use super::session::{Session, open_scene};
+use super::summary;
+use crate::gpu::rays::Extent;
+use crate::render::{FrameOutput, Light, RenderSettings, Renderer};
+use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::stats::Record;
+use anyhow::{Context, Result, bail};
+use brickwalk_convert::progress::Progress;
+use glam::DVec3;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Set by Ctrl-C: the frame at hand is finished, then the records are completed.
+fn interrupted() -> &'static AtomicBool {
+    static FLAG: AtomicBool = AtomicBool::new(false);
+    static HANDLER: std::sync::Once = std::sync::Once::new();
+    HANDLER.call_once(|| {
+        // Without a handler Ctrl-C ends the process at once, which leaves finished frames and whole records, too.
+        let _ = ctrlc::set_handler(|| FLAG.store(true, Ordering::Relaxed));
+    });
+    &FLAG
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad scene, path, cache or output folder; a damaged brick; the device's.
+pub fn run(args: &WalkArgs) -> Result<()> {
+    let scene = open_scene(&args.scene)?;
+    let manifest = &scene.resident().manifest;
+    let mut path = match &args.path {
+        Some(file) => CameraPath::read(file)?,
+        None => path_from_bounds(manifest.min, manifest.max),
+    };
+    if let Some(fov) = args.fov {
+        path = path.with_fov_y_degrees(fov)?;
+    }
+    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let session = Session::open(scene, &args.scene, &args.stream, extent)?;
+    let frames_folder = args.output.join("frames");
+    atomic::create_folder(&frames_folder)?;
+    for stale in ["summary.json", "report.html"] {
+        // What is left of an earlier walk must not be taken for a part of this one.
+        let _ = std::fs::remove_file(args.output.join(stale));
+    }
+    let mut renderer = renderer(session, args);
+    let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
+    let progress = Progress::new();
+    progress.phase("frames", args.frames.into());
+    let stop = interrupted();
+    let mut records = Vec::new();
+    let mut finished = 0;
+    for frame in 0..args.frames {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let output = renderer.frame(frame, &path.frame(frame, args.frames)).with_context(|| args.scene.display().to_string())?;
+        write_frame(&frames_folder, frame, args, &output)?;
+        for record in output.records {
+            let line = lines.push(&record)?;
+            if args.json {
+                super::print(&line)?;
+            }
+            records.push(record);
+        }
+        finished += 1;
+        progress.advance(1);
+    }
+    progress.finish();
+    finish(args, &renderer, &records, finished)?;
+    if finished < args.frames {
+        bail!("interrupted after {finished} of {} frames; {} holds what is done", args.frames, args.output.display());
+    }
+    let non_finite: u64 = records.iter().map(|r| r.non_finite).sum();
+    if non_finite > 0 {
+        bail!("{non_finite} pixels were not finite and are black; this is a defect, see records.jsonl for the frames");
+    }
+    Ok(())
+}
+
+fn renderer(session: Session, args: &WalkArgs) -> Renderer {
+    let Session { scene, executor, cache, schedule } = session;
+    let settings = RenderSettings {
+        schedule,
+        shadows: args.effects.shadow,
+        samples: args.spp,
+        // Both halves of the seed count.
+        seed: (args.seed ^ (args.seed >> 32)) as u32,
+        measure_needed: args.measure_needed,
+        aov: args.aov,
+    };
+    let light = Light::new(
+        DVec3::from_array(args.light.sun.0),
+        args.light.sun_angle,
+        args.light.sun_intensity as f32,
+        args.light.sky_intensity as f32,
+    );
+    Renderer { scene, executor, cache, settings, light, size: (args.size.width, args.size.height) }
+}
+
+fn write_frame(folder: &Path, frame: u32, args: &WalkArgs, output: &FrameOutput) -> Result<()> {
+    let pixels = &output.pixels;
+    let name = folder.join(format!("{frame:04}.png"));
+    let srgb: Vec<[u8; 3]> = pixels.radiance.iter().map(|c| c.map(png::srgb8)).collect();
+    png::write(&name, args.size.width, args.size.height, &srgb)?;
+    if args.aov {
+        let aovs = exr::Aovs {
+            width: args.size.width,
+            height: args.size.height,
+            radiance: &pixels.radiance,
+            depth: &pixels.depth,
+            normal: &pixels.normal,
+            triangle: &pixels.id,
+            albedo: &pixels.albedo,
+        };
+        exr::write(&name.with_extension("exr"), &aovs)?;
+    }
+    Ok(())
+}
+
+fn finish(args: &WalkArgs, renderer: &Renderer, records: &[Record], frames: u32) -> Result<()> {
+    let summary = summary::of_walk(args, renderer, records, frames);
+    let text = serde_json::to_string_pretty(&summary)? + "\n";
+    atomic::write(&args.output.join("summary.json"), text.as_bytes())?;
+    if let (Some(file), Some(trace)) = (&args.stream.requests_out, &renderer.cache.trace) {
+        trace.write_file(Path::new(file)).with_context(|| format!("{file}: cannot write the request trace"))?;
+    }
+    brickwalk_report::write(&args.output)?;
+    Ok(())
+}
+

@@ -1,0 +1,148 @@
+//! The adapter, its limits, and the device made from it.
+
+use thiserror::Error;
+
+/// Why there is no device to work with.
+#[derive(Debug, Error)]
+pub enum DeviceError {
+    /// No adapter, or none of the given name.
+    #[error("no Vulkan, Metal or DirectX 12 adapter{}; install a driver (on Debian without a GPU: apt-get install libvulkan1 mesa-vulkan-drivers); found: {found}", .wanted.as_ref().map(|w| format!(" whose name contains {w:?}")).unwrap_or_default())]
+    NoAdapter {
+        /// The name asked for.
+        wanted: Option<String>,
+        /// Names of the adapters present.
+        found: String,
+    },
+    /// The driver refused.
+    #[error("adapter {adapter:?} gives no device: {reason}; update its driver or choose another with --adapter")]
+    NoDevice {
+        /// Adapter name.
+        adapter: String,
+        /// The driver's words.
+        reason: String,
+    },
+    /// The adapter lacks something without which nothing works.
+    #[error("adapter {adapter:?} allows {found} {what}, {needed} are needed; choose another with --adapter")]
+    Limit {
+        /// Adapter name.
+        adapter: String,
+        /// The limit.
+        what: &'static str,
+        /// What it allows.
+        found: u64,
+        /// What is needed.
+        needed: u64,
+    },
+}
+
+/// How payloads reach the cache pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UploadPath {
+    /// Pages are mapped and written in place: integrated and software adapters, where device memory is host memory.
+    Mapped,
+    /// A reused staging buffer is mapped, written, and copied on the device.
+    Staged,
+}
+
+impl UploadPath {
+    /// The name that reports use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mapped => "mapped pages",
+            Self::Staged => "staging buffer",
+        }
+    }
+}
+
+/// A device with everything of it that the executor asks about.
+pub struct Gpu {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its one queue.
+    pub queue: wgpu::Queue,
+    /// Name, driver, backend.
+    pub info: wgpu::AdapterInfo,
+    /// Limits in force: those of the adapter.
+    pub limits: wgpu::Limits,
+    /// Whether passes are timed on the device.
+    pub timestamps: bool,
+    /// How payloads reach the cache.
+    pub upload: UploadPath,
+}
+
+/// Storage buffers a kernel needs besides cache and texel pages.
+const FIXED_STORAGE_BUFFERS: u32 = 19;
+
+impl Gpu {
+    /// Opens the adapter whose name contains `wanted` (any case), or by itself a discrete GPU, else an integrated one,
+    /// else whatever there is. `BRICKWALK_UPLOAD=staged` forces the staging buffer where pages could be mapped.
+    pub fn open(wanted: Option<&str>) -> Result<Self, DeviceError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        let found = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
+        if let Some(wanted) = wanted {
+            let wanted = wanted.to_lowercase();
+            adapters.retain(|a| a.get_info().name.to_lowercase().contains(&wanted));
+        }
+        let rank = |a: &wgpu::Adapter| {
+            let info = a.get_info();
+            let kind = match info.device_type {
+                wgpu::DeviceType::DiscreteGpu => 0,
+                wgpu::DeviceType::IntegratedGpu => 1,
+                wgpu::DeviceType::VirtualGpu => 2,
+                wgpu::DeviceType::Cpu => 3,
+                wgpu::DeviceType::Other => 4,
+            };
+            (info.backend == wgpu::Backend::Gl, kind)
+        };
+        let Some(adapter) = adapters.into_iter().min_by_key(rank) else {
+            let found = if found.is_empty() { "none".to_string() } else { found };
+            return Err(DeviceError::NoAdapter { wanted: wanted.map(str::to_string), found });
+        };
+        Self::from_adapter(&adapter)
+    }
+
+    fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, DeviceError> {
+        let info = adapter.get_info();
+        let limits = adapter.limits();
+        let storage = limits.max_storage_buffers_per_shader_stage;
+        if storage < FIXED_STORAGE_BUFFERS + 3 {
+            return Err(DeviceError::Limit {
+                adapter: info.name,
+                what: "storage buffers a kernel",
+                found: storage.into(),
+                needed: (FIXED_STORAGE_BUFFERS + 3).into(),
+            });
+        }
+        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
+        let features = adapter.features() & wanted;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("brickwalk"),
+            required_features: features,
+            required_limits: limits.clone(),
+            memory_hints: wgpu::MemoryHints::Performance,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| DeviceError::NoDevice { adapter: info.name.clone(), reason: e.to_string() })?;
+        let host_memory = matches!(info.device_type, wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu);
+        let forced = std::env::var("BRICKWALK_UPLOAD").is_ok_and(|v| v == "staged");
+        let mapped = host_memory && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) && !forced;
+        let upload = if mapped { UploadPath::Mapped } else { UploadPath::Staged };
+        let timestamps = features.contains(wgpu::Features::TIMESTAMP_QUERY);
+        Ok(Self { device, queue, info, limits, timestamps, upload })
+    }
+
+    /// Largest number of bytes of one page of the cache or of the texels.
+    pub fn page_bytes(&self) -> u64 {
+        let binding = self.limits.max_storage_buffer_binding_size;
+        // Offsets within a page are u32 words, and 1 GiB keeps an allocation within what drivers give in one piece.
+        binding.min(self.limits.max_buffer_size).min(1 << 30) / 256 * 256
+    }
+
+    /// Most pages of cache (each bound twice) beside `texel_pages` pages of texels.
+    pub fn max_cache_pages(&self, texel_pages: usize) -> usize {
+        let left = self.limits.max_storage_buffers_per_shader_stage as usize - FIXED_STORAGE_BUFFERS as usize;
+        (left.saturating_sub(texel_pages) / 2).min(64)
+    }
+}

@@ -1,0 +1,162 @@
+//! Bind group layouts and pipelines: one pipeline a kernel, named as its file.
+
+use super::device::Gpu;
+use super::wgsl::{self, Pages};
+use std::collections::HashMap;
+
+include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// The text of kernel `name` with everything it includes.
+pub fn source(name: &str, pages: Pages) -> String {
+    let file = |name: &str| FILES.iter().find(|f| f.0 == name).map(|f| f.1.to_string());
+    // The build has assembled every kernel from the same table.
+    wgsl::assemble(&format!("{name}.wgsl"), pages, &file).unwrap_or_default()
+}
+
+/// What a binding of a layout is.
+#[derive(Clone, Copy)]
+enum Bound {
+    Read,
+    Write,
+    Params,
+}
+
+/// Groups that a kernel binds beside 0 (scene) and 1 (rays).
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Groups {
+    /// 3: tiles.
+    Tiles,
+    /// 2: cache, 3: tiles.
+    CacheTiles,
+    /// 3: shading.
+    Shading,
+    /// 2: cache, 3: shading.
+    CacheShading,
+}
+
+/// All pipelines and the layouts of their groups.
+pub struct Kernels {
+    /// Group 0: the resident part of the scene.
+    pub scene: wgpu::BindGroupLayout,
+    /// Group 1: parameters and rays.
+    pub rays: wgpu::BindGroupLayout,
+    /// Group 2: pages of the cache.
+    pub cache: wgpu::BindGroupLayout,
+    /// Group 3 of tile kernels.
+    pub tiles: wgpu::BindGroupLayout,
+    /// Group 3 of shading kernels.
+    pub shading: wgpu::BindGroupLayout,
+    /// A group of nothing.
+    pub none: wgpu::BindGroupLayout,
+    pipelines: HashMap<&'static str, wgpu::ComputePipeline>,
+}
+
+/// Kernel, groups, override constants, and the name of the specialisation.
+type Specialisation = (&'static str, &'static str, Groups, &'static [(&'static str, f64)]);
+
+const SPECIALISATIONS: &[Specialisation] = &[
+    ("generate_primary", "generate_primary", Groups::Tiles, &[]),
+    ("generate_shadow", "generate_shadow", Groups::Shading, &[]),
+    ("start_hits", "start_hits", Groups::Tiles, &[]),
+    ("clear_gbuffer", "clear_gbuffer", Groups::Shading, &[]),
+    ("hit_demand", "hit_demand", Groups::Tiles, &[]),
+    ("resolve", "resolve", Groups::CacheShading, &[]),
+    ("shade", "shade", Groups::Shading, &[]),
+    ("tile_bounds", "tile_bounds", Groups::Tiles, &[]),
+    ("tile_walk", "tile_walk_count", Groups::Tiles, &[("WRITE", 0.0)]),
+    ("tile_walk", "tile_walk_write", Groups::Tiles, &[("WRITE", 1.0)]),
+    ("tile_scan", "tile_scan", Groups::Tiles, &[]),
+    ("tile_select", "tile_select", Groups::Tiles, &[("INTERSECT", 0.0)]),
+    ("tile_select", "tile_select_intersect", Groups::Tiles, &[("INTERSECT", 1.0)]),
+    ("query", "query", Groups::Tiles, &[]),
+    ("query_reduce", "query_reduce", Groups::Tiles, &[]),
+    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 0.0)]),
+    ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0)]),
+];
+
+/// Specialisations that count nodes and triangles, made only when counting is asked for.
+const COUNTING: &[Specialisation] = &[
+    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 1.0)]),
+    ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 1.0)]),
+];
+
+impl Kernels {
+    /// Compiles every kernel for `pages`. `count` makes intersection kernels count nodes and triangles.
+    pub fn new(gpu: &Gpu, pages: Pages, count: bool) -> Self {
+        use Bound::{Params, Read, Write};
+        let device = &gpu.device;
+        let scene = layout(device, "scene", &[Read; 7]);
+        let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write]);
+        let cache = layout(device, "cache", &vec![Read; 2 * pages.cache]);
+        let tiles = layout(device, "tiles", &[Write; 5]);
+        let shading = shading_layout(device, &[Read, Read, Write, Write, Write, Write, Write], pages.texels);
+        let none = layout(device, "none", &[]);
+        let mut pipelines = HashMap::new();
+        let mut layouts = HashMap::new();
+        for &(kernel, name, groups, constants) in SPECIALISATIONS {
+            let constants = COUNTING.iter().find(|c| count && c.1 == name).map_or(constants, |c| c.3);
+            let layout = layouts.entry(groups).or_insert_with(|| {
+                let (second, third) = match groups {
+                    Groups::Tiles => (&none, &tiles),
+                    Groups::CacheTiles => (&cache, &tiles),
+                    Groups::Shading => (&none, &shading),
+                    Groups::CacheShading => (&cache, &shading),
+                };
+                device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: Some(name),
+                    bind_group_layouts: &[Some(&scene), Some(&rays), Some(second), Some(third)],
+                    immediate_size: 0,
+                })
+            });
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(kernel),
+                source: wgpu::ShaderSource::Wgsl(source(kernel, pages).into()),
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(name),
+                layout: Some(layout),
+                module: &module,
+                entry_point: Some("main"),
+                compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
+                cache: None,
+            });
+            pipelines.insert(name, pipeline);
+        }
+        Self { scene, rays, cache, tiles, shading, none, pipelines }
+    }
+
+    /// The pipeline of a specialisation of the table above.
+    pub fn pipeline(&self, name: &'static str) -> &wgpu::ComputePipeline {
+        &self.pipelines[name]
+    }
+}
+
+fn entry(binding: u32, bound: Bound) -> wgpu::BindGroupLayoutEntry {
+    let ty = match bound {
+        Bound::Params => wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: true,
+            min_binding_size: None,
+        },
+        Bound::Read | Bound::Write => wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: matches!(bound, Bound::Read) },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+    };
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+}
+
+fn layout(device: &wgpu::Device, label: &str, bindings: &[Bound]) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = bindings.iter().enumerate().map(|(i, &b)| entry(i as u32, b)).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
+
+/// First binding of the texels in the shading group.
+pub const TEXEL_BINDING: u32 = 8;
+
+fn shading_layout(device: &wgpu::Device, fixed: &[Bound], texel_pages: usize) -> wgpu::BindGroupLayout {
+    let mut entries: Vec<_> = fixed.iter().enumerate().map(|(i, &b)| entry(i as u32, b)).collect();
+    entries.extend((0..texel_pages as u32).map(|k| entry(TEXEL_BINDING + k, Bound::Read)));
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("shading"), entries: &entries })
+}

@@ -1,0 +1,87 @@
+//! Structures and constants shared with the kernels. The build reflects `shaders/shared/types.wgsl` and asserts that
+//! sizes, offsets and values agree; see the WGSL for what each field means.
+#![allow(missing_docs)]
+
+use bytemuck::{Pod, Zeroable};
+
+pub use bricks::{BRICK_INDEX32, BRICK_WIDE, INSTANCE_IDENTITY, NONE};
+
+pub const PARAM_ANY_HIT: u32 = 1;
+pub const PARAM_NEEDED: u32 = 2;
+/// Bit of [`Params::flags`] for the kernel `shade`: the pass's hits are shadow rays.
+pub const SHADE_SHADOWS: u32 = 4;
+pub const STATE_GEOMETRY: u32 = 1;
+pub const STATE_DONE: u32 = 2;
+pub const STATE_BATCH: u32 = 4;
+pub const STATE_ATTRIBUTES: u32 = 8;
+pub const COUNTER_PAIRS_TESTED: u32 = 0;
+pub const COUNTER_PAIRS_CULLED: u32 = 1;
+pub const COUNTER_PAIRS_VISIBLE: u32 = 2;
+pub const COUNTER_PAIRS_INVISIBLE: u32 = 3;
+pub const COUNTER_PAIRS_INTERSECTED: u32 = 4;
+pub const COUNTER_LIST_ENTRIES: u32 = 5;
+pub const COUNTER_STACK_OVERFLOW: u32 = 6;
+pub const COUNTER_NON_FINITE: u32 = 7;
+pub const COUNTER_RAYS: u32 = 8;
+pub const COUNTER_NODES: u32 = 9;
+pub const COUNTER_TRIANGLES: u32 = 10;
+pub const COUNTER_HITS: u32 = 11;
+/// Number of counters.
+pub const COUNTERS: usize = 16;
+/// What an unbounded ray has for t_max on the device: the greatest f32 but one.
+pub const T_INFINITE: f32 = 3.402_823_4e38;
+
+macro_rules! mirror {
+    ($(struct $name:ident { $($field:ident: $kind:ty),* $(,)? })*) => {$(
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+        #[repr(C)]
+        pub struct $name { $(pub $field: $kind),* }
+    )*};
+}
+
+mirror! {
+    struct Params {
+        zero: u32, width: u32, height: u32, tile: u32,
+        tiles_x: u32, tiles: u32, flags: u32, list_capacity: u32,
+        select_mask: u32, select_want: u32, threshold: u32, top_count: u32,
+        sample: u32, seed: u32, instance_pad: f32, sun_radius: f32,
+        origin: [f32; 4], base: [f32; 4], step_x: [f32; 4], step_y: [f32; 4],
+        sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
+    }
+    struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
+    struct Hit { t: f32, id: u32, u: f32, v: f32 }
+    struct Surface {
+        point: [f32; 3], leaf: u32, normal: [f32; 3], triangle: u32, area: f32, padding0: u32, padding1: u32, padding2: u32,
+    }
+    struct TileBounds {
+        origin_min: [f32; 3], t_min: f32, origin_max: [f32; 3], t_max: f32,
+        direction_min: [f32; 3], rays: u32, direction_max: [f32; 3], padding: u32,
+    }
+    struct TileList { first: u32, count: u32, selected: u32, padding: u32 }
+    struct TopNode2 { min: [f32; 3], left: u32, max: [f32; 3], right: u32 }
+    struct Leaf { offset_high: [f32; 3], instance: u32, offset_low: [f32; 3], brick: u32 }
+    struct Instance {
+        object_from_world: [[f32; 4]; 3], world_from_object: [[f32; 4]; 3],
+        base: u32, flags: u32, scale: f32, padding: u32,
+    }
+    struct Brick {
+        vertices: u32, ids: u32, indices: u32, flags: u32,
+        surfaces: u32, attribute_indices: u32, padding0: u32, padding1: u32,
+    }
+    struct Slot {
+        geometry_page: u32, geometry_offset: u32, attributes_page: u32, attributes_offset: u32,
+        state: u32, padding0: u32, padding1: u32, padding2: u32,
+    }
+    struct Demand { rays: u32, nearest: u32 }
+    struct Material {
+        base_color: [f32; 4], emission: [f32; 3], metallic: f32,
+        roughness: f32, alpha_cutoff: f32, flags: u32, base_color_texture: u32, padding: [u32; 4],
+    }
+    struct Texture {
+        width: u32, height: u32, levels: u32, wrap: u32, page: u32, offset: u32, padding0: u32, padding1: u32,
+    }
+    struct GBuffer {
+        albedo: [f32; 3], state: u32, normal: [f32; 3], material: u32, emission: [f32; 3], padding: u32,
+        weights: [f32; 2], uv: [f32; 2],
+    }
+}

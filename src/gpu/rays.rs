@@ -1,0 +1,119 @@
+//! Buffers of a pass: rays and hits of both passes, tiles and their lists, the G-buffer.
+
+use super::device::Gpu;
+use super::layout;
+
+/// Size of the picture, or of the block of rays, in rays, and the tiles over it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Rays per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Edge of a tile in rays.
+    pub tile: u32,
+}
+
+impl Extent {
+    /// Number of rays.
+    pub fn rays(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Tiles per row.
+    pub fn tiles_x(&self) -> u32 {
+        self.width.div_ceil(self.tile)
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> u32 {
+        self.tiles_x() * self.height.div_ceil(self.tile)
+    }
+
+    /// Most rays that buffers on this device hold.
+    pub fn most_rays(gpu: &Gpu) -> u64 {
+        let bytes = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
+        bytes / size_of::<layout::GBuffer>().max(size_of::<layout::Surface>()) as u64
+    }
+}
+
+/// Rays, hits and surfaces of one pass.
+pub struct RayBuffers {
+    /// [`layout::Ray`]s.
+    pub rays: wgpu::Buffer,
+    /// [`layout::Hit`]s.
+    pub hits: wgpu::Buffer,
+    /// [`layout::Surface`]s.
+    pub surfaces: wgpu::Buffer,
+}
+
+/// Lists of leaves of all tiles; grown when a walk finds more.
+pub struct TileBuffers {
+    /// [`layout::TileBounds`].
+    pub bounds: wgpu::Buffer,
+    /// [`layout::TileList`]s.
+    pub lists: wgpu::Buffer,
+    /// Leaves.
+    pub list: wgpu::Buffer,
+    /// Positions in the list.
+    pub selection: wgpu::Buffer,
+    /// Queries per position.
+    pub pair_demand: wgpu::Buffer,
+    /// Entries the lists hold.
+    pub capacity: u32,
+}
+
+/// What shading keeps per pixel.
+pub struct PixelBuffers {
+    /// [`layout::GBuffer`].
+    pub gbuffer: wgpu::Buffer,
+    /// Radiance summed over samples.
+    pub radiance: wgpu::Buffer,
+}
+
+/// A storage buffer of `count` elements that can be written from and copied to the host.
+pub fn storage(gpu: &Gpu, label: &str, count: usize, stride: usize) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: (count.max(1) * stride) as u64,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+impl RayBuffers {
+    /// For `rays` rays.
+    pub fn new(gpu: &Gpu, rays: usize) -> Self {
+        Self {
+            rays: storage(gpu, "rays", rays, size_of::<layout::Ray>()),
+            hits: storage(gpu, "hits", rays, size_of::<layout::Hit>()),
+            surfaces: storage(gpu, "surfaces", rays, size_of::<layout::Surface>()),
+        }
+    }
+}
+
+impl TileBuffers {
+    /// For the tiles of `extent` and lists of `capacity` entries in all.
+    pub fn new(gpu: &Gpu, extent: Extent, capacity: u32) -> Self {
+        let tiles = extent.tiles() as usize;
+        let entries = capacity as usize;
+        Self {
+            bounds: storage(gpu, "tile bounds", tiles, size_of::<layout::TileBounds>()),
+            lists: storage(gpu, "tile lists", tiles, size_of::<layout::TileList>()),
+            list: storage(gpu, "list", entries, 4),
+            selection: storage(gpu, "selection", entries, 4),
+            pair_demand: storage(gpu, "pair demand", entries, size_of::<layout::Demand>()),
+            capacity: capacity.max(1),
+        }
+    }
+}
+
+impl PixelBuffers {
+    /// For `rays` pixels.
+    pub fn new(gpu: &Gpu, rays: usize) -> Self {
+        Self {
+            gbuffer: storage(gpu, "gbuffer", rays, size_of::<layout::GBuffer>()),
+            radiance: storage(gpu, "radiance", rays, 16),
+        }
+    }
+}

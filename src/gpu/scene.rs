@@ -1,0 +1,259 @@
+//! The resident part of a scene on the device, relative to the reference point of the frame.
+//!
+//! Positions follow numerics.md: the reference point R is a lattice point on multiples of 2²⁰ steps near the camera, each
+//! instance has its own on its object's lattice, and a brick's offset d = O − R is exact in one f32 (near) or two (wide).
+
+use super::device::Gpu;
+use super::layout;
+use bricks::{BRICK_WIDE, Brick, ORIGIN_STEPS, Resident, WIDE_HIGH_STEPS};
+use glam::{DMat3, DVec3};
+
+/// 2^e for any e that f64 holds.
+fn exp2(e: i32) -> f64 {
+    f64::from(e).exp2()
+}
+
+/// The reference point of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// R in steps of the world's lattice, multiples of 2²⁰.
+    pub reference: [i64; 3],
+    /// World units of one device unit.
+    pub unit: f64,
+    /// R in world units.
+    pub origin: DVec3,
+}
+
+impl Frame {
+    /// The frame of a viewer at `position` (world units): R is the nearest multiple of 2²⁰ steps, held to the scene's
+    /// bounds so that offsets of bricks stay exact however far away the viewer is.
+    pub fn near(resident: &Resident, position: DVec3) -> Self {
+        let world = &resident.objects[0];
+        let step = exp2(world.step_log2);
+        let cell = step * ORIGIN_STEPS as f64;
+        let mut reference = [0i64; 3];
+        for k in 0..3 {
+            let (lo, hi) = match resident.top2.first() {
+                Some(root) => (root.min[k], root.max[k]),
+                None => (0, 0),
+            };
+            let lo = lo.div_euclid(ORIGIN_STEPS) - 1;
+            let hi = hi.div_euclid(ORIGIN_STEPS) + 1;
+            // A float-to-integer cast saturates, and NaN becomes 0.
+            reference[k] = ((position[k] / cell).round() as i64).clamp(lo, hi) * ORIGIN_STEPS;
+        }
+        let origin = DVec3::from_array(reference.map(|r| r as f64)) * step;
+        Self { reference, unit: exp2(world.unit_log2), origin }
+    }
+
+    /// A world point in device units relative to R, rounded once.
+    pub fn point(&self, p: DVec3) -> [f32; 3] {
+        ((p - self.origin) / self.unit).as_vec3().to_array()
+    }
+}
+
+/// The buffers of group 0.
+pub struct SceneBuffers {
+    top8: wgpu::Buffer,
+    top2: wgpu::Buffer,
+    leaves: wgpu::Buffer,
+    instances: wgpu::Buffer,
+    bricks: wgpu::Buffer,
+    roots: wgpu::Buffer,
+    /// Slots and states, written before every submission.
+    pub slots: wgpu::Buffer,
+    frame: Option<Frame>,
+    /// Relative padding of top-level boxes for the rounding of instance rays.
+    pub instance_pad: f32,
+}
+
+impl SceneBuffers {
+    /// Allocates buffers for `resident` and fills what does not depend on the frame.
+    pub fn new(gpu: &Gpu, resident: &Resident) -> Self {
+        let buffer = |label: &str, count: usize, stride: usize| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: (count.max(1) * stride) as u64,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let count = resident.bricks.len();
+        let buffers = Self {
+            top8: buffer("top8", resident.top8.len(), size_of::<bricks::Node>()),
+            top2: buffer("top2", resident.top2.len(), size_of::<layout::TopNode2>()),
+            leaves: buffer("leaves", resident.leaves.len(), size_of::<layout::Leaf>()),
+            instances: buffer("instances", resident.instances.len(), size_of::<layout::Instance>()),
+            bricks: buffer("bricks", count, size_of::<layout::Brick>()),
+            roots: buffer("roots", count, size_of::<bricks::Node>()),
+            slots: buffer("slots", count, size_of::<layout::Slot>()),
+            frame: None,
+            instance_pad: 0.0,
+        };
+        let records: Vec<layout::Brick> = resident.bricks.iter().map(brick_record).collect();
+        let roots: Vec<bricks::Node> = resident.bricks.iter().map(|b| b.root).collect();
+        gpu.queue.write_buffer(&buffers.bricks, 0, bytemuck::cast_slice(&records));
+        gpu.queue.write_buffer(&buffers.roots, 0, bytemuck::cast_slice(&roots));
+        buffers
+    }
+
+    /// Bindings of group 0.
+    pub fn bindings(&self) -> Vec<wgpu::BindGroupEntry<'_>> {
+        [&self.top8, &self.top2, &self.leaves, &self.instances, &self.bricks, &self.roots, &self.slots]
+            .into_iter()
+            .enumerate()
+            .map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() })
+            .collect()
+    }
+
+    /// Moves everything to `frame`, if it is not there yet.
+    pub fn rebase(&mut self, gpu: &Gpu, resident: &Resident, frame: Frame) {
+        if self.frame == Some(frame) {
+            return;
+        }
+        self.frame = Some(frame);
+        let world = &resident.objects[0];
+        let world_scale = exp2(world.step_log2 - world.unit_log2);
+        let instances: Vec<Placed> = resident.instances.iter().map(|i| Placed::new(resident, i, &frame)).collect();
+        self.instance_pad = instances.iter().map(|i| i.pad).fold(0.0, f32::max);
+        let top8: Vec<bricks::Node> = resident.top8.iter().map(|n| rebase_top8(n, &frame, world_scale)).collect();
+        let top2: Vec<layout::TopNode2> = resident.top2.iter().map(|n| rebase_top2(n, &frame, world_scale)).collect();
+        let leaves: Vec<layout::Leaf> = resident
+            .leaves
+            .iter()
+            .map(|leaf| instances[leaf.instance as usize].leaf(leaf, &resident.bricks[leaf.brick as usize]))
+            .collect();
+        let records: Vec<layout::Instance> = instances.iter().map(|i| i.record).collect();
+        gpu.queue.write_buffer(&self.top8, 0, bytemuck::cast_slice(&top8));
+        gpu.queue.write_buffer(&self.top2, 0, bytemuck::cast_slice(&top2));
+        gpu.queue.write_buffer(&self.leaves, 0, bytemuck::cast_slice(&leaves));
+        gpu.queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&records));
+    }
+}
+
+/// Word offsets of a brick's arrays.
+fn brick_record(brick: &Brick) -> layout::Brick {
+    let geometry = bricks::GeometryLayout::of(brick);
+    let attributes = bricks::AttributeLayout::of(brick);
+    let words = |bytes: u64| (bytes / 4) as u32;
+    layout::Brick {
+        vertices: words(geometry.vertices),
+        ids: words(geometry.ids),
+        indices: words(geometry.indices),
+        flags: brick.flags,
+        surfaces: words(attributes.surfaces),
+        attribute_indices: words(attributes.indices),
+        ..Default::default()
+    }
+}
+
+/// An instance in the frame.
+struct Placed {
+    record: layout::Instance,
+    /// R′ in steps of the object's lattice, multiples of 2²⁰.
+    reference: [i64; 3],
+    /// Device units of the object per lattice step.
+    scale: f64,
+    pad: f32,
+}
+
+impl Placed {
+    fn new(resident: &Resident, instance: &bricks::Instance, frame: &Frame) -> Self {
+        let object = &resident.objects[instance.object as usize];
+        let scale = exp2(object.step_log2 - object.unit_log2);
+        let mut record = layout::Instance { base: instance.base, flags: instance.flags, scale: 1.0, ..Default::default() };
+        if instance.flags & bricks::INSTANCE_IDENTITY != 0 {
+            for k in 0..3 {
+                record.object_from_world[k][k] = 1.0;
+                record.world_from_object[k][k] = 1.0;
+            }
+            return Self { record, reference: frame.reference, scale, pad: 0.0 };
+        }
+        let m = &instance.world_from_object;
+        let linear = DMat3::from_cols(
+            DVec3::new(m[0], m[4], m[8]),
+            DVec3::new(m[1], m[5], m[9]),
+            DVec3::new(m[2], m[6], m[10]),
+        );
+        let translation = DVec3::new(m[3], m[7], m[11]);
+        let inverse = linear.inverse();
+        let object_unit = exp2(object.unit_log2);
+        let step = exp2(object.step_log2);
+        // R' near R, held to the object's own neighbourhood as R is to the scene's: a function of R alone, as
+        // what rays hit must be.
+        let near = inverse * (frame.origin - translation) / (step * ORIGIN_STEPS as f64);
+        let bounds = object_bounds(resident, object);
+        let mut reference = [0i64; 3];
+        for k in 0..3 {
+            let (lo, hi) = (bounds[0][k].div_euclid(ORIGIN_STEPS) - 1, bounds[1][k].div_euclid(ORIGIN_STEPS) + 1);
+            reference[k] = (near[k].round() as i64).clamp(lo, hi) * ORIGIN_STEPS;
+        }
+        let reference_point = DVec3::from_array(reference.map(|r| r as f64)) * step;
+        let forward = linear * (object_unit / frame.unit);
+        let backward = inverse * (frame.unit / object_unit);
+        let c = (inverse * (frame.origin - translation) - reference_point) / object_unit;
+        let t = (linear * reference_point + translation - frame.origin) / frame.unit;
+        for k in 0..3 {
+            record.object_from_world[k] = backward.row(k).as_vec3().extend(c[k] as f32).to_array();
+            record.world_from_object[k] = forward.row(k).as_vec3().extend(t[k] as f32).to_array();
+        }
+        // Frobenius norms bound the ratio of scales from above.
+        let norm = |m: &DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+        let ratio = (norm(&linear) * norm(&inverse)).max(1.0);
+        record.scale = ratio as f32;
+        // numerics.md, "Instances": 3.5 u κ on the direction and 3.7 u κ (|o| + |c|) on the origin; c, seen from the world,
+        // is bounded by |t| and the scene's own extent, which the kernel's reach holds. 32 leaves a wide margin.
+        let pad = (32.0 * f64::from(f32::EPSILON) / 2.0 * ratio) as f32;
+        Self { record, reference, scale, pad }
+    }
+
+    /// A leaf of this instance: the brick's offset from R′.
+    fn leaf(&self, leaf: &bricks::Leaf, brick: &Brick) -> layout::Leaf {
+        let mut out = layout::Leaf { instance: leaf.instance, brick: leaf.brick, ..Default::default() };
+        for k in 0..3 {
+            let d = brick.origin[k] - self.reference[k];
+            if brick.flags & BRICK_WIDE != 0 {
+                let high = (d + WIDE_HIGH_STEPS / 2).div_euclid(WIDE_HIGH_STEPS) * WIDE_HIGH_STEPS;
+                out.offset_high[k] = (high as f64 * self.scale) as f32;
+                out.offset_low[k] = ((d - high) as f64 * self.scale) as f32;
+            } else {
+                out.offset_high[k] = (d as f64 * self.scale) as f32;
+            }
+        }
+        out
+    }
+}
+
+/// Bounds of an object's bricks in its lattice steps.
+fn object_bounds(resident: &Resident, object: &bricks::Object) -> [[i64; 3]; 2] {
+    let first = object.first_brick as usize;
+    let mut bounds = [[0; 3]; 2];
+    for (i, brick) in resident.bricks[first..first + object.brick_count as usize].iter().enumerate() {
+        for k in 0..3 {
+            bounds[0][k] = if i == 0 { brick.min[k] } else { bounds[0][k].min(brick.min[k]) };
+            bounds[1][k] = if i == 0 { brick.max[k] } else { bounds[1][k].max(brick.max[k]) };
+        }
+    }
+    bounds
+}
+
+fn rebase_top8(node: &bricks::TopNode8, frame: &Frame, scale: f64) -> bricks::Node {
+    let scale_log2 = scale.log2().round() as i32;
+    bricks::Node {
+        // Rounded to nearest; the kernel's padding by 4 u |p| holds that.
+        origin: std::array::from_fn(|k| ((node.origin[k] - frame.reference[k]) as f64 * scale) as f32),
+        exponent: node.exponent.map(|e| (i32::from(e) + scale_log2 + 127).clamp(1, 254) as u8),
+        inner_mask: node.inner_mask,
+        child_base: node.child_base,
+        triangle_base: node.leaf_base,
+        meta: node.meta,
+        lo: node.lo,
+        hi: node.hi,
+    }
+}
+
+fn rebase_top2(node: &bricks::TopNode2, frame: &Frame, scale: f64) -> layout::TopNode2 {
+    // The kernel pads by more than the rounding to f32.
+    let point = |p: &[i64; 3]| std::array::from_fn(|k| ((p[k] - frame.reference[k]) as f64 * scale) as f32);
+    layout::TopNode2 { min: point(&node.min), left: node.left, max: point(&node.max), right: node.right }
+}

@@ -1,0 +1,82 @@
+//! Assembly of WGSL: `#include "shared/x.wgsl"` lines are replaced by the file, each file once; the accessors of paged
+//! buffers are generated for the number of pages at hand, so that one page costs no branch.
+//!
+//! The build script includes this file to check every kernel; it must not depend on the rest of the crate.
+
+use std::fmt::Write;
+
+/// Numbers of pages that the generated accessors serve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pages {
+    /// Pages of the brick cache; each is bound twice, as vectors and as words.
+    pub cache: usize,
+    /// Pages of texels.
+    pub texels: usize,
+}
+
+/// The text of kernel `name`, with includes taken from `file`. `None` if a file is missing.
+pub fn assemble(name: &str, pages: Pages, file: &dyn Fn(&str) -> Option<String>) -> Option<String> {
+    let mut out = String::new();
+    let mut seen = Vec::new();
+    append(name, pages, file, &mut seen, &mut out)?;
+    Some(out)
+}
+
+fn append(
+    name: &str,
+    pages: Pages,
+    file: &dyn Fn(&str) -> Option<String>,
+    seen: &mut Vec<String>,
+    out: &mut String,
+) -> Option<()> {
+    if seen.iter().any(|s| s == name) {
+        return Some(());
+    }
+    seen.push(name.to_string());
+    let text = match name {
+        "shared/cache.wgsl" => cache_accessors(pages.cache),
+        "shared/texels.wgsl" => texel_accessors(pages.texels),
+        _ => file(name)?,
+    };
+    for line in text.lines() {
+        match line.strip_prefix("#include \"").and_then(|rest| rest.strip_suffix('"')) {
+            Some(included) => append(included, pages, file, seen, out)?,
+            None => {
+                out.push_str(line);
+                out.push('\n');
+            }
+        }
+    }
+    Some(())
+}
+
+/// Accessors of the brick cache: group 2, binding 2k as vectors and 2k + 1 as words of page k.
+fn cache_accessors(pages: usize) -> String {
+    let mut s = String::new();
+    for k in 0..pages {
+        let (v, w) = (2 * k, 2 * k + 1);
+        let _ = writeln!(s, "@group(2) @binding({v}) var<storage, read> cache_vectors_{k}: array<vec4<u32>>;");
+        let _ = writeln!(s, "@group(2) @binding({w}) var<storage, read> cache_words_{k}: array<u32>;");
+    }
+    accessor(&mut s, "cache_vec4", "vec4<u32>", "cache_vectors", pages);
+    accessor(&mut s, "cache_word", "u32", "cache_words", pages);
+    s
+}
+
+/// Accessor of the texels: group 3, from binding 8.
+fn texel_accessors(pages: usize) -> String {
+    let mut s = String::new();
+    for k in 0..pages {
+        let _ = writeln!(s, "@group(3) @binding({}) var<storage, read> texels_{k}: array<u32>;", 8 + k);
+    }
+    accessor(&mut s, "texel_word", "u32", "texels", pages);
+    s
+}
+
+fn accessor(s: &mut String, name: &str, kind: &str, array: &str, pages: usize) {
+    let _ = writeln!(s, "fn {name}(page: u32, index: u32) -> {kind} {{");
+    for k in 1..pages {
+        let _ = writeln!(s, "    if page == {k}u {{ return {array}_{k}[index]; }}");
+    }
+    let _ = writeln!(s, "    return {array}_0[index];\n}}");
+}

@@ -1,0 +1,32 @@
+//! Sun and sky.
+
+use glam::DVec3;
+
+/// A sun disc and a sky of one colour over a ground of another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Unit vector toward the sun, world space.
+    pub sun_direction: DVec3,
+    /// Full angle of the sun's disc in degrees; 0 makes shadows hard.
+    pub sun_angle_degrees: f64,
+    /// What a white surface that faces the sun reflects of it, linear.
+    pub sun_color: [f32; 3],
+    /// Radiance of the sky, linear.
+    pub sky_color: [f32; 3],
+    /// Radiance of the ground, linear.
+    pub ground_color: [f32; 3],
+}
+
+impl Light {
+    /// A clear afternoon: direction as given, intensities relative to it.
+    pub fn new(sun_direction: DVec3, sun_angle_degrees: f64, sun_intensity: f32, sky_intensity: f32) -> Self {
+        let scaled = |c: [f32; 3], by: f32| c.map(|x| x * by);
+        Self {
+            sun_direction: sun_direction.normalize_or(DVec3::Y),
+            sun_angle_degrees,
+            sun_color: scaled([1.55, 1.42, 1.18], sun_intensity),
+            sky_color: scaled([0.36, 0.52, 0.82], sky_intensity),
+            ground_color: scaled([0.24, 0.22, 0.19], sky_intensity),
+        }
+    }
+}

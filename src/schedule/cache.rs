@@ -1,0 +1,108 @@
+//! The cache as a schedule uses it: residency, brick states, and the request trace.
+
+use super::{BrickStates, Executor, ExecutorError, Load, PassStats};
+use crate::stream::{Item, Kind, Residency, Trace};
+use std::time::Instant;
+
+/// Most bricks loaded between two queries (design.md: a fresh query per 8 loads costs at most 10 % more bytes).
+pub const BATCH_BRICKS: usize = 8;
+
+/// Bytes of one brick's payloads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BrickBytes {
+    /// Nodes.
+    pub bvh: u64,
+    /// All that traversal reads, nodes counted.
+    pub geometry: u64,
+    /// What shading reads.
+    pub attributes: u64,
+}
+
+/// What is resident, what every brick weighs, and what was asked for.
+pub struct Cache {
+    /// Placement and eviction.
+    pub residency: Residency,
+    /// Its mirror for executors, with each brick's part in the pass.
+    pub states: BrickStates,
+    /// Bytes per brick.
+    pub bytes: Vec<BrickBytes>,
+    /// Requests in order, when they are recorded.
+    pub trace: Option<Trace>,
+}
+
+impl Cache {
+    /// An empty cache over bricks of the given sizes.
+    pub fn new(residency: Residency, bytes: Vec<BrickBytes>, trace: Option<Trace>) -> Self {
+        let states = BrickStates::new(bytes.len());
+        Self { residency, states, bytes, trace }
+    }
+
+    /// Starts a pass: nothing is done, nothing is pinned.
+    pub fn begin_pass(&mut self, name: &str, frame: u32) {
+        self.residency.begin_pass();
+        self.residency.unpin_all();
+        self.states.begin_pass();
+        if let Some(trace) = &mut self.trace {
+            trace.begin_pass(frame, name);
+        }
+    }
+
+    /// Notes the use of what is resident.
+    pub fn touch(&mut self, item: Item) {
+        self.residency.touch(item);
+        if let Some(trace) = &mut self.trace {
+            trace.request(item);
+        }
+    }
+
+    /// Loads as many of `items` as fit without evicting each other, at least one and at most `most`; returns how many,
+    /// from the front.
+    ///
+    /// # Errors
+    /// What the executor says; nothing of the batch is resident then.
+    pub fn load(
+        &mut self,
+        executor: &mut dyn Executor,
+        items: &[Item],
+        most: usize,
+        stats: &mut PassStats,
+    ) -> Result<usize, ExecutorError> {
+        let start = Instant::now();
+        let before = self.residency.counters();
+        self.residency.unpin_all();
+        let mut loads = Vec::new();
+        for &item in items.iter().take(most) {
+            let Ok(placed) = self.residency.insert(item) else { break };
+            self.residency.pin(item);
+            self.states.place(item, &placed);
+            if let Some(trace) = &mut self.trace {
+                trace.request(item);
+            }
+            loads.push(Load { item, slot: placed.slot });
+        }
+        if let Err(error) = executor.load(&loads) {
+            for load in &loads {
+                self.residency.withdraw(load.item);
+                self.states.forget(load.item);
+            }
+            return Err(error);
+        }
+        for load in &loads {
+            let bytes = self.bytes[load.item.brick as usize];
+            match load.item.kind {
+                Kind::Geometry => {
+                    stats.bytes_bvh += bytes.bvh;
+                    stats.bytes_geometry += bytes.geometry - bytes.bvh;
+                }
+                Kind::Attributes => stats.bytes_attributes += bytes.attributes,
+            }
+        }
+        let change = self.residency.counters().since(&before).total();
+        stats.loaded += change.loaded;
+        stats.reloaded += change.reloaded;
+        stats.evicted += change.evicted;
+        stats.batches += 1;
+        stats.ms_stream += start.elapsed().as_secs_f64() * 1e3;
+        Ok(loads.len())
+    }
+}

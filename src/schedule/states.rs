@@ -1,0 +1,114 @@
+//! The state of every brick as a schedule sees it, mirrored to the executor at each step.
+
+use crate::stream::{Item, Kind, Placed, Residency, Slot};
+
+/// Where bricks lie and what part they play in the pass.
+#[derive(Clone, Debug)]
+pub struct BrickStates {
+    geometry: Vec<Option<Slot>>,
+    attributes: Vec<Option<Slot>>,
+    done: Vec<bool>,
+    batch: Vec<bool>,
+}
+
+impl BrickStates {
+    /// Nothing resident of `bricks` bricks.
+    pub fn new(bricks: usize) -> Self {
+        Self {
+            geometry: vec![None; bricks],
+            attributes: vec![None; bricks],
+            done: vec![false; bricks],
+            batch: vec![false; bricks],
+        }
+    }
+
+    /// Number of bricks.
+    pub fn len(&self) -> usize {
+        self.done.len()
+    }
+
+    /// Whether there are no bricks.
+    pub fn is_empty(&self) -> bool {
+        self.done.is_empty()
+    }
+
+    /// Slot of a brick's geometry.
+    pub fn geometry(&self, brick: usize) -> Option<Slot> {
+        self.geometry[brick]
+    }
+
+    /// Slot of a brick's attributes.
+    pub fn attributes(&self, brick: usize) -> Option<Slot> {
+        self.attributes[brick]
+    }
+
+    /// Whether every ray of the pass that wanted the brick has been intersected with it.
+    pub fn done(&self, brick: usize) -> bool {
+        self.done[brick]
+    }
+
+    /// Whether the brick came with the batch to be intersected now.
+    pub fn batch(&self, brick: usize) -> bool {
+        self.batch[brick]
+    }
+
+    /// Forgets the pass before.
+    pub(super) fn begin_pass(&mut self) {
+        self.done.fill(false);
+        self.batch.fill(false);
+    }
+
+    /// Marks what is resident as done, and returns it.
+    pub(super) fn finish_resident(&mut self) -> Vec<u32> {
+        let mut finished = Vec::new();
+        for brick in 0..self.done.len() {
+            if self.geometry[brick].is_some() && !self.done[brick] {
+                self.done[brick] = true;
+                finished.push(brick as u32);
+            }
+        }
+        finished
+    }
+
+    /// Marks `bricks` as the batch, done when its step has run.
+    pub(super) fn set_batch(&mut self, bricks: &[u32]) {
+        self.batch.fill(false);
+        for &brick in bricks {
+            self.batch[brick as usize] = true;
+            self.done[brick as usize] = true;
+        }
+    }
+
+    /// Enters a placement that `residency` made.
+    pub(super) fn place(&mut self, item: Item, placed: &Placed) {
+        for evicted in &placed.evicted {
+            *self.slot(*evicted) = None;
+        }
+        *self.slot(item) = Some(placed.slot);
+    }
+
+    /// Drops a payload that could not be read.
+    pub(super) fn forget(&mut self, item: Item) {
+        *self.slot(item) = None;
+    }
+
+    /// Whether every brick's geometry is resident.
+    pub fn all_geometry_resident(&self) -> bool {
+        self.geometry.iter().all(Option::is_some)
+    }
+
+    /// Whether the slots are those of `residency`, for checks.
+    pub fn agrees_with(&self, residency: &Residency) -> bool {
+        (0..self.len()).all(|brick| {
+            self.geometry[brick] == residency.slot(Item::geometry(brick as u32))
+                && self.attributes[brick] == residency.slot(Item::attributes(brick as u32))
+        })
+    }
+
+    fn slot(&mut self, item: Item) -> &mut Option<Slot> {
+        match item.kind {
+            Kind::Geometry => &mut self.geometry[item.brick as usize],
+            Kind::Attributes => &mut self.attributes[item.brick as usize],
+        }
+    }
+}

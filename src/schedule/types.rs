@@ -1,0 +1,176 @@
+//! What a schedule and an executor say to each other.
+
+use super::BrickStates;
+use crate::stream::{Item, Slot};
+use thiserror::Error;
+
+/// The rays that a step works on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Pass {
+    /// Camera rays, or rays given from outside: closest hit.
+    Primary,
+    /// Rays from primary hits to the sun, or rays given from outside: any hit.
+    Shadow,
+}
+
+/// A kernel, or a few that belong together, run over all rays or tiles of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Fill the pass's rays from the camera, or from the primary hits.
+    Generate,
+    /// Start the hits of rays given from outside.
+    StartHits,
+    /// Bounds of the tiles, their walk of the top level, their lists of leaves.
+    Lists,
+    /// Intersect the listed leaves whose geometry is resident and not done: phase 1.
+    IntersectResident,
+    /// Intersect the listed leaves of the batch just loaded: phase 3.
+    IntersectBatch,
+    /// Intersect everything, all of it resident, from the root.
+    IntersectAll,
+    /// Ask ray by ray which missing bricks are still wanted: phase 2.
+    QueryMissing,
+    /// Ask ray by ray which bricks the pass needed, from its final hits.
+    QueryNeeded,
+    /// Ask which bricks hold a final hit of the pass.
+    QueryHits,
+    /// Empty the G-buffer.
+    ClearAttributes,
+    /// Read the attributes that are resident.
+    Resolve,
+    /// Shade the primary hits; with the shadow rays of the pass when `shadows`.
+    Shade {
+        /// Whether the shadow pass has been traced.
+        shadows: bool,
+    },
+}
+
+/// One payload to be copied into the cache.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Load {
+    /// What.
+    pub item: Item,
+    /// Where to.
+    pub slot: Slot,
+}
+
+/// What came back from one round trip.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Round trips it took: 2 when the lists had to grow, else 1.
+    pub round_trips: u32,
+    /// Bricks still wanted: brick, rays, entry distance of the nearest; ascending by brick.
+    pub demand: Vec<(u32, u32, f32)>,
+    /// Entries that the tiles' lists hold, or would hold.
+    pub list_entries: u32,
+    /// Pairs (tile, node) put to the interval test.
+    pub pairs_tested: u64,
+    /// Of these, culled.
+    pub pairs_culled: u64,
+    /// Ray-by-ray queries with a ray that wants the leaf.
+    pub pairs_visible: u64,
+    /// Ray-by-ray queries without.
+    pub pairs_invisible: u64,
+    /// Pairs (tile, leaf) intersected.
+    pub pairs_intersected: u64,
+    /// Rays traced; counted by [`Step::Lists`] and [`Step::IntersectAll`].
+    pub rays: u64,
+    /// Nodes visited, when the executor counts.
+    pub nodes: u64,
+    /// Triangles tested, when the executor counts.
+    pub triangles: u64,
+    /// Pixels whose radiance was not finite.
+    pub non_finite: u64,
+    /// Device time of phases 1, 2 and 3 in milliseconds; zero where the device has no timestamps.
+    pub ms_phases: [f64; 3],
+}
+
+/// Why an executor gave up.
+#[derive(Debug, Error)]
+pub enum ExecutorError {
+    /// A payload could not be read.
+    #[error(transparent)]
+    Stream(#[from] crate::stream::StreamError),
+    /// The device failed.
+    #[error("the device {0}")]
+    Device(String),
+    /// A traversal stack was too small: the scene file's heights are wrong.
+    #[error("a traversal stack overflowed {0} times; the scene file's tree heights are wrong: run `brickwalk verify`")]
+    StackOverflow(u32),
+}
+
+/// Makes bricks resident and runs kernels over them.
+pub trait Executor {
+    /// Copies payloads to their slots. Everything in `loads` is resident when this returns.
+    ///
+    /// # Errors
+    /// A payload that cannot be read or whose checksum fails, by its brick.
+    fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError>;
+
+    /// Runs `steps` in order over the rays of `pass` against bricks in the given states, waits, and reports.
+    ///
+    /// # Errors
+    /// The device's, and [`ExecutorError::StackOverflow`].
+    fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError>;
+}
+
+/// Statistics of one pass.
+#[derive(Clone, Debug, Default)]
+pub struct PassStats {
+    /// Sums over the pass's round trips.
+    pub report: Report,
+    /// Wall time in `Executor::load`, milliseconds.
+    pub ms_stream: f64,
+    /// Wall time of the pass, milliseconds.
+    pub ms: f64,
+    /// Distinct bricks whose geometry was intersected.
+    pub bricks_intersected: Vec<u32>,
+    /// Distinct bricks that the pass needed (definitions.md), where it was asked.
+    pub bricks_needed: Option<Vec<u32>>,
+    /// Distinct bricks that hold a final hit, where it was asked.
+    pub bricks_hit: Option<Vec<u32>>,
+    /// Pairs (tile, leaf) of the visible front at the end.
+    pub pairs_visible: u64,
+    /// Pairs (tile, node) of the invisible front at the end.
+    pub pairs_invisible: u64,
+    /// Pairs whose invisible children were collapsed.
+    pub pulled_up: u64,
+    /// Bytes of needed geometry, where it was asked.
+    pub bytes_needed: u64,
+    /// Bytes of needed geometry that was not resident when the pass began, where it was asked.
+    pub bytes_needed_missing: u64,
+    /// Payloads loaded.
+    pub loaded: u64,
+    /// Payloads loaded twice or more in this pass.
+    pub reloaded: u64,
+    /// Payloads evicted.
+    pub evicted: u64,
+    /// Bytes of nodes loaded.
+    pub bytes_bvh: u64,
+    /// Bytes of triangles loaded.
+    pub bytes_geometry: u64,
+    /// Bytes of attributes loaded.
+    pub bytes_attributes: u64,
+    /// Batches of loads.
+    pub batches: u64,
+}
+
+impl PassStats {
+    /// Adds what one round trip reported.
+    pub fn add(&mut self, r: Report) {
+        let sum = &mut self.report;
+        sum.round_trips += r.round_trips;
+        sum.pairs_tested += r.pairs_tested;
+        sum.pairs_culled += r.pairs_culled;
+        sum.pairs_visible += r.pairs_visible;
+        sum.pairs_invisible += r.pairs_invisible;
+        sum.pairs_intersected += r.pairs_intersected;
+        sum.rays += r.rays;
+        sum.nodes += r.nodes;
+        sum.triangles += r.triangles;
+        sum.non_finite += r.non_finite;
+        for (total, ms) in sum.ms_phases.iter_mut().zip(r.ms_phases) {
+            *total += ms;
+        }
+    }
+}

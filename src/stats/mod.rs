@@ -1,0 +1,139 @@
+//! The records of a walk: one struct a row, written as JSON lines. Field names and meanings are those of the interface.
+
+use crate::schedule::PassStats;
+use serde::Serialize;
+
+/// One frame and pass.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Record {
+    /// Frame, from 0.
+    pub frame: u32,
+    /// `primary` or `shadow`.
+    pub pass: &'static str,
+    /// Rays traced.
+    pub rays: u64,
+    /// Wall time from first submission to last fence, ms.
+    pub ms: f64,
+    /// Device time of intersecting what was resident, ms.
+    pub ms_phase1: f64,
+    /// Device time of queries and lists, ms.
+    pub ms_phase2: f64,
+    /// Device time of intersecting what was loaded or found visible, ms.
+    pub ms_phase3: f64,
+    /// Wall time of loading, ms.
+    pub ms_stream: f64,
+    /// Millions of rays per second of `ms`.
+    pub mrays_per_s: f64,
+    /// Pairs (tile, node) queried, by interval and ray by ray.
+    pub queries: u64,
+    /// Ray-by-ray queries that found a ray.
+    pub queries_visible: u64,
+    /// Pairs that the interval test culled.
+    pub queries_interval_culled: u64,
+    /// Queries over several nodes at once.
+    pub multi_queries: u64,
+    /// Of these, those that had to be repeated node by node.
+    pub multi_queries_failed: u64,
+    /// Visible pairs (tile, leaf) at the end.
+    pub pairs_visible: u64,
+    /// Invisible pairs at the end.
+    pub pairs_invisible: u64,
+    /// Pairs whose children were collapsed.
+    pub pulled_up: u64,
+    /// Pairs (tile, leaf) intersected.
+    pub pairs_intersected: u64,
+    /// Submissions that the host waited for.
+    pub round_trips: u64,
+    /// Distinct bricks that the pass needed, where that is known, else that were intersected.
+    pub bricks_needed: u64,
+    /// Distinct bricks that hold a final hit.
+    pub bricks_hit: u64,
+    /// Payloads loaded.
+    pub bricks_loaded: u64,
+    /// Payloads loaded twice or more in this pass.
+    pub bricks_reloaded: u64,
+    /// Payloads evicted.
+    pub bricks_evicted: u64,
+    /// Payloads resident at the start.
+    pub bricks_resident_start: u64,
+    /// Payloads resident at the end.
+    pub bricks_resident_end: u64,
+    /// Batches of loads.
+    pub load_batches: u64,
+    /// Bytes of needed geometry, where needs are measured.
+    pub bytes_needed: u64,
+    /// Of these, bytes that were not resident when the pass began.
+    pub bytes_needed_missing: u64,
+    /// Bytes of nodes moved.
+    pub bytes_bvh: u64,
+    /// Bytes of triangles moved.
+    pub bytes_geometry: u64,
+    /// Bytes of attributes moved.
+    pub bytes_attributes: u64,
+    /// Bytes of textures moved.
+    pub bytes_textures: u64,
+    /// Nodes visited, with `--count`.
+    pub nodes_visited: u64,
+    /// Triangles tested, with `--count`.
+    pub triangles_tested: u64,
+    /// The cache's budget.
+    pub cache_bytes: u64,
+    /// Of it, bytes in use at the end.
+    pub cache_used_bytes: u64,
+    /// Pixels that are not final.
+    pub unresolved_pixels: u64,
+    /// Pixels whose radiance was not finite.
+    pub non_finite: u64,
+}
+
+impl Record {
+    /// The record of a pass from its statistics; the caller adds what concerns the cache.
+    pub fn of(frame: u32, pass: &'static str, stats: &PassStats) -> Self {
+        let r = &stats.report;
+        let needed = stats.bricks_needed.as_ref().unwrap_or(&stats.bricks_intersected);
+        Self {
+            frame,
+            pass,
+            rays: r.rays,
+            ms: stats.ms,
+            ms_phase1: r.ms_phases[0],
+            ms_phase2: r.ms_phases[1],
+            ms_phase3: r.ms_phases[2],
+            ms_stream: stats.ms_stream,
+            mrays_per_s: if stats.ms > 0.0 { r.rays as f64 / stats.ms * 1e-3 } else { 0.0 },
+            queries: r.pairs_tested + r.pairs_visible + r.pairs_invisible,
+            queries_visible: r.pairs_visible,
+            queries_interval_culled: r.pairs_culled,
+            pairs_visible: stats.pairs_visible,
+            pairs_invisible: stats.pairs_invisible,
+            pulled_up: stats.pulled_up,
+            multi_queries: 0,
+            multi_queries_failed: 0,
+            pairs_intersected: r.pairs_intersected,
+            round_trips: r.round_trips.into(),
+            bricks_needed: distinct(needed),
+            bricks_hit: stats.bricks_hit.as_deref().map_or(0, distinct),
+            bricks_loaded: stats.loaded,
+            bricks_reloaded: stats.reloaded,
+            bricks_evicted: stats.evicted,
+            load_batches: stats.batches,
+            bytes_needed: stats.bytes_needed,
+            bytes_needed_missing: stats.bytes_needed_missing,
+            bytes_bvh: stats.bytes_bvh,
+            bytes_geometry: stats.bytes_geometry,
+            bytes_attributes: stats.bytes_attributes,
+            nodes_visited: r.nodes,
+            triangles_tested: r.triangles,
+            non_finite: r.non_finite,
+            ..Self::default()
+        }
+    }
+}
+
+/// Number of distinct bricks: the samples of a frame name some several times.
+fn distinct(bricks: &[u32]) -> u64 {
+    let mut sorted = bricks.to_vec();
+    sorted.sort_unstable();
+    sorted.dedup();
+    sorted.len() as u64
+}
