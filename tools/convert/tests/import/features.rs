@@ -403,11 +403,28 @@ fn an_image_that_cannot_be_used_is_white() {
         assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
         assert!(scene.warnings[0].contains("image 0"), "{:?}", scene.warnings);
     }
+    // A PNG whose header claims 16000x16000 texels is not even begun.
+    let mut file = textured();
+    let offset = file.root["bufferViews"][2]["byteOffset"].as_u64().unwrap() as usize;
+    let header = &mut file.bytes[offset + 12..offset + 33];
+    header[4..8].copy_from_slice(&16000u32.to_be_bytes());
+    header[8..12].copy_from_slice(&16000u32.to_be_bytes());
+    let checksum = crc32(&header[..17]);
+    header[17..].copy_from_slice(&checksum.to_be_bytes());
+    let warnings = file.scene().warnings;
+    assert!(warnings[0].contains("claims 16000x16000 texels"), "{warnings:?}");
     // A PNG cut short is no image either.
     let mut file = textured();
     let length = file.root["bufferViews"][2]["byteLength"].as_u64().unwrap();
     file.root["bufferViews"][2]["byteLength"] = json!(length / 2);
     assert_eq!(file.scene().warnings.len(), 1);
+}
+
+/// The checksum of PNG chunks.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, &byte| {
+        (0..8).fold(crc ^ byte as u32, |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb88320 } else { crc >> 1 })
+    })
 }
 
 #[test]

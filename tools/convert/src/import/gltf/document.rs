@@ -32,7 +32,7 @@ impl<'de> Deserialize<'de> for Uint {
 
             fn visit_f64<E: Error>(self, value: f64) -> Result<Uint, E> {
                 // Beyond 2^53 a float is no exact integer any more.
-                if value >= 0.0 && value <= 9007199254740992.0 && value.fract() == 0.0 {
+                if (0.0..=9007199254740992.0).contains(&value) && value.fract() == 0.0 {
                     Ok(Uint(value as u64))
                 } else {
                     Err(E::invalid_value(Unexpected::Float(value), &self))

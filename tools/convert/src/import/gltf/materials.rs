@@ -3,7 +3,7 @@
 use super::document::{Document, Index, Material as Json, TextureTransform, Uint};
 use super::file::{File, Problem, item, read};
 use super::{label, uri};
-use crate::import::error::{ImportError, show};
+use crate::import::error::{ImportError, one_line, show};
 use crate::import::warnings::Warnings;
 use crate::progress::Progress;
 use crate::source::SourceTexture;
@@ -14,6 +14,13 @@ use std::collections::BTreeMap;
 
 /// Longest side of an image, in texels: what devices commonly allow.
 const MAX_SIDE: u32 = 16384;
+
+/// Most bytes of RGBA texels for a byte of an image file, so that a few bytes cannot demand gigabytes. Deflate reaches
+/// 1032:1, and a grey texel of one byte becomes four.
+const MAX_COMPRESSION: u64 = 8192;
+
+/// Images of so few bytes of RGBA texels may be compressed at will.
+const FREE_TEXEL_BYTES: u64 = 1 << 20;
 
 /// Set of texture coordinates of the base colour texture, and their transformation. `None`: no texture.
 pub(super) fn base_color_set(material: &Json) -> Option<(Uint, Option<&TextureTransform>)> {
@@ -212,16 +219,22 @@ fn decode_image(file: &File, index: usize) -> Result<Texels, String> {
         (None, Some(view)) => file.view(view).map_err(|problem| problem.what)?.0,
         (None, None) => return Err("it has neither a URI nor a buffer view".into()),
     };
-    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
-    reader.set_format(match image::guess_format(bytes) {
+    let format = match image::guess_format(bytes) {
         Ok(format @ (image::ImageFormat::Png | image::ImageFormat::Jpeg)) => format,
         _ => return Err("it is neither PNG nor JPEG".into()),
-    });
+    };
+    let reader = || image::ImageReader::with_format(std::io::Cursor::new(bytes), format);
+    let (width, height) = reader().into_dimensions().map_err(|e| one_line(&e.to_string()))?;
+    let texel_bytes = 4 * u64::from(width) * u64::from(height);
+    if texel_bytes > FREE_TEXEL_BYTES && texel_bytes / MAX_COMPRESSION > bytes.len() as u64 {
+        return Err(format!("it claims {width}x{height} texels, more than its {} bytes can hold", bytes.len()));
+    }
+    let mut reader = reader();
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(4 * 4 * u64::from(MAX_SIDE) * u64::from(MAX_SIDE));
     reader.limits(limits);
-    let image = reader.decode().map_err(|e| crate::import::error::one_line(&e.to_string()))?.into_rgba8();
+    let image = reader.decode().map_err(|e| one_line(&e.to_string()))?.into_rgba8();
     Ok((image.width(), image.height(), image.into_raw()))
 }

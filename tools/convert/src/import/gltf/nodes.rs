@@ -78,7 +78,7 @@ pub(super) fn uses<'a>(file: &'a File, warnings: &mut Warnings) -> Result<Vec<Us
     }
     let left_out = document.nodes.len() - visited;
     if left_out > 0 && document.nodes.iter().any(|node| node.mesh.is_some()) {
-        warnings.add(format!("{left_out} nodes outside the default scene are left out"), String::new);
+        warnings.add(format!("nodes outside the default scene are left out: {left_out}"), String::new);
     }
     if uses.is_empty() && !document.meshes.is_empty() {
         warnings.add("no node of the scene has a mesh", String::new);
