@@ -1,0 +1,5 @@
+//! Arithmetic that the rest builds on: the exact ray-triangle test, sampling patterns, encodings of directions.
+
+pub mod exact;
+pub mod octahedral;
+pub mod sampling;

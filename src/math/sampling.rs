@@ -1,0 +1,158 @@
+//! Point sets and maps of the unit square: Halton and Hammersley, the concentric disc, integer hashes.
+
+/// Radical inverse of `index` in `base`: the digits mirrored at the point, in [0, 1). `base` is at least 2.
+///
+/// Computed in integers and divided once, so that it is exact to rounding; never 1 (Pharr, Jakob, Humphreys, "Physically
+/// Based Rendering", 8.6.1).
+pub fn radical_inverse(base: u32, index: u32) -> f64 {
+    let (base, mut index) = (u64::from(base), u64::from(index));
+    let (mut mirrored, mut power) = (0u64, 1u64);
+    // power <= base * index < 2^64.
+    while index > 0 {
+        mirrored = mirrored * base + index % base;
+        power *= base;
+        index /= base;
+    }
+    // u64 above 2^53 round: 1 - 1/power may become 1.
+    (mirrored as f64 / power as f64).min(1.0 - f64::EPSILON / 2.0)
+}
+
+/// Bases of the dimensions of [`halton`].
+const PRIMES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
+
+/// Point `index` of the Halton sequence in `dimension` 0..12 (bases 2, 3, 5, ...; it repeats beyond), in [0, 1).
+pub fn halton(index: u32, dimension: usize) -> f32 {
+    below_one(radical_inverse(PRIMES[dimension % PRIMES.len()], index))
+}
+
+/// Point `index` of the Hammersley set of `count` points in the unit square: ((index + 0.5) / count, radical inverse in
+/// base 2). Both are in [0, 1) for `index` below `count`; a `count` of 0 counts as 1.
+pub fn hammersley(index: u32, count: u32) -> [f32; 2] {
+    let x = (f64::from(index) + 0.5) / f64::from(count.max(1));
+    [below_one(x), below_one(radical_inverse(2, index))]
+}
+
+/// To f32, toward 0 where rounding would reach 1.
+fn below_one(x: f64) -> f32 {
+    (x as f32).clamp(0.0, 1.0 - f32::EPSILON / 2.0)
+}
+
+/// The unit square to the unit disc, areas and neighbours kept (Shirley, Chiu 1997). The centre goes to the centre.
+pub fn concentric_disc([x, y]: [f32; 2]) -> [f32; 2] {
+    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+    let (x, y) = (2.0 * x - 1.0, 2.0 * y - 1.0);
+    if x == 0.0 && y == 0.0 {
+        return [0.0; 2];
+    }
+    let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_2 - FRAC_PI_4 * (x / y)) };
+    [r * angle.cos(), r * angle.sin()]
+}
+
+/// A direction of the upper hemisphere about z with density cos / pi, from the disc (Malley). The height is clamped
+/// at 0, because the disc's rounding can exceed 1.
+pub fn cosine_hemisphere(square: [f32; 2]) -> [f32; 3] {
+    let [x, y] = concentric_disc(square);
+    [x, y, (1.0 - x * x - y * y).max(0.0).sqrt()]
+}
+
+/// 32 random bits from 32: the output function of PCG on one step of its generator (O'Neill 2014; Jarzynski, Olano 2020).
+/// The kernels' `pcg` in `shaders/shared/random.wgsl`.
+pub fn pcg(x: u32) -> u32 {
+    let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+/// Two numbers in [0, 1) from (pixel, sample, seed): the kernels' `random2`, equal bit for bit.
+pub fn random2(pixel: u32, sample: u32, seed: u32) -> [f32; 2] {
+    let a = pcg(pixel ^ pcg(sample ^ pcg(seed)));
+    [a, pcg(a)].map(|x| (x >> 8) as f32 / 16_777_216.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radical_inverses_are_known_and_below_one() {
+        assert_eq!((1..=6).map(|i| radical_inverse(2, i)).collect::<Vec<_>>(), [0.5, 0.25, 0.75, 0.125, 0.625, 0.375]);
+        assert_eq!([1, 2, 3, 4].map(|i| radical_inverse(3, i)), [1.0 / 3.0, 2.0 / 3.0, 1.0 / 9.0, 4.0 / 9.0]);
+        for base in PRIMES {
+            for index in [u32::MAX, u32::MAX - 1, 1 << 31, base, base - 1] {
+                let x = radical_inverse(base, index);
+                assert!((0.0..1.0).contains(&x), "{base} {index} {x}");
+            }
+        }
+        assert!(halton(u32::MAX, 0) < 1.0);
+        // Mirrored twice is the same: for base 2 by bit reversal.
+        for index in [3u32, 1234, 0xdead_beef] {
+            assert_eq!(radical_inverse(2, index), f64::from(index.reverse_bits()) / 4_294_967_296.0);
+        }
+    }
+
+    /// Greatest difference between the share of points in a box at the origin and its area.
+    fn discrepancy(points: &[[f32; 2]]) -> f64 {
+        let mut worst = 0.0f64;
+        for i in 1..=16 {
+            for j in 1..=16 {
+                let (x, y) = (i as f32 / 16.0, j as f32 / 16.0);
+                let inside = points.iter().filter(|p| p[0] < x && p[1] < y).count() as f64;
+                worst = worst.max((inside / points.len() as f64 - f64::from(x * y)).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn low_discrepancy_is_low() {
+        let n = 1024;
+        let hammersley: Vec<_> = (0..n).map(|i| hammersley(i, n)).collect();
+        let halton: Vec<_> = (0..n).map(|i| [halton(i, 0), halton(i, 1)]).collect();
+        let random: Vec<_> = (0..n).map(|i| random2(i, 0, 0)).collect();
+        let (a, b, control) = (discrepancy(&hammersley), discrepancy(&halton), discrepancy(&random));
+        assert!(a < 0.005 && b < 0.01, "{a} {b}");
+        assert!(control > 0.01, "the control must show: {control}");
+        assert!(hammersley.iter().flatten().all(|x| (0.0..1.0).contains(x)));
+    }
+
+    #[test]
+    fn the_disc_keeps_centre_diagonals_and_areas() {
+        assert_eq!(concentric_disc([0.5, 0.5]), [0.0, 0.0]);
+        for (x, y) in [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)] {
+            let [a, b] = concentric_disc([x, y]);
+            assert!((a.hypot(b) - 1.0).abs() < 1e-6 && (a.abs() - b.abs()).abs() < 1e-6, "{a} {b}");
+            assert_eq!((a > 0.0, b > 0.0), (x > 0.5, y > 0.5));
+        }
+        let n = 1 << 14;
+        let points: Vec<_> = (0..n).map(|i| concentric_disc(hammersley(i, n))).collect();
+        // The ring of radius r holds the share r^2; without the map's correction (x, y) -> r it would not.
+        for r in [0.25f32, 0.5, 0.75] {
+            let inside = points.iter().filter(|p| p[0].hypot(p[1]) < r).count() as f32 / n as f32;
+            assert!((inside - r * r).abs() < 0.003, "{r} {inside}");
+        }
+    }
+
+    #[test]
+    fn hemisphere_directions_are_unit_also_at_the_rim() {
+        for i in 0..4096 {
+            for square in [hammersley(i, 4096), [0.0, i as f32 / 4096.0], [1.0, 1.0]] {
+                let d = cosine_hemisphere(square);
+                let length = d.iter().map(|x| x * x).sum::<f32>().sqrt();
+                assert!((length - 1.0).abs() < 1e-6 && d[2] >= 0.0, "{d:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn hashes_are_fixed_and_use_every_bit() {
+        assert_eq!([0, 1, 2].map(pcg), [129_708_002, 2_831_084_092, 2_055_130_248]);
+        let n = 1 << 16;
+        for bit in 0..32 {
+            let set = (0..n).filter(|&i| pcg(i) >> bit & 1 == 1).count() as i64;
+            assert!((set - i64::from(n) / 2).abs() < 1000, "bit {bit}: {set}");
+        }
+        let [x, y] = random2(7, 3, 1);
+        assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y) && x != y);
+        assert_ne!(random2(7, 3, 1), random2(7, 3, 2));
+    }
+}
