@@ -1,0 +1,115 @@
+//! Why a scene could not be built.
+
+/// Why a scene could not be built. Each message says which mesh or setting is at fault and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// A setting is outside its range.
+    #[error("{setting} is {found}; give {expected}")]
+    Setting {
+        /// Name of the setting, as on the command line.
+        setting: &'static str,
+        /// What was given.
+        found: String,
+        /// What can be given.
+        expected: String,
+    },
+    /// The scene does not hold together: an index without its target, arrays of different lengths.
+    #[error("{what}: found {found}, expected {expected}; the file is damaged, export it again")]
+    Inconsistent {
+        /// The part of the scene.
+        what: String,
+        /// What is there.
+        found: String,
+        /// What should be.
+        expected: String,
+    },
+    /// Global ids do not fit 32 bits.
+    #[error(
+        "the scene has {found} triangles with every instance multiplied out; at most {} can be numbered, \
+         split the scene into several files",
+        bricks::MAX_TRIANGLE_IDS
+    )]
+    TooManyTriangles {
+        /// The number of triangles.
+        found: u64,
+    },
+    /// A vertex that is not a number or infinite.
+    #[error(
+        "mesh \"{mesh}\", primitive {primitive}: vertex {vertex} is not finite: {position:?}; \
+         repair the mesh, or convert with --drop-non-finite to leave such triangles out"
+    )]
+    NonFinite {
+        /// Name of the mesh.
+        mesh: String,
+        /// Index of the primitive in the mesh.
+        primitive: u32,
+        /// Index of the vertex in the primitive.
+        vertex: u32,
+        /// The position in mesh space.
+        position: [f64; 3],
+    },
+    /// A coordinate too large for any lattice.
+    #[error(
+        "mesh \"{mesh}\", primitive {primitive}: vertex {vertex} lies at {position:?}, farther out than \
+         {limit:e}; scale the scene down or remove the vertex"
+    )]
+    OutOfRange {
+        /// Name of the mesh.
+        mesh: String,
+        /// Index of the primitive in the mesh.
+        primitive: u32,
+        /// Index of the vertex in the primitive.
+        vertex: u32,
+        /// The position after its placement.
+        position: [f64; 3],
+        /// Largest magnitude of a coordinate.
+        limit: f64,
+    },
+    /// A placement that puts an instance too far out or blows it up too much.
+    #[error(
+        "node \"{node}\": its instance of mesh \"{mesh}\" reaches farther out than {limit:e}; \
+         correct the node's matrix or scale the scene down"
+    )]
+    InstanceOutOfRange {
+        /// Name of the node.
+        node: String,
+        /// Name of the mesh.
+        mesh: String,
+        /// Largest magnitude of a coordinate.
+        limit: f64,
+    },
+    /// The lattice that was asked for is too fine for the size or place of an object.
+    #[error(
+        "--lattice {found}: steps of 2^{found} are too fine for {object}, which reaches {reach:e} and is {size:e} large; \
+         give --lattice {least} or more, or leave it out"
+    )]
+    LatticeTooFine {
+        /// "the scene" or the name of the mesh.
+        object: String,
+        /// The exponent that was given.
+        found: i32,
+        /// Largest magnitude of a coordinate.
+        reach: f64,
+        /// Diagonal of the bounds.
+        size: f64,
+        /// Least exponent that can be given for this object.
+        least: i32,
+    },
+    /// More leaves or bricks than indices can name.
+    #[error("{what}: found {found}, at most {limit}; raise --brick-triangles or split the scene into several files")]
+    TooMany {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many.
+        found: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// Worker threads could not be started.
+    #[error("cannot start worker threads: {0}; try fewer with --threads")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The scene file could not be written.
+    #[error(transparent)]
+    File(#[from] bricks::Error),
+}

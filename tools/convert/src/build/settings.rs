@@ -1,0 +1,96 @@
+//! How to build, and what was built.
+
+use super::error::BuildError;
+use std::time::Duration;
+
+/// Largest number of triangles a brick may be allowed.
+const LARGEST_BRICK: u32 = 1 << 20;
+
+/// How to build.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildSettings {
+    /// Most triangles of a brick, 1 to 1,048,576. Changes neither ids nor positions.
+    pub brick_triangles: u32,
+    /// Worker threads, at least 1; `None`: one a core. Changes nothing but the time.
+    pub threads: Option<usize>,
+    /// log2 of the lattice step in scene units, -126 to 96; `None`: from the sizes of each object.
+    pub lattice_log2: Option<i32>,
+    /// Leaves out triangles with a vertex that is not finite; otherwise such a vertex is an error.
+    pub drop_non_finite: bool,
+    /// Least triangles of a mesh that is placed more than once and stored once.
+    pub instance_min_triangles: u32,
+    /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they too are stored
+    /// once.
+    pub bake_budget_triangles: u64,
+}
+
+impl Default for BuildSettings {
+    fn default() -> Self {
+        Self {
+            brick_triangles: 16384,
+            threads: None,
+            lattice_log2: None,
+            drop_non_finite: false,
+            instance_min_triangles: 1000,
+            bake_budget_triangles: 4_000_000,
+        }
+    }
+}
+
+impl BuildSettings {
+    /// Checks the ranges of all settings.
+    pub(super) fn check(&self) -> Result<(), BuildError> {
+        let rule = |ok: bool, setting, found: String, expected: &str| {
+            if ok { Ok(()) } else { Err(BuildError::Setting { setting, found, expected: expected.to_owned() }) }
+        };
+        let bricks = self.brick_triangles;
+        rule((1..=LARGEST_BRICK).contains(&bricks), "--brick-triangles", bricks.to_string(), "1 to 1048576")?;
+        let threads = self.threads.unwrap_or(1);
+        rule((1..=4096).contains(&threads), "--threads", threads.to_string(), "1 to 4096")?;
+        let lattice = self.lattice_log2.unwrap_or(0);
+        rule((-126..=96).contains(&lattice), "--lattice", lattice.to_string(), "-126 to 96")
+    }
+}
+
+/// What was built.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BuildSummary {
+    /// Objects, the world counted.
+    pub objects: u64,
+    /// Instances, the world not counted.
+    pub instances: u64,
+    /// Bricks.
+    pub bricks: u64,
+    /// Bricks with wide vertices.
+    pub wide_bricks: u64,
+    /// Leaves of the top level.
+    pub leaves: u64,
+    /// Triangle ids: all triangles of the sources, placements multiplied out.
+    pub triangle_ids: u64,
+    /// Triangles stored.
+    pub triangles_stored: u64,
+    /// Triangles with every instance multiplied out, without the dropped ones.
+    pub triangles_instanced: u64,
+    /// Triangles without area, instances multiplied out.
+    pub dropped_zero_area: u64,
+    /// Triangles with a vertex that is not finite, instances multiplied out.
+    pub dropped_non_finite: u64,
+    /// log2 of the world's lattice step in scene units.
+    pub world_step_log2: i32,
+    /// Wide nodes of all bricks.
+    pub nodes: u64,
+    /// Bytes of the nodes of all bricks.
+    pub bytes_nodes: u64,
+    /// Bytes of the geometry of all bricks, nodes included.
+    pub bytes_geometry: u64,
+    /// Bytes of the attributes of all bricks.
+    pub bytes_attributes: u64,
+    /// Bytes of the textures.
+    pub bytes_textures: u64,
+    /// Bytes of the file.
+    pub bytes_file: u64,
+    /// Warnings, as in the manifest.
+    pub warnings: Vec<String>,
+    /// Wall time of the phases, in their order.
+    pub phases: Vec<(&'static str, Duration)>,
+}
