@@ -72,7 +72,7 @@ fn embedded(names: &[String]) -> String {
 fn layout_checks(module: &naga::Module) -> String {
     let mirrored = [
         "Params", "Ray", "Hit", "Surface", "TileBounds", "TileList", "TopNode2", "Leaf", "Instance", "Brick", "Slot",
-        "Demand", "Material", "Texture", "GBuffer",
+        "Demand", "Pair", "Material", "Texture", "GBuffer",
     ];
     let mut s = String::new();
     for name in mirrored {

@@ -26,6 +26,10 @@ struct Params {
     sky_color: vec4<f32>,
     ground_color: vec4<f32>,
     jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
+    pair_count: u32,      // pairs to be queried
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
 }
 
 const PARAM_ANY_HIT: u32 = 1u;
@@ -114,6 +118,17 @@ struct Slot {             // where a brick lies in the cache, and its part in th
     attributes_page: u32,
     attributes_offset: u32,
     state: u32,           // STATE_* bits
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
+}
+
+struct Pair {             // a query pair: a rectangle of rays and a node of the binary top-level tree
+    x0: u32,
+    y0: u32,
+    x1: u32,              // exclusive
+    y1: u32,
+    node: u32,
     padding0: u32,
     padding1: u32,
     padding2: u32,

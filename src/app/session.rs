@@ -81,7 +81,7 @@ impl Session {
         let residency =
             Residency::new(&sizes, budget, page_bytes, policy).with_context(|| format!("{name}: --cache"))?;
         let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
-        let host = Arc::new(HostCache::new(args.host_cache));
+        let host = HostCache::new(args.host_cache);
         let workers = Workers::new(scene.clone(), host, args.worker_count(), 0)?;
         let setup = Setup { extent, threshold: args.query_threshold, count: false };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();

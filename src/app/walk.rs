@@ -6,6 +6,7 @@ use super::session::{Session, open_scene};
 use super::summary;
 use crate::gpu::rays::Extent;
 use crate::render::{FrameOutput, Light, RenderSettings, Renderer};
+use crate::schedule::fronts::Fronts;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::stats::Record;
 use anyhow::{Context, Result, bail};
@@ -99,7 +100,9 @@ fn renderer(session: Session, args: &WalkArgs) -> Renderer {
         args.light.sun_intensity as f32,
         args.light.sky_intensity as f32,
     );
-    Renderer { scene, executor, cache, settings, light, size: (args.size.width, args.size.height) }
+    let fronts = (args.stream.fronts == "on").then(Fronts::default);
+    let size = (args.size.width, args.size.height);
+    Renderer { scene, executor, cache, settings, light, size, tile: args.stream.tile, fronts }
 }
 
 fn write_frame(folder: &Path, frame: u32, args: &WalkArgs, output: &FrameOutput) -> Result<()> {

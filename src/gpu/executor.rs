@@ -10,7 +10,7 @@ use super::scene::{Frame, SceneBuffers};
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::schedule::{BrickStates, Executor, ExecutorError, Load, Pass, Report, Step};
+use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, Workers};
 use bricks::SceneFile;
 use std::sync::Arc;
@@ -50,6 +50,7 @@ pub struct GpuExecutor {
     groups: Groups,
     view: Params,
     threshold: u32,
+    pair_count: u32,
 }
 
 /// Bind groups; made anew when a buffer is.
@@ -140,6 +141,7 @@ impl GpuExecutor {
             groups,
             view: Params::default(),
             threshold: setup.threshold,
+            pair_count: 0,
         })
     }
 
@@ -291,6 +293,10 @@ impl GpuExecutor {
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
         let demand: Vec<layout::Demand> = bytemuck::pod_collect_to_vec(&demand[..bricks.len() * 8]);
         let mut report = read_report(&counters, &demand)?;
+        if steps.contains(&Step::QueryPairs) && self.pair_count > 0 {
+            let rays: Vec<u32> = self.read(|s| &s.tiles.pair_rays)?;
+            report.pair_rays = rays[..self.pair_count as usize].to_vec();
+        }
         let times = self.timing.read(&self.gpu, dispatches.len())?;
         for (dispatch, ms) in dispatches.iter().zip(times) {
             if let Some(phase) = dispatch.phase {
@@ -337,6 +343,7 @@ impl GpuExecutor {
         params.tiles = extent.tiles();
         params.list_capacity = self.tiles.capacity;
         params.threshold = self.threshold;
+        params.pair_count = self.pair_count;
         params.top_count = self.scene.resident().top2.len() as u32;
         params.instance_pad = self.resident.instance_pad;
         params.flags = if pass == Pass::Shadow { layout::PARAM_ANY_HIT } else { 0 };
@@ -360,15 +367,16 @@ impl GpuExecutor {
                 kernel("query_reduce", p, per_tile, Some(1)),
             ]
         };
+        let across = extent.tiles().min(65_535);
+        let bounds = kernel("tile_bounds", params, [across, extent.tiles().div_ceil(across)], Some(1));
         match step {
             Step::Generate if pass == Pass::Primary => vec![kernel("generate_primary", params, per_ray, None)],
             Step::Generate => vec![shading("generate_shadow", params, false)],
             Step::StartHits => vec![kernel("start_hits", params, per_ray, None)],
+            Step::CountRays => vec![bounds],
             Step::Lists => {
-                let across = extent.tiles().min(65_535);
-                let bounds = [across, extent.tiles().div_ceil(across)];
                 vec![
-                    kernel("tile_bounds", params, bounds, Some(1)),
+                    bounds,
                     kernel("tile_walk_count", params, per_tile, Some(1)),
                     kernel("tile_scan", params, [1, 1], Some(1)),
                     kernel("tile_walk_write", params, per_tile, Some(1)),
@@ -380,6 +388,10 @@ impl GpuExecutor {
             Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, 2),
             Step::IntersectAll => vec![kernel("intersect_all", params, per_ray, Some(0))],
             Step::QueryMissing => query(layout::STATE_GEOMETRY | layout::STATE_DONE, 0, params.flags),
+            Step::QueryPairs => {
+                let across = self.pair_count.clamp(1, 65_535);
+                vec![kernel("query_pairs", params, [across, self.pair_count.div_ceil(across)], Some(1))]
+            }
             Step::QueryNeeded => {
                 let exact = Params { threshold: 0, ..params };
                 let mut dispatches = query(0, 0, params.flags | layout::PARAM_NEEDED);
@@ -401,6 +413,40 @@ impl GpuExecutor {
 }
 
 impl Executor for GpuExecutor {
+    fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
+        let entries: Vec<u32> = lists.iter().flatten().copied().collect();
+        if entries.len() > self.tiles.capacity as usize {
+            self.grow_lists(u32::try_from(entries.len()).unwrap_or(u32::MAX))?;
+        }
+        let mut first = 0;
+        let mut records = Vec::with_capacity(lists.len());
+        for list in lists {
+            records.push(layout::TileList { first, count: list.len() as u32, ..Default::default() });
+            first += list.len() as u32;
+        }
+        let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX }; entries.len()];
+        self.gpu.queue.write_buffer(&self.tiles.lists, 0, bytemuck::cast_slice(&records));
+        self.gpu.queue.write_buffer(&self.tiles.list, 0, bytemuck::cast_slice(&entries));
+        self.gpu.queue.write_buffer(&self.tiles.pair_demand, 0, bytemuck::cast_slice(&unasked));
+        Ok(())
+    }
+
+    fn set_pairs(&mut self, pairs: &[PairQuery]) -> Result<(), ExecutorError> {
+        let records: Vec<layout::Pair> = pairs
+            .iter()
+            .map(|p| layout::Pair { x0: p.x[0], y0: p.y[0], x1: p.x[1], y1: p.y[1], node: p.node, ..Default::default() })
+            .collect();
+        if (self.tiles.pair_rays.size() / 4) < records.len() as u64 {
+            let room = records.len().next_power_of_two();
+            self.tiles.pairs = storage(&self.gpu, "pairs", room, size_of::<layout::Pair>());
+            self.tiles.pair_rays = storage(&self.gpu, "pair rays", room, 4);
+            self.rebind();
+        }
+        self.gpu.queue.write_buffer(&self.tiles.pairs, 0, bytemuck::cast_slice(&records));
+        self.pair_count = records.len() as u32;
+        Ok(())
+    }
+
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
         let resident = self.scene.resident();
         let bytes = |item: Item| match item.kind {
@@ -412,7 +458,7 @@ impl Executor for GpuExecutor {
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let report = self.submit(pass, steps, bricks)?;
-        if !steps.contains(&Step::Lists) || report.list_entries <= self.tiles.capacity {
+        if report.list_entries <= self.tiles.capacity {
             return Ok(report);
         }
         // The lists did not fit and were left empty, so nothing has been intersected: once more, with room.
@@ -444,6 +490,7 @@ fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, Ex
         triangles: count(layout::COUNTER_TRIANGLES),
         non_finite: count(layout::COUNTER_NON_FINITE),
         ms_phases: [0.0; 3],
+        pair_rays: Vec::new(),
     })
 }
 
@@ -482,7 +529,15 @@ impl Groups {
             entries.extend(numbered(&buffers, 1));
             group("rays", &kernels.rays, &entries)
         };
-        let tile_buffers = [&tiles.bounds, &tiles.lists, &tiles.list, &tiles.selection, &tiles.pair_demand];
+        let tile_buffers = [
+            &tiles.bounds,
+            &tiles.lists,
+            &tiles.list,
+            &tiles.selection,
+            &tiles.pair_demand,
+            &tiles.pairs,
+            &tiles.pair_rays,
+        ];
         let primary = &passes[Pass::Primary as usize];
         let fixed = [
             &texels.materials,

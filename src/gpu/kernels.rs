@@ -69,6 +69,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("tile_select", "tile_select", Groups::Tiles, &[("INTERSECT", 0.0)]),
     ("tile_select", "tile_select_intersect", Groups::Tiles, &[("INTERSECT", 1.0)]),
     ("query", "query", Groups::Tiles, &[]),
+    ("query_pairs", "query_pairs", Groups::Tiles, &[]),
     ("query_reduce", "query_reduce", Groups::Tiles, &[]),
     ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 0.0)]),
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0)]),
@@ -88,7 +89,7 @@ impl Kernels {
         let scene = layout(device, "scene", &[Read; 7]);
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write]);
         let cache = layout(device, "cache", &vec![Read; 2 * pages.cache]);
-        let tiles = layout(device, "tiles", &[Write; 5]);
+        let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write]);
         let shading = shading_layout(device, &[Read, Read, Write, Write, Write, Write, Write], pages.texels);
         let none = layout(device, "none", &[]);
         let mut pipelines = HashMap::new();

@@ -47,6 +47,7 @@ mirror! {
         sample: u32, seed: u32, instance_pad: f32, sun_radius: f32,
         origin: [f32; 4], base: [f32; 4], step_x: [f32; 4], step_y: [f32; 4],
         sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
+        pair_count: u32, padding0: u32, padding1: u32, padding2: u32,
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
     struct Hit { t: f32, id: u32, u: f32, v: f32 }
@@ -72,6 +73,7 @@ mirror! {
         geometry_page: u32, geometry_offset: u32, attributes_page: u32, attributes_offset: u32,
         state: u32, padding0: u32, padding1: u32, padding2: u32,
     }
+    struct Pair { x0: u32, y0: u32, x1: u32, y1: u32, node: u32, padding0: u32, padding1: u32, padding2: u32 }
     struct Demand { rays: u32, nearest: u32 }
     struct Material {
         base_color: [f32; 4], emission: [f32; 3], metallic: f32,

@@ -59,6 +59,10 @@ pub struct TileBuffers {
     pub selection: wgpu::Buffer,
     /// Queries per position.
     pub pair_demand: wgpu::Buffer,
+    /// [`layout::Pair`]s to be queried.
+    pub pairs: wgpu::Buffer,
+    /// Rays that see each pair.
+    pub pair_rays: wgpu::Buffer,
     /// Entries the lists hold.
     pub capacity: u32,
 }
@@ -103,6 +107,8 @@ impl TileBuffers {
             list: storage(gpu, "list", entries, 4),
             selection: storage(gpu, "selection", entries, 4),
             pair_demand: storage(gpu, "pair demand", entries, size_of::<layout::Demand>()),
+            pairs: storage(gpu, "pairs", 1, size_of::<layout::Pair>()),
+            pair_rays: storage(gpu, "pair rays", 1, 4),
             capacity: capacity.max(1),
         }
     }

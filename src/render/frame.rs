@@ -5,6 +5,7 @@ use crate::gpu::executor::GpuExecutor;
 use crate::gpu::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
 use crate::schedule::cache::Cache;
+use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{Executor, ExecutorError, Pass, PassStats, Step, attributes, chc, plain};
 use crate::stats::Record;
 use bricks::SceneFile;
@@ -84,6 +85,10 @@ pub struct Renderer {
     pub light: Light,
     /// Picture size in pixels.
     pub size: (u32, u32),
+    /// Edge of a tile in pixels.
+    pub tile: u32,
+    /// The temporal fronts, when they are on.
+    pub fronts: Option<Fronts>,
 }
 
 impl Renderer {
@@ -100,12 +105,12 @@ impl Renderer {
             let view = camera_view(self.scene.resident(), camera, &self.light, self.size, sample, seed);
             self.executor.begin_frame(&view);
             primary.measure(self, |r, stats| {
-                r.trace(Pass::Primary, stats)?;
+                r.trace(frame, Pass::Primary, stats)?;
                 attributes::resolve(&mut r.executor, &mut r.cache, stats)
             })?;
             if self.settings.shadows {
                 shadow.measure(self, |r, stats| {
-                    r.trace(Pass::Shadow, stats)?;
+                    r.trace(frame, Pass::Shadow, stats)?;
                     let steps = [Step::QueryHits, Step::Shade { shadows: true }];
                     let report = r.executor.run(Pass::Shadow, &steps, &r.cache.states)?;
                     stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.0));
@@ -133,12 +138,19 @@ impl Renderer {
     }
 
     /// Traces the generated rays of a pass by the schedule in force.
-    fn trace(&mut self, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
-        let trace = match self.settings.schedule {
-            Schedule::Chc => chc::trace,
-            Schedule::Plain => plain::trace,
-        };
-        trace(&mut self.executor, &mut self.cache, pass, &[Step::Generate], self.settings.measure_needed, stats)
+    fn trace(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
+        let needed = self.settings.measure_needed;
+        let first = [Step::Generate];
+        match (self.settings.schedule, &mut self.fronts) {
+            (Schedule::Plain, _) => plain::trace(&mut self.executor, &mut self.cache, pass, &first, needed, stats),
+            (Schedule::Chc, None) => chc::trace(&mut self.executor, &mut self.cache, pass, &first, needed, stats),
+            (Schedule::Chc, Some(fronts)) => {
+                let resident = self.scene.resident();
+                let extent = (self.size.0, self.size.1, self.tile);
+                let setup = FrontPass { resident, extent, frame, pass, measure_needed: needed };
+                fronts.trace(&mut self.executor, &mut self.cache, &setup, &first, stats)
+            }
+        }
     }
 
     fn read_aovs(&mut self, unit: f64, pixels: &mut Pixels) -> Result<(), ExecutorError> {

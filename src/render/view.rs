@@ -4,6 +4,7 @@ use super::Light;
 use crate::gpu::executor::View;
 use crate::gpu::layout::Params;
 use crate::gpu::scene::Frame;
+use crate::math::sampling::halton;
 use crate::scene::Camera;
 use bricks::Resident;
 use glam::DVec3;
@@ -14,7 +15,7 @@ fn jitter(sample: u32) -> [f32; 2] {
     if sample == 0 {
         return [0.5, 0.5];
     }
-    [crate::math::sampling::halton(sample, 2) as f32, crate::math::sampling::halton(sample, 3) as f32]
+    [halton(sample, 0), halton(sample, 1)]
 }
 
 /// The view of `camera` for one sample of a picture of `width` x `height` pixels.

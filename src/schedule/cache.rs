@@ -47,6 +47,11 @@ impl Cache {
         }
     }
 
+    /// Which bricks' geometry is resident.
+    pub fn resident_geometry(&self) -> Vec<bool> {
+        (0..self.states.len()).map(|brick| self.states.geometry(brick).is_some()).collect()
+    }
+
     /// Notes the use of what is resident.
     pub fn touch(&mut self, item: Item) {
         self.residency.touch(item);

@@ -2,12 +2,12 @@
 //! batch.
 
 use super::cache::{BATCH_BRICKS, Cache};
-use super::{Executor, ExecutorError, Pass, PassStats, Step};
+use super::{Executor, ExecutorError, Pass, PassStats, Report, Step};
 use crate::stream::Item;
 
 /// Traces the rays of `pass`, after the steps in `first` have made them.
 ///
-/// With `measure_needed` one more query asks, from the final hits, which bricks the pass needed.
+/// With `needed` one more query asks, from the final hits, which bricks the pass needed.
 ///
 /// # Errors
 /// What the executor says.
@@ -16,27 +16,45 @@ pub fn trace(
     cache: &mut Cache,
     pass: Pass,
     first: &[Step],
-    measure_needed: bool,
+    needed: bool,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
-    let resident_before: Option<Vec<bool>> =
-        measure_needed.then(|| (0..cache.states.len()).map(|b| cache.states.geometry(b).is_some()).collect());
+    let resident_before = cache.resident_geometry();
     let mut steps = first.to_vec();
     steps.extend([Step::Lists, Step::IntersectResident]);
     if !cache.states.all_geometry_resident() {
         steps.push(Step::QueryMissing);
     }
-    let mut report = executor.run(pass, &steps, &cache.states)?;
+    let report = executor.run(pass, &steps, &cache.states)?;
     let resident = cache.states.finish_resident();
     for &brick in &resident {
         cache.touch(Item::geometry(brick));
     }
     stats.bricks_intersected.extend(resident);
+    load_and_intersect(executor, cache, pass, report, stats)?;
+    if needed {
+        measure_needed(executor, cache, pass, &[], &resident_before, stats)?;
+    }
+    Ok(())
+}
+
+/// Loads what the queries in `report` want, nearest first, a few at a time, each batch intersected and the rest asked for
+/// again, until nothing is wanted.
+///
+/// # Errors
+/// What the executor says.
+pub fn load_and_intersect(
+    executor: &mut dyn Executor,
+    cache: &mut Cache,
+    pass: Pass,
+    mut report: Report,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
     loop {
         let items = nearest_first(&report.demand);
         stats.add(report);
         if items.is_empty() {
-            break;
+            return Ok(());
         }
         let count = cache.load(executor, &items, BATCH_BRICKS, stats)?;
         let batch: Vec<u32> = items[..count].iter().map(|item| item.brick).collect();
@@ -44,13 +62,31 @@ pub fn trace(
         stats.bricks_intersected.extend(&batch);
         report = executor.run(pass, &[Step::IntersectBatch, Step::QueryMissing], &cache.states)?;
     }
-    if let Some(resident_before) = resident_before {
-        let report = executor.run(pass, &[Step::QueryNeeded], &cache.states)?;
-        let needed: Vec<u32> = report.demand.iter().map(|d| d.0).collect();
-        let missing = needed.iter().filter(|&&b| !resident_before[b as usize]);
-        stats.bytes_needed += needed.iter().map(|&b| cache.bytes[b as usize].geometry).sum::<u64>();
-        stats.bytes_needed_missing += missing.map(|&b| cache.bytes[b as usize].geometry).sum::<u64>();
-        stats.bricks_needed.get_or_insert_default().extend(needed);
+}
+
+/// Asks, from the final hits, which bricks the pass needed, and what of that was missing when it began. Not part of the
+/// pass: it counts in none of its statistics.
+///
+/// # Errors
+/// What the executor says.
+pub fn measure_needed(
+    executor: &mut dyn Executor,
+    cache: &Cache,
+    pass: Pass,
+    first: &[Step],
+    resident_before: &[bool],
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
+    let mut steps = first.to_vec();
+    steps.push(Step::QueryNeeded);
+    let report = executor.run(pass, &steps, &cache.states)?;
+    for &(brick, ..) in &report.demand {
+        let bytes = cache.bytes[brick as usize].geometry;
+        stats.bytes_needed += bytes;
+        if !resident_before[brick as usize] {
+            stats.bytes_needed_missing += bytes;
+        }
+        stats.bricks_needed.get_or_insert_default().push(brick);
     }
     Ok(())
 }

@@ -12,9 +12,11 @@
 pub mod attributes;
 pub mod cache;
 pub mod chc;
+pub mod fronts;
 pub mod plain;
+mod pair_tree;
 mod states;
 mod types;
 
 pub use states::BrickStates;
-pub use types::{Executor, ExecutorError, Load, Pass, PassStats, Report, Step};
+pub use types::{Executor, ExecutorError, Load, PairQuery, Pass, PassStats, Report, Step};

@@ -1,6 +1,7 @@
 //! The schedule `plain`: everything resident, every ray from the root. The baseline.
 
 use super::cache::Cache;
+use super::chc::measure_needed;
 use super::{Executor, ExecutorError, Pass, PassStats, Step};
 use crate::stream::Item;
 
@@ -34,20 +35,18 @@ pub fn trace(
     cache: &mut Cache,
     pass: Pass,
     first: &[Step],
-    measure_needed: bool,
+    needed: bool,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
+    let resident_before = cache.resident_geometry();
     make_all_resident(executor, cache, stats)?;
     let mut steps = first.to_vec();
     steps.push(Step::IntersectAll);
     let report = executor.run(pass, &steps, &cache.states)?;
     stats.bricks_intersected.extend(cache.states.finish_resident());
     stats.add(report);
-    if measure_needed {
-        let report = executor.run(pass, &[Step::Lists, Step::QueryNeeded], &cache.states)?;
-        let needed: Vec<u32> = report.demand.iter().map(|d| d.0).collect();
-        stats.bytes_needed += needed.iter().map(|&b| cache.bytes[b as usize].geometry).sum::<u64>();
-        stats.bricks_needed.get_or_insert_default().extend(needed);
+    if needed {
+        measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;
     }
     Ok(())
 }

@@ -20,6 +20,8 @@ pub enum Step {
     Generate,
     /// Start the hits of rays given from outside.
     StartHits,
+    /// Count the rays traced, where no other step does.
+    CountRays,
     /// Bounds of the tiles, their walk of the top level, their lists of leaves.
     Lists,
     /// Intersect the listed leaves whose geometry is resident and not done: phase 1.
@@ -30,6 +32,8 @@ pub enum Step {
     IntersectAll,
     /// Ask ray by ray which missing bricks are still wanted: phase 2.
     QueryMissing,
+    /// Ask how many rays see each of the pairs set by [`Executor::set_pairs`]: phase 2 of the fronts.
+    QueryPairs,
     /// Ask ray by ray which bricks the pass needed, from its final hits.
     QueryNeeded,
     /// Ask which bricks hold a final hit of the pass.
@@ -43,6 +47,17 @@ pub enum Step {
         /// Whether the shadow pass has been traced.
         shadows: bool,
     },
+}
+
+/// A query pair: a rectangle of rays and a node of the binary top-level tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PairQuery {
+    /// First column, and the one after the last.
+    pub x: [u32; 2],
+    /// First row, and the one after the last.
+    pub y: [u32; 2],
+    /// The node.
+    pub node: u32,
 }
 
 /// One payload to be copied into the cache.
@@ -73,7 +88,7 @@ pub struct Report {
     pub pairs_invisible: u64,
     /// Pairs (tile, leaf) intersected.
     pub pairs_intersected: u64,
-    /// Rays traced; counted by [`Step::Lists`] and [`Step::IntersectAll`].
+    /// Rays traced; counted by [`Step::Lists`], [`Step::CountRays`] and [`Step::IntersectAll`].
     pub rays: u64,
     /// Nodes visited, when the executor counts.
     pub nodes: u64,
@@ -81,6 +96,8 @@ pub struct Report {
     pub triangles: u64,
     /// Pixels whose radiance was not finite.
     pub non_finite: u64,
+    /// Rays that see each pair, after [`Step::QueryPairs`].
+    pub pair_rays: Vec<u32>,
     /// Device time of phases 1, 2 and 3 in milliseconds; zero where the device has no timestamps.
     pub ms_phases: [f64; 3],
 }
@@ -106,6 +123,18 @@ pub trait Executor {
     /// # Errors
     /// A payload that cannot be read or whose checksum fails, by its brick.
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError>;
+
+    /// Sets the tiles' lists of leaves, near first, in place of [`Step::Lists`]; one list a tile, row by row.
+    ///
+    /// # Errors
+    /// Lists beyond what the device holds.
+    fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError>;
+
+    /// Sets the pairs that the next [`Step::QueryPairs`] queries.
+    ///
+    /// # Errors
+    /// More pairs than the device holds.
+    fn set_pairs(&mut self, pairs: &[PairQuery]) -> Result<(), ExecutorError>;
 
     /// Runs `steps` in order over the rays of `pass` against bricks in the given states, waits, and reports.
     ///

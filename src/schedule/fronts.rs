@@ -1,0 +1,190 @@
+//! The schedule `chc` with `--fronts on`: Algorithm 1 of CHC+RT with temporal visible and invisible fronts.
+//!
+//! *Changed*: the pairs of one round of queries are evaluated in one dispatch; newly visible pairs are intersected before
+//! the next round instead of after every 16; visible pairs whose brick is missing wait, and at the end of the traversal are
+//! queried, loaded nearest first and intersected as without fronts. Invisible pairs are queried in every frame and a pair
+//! is only ever left out by a query against present hits, so the final hits are exact.
+
+use super::cache::Cache;
+use super::chc::{load_and_intersect, measure_needed};
+use super::pair_tree::{Front, PairTree};
+use super::{Executor, ExecutorError, Pass, PassStats, Step};
+use crate::stream::Item;
+use bricks::{Resident, TopNode2};
+
+/// Visible pairs are queried again every so many frames (CHC+RT §5.1, n).
+const REQUERY_FRAMES: u32 = 3;
+
+/// The fronts of both passes, kept from frame to frame.
+#[derive(Clone, Debug, Default)]
+pub struct Fronts {
+    trees: [Option<PairTree>; 2],
+}
+
+/// What stays the same over a pass.
+pub struct FrontPass<'a> {
+    /// The scene.
+    pub resident: &'a Resident,
+    /// Rays per row, rows, edge of a tile.
+    pub extent: (u32, u32, u32),
+    /// Frame, for lazy queries.
+    pub frame: u32,
+    /// Which rays.
+    pub pass: Pass,
+    /// Ask which bricks the pass needed.
+    pub measure_needed: bool,
+}
+
+impl Fronts {
+    /// Traces the rays that the steps in `first` make.
+    ///
+    /// # Errors
+    /// What the executor says.
+    pub fn trace(
+        &mut self,
+        executor: &mut dyn Executor,
+        cache: &mut Cache,
+        setup: &FrontPass,
+        first: &[Step],
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
+        let (width, height, tile) = setup.extent;
+        let top = &setup.resident.top2;
+        let slot = &mut self.trees[setup.pass as usize];
+        if !slot.as_ref().is_some_and(|t| t.fits(width, height, tile)) {
+            *slot = None;
+        }
+        let tree = slot.get_or_insert_with(|| PairTree::new(width, height, tile));
+        let resident_before = cache.resident_geometry();
+
+        // Phase 1: what was visible, of what is resident.
+        let leaves = tree.leaves();
+        let (visible, invisible): (Vec<u32>, Vec<u32>) =
+            leaves.into_iter().partition(|&i| matches!(tree.pair(i).front, Front::Visible { .. }));
+        let mut waiting = Vec::new();
+        set_lists(executor, cache, tree, setup.resident, &visible, &mut waiting, stats)?;
+        // Rays are counted by the step that bounds the tiles; its lists are replaced by the fronts'.
+        let mut steps = first.to_vec();
+        steps.extend([Step::CountRays, Step::IntersectResident]);
+
+        // Phases 2 and 3: query the invisible front; split what became visible until a front is reached again.
+        let mut queue = if top.is_empty() { Vec::new() } else { invisible };
+        loop {
+            let queries: Vec<_> = queue.iter().map(|&i| tree.query(i)).collect();
+            executor.set_pairs(&queries)?;
+            steps.push(Step::QueryPairs);
+            let report = executor.run(setup.pass, &steps, &cache.states)?;
+            let seen = report.pair_rays.clone();
+            stats.add(report);
+            stats.report.pairs_tested += queue.len() as u64;
+            let mut next = Vec::new();
+            let mut found = Vec::new();
+            for (&index, _) in queue.iter().zip(&seen).filter(|(_, rays)| **rays > 0) {
+                if tree.is_terminal(index, top) {
+                    // Spread over the frames to come, so that not all fall due at once.
+                    let requery = setup.frame + 1 + index % REQUERY_FRAMES;
+                    tree.set_front(index, Front::Visible { requery });
+                    found.push(index);
+                } else {
+                    next.extend(tree.split(index, top));
+                }
+            }
+            stats.report.pairs_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
+            if next.is_empty() && found.is_empty() {
+                break;
+            }
+            set_lists(executor, cache, tree, setup.resident, &found, &mut waiting, stats)?;
+            steps = vec![Step::IntersectResident];
+            queue = next;
+        }
+        let mut used = stats.bricks_intersected.clone();
+        used.sort_unstable();
+        used.dedup();
+        for brick in used {
+            cache.touch(Item::geometry(brick));
+        }
+
+        // What is visible and missing: ask again, load, intersect.
+        if !waiting.is_empty() {
+            executor.set_lists(&lists(tree, top, &waiting))?;
+            let report = executor.run(setup.pass, &[Step::QueryMissing], &cache.states)?;
+            load_and_intersect(executor, cache, setup.pass, report, stats)?;
+        }
+        self.finish(executor, cache, setup, &resident_before, stats)
+    }
+
+    /// Lazy queries of the visible front against final hits, pull-up, and the statistics of the fronts.
+    fn finish(
+        &mut self,
+        executor: &mut dyn Executor,
+        cache: &mut Cache,
+        setup: &FrontPass,
+        resident_before: &[bool],
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
+        let Some(tree) = &mut self.trees[setup.pass as usize] else { return Ok(()) };
+        let due: Vec<u32> = tree
+            .leaves()
+            .into_iter()
+            .filter(|&i| matches!(tree.pair(i).front, Front::Visible { requery } if requery <= setup.frame))
+            .collect();
+        if !due.is_empty() {
+            let queries: Vec<_> = due.iter().map(|&i| tree.query(i)).collect();
+            executor.set_pairs(&queries)?;
+            let report = executor.run(setup.pass, &[Step::QueryPairs], &cache.states)?;
+            for (&index, &rays) in due.iter().zip(&report.pair_rays) {
+                let requery = setup.frame + REQUERY_FRAMES;
+                tree.set_front(index, if rays > 0 { Front::Visible { requery } } else { Front::Invisible });
+            }
+            stats.report.pairs_tested += due.len() as u64;
+            stats.add(report);
+        }
+        stats.pulled_up += tree.pull_up();
+        let fronts = tree.leaves();
+        let visible = fronts.iter().filter(|&&i| matches!(tree.pair(i).front, Front::Visible { .. })).count();
+        stats.pairs_visible = visible as u64;
+        stats.pairs_invisible = (fronts.len() - visible) as u64;
+        if setup.measure_needed {
+            measure_needed(executor, cache, setup.pass, &[Step::Lists], resident_before, stats)?;
+        }
+        Ok(())
+    }
+}
+
+/// Lists the pairs whose brick is resident, and adds the others to `waiting`.
+fn set_lists(
+    executor: &mut dyn Executor,
+    cache: &Cache,
+    tree: &PairTree,
+    resident: &Resident,
+    pairs: &[u32],
+    waiting: &mut Vec<u32>,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
+    let mut present = Vec::new();
+    for &index in pairs {
+        let brick = brick_of(tree, resident, index);
+        if cache.states.geometry(brick as usize).is_some() {
+            present.push(index);
+            stats.bricks_intersected.push(brick);
+        } else {
+            waiting.push(index);
+        }
+    }
+    executor.set_lists(&lists(tree, &resident.top2, &present))
+}
+
+fn brick_of(tree: &PairTree, resident: &Resident, index: u32) -> u32 {
+    let leaf = resident.top2[tree.pair(index).node as usize].left;
+    resident.leaves[leaf as usize].brick
+}
+
+/// One list a tile: leaves in the order of the pairs.
+fn lists(tree: &PairTree, top: &[TopNode2], pairs: &[u32]) -> Vec<Vec<u32>> {
+    let mut lists = vec![Vec::new(); tree.tiles()];
+    for &index in pairs {
+        let pair = tree.pair(index);
+        lists[tree.tile_index(pair.square)].push(top[pair.node as usize].left);
+    }
+    lists
+}
