@@ -15,7 +15,7 @@ const UNITS: &str = "Sizes are bytes and take K, M, G (powers of 1024); counts t
 ///
 /// A scene is converted once into bricks, in one file; rendering streams the bricks that rays need through a small cache.
 #[derive(Debug, Parser)]
-#[command(name = "brickwalk", version, after_help = UNITS, max_term_width = 110)]
+#[command(name = "brickwalk", bin_name = "brickwalk", version, after_help = UNITS, max_term_width = 110)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -48,7 +48,7 @@ pub enum Command {
 #[command(after_help = UNITS)]
 pub struct DemoArgs {
     /// Folder for the scene, the frames and the report; created when missing
-    #[arg(short, long, value_name = "DIR", default_value = "brickwalk-demo")]
+    #[arg(short, long, value_name = "DIR", default_value = "demo-out")]
     pub output: PathBuf,
     /// Triangles of the city, about
     #[arg(long, value_name = "COUNT", default_value = "2M", value_parser = positive_count)]
@@ -90,8 +90,8 @@ pub struct ConvertArgs {
     /// are copied into the world
     #[arg(long, value_name = "COUNT", default_value = "1K", value_parser = positive_count32)]
     pub instance_min_triangles: u32,
-    /// Most triangles that copying small instances may add
-    #[arg(long, value_name = "COUNT", default_value = "16M", value_parser = positive_count)]
+    /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they are stored once
+    #[arg(long, value_name = "COUNT", default_value = "4M", value_parser = positive_count)]
     pub bake_budget: u64,
     /// Bounded memory for the conversion; comes with a later version.
     #[arg(long, hide = true, value_parser = not_built)]
@@ -101,14 +101,14 @@ pub struct ConvertArgs {
 /// Options of everything that writes a `.bricks` file.
 #[derive(Clone, Debug, Args)]
 pub struct BuildArgs {
-    /// Most triangles of a brick, 1 to 1M; larger is faster in core, smaller reads less out of core
+    /// Most triangles of a brick, 1 to 1048576; larger is faster in core, smaller reads less out of core
     #[arg(long, value_name = "COUNT", default_value = "16384", value_parser = brick_triangles)]
     pub brick_triangles: u32,
     /// Threads that convert [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<u32>,
     /// log2 of the step that positions are rounded to, in world units [default: from the sizes of the bricks]
-    #[arg(long, value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-200..=200))]
+    #[arg(long, value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-126..=96))]
     pub lattice: Option<i32>,
 }
 
@@ -176,21 +176,22 @@ pub struct StreamArgs {
     /// Threads that read bricks and check them [default: one per core, at most 4]
     #[arg(long, value_name = "N", alias = "hash-threads", value_parser = threads)]
     pub workers: Option<u32>,
-    /// Keep query pairs from frame to frame: off
-    #[arg(long, value_name = "off", default_value = "off", hide = true, value_parser = |s: &str| only(s, "off"))]
-    pub fronts: String,
-    /// Pixels a query may lose: 0 (exact)
-    #[arg(long, value_name = "0", default_value = "0", hide = true, value_parser = |s: &str| only(s, "0"))]
-    pub query_threshold: String,
-    /// Which brick makes room: round-robin
-    #[arg(long, value_name = "NAME", default_value = "round-robin", hide = true,
-        value_parser = |s: &str| only(s, "round-robin"))]
+    /// Which brick makes room for another: round-robin, lru (the one not used for longest)
+    #[arg(long, value_name = "NAME", default_value = "round-robin",
+        value_parser = |s: &str| one_of(s, &["round-robin", "lru"]))]
     pub evict: String,
-    /// Bricks to load ahead: 0
+    /// Keep query pairs of tiles and nodes from frame to frame (walk, with schedule chc): on, off
+    #[arg(long, value_name = "on|off", default_value = "off", value_parser = |s: &str| one_of(s, &["on", "off"]))]
+    pub fronts: String,
+    /// Leave a brick out of a tile where at most this many of its rays could see it, scaled to a tile of 200x200 pixels;
+    /// 0 is exact, more is faster and misses hits
+    #[arg(long, value_name = "PIXELS", default_value = "0", value_parser = query_threshold)]
+    pub query_threshold: u32,
+    /// Bricks to load ahead; this version loads none
     #[arg(long, value_name = "N", default_value = "0", hide = true, value_parser = |s: &str| only(s, "0"))]
     pub prefetch: String,
-    /// File for the trace of requests; comes with a later version.
-    #[arg(long, hide = true, value_parser = not_built)]
+    /// Write the trace of brick requests to this file, to be replayed against other caches [default: none]
+    #[arg(long, value_name = "F")]
     pub requests_out: Option<String>,
     /// Use the graphics adapter whose name contains NAME, upper and lower case alike [default: a GPU, else software]
     #[arg(long, value_name = "NAME")]
@@ -242,6 +243,9 @@ pub struct WalkArgs {
     /// Write an EXR with radiance, depth, normal, triangle id and albedo beside each PNG
     #[arg(long)]
     pub aov: bool,
+    /// Ask after every pass which bricks it needed (bricks_needed in the records); takes a traversal more a pass
+    #[arg(long)]
+    pub measure_needed: bool,
     /// Print the records on standard output too, one JSON object a line
     #[arg(long)]
     pub json: bool,
@@ -296,6 +300,24 @@ pub struct TraceArgs {
     /// Streaming.
     #[command(flatten)]
     pub stream: StreamArgs,
+}
+
+impl TraceArgs {
+    /// Refuses options of the streaming that mean nothing without frames.
+    ///
+    /// # Errors
+    /// Which option to leave out.
+    pub fn check(&self) -> Result<(), super::Usage> {
+        let meaningless = [
+            (self.stream.fronts == "on", "--fronts on"),
+            (self.stream.query_threshold > 0, "--query-threshold"),
+            (self.stream.requests_out.is_some(), "--requests-out"),
+        ];
+        match meaningless.iter().find(|(given, _)| *given) {
+            Some((_, option)) => Err(super::Usage(format!("{option} is for walk; leave it out of trace"))),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Options of `compare`.
@@ -417,6 +439,11 @@ named_values! {
     } later &["pipes", "terrain", "stadium"]
 }
 
+/// Accepts the values of a list.
+fn one_of(text: &str, known: &[&str]) -> Result<String, String> {
+    if known.contains(&text) { Ok(text.into()) } else { Err(unknown(text, known, &[])) }
+}
+
 /// Accepts exactly one value: the one that this version does.
 fn only(text: &str, value: &'static str) -> Result<String, String> {
     if text == value { Ok(text.into()) } else { Err(format!("this version has only {value}")) }
@@ -448,8 +475,12 @@ fn threads(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1024)
 }
 
+fn query_threshold(text: &str) -> Result<u32, String> {
+    ranged(text, 0, 40_000)
+}
+
 fn brick_triangles(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 1_000_000)
+    ranged(text, 1, 1 << 20)
 }
 
 fn tile(text: &str) -> Result<u32, String> {

@@ -28,6 +28,10 @@ fn defaults_of_walk_are_the_documented_ones() {
     assert_eq!(w.stream.cache, CacheSize::Percent(25.0));
     assert_eq!(w.stream.host_cache, 1 << 30);
     assert_eq!(w.secondary, Secondary::Exact);
+    assert_eq!(
+        (w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()),
+        ("off", 0, "round-robin")
+    );
     let Direction(sun) = "0.4,0.8,0.45".parse().unwrap();
     assert_eq!(w.light.sun.0, sun);
     assert_eq!(w.light.sun_angle, 0.53);
@@ -39,7 +43,8 @@ fn options_arrive() {
     let w = walk(
         "--path p.json --frames 3 --size 64x32 --cache 12M --host-cache 2G --schedule plain --effects primary --spp 4 \
          --seed 9 --aov --json --sun -1,2,-3 --sun-angle 0 --sun-intensity 5 --sky-intensity 0 --tile 32 --workers 2 \
-         --fov 1e-6 --adapter llvm --secondary exact --fronts off --query-threshold 0 --evict round-robin --prefetch 0",
+         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru --prefetch 0 \
+         --requests-out f.jsonl --measure-needed",
     )
     .unwrap();
     assert_eq!(w.path, Some("p.json".into()));
@@ -51,6 +56,8 @@ fn options_arrive() {
     assert!(w.aov && w.json && w.light.sun.0[0] < 0.0);
     assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
     assert_eq!(w.stream.adapter.as_deref(), Some("llvm"));
+    assert_eq!((w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()), ("on", 20, "lru"));
+    assert!(w.measure_needed && w.stream.requests_out.is_some());
     assert_eq!(walk("--hash-threads 3").unwrap().stream.worker_count(), 3);
     assert!(walk("").unwrap().stream.worker_count() >= 1);
 }
@@ -85,10 +92,10 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--workers 0", "from 1"),
         ("--fov 180", "179.99"),
         ("--fov nan", "179.99"),
-        ("--fronts on", "only off"),
-        ("--query-threshold 20", "only 0"),
-        ("--evict lru", "only round-robin"),
-        ("--requests-out f", "not in this version"),
+        ("--fronts yes", "known: on, off"),
+        ("--query-threshold 40001", "0 to 40000"),
+        ("--evict fifo", "known: round-robin, lru"),
+        ("--prefetch 3", "only 0"),
         ("--environment f.hdr", "not in this version"),
         ("--nonsense", "--nonsense"),
     ] {
@@ -126,6 +133,18 @@ fn other_commands_check_too() {
 }
 
 #[test]
+fn trace_refuses_what_is_for_walks() {
+    let check = |options: &str| match parse(&format!("trace s.bricks --rays r.npy -o h.npy {options}")).unwrap() {
+        Command::Trace(args) => args.check(),
+        other => panic!("{other:?}"),
+    };
+    assert!(check("").is_ok() && check("--any --cache 1M --evict lru").is_ok());
+    for options in ["--fronts on", "--query-threshold 20", "--requests-out f"] {
+        assert!(check(options).unwrap_err().to_string().contains(options.split(' ').next().unwrap()), "{options}");
+    }
+}
+
+#[test]
 fn convert_and_scene_arrive() {
     let Command::Convert(c) =
         parse("convert a.gltf b.glb -o s.bricks --brick-triangles 4K --threads 2 --lattice -12 --drop-non-finite")
@@ -139,7 +158,7 @@ fn convert_and_scene_arrive() {
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
     assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (SceneKind::City, 200_000, 7, 16384));
     let Command::Demo(d) = parse("demo").unwrap() else { panic!() };
-    assert_eq!(d.output, PathBuf::from("brickwalk-demo"));
+    assert_eq!(d.output, PathBuf::from("demo-out"));
 }
 
 /// Every subcommand's help explains units and names a default where an option with a value has one.

@@ -1,0 +1,156 @@
+//! `convert`: scenes of common formats into one `.bricks` file.
+
+use super::args::{BuildArgs, ConvertArgs};
+use super::sizes::{human_bytes, human_count};
+use anyhow::{Context, Result, bail, ensure};
+use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::import::{ImportSettings, import};
+use brickwalk_convert::progress::Progress;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Extensions that are looked for in folders, lower case.
+const EXTENSIONS: [&str; 2] = ["gltf", "glb"];
+
+/// Deepest nesting of folders that is searched.
+const MAX_DEPTH: u32 = 64;
+
+/// Runs `convert`.
+///
+/// # Errors
+/// An input cannot be read or is bad, or the output cannot be written; an old output then stays as it was.
+pub fn run(args: &ConvertArgs) -> Result<()> {
+    let start = Instant::now();
+    let inputs = expand(&args.inputs)?;
+    refuse_overwriting(&inputs, &args.output)?;
+    let progress = Progress::new();
+    let threads = args.build.threads.map(|n| n as usize);
+    let scene = import(&inputs, &ImportSettings { threads }, &progress)?;
+    let settings = BuildSettings {
+        drop_non_finite: args.drop_non_finite,
+        instance_min_triangles: args.instance_min_triangles,
+        bake_budget_triangles: args.bake_budget,
+        ..build_settings(&args.build)
+    };
+    build(scene, &settings, &args.output, &progress)?;
+    progress.finish();
+    summarise(&args.output, start)
+}
+
+/// The settings of the builder that options share.
+pub fn build_settings(args: &BuildArgs) -> BuildSettings {
+    BuildSettings {
+        brick_triangles: args.brick_triangles,
+        threads: args.threads.map(|n| n as usize),
+        lattice_log2: args.lattice,
+        ..BuildSettings::default()
+    }
+}
+
+/// Says on standard output what a written scene holds, on standard error what its conversion warned of.
+///
+/// # Errors
+/// The file cannot be opened, or standard output is closed.
+pub fn summarise(path: &Path, start: Instant) -> Result<()> {
+    let scene = bricks::SceneFile::open(path)?;
+    let resident = scene.resident();
+    for warning in &resident.manifest.warnings {
+        let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(warning));
+    }
+    super::print(&format!(
+        "{}: {} triangles ({} with instances) in {} bricks, {}, {:.1} s\n",
+        path.display(),
+        human_count(resident.manifest.triangles_stored),
+        human_count(resident.manifest.triangles_instanced),
+        human_count(resident.bricks.len() as u64),
+        human_bytes(scene.file_bytes()),
+        start.elapsed().as_secs_f64()
+    ))
+}
+
+/// The files that the inputs name: a folder stands for the scene files in it and below, sorted bytewise by path.
+fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for input in inputs {
+        if !input.is_dir() {
+            files.push(input.clone());
+            continue;
+        }
+        let mut found = Vec::new();
+        search(input, 0, &mut found)?;
+        ensure!(
+            !found.is_empty(),
+            "{}: there is no .gltf or .glb file in this folder; name the scene files themselves",
+            input.display()
+        );
+        found.sort_by(|a, b| a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes()));
+        files.append(&mut found);
+    }
+    Ok(files)
+}
+
+fn search(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
+    ensure!(depth < MAX_DEPTH, "{}: folders are nested too deeply; name the scene files themselves", folder.display());
+    let context = || format!("{}: cannot read this folder; check its permissions", folder.display());
+    for entry in std::fs::read_dir(folder).with_context(context)? {
+        let entry = entry.with_context(context)?;
+        let path = entry.path();
+        // Links to folders are not followed, so that no circle of them is searched for ever.
+        if entry.file_type().with_context(context)?.is_dir() {
+            search(&path, depth + 1, found)?;
+            continue;
+        }
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an output that is an input or a folder.
+fn refuse_overwriting(inputs: &[PathBuf], output: &Path) -> Result<()> {
+    if output.is_dir() {
+        bail!("{}: this is a folder; give -o the name of a file, as in scene.bricks", output.display());
+    }
+    let Ok(target) = output.canonicalize() else { return Ok(()) };
+    for input in inputs {
+        if input.canonicalize().is_ok_and(|input| input == target) {
+            bail!("{}: the output would overwrite this input; give -o another name", input.display());
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_stand_for_their_scene_files_in_bytewise_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir_all(at("sub/deep")).unwrap();
+        std::fs::create_dir(at("empty")).unwrap();
+        for name in ["b.gltf", "B.GLB", "a.glb", "notes.txt", "sub/c.glb", "sub/deep/a.gltf", "noextension"] {
+            std::fs::write(at(name), b"").unwrap();
+        }
+        let files = expand(&[at("a.glb"), folder.path().into(), at("missing.gltf")]).unwrap();
+        let expected = ["a.glb", "B.GLB", "a.glb", "b.gltf", "sub/c.glb", "sub/deep/a.gltf", "missing.gltf"].map(at);
+        assert_eq!(files, expected);
+        let error = expand(&[at("empty")]).unwrap_err().to_string();
+        assert!(error.contains("empty: there is no"), "{error}");
+    }
+
+    #[test]
+    fn inputs_and_folders_are_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a.glb"), b"").unwrap();
+        std::fs::create_dir(at("sub")).unwrap();
+        assert!(refuse_overwriting(&[at("a.glb")], &at("b.bricks")).is_ok());
+        assert!(refuse_overwriting(&[at("a.glb")], &at("sub/../a.glb")).unwrap_err().to_string().contains("overwrite"));
+        assert!(refuse_overwriting(&[at("a.glb")], &at("sub")).unwrap_err().to_string().contains("folder"));
+    }
+}
