@@ -128,6 +128,9 @@ pub struct SceneArgs {
     /// Seed; the same seed and count make the same scene
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// Store trees and vehicles once and place them as instances; the triangles are the same
+    #[arg(long)]
+    pub instanced: bool,
     /// How to cut and round.
     #[command(flatten)]
     pub build: BuildArgs,

@@ -109,11 +109,18 @@ fn search(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
+/// Refuses an output that is a folder.
+///
+/// # Errors
+/// It is one.
+pub fn refuse_folder(output: &Path) -> Result<()> {
+    ensure!(!output.is_dir(), "{}: this is a folder; give -o the name of a file, as in scene.bricks", output.display());
+    Ok(())
+}
+
 /// Refuses an output that is an input or a folder.
 fn refuse_overwriting(inputs: &[PathBuf], output: &Path) -> Result<()> {
-    if output.is_dir() {
-        bail!("{}: this is a folder; give -o the name of a file, as in scene.bricks", output.display());
-    }
+    refuse_folder(output)?;
     let Ok(target) = output.canonicalize() else { return Ok(()) };
     for input in inputs {
         if input.canonicalize().is_ok_and(|input| input == target) {
