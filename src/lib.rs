@@ -2,8 +2,11 @@
 //!
 //! See `ARCHITECTURE.md` for the house: math → scene → stream → schedule → gpu → render → app.
 
+pub mod app;
 pub mod gpu;
 pub mod math;
+pub mod metrics;
+pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod schedule;

@@ -1,2 +1,7 @@
 //! The command `brickwalk`.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    brickwalk::app::main()
+}

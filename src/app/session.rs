@@ -1,6 +1,5 @@
 //! Everything a walk or a trace works with, opened from the command line's options.
 
-use super::Usage;
 use super::args::{Schedule as ScheduleArg, StreamArgs};
 use crate::gpu::device::Gpu;
 use crate::gpu::executor::{GpuExecutor, Setup};
@@ -83,18 +82,12 @@ impl Session {
         let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
         let host = HostCache::new(args.host_cache);
         let workers = Workers::new(scene.clone(), host, args.worker_count(), 0)?;
-        let setup = Setup { extent, threshold: args.query_threshold, count: false };
+        // The threshold counts pixels of a tile of 200 x 200.
+        let threshold = (f64::from(args.query_threshold) * f64::from(extent.tile).powi(2) / 40_000.0) as u32;
+        let setup = Setup { extent, threshold, count: false };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let executor = GpuExecutor::new(gpu, scene.clone(), workers, page_sizes.into_iter(), setup)
             .with_context(|| format!("{name}"))?;
         Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule })
     }
-}
-
-/// Refuses combinations that only the command can see.
-///
-/// # Errors
-/// [`Usage`].
-pub fn check_usage(holds: bool, message: &str) -> Result<()> {
-    if holds { Ok(()) } else { Err(Usage(message.to_string()).into()) }
 }

@@ -15,7 +15,7 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Rays a dispatch; tiles are runs of 32 x 32 of them.
-const EXTENT: Extent = Extent { width: 32, height: 2048, tile: 32 };
+pub const EXTENT: Extent = Extent { width: 32, height: 2048, tile: 32 };
 
 /// Runs the command.
 ///

@@ -83,7 +83,8 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     Ok(())
 }
 
-fn renderer(session: Session, args: &WalkArgs) -> Renderer {
+/// The renderer that the options of a walk ask for.
+pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
     let Session { scene, executor, cache, schedule } = session;
     let settings = RenderSettings {
         schedule,

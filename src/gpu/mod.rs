@@ -5,6 +5,7 @@ pub mod executor;
 pub mod kernels;
 pub mod layout;
 pub mod pages;
+pub mod probe;
 pub mod rays;
 pub mod readback;
 pub mod scene;

@@ -24,9 +24,9 @@ impl Light {
         Self {
             sun_direction: sun_direction.normalize_or(DVec3::Y),
             sun_angle_degrees,
-            sun_color: scaled([1.55, 1.42, 1.18], sun_intensity),
-            sky_color: scaled([0.36, 0.52, 0.82], sky_intensity),
-            ground_color: scaled([0.24, 0.22, 0.19], sky_intensity),
+            sun_color: scaled([0.60, 0.56, 0.48], sun_intensity),
+            sky_color: scaled([1.15, 1.55, 2.20], sky_intensity),
+            ground_color: scaled([0.75, 0.69, 0.60], sky_intensity),
         }
     }
 }

@@ -1,0 +1,100 @@
+//! Streaming of a warm file into device pages against one thread's memcpy + xxh3 of the same map into an equally mapped
+//! buffer: the physical limit of a verified copy by one thread. The upload path is named.
+
+use brickwalk::app::args::{Cli, Command};
+use brickwalk::app::session::{Session, brick_bytes, open_scene};
+use brickwalk::gpu::device::Gpu;
+use brickwalk::gpu::rays::Extent;
+use brickwalk::schedule::{Executor, Load};
+use brickwalk::stream::{Item, Slot};
+use clap::Parser;
+use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A city of 1.5M triangles, made once.
+fn scene() -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("streaming.bricks");
+    if !path.exists() {
+        let words = ["brickwalk", "scene", "city", "--triangles", "1.5M", "-o"].map(std::ffi::OsString::from);
+        let cli = Cli::parse_from(words.into_iter().chain([path.clone().into()]));
+        brickwalk::app::run(&cli.command).expect("a city");
+    }
+    path
+}
+
+fn streaming(c: &mut Criterion) {
+    let path = scene();
+    let file = open_scene(&path).expect("the scene");
+    let mut group = c.benchmark_group("streaming");
+    group.sampling_mode(SamplingMode::Flat).sample_size(20).measurement_time(Duration::from_secs(8));
+    let bricks = brick_bytes(&file);
+    let total: u64 = bricks.iter().map(|b| b.geometry).sum();
+    group.throughput(Throughput::Bytes(total));
+
+    // The limit: the same bytes of the same map, hashed and copied once by one thread into mapped device memory.
+    let raw = std::fs::File::open(&path).expect("the file");
+    // SAFETY: the file was just made by this process and nothing truncates it while the bench runs.
+    let map = unsafe { memmap2::Mmap::map(&raw) }.expect("a map");
+    let gpu = Gpu::open(None).expect("a device");
+    let mapped = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("limit"),
+        size: total.next_multiple_of(8),
+        usage: wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: true,
+    });
+    let spans: Vec<bricks::Span> = file.resident().bricks.iter().map(|b| b.geometry).collect();
+    {
+        let mut view = mapped.get_mapped_range_mut(..).expect("mapped at creation");
+        group.bench_function("memcpy + xxh3, one thread", |b| {
+            b.iter(|| {
+                let mut at = 0;
+                for span in &spans {
+                    let bytes = &map[span.offset as usize..(span.offset + span.bytes) as usize];
+                    assert_eq!(xxhash_rust::xxh3::xxh3_64(bytes), span.checksum);
+                    view.slice(at..at + bytes.len()).copy_from_slice(bytes);
+                    at += bytes.len();
+                }
+            });
+        });
+    }
+    mapped.unmap();
+
+    for (name, options) in [("file", "--host-cache 0"), ("host cache", "--host-cache 4G")] {
+        let words = format!("brickwalk walk s -o o --cache 100% {options}");
+        let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
+        let extent = Extent { width: 64, height: 64, tile: 64 };
+        let mut session = Session::open(file.clone(), &path, &args.stream, extent).expect("a session");
+        let upload = session.executor.gpu().upload.name();
+        let loads = place(&session, &bricks);
+        group.bench_function(BenchmarkId::new(format!("brickwalk from the {name}"), upload), |b| {
+            b.iter(|| {
+                // As a walk loads: a few bricks at a time.
+                for batch in loads.chunks(8) {
+                    session.executor.load(batch).expect("a load");
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+/// All geometry one after the other in the pages of an empty cache.
+fn place(session: &Session, bricks: &[brickwalk::schedule::cache::BrickBytes]) -> Vec<Load> {
+    let pages: Vec<u64> = session.cache.residency.page_sizes().collect();
+    let (mut page, mut offset) = (0usize, 0u64);
+    let mut loads = Vec::new();
+    for (brick, bytes) in bricks.iter().enumerate() {
+        if offset + bytes.geometry > pages[page] {
+            page += 1;
+            offset = 0;
+        }
+        let slot = Slot { page: page as u32, offset: offset as u32 };
+        loads.push(Load { item: Item::geometry(brick as u32), slot });
+        offset += bytes.geometry;
+    }
+    loads
+}
+
+criterion_group!(benches, streaming);
+criterion_main!(benches);

@@ -1,0 +1,183 @@
+//! Exact means exact: hits of primary and shadow rays of a walk, and of `trace`, against f64 truth over the lattice-rounded
+//! triangles and the very f32 rays that the kernels used. Unexcused mismatches: none. Excused ones are counted and printed.
+
+mod common;
+
+use brickwalk::app::args::{Cli, Command};
+use brickwalk::app::output::npy;
+use brickwalk::app::session::{Session, open_scene};
+use brickwalk::app::trace::{EXTENT, device_ray, trace};
+use brickwalk::app::walk::renderer;
+use brickwalk::gpu::layout::{Hit, NONE, Ray, T_INFINITE};
+use brickwalk::gpu::rays::Extent;
+use brickwalk::gpu::scene::Frame;
+use brickwalk::reference::{Tally, Truth, TruthRay, judge, judge_any};
+use brickwalk::scene::path::{CameraPath, path_from_bounds};
+use brickwalk::schedule::Pass;
+use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::SourceScene;
+use brickwalk_scenes::{SoupKind, rotated_instances, soup};
+use clap::Parser;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+
+const OPTIONS: &str = "--cache 35% --tile 16 --size 112x80 --frames 3";
+
+fn made(folder: &Path, source: SourceScene, brick_triangles: u32) -> PathBuf {
+    let path = folder.join("scene.bricks");
+    let settings = BuildSettings { brick_triangles, ..BuildSettings::default() };
+    build(source, &settings, &path, &Progress::hidden()).expect("a scene");
+    path
+}
+
+fn truth_ray(frame: &Frame, ray: &Ray) -> TruthRay {
+    let t_max = if ray.t_max >= T_INFINITE { f32::INFINITY } else { ray.t_max };
+    TruthRay::from_f32(frame.origin.to_array(), frame.unit, ray.origin, ray.direction, ray.t_min, t_max)
+}
+
+fn found(hit: &Hit) -> Option<(u32, f64)> {
+    (hit.id != NONE).then_some((hit.id, f64::from(hit.t)))
+}
+
+fn report(name: &str, tally: &Tally, least_hits: usize, hits: usize) {
+    println!("{name}: {tally}");
+    assert_eq!(tally.mismatches, 0, "{name}: {tally}");
+    assert!(hits >= least_hits, "{name}: only {hits} hits; the view shows nothing");
+    // Excuses are rare: rays this close to an edge, or hits this close together.
+    assert!(tally.excused() * 100 <= tally.total() + 100, "{name}: {tally}");
+}
+
+/// Frames along a path: every primary and every shadow ray.
+fn check_walk(name: &str, scene: &Path, path: Option<CameraPath>) {
+    let file = open_scene(scene).expect("the scene");
+    let truth = Truth::load(&file).expect("truth");
+    let words = format!("brickwalk walk s -o o {OPTIONS}");
+    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
+    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let session = Session::open(file.clone(), scene, &args.stream, extent).expect("a session");
+    let mut renderer = renderer(session, &args);
+    let manifest = &file.resident().manifest;
+    let path = path.unwrap_or_else(|| path_from_bounds(manifest.min, manifest.max));
+    let (mut primary, mut shadow) = (Tally::default(), Tally::default());
+    let (mut hit_count, mut shadow_count) = (0, 0);
+    let mut swapped = Tally::default();
+    for k in 0..args.frames {
+        let camera = path.frame(k, args.frames);
+        renderer.frame(k, &camera).expect("a frame");
+        let frame = Frame::near(file.resident(), camera.position);
+        let rays = renderer.executor.read_rays(Pass::Primary).expect("rays");
+        let hits = renderer.executor.read_hits(Pass::Primary).expect("hits");
+        for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
+            let ray = truth_ray(&frame, ray);
+            primary.add(judge(&truth, &ray, found(hit)));
+            hit_count += usize::from(hit.id != NONE);
+            // Negative control: the hit of a ray elsewhere in the picture is no hit of this one.
+            let other = &hits[(i + hits.len() / 2) % hits.len()];
+            swapped.add(judge(&truth, &ray, found(other)));
+        }
+        let rays = renderer.executor.read_rays(Pass::Shadow).expect("rays");
+        let hits = renderer.executor.read_hits(Pass::Shadow).expect("hits");
+        for (ray, hit) in rays.iter().zip(&hits).filter(|(ray, _)| ray.t_min <= ray.t_max) {
+            shadow.add(judge_any(&truth, &truth_ray(&frame, ray), hit.id != NONE));
+            shadow_count += 1;
+        }
+    }
+    report(&format!("{name}, primary"), &primary, 500, hit_count);
+    report(&format!("{name}, shadow"), &shadow, 100, shadow_count);
+    assert!(swapped.mismatches > primary.total() / 10, "the judge must notice wrong hits: {swapped}");
+}
+
+/// Rays between random points of the scene's bounds, half of them aimed at vertices of hit triangles' bricks.
+fn check_trace(name: &str, scene: &Path) {
+    let file = open_scene(scene).expect("the scene");
+    let truth = Truth::load(&file).expect("truth");
+    let Command::Trace(args) =
+        Cli::parse_from("brickwalk trace s --rays r -o h --cache 35%".split_whitespace()).command
+    else {
+        unreachable!("it says trace")
+    };
+    let mut session = Session::open(file.clone(), scene, &args.stream, EXTENT).expect("a session");
+    let manifest = &file.resident().manifest;
+    let (min, max) = (DVec3::from_array(manifest.min), DVec3::from_array(manifest.max));
+    let mut state = 0x2545_F491_4F6C_DD1Du64;
+    println!("{name}: seed {state:#x}");
+    let mut random = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let mut point = || min + (max - min) * DVec3::new(random(), random(), random());
+    let rays: Vec<npy::Ray> = (0..6000)
+        .map(|i| {
+            let (from, to) = (point(), point());
+            // Directions of all lengths; some bounded intervals.
+            let length = 10f64.powi(i % 7 - 3);
+            let direction = (to - from) * length;
+            let t_max = if i % 3 == 0 { 0.7 / length } else { f64::INFINITY };
+            npy::Ray { origin: from.to_array(), direction: direction.to_array(), t_min: 0.0, t_max }
+        })
+        .collect();
+    let progress = Progress::hidden();
+    let (closest, _) = trace(&mut session, &rays, false, &progress).expect("hits");
+    let (any, _) = trace(&mut session, &rays, true, &progress).expect("hits");
+    let (mut tally, mut occlusion, mut count) = (Tally::default(), Tally::default(), 0);
+    for ((ray, hit), any) in rays.iter().zip(&closest).zip(&any) {
+        let frame = Frame::near(file.resident(), DVec3::from_array(ray.origin));
+        let device = device_ray(ray, &frame);
+        let dumped = truth_ray(&frame, &device.ray);
+        let found = (hit.triangle != NONE).then(|| (hit.triangle, hit.t / device.t_scale));
+        tally.add(judge(&truth, &dumped, found));
+        occlusion.add(judge_any(&truth, &dumped, any.triangle != NONE));
+        count += usize::from(hit.triangle != NONE);
+        if let (Some(truth), Some((id, _))) = (truth.closest(&dumped), found)
+            && truth.id == id
+        {
+            let error = (truth.u - f64::from(hit.u)).abs().max((truth.v - f64::from(hit.v)).abs());
+            assert!(error < 0.02, "weights of the source's vertices: {hit:?} is not {truth:?}");
+        }
+    }
+    report(&format!("{name}, trace"), &tally, 1000, count);
+    report(&format!("{name}, trace --any"), &occlusion, 1000, count);
+}
+
+#[test]
+fn soups_are_exact() {
+    for kind in [SoupKind::Uniform, SoupKind::Clustered, SoupKind::Slivers] {
+        let folder = common::folder();
+        let scene = made(folder.path(), soup(kind, 3000, 11), 256);
+        check_walk(&format!("{kind:?} soup"), &scene, None);
+        check_trace(&format!("{kind:?} soup"), &scene);
+    }
+}
+
+#[test]
+fn rotated_overlapping_instances_are_exact() {
+    let folder = common::folder();
+    let scene = made(folder.path(), rotated_instances(5), 256);
+    assert!(open_scene(&scene).expect("the scene").resident().instances.len() > 8, "they stay instances");
+    check_walk("instances", &scene, None);
+    check_trace("instances", &scene);
+}
+
+#[test]
+fn a_city_of_500k_triangles_is_exact() {
+    let folder = common::folder();
+    let scene = common::city(folder.path(), "500K", "4K");
+    let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
+    check_walk("city", &scene, Some(path));
+    check_trace("city", &scene);
+}
+
+#[test]
+fn sponza_is_exact() {
+    let Some(scenes) = common::shared_scenes() else { return };
+    let folder = common::folder();
+    let scene = folder.path().join("sponza.bricks");
+    let input = scenes.join("sponza/Sponza.gltf");
+    let words = ["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()];
+    common::succeed(words.into_iter().chain(["--brick-triangles", "1K"].map(std::ffi::OsStr::new)));
+    check_walk("sponza", &scene, None);
+    check_trace("sponza", &scene);
+}
