@@ -1,0 +1,196 @@
+//! A plain binary BVH in f64, built by binned SAH.
+
+use super::ray::TruthRay;
+
+/// Most triangles of a leaf.
+const LEAF: usize = 4;
+/// Bins an axis.
+const BINS: usize = 16;
+/// Relative margin of the slab test: many times the roundings of a subtraction, a product and a division.
+const MARGIN: f64 = 64.0 * f64::EPSILON;
+
+/// An axis-aligned box, world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bounds {
+    pub(super) min: [f64; 3],
+    pub(super) max: [f64; 3],
+}
+
+impl Bounds {
+    pub(super) const EMPTY: Bounds = Bounds { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+
+    pub(super) fn of(points: &[[f64; 3]]) -> Self {
+        points.iter().fold(Self::EMPTY, |b, &p| b.join(&Bounds { min: p, max: p }))
+    }
+
+    fn join(&self, other: &Self) -> Self {
+        Self {
+            min: std::array::from_fn(|k| self.min[k].min(other.min[k])),
+            max: std::array::from_fn(|k| self.max[k].max(other.max[k])),
+        }
+    }
+
+    fn center(&self, k: usize) -> f64 {
+        0.5 * (self.min[k] + self.max[k])
+    }
+
+    /// Half the surface area; 0 for an empty box.
+    fn area(&self) -> f64 {
+        let e: [f64; 3] = std::array::from_fn(|k| (self.max[k] - self.min[k]).max(0.0));
+        e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
+    }
+}
+
+/// A node: a leaf of `count` items from `first` in the order, or (`count` = 0) the children `first` and `first + 1`.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Bounds,
+    first: u32,
+    count: u32,
+}
+
+/// The tree, over items 0..n.
+#[derive(Clone, Debug)]
+pub(super) struct Bvh {
+    nodes: Vec<Node>,
+    order: Vec<u32>,
+}
+
+impl Bvh {
+    /// The tree over boxes; at most 2^31 of them.
+    pub(super) fn build(bounds: &[Bounds]) -> Self {
+        let mut order: Vec<u32> = (0..bounds.len() as u32).collect();
+        let mut nodes = vec![Node { bounds: Bounds::EMPTY, first: 0, count: 0 }];
+        let mut pending = vec![(0usize, 0usize, order.len())];
+        while let Some((node, start, end)) = pending.pop() {
+            let items = &mut order[start..end];
+            let all = items.iter().fold(Bounds::EMPTY, |b, &i| b.join(&bounds[i as usize]));
+            if items.len() <= LEAF {
+                nodes[node] = Node { bounds: all, first: start as u32, count: items.len() as u32 };
+                continue;
+            }
+            let middle = start + split(items, bounds);
+            let first = nodes.len();
+            nodes[node] = Node { bounds: all, first: first as u32, count: 0 };
+            nodes.extend([nodes[node]; 2]);
+            pending.extend([(first, start, middle), (first + 1, middle, end)]);
+        }
+        Self { nodes, order }
+    }
+
+    /// The box around everything.
+    pub(super) fn bounds(&self) -> Bounds {
+        self.nodes[0].bounds
+    }
+
+    /// Calls `visit` for every item whose box, grown by `pad` on all sides, the ray meets at some t in t_min..=limit, nearer
+    /// nodes first; `visit` returns the limit from then on.
+    pub(super) fn visit(&self, ray: &TruthRay, pad: f64, mut limit: f64, mut visit: impl FnMut(u32) -> f64) {
+        if self.order.is_empty() {
+            return;
+        }
+        let slabs = Slabs { ray, pad };
+        let mut stack = vec![(0u32, f64::NEG_INFINITY)];
+        while let Some((index, entry)) = stack.pop() {
+            if entry > limit {
+                continue;
+            }
+            let node = &self.nodes[index as usize];
+            if node.count > 0 {
+                for &item in &self.order[node.first as usize..][..node.count as usize] {
+                    limit = visit(item);
+                }
+                continue;
+            }
+            let children = [node.first, node.first + 1];
+            let entries = children.map(|child| slabs.entry(&self.nodes[child as usize].bounds, limit));
+            let near = usize::from(entries[1] < entries[0]);
+            for child in [1 - near, near] {
+                if entries[child] <= limit {
+                    stack.push((children[child], entries[child]));
+                }
+            }
+        }
+    }
+}
+
+/// Reorders `items` and returns where to cut them, neither end.
+fn split(items: &mut [u32], bounds: &[Bounds]) -> usize {
+    let center = |i: u32, k: usize| bounds[i as usize].center(k);
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    for &i in items.iter() {
+        for k in 0..3 {
+            low[k] = low[k].min(center(i, k));
+            high[k] = high[k].max(center(i, k));
+        }
+    }
+    let bin = |i: u32, k: usize| {
+        let x = (center(i, k) - low[k]) / (high[k] - low[k]) * BINS as f64;
+        (x as usize).min(BINS - 1)
+    };
+    let mut best = (f64::INFINITY, 0, 0);
+    for k in (0..3).filter(|&k| high[k] > low[k]) {
+        let mut bins = [(Bounds::EMPTY, 0usize); BINS];
+        for &i in items.iter() {
+            let slot = &mut bins[bin(i, k)];
+            *slot = (slot.0.join(&bounds[i as usize]), slot.1 + 1);
+        }
+        let mut right = [0.0; BINS];
+        let mut sum = (Bounds::EMPTY, 0);
+        for cut in (1..BINS).rev() {
+            sum = (sum.0.join(&bins[cut].0), sum.1 + bins[cut].1);
+            right[cut] = sum.0.area() * sum.1 as f64;
+        }
+        let mut sum = (Bounds::EMPTY, 0);
+        for cut in 1..BINS {
+            sum = (sum.0.join(&bins[cut - 1].0), sum.1 + bins[cut - 1].1);
+            let cost = sum.0.area() * sum.1 as f64 + right[cut];
+            if cost < best.0 && sum.1 > 0 && sum.1 < items.len() {
+                best = (cost, k, cut);
+            }
+        }
+    }
+    if best.2 == 0 {
+        // All centres in one place: any halves do.
+        return items.len() / 2;
+    }
+    let (_, k, cut) = best;
+    let mut middle = 0;
+    for i in 0..items.len() {
+        if bin(items[i], k) < cut {
+            items.swap(i, middle);
+            middle += 1;
+        }
+    }
+    middle
+}
+
+struct Slabs<'a> {
+    ray: &'a TruthRay,
+    pad: f64,
+}
+
+impl Slabs<'_> {
+    /// A lower bound of the t at which the ray enters the box; +∞ if it misses it within t_min..=limit.
+    fn entry(&self, bounds: &Bounds, limit: f64) -> f64 {
+        let ray = self.ray;
+        let (mut near, mut far) = (ray.t_min, limit);
+        for k in 0..3 {
+            let (min, max) = (bounds.min[k] - ray.reference[k], bounds.max[k] - ray.reference[k]);
+            let pad = self.pad + MARGIN * (min.abs().max(max.abs()) + ray.origin[k].abs());
+            let (low, high) = (min - ray.origin[k] - pad, max - ray.origin[k] + pad);
+            let d = ray.direction[k];
+            if d == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return f64::INFINITY;
+                }
+                continue;
+            }
+            let (t0, t1) = (low / d, high / d);
+            near = near.max(t0.min(t1) - MARGIN * t0.min(t1).abs());
+            far = far.min(t0.max(t1) + MARGIN * t0.max(t1).abs());
+        }
+        if near <= far { near } else { f64::INFINITY }
+    }
+}
