@@ -74,7 +74,7 @@ pub enum Error {
     },
     /// The file does not start like a scene file.
     #[error(
-        "{}: not a .bricks scene file: it starts with \"{}\", expected \"{}\"; give a file that `convert` wrote",
+        "{}: not a .bricks scene file: found \"{}\" at its start, expected \"{}\"; give a file that `convert` wrote",
         path.display(), found.escape_ascii(), MAGIC.escape_ascii()
     )]
     NotSceneFile {
@@ -85,8 +85,8 @@ pub enum Error {
     },
     /// The file has a version of the format that this program does not read.
     #[error(
-        "{}: the header says format version {found}, {} than version {VERSION}, the one this program reads; \
-         convert again with this program",
+        "{}: the header is of another format version: found version {found}, expected version {VERSION}; the file is {} \
+         than this program reads: convert again with this program",
         path.display(), if *found < VERSION { "older" } else { "newer" }
     )]
     Version {
@@ -125,6 +125,22 @@ pub enum Error {
         /// Checksum that the file states.
         expected: u64,
     },
+    /// A byte of padding, which is zero when written, is not.
+    #[error(
+        "{}: {part} is damaged: found {found:#04x} at byte {offset}, expected zero; \
+         copy the file again from where it is whole, or convert again",
+        path.display()
+    )]
+    Padding {
+        /// The file.
+        path: PathBuf,
+        /// The padding, by what it follows.
+        part: Part,
+        /// Where in the file the first such byte is.
+        offset: u64,
+        /// The byte.
+        found: u8,
+    },
     /// The bytes are those that were written, but they break a rule of the format.
     #[error(
         "{}: {} is not valid: found {}, expected {}; convert again",
@@ -156,7 +172,7 @@ impl Error {
         match self {
             Error::Io { part, .. } => *part,
             Error::NotSceneFile { .. } | Error::Version { .. } | Error::Length { .. } => Some(Part::Header),
-            Error::Corrupt { part, .. } => Some(*part),
+            Error::Corrupt { part, .. } | Error::Padding { part, .. } => Some(*part),
             Error::Invalid { flaw, .. } => Some(flaw.part),
             Error::Request { payload, .. } => Some(Part::Payload(*payload)),
         }
@@ -170,6 +186,7 @@ impl Error {
             | Error::Version { path, .. }
             | Error::Length { path, .. }
             | Error::Corrupt { path, .. }
+            | Error::Padding { path, .. }
             | Error::Invalid { path, .. }
             | Error::Request { path, .. } => path,
         }

@@ -201,8 +201,8 @@ impl Verifier<'_> {
         if self.keep(read).is_some()
             && let Some(at) = page.iter().position(|&byte| byte != 0)
         {
-            let found = format!("{:#04x} at byte {}", page[at], start + at as u64);
-            self.keep_flaw(Err(Flaw { part, found, expected: "zero".to_owned() }));
+            let (path, offset) = (self.reader.path.to_owned(), start + at as u64);
+            self.report.problems.push(Error::Padding { path, part, offset, found: page[at] });
         }
         self.advance(end - start);
     }

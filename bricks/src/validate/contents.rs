@@ -79,7 +79,7 @@ fn vertices(part: Part, brick: &Brick, step_unit_log2: i32, bytes: &[u8]) -> Res
     let mut vertices = Vec::with_capacity(brick.vertex_count as usize);
     for index in 0..brick.vertex_count as usize {
         let mut vertex = [0; 3];
-        for axis in 0..3 {
+        for (axis, coordinate) in vertex.iter_mut().enumerate() {
             let at = index * if wide { 24 } else { 12 } + axis * 4;
             let value = read(at);
             let steps = f64::from(value) * steps_per_unit;
@@ -98,7 +98,7 @@ fn vertices(part: Part, brick: &Brick, step_unit_log2: i32, bytes: &[u8]) -> Res
                 let found = format!("vertex {index} at {steps} steps on axis {axis}");
                 (found, "a vertex on the lattice within the brick's bounds")
             })?;
-            vertex[axis] = sum;
+            *coordinate = sum;
         }
         vertices.push(vertex);
     }

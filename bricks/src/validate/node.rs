@@ -10,7 +10,7 @@ const ONES: u64 = 0x0101_0101_0101_0101;
 const INNER_META: u64 = 0x3f3e_3d3c_3b3a_3938;
 
 /// What links a wide node to its children.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct NodeView {
     /// `meta`, child 0 in the lowest byte.
     pub(super) meta: u64,
@@ -20,6 +20,7 @@ pub(super) struct NodeView {
 }
 
 /// What is wrong with a node.
+#[derive(Debug)]
 pub(super) struct NodeFlaw {
     found: String,
     expected: String,
