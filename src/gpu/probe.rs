@@ -1,0 +1,260 @@
+//! The start-up probe: does this device compute what exact rendering needs?
+//!
+//! WGSL promises little about floats: compilers may contract, division and square root may be off by some ulps. The kernels
+//! are built to give equal bits all the same (`shaders/shared/exact.wgsl`), provided that + - * round to nearest and
+//! nothing sees through `barrier`. The probe runs them on fixed cases, those made to tell included, and compares every
+//! result with the twin in [`crate::math::exact`] bit for bit.
+
+use super::wgsl::{self, Pages};
+use crate::math::exact;
+use cases::{ArithmeticCase, TriangleCase};
+use serde::Serialize;
+use std::sync::mpsc;
+use std::time::Instant;
+
+mod cases;
+
+/// What the probe found on a device.
+#[derive(Clone, Debug, Serialize)]
+pub struct ProbeReport {
+    /// Adapter name.
+    pub adapter: String,
+    /// What was compared.
+    pub checks: Vec<Check>,
+    /// Whether the compiler fuses `a * b - c * d` where no barrier stands between. Harmless behind barriers.
+    pub contracts: bool,
+    /// Whether products in the denormal range become 0. Harmless in the ranges that exact.wgsl states.
+    pub flushes_denormals: bool,
+    /// Whether the bits of a NaN survive a load and a store as f32.
+    pub keeps_nan_bits: bool,
+    /// Least and greatest subgroup size, where the driver tells.
+    pub subgroup_size: Option<(u32, u32)>,
+    /// Wall time of the probe, milliseconds, compilation included.
+    pub ms: f64,
+}
+
+/// One function or property, over all cases that concern it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    /// Function of exact.wgsl, or the property.
+    pub name: &'static str,
+    /// Cases compared.
+    pub cases: u32,
+    /// Cases with another result than the twin's.
+    pub different: u32,
+    /// The first of these, in words.
+    pub first: Option<String>,
+}
+
+impl ProbeReport {
+    /// One line for everything that differs; empty if the device may render in exact mode.
+    pub fn failures(&self) -> Vec<String> {
+        let line = |c: &Check| {
+            let first = c.first.as_deref().unwrap_or_default();
+            format!("{} differs in {} of {} cases (first: {first})", c.name, c.different, c.cases)
+        };
+        self.checks.iter().filter(|c| c.different > 0).map(line).collect()
+    }
+}
+
+impl Check {
+    fn new(name: &'static str) -> Self {
+        Self { name, cases: 0, different: 0, first: None }
+    }
+
+    /// Compares words of a result; +0 and -0 are one value.
+    fn compare(&mut self, found: &[u32], expected: &[u32], case: &dyn std::fmt::Debug) {
+        let value = |x: u32| if x == 1 << 31 { 0 } else { x };
+        self.cases += 1;
+        if found.iter().map(|&x| value(x)).eq(expected.iter().map(|&x| value(x))) {
+            return;
+        }
+        self.different += 1;
+        self.first.get_or_insert_with(|| format!("{found:08x?} instead of {expected:08x?} for {case:?}"));
+    }
+}
+
+/// Words of results per case of the kernel `arithmetic`.
+const ARITHMETIC_WORDS: usize = 12;
+/// Words of results per case of the kernel `triangles`.
+const TRIANGLE_WORDS: usize = 28;
+
+/// Runs the probe; about 4,000 cases, some milliseconds beside the compilation of two kernels.
+///
+/// A device that returns nothing gives a report whose one failure says so.
+pub fn run(device: &wgpu::Device, queue: &wgpu::Queue) -> ProbeReport {
+    run_source(device, queue, &source())
+}
+
+/// The text of `shaders/probe.wgsl` with what it includes.
+fn source() -> String {
+    let file = |name: &str| match name {
+        "probe.wgsl" => Some(include_str!("../../shaders/probe.wgsl").to_string()),
+        "shared/exact.wgsl" => Some(include_str!("../../shaders/shared/exact.wgsl").to_string()),
+        _ => None,
+    };
+    // Both files are embedded, so that assembly cannot fail.
+    wgsl::assemble("probe.wgsl", Pages { cache: 1, texels: 1 }, &file).unwrap_or_default()
+}
+
+fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> ProbeReport {
+    let start = Instant::now();
+    let info = device.adapter_info();
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("probe"),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    });
+    let arithmetic = cases::arithmetic();
+    let triangles = cases::triangles();
+    let mut report = ProbeReport {
+        adapter: info.name,
+        checks: Vec::new(),
+        contracts: false,
+        flushes_denormals: false,
+        keeps_nan_bits: true,
+        subgroup_size: (info.subgroup_max_size > 0).then_some((info.subgroup_min_size, info.subgroup_max_size)),
+        ms: 0.0,
+    };
+    let words = |c: &ArithmeticCase| c.words;
+    match dispatch(device, queue, &module, "arithmetic", &arithmetic, words, ARITHMETIC_WORDS) {
+        Ok(results) => check_arithmetic(&mut report, &arithmetic, &results),
+        Err(reason) => report.checks.push(no_results("arithmetic", reason)),
+    }
+    match dispatch(device, queue, &module, "triangles", &triangles, TriangleCase::words, TRIANGLE_WORDS) {
+        Ok(results) => check_triangles(&mut report, &triangles, &results),
+        Err(reason) => report.checks.push(no_results("triangles", reason)),
+    }
+    report.ms = start.elapsed().as_secs_f64() * 1e3;
+    report
+}
+
+fn no_results(name: &'static str, reason: String) -> Check {
+    Check { name, cases: 1, different: 1, first: Some(format!("the device returned no results: {reason}")) }
+}
+
+/// Runs one entry point over all cases; `result_words` words a case come back.
+fn dispatch<Case, const N: usize>(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    module: &wgpu::ShaderModule,
+    entry_point: &'static str,
+    cases: &[Case],
+    words: impl Fn(&Case) -> [u32; N],
+    result_words: usize,
+) -> Result<Vec<u32>, String> {
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry_point),
+        layout: None,
+        module,
+        entry_point: Some(entry_point),
+        compilation_options: Default::default(),
+        cache: None,
+    });
+    let buffer = |label, size: u64, usage| {
+        let usage = usage | wgpu::BufferUsages::COPY_DST;
+        device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+    };
+    let input: Vec<u32> = cases.iter().flat_map(words).collect();
+    let bytes = (cases.len() * result_words * 4) as u64;
+    let params = buffer("probe params", 16, wgpu::BufferUsages::UNIFORM);
+    let given = buffer("probe cases", input.len() as u64 * 4, wgpu::BufferUsages::STORAGE);
+    let results = buffer("probe results", bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+    let readable = buffer("probe readback", bytes, wgpu::BufferUsages::MAP_READ);
+    queue.write_buffer(&params, 0, bytemuck::cast_slice(&[0, cases.len() as u32, 0, 0]));
+    queue.write_buffer(&given, 0, bytemuck::cast_slice(&input));
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("probe"),
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[entry(0, &params), entry(1, &given), entry(2, &results)],
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(cases.len().div_ceil(64) as u32, 1, 1);
+    }
+    encoder.copy_buffer_to_buffer(&results, 0, &readable, 0, bytes);
+    queue.submit([encoder.finish()]);
+    let (send, receive) = mpsc::channel();
+    readable.map_async(wgpu::MapMode::Read, .., move |result| {
+        // The receiver outlives the poll below.
+        let _ = send.send(result);
+    });
+    device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
+    receive.try_recv().map_err(|e| e.to_string())?.map_err(|e| e.to_string())?;
+    let view = readable.get_mapped_range(..).map_err(|e| e.to_string())?;
+    Ok(bytemuck::pod_collect_to_vec(&view))
+}
+
+fn entry(binding: u32, buffer: &wgpu::Buffer) -> wgpu::BindGroupEntry<'_> {
+    wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }
+}
+
+/// Neither denormal, infinite nor NaN: what the kernels' arithmetic is promised to see and give.
+fn ordinary(x: f32) -> bool {
+    x == 0.0 || x.is_normal()
+}
+
+fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results: &[u32]) {
+    let names = ["rounding of +", "rounding of -", "rounding of *", "barrier", "divide", "square_root", "diffprod"];
+    let mut checks = names.map(Check::new);
+    for (case, found) in cases.iter().zip(results.chunks_exact(ARITHMETIC_WORDS)) {
+        let [a, b, c, d] = case.words.map(f32::from_bits);
+        if !case.words.iter().all(|&x| ordinary(f32::from_bits(x))) {
+            report.keeps_nan_bits &= !a.is_nan() || found[8] == case.words[0];
+            continue;
+        }
+        let product = a * b;
+        if !ordinary(product) && product.is_finite() && product != 0.0 {
+            report.flushes_denormals |= f32::from_bits(found[2]) == 0.0;
+        }
+        let apart = product - c * d;
+        let expected = [
+            (0, a + b, true),
+            (1, a - b, true),
+            (2, product, true),
+            (3, apart, ordinary(product) && ordinary(c * d)),
+            (5, exact::divide(a, b), b != 0.0),
+            (6, exact::square_root(a.abs()), true),
+            (7, exact::diffprod(a, b, c, d), true),
+        ];
+        for ((word, value, applies), check) in expected.into_iter().zip(&mut checks) {
+            if applies && ordinary(value) {
+                check.compare(&[found[word]], &[value.to_bits()], case);
+            }
+        }
+        if case.cancels {
+            report.contracts |= f32::from_bits(found[4]) != 0.0;
+        }
+    }
+    report.checks.extend(checks);
+}
+
+fn check_triangles(report: &mut ProbeReport, cases: &[TriangleCase], results: &[u32]) {
+    let mut checks = ["ray_frame", "intersect_triangle", "surface_point", "offset_origin"].map(Check::new);
+    for (case, found) in cases.iter().zip(results.chunks_exact(TRIANGLE_WORDS)) {
+        let [a, b, c] = case.vertices;
+        let f = exact::ray_frame(case.direction);
+        let relative = |v: [f32; 3]| [0, 1, 2].map(|k| v[k] - case.origin[k]);
+        let h = exact::intersect_triangle(&f, relative(a), relative(b), relative(c), case.t_min);
+        let mut expected = vec![f.kx | f.ky << 8 | f.kz << 16];
+        let bits = |x: &[f32]| x.iter().map(|x| x.to_bits()).collect::<Vec<u32>>();
+        expected.extend(bits(&[f.sx, f.sy, f.iz, f.inv[0], f.inv[1], f.inv[2]]));
+        checks[0].compare(&found[..7], &expected, case);
+        let mut expected = vec![u32::from(h.hit)];
+        expected.extend(bits(&[h.t, h.u, h.v, h.w, h.det]));
+        checks[1].compare(&found[7..13], &expected, case);
+        if h.hit {
+            let s = exact::surface_point(a, b, c, &h, case.direction);
+            let mut expected = bits(&[s.p[0], s.p[1], s.p[2], s.delta, s.n[0], s.n[1], s.n[2]]);
+            expected.push(s.down);
+            checks[2].compare(&found[13..21], &expected, case);
+            checks[3].compare(&found[21..24], &bits(&exact::offset_origin(&s)), case);
+        }
+    }
+    report.checks.extend(checks);
+}
+
+#[cfg(test)]
+mod tests;
