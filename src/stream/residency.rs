@@ -1,0 +1,507 @@
+//! Which items are on the device and where: a pure, deterministic state machine without threads, clocks or a device.
+
+use super::item::{Item, Kind, Policy, Slot};
+use super::lru::Lru;
+use super::ring::Ring;
+use super::space::Space;
+
+/// Alignment in bytes of sizes, offsets and the budget.
+const ALIGN: u64 = 16;
+
+/// [`Residency::place`]: not resident.
+const NOWHERE: u64 = u64::MAX;
+
+/// The cache cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ResidencyError {
+    /// The budget does not hold the two largest bricks.
+    #[error(
+        "a cache of {given} bytes is too small: the two largest bricks need {needed} bytes; give it at least that, or \
+         convert the scene with smaller bricks"
+    )]
+    CacheTooSmall {
+        /// Least budget in bytes.
+        needed: u64,
+        /// The budget in bytes, rounded down to 16.
+        given: u64,
+    },
+    /// A page does not hold the largest item.
+    #[error(
+        "{item} has {needed} bytes, more than a page of the cache ({given} bytes, at most one storage binding); convert \
+         the scene with smaller bricks"
+    )]
+    PageTooSmall {
+        /// The largest item.
+        item: Item,
+        /// Its bytes.
+        needed: u64,
+        /// Bytes of a page, rounded down to 16.
+        given: u64,
+    },
+    /// The budget makes more pages, or the scene has more bricks, than 32 bits count.
+    #[error("{count} {what} are more than the cache can count")]
+    TooMany {
+        /// How many.
+        count: u64,
+        /// What: "pages" or "bricks".
+        what: &'static str,
+    },
+    /// An item's size is not a multiple of 16.
+    #[error("{item} has {bytes} bytes, which is not a multiple of 16")]
+    Unaligned {
+        /// The item.
+        item: Item,
+        /// Its bytes.
+        bytes: u64,
+    },
+}
+
+/// Pinned items leave no place for an item. Nothing was changed.
+///
+/// Finish what is pinned, [`Residency::unpin_all`], insert again: with nothing pinned every item finds a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no place for {item} ({bytes} bytes) beside what is pinned")]
+pub struct NoRoom {
+    /// The item.
+    pub item: Item,
+    /// Its bytes.
+    pub bytes: u64,
+}
+
+/// Where an item was placed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Placed {
+    /// Its place.
+    pub slot: Slot,
+    /// What is no longer resident because of it, in the order of addresses; never pinned. Usually none to three.
+    pub evicted: Vec<Item>,
+}
+
+/// What happened to the items of one kind since the cache was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KindCounters {
+    /// Items inserted.
+    pub loaded: u64,
+    /// Of those, items that had been inserted before within the same pass ([`Residency::begin_pass`]).
+    pub reloaded: u64,
+    /// Items evicted.
+    pub evicted: u64,
+    /// Bytes of the items inserted.
+    pub loaded_bytes: u64,
+    /// Bytes of the items evicted.
+    pub evicted_bytes: u64,
+}
+
+impl KindCounters {
+    fn zip(&self, other: &Self, f: impl Fn(u64, u64) -> u64) -> Self {
+        Self {
+            loaded: f(self.loaded, other.loaded),
+            reloaded: f(self.reloaded, other.reloaded),
+            evicted: f(self.evicted, other.evicted),
+            loaded_bytes: f(self.loaded_bytes, other.loaded_bytes),
+            evicted_bytes: f(self.evicted_bytes, other.evicted_bytes),
+        }
+    }
+}
+
+/// What happened since the cache was made: resident = loaded − evicted, per kind, in items and in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Of geometry.
+    pub geometry: KindCounters,
+    /// Of attributes.
+    pub attributes: KindCounters,
+}
+
+impl Counters {
+    /// Of one kind.
+    pub fn kind(&self, kind: Kind) -> &KindCounters {
+        match kind {
+            Kind::Geometry => &self.geometry,
+            Kind::Attributes => &self.attributes,
+        }
+    }
+
+    fn kind_mut(&mut self, kind: Kind) -> &mut KindCounters {
+        match kind {
+            Kind::Geometry => &mut self.geometry,
+            Kind::Attributes => &mut self.attributes,
+        }
+    }
+
+    /// Of both kinds together.
+    pub fn total(&self) -> KindCounters {
+        self.geometry.zip(&self.attributes, |a, b| a + b)
+    }
+
+    /// What happened between `earlier` and `self`, both read from one cache in this order.
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            geometry: self.geometry.zip(&earlier.geometry, u64::saturating_sub),
+            attributes: self.attributes.zip(&earlier.attributes, u64::saturating_sub),
+        }
+    }
+}
+
+/// Where the next write goes, per policy.
+#[derive(Clone, Debug)]
+pub(super) enum Placement {
+    RoundRobin(Ring),
+    Lru(Lru),
+}
+
+/// The device cache: a budget in bytes, cut into pages, with items in slots.
+///
+/// Pages are `page_bytes` long, the last one shorter, and together exactly the budget rounded down to 16. An item never
+/// straddles a page. Items of zero bytes are always resident, take no room and are not counted.
+#[derive(Clone, Debug)]
+pub struct Residency {
+    pub(super) space: Space,
+    pub(super) placement: Placement,
+    /// Per item: its bytes.
+    bytes: Vec<u64>,
+    /// Per item: its address, or [`NOWHERE`].
+    pub(super) place: Vec<u64>,
+    /// Per item: whether it is pinned. Only resident items are.
+    pub(super) is_pinned: Vec<bool>,
+    /// The pinned items, unordered.
+    pub(super) pinned: Vec<Item>,
+    /// Per item: the pass that inserted it last, and how often that pass did.
+    inserted: Vec<(u32, u32)>,
+    pass: u32,
+    pub(super) used_bytes: u64,
+    pub(super) counters: Counters,
+}
+
+impl Residency {
+    /// An empty cache for bricks of `sizes` (geometry bytes, attribute bytes; multiples of 16).
+    ///
+    /// # Errors
+    /// [`ResidencyError::CacheTooSmall`] below [`Self::least_budget`]; [`ResidencyError::PageTooSmall`] when the first page
+    /// (`page_bytes`, or the budget if that is less) does not hold the largest item.
+    pub fn new(
+        sizes: &[(u64, u64)],
+        budget_bytes: u64,
+        page_bytes: u64,
+        policy: Policy,
+    ) -> Result<Self, ResidencyError> {
+        // Item tables are indexed by u32, two rows a brick and one spare.
+        if sizes.len() as u64 * 2 >= u32::MAX as u64 {
+            return Err(ResidencyError::TooMany { count: sizes.len() as u64, what: "bricks" });
+        }
+        let bytes: Vec<u64> = sizes.iter().flat_map(|&(geometry, attributes)| [geometry, attributes]).collect();
+        let items = || (0..bytes.len()).filter_map(Item::from_index).zip(bytes.iter().copied());
+        if let Some((item, bytes)) = items().find(|(_, bytes)| bytes % ALIGN != 0) {
+            return Err(ResidencyError::Unaligned { item, bytes });
+        }
+        let budget = round_down(budget_bytes);
+        let needed = Self::least_budget(sizes);
+        if needed > budget {
+            return Err(ResidencyError::CacheTooSmall { needed, given: budget });
+        }
+        // Offsets are u32. A page of nothing would make no progress.
+        let page_bytes = round_down(page_bytes.min(u32::MAX as u64)).max(ALIGN);
+        if let Some((item, needed)) = items().find(|&(_, bytes)| bytes > page_bytes) {
+            let (item, needed) = items().fold((item, needed), |most, next| if next.1 > most.1 { next } else { most });
+            return Err(ResidencyError::PageTooSmall { item, needed, given: page_bytes });
+        }
+        let pages = budget.div_ceil(page_bytes);
+        if pages > u32::MAX as u64 {
+            return Err(ResidencyError::TooMany { count: pages, what: "pages" });
+        }
+        let space = Space::new(page_bytes, budget);
+        let count = bytes.len();
+        let placement = match policy {
+            Policy::RoundRobin => Placement::RoundRobin(Ring::default()),
+            Policy::Lru => Placement::Lru(Lru::new(count, &space)),
+        };
+        Ok(Self {
+            space,
+            placement,
+            bytes,
+            place: vec![NOWHERE; count],
+            is_pinned: vec![false; count],
+            pinned: Vec::new(),
+            inserted: vec![(0, 0); count],
+            pass: 0,
+            used_bytes: 0,
+            counters: Counters::default(),
+        })
+    }
+
+    /// The least budget in bytes: the two largest bricks, geometry and attributes. Saturates.
+    pub fn least_budget(sizes: &[(u64, u64)]) -> u64 {
+        let (mut first, mut second) = (0u64, 0u64);
+        for &(geometry, attributes) in sizes {
+            let brick = geometry.saturating_add(attributes);
+            if brick > first {
+                (first, second) = (brick, first);
+            } else {
+                second = second.max(brick);
+            }
+        }
+        first.saturating_add(second)
+    }
+
+    /// A budget in bytes at which everything fits at once in pages of `page_bytes`: the sum of all items, plus what can be
+    /// left over at the ends of pages. Saturates.
+    pub fn budget_for_all(sizes: &[(u64, u64)], page_bytes: u64) -> u64 {
+        let sum = sizes
+            .iter()
+            .fold(0u64, |sum, &(geometry, attributes)| sum.saturating_add(geometry).saturating_add(attributes));
+        let page_bytes = round_down(page_bytes.min(u32::MAX as u64)).max(ALIGN);
+        let sum = sum.max(Self::least_budget(sizes));
+        if sum <= page_bytes {
+            return sum;
+        }
+        let largest = sizes.iter().map(|&(geometry, attributes)| geometry.max(attributes)).max().unwrap_or(0);
+        // A page is left for the next one when the next item does not fit: it is filled but for less than that item.
+        let filled = page_bytes.saturating_sub(largest.saturating_sub(ALIGN)).max(ALIGN);
+        sum.div_ceil(filled).saturating_mul(page_bytes)
+    }
+
+    /// Lengths of the pages in bytes; their sum is [`Self::budget_bytes`].
+    pub fn page_sizes(&self) -> impl ExactSizeIterator<Item = u64> + '_ {
+        self.space.page_sizes()
+    }
+
+    /// The budget in bytes, rounded down to 16.
+    pub fn budget_bytes(&self) -> u64 {
+        self.space.total()
+    }
+
+    /// Bytes of all resident items.
+    pub fn used_bytes(&self) -> u64 {
+        self.used_bytes
+    }
+
+    /// The policy.
+    pub fn policy(&self) -> Policy {
+        match self.placement {
+            Placement::RoundRobin(_) => Policy::RoundRobin,
+            Placement::Lru(_) => Policy::Lru,
+        }
+    }
+
+    /// Number of bricks.
+    pub fn brick_count(&self) -> u32 {
+        (self.bytes.len() / 2) as u32
+    }
+
+    /// Bytes of `item`. Its brick must be below [`Self::brick_count`], here and in every other method.
+    pub fn bytes(&self, item: Item) -> u64 {
+        self.bytes[item.index()]
+    }
+
+    /// What happened so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Begins a pass: the scope within which a second insertion of an item counts as reloaded.
+    pub fn begin_pass(&mut self) {
+        if self.pass == u32::MAX {
+            self.inserted.fill((0, 0));
+            self.pass = 0;
+        }
+        self.pass += 1;
+    }
+
+    /// Where `item` lies, if it is resident. Does not count as a use.
+    pub fn slot(&self, item: Item) -> Option<Slot> {
+        if self.bytes(item) == 0 {
+            return Some(Slot { page: 0, offset: 0 });
+        }
+        match self.place[item.index()] {
+            NOWHERE => None,
+            address => Some(self.space.slot(address)),
+        }
+    }
+
+    /// Everything resident that takes room, in the order of addresses.
+    pub fn resident(&self) -> impl Iterator<Item = (Item, Slot)> + '_ {
+        self.space.extents().map(|extent| (extent.item, self.space.slot(extent.start)))
+    }
+
+    /// Notes a use of `item`: under LRU it becomes the most recently used, if it is resident.
+    pub fn touch(&mut self, item: Item) {
+        if let Placement::Lru(lru) = &mut self.placement
+            && self.place[item.index()] != NOWHERE
+        {
+            lru.recency.touch(item);
+        }
+    }
+
+    /// Keeps `item` from being evicted until [`Self::unpin_all`]. Returns whether it is resident; else nothing happens.
+    pub fn pin(&mut self, item: Item) -> bool {
+        if self.bytes(item) == 0 {
+            return true;
+        }
+        if self.place[item.index()] == NOWHERE {
+            return false;
+        }
+        if !self.is_pinned[item.index()] {
+            self.is_pinned[item.index()] = true;
+            self.pinned.push(item);
+        }
+        true
+    }
+
+    /// Whether `item` is pinned.
+    pub fn is_pinned(&self, item: Item) -> bool {
+        self.is_pinned[item.index()]
+    }
+
+    /// Lets everything be evicted again.
+    pub fn unpin_all(&mut self) {
+        for item in self.pinned.drain(..) {
+            self.is_pinned[item.index()] = false;
+        }
+    }
+
+    /// Makes `item` resident, evicting what is in the way, and notes a use. It is not pinned by this. An item that is
+    /// resident stays where it is.
+    ///
+    /// With nothing pinned this always succeeds. A batch that wants several items at once pins each as it is placed.
+    ///
+    /// # Errors
+    /// [`NoRoom`] when pinned items leave no place; nothing has changed then.
+    pub fn insert(&mut self, item: Item) -> Result<Placed, NoRoom> {
+        if let Some(slot) = self.slot(item) {
+            self.touch(item);
+            return Ok(Placed { slot, evicted: Vec::new() });
+        }
+        let bytes = self.bytes(item);
+        let is_pinned = |item: Item| self.is_pinned[item.index()];
+        let start = match &mut self.placement {
+            Placement::RoundRobin(ring) => ring.place(&self.space, bytes, is_pinned),
+            Placement::Lru(lru) => lru.place(&self.space, bytes, is_pinned, |item| {
+                let start = self.place[item.index()];
+                (start, start + self.bytes[item.index()])
+            }),
+        };
+        let start = start.ok_or(NoRoom { item, bytes })?;
+        let evicted: Vec<Item> = self.space.overlapping(start, start + bytes).map(|extent| extent.item).collect();
+        for &old in &evicted {
+            self.release(old);
+            let old_bytes = self.bytes(old);
+            let counters = self.counters.kind_mut(old.kind);
+            counters.evicted += 1;
+            counters.evicted_bytes += old_bytes;
+        }
+        self.space.occupy(start, bytes, item);
+        self.place[item.index()] = start;
+        self.used_bytes += bytes;
+        match &mut self.placement {
+            Placement::RoundRobin(ring) => ring.advance_to(start + bytes),
+            Placement::Lru(lru) => lru.recency.touch(item),
+        }
+        let (pass, times) = &mut self.inserted[item.index()];
+        if *pass != self.pass {
+            (*pass, *times) = (self.pass, 0);
+        }
+        *times += 1;
+        let counters = self.counters.kind_mut(item.kind);
+        counters.loaded += 1;
+        counters.loaded_bytes += bytes;
+        counters.reloaded += u64::from(*times > 1);
+        Ok(Placed { slot: self.space.slot(start), evicted })
+    }
+
+    /// Takes back the insertion of `item` in this pass, because its bytes did not arrive: it is not resident, not pinned,
+    /// and not counted as loaded. What it evicted stays evicted. Returns whether it was resident.
+    pub fn withdraw(&mut self, item: Item) -> bool {
+        if self.bytes(item) == 0 || self.place[item.index()] == NOWHERE {
+            return false;
+        }
+        self.release(item);
+        let bytes = self.bytes(item);
+        let (pass, times) = &mut self.inserted[item.index()];
+        let counters = self.counters.kind_mut(item.kind);
+        counters.loaded -= 1;
+        counters.loaded_bytes -= bytes;
+        if *pass == self.pass && *times > 0 {
+            counters.reloaded -= u64::from(*times > 1);
+            *times -= 1;
+        }
+        true
+    }
+
+    /// Frees the room of a resident item and whatever was noted of it, but for the counters.
+    fn release(&mut self, item: Item) {
+        let (start, bytes) = (self.place[item.index()], self.bytes(item));
+        self.space.free(start);
+        self.place[item.index()] = NOWHERE;
+        self.used_bytes -= bytes;
+        if std::mem::take(&mut self.is_pinned[item.index()]) {
+            self.pinned.retain(|&pinned| pinned != item);
+        }
+        if let Placement::Lru(lru) = &mut self.placement {
+            lru.freed(&self.space, item, start, start + bytes);
+        }
+    }
+
+    /// Checks every invariant; for tests. The error names the first that does not hold.
+    pub fn validate(&self) -> Result<(), String> {
+        let check = |holds: bool, what: &dyn Fn() -> String| if holds { Ok(()) } else { Err(what()) };
+        let mut used = 0;
+        let mut last_end = 0;
+        let mut residents = 0;
+        let mut by_kind = [(0u64, 0u64); 2];
+        for extent in self.space.extents() {
+            let (start, end, item) = (extent.start, extent.end, extent.item);
+            check(start >= last_end, &|| format!("{item} at {start} overlaps what ends at {last_end}"))?;
+            check(start < end && end <= self.space.total(), &|| format!("{item} at {start}..{end} is out of bounds"))?;
+            check(end <= self.space.page_end(start), &|| format!("{item} at {start}..{end} straddles a page"))?;
+            check(start % ALIGN == 0, &|| format!("{item} at {start} is not aligned"))?;
+            check(end - start == self.bytes(item), &|| format!("{item} at {start}..{end} has the wrong length"))?;
+            check(self.place[item.index()] == start, &|| format!("{item} is noted at another place than {start}"))?;
+            last_end = end;
+            used += end - start;
+            residents += 1;
+            let kind = &mut by_kind[item.kind as usize];
+            *kind = (kind.0 + 1, kind.1 + end - start);
+        }
+        let placed = self.place.iter().filter(|&&place| place != NOWHERE).count();
+        check(placed == residents, &|| format!("{placed} items have a place, {residents} places an item"))?;
+        check(used == self.used_bytes, &|| format!("{used} bytes are used, {} are noted", self.used_bytes))?;
+        let pages: u64 = self.page_sizes().sum();
+        check(pages == self.budget_bytes(), &|| format!("pages of {pages} bytes for {}", self.budget_bytes()))?;
+        for kind in [Kind::Geometry, Kind::Attributes] {
+            let c = self.counters.kind(kind);
+            let found = by_kind[kind as usize];
+            let counted = (c.loaded.wrapping_sub(c.evicted), c.loaded_bytes.wrapping_sub(c.evicted_bytes));
+            check(found == counted, &|| format!("{kind:?}: {found:?} resident, {counted:?} loaded − evicted"))?;
+            check(c.reloaded <= c.loaded, &|| format!("{kind:?}: more reloaded than loaded"))?;
+        }
+        let flags = self.is_pinned.iter().filter(|&&pinned| pinned).count();
+        check(flags == self.pinned.len(), &|| format!("{flags} items pinned, {} listed", self.pinned.len()))?;
+        for &item in &self.pinned {
+            check(self.is_pinned(item), &|| format!("{item} is listed as pinned and is not"))?;
+            check(self.place[item.index()] != NOWHERE, &|| format!("{item} is pinned and not resident"))?;
+        }
+        match &self.placement {
+            Placement::RoundRobin(ring) => {
+                let head = ring.head();
+                check(head <= self.space.total() && head % ALIGN == 0, &|| format!("the head is at {head}"))?;
+            }
+            Placement::Lru(lru) => {
+                let mut listed = 0;
+                for item in lru.recency.oldest_first().take(residents + 1) {
+                    listed += 1;
+                    check(self.place[item.index()] != NOWHERE, &|| format!("{item} has a use and is not resident"))?;
+                }
+                check(listed == residents, &|| format!("{listed} items have a use, {residents} are resident"))?;
+                let largest = self.space.first_fit(u64::MAX).err().unwrap_or(u64::MAX);
+                let bound = lru.gap_bound;
+                check(largest <= bound, &|| format!("{largest} bytes are free in a row, the bound says {bound}"))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Down to the alignment.
+fn round_down(bytes: u64) -> u64 {
+    bytes - bytes % ALIGN
+}

@@ -1,0 +1,57 @@
+//! Where payloads come from.
+
+use bricks::{Payload, SceneFile};
+
+use super::item::{Item, Kind};
+
+/// Why a payload could not be had: a corrupt, truncated or unreadable brick. The text names the item, what was found and
+/// what was expected.
+pub type SourceError = Box<dyn std::error::Error + Send + Sync>;
+
+/// A scene file as the workers see it. Only they call [`Self::copy`].
+pub trait PayloadSource: Send + Sync + 'static {
+    /// Number of bricks.
+    fn brick_count(&self) -> u32;
+
+    /// Length of a payload in bytes, a multiple of 16, from the always-resident part: touches no payload. The brick is
+    /// below [`Self::brick_count`].
+    fn bytes(&self, item: Item) -> u64;
+
+    /// Copies a payload into `out`, [`Self::bytes`] long, and verifies *the copy*: after `Ok` it can be indexed freely.
+    /// After an error the contents of `out` are unspecified.
+    ///
+    /// # Errors
+    /// The payload is corrupt or cannot be read.
+    fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError>;
+
+    /// Bytes of geometry and attributes of every brick, as [`super::Residency::new`] wants them.
+    fn sizes(&self) -> Vec<(u64, u64)> {
+        (0..self.brick_count())
+            .map(|brick| (self.bytes(Item::geometry(brick)), self.bytes(Item::attributes(brick))))
+            .collect()
+    }
+}
+
+impl From<Item> for Payload {
+    fn from(item: Item) -> Self {
+        match item.kind {
+            Kind::Geometry => Payload::Geometry(item.brick),
+            Kind::Attributes => Payload::Attributes(item.brick),
+        }
+    }
+}
+
+impl PayloadSource for SceneFile {
+    fn brick_count(&self) -> u32 {
+        // The format numbers bricks by u32; opening checked it.
+        self.resident().bricks.len() as u32
+    }
+
+    fn bytes(&self, item: Item) -> u64 {
+        self.span(item.into()).bytes
+    }
+
+    fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError> {
+        Ok(SceneFile::copy(self, item.into(), out)?)
+    }
+}

@@ -1,0 +1,7 @@
+//! Tests of the streaming modules, no device needed.
+
+mod host_cache;
+mod model;
+mod residency;
+mod trace;
+mod workers;

@@ -1,0 +1,358 @@
+//! The workers: order, corrupt payloads, panics, lost and late answers, host cache, prefetch, shutdown.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use super::model::Random;
+use crate::stream::workers::collect;
+use crate::stream::{Destination, HostCache, Item, Kind, PayloadSource, SourceError, StreamError, Workers};
+
+/// What the mock does with an item.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    Corrupt,
+    Panic,
+    PanicWithBomb,
+    Slow,
+}
+
+/// Payloads made from the item's number; faults on request.
+#[derive(Default)]
+struct Mock {
+    bricks: u32,
+    faults: HashMap<Item, Fault>,
+    copies: AtomicU64,
+    /// When set, every copy waits for one message.
+    gate: Option<Mutex<Receiver<()>>>,
+}
+
+/// Panics when dropped.
+struct Bomb;
+
+impl Drop for Bomb {
+    fn drop(&mut self) {
+        panic!("the payload of a panic was dropped");
+    }
+}
+
+fn payload(item: Item) -> Vec<u8> {
+    let bytes = match item.kind {
+        Kind::Geometry => 16 * (1 + item.brick as usize % 7),
+        Kind::Attributes => 16 * (item.brick as usize % 3),
+    };
+    (0..bytes).map(|byte| (byte + item.index() * 31) as u8).collect()
+}
+
+impl PayloadSource for Mock {
+    fn brick_count(&self) -> u32 {
+        self.bricks
+    }
+
+    fn bytes(&self, item: Item) -> u64 {
+        payload(item).len() as u64
+    }
+
+    fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError> {
+        if let Some(gate) = &self.gate {
+            gate.lock().unwrap().recv()?;
+        }
+        self.copies.fetch_add(1, Ordering::Relaxed);
+        out.copy_from_slice(&payload(item));
+        match self.faults.get(&item) {
+            None => Ok(()),
+            Some(Fault::Corrupt) => {
+                out.fill(0xAA);
+                Err(format!("{item} is damaged: found checksum 1, expected 2").into())
+            }
+            Some(Fault::Panic) => panic!("mock panic at {item}"),
+            Some(Fault::PanicWithBomb) => std::panic::panic_any(Bomb),
+            Some(Fault::Slow) => {
+                std::thread::sleep(Duration::from_millis(30));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Collects what it is filled with, like a buffer of fixed length.
+#[derive(Debug, Default, PartialEq)]
+struct Sink {
+    bytes: Option<Vec<u8>>,
+    panics: bool,
+}
+
+impl Destination for Sink {
+    fn fill(&mut self, bytes: &[u8]) {
+        assert!(!self.panics, "the destination is too short");
+        assert!(self.bytes.is_none(), "filled twice");
+        self.bytes = Some(bytes.to_vec());
+    }
+}
+
+fn start(mock: Mock, host_bytes: u64, threads: usize) -> (Workers<Sink>, Arc<Mock>) {
+    let mock = Arc::new(mock);
+    (Workers::new(mock.clone(), HostCache::new(host_bytes), threads, 64).unwrap(), mock)
+}
+
+fn requests(items: impl IntoIterator<Item = Item>) -> Vec<(Item, Sink)> {
+    items.into_iter().map(|item| (item, Sink::default())).collect()
+}
+
+fn all_items(bricks: u32) -> impl Iterator<Item = Item> {
+    (0..bricks).flat_map(|brick| [Item::geometry(brick), Item::attributes(brick)])
+}
+
+/// Waits until `done`, for things that happen on other threads; fails after ten seconds.
+fn wait_until(what: &str, done: impl Fn() -> bool) {
+    let begin = Instant::now();
+    while !done() {
+        assert!(begin.elapsed() < Duration::from_secs(10), "waited in vain: {what}");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn every_destination_gets_its_payload_in_the_order_of_requests() {
+    for threads in [0, 1, 3] {
+        let (workers, mock) = start(Mock { bricks: 200, ..Mock::default() }, 0, threads);
+        let loaded = workers.load(requests(all_items(200))).unwrap();
+        assert!(loaded.iter().map(|one| one.0).eq(all_items(200)));
+        assert!(loaded.iter().all(|(item, sink)| sink.bytes.as_deref() == Some(&payload(*item)[..])));
+        // Control: the payloads tell items apart.
+        assert_ne!(payload(Item::geometry(3)), payload(Item::geometry(10)));
+        let stats = workers.stats();
+        assert_eq!((stats.read, stats.cached, stats.failed), (400, 0, 0));
+        assert_eq!(stats.read_bytes, mock.sizes().iter().map(|size| size.0 + size.1).sum::<u64>());
+        assert!(workers.load(Vec::new()).unwrap().is_empty());
+    }
+}
+
+#[test]
+fn a_corrupt_payload_is_named_and_the_others_complete() {
+    let faults = HashMap::from([
+        (Item::geometry(5), Fault::Corrupt),
+        (Item::attributes(7), Fault::Panic),
+        (Item::geometry(8), Fault::PanicWithBomb),
+    ]);
+    let (workers, _) = start(Mock { bricks: 12, faults: faults.clone(), ..Mock::default() }, 1 << 20, 2);
+    for _ in 0..3 {
+        for one in workers.load_each(requests(all_items(12))) {
+            let sink = one.destination.expect("destinations come back");
+            match (&one.result, faults.get(&one.item)) {
+                (Ok(()), None) => assert_eq!(sink.bytes.as_deref(), Some(&payload(one.item)[..])),
+                (Err(error), Some(_)) => {
+                    assert_eq!(sink.bytes, None, "unverified bytes reached a destination");
+                    assert!(error.to_string().starts_with(&one.item.to_string()), "{error}");
+                }
+                other => panic!("{}: {other:?}", one.item),
+            }
+            assert_eq!(workers.host_cache().contains(one.item), !faults.contains_key(&one.item));
+        }
+    }
+    assert_eq!(workers.stats().failed, 9);
+    let error = workers.load(requests([Item::geometry(8), Item::geometry(5)])).unwrap_err();
+    assert!(matches!(error, StreamError::Panicked { item, .. } if item == Item::geometry(8)), "{error}");
+    let error = workers.load(requests([Item::geometry(1), Item::geometry(5)])).unwrap_err();
+    assert_eq!(error.to_string(), "brick 5 geometry is damaged: found checksum 1, expected 2");
+    let error = workers.load(requests([Item::attributes(7)])).unwrap_err();
+    assert!(error.to_string().contains("mock panic at brick 7 attributes"), "{error}");
+    // The threads live on, and no room in the host cache stays reserved.
+    let held: u64 =
+        all_items(12).filter(|item| !faults.contains_key(item)).map(|item| payload(item).len() as u64).sum();
+    assert_eq!(workers.host_cache().stats().used_bytes, held);
+}
+
+#[test]
+fn a_panicking_destination_is_an_error() {
+    let (workers, _) = start(Mock { bricks: 4, ..Mock::default() }, 1 << 20, 1);
+    let panics = Sink { panics: true, ..Sink::default() };
+    let loaded = workers.load_each(vec![(Item::geometry(1), panics), (Item::geometry(2), Sink::default())]);
+    assert!(matches!(loaded[0].result, Err(StreamError::Panicked { .. })));
+    assert!(loaded[1].result.is_ok());
+}
+
+#[test]
+fn a_brick_beyond_the_last_is_an_error() {
+    let (workers, mock) = start(Mock { bricks: 4, ..Mock::default() }, 1 << 20, 1);
+    let loaded = workers.load_each(requests([Item::geometry(4), Item::geometry(3)]));
+    assert!(matches!(loaded[0].result, Err(StreamError::NoSuchBrick { bricks: 4, .. })));
+    assert!(loaded[1].result.is_ok());
+    assert_eq!(workers.prefetch(&[Item::geometry(9)]), 0);
+    assert_eq!(mock.copies.load(Ordering::Relaxed), 1);
+}
+
+#[test]
+fn late_answers_find_their_place_and_lost_ones_are_errors() {
+    let items = [0, 1, 2, 3].map(Item::geometry);
+    let (sender, receiver) = crossbeam::channel::bounded(4);
+    // Out of order, one after a while, one never.
+    sender.send((2, "two", Ok(()))).unwrap();
+    let late = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(20));
+        sender.send((0, "zero", Ok(()))).unwrap();
+        sender.send((3, "three", Err(StreamError::Lost { item: items[3] }))).unwrap();
+    });
+    let loaded = collect(&items, &receiver, &crossbeam::channel::never());
+    late.join().unwrap();
+    assert_eq!(
+        loaded.iter().map(|one| one.destination).collect::<Vec<_>>(),
+        [Some("zero"), None, Some("two"), Some("three")]
+    );
+    assert_eq!(loaded.iter().map(|one| one.result.is_ok()).collect::<Vec<_>>(), [true, false, true, false]);
+    assert!(matches!(loaded[1].result, Err(StreamError::Lost { item }) if item == items[1]));
+
+    // A slow payload keeps its batch waiting, and the next batch gets its own answers.
+    let faults = HashMap::from([(Item::geometry(1), Fault::Slow)]);
+    let (workers, _) = start(Mock { bricks: 8, faults, ..Mock::default() }, 0, 2);
+    for _ in 0..3 {
+        let loaded = workers.load(requests([1, 2, 3].map(Item::geometry))).unwrap();
+        assert!(loaded.iter().all(|(item, sink)| sink.bytes.as_deref() == Some(&payload(*item)[..])));
+    }
+}
+
+#[test]
+fn threads_that_end_lose_items_and_hang_nobody() {
+    let mock = Arc::new(Mock { bricks: 100, ..Mock::default() });
+    let cache = HostCache::new(1 << 20);
+    // The only thread takes three jobs, answers none and ends: with jobs queued, and more to come than the queue holds.
+    let workers: Workers<Sink> = Workers::with_body(mock.clone(), cache.clone(), 1, 0, |_, jobs, _| {
+        (0..3).for_each(|_| drop(jobs.recv()));
+    })
+    .unwrap();
+    for _ in 0..2 {
+        let loaded = workers.load_each(requests((0..100).map(Item::geometry)));
+        assert_eq!(loaded.len(), 100);
+        for (brick, one) in (0..).zip(loaded) {
+            assert_eq!(one.item, Item::geometry(brick));
+            assert!(matches!(one.result, Err(StreamError::Lost { item }) if item == one.item));
+        }
+    }
+    drop(workers);
+    assert_eq!(cache.stats().used_bytes, 0, "lost jobs keep room reserved");
+    assert_eq!(mock.copies.load(Ordering::Relaxed), 0);
+}
+
+#[test]
+fn the_host_cache_answers_the_second_time() {
+    let (workers, mock) = start(Mock { bricks: 50, ..Mock::default() }, 1 << 20, 2);
+    for round in 0..3 {
+        let loaded = workers.load(requests(all_items(50))).unwrap();
+        assert!(loaded.iter().all(|(item, sink)| sink.bytes.as_deref() == Some(&payload(*item)[..])), "{round}");
+    }
+    let stats = workers.stats();
+    assert_eq!((stats.read, stats.cached), (100, 200));
+    assert_eq!(stats.cached_bytes, 2 * stats.read_bytes);
+    let filled = all_items(50).filter(|&item| !payload(item).is_empty()).count() as u64;
+    assert_eq!(mock.copies.load(Ordering::Relaxed), filled);
+    // Control: without it everything is read each time.
+    let (workers, _) = start(Mock { bricks: 50, ..Mock::default() }, 0, 2);
+    (0..3).for_each(|_| drop(workers.load(requests(all_items(50))).unwrap()));
+    assert_eq!((workers.stats().read, workers.stats().cached), (300, 0));
+}
+
+/// The statistics after a seeded sequence of batches through a host cache far too small for them.
+fn stats_of_a_walk(threads: usize, seed: u64) -> impl PartialEq + std::fmt::Debug {
+    let (workers, _) = start(Mock { bricks: 60, ..Mock::default() }, 1200, threads);
+    let mut random = Random(seed);
+    for _ in 0..60 {
+        let count = random.below(30);
+        let items: Vec<Item> = (0..count).map(|_| Item::from_index(random.below(120) as usize).unwrap()).collect();
+        let loaded = workers.load(requests(items)).unwrap();
+        assert!(loaded.iter().all(|(item, sink)| sink.bytes.as_deref() == Some(&payload(*item)[..])));
+        assert!(workers.host_cache().stats().used_bytes <= 1200);
+    }
+    (workers.stats(), workers.host_cache().stats())
+}
+
+#[test]
+fn counters_do_not_depend_on_threads() {
+    let once = stats_of_a_walk(1, 7);
+    for threads in [1, 2, 4, 4] {
+        assert_eq!(stats_of_a_walk(threads, 7), once);
+    }
+    // Control: they depend on the requests.
+    assert_ne!(stats_of_a_walk(1, 8), once);
+}
+
+#[test]
+fn prefetched_payloads_are_not_read_again() {
+    let (workers, mock) = start(Mock { bricks: 20, ..Mock::default() }, 1 << 20, 2);
+    let items: Vec<Item> = (0..20).map(Item::geometry).collect();
+    assert_eq!(workers.prefetch(&items), 20);
+    wait_until("prefetches", || workers.stats().prefetched == 20);
+    assert_eq!(workers.prefetch(&items), 0, "all are held");
+    workers.load(requests(items)).unwrap();
+    let stats = workers.stats();
+    assert_eq!((stats.read, stats.cached, mock.copies.load(Ordering::Relaxed)), (0, 20, 20));
+}
+
+#[test]
+fn a_failing_prefetch_is_told_by_the_load() {
+    let faults = HashMap::from([(Item::geometry(1), Fault::Corrupt), (Item::geometry(2), Fault::PanicWithBomb)]);
+    let (workers, _) = start(Mock { bricks: 4, faults, ..Mock::default() }, 1 << 20, 1);
+    workers.prefetch(&[1, 2].map(Item::geometry));
+    wait_until("dropped prefetches", || workers.stats().prefetch_dropped == 2);
+    assert_eq!(workers.host_cache().stats().used_bytes, 0);
+    assert!(workers.load(requests([Item::geometry(1)])).is_err());
+    assert!(workers.load(requests([Item::geometry(3)])).is_ok());
+}
+
+/// Workers whose source waits for the returned sender.
+fn gated(prefetch_queue: usize) -> (Workers<Sink>, Arc<Mock>, Sender<()>) {
+    let (open, gate) = channel();
+    let mock = Arc::new(Mock { bricks: 50, gate: Some(Mutex::new(gate)), ..Mock::default() });
+    (Workers::new(mock.clone(), HostCache::new(1 << 20), 1, prefetch_queue).unwrap(), mock, open)
+}
+
+#[test]
+fn prefetching_never_waits_and_loads_go_first() {
+    let (workers, mock, open) = gated(4);
+    // One is taken by the thread and stands at the gate; four wait; the rest is dropped.
+    assert_eq!(workers.prefetch(&[Item::geometry(0)]), 1);
+    wait_until("the first to be taken", || workers.host_cache().stats().used_bytes > 0);
+    let many: Vec<Item> = (1..40).map(Item::geometry).collect();
+    assert_eq!(workers.prefetch(&many), 4);
+    assert_eq!(workers.stats().prefetch_dropped, 35);
+    // A load overtakes what waits: with the gate open twice, the first prefetch and the load get through.
+    std::thread::scope(|scope| {
+        let load = scope.spawn(|| workers.load(requests([Item::geometry(45)])).map(|loaded| loaded.len()));
+        wait_until("the load's reservation", || {
+            let both = payload(Item::geometry(0)).len() + payload(Item::geometry(45)).len();
+            workers.host_cache().stats().used_bytes == both as u64
+        });
+        // The job is sent right after its reservation; give it the time to be queued.
+        std::thread::sleep(Duration::from_millis(20));
+        open.send(()).unwrap();
+        open.send(()).unwrap();
+        assert_eq!(load.join().unwrap().unwrap(), 1);
+    });
+    assert_eq!(mock.copies.load(Ordering::Relaxed), 2);
+    // What is cancelled is not read.
+    workers.cancel_prefetch();
+    open.send(()).unwrap();
+    open.send(()).unwrap();
+    wait_until("cancelled prefetches", || workers.stats().prefetch_dropped >= 35 + 3);
+    assert!(mock.copies.load(Ordering::Relaxed) <= 3, "one may have been under way");
+    assert_eq!(gated(0).0.prefetch(&many), 0, "no queue, no prefetch");
+}
+
+#[test]
+fn shutdown_drops_what_is_queued() {
+    let (workers, mock, open) = gated(40);
+    assert_eq!(workers.prefetch(&(0..40).map(Item::geometry).collect::<Vec<_>>()), 40);
+    let cache = workers.host_cache().clone();
+    wait_until("the first to be taken", || cache.stats().used_bytes > 0);
+    let end = std::thread::spawn(move || drop(workers));
+    std::thread::sleep(Duration::from_millis(20));
+    open.send(()).unwrap();
+    // Were the queue worked off, the gate would hold the thread for ever.
+    wait_until("the threads to end", || end.is_finished());
+    end.join().unwrap();
+    assert_eq!(mock.copies.load(Ordering::Relaxed), 1);
+    assert_eq!(Arc::strong_count(&mock), 1, "a thread outlived the pool");
+    let stats = cache.stats();
+    assert_eq!(stats.used_bytes, payload(Item::geometry(0)).len() as u64);
+}

@@ -1,0 +1,306 @@
+//! Traces of requests: recorded per pass, written as JSON lines, replayed against other caches.
+//!
+//! The file's first line describes the cache, every other line one pass:
+//!
+//! ```text
+//! {"format":1,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"sizes":[[1024,512],[2048,512]]}
+//! {"frame":0,"pass":"primary","requests":["g0","g1","a1"]}
+//! ```
+//!
+//! `sizes` are the bytes of geometry and attributes of every brick; `g1` is the geometry of brick 1, `a1` its attributes.
+//! A request is one use of an item by a pass, resident or not. The order of requests was chosen knowing what was resident
+//! (resident bricks come first), so a replay shows what another cache makes of these requests, not of the same frames.
+
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufWriter, Write};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::item::{Item, Policy};
+use super::residency::{Residency, ResidencyError};
+
+/// The format number of a trace.
+const FORMAT: u32 = 1;
+
+/// Why a trace cannot be written, read or replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    /// The file cannot be read or written.
+    #[error("the request trace cannot be read or written")]
+    Io(#[from] std::io::Error),
+    /// A line is not what it should be.
+    #[error("line {line} of the request trace: {reason}")]
+    Line {
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A request names a brick that has no size.
+    #[error("the request trace asks for {item}, yet there are {bricks} bricks")]
+    NoSuchBrick {
+        /// The request.
+        item: Item,
+        /// Number of bricks.
+        bricks: usize,
+    },
+    /// The cache to replay against cannot be made.
+    #[error(transparent)]
+    Cache(#[from] ResidencyError),
+}
+
+/// The requests of one pass, in order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PassRequests {
+    /// The frame, from 0.
+    pub frame: u32,
+    /// The pass, such as `primary`.
+    pub pass: String,
+    /// What it used.
+    pub requests: Vec<Item>,
+}
+
+/// The sequence of requests of a walk.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Trace {
+    /// Bytes of geometry and attributes of every brick.
+    pub sizes: Vec<(u64, u64)>,
+    /// The budget it was recorded with, bytes.
+    pub budget_bytes: u64,
+    /// The length of its pages, bytes.
+    pub page_bytes: u64,
+    /// The policy it was recorded with.
+    pub policy: Policy,
+    /// The passes.
+    pub passes: Vec<PassRequests>,
+}
+
+/// The first line.
+#[derive(Serialize, Deserialize)]
+struct Head {
+    format: u32,
+    policy: String,
+    budget_bytes: u64,
+    page_bytes: u64,
+    sizes: Vec<(u64, u64)>,
+}
+
+/// Every other line.
+#[derive(Serialize, Deserialize)]
+struct Line {
+    frame: u32,
+    pass: String,
+    requests: Vec<String>,
+}
+
+impl Trace {
+    /// An empty trace of a walk with this cache.
+    pub fn new(sizes: Vec<(u64, u64)>, budget_bytes: u64, page_bytes: u64, policy: Policy) -> Self {
+        Self { sizes, budget_bytes, page_bytes, policy, passes: Vec::new() }
+    }
+
+    /// Begins a pass; requests count towards it.
+    pub fn begin_pass(&mut self, frame: u32, pass: &str) {
+        self.passes.push(PassRequests { frame, pass: pass.to_owned(), requests: Vec::new() });
+    }
+
+    /// Notes a request of the pass that began last; before the first one it is dropped.
+    pub fn request(&mut self, item: Item) {
+        if let Some(pass) = self.passes.last_mut() {
+            pass.requests.push(item);
+        }
+    }
+
+    /// All requests in order.
+    pub fn requests(&self) -> impl Iterator<Item = Item> + '_ {
+        self.passes.iter().flat_map(|pass| pass.requests.iter().copied())
+    }
+
+    /// Writes the lines.
+    ///
+    /// # Errors
+    /// What `out` answers.
+    pub fn write(&self, mut out: impl Write) -> Result<(), TraceError> {
+        let head = Head {
+            format: FORMAT,
+            policy: self.policy.name().to_owned(),
+            budget_bytes: self.budget_bytes,
+            page_bytes: self.page_bytes,
+            sizes: self.sizes.clone(),
+        };
+        let mut line = |value: serde_json::Result<String>| writeln!(out, "{}", value.map_err(std::io::Error::from)?);
+        line(serde_json::to_string(&head))?;
+        for PassRequests { frame, pass, requests } in &self.passes {
+            let requests = requests.iter().map(|item| item.code()).collect();
+            line(serde_json::to_string(&Line { frame: *frame, pass: pass.clone(), requests }))?;
+        }
+        Ok(out.flush()?)
+    }
+
+    /// Writes the lines to a file, which appears complete or not at all.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_file(&self, path: &Path) -> Result<(), TraceError> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            // Temporary files are private to the user; this one is an output, under the user's mask like any other.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let mut file = builder.tempfile_in(folder)?;
+        self.write(BufWriter::new(&mut file))?;
+        file.persist(path).map_err(|error| error.error)?;
+        Ok(())
+    }
+
+    /// Reads what [`Self::write`] wrote.
+    ///
+    /// # Errors
+    /// [`TraceError::Line`] says which line is wrong.
+    pub fn read(input: impl BufRead) -> Result<Self, TraceError> {
+        let mut trace: Option<Self> = None;
+        for (number, text) in input.lines().enumerate() {
+            let text = text?;
+            let wrong = |reason: String| TraceError::Line { line: number + 1, reason };
+            match &mut trace {
+                None => {
+                    let head: Head = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+                    if head.format != FORMAT {
+                        return Err(wrong(format!("format {}, expected {FORMAT}; record it again", head.format)));
+                    }
+                    let policy = head.policy.parse().map_err(wrong)?;
+                    trace = Some(Self::new(head.sizes, head.budget_bytes, head.page_bytes, policy));
+                }
+                Some(trace) => {
+                    let line: Line = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+                    let requests: Result<Vec<Item>, _> = line.requests.iter().map(|code| code.parse()).collect();
+                    let requests = requests.map_err(|error| wrong(error.to_string()))?;
+                    trace.passes.push(PassRequests { frame: line.frame, pass: line.pass, requests });
+                }
+            }
+        }
+        trace.ok_or(TraceError::Line { line: 1, reason: "the file is empty".to_owned() })
+    }
+}
+
+/// What to replay a trace against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Replay {
+    /// A [`Residency`] with this policy, pages and all.
+    Cache(Policy),
+    /// Bélády's rule: evict what is used again last. Sizes differ, so this is the greedy bound: the optimum when all items
+    /// have one size, else an estimate that an optimal choice may beat. Counts bytes alone: no pages, no fragmentation.
+    Belady,
+}
+
+impl Replay {
+    /// Everything to compare.
+    pub const ALL: [Self; 3] = [Self::Cache(Policy::RoundRobin), Self::Cache(Policy::Lru), Self::Belady];
+
+    /// The name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cache(policy) => policy.name(),
+            Self::Belady => "belady-greedy",
+        }
+    }
+}
+
+/// What a cache made of a trace. Requests for items of zero bytes are not counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReplayResult {
+    /// Requests.
+    pub requests: u64,
+    /// Requests for what was resident.
+    pub hits: u64,
+    /// Requests for what had to be loaded.
+    pub loads: u64,
+    /// Bytes loaded.
+    pub loaded_bytes: u64,
+    /// Distinct items: no cache that begins empty loads fewer.
+    pub distinct: u64,
+    /// Bytes of the distinct items: no cache that begins empty loads fewer.
+    pub distinct_bytes: u64,
+}
+
+impl ReplayResult {
+    /// Hits ÷ requests; 1 without requests.
+    pub fn hit_rate(&self) -> f64 {
+        if self.requests == 0 { 1.0 } else { self.hits as f64 / self.requests as f64 }
+    }
+}
+
+/// Replays `trace` against a cache that begins empty: bricks of `sizes`, `budget_bytes` in pages of `page_bytes`. Nothing is
+/// pinned.
+///
+/// # Errors
+/// A request for a brick without a size, or a cache that cannot be made ([`Residency::new`], for Bélády too).
+pub fn replay(
+    trace: &Trace,
+    sizes: &[(u64, u64)],
+    budget_bytes: u64,
+    page_bytes: u64,
+    against: Replay,
+) -> Result<ReplayResult, TraceError> {
+    let policy = match against {
+        Replay::Cache(policy) => policy,
+        Replay::Belady => Policy::default(),
+    };
+    let mut cache = Residency::new(sizes, budget_bytes, page_bytes, policy)?;
+    if let Some(item) = trace.requests().find(|item| item.brick as usize >= sizes.len()) {
+        return Err(TraceError::NoSuchBrick { item, bricks: sizes.len() });
+    }
+    let requests: Vec<Item> = trace.requests().filter(|&item| cache.bytes(item) > 0).collect();
+    let mut result = ReplayResult { requests: requests.len() as u64, ..ReplayResult::default() };
+    for item in requests.iter().collect::<BTreeSet<_>>() {
+        result.distinct += 1;
+        result.distinct_bytes += cache.bytes(*item);
+    }
+    match against {
+        Replay::Cache(_) => {
+            for &item in &requests {
+                if cache.slot(item).is_some() {
+                    result.hits += 1;
+                    cache.touch(item);
+                } else if cache.insert(item).is_ok() {
+                    // Always: nothing is pinned.
+                    result.loads += 1;
+                    result.loaded_bytes += cache.bytes(item);
+                }
+            }
+        }
+        Replay::Belady => belady(&requests, sizes.len(), cache.budget_bytes(), |item| cache.bytes(item), &mut result),
+    }
+    Ok(result)
+}
+
+/// Bélády's rule, greedily, into `result`. Every item fits into the budget alone.
+fn belady(requests: &[Item], bricks: usize, budget: u64, bytes: impl Fn(Item) -> u64, result: &mut ReplayResult) {
+    const NEVER: usize = usize::MAX;
+    let mut next_use = vec![NEVER; requests.len()];
+    let mut seen = vec![NEVER; bricks * 2];
+    for (now, item) in requests.iter().enumerate().rev() {
+        next_use[now] = std::mem::replace(&mut seen[item.index()], now);
+    }
+    // (next use, item) of everything resident; the last is evicted first.
+    let mut resident: BTreeSet<(usize, Item)> = BTreeSet::new();
+    let mut used = 0;
+    for (now, &item) in requests.iter().enumerate() {
+        if resident.remove(&(now, item)) {
+            result.hits += 1;
+        } else {
+            result.loads += 1;
+            result.loaded_bytes += bytes(item);
+            used += bytes(item);
+            while used > budget {
+                let Some((_, old)) = resident.pop_last() else { break };
+                used -= bytes(old);
+            }
+        }
+        resident.insert((next_use[now], item));
+    }
+}
