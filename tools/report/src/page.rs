@@ -1,0 +1,331 @@
+//! The page: headline facts, frames, plots, tables.
+
+use crate::chart::{self, Drawing, Shape};
+use crate::frames::{Gallery, Picture, dimensions};
+use crate::plots::{self, Plot};
+use crate::walk::{Statistics, Walk};
+use crate::{ReportError, format, tables};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde_json::Value;
+
+const STYLE: &str = include_str!("style.css");
+/// Parts of the summary that the page shows in places of their own, or computes from the records.
+const SHOWN_APART: [&str; 7] =
+    ["settings", "scene", "adapter", "left_out", "memory", "passes", "texture_bytes_resident"];
+
+/// The whole page as HTML.
+///
+/// # Errors
+/// A plot cannot be drawn.
+pub fn render(walk: &Walk, gallery: &Gallery) -> Result<String, ReportError> {
+    let scene = walk.text("scene/file").unwrap_or_else(|| "unnamed scene".into());
+    let dark = chart::colour_rules();
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { "Walk through " (scene) }
+                style { (PreEscaped(STYLE)) "@media (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
+            }
+            body {
+                header {
+                    p.kicker { "brickwalk · walk" }
+                    h1 { (scene) }
+                    (verdict(walk))
+                    (facts(walk))
+                }
+                main {
+                    (medians(walk))
+                    section { h2 { "Frames" } (frames(walk, gallery)) }
+                    (all_plots(walk)?)
+                    (all_tables(walk))
+                }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// How many frames there are, and whether all of their pixels can be trusted.
+fn verdict(walk: &Walk) -> Markup {
+    let finished = walk.number("frames").unwrap_or(walk.frames.len() as f64);
+    let asked = walk.number("settings/frames").unwrap_or(finished);
+    let interrupted = finished < asked;
+    let (unresolved, non_finite) = (walk.total("unresolved_pixels"), walk.total("non_finite"));
+    html! {
+        ul.verdict {
+            li.warn[interrupted] {
+                @if interrupted { "Interrupted after " (format::count(finished)) " of " (format::count(asked)) " frames" }
+                @else { (format::count(finished)) " of " (format::count(asked)) " frames finished" }
+            }
+            @if !walk.passes.is_empty() {
+                @if unresolved > 0.0 { li.warn { (format::count(unresolved)) " pixels are not final" } }
+                @if non_finite > 0.0 { li.warn { (format::count(non_finite)) " pixels were not finite and are black" } }
+                @if unresolved == 0.0 && non_finite == 0.0 { li { "every pixel is final and finite" } }
+            }
+        }
+    }
+}
+
+/// The headline facts.
+fn facts(walk: &Walk) -> Markup {
+    let count = |path: &str| walk.number(path).map(format::count);
+    let bytes = |path: &str| walk.number(path).map(format::bytes);
+    let joined = |parts: [Option<String>; 2], separator: &str| {
+        let parts: Vec<String> = parts.into_iter().flatten().filter(|part| !part.is_empty()).collect();
+        (!parts.is_empty()).then(|| parts.join(separator))
+    };
+    let size = match (count("settings/width"), count("settings/height")) {
+        (Some(width), Some(height)) => Some(format!("{} × {} px", width.replace(',', ""), height.replace(',', ""))),
+        _ => None,
+    };
+    let percent = walk.number("settings/cache_percent").map(|p| format!("{} % of the bricks", format::number(p)));
+    let fronts = walk.text("settings/fronts").map(|fronts| format!("fronts {fronts}"));
+    let version = walk.text("version").map(|version| format!("version {version}"));
+    let driver = joined([walk.text("adapter/driver"), walk.text("adapter/driver_info")], " ");
+    let backend = walk.text("adapter/backend").map(|backend| format!("({backend})"));
+    let facts = [
+        ("Triangles", count("scene/triangles")),
+        ("Bricks", joined([count("scene/bricks"), bytes("scene/brick_bytes")], ", ")),
+        ("Scene file", bytes("scene/file_bytes")),
+        ("Frame size", size),
+        ("Cache", joined([bytes("settings/cache_bytes"), percent], ", ")),
+        ("Schedule", joined([walk.text("settings/schedule"), fronts], ", ")),
+        ("Adapter", joined([walk.text("adapter/name"), backend], " ")),
+        ("Driver", driver),
+        ("Commit", joined([walk.text("commit"), version], ", ")),
+    ];
+    html! {
+        dl.facts {
+            @for (name, value) in facts {
+                div { dt { (name) } dd { (value.unwrap_or_else(|| "not recorded".into())) } }
+            }
+        }
+    }
+}
+
+/// A row of medians, so that the page's first screen answers how fast the walk was.
+fn medians(walk: &Walk) -> Markup {
+    let median = |values: Vec<(u64, f64)>| Statistics::of(values.into_iter().map(|v| v.1).collect()).map(|s| s.median);
+    let frame_ms = median(walk.per_frame("ms"));
+    let mut moved: Vec<(u64, f64)> = Vec::new();
+    for values in tables::MOVED.map(|field| walk.per_frame(field)) {
+        for (frame, bytes) in values {
+            match moved.iter_mut().rev().find(|m| m.0 == frame) {
+                Some(sum) => sum.1 += bytes,
+                None => moved.push((frame, bytes)),
+            }
+        }
+    }
+    html! {
+        @if !walk.passes.is_empty() {
+            section {
+                h2 { "Median frame" }
+                ul.tiles {
+                    @if let Some(ms) = frame_ms { li { b { (format::number(ms)) } " ms, all passes" } }
+                    @for pass in &walk.passes {
+                        @if let Some(s) = pass.statistics("mrays_per_s") { li { b { (format::number(s.median)) } " Mrays/s, " (pass.name) } }
+                    }
+                    @if let Some(bytes) = median(moved) { li { b { (format::bytes(bytes)) } " moved" } }
+                    @if let Some(trips) = median(walk.per_frame("round_trips")) { li { b { (format::number(trips)) } " round trips" } }
+                }
+            }
+        }
+    }
+}
+
+/// The gallery: a tap or click on a frame enlarges it; no script is needed.
+fn frames(walk: &Walk, gallery: &Gallery) -> Markup {
+    let (embedded, linked): (Vec<&Picture>, Vec<&Picture>) = gallery.pictures.iter().partition(|p| p.png.is_some());
+    let times = walk.per_frame("ms");
+    let time = |frame: u64| times.binary_search_by_key(&frame, |t| t.0).ok().map(|at| times[at].1);
+    html! {
+        @if gallery.pictures.is_empty() {
+            p { @if walk.frames.is_empty() { "No frame was finished, so there is nothing to show or to plot." } @else { "The folder holds no pictures of these frames." } }
+        }
+        @if !embedded.is_empty() {
+            p.reading { "Choose a frame to enlarge it; its number leads to the file beside this page." }
+            div.gallery {
+                @for picture in &embedded { (figure(picture, time(picture.frame))) }
+            }
+        }
+        @if !linked.is_empty() {
+            details {
+                summary { (linked.len()) " more frames beside this page" }
+                p.links { @for picture in &linked { a href={ "frames/" (picture.name) } { (picture.frame) } " " } }
+            }
+        }
+        @if !gallery.left_out.is_empty() {
+            p.note { "Left out, because they belong to no record of this walk or hold no PNG: " (gallery.left_out.join(", ")) "." }
+        }
+    }
+}
+
+fn figure(picture: &Picture, ms: Option<f64>) -> Markup {
+    let png = picture.png.as_deref().unwrap_or_default();
+    let size = dimensions(png);
+    let source = format!("data:image/png;base64,{}", format::base64(png));
+    html! {
+        figure {
+            label {
+                input type="checkbox" aria-label={ "enlarge frame " (picture.frame) };
+                img src=(PreEscaped(source)) alt={ "frame " (picture.frame) } width=[size.map(|s| s.0)] height=[size.map(|s| s.1)];
+            }
+            figcaption { a href={ "frames/" (picture.name) } { "frame " (picture.frame) } @if let Some(ms) = ms { " · " (format::number(ms)) " ms" } }
+        }
+    }
+}
+
+fn all_plots(walk: &Walk) -> Result<Markup, ReportError> {
+    if walk.passes.is_empty() {
+        return Ok(html! {});
+    }
+    let shared = section_of("All passes", &plots::of_walk(walk))?;
+    let passes = walk.passes.iter().map(|pass| section_of(&format!("Pass: {}", pass.name), &plots::of_pass(pass)));
+    let passes = passes.collect::<Result<Vec<_>, _>>()?;
+    Ok(html! { (shared) @for pass in passes { (pass) } })
+}
+
+fn section_of(title: &str, plots: &[Plot]) -> Result<Markup, ReportError> {
+    let drawn = plots.iter().map(plot).collect::<Result<Vec<_>, _>>()?;
+    Ok(html! {
+        section {
+            h2 { (title) }
+            div.plots { @for figure in drawn.into_iter().flatten() { (figure) } }
+            @for plot in plots.iter().filter(|plot| plot.chart.is_none()) {
+                p.note { (plot.title) ": not drawn, because " (undrawn(plot)) "." }
+            }
+        }
+    })
+}
+
+/// Why series are not drawn: which are zero and which are not recorded.
+fn undrawn(plot: &Plot) -> String {
+    fn are(names: &[String], what: &str) -> Option<String> {
+        let verb = if names.len() == 1 { "is" } else { "are" };
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        (!names.is_empty()).then(|| format!("{} {verb} {what}", format::list(&names)))
+    }
+    let parts = [are(&plot.zero, "zero in every frame"), are(&plot.missing, "not recorded")];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
+}
+
+fn plot(plot: &Plot) -> Result<Option<Markup>, ReportError> {
+    let Some(chart) = &plot.chart else { return Ok(None) };
+    let drawing = chart.draw()?;
+    let undrawn = undrawn(plot);
+    Ok(Some(html! {
+        figure.plot {
+            figcaption {
+                h3 { (plot.title) @if !drawing.unit.is_empty() { span.unit { ", " (drawing.unit) } } }
+                ul.legend {
+                    @for series in &chart.series {
+                        @let values = series.points.iter().map(|p| p.1).collect();
+                        li {
+                            svg.key viewBox="0 0 16 10" aria-hidden="true" { (key(series.shape, &series.ink.light_hex())) }
+                            (series.name) " "
+                            @if let Some(s) = Statistics::of(values) { span.value { (chart.unit.show(s.median)) } }
+                        }
+                    }
+                }
+            }
+            svg viewBox=(Drawing::view_box()) role="img" aria-label=(chart.title) { (PreEscaped(drawing.svg)) }
+            p.reading { (plot.reading) }
+            @if !drawing.beyond.is_empty() { p.note { (drawing.beyond) } }
+            @if !undrawn.is_empty() { p.note { "Left out: " (undrawn) "." } }
+        }
+    }))
+}
+
+/// A legend's sample of a series.
+fn key(shape: Shape, colour: &str) -> Markup {
+    html! {
+        @match shape {
+            Shape::Stacked => { rect x="2" y="0" width="12" height="10" fill=(colour) {} }
+            Shape::Line => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="2.5" {} }
+            Shape::Total => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="3.5" {} }
+            Shape::Limit => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="2.5" stroke-dasharray="5 4" {} }
+        }
+    }
+}
+
+fn all_tables(walk: &Walk) -> Markup {
+    html! {
+        @if !walk.passes.is_empty() {
+            section {
+                h2 { "Throughput, queries and bytes moved" }
+                p.reading { "The columns of Table 3 of CHC+RT, in MiB. Median and p95 are per frame; for Mray/s a high p95 is the fast end, and its total is all rays over all time." }
+                (tables::out_of_core(walk))
+            }
+            section {
+                h2 { "Moved against needed" }
+                @match tables::needs(walk) {
+                    Some(table) => {
+                        p.reading { "BVH and geometry. The first frame starts cold: its target is moved ÷ needed near 1. Later frames keep what is resident: their target is moved ÷ missing near 1." }
+                        (table)
+                    }
+                    None => p.note { "This walk did not measure which bricks its rays needed." },
+                }
+            }
+            section {
+                h2 { "Every field" }
+                details { summary { "Total, median and p95 of " (walk.fields.len()) " fields" } (tables::all_fields(walk)) }
+                details { summary { "Frame by frame" } (tables::per_frame(walk)) }
+            }
+        }
+        section { h2 { "Left out, and why" } (left_out(walk)) }
+        section { h2 { "Memory" } (memory(walk)) }
+        section {
+            h2 { "Settings" }
+            @for (title, part) in [("Walk", "settings"), ("Scene", "scene"), ("Adapter", "adapter")] {
+                details open[part == "settings"] {
+                    summary { (title) }
+                    @match walk.summary(part).and_then(tables::pairs) {
+                        Some(table) => (table),
+                        None => p.note { "The summary does not tell." },
+                    }
+                }
+            }
+            @let others = walk.summary.iter().filter(|(key, _)| !SHOWN_APART.contains(&key.as_str()));
+            @let others = Value::Object(others.map(|(key, value)| (key.clone(), value.clone())).collect());
+            @if let Some(table) = tables::pairs(&others) { details { summary { "Also in the summary" } (table) } }
+        }
+    }
+}
+
+/// What rendering left out because the scene does not need it.
+fn left_out(walk: &Walk) -> Markup {
+    let items = walk.summary("left_out").and_then(Value::as_array);
+    html! {
+        @match items.map(Vec::as_slice) {
+            Some([]) => p { "Nothing: the scene needs every part." },
+            Some(items) => ul {
+                @for item in items {
+                    @match (item.get("what").and_then(Value::as_str), item.get("why").and_then(Value::as_str)) {
+                        (Some(what), Some(why)) => li { b { (what) } ": " (why) },
+                        _ => li { (item.as_str().map_or_else(|| item.to_string(), str::to_string)) },
+                    }
+                }
+            },
+            None => p.note { "The summary does not tell." },
+        }
+    }
+}
+
+fn memory(walk: &Walk) -> Markup {
+    html! {
+        @match walk.summary("memory").and_then(tables::pairs) {
+            Some(table) => {
+                p.reading { "Peak of the process without mapped files; mapped pages are listed apart. On a software adapter the cache is part of it." }
+                (table)
+            }
+            None => p.note { "The system did not tell how much memory the walk used." },
+        }
+        @if let Some(bytes) = walk.number("texture_bytes_resident") {
+            p { "Textures on the device: " (format::bytes(bytes)) ", outside of the cache's budget." }
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! The tables of a report.
+
+use crate::format;
+use crate::walk::{Pass, Walk};
+use maud::{Markup, html};
+use serde_json::Value;
+
+/// Everything that a pass can move to the device.
+pub const MOVED: [&str; 4] = ["bytes_bvh", "bytes_geometry", "bytes_attributes", "bytes_textures"];
+/// What of it the needed bytes speak of.
+const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
+/// What stands for a value that is not recorded.
+const NONE: &str = "–";
+
+/// What a field of the records means, with its unit. Fields that are not listed are shown without.
+const MEANINGS: [(&str, &str); 38] = [
+    ("rays", "rays traced"),
+    ("ms", "wall time from submission to fence, ms"),
+    ("ms_phase1", "device time of phase 1: what was known and resident, ms"),
+    ("ms_phase2", "device time of phase 2: queries, ms"),
+    ("ms_phase3", "device time of phase 3: what was loaded or found visible, ms"),
+    ("ms_stream", "wall time of loading, ms"),
+    ("mrays_per_s", "millions of rays per second of wall time"),
+    ("queries", "pairs (tile, node) queried"),
+    ("queries_visible", "queries that found a ray"),
+    ("queries_interval_culled", "pairs culled by the interval test"),
+    ("multi_queries", "queries over several nodes at once"),
+    ("multi_queries_failed", "of these, repeated node by node"),
+    ("pairs_visible", "visible pairs (tile, leaf) at the end"),
+    ("pairs_invisible", "invisible pairs at the end"),
+    ("pulled_up", "pairs whose children were merged"),
+    ("pairs_intersected", "pairs (tile, leaf) intersected"),
+    ("round_trips", "submissions that the host waited for"),
+    ("bricks_needed", "distinct bricks that the rays needed, where known, else intersected"),
+    ("bricks_hit", "distinct bricks that hold a final hit"),
+    ("bricks_loaded", "payloads loaded"),
+    ("bricks_reloaded", "payloads loaded twice or more in one pass"),
+    ("bricks_evicted", "payloads evicted"),
+    ("bricks_resident_start", "payloads resident at the start"),
+    ("bricks_resident_end", "payloads resident at the end"),
+    ("load_batches", "batches of loads"),
+    ("bytes_needed", "bytes of BVH and geometry of the needed bricks, where measured"),
+    ("bytes_needed_missing", "of these, bytes not resident when the pass began"),
+    ("bytes_bvh", "bytes of BVH moved"),
+    ("bytes_geometry", "bytes of geometry moved"),
+    ("bytes_attributes", "bytes of attributes moved"),
+    ("bytes_textures", "bytes of textures moved"),
+    ("nodes_visited", "BVH nodes visited, where counted"),
+    ("triangles_tested", "triangles tested, where counted"),
+    ("cache_bytes", "the cache's budget, bytes"),
+    ("cache_used_bytes", "bytes of the cache in use at the end"),
+    ("unresolved_pixels", "pixels that are not final"),
+    ("non_finite", "pixels whose radiance was not finite"),
+    ("seed", "seed of the samples"),
+];
+
+fn meaning(field: &str) -> &'static str {
+    MEANINGS.iter().find(|(name, _)| *name == field).map_or("", |(_, text)| text)
+}
+
+fn cell(value: Option<f64>, show: fn(f64) -> String) -> String {
+    value.map_or_else(|| NONE.into(), show)
+}
+
+/// A count without, a measured value with a fraction.
+fn value(value: f64) -> String {
+    if value.fract() == 0.0 { format::count(value) } else { format::number(value) }
+}
+
+/// Throughput, queries and bytes moved of every pass: the columns of CHC+RT, Table 3, and time.
+pub fn out_of_core(walk: &Walk) -> Markup {
+    html! {
+        div.wide { table {
+            thead { tr {
+                th { "Pass" } th { "Over the frames" } th { "Mray/s" } th { "ms" } th { "Queries" } th { "MiB moved" }
+                th { "of it BVH" } th { "geometry" } th { "attributes" } th { "textures" }
+            } }
+            @for pass in &walk.passes {
+                tbody {
+                    @for (row, (name, pick)) in PICKS.iter().enumerate() {
+                        tr {
+                            @if row == 0 { th scope="rowgroup" rowspan=(PICKS.len()) { (pass.name) } }
+                            th scope="row" { (name) }
+                            td { (if *name == "total" { cell(overall_throughput(pass), format::number) } else { picked(pass, "mrays_per_s", *pick, format::number) }) }
+                            td { (picked(pass, "ms", *pick, format::number)) }
+                            td { (picked(pass, "queries", *pick, value)) }
+                            td { (cell(pass.statistics_of_sum(&MOVED).map(pick), format::mebibytes)) }
+                            @for field in MOVED { td { (picked(pass, field, *pick, format::mebibytes)) } }
+                        }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+/// The statistics that a table has a row of.
+const PICKS: [(&str, fn(crate::walk::Statistics) -> f64); 4] =
+    [("first frame", |s| s.first), ("median", |s| s.median), ("p95", |s| s.p95), ("total", |s| s.total)];
+
+fn picked(pass: &Pass, field: &str, pick: fn(crate::walk::Statistics) -> f64, show: fn(f64) -> String) -> String {
+    cell(pass.statistics(field).map(pick), show)
+}
+
+/// All rays of a pass over all of its time, millions per second; `None` where either is unknown or no time passed.
+fn overall_throughput(pass: &Pass) -> Option<f64> {
+    let (rays, ms) = (pass.statistics("rays")?.total, pass.statistics("ms")?.total);
+    (ms > 0.0).then(|| rays / ms * 1e-3)
+}
+
+/// Bytes moved against bytes needed, cold and steady; `None` where no need was measured.
+pub fn needs(walk: &Walk) -> Option<Markup> {
+    let measured: Vec<&Pass> = walk.passes.iter().filter(|pass| pass.has_nonzero("bytes_needed")).collect();
+    if measured.is_empty() {
+        return None;
+    }
+    let ratio = |moved: f64, needed: f64| if needed > 0.0 { format::number(moved / needed) } else { NONE.into() };
+    Some(html! {
+        div.wide { table {
+            thead { tr {
+                th { "Pass" } th { "Frames" } th { "MiB moved" } th { "MiB needed" } th { "MiB missing" } th { "moved ÷ needed" } th { "moved ÷ missing" }
+            } }
+            @for pass in measured {
+                tbody {
+                    @for (row, (name, rows)) in [("first", &pass.rows[..1]), ("all later", &pass.rows[1..])].into_iter().enumerate() {
+                        @let sum = |fields: &[&str]| rows.iter().map(|row| row.sum(fields)).sum::<f64>();
+                        @let (moved, needed, missing) = (sum(&MOVED_GEOMETRY), sum(&["bytes_needed"]), sum(&["bytes_needed_missing"]));
+                        tr {
+                            @if row == 0 { th scope="rowgroup" rowspan="2" { (pass.name) } }
+                            th scope="row" { (name) }
+                            td { (format::mebibytes(moved)) } td { (format::mebibytes(needed)) } td { (format::mebibytes(missing)) }
+                            td { (ratio(moved, needed)) } td { (ratio(moved, missing)) }
+                        }
+                    }
+                }
+            }
+        } }
+    })
+}
+
+/// Total, median and 95th percentile of every field of every pass.
+pub fn all_fields(walk: &Walk) -> Markup {
+    html! {
+        div.wide { table.fields {
+            thead {
+                tr { th rowspan="2" { "Field" } @for pass in &walk.passes { th.group colspan="3" { (pass.name) } } th.text rowspan="2" { "Meaning" } }
+                tr { @for _ in &walk.passes { th { "total" } th { "median" } th { "p95" } } }
+            }
+            tbody {
+                @for field in &walk.fields {
+                    tr {
+                        th scope="row" { code { (field) } }
+                        @for pass in &walk.passes {
+                            @match pass.statistics(field) {
+                                Some(s) => { td { (value(s.total)) } td { (value(s.median)) } td { (value(s.p95)) } }
+                                None => { td { (NONE) } td { (NONE) } td { (NONE) } }
+                            }
+                        }
+                        td.text { (meaning(field)) }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+/// The columns of [`out_of_core`] for every frame and pass.
+pub fn per_frame(walk: &Walk) -> Markup {
+    html! {
+        div.wide { table {
+            thead { tr {
+                th { "Frame" } th.text { "Pass" } th { "Mray/s" } th { "ms" } th { "Queries" } th { "MiB moved" } th { "of it BVH" } th { "geometry" } th { "Loaded" } th { "Evicted" }
+            } }
+            tbody {
+                @for frame in &walk.frames {
+                    @for pass in &walk.passes {
+                        // Rows are in the order of their frames.
+                        @let start = pass.rows.partition_point(|row| row.frame < *frame);
+                        @for row in pass.rows[start..].iter().take_while(|row| row.frame == *frame) {
+                            tr {
+                                th scope="row" { (frame) } td.text { (pass.name) }
+                                td { (cell(row.get("mrays_per_s"), format::number)) } td { (cell(row.get("ms"), format::number)) }
+                                td { (cell(row.get("queries"), value)) } td { (format::mebibytes(row.sum(&MOVED))) }
+                                td { (cell(row.get("bytes_bvh"), format::mebibytes)) } td { (cell(row.get("bytes_geometry"), format::mebibytes)) }
+                                td { (cell(row.get("bricks_loaded"), value)) } td { (cell(row.get("bricks_evicted"), value)) }
+                            }
+                        }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+/// A part of the summary as a table of names and values; `None` where there is nothing in it.
+pub fn pairs(value: &Value) -> Option<Markup> {
+    let mut rows = Vec::new();
+    flatten("", value, &mut rows);
+    (!rows.is_empty()).then(|| {
+        html! {
+            div.wide { table.pairs { tbody {
+                @for (name, value) in rows { tr { th scope="row" { code { (name) } } td.text { (value) } } }
+            } } }
+        }
+    })
+}
+
+/// The leaves of a JSON value as dotted names and readable values.
+fn flatten(prefix: &str, value: &Value, rows: &mut Vec<(String, String)>) {
+    if let Value::Object(object) = value {
+        for (key, value) in object {
+            let name = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+            flatten(&name, value, rows);
+        }
+    } else {
+        rows.push((prefix.to_string(), readable(prefix, value)));
+    }
+}
+
+fn readable(name: &str, value: &Value) -> String {
+    let numbers_of = |text: &str| name.ends_with(text);
+    match value {
+        Value::Null => "not known".into(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.into(),
+        Value::String(text) => text.clone(),
+        Value::Array(items) => items.iter().map(|item| readable(name, item)).collect::<Vec<_>>().join(", "),
+        Value::Object(_) => value.to_string(),
+        Value::Number(number) => match number.as_f64() {
+            Some(bytes) if (numbers_of("_bytes") || numbers_of("bytes_resident")) && bytes >= 10_240.0 => {
+                format!("{} ({} bytes)", format::bytes(bytes), format::count(bytes))
+            }
+            Some(bytes) if numbers_of("_bytes") => format::bytes(bytes),
+            Some(percent) if numbers_of("_percent") => format!("{} %", format::number(percent)),
+            Some(count) if count.fract() == 0.0 && count.abs() >= 10_000.0 && !numbers_of("seed") => {
+                format::count(count)
+            }
+            _ => number.to_string(),
+        },
+    }
+}
