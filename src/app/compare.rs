@@ -95,8 +95,8 @@ mod tests {
         assert_eq!((json["format"].as_u64(), json["ids_differing"].as_u64()), (Some(1), Some(1)));
 
         let (c, d) = (folder.path().join("c.png"), folder.path().join("d.png"));
-        png::write(&c, 8, 6, &vec![[10, 20, 30]; 48]).unwrap();
-        png::write(&d, 8, 6, &vec![[10, 20, 230]; 48]).unwrap();
+        png::write(&c, 8, 6, &[[10, 20, 30]; 48]).unwrap();
+        png::write(&d, 8, 6, &[[10, 20, 230]; 48]).unwrap();
         let text = human(&compare(&load(&c).unwrap(), &load(&d).unwrap()).unwrap());
         assert!(text.contains("  FLIP") && !text.contains("triangle ids"), "{text}");
     }

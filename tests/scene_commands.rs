@@ -1,0 +1,178 @@
+//! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that appear
+//! complete or not at all.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+fn brickwalk(folder: &Path, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_brickwalk"))
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Runs a command that must succeed without a word on standard error; returns its standard output.
+fn done(folder: &Path, line: &str) -> String {
+    let output = brickwalk(folder, line);
+    assert_eq!(output.status.code(), Some(0), "{line}: {}", stderr(&output));
+    assert_eq!(stderr(&output), "", "{line}: a pipe sees no progress");
+    stdout(&output)
+}
+
+/// Runs a command that must find its input bad; returns its one line.
+fn refused(folder: &Path, line: &str) -> String {
+    let output = brickwalk(folder, line);
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{line}: {text}");
+    assert!(text.starts_with("brickwalk: ") && text.lines().count() == 1 && text.ends_with('\n'), "{line}: {text:?}");
+    assert!(!text.contains("internal error"), "{text}");
+    text
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_generated_scene_is_described_and_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let said = done(folder, "scene city -o city.bricks --triangles 12K --brick-triangles 1K");
+    assert!(said.contains("city.bricks: ") && said.contains("city.near.json"), "{said}");
+    let found = names(folder);
+    for name in ["city.bricks", "city.near.json", "city.far.json"] {
+        assert!(found.contains(&name.to_string()), "{found:?}");
+    }
+    assert!(found.iter().all(|name| name.starts_with("city.")), "no temporary is left: {found:?}");
+
+    let info: serde_json::Value = serde_json::from_str(&done(folder, "info city.bricks --json")).unwrap();
+    assert_eq!(info["format"], 1);
+    let triangles = info["triangles_stored"].as_u64().unwrap();
+    assert!((11_000..=12_000).contains(&triangles), "{triangles}");
+    assert!(info["bricks"].as_u64().unwrap() >= triangles / 1000);
+    assert!(info["largest_brick_triangles"].as_u64().unwrap() <= 1000);
+    assert!(info["two_largest_bricks_bytes"].as_u64().unwrap() > 0);
+    assert!(done(folder, "info city.bricks").contains("triangles"));
+
+    let ids = info["triangle_ids"].as_u64().unwrap();
+    let origin: serde_json::Value =
+        serde_json::from_str(&done(folder, &format!("info city.bricks --json --id {}", ids - 1))).unwrap();
+    assert_eq!(origin["id"], ids - 1);
+    let line = refused(folder, &format!("info city.bricks --id {ids}"));
+    assert!(line.contains(&format!("0 to {}", ids - 1)), "{line}");
+
+    assert!(done(folder, "verify city.bricks").contains("whole"));
+}
+
+#[test]
+fn verify_names_the_damaged_brick() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    done(folder, "scene city -o city.bricks --triangles 12K --brick-triangles 1K");
+    let file = folder.join("city.bricks");
+    let whole = std::fs::read(&file).unwrap();
+    let scene = bricks::SceneFile::open(&file).unwrap();
+    for brick in [0, 3] {
+        let span = scene.span(bricks::Payload::Geometry(brick));
+        let mut damaged = whole.clone();
+        damaged[(span.offset + span.bytes / 2) as usize] ^= 0x10;
+        std::fs::write(folder.join("damaged.bricks"), damaged).unwrap();
+        let line = refused(folder, "verify damaged.bricks");
+        assert!(line.contains(&format!("damaged.bricks: brick {brick} ")), "{line}");
+        // The resident part is whole, so what it says can still be read.
+        done(folder, "info damaged.bricks");
+    }
+    std::fs::write(folder.join("short.bricks"), &whole[..whole.len() / 2]).unwrap();
+    assert!(refused(folder, "verify short.bricks").contains("shorter"));
+    assert!(refused(folder, "info short.bricks").contains("shorter"));
+}
+
+#[test]
+fn bad_input_is_one_line_and_exit_status_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("text.bricks"), "this is no scene").unwrap();
+    std::fs::write(folder.join("text.gltf"), "{\"asset\": ").unwrap();
+    std::fs::write(folder.join("text.png"), "neither").unwrap();
+    std::fs::create_dir(folder.join("empty")).unwrap();
+    let before = names(folder);
+    for (line, part) in [
+        ("info missing.bricks", "missing.bricks"),
+        ("info text.bricks", "not a .bricks scene file"),
+        ("info empty", "empty"),
+        ("verify text.bricks", "text.bricks"),
+        ("convert missing.gltf -o out.bricks", "missing.gltf"),
+        ("convert text.gltf -o out.bricks", "text.gltf"),
+        ("convert text.png -o out.bricks", "text.png"),
+        ("convert empty -o out.bricks", "no .gltf or .glb"),
+        ("convert text.gltf -o text.gltf", "overwrite"),
+        ("convert text.gltf -o empty", "folder"),
+        ("scene city -o no/such/out.bricks --triangles 12K", "out.bricks"),
+        ("walk missing.bricks -o out", "missing.bricks"),
+        ("walk text.bricks -o out", "text.bricks"),
+        ("trace missing.bricks --rays r.npy -o h.npy", ""),
+        ("compare text.png text.png", "text.png"),
+        ("compare missing.png text.png", "missing.png"),
+    ] {
+        let said = refused(folder, line);
+        assert!(said.contains(part), "{line}: {said}");
+    }
+    assert_eq!(names(folder), before, "nothing is left behind");
+}
+
+#[test]
+fn wrong_usage_is_exit_status_2_and_help_is_0() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for line in [
+        "",
+        "fly",
+        "info",
+        "walk s.bricks",
+        "walk s.bricks -o out --frames 0",
+        "walk s.bricks -o out --effects ao",
+        "walk s.bricks -o out --schedule demand",
+        "scene pipes -o s.bricks",
+        "scene city -o s.bricks --triangles 3",
+        "trace s.bricks --rays r.npy -o h.npy --fronts on",
+    ] {
+        let output = brickwalk(folder, line);
+        assert_eq!(output.status.code(), Some(2), "{line}: {}", stderr(&output));
+        assert!(stdout(&output).is_empty() && !stderr(&output).is_empty(), "{line}");
+    }
+    assert!(done(folder, "--version").starts_with("brickwalk "));
+    for command in ["", "demo", "convert", "scene", "info", "verify", "walk", "trace", "compare"] {
+        assert!(done(folder, &format!("{command} --help")).contains("Usage: brickwalk"), "{command}");
+    }
+    assert!(names(folder).is_empty());
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    done(folder, "scene city -o city.bricks --triangles 12K");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_brickwalk"))
+        .args(["info", "city.bricks", "--json"])
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(0), ""));
+}
