@@ -21,7 +21,7 @@ pub struct Manifest {
     pub dropped_zero_area: u64,
     /// Triangles dropped for a non-finite vertex (with the option that allows it).
     pub dropped_non_finite: u64,
-    /// World bounds of everything, world units. `min > max` when the scene is empty.
+    /// World bounds of everything, world units, finite. `min > max` on every axis when the scene is empty.
     pub min: [f64; 3],
     /// See [`Self::min`].
     pub max: [f64; 3],

@@ -124,6 +124,39 @@ fn payloads_of_wrong_length() {
     assert_eq!(writer.write(&[3; 16]).unwrap().offset, 8192);
 }
 
+/// A process that ends without tidying up, as one that is killed or loses power does.
+#[test]
+fn an_aborted_process_leaves_the_old_file() {
+    let (folder, path, _) = written();
+    let old = fs::read(&path).unwrap();
+    let test = std::env::current_exe().unwrap();
+    let output = std::process::Command::new(test)
+        .args(["--exact", "--ignored", "aborts_while_writing"])
+        .env("BRICKS_TEST_PATH", &path)
+        .output()
+        .unwrap();
+    assert!(!output.status.success() && !output.stdout.is_empty());
+    assert_eq!(fs::read(&path).unwrap(), old);
+    assert_eq!(common::problems(&path), "");
+    // What is left is no scene file.
+    let left: Vec<_> = names(folder.path()).into_iter().filter(|name| name != "scene.bricks").collect();
+    assert!(matches!(&left[..], [name] if name.ends_with(".partial")), "{left:?}");
+    assert!(SceneFile::open(folder.path().join(&left[0])).is_err());
+}
+
+/// Run by `an_aborted_process_leaves_the_old_file`.
+#[test]
+#[ignore = "run by an_aborted_process_leaves_the_old_file in a process of its own"]
+fn aborts_while_writing() {
+    let Some(path) = std::env::var_os("BRICKS_TEST_PATH") else {
+        println!("skipped: BRICKS_TEST_PATH is not set");
+        return;
+    };
+    let mut writer = Writer::create(path).unwrap();
+    writer.write(&vec![1; 8 << 20]).unwrap();
+    std::process::abort();
+}
+
 /// A disk that is full: the error says so and no file appears.
 #[cfg(target_os = "linux")]
 #[test]
@@ -143,7 +176,10 @@ fn a_failing_disk() {
 #[test]
 #[ignore = "run by a_failing_disk in a process of its own"]
 fn writes_a_large_payload() {
-    let path = std::env::var_os("BRICKS_TEST_PATH").expect("a path");
+    let Some(path) = std::env::var_os("BRICKS_TEST_PATH") else {
+        println!("skipped: BRICKS_TEST_PATH is not set");
+        return;
+    };
     let mut writer = Writer::create(path).unwrap();
     let error = writer.write(&vec![1; 8 << 20]).unwrap_err();
     assert!(matches!(error, Error::Io { .. }), "{error}");
