@@ -72,7 +72,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--cache 0", "at least 1"),
         ("--cache 101%", "100 %"),
         ("--cache 99999999999G", "64 bits"),
-        ("--host-cache 0", "at least 1"),
+        ("--host-cache 1.5G", "whole number"),
         ("--schedule demand", "not in this version"),
         ("--schedule fastest", "known: chc, plain, auto"),
         ("--effects primary,ao", "ao is not in this version"),
