@@ -3,5 +3,6 @@
 mod host_cache;
 mod model;
 mod residency;
+mod scene_file;
 mod trace;
 mod workers;
