@@ -325,7 +325,7 @@ fn weighted(weights: [f32; 3], a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3
 }
 
 /// Where on the triangle a hit lies. `a`, `b`, `c` are relative to the frame's reference point (not to the ray), `hit` is
-/// that of [`intersect_triangle`], `d` the ray's direction in the frame. numerics: the barycentrics are inset so that the
+/// that of [`intersect_triangle`], `d` the ray's direction in the frame. The barycentrics are inset so that the
 /// point stays inside by more than its error, and `delta` is 32 u times the terms of the plane equation at the point.
 pub fn surface_point(a: [f32; 3], b: [f32; 3], c: [f32; 3], hit: &TriangleHit, d: [f32; 3]) -> SurfacePoint {
     let minus = |x: f32, y: f32| barrier(x - y);

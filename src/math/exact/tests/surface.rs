@@ -161,10 +161,7 @@ fn normals_are_unit_and_face_the_ray() {
         let plane: f64 = (0..3).map(|k| f64::from(s.n[k]) * (f64::from(s.p[k]) - f64::from(t[0][k]))).sum();
         assert!(plane.abs() <= f64::from(s.delta), "{plane} {}", s.delta);
         let o = offset_origin(&s);
-        for k in 0..3 {
-            let down = s.down >> k & 1 != 0;
-            assert!(if down { o[k] < s.p[k] } else { o[k] > s.p[k] });
-        }
+        assert!((0..3).all(|k| if s.down >> k & 1 != 0 { o[k] < s.p[k] } else { o[k] > s.p[k] }), "{s:?} {o:?}");
     }
 }
 
