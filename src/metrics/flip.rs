@@ -2,8 +2,8 @@
 //!
 //! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild: *FLIP: A Difference Evaluator for Alternating
 //! Images*, HPG 2020. Per pixel: the perceived colour difference ΔEc between the images after filtering by contrast
-//! sensitivity, raised by the difference ΔEf of their edges and points: ΔE = ΔEc^(1 − ΔEf). All filters are Gaussians or
-//! derivatives of Gaussians, so the two-dimensional convolutions are made of passes along x and y. The filter of the
+//! sensitivity, raised by the difference ΔEf of their edges and points: ΔE = ΔEc^(1 − ΔEf). All filters are Gaussians
+//! or derivatives of Gaussians, so the two-dimensional convolutions are made of passes along x and y. The filter of the
 //! blue-yellow channel is a sum of two Gaussians and takes two such pairs.
 
 use super::color::{hunt_lab_from_rgb, hyab, rgb_from_ycxcz, ycxcz_from_rgb};

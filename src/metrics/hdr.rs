@@ -1,6 +1,7 @@
 //! HDR-FLIP: the greatest FLIP over a range of exposures.
 //!
-//! Andersson, Nilsson, Shirley, Akenine-Möller: *Visualizing Errors in Rendered High Dynamic Range Images*, Eurographics
+//! Andersson, Nilsson, Shirley, Akenine-Möller: *Visualizing Errors in Rendered High Dynamic Range Images*,
+//! Eurographics
 //! 2021. The range of exposures is that in which the tone mapper brings the reference's maximum luminance, then its
 //! median, to 85 % of white. Both images are exposed and tone mapped at steps of about one stop; each pixel's error
 //! is the greatest of its FLIP errors.

@@ -1,7 +1,8 @@
 //! How much two pictures differ: RMSE, relMSE, signed bias, greatest error, FLIP and HDR-FLIP, and ids that differ.
 //!
-//! All metrics take linear Rec. 709 RGB; [`load()`] decodes PNG from sRGB and takes EXR as it is. In every comparison the
-//! second image is the reference. [`compare()`] computes them all at once; the functions are there one by one as well.
+//! All metrics take linear Rec. 709 RGB; [`load()`] decodes PNG from sRGB and takes EXR as it is. In every comparison
+//! the second image is the reference. [`compare()`] computes them all at once; the functions are there one by one as
+//! well.
 //!
 //! | metric | formula, over the compared pixels and channels | source |
 //! | --- | --- | --- |

@@ -5,7 +5,8 @@ use super::image::{Image, ImageError, check_same_size, finite_in_both};
 /// ε of relMSE: it bounds the weight of dark pixels.
 pub const RELATIVE_EPSILON: f64 = 0.01;
 
-/// The per-pixel metrics of two images, in f64 over the pixels that are finite in both. With no such pixel all are zero.
+/// The per-pixel metrics of two images, in f64 over the pixels that are finite in both. With no such pixel all are
+/// zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PixelErrors {
     /// Pixels finite in both images.

@@ -1,19 +1,19 @@
 //! How far f32 arithmetic, as the kernels carry it out, can be from truth.
 //!
 //! Everything is in units of the triangle's object, relative to the ray's origin; u = 2⁻²⁴. The device's units differ
-//! from these by powers of two, which round nothing. Bounds are to first order in u, times 1 + 2⁻¹⁶, which holds what is
-//! left: each term of higher order is below 8 u times one that is counted.
+//! from these by powers of two, which round nothing. Bounds are to first order in u, times 1 + 2⁻¹⁶, which holds what
+//! is left: each term of higher order is below 8 u times one that is counted.
 //!
 //! # What the kernel computes (numerics.md)
 //!
 //! 1. *Vertices.* v = fl(p − R), whatever the form of the brick, then a = fl(v − o). Per component the error is
-//!    at most u·abs(v) + u·abs(a). The ray of an instance is transformed first, o′ = fl(M o + c′) and d′ = fl(M d), with
-//!    M = A⁻¹ and c′ = M (R − T) − R′ in f64, rounded to f32. M and three products and two sums of which take part:
-//!    d′ is off by at most δd = 4u·abs(M)·abs(d) per component; o′, with one more sum and the rounding of c′, by
+//!    at most u·abs(v) + u·abs(a). The ray of an instance is transformed first, o′ = fl(M o + c′) and d′ = fl(M d),
+//!    with M = A⁻¹ and c′ = M (R − T) − R′ in f64, rounded to f32. M and three products and two sums of which take
+//!    part: d′ is off by at most δd = 4u·abs(M)·abs(d) per component; o′, with one more sum and the rounding of c′, by
 //!    δo = 5u·abs(M)·abs(o) + 2u·abs(c′), which adds to a. (These are worst cases of what numerics.md measured as
 //!    3.5 u κ and 3.7 u κ (abs(o) + abs(c)) in world space.) What f64 itself rounds for the instance is added too.
-//! 2. *Shear.* x = fl(a_x − fl(S·a_z)), S = fl(d_x · iz), iz = fl(1 / d_z), along the axis z of the largest component of
-//!    d. S is off by δS = (δd_x + abs(S)·δd_z) / (abs(d_z) − δd_z) + 2u·abs(S), and x by
+//! 2. *Shear.* x = fl(a_x − fl(S·a_z)), S = fl(d_x · iz), iz = fl(1 / d_z), along the axis z of the largest component
+//!    of d. S is off by δS = (δd_x + abs(S)·δd_z) / (abs(d_z) − δd_z) + 2u·abs(S), and x by
 //!
 //!    e_x = δa_x + abs(S)·δa_z + δS·abs(a_z) + u·abs(S·a_z) + u·abs(x) + 2⁻⁶⁰·abs(a_z)
 //!
@@ -28,22 +28,23 @@
 //! # ε_edge
 //!
 //! Let E = max over the vertices of √(e_x² + e_y²). If the vertices move along straight lines from truth to what the
-//! kernel has, every point of the boundary moves by at most E. The answer "inside" changes only when the boundary passes
-//! over the origin. So kernel and truth agree unless the true triangle's boundary comes within ε_edge = E of the ray,
-//! measured across axis z, along the ray. This holds for any shape of triangle.
+//! kernel has, every point of the boundary moves by at most E. The answer "inside" changes only when the boundary
+//! passes over the origin. So kernel and truth agree unless the true triangle's boundary comes within ε_edge = E of the
+//! ray, measured across axis z, along the ray. This holds for any shape of triangle.
 //!
 //! # The interval of t
 //!
 //! An accepted perturbed triangle has weights w ≥ 0 with Σ w (x + δx) = 0. The exact plane has at q = Σ w x the height
 //! Σ w z, and abs(q) ≤ E; so the perturbed height differs from the true one at the origin by at most
-//! abs(g)·E + E_z with g the gradient of z over the sheared plane and E_z = max δa_z. Rounding the edge values moves it further:
-//! each U is off by η ≤ u (abs(c_x b_y) + abs(c_y b_x) + abs(U)), which moves Σ U z / Σ U by at most Σ η times the extent of
-//! z over Σ U, a Σ U that is no less than abs(det) − E·perimeter − 3E² − Σ η. Rounding products, sums, quotient and the product
-//! with iz adds 3 + 2 + 1 + 2 units of u, taken as 9 u·max abs(z); an instance's direction abs(t)·δd_z / abs(d_z).
+//! abs(g)·E + E_z with g the gradient of z over the sheared plane and E_z = max δa_z. Rounding the edge values moves it
+//! further: each U is off by η ≤ u (abs(c_x b_y) + abs(c_y b_x) + abs(U)), which moves Σ U z / Σ U by at most Σ η times
+//! the extent of z over Σ U, a Σ U that is no less than abs(det) − E·perimeter − 3E² − Σ η. Rounding products, sums,
+//! quotient and the product with iz adds 3 + 2 + 1 + 2 units of u, taken as 9 u·max abs(z); an instance's direction
+//! abs(t)·δd_z / abs(d_z).
 //!
-//! Whatever the plane's slope, the clamp keeps z within the extent of the perturbed triangle, 32 u of padding and 4 u of
-//! rounding. It never moves t away from the perturbed triangle's own distance, which lies within. The two intervals are
-//! intersected; if Σ U may vanish only the second one stands.
+//! Whatever the plane's slope, the clamp keeps z within the extent of the perturbed triangle, 32 u of padding and 4 u
+//! of rounding. It never moves t away from the perturbed triangle's own distance, which lies within. The two intervals
+//! are intersected; if Σ U may vanish only the second one stands.
 
 use super::predicate::crossing;
 use super::ray::TruthRay;
@@ -55,7 +56,8 @@ use glam::{DMat3, DVec3};
 const U: f64 = 1.0 / 16_777_216.0;
 /// Holds the terms of higher order.
 const SLACK: f64 = 1.0 + 1.0 / 65_536.0;
-/// f64's own rounding in transforming by an instance, relative to the sizes that take part: 2⁻⁴⁸ per unit of the ratio of scales.
+/// f64's own rounding in transforming by an instance, relative to the sizes that take part: 2⁻⁴⁸ per unit of the ratio
+/// of scales.
 const NOISE: f64 = f64::EPSILON * 16.0;
 /// Norm of the map between the sheared planes of two axes along which the direction is equally long.
 const OTHER_AXIS: f64 = 1.618_033_988_749_895;
@@ -291,8 +293,8 @@ pub fn assess(truth: &Truth, ray: &TruthRay, id: u32) -> Option<Assessment> {
     truth.find(id).map(|index| assess_index(truth, ray, index))
 }
 
-/// How far from its true place any triangle near the ray can be for a kernel, in world units, four times over: ε_edge of
-/// every triangle is below a quarter of it.
+/// How far from its true place any triangle near the ray can be for a kernel, in world units, four times over: ε_edge
+/// of every triangle is below a quarter of it.
 pub(super) fn scene_pad(truth: &Truth, ray: &TruthRay) -> f64 {
     let bounds = truth.bvh.bounds();
     if bounds.min[0] > bounds.max[0] {

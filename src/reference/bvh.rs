@@ -83,8 +83,8 @@ impl Bvh {
         self.nodes[0].bounds
     }
 
-    /// Calls `visit` for every item whose box, grown by `pad` on all sides, the ray meets at some t in t_min..=limit, nearer
-    /// nodes first; `visit` returns the limit from then on.
+    /// Calls `visit` for every item whose box, grown by `pad` on all sides, the ray meets at some t in t_min..=limit,
+    /// nearer nodes first; `visit` returns the limit from then on.
     pub(super) fn visit(&self, ray: &TruthRay, pad: f64, mut limit: f64, mut visit: impl FnMut(u32) -> f64) {
         if self.order.is_empty() {
             return;

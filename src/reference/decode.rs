@@ -24,8 +24,8 @@ pub struct TruthObject {
     pub step_log2: i32,
     /// Triangles by increasing `local_id`, each once.
     pub triangles: Vec<TruthTriangle>,
-    /// Least and greatest vertex coordinates of the object's bricks in lattice steps; zero without triangles. They bound
-    /// the reference point that kernels use for its instances.
+    /// Least and greatest vertex coordinates of the object's bricks in lattice steps; zero without triangles. They
+    /// bound the reference point that kernels use for its instances.
     pub bounds: [[i64; 3]; 2],
 }
 

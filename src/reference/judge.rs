@@ -1,12 +1,13 @@
 //! Compares what a kernel found with truth.
 //!
-//! From [`super::bounds`] follows for every triangle near the ray whether a kernel *must* find it, *may* find it, or must
-//! not, and between which t. A kernel's answer that differs from truth is excused only if all of this could have been:
+//! From [`super::bounds`] follows for every triangle near the ray whether a kernel *must* find it, *may* find it, or
+//! must not, and between which t. A kernel's answer that differs from truth is excused only if all of this could have
+//! been:
 //!
 //! * the triangle it names may be met, at the t it gives;
 //! * no triangle that it must find lies nearer, beyond doubt;
-//! * no patch of triangles joined by shared edges covers the surroundings of the ray nearer: one of them is met whichever
-//!   way the vertices were rounded, because they are rounded alike. A gap in a closed mesh is never excused;
+//! * no patch of triangles joined by shared edges covers the surroundings of the ray nearer: one of them is met
+//!   whichever way the vertices were rounded, because they are rounded alike. A gap in a closed mesh is never excused;
 //! * no copy of the named triangle, vertex for vertex, has a lower id: equal bits give equal t.
 //!
 //! Then one of the two triangles has an edge within ε_edge of the ray, or the two distances cannot be told apart, or
@@ -305,15 +306,15 @@ impl<'a> Nearby<'a> {
     }
 }
 
-/// A triangle out of a patch that covers the ray however its vertices are rounded, if there is one among triangles of one
-/// instance.
+/// A triangle out of a patch that covers the ray however its vertices are rounded, if there is one among triangles of
+/// one instance.
 ///
 /// Let E be the greatest ε_edge among the triangles near the ray. The patch is the largest set of triangles in which
 /// every edge within 4E of the ray has a triangle of certain winding on either side. Suppose that the ray is not on the
-/// patch as the kernel has it, but a triangle of the patch is within E. Then the nearest point of the patch is within 2E
-/// and lies on an edge that in truth is within 3E. Not within an edge: there is a triangle on the other side. Not at a
-/// vertex: all edges of the patch that meet there are within 3E, each with triangles on both sides, so that they go all
-/// the way round. So the kernel must have met a triangle of the patch.
+/// patch as the kernel has it, but a triangle of the patch is within E. Then the nearest point of the patch is within
+/// 2E and lies on an edge that in truth is within 3E. Not within an edge: there is a triangle on the other side. Not at
+/// a vertex: all edges of the patch that meet there are within 3E, each with triangles on both sides, so that they go
+/// all the way round. So the kernel must have met a triangle of the patch.
 fn covering(truth: &Truth, candidates: &[&Candidate]) -> Option<usize> {
     let close = |c: &&&Candidate| c.at.inside || c.at.edge_distance <= 4.0 * c.at.edge_epsilon;
     let e = candidates.iter().filter(close).map(|c| c.at.edge_epsilon).fold(0.0, f64::max);
@@ -336,7 +337,8 @@ fn covering(truth: &Truth, candidates: &[&Candidate]) -> Option<usize> {
     patch.iter().find(|c| c.at.possibly_met()).map(|c| c.index)
 }
 
-/// The edges of a triangle within `reach` of the ray: their ends on the lattice, in order, and the side of the third vertex.
+/// The edges of a triangle within `reach` of the ray: their ends on the lattice, in order, and the side of the third
+/// vertex.
 fn near_edges<'a>(
     truth: &'a Truth,
     candidate: &'a Candidate,

@@ -1,8 +1,8 @@
 //! Does a ray meet a triangle, and where: f64 with error bounds, exact arithmetic where they do not decide.
 //!
 //! With the vertices a, b, c relative to the ray's origin and d its direction, the edge values U = d·(b×c),
-//! V = d·(c×a), W = d·(a×b) weight a, b and c. The ray's line meets the closed triangle where no two of them have opposite
-//! signs and not all are zero; then D = U + V + W is not zero either, and t = N / D with N = a·(b×c).
+//! V = d·(c×a), W = d·(a×b) weight a, b and c. The ray's line meets the closed triangle where no two of them have
+//! opposite signs and not all are zero; then D = U + V + W is not zero either, and t = N / D with N = a·(b×c).
 
 use super::expansion::{Expansion, cross, dot};
 use super::ray::TruthRay;
@@ -10,9 +10,9 @@ use std::cmp::Ordering;
 
 /// 2^-53.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
-/// Bounds the error of a sum of six products of three factors, two of them with relative errors of 2 roundings each: 4 from
-/// the factors, 4 from products and sums within a 2x2 minor and its product with the third factor, 2 from adding up; doubled
-/// against terms of higher order.
+/// Bounds the error of a sum of six products of three factors, two of them with relative errors of 2 roundings each: 4
+/// from the factors, 4 from products and sums within a 2x2 minor and its product with the third factor, 2 from adding
+/// up; doubled against terms of higher order.
 const TRIPLE_ERROR: f64 = 24.0 * ROUNDING;
 
 /// A point of the ray's line on a triangle.

@@ -24,8 +24,8 @@ impl TruthRay {
         Self { reference: [0.0; 3], origin, direction, t_min, t_max }
     }
 
-    /// The ray of a kernel: `o` and `d` in device units relative to `reference_point_world`, and `unit` world units (a power
-    /// of two) to a device unit.
+    /// The ray of a kernel: `o` and `d` in device units relative to `reference_point_world`, and `unit` world units (a
+    /// power of two) to a device unit.
     ///
     /// Origin and direction are scaled alike, so that t is the kernel's own t.
     pub fn from_f32(

@@ -184,8 +184,8 @@ fn identity(base: u32) -> TruthInstance {
     TruthInstance { object: 0, base, world_from_object: None }
 }
 
-/// A world of a closed mesh around a soup, whole copies of some triangles under higher ids, `cells` reference cells from
-/// the world's origin.
+/// A world of a closed mesh around a soup, whole copies of some triangles under higher ids, `cells` reference cells
+/// from the world's origin.
 fn world(seed: u64, cells: i64) -> (Truth, [i64; 3]) {
     let mut random = Random(seed);
     let reference = [cells * ORIGIN_STEPS, -cells * ORIGIN_STEPS, ORIGIN_STEPS];
@@ -220,7 +220,8 @@ fn instanced(seed: u64) -> (Truth, [i64; 3]) {
     (Truth::new(objects, instances).unwrap(), reference)
 }
 
-/// Rays that look for trouble: aimed at vertices, edges and along surfaces, some with an interval that ends near the hit.
+/// Rays that look for trouble: aimed at vertices, edges and along surfaces, some with an interval that ends near the
+/// hit.
 fn adversarial_ray(random: &mut Random, kernel: &Kernel) -> Ray32 {
     let truth = kernel.truth;
     let target = truth.world_vertices(random.below(truth.triangle_count())).map(DVec3::from);
@@ -387,8 +388,8 @@ fn fan(n: u32, closed: bool) -> Truth {
 
 #[test]
 fn a_gap_between_neighbours_is_no_excuse() {
-    // Through the middle vertex of the fan to the wall behind: in f32 it may be any triangle of the fan, or a miss if the
-    // fan is open there, but never the wall behind a closed one.
+    // Through the middle vertex of the fan to the wall behind: in f32 it may be any triangle of the fan, or a miss if
+    // the fan is open there, but never the wall behind a closed one.
     let reference = [0; 3];
     let ray32 = Ray32 { o: [0.1, 0.05, 0.2], d: [-0.5, -0.25, -1.0], t_min: 0.0, t_max: f32::MAX };
     for closed in [true, false] {

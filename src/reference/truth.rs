@@ -113,8 +113,8 @@ impl Truth {
         self.placed.iter().map(|placed| placed.id)
     }
 
-    /// The stored vertices of triangle `id` in world units, exact but for the product with an instance's matrix; `None` if
-    /// there is no such triangle.
+    /// The stored vertices of triangle `id` in world units, exact but for the product with an instance's matrix; `None`
+    /// if there is no such triangle.
     pub fn vertices(&self, id: u32) -> Option<[[f64; 3]; 3]> {
         self.find(id).map(|index| self.world_vertices(index))
     }
@@ -132,7 +132,8 @@ impl Truth {
         (instance, object, &object.triangles[placed.triangle as usize])
     }
 
-    /// World vertices of a placed triangle. The same object vertex gives the same bits in every triangle of an instance.
+    /// World vertices of a placed triangle. The same object vertex gives the same bits in every triangle of an
+    /// instance.
     pub(super) fn world_vertices(&self, index: usize) -> [[f64; 3]; 3] {
         let (instance, object, triangle) = self.stored(index);
         let step = f64::from(object.step_log2).exp2();
