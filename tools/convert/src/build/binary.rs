@@ -1,12 +1,13 @@
 //! Binary trees over boxes on a lattice: topology by obvhs, or by splits of bounded depth.
 
 use super::partition::{Item, split};
-use glam::Vec3A;
+use glam::{DVec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
+use obvhs::ploc::morton::morton_encode_u64_unorm;
 
 /// A box in lattice steps, bounds inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,8 +62,14 @@ pub(super) struct BinaryNode {
     pub right: u32,
 }
 
-/// Mean area of the nodes against the root's above which boxes are too crowded for reinsertion.
-const CROWDED: f64 = 1.0 / 16.0;
+/// Sum of the nodes' areas in areas of the root above which boxes are too crowded for reinsertion. It is about 50 for meshes.
+const CROWDED: f64 = 4096.0;
+
+/// Boxes below which the square of their number does not matter.
+const LEAST_CHAIN: usize = 512;
+
+/// Levels of the binary tree over boxes in a chain.
+const CHAIN_DEPTH: u32 = 64;
 
 /// A binary tree with one item a leaf: node 0 is the root, children follow their parent.
 #[derive(Debug)]
@@ -77,6 +84,9 @@ impl BinaryTree {
     pub fn by_obvhs(boxes: &[Box3]) -> Self {
         let vector = |p: [i64; 3]| Vec3A::from_array(p.map(|x| x as f32));
         let aabbs: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(vector(b.min), vector(b.max))).collect();
+        if is_chain(&aabbs) {
+            return Self::by_splits(boxes, CHAIN_DEPTH);
+        }
         let config = BvhBuildParams::medium_build();
         let mut bvh: Bvh2 = PlocBuilder::with_capacity(aabbs.len()).build(
             config.ploc_search_distance,
@@ -85,10 +95,10 @@ impl BinaryTree {
             config.sort_precision,
             config.search_depth_threshold,
         );
-        // Where most nodes are as large as the root the search for a better place visits them all and finds none.
+        // Where many nodes are as large as the root the search for a better place visits them all and finds none.
         let areas = bvh.nodes.iter().map(|node| f64::from(node.aabb().half_area())).sum::<f64>();
         let root = f64::from(bvh.nodes[0].aabb().half_area());
-        if areas <= root * bvh.nodes.len() as f64 * CROWDED {
+        if areas <= root * CROWDED {
             ReinsertionOptimizer::default().run(&mut bvh, config.reinsertion_batch_ratio, None);
         }
 
@@ -156,6 +166,31 @@ impl BinaryTree {
             }
         }
     }
+}
+
+/// Whether PLOC would merge too few neighbours a round, of which it takes time in proportion to the square: duplicates, and
+/// boxes in a row of growing size. It merges mutual nearest neighbours, so along its Morton order there is a local minimum
+/// of the merged area for each; of scattered boxes that is every third.
+fn is_chain(boxes: &[Aabb]) -> bool {
+    if boxes.len() < LEAST_CHAIN {
+        return false;
+    }
+    let all = boxes[1..].iter().fold(boxes[0], |all, b| all.union(b));
+    let extent = all.diagonal().as_dvec3();
+    let scale = DVec3::from_array(extent.to_array().map(|x| if x > 0.0 { 1.0 / x } else { 0.0 }));
+    let mut order: Vec<(u64, u32)> = (0u32..)
+        .zip(boxes)
+        .map(|(index, b)| (morton_encode_u64_unorm((b.center() - all.min).as_dvec3() * scale), index))
+        .collect();
+    order.sort_unstable();
+    let areas = order.windows(2).map(|pair| boxes[pair[0].1 as usize].union(&boxes[pair[1].1 as usize]).half_area());
+    let (mut minima, mut before, mut is_falling) = (0, f32::INFINITY, false);
+    for area in areas {
+        minima += usize::from(is_falling && area > before);
+        is_falling = area < before;
+        before = area;
+    }
+    minima < boxes.len() / 8
 }
 
 const PLACEHOLDER: BinaryNode =
@@ -233,15 +268,27 @@ mod tests {
         assert!(bounded <= 20, "{bounded} levels");
     }
 
+    fn is_chain_of(boxes: &[Box3]) -> bool {
+        let vector = |p: [i64; 3]| Vec3A::from_array(p.map(|x| x as f32));
+        let aabbs: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(vector(b.min), vector(b.max))).collect();
+        is_chain(&aabbs)
+    }
+
     #[test]
-    fn crowds_take_no_longer_than_others() {
-        let one = boxes(1)[0];
-        let concentric = (1..16384).map(|i| Box3 { min: [-i, -2 * i, -i], max: [i, 2 * i, i] });
-        for boxes in [vec![one; 16384], concentric.collect()] {
-            let start = std::time::Instant::now();
+    fn crowds_and_chains_take_no_longer_than_others() {
+        // Each takes seconds where PLOC and the reinsertion are let loose on it.
+        let concentric = |i: i64| Box3 { min: [-i, -2 * i, -i], max: [i, 2 * i, i] };
+        let series = (0..16384).map(|i| {
+            let x = (1e12 * 0.999f64.powi(i)) as i64;
+            Box3 { min: [x, 0, 0], max: [x + x / 1000, 9, 9] }
+        });
+        let chains = [vec![boxes(1)[0]; 16384], (1..16384).map(concentric).collect(), series.collect()];
+        for boxes in chains {
+            assert!(is_chain_of(&boxes));
             check(&BinaryTree::by_obvhs(&boxes), &boxes);
-            // It takes 20 ms; without the measure against crowds 5 s.
-            assert!(start.elapsed().as_millis() < 1500, "{:?}", start.elapsed());
         }
+        let shuffled: Vec<Box3> = (0..16381).map(|i| concentric(1 + i * 7919 % 16381)).collect();
+        check(&BinaryTree::by_obvhs(&shuffled), &shuffled);
+        assert!(!is_chain_of(&boxes(16384)));
     }
 }

@@ -6,7 +6,7 @@ use super::intern::Interner;
 use super::lattice::{Lattice, pow2};
 use super::node;
 use super::objects::ObjectPlan;
-use super::wide::{WideTree, collapse};
+use super::wide::{WideTree, collapse, collapse_levels};
 use bricks::{
     AttributeLayout, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, LEAF_TRIANGLES, MAX_BRICK_HEIGHT, NEAR_STEPS,
     ORIGIN_STEPS, SURFACE_ROTATION_SHIFT, Span, WIDE_HIGH_STEPS,
@@ -15,6 +15,9 @@ use bytemuck::Zeroable;
 
 /// No attribute vertex yet: the source has no usable normal there.
 const FLAT: u32 = u32::MAX;
+
+/// Levels of a binary tree whose wide tree is seldom too high.
+const SPLIT_LEVELS: u32 = 48;
 
 /// What bricks of one object have in common.
 #[derive(Clone, Copy)]
@@ -130,14 +133,18 @@ fn round(context: &BrickContext, slots: &[u32]) -> Contents {
     Contents { triangles, positions, attributes, mean_albedo: mean(albedo), mean_emission: mean(emission), dropped }
 }
 
-/// The wide tree over the boxes of the triangles, of at most [`MAX_BRICK_HEIGHT`] levels.
-fn build_tree(boxes: &[Box3]) -> WideTree {
+/// The wide tree over the boxes of the triangles, of at most `levels` levels; 8 always suffice.
+fn build_tree(boxes: &[Box3], levels: u32) -> WideTree {
     let tree = collapse(&BinaryTree::by_obvhs(boxes), LEAF_TRIANGLES);
-    if tree.height <= MAX_BRICK_HEIGHT {
+    if tree.height <= levels {
         return tree;
     }
-    // Halving 2^20 triangles takes 21 binary levels, and a wide tree is not higher than its binary one.
-    collapse(&BinaryTree::by_splits(boxes, 0), LEAF_TRIANGLES)
+    let tree = collapse(&BinaryTree::by_splits(boxes, SPLIT_LEVELS), LEAF_TRIANGLES);
+    if tree.height <= levels {
+        return tree;
+    }
+    // Halving 2^20 triangles takes 21 levels, of which each wide node spans three.
+    collapse_levels(&BinaryTree::by_splits(boxes, 0), LEAF_TRIANGLES)
 }
 
 /// Renumbers values in the order of their first use.
@@ -169,7 +176,7 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     let origin: [i64; 3] = std::array::from_fn(|k| nearest_origin(bounds.min[k] + (bounds.max[k] - bounds.min[k]) / 2));
     let relative = |p: [i64; 3]| -> [i64; 3] { std::array::from_fn(|k| p[k] - origin[k]) };
     let relative_boxes: Vec<Box3> = boxes.iter().map(|b| Box3 { min: relative(b.min), max: relative(b.max) }).collect();
-    let tree = build_tree(&relative_boxes);
+    let tree = build_tree(&relative_boxes, MAX_BRICK_HEIGHT);
 
     let mut vertices = Renumbering::new(points.len());
     let mut attribute_vertices = Renumbering::new(contents.attributes.values().len());
@@ -310,8 +317,14 @@ mod tests {
                 Box3 { min: [0; 3], max: [x + 1, x + i64::from(i % 7), x] }
             })
             .collect();
-        let tree = build_tree(&boxes);
-        assert!(tree.height <= MAX_BRICK_HEIGHT);
-        assert_eq!(tree.items.len(), boxes.len());
+        let heights = [MAX_BRICK_HEIGHT, 14].map(|levels| {
+            let tree = build_tree(&boxes, levels);
+            assert!(tree.height <= levels, "{} levels", tree.height);
+            let mut items = tree.items.clone();
+            items.sort_unstable();
+            assert!(items.len() == boxes.len() && items.iter().zip(0..).all(|(&item, index)| item == index));
+            tree.height
+        });
+        assert!(heights[0] > 14, "the bound takes effect: {heights:?}");
     }
 }

@@ -21,8 +21,8 @@ struct Grid {
 /// Absent children are inverted, so that they are neutral to unions and entered by no ray.
 fn quantise(node: &WideNode, origin: [i64; 3]) -> Grid {
     let mut grid = Grid { exponent: [0; 3], lo: [[GRID_END as u8; NODE_WIDTH]; 3], hi: [[0; NODE_WIDTH]; 3] };
-    for k in 0..3 {
-        let extent = node.bounds.max[k] - origin[k];
+    for (k, &origin) in origin.iter().enumerate() {
+        let extent = node.bounds.max[k] - origin;
         let mut exponent = 0;
         while ceil_shift(extent, exponent) > GRID_END {
             exponent += 1;
@@ -30,8 +30,8 @@ fn quantise(node: &WideNode, origin: [i64; 3]) -> Grid {
         grid.exponent[k] = exponent;
         for (slot, child) in node.children.iter().enumerate() {
             if let Some(child) = child {
-                grid.lo[k][slot] = ((child.bounds.min[k] - origin[k]) >> exponent) as u8;
-                grid.hi[k][slot] = ceil_shift(child.bounds.max[k] - origin[k], exponent) as u8;
+                grid.lo[k][slot] = ((child.bounds.min[k] - origin) >> exponent) as u8;
+                grid.hi[k][slot] = ceil_shift(child.bounds.max[k] - origin, exponent) as u8;
             }
         }
     }

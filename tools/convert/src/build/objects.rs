@@ -125,7 +125,7 @@ pub(super) fn plan<'a>(scene: &'a SourceScene, settings: &BuildSettings) -> Resu
         return Err(BuildError::TooManyTriangles { found: triangle_ids });
     }
 
-    let invertible: Vec<bool> = scene.placements.iter().map(|placement| is_invertible(placement)).collect();
+    let invertible: Vec<bool> = scene.placements.iter().map(is_invertible).collect();
     let instanced = choose_instanced(scene, &counts, &invertible, settings);
     let mut objects = vec![ObjectPlan {
         name: "the scene".to_owned(),

@@ -5,7 +5,7 @@ use super::error::BuildError;
 use super::lattice::Lattice;
 use super::matrix::Affine;
 use super::node::encode_top;
-use super::wide::collapse;
+use super::wide::{collapse, collapse_levels};
 use bricks::{Leaf, MAX_TOP_HEIGHT, TOP_LEAF, TopNode2, TopNode8};
 
 /// Most levels of the binary tree, the root counted.
@@ -41,9 +41,9 @@ pub(super) fn build(leaves: &[Leaf], boxes: &[Box3]) -> Result<TopLevel, BuildEr
     let mut binary = BinaryTree::by_splits(boxes, BINARY_DEPTH);
     let mut wide = collapse(&binary, 1);
     if wide.height > MAX_TOP_HEIGHT {
-        // Levels of the 8-wide tree merge two levels or more of a halved one, of which there are 32 at most.
+        // Halving takes at most 32 levels, of which each wide node spans three.
         binary = BinaryTree::by_splits(boxes, 0);
-        wide = collapse(&binary, 1);
+        wide = collapse_levels(&binary, 1);
     }
     let mut new_of_old = vec![0u32; leaves.len()];
     for (new, &old) in (0u32..).zip(&wide.items) {

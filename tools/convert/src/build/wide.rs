@@ -89,9 +89,19 @@ enum Kind {
 /// Most roots of a subtree within its parent.
 const ROOTS: usize = NODE_WIDTH - 1;
 
-/// Collapses `tree` with up to `leaf_items` (1 to 3) items a leaf.
+/// Collapses `tree` with up to `leaf_items` (1 to 3) items a leaf, at the least cost.
 pub(super) fn collapse(tree: &BinaryTree, leaf_items: u32) -> WideTree {
-    let decisions = decide(tree, leaf_items);
+    emit(tree, &decide(tree, leaf_items, cheapest))
+}
+
+/// Collapses `tree` with up to `leaf_items` (1 to 3) items a leaf, three binary levels to each wide one: the height is at
+/// most a third of the binary tree's, rounded up.
+pub(super) fn collapse_levels(tree: &BinaryTree, leaf_items: u32) -> WideTree {
+    emit(tree, &decide(tree, leaf_items, three_levels))
+}
+
+/// Makes the wide tree that was decided on.
+fn emit(tree: &BinaryTree, decisions: &[Choices]) -> WideTree {
     let mut out = WideTree {
         nodes: Vec::with_capacity(tree.nodes.len() / 6 + 1),
         items: Vec::with_capacity(tree.nodes.len() / 2 + 1),
@@ -114,8 +124,8 @@ pub(super) fn collapse(tree: &BinaryTree, leaf_items: u32) -> WideTree {
             roots.push(binary);
         } else {
             let Decision { left, right, .. } = decisions[binary as usize][0];
-            push_roots(tree, &decisions, tree.nodes[binary as usize].left, left, &mut roots);
-            push_roots(tree, &decisions, tree.nodes[binary as usize].right, right, &mut roots);
+            push_roots(tree, decisions, tree.nodes[binary as usize].left, left, &mut roots);
+            push_roots(tree, decisions, tree.nodes[binary as usize].right, right, &mut roots);
         }
         let slots = assign_slots(tree, binary, &roots);
         let (child_base, item_base) = (out.nodes.len() as u32, out.items.len() as u32);
@@ -140,8 +150,12 @@ pub(super) fn collapse(tree: &BinaryTree, leaf_items: u32) -> WideTree {
     out
 }
 
-/// Fills the table of decisions from the leaves up.
-fn decide(tree: &BinaryTree, leaf_items: u32) -> Vec<[Decision; ROOTS]> {
+/// The decisions of one node's children, of up to so many roots less one.
+type Choices = [Decision; ROOTS];
+
+/// Fills the table of decisions from the leaves up; `choose` decides on a node that is no leaf, from its area and the
+/// choices of its children.
+fn decide(tree: &BinaryTree, leaf_items: u32, choose: fn(f32, &Choices, &Choices) -> Choices) -> Vec<Choices> {
     let mut decisions = vec![[Decision::default(); ROOTS]; tree.nodes.len()];
     let mut counts = vec![1u32; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
@@ -150,29 +164,14 @@ fn decide(tree: &BinaryTree, leaf_items: u32) -> Vec<[Decision; ROOTS]> {
             decisions[index] = [Decision { cost: area * ITEM_COST, kind: Kind::Leaf, left: 0, right: 0 }; ROOTS];
             continue;
         }
-        let (left, right) = (&decisions[node.left as usize], &decisions[node.right as usize]);
+        let mut own = choose(area, &decisions[node.left as usize], &decisions[node.right as usize]);
         let count = counts[node.left as usize].saturating_add(counts[node.right as usize]);
-        // The cheapest way to share out `roots + 2` roots, of which each child gets at least one.
-        let share = |roots: usize| {
-            let mut best = Decision { cost: f32::INFINITY, kind: Kind::Spread, left: 0, right: 0 };
-            for i in 0..=roots {
-                let cost = left[i].cost + right[roots - i].cost;
-                if cost < best.cost {
-                    best = Decision { cost, kind: Kind::Spread, left: i as u8, right: (roots - i) as u8 };
-                }
-            }
-            best
-        };
-        let mut own = [Decision::default(); ROOTS];
-        let eight = share(ROOTS - 1);
-        own[0] = Decision { cost: eight.cost + area, kind: Kind::Inner, ..eight };
         let leaf_cost = area * count as f32 * ITEM_COST;
         if count <= leaf_items && leaf_cost <= own[0].cost {
-            own[0] = Decision { cost: leaf_cost, kind: Kind::Leaf, ..eight };
-        }
-        for roots in 1..ROOTS {
-            let spread = share(roots - 1);
-            own[roots] = if spread.cost < own[roots - 1].cost { spread } else { own[roots - 1] };
+            // Also where one root is the best choice of more.
+            for choice in own.iter_mut().filter(|choice| choice.kind == Kind::Inner || leaf_cost <= choice.cost) {
+                *choice = Decision { cost: leaf_cost, kind: Kind::Leaf, ..*choice };
+            }
         }
         counts[index] = count;
         decisions[index] = own;
@@ -180,9 +179,45 @@ fn decide(tree: &BinaryTree, leaf_items: u32) -> Vec<[Decision; ROOTS]> {
     decisions
 }
 
+/// Shares out roots at the least cost.
+fn cheapest(area: f32, left: &Choices, right: &Choices) -> Choices {
+    // The cheapest way to share out `roots + 2` roots, of which each child gets at least one.
+    let share = |roots: usize| {
+        let mut best = Decision { cost: f32::INFINITY, kind: Kind::Spread, left: 0, right: 0 };
+        for i in 0..=roots {
+            let cost = left[i].cost + right[roots - i].cost;
+            if cost < best.cost {
+                best = Decision { cost, kind: Kind::Spread, left: i as u8, right: (roots - i) as u8 };
+            }
+        }
+        best
+    };
+    let mut own = [Decision::default(); ROOTS];
+    let eight = share(ROOTS - 1);
+    own[0] = Decision { cost: eight.cost + area, kind: Kind::Inner, ..eight };
+    for roots in 1..ROOTS {
+        let spread = share(roots - 1);
+        own[roots] = if spread.cost < own[roots - 1].cost { spread } else { own[roots - 1] };
+    }
+    own
+}
+
+/// Shares out eight roots as four and four, four as two and two, two as one and one.
+fn three_levels(_: f32, _: &Choices, _: &Choices) -> Choices {
+    std::array::from_fn(|roots| {
+        let (kind, half) = match roots {
+            0 => (Kind::Inner, 3),
+            1 | 2 => (Kind::Spread, 0),
+            _ => (Kind::Spread, 1),
+        };
+        // Without costs any leaf that fits is taken.
+        Decision { cost: f32::INFINITY, kind, left: half, right: half }
+    })
+}
+
 /// Collects the roots that represent `node` within its wide parent, at most `budget + 1`. The depth is at most 7: each
 /// level of the recursion shares out at least one root less.
-fn push_roots(tree: &BinaryTree, decisions: &[[Decision; ROOTS]], node: u32, budget: u8, roots: &mut Vec<u32>) {
+fn push_roots(tree: &BinaryTree, decisions: &[Choices], node: u32, budget: u8, roots: &mut Vec<u32>) {
     let decision = decisions[node as usize][budget as usize];
     if decision.kind == Kind::Spread {
         push_roots(tree, decisions, tree.nodes[node as usize].left, decision.left, roots);
@@ -286,6 +321,12 @@ mod tests {
             let boxes = boxes(count);
             let binary = BinaryTree::by_obvhs(&boxes);
             check(&collapse(&binary, 3), &boxes, 3);
+            let halved = BinaryTree::by_splits(&boxes, 0);
+            for leaf_items in [1, 3] {
+                let low = collapse_levels(&halved, u32::from(leaf_items));
+                check(&low, &boxes, leaf_items);
+                assert!(3 * low.height < (count as u64).next_power_of_two().ilog2() + 5, "{} levels", low.height);
+            }
             let single = collapse(&binary, 1);
             assert_eq!(check(&single, &boxes, 1), count as usize);
             if count == 3000 {

@@ -1,0 +1,9 @@
+//! Builds small scenes and looks into the files: boxes, ids, positions, and that settings change nothing they must not.
+
+mod decode;
+mod degenerate;
+mod errors;
+mod invariance;
+mod placement;
+mod scenes;
+mod structure;
