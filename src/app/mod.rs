@@ -127,7 +127,7 @@ pub fn print(text: &str) -> anyhow::Result<()> {
 /// Writes a value as indented JSON and a newline to standard output.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
     print(&(serde_json::to_string_pretty(value)? + "\n"))
 }
