@@ -96,7 +96,10 @@ fn chain(error: &anyhow::Error) -> String {
 
 /// `text` with every run of control characters and white space as one space.
 fn one_line(text: &str) -> String {
-    text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
+    text.split(|c: char| c.is_whitespace() || c.is_control())
+        .filter(|word| !word.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// Whether the reader of standard output went away, as in `brickwalk info S.bricks | head -1`.
