@@ -106,12 +106,12 @@ fn ids_and_depths_do_not_depend_on_brick_size() {
 /// Bits of `triangle.id` and `depth.Z`.
 fn channels(file: &Path) -> Vec<(String, Vec<u32>)> {
     use exr::prelude::*;
-    let image = read_all_data_from_file(file).expect("an EXR");
+    let image = read_all_flat_layers_from_file(file).expect("an EXR");
     let mut out = Vec::new();
     for channel in &image.layer_data[0].channel_data.list {
-        let bits: Vec<u32> = match &channel.sample_data {
-            FlatSamples::F16(v) => v.iter().map(|x| x.to_bits().into()).collect(),
-            FlatSamples::F32(v) => v.iter().map(|x| x.to_bits()).collect(),
+        let bits = match &channel.sample_data {
+            FlatSamples::F16(v) => v.iter().map(|x| u32::from(x.to_bits())).collect::<Vec<u32>>(),
+            FlatSamples::F32(v) => v.iter().map(|x| x.to_bits()).collect::<Vec<u32>>(),
             FlatSamples::U32(v) => v.clone(),
         };
         let name = channel.name.to_string();

@@ -166,8 +166,9 @@ pub struct StreamArgs {
     /// Device memory for bricks: a size, or a share P% of all bricks; it must hold the two largest
     #[arg(long, value_name = "SIZE|P%", default_value = "25%")]
     pub cache: CacheSize,
-    /// Host memory for verified bricks
-    #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = size_bytes)]
+    /// Host memory for verified bricks; 0 keeps none
+    #[arg(long, value_name = "SIZE", default_value = "1G",
+        value_parser = |s: &str| if s == "0" { Ok(0) } else { size_bytes(s) })]
     pub host_cache: u64,
     /// How bricks to intersect are found: chc (tiles against the top level, loading what rays need), plain (everything
     /// resident, one traversal per ray; the cache must hold the scene), auto (the cheaper one)
