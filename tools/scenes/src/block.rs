@@ -69,7 +69,7 @@ fn perimeter(site: &mut Site, rng: &mut Rng) {
     let mut rows: Vec<(Rect, [Side; 4])> = Vec::new();
     for k in [NORTH, SOUTH] {
         let (z0, z1) = if k == NORTH { (lots.z0, yard.z0) } else { (yard.z1, lots.z1) };
-        let pieces = split(rng, lots.x0, lots.x1, 14.5);
+        let pieces = split(rng, lots.x0, lots.x1, 15.5);
         for (s, [x0, x1]) in pieces.iter().copied().enumerate() {
             let mut sides = [Side::Party; 4];
             sides[k] = Side::Street;
@@ -86,7 +86,7 @@ fn perimeter(site: &mut Site, rng: &mut Rng) {
     for k in [WEST, EAST] {
         let (x0, x1) = if k == WEST { (lots.x0, yard.x0) } else { (yard.x1, lots.x1) };
         if yard.depth() > 7.0 && rng.chance(0.9) {
-            for [z0, z1] in split(rng, yard.z0, yard.z1, 13.0) {
+            for [z0, z1] in split(rng, yard.z0, yard.z1, 14.5) {
                 let mut sides = [Side::Party; 4];
                 sides[k] = Side::Street;
                 sides[if k == WEST { EAST } else { WEST }] = Side::Rear;

@@ -34,8 +34,8 @@ pub struct Outcome {
     pub blocks: usize,
     /// The last ring with a block.
     pub ring: i64,
-    /// Least and greatest coordinates of the blocks.
-    pub bounds: [DVec3; 2],
+    /// Least and greatest coordinates of each block.
+    pub bounds: Vec<[DVec3; 2]>,
 }
 
 /// Triangles of the meadows and fields around `blocks` blocks.
@@ -86,15 +86,11 @@ fn build(
     };
     let name = |index: usize| {
         let (i, j) = cell_of(index);
-        format!("block {i} {j}")
+        format!("block {i} {j} {:?}", layout.cell(i, j).zone).to_lowercase()
     };
     progress.phase("city", wanted);
-    let mut outcome = Outcome { blocks: 0, ring: 0, bounds: [DVec3::INFINITY, DVec3::NEG_INFINITY] };
+    let mut outcome = Outcome { blocks: 0, ring: 0, bounds: Vec::new() };
     let mut total = 0;
-    let mut grow = |mesh: &Builder| {
-        let [low, high] = mesh.bounds();
-        outcome.bounds = [outcome.bounds[0].min(low), outcome.bounds[1].max(high)];
-    };
     let mut count = 0;
     'all: loop {
         let guess = ((wanted - total) / USUAL + 1) as usize;
@@ -104,7 +100,7 @@ fn build(
             let around = surroundings(seed, &layout, count + 1).1.triangles();
             let left = wanted.saturating_sub(total + around);
             if triangles <= left {
-                grow(&mesh);
+                outcome.bounds.push(mesh.bounds());
                 take(name(index), mesh, uses);
                 progress.advance(triangles);
                 total += triangles;
@@ -113,7 +109,7 @@ fn build(
             }
             if left >= LEAST || count == 0 {
                 let (mesh, uses, triangles) = one(index, left);
-                grow(&mesh);
+                outcome.bounds.push(mesh.bounds());
                 take(name(index), mesh, uses);
                 progress.advance(triangles);
                 count += 1;

@@ -298,11 +298,11 @@ pub fn fence(b: &mut Builder, f: &Frame, length: f64, tint: Tint) {
             face::FRONT | face::BACK | face::TOP,
         );
     }
-    let count = (length / 0.28).floor().max(1.0);
+    let count = (length / 0.36).floor().max(1.0);
     for k in 0..count as u32 {
         let u = (f64::from(k) + 0.5) * length / count;
-        b.cuboid(f, Mat::Paint, tint, [u - 0.045, u + 0.045], [0.05, 1.0], [0.02, 0.04], face::STANDING & !face::BACK);
-        b.panel(f, Mat::Paint, shade(tint, 0.9), [u + 0.045, u - 0.045], [0.05, 1.0], 0.0195);
+        b.cuboid(f, Mat::Paint, tint, [u - 0.055, u + 0.055], [0.05, 1.0], [0.02, 0.04], face::FRONT | face::TOP);
+        b.panel(f, Mat::Paint, shade(tint, 0.9), [u + 0.055, u - 0.055], [0.05, 1.0], 0.0195);
     }
 }
 

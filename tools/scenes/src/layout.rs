@@ -148,7 +148,7 @@ impl Layout {
             negative.extend(positive);
             negative
         };
-        Self { seed, x: lines(0, 66.0, 90.0), z: lines(1, 56.0, 70.0) }
+        Self { seed, x: lines(0, 62.0, 82.0), z: lines(1, 55.0, 66.0) }
     }
 
     /// Position of the street along z with number `i`, |i| ≤ 120. Street 0 is at 0.
@@ -181,7 +181,7 @@ impl Layout {
 
     /// A centre of 300 m and lesser ones, from smooth noise.
     fn density(&self, p: DVec2) -> f64 {
-        let core = (-p.length_squared() / (2.0 * 190.0f64.powi(2))).exp();
+        let core = (-p.length_squared() / (2.0 * 150.0f64.powi(2))).exp();
         let q = p / 330.0;
         let (fx, fz) = (q.x - q.x.floor(), q.y - q.y.floor());
         let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
@@ -213,7 +213,7 @@ impl Layout {
             Zone::Plaza
         } else if kind < 0.5 * (density - 0.45) {
             Zone::Towers
-        } else if density < 0.16 && kind < 0.75 {
+        } else if density < 0.22 && kind < 0.75 {
             Zone::Houses
         } else if kind > 0.86 {
             Zone::Slabs
@@ -272,7 +272,7 @@ mod tests {
             assert_eq!((layout.x(0), layout.z(0)), (0.0, 0.0));
             for k in -100..100 {
                 let cell = layout.cell(k, -k);
-                assert!(cell.lots().width() > 40.0 && cell.lots().depth() > 34.0, "{cell:?}");
+                assert!(cell.lots().width() > 36.0 && cell.lots().depth() > 32.0, "{cell:?}");
             }
         }
     }

@@ -21,6 +21,7 @@ mod street;
 mod style;
 mod vegetation;
 mod vehicle;
+mod window;
 
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;

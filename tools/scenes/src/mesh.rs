@@ -188,6 +188,7 @@ impl Builder {
     }
 
     /// The faces `faces` of a box.
+    #[expect(clippy::too_many_arguments, reason = "a box is three intervals, and calls read as such")]
     pub fn cuboid(
         &mut self,
         f: &Frame,

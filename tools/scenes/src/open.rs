@@ -122,7 +122,7 @@ pub fn park(site: &mut Site, rng: &mut Rng) {
         let near = walk.iter().map(|q| (*q - p).length()).fold(f64::INFINITY, f64::min);
         let within = (p - center).length() < 0.8 * radii.min_element();
         if near > 2.2 && !within && planted.iter().all(|q| (*q - p).length() > 5.0) && planted.len() < 18 {
-            let kind = if planted.len() % 2 == 0 {
+            let kind = if planted.len().is_multiple_of(2) {
                 Tree::Park
             } else {
                 rng.pick(&[Tree::Street, Tree::Street, Tree::Conifer, Tree::Column])

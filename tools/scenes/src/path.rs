@@ -114,11 +114,12 @@ pub fn near_path(seed: u64, frames: u32) -> CameraPath {
 /// A third of a circle around the city, above its roofs, all of it in view.
 fn far_path(city: &Outcome) -> CameraPath {
     const KEYS: u32 = 13;
-    let [low, high] = city.bounds;
+    let start = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let [low, high] = city.bounds.iter().fold(start, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let middle = 0.5 * (low + high);
-    let target = DVec3::new(middle.x, 0.25 * high.y, middle.z);
+    let target = DVec3::new(middle.x, (0.02 * (high.x - low.x)).min(0.3 * high.y), middle.z);
     let fov_y_degrees: f64 = 50.0;
-    let rise: f64 = 30.0f64.to_radians();
+    let rise: f64 = 33.0f64.to_radians();
     // Away from the target.
     let directions: Vec<DVec3> = (0..KEYS)
         .map(|k| {
@@ -126,18 +127,17 @@ fn far_path(city: &Outcome) -> CameraPath {
             DVec3::new(angle.cos() * rise.cos(), rise.sin(), angle.sin() * rise.cos())
         })
         .collect();
-    // Every corner of the bounds stays within a square picture in every keyframe.
+    // Every corner of every block's bounds stays within a picture of 4:3 or wider, in every keyframe.
     let slope = (0.5 * fov_y_degrees).to_radians().tan();
-    let needed = |d: DVec3| {
-        let right = DVec3::Y.cross(d).normalize();
+    let corners =
+        city.bounds.iter().flat_map(|b| (0..8).map(|k| DVec3::new(b[k & 1].x, b[k >> 1 & 1].y, b[k >> 2].z) - target));
+    let corners: Vec<DVec3> = corners.collect();
+    let needed = directions.iter().flat_map(|d| {
+        let right = DVec3::Y.cross(*d).normalize();
         let up = d.cross(right);
-        (0..8).map(move |k| {
-            let pick = |bit: u32, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
-            let c = DVec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z)) - target;
-            c.dot(right).abs().max(c.dot(up).abs()) / slope + c.dot(d)
-        })
-    };
-    let distance = 1.05 * directions.iter().flat_map(|d| needed(*d)).fold(0.0, f64::max);
+        corners.iter().map(move |c| (0.75 * c.dot(right).abs()).max(c.dot(up).abs()) / slope + c.dot(*d))
+    });
+    let distance = 1.03 * needed.fold(0.0, f64::max);
     let keyframes = directions.iter().enumerate().map(|(k, d)| Keyframe {
         time: k as f64,
         position: (target + *d * distance).to_array(),

@@ -1,12 +1,13 @@
 //! Roofs: parapets, terraces, slopes with dormers, and what stands on them.
 
 use crate::building::Plan;
-use crate::facade::{Side, Window};
+use crate::facade::Side;
 use crate::layout::Rect;
 use crate::material::{Mat, Tint, WHITE, shade};
 use crate::mesh::{Builder, Frame, face, inset, lift};
 use crate::rng::Rng;
 use crate::style::Style;
+use crate::window::Window;
 use glam::{DVec2, DVec3};
 
 /// A parapet of height `height` and thickness `t` on the walls of `plan`.
@@ -87,7 +88,7 @@ pub fn mansard(b: &mut Builder, rng: &mut Rng, plan: &Plan, y: f64, style: &Styl
             for s in 0..bays as u32 {
                 let u = (f64::from(s) + 0.5) * width / bays;
                 if u > back + 0.8 && u < width - back - 0.8 {
-                    dormer(b, rng, &f, u, back, height, style, plan.sides[k] == Side::Street);
+                    dormer(b, rng, &f, u, [back, height], style, plan.sides[k] == Side::Street);
                 }
             }
         }
@@ -105,7 +106,7 @@ pub fn mansard(b: &mut Builder, rng: &mut Rng, plan: &Plan, y: f64, style: &Styl
 }
 
 /// A dormer on the slope above a wall: `back` over `height` is the slope.
-fn dormer(b: &mut Builder, rng: &mut Rng, f: &Frame, u: f64, back: f64, height: f64, style: &Style, full: bool) {
+fn dormer(b: &mut Builder, rng: &mut Rng, f: &Frame, u: f64, [back, height]: [f64; 2], style: &Style, full: bool) {
     let (half, low, high) = (0.62, 0.45, (height - 0.35).min(2.15));
     // How deep the slope lies behind the wall at height v.
     let behind = |v: f64| -back * v / height;
@@ -121,7 +122,6 @@ fn dormer(b: &mut Builder, rng: &mut Rng, f: &Frame, u: f64, back: f64, height: 
         if outward > 0.0 {
             quad.reverse();
         }
-        quad.reverse();
         b.fan(style.roof_mat, cheek, &quad);
     }
     let window = Window { sill: full, full, recess: 0.1, wall: Mat::Paint, ..Window::of(style, style.frame_tint) };
@@ -173,13 +173,12 @@ pub fn gable(b: &mut Builder, rng: &mut Rng, rect: Rect, along_x: bool, flush: [
         }
         b.fan(style.wall, shade(style.wall_tint, 0.95), &triangle);
         let edge = if outward { right } else { left };
-        for s in 0..2 {
-            let foot = f.at(edge, -drop, eaves[s]);
+        for (s, w) in eaves.into_iter().enumerate() {
+            let foot = f.at(edge, -drop, w);
             let mut board = [foot, foot + lift, f.at(edge, rise, -0.5 * depth) + lift, f.at(edge, rise, -0.5 * depth)];
             if (s == 0) == outward {
                 board.reverse();
             }
-            board.reverse();
             b.fan(Mat::Wood, shade(WHITE, 0.9), &board);
         }
     }
@@ -206,10 +205,10 @@ fn antenna(b: &mut Builder, rng: &mut Rng, p: DVec2, y: f64) {
     let h = rng.range(2.0, 4.0);
     b.tube(Mat::Metal, shade(WHITE, 0.7), [f.o, f.at(0.0, h, 0.0)], [0.03, 0.025], 5, true);
     b.tube(Mat::Metal, WHITE, [f.at(0.0, h - 0.2, -0.9), f.at(0.0, h - 0.2, 0.9)], [0.018, 0.018], 4, true);
-    for k in 0..7 {
-        let w = -0.85 + 0.28 * f64::from(k);
-        let half = 0.5 - 0.05 * f64::from(k);
-        b.tube(Mat::Metal, WHITE, [f.at(-half, h - 0.2, w), f.at(half, h - 0.2, w)], [0.012, 0.012], 4, true);
+    for k in 0..5 {
+        let w = -0.85 + 0.4 * f64::from(k);
+        let half = 0.5 - 0.07 * f64::from(k);
+        b.tube(Mat::Metal, WHITE, [f.at(-half, h - 0.2, w), f.at(half, h - 0.2, w)], [0.012, 0.012], 3, false);
     }
 }
 
@@ -239,7 +238,7 @@ fn clutter(b: &mut Builder, rng: &mut Rng, area: Rect, y: f64) {
         let f = frame(rng, p);
         stair_house(b, rng, &f);
     }
-    let units = (area.width() * area.depth() / 60.0).min(4.0) as u32 + 1;
+    let units = (area.width() * area.depth() / 60.0).min(2.0) as u32 + 1;
     for _ in 0..units {
         if let Some(p) = free(rng, 1.0) {
             let f = frame(rng, p);
@@ -297,13 +296,13 @@ fn cooler(b: &mut Builder, rng: &mut Rng, f: &Frame) {
     }
     let tint = shade(WHITE, rng.range(0.8, 1.0));
     b.cuboid(f, Mat::Paint, shade(tint, 0.75), [-w, w], [0.2, h], [-d, d], face::ALL);
-    for k in 0..5 {
-        let v = 0.3 + 0.1 * f64::from(k);
+    for k in 0..3 {
+        let v = 0.34 + 0.16 * f64::from(k);
         b.cuboid(f, Mat::Metal, [0.3; 3], [-w + 0.08, w - 0.08], [v, v + 0.04], [d, d + 0.02], face::LEVEL);
     }
     let center = f.at(0.0, h, 0.0);
-    b.tube(Mat::Metal, [0.4; 3], [center, center + DVec3::Y * 0.1], [0.8 * d, 0.8 * d], 12, false);
-    b.tube(Mat::Rubber, WHITE, [center, center + DVec3::Y * 0.03], [0.79 * d, 0.79 * d], 12, true);
+    b.tube(Mat::Metal, [0.4; 3], [center, center + DVec3::Y * 0.1], [0.8 * d, 0.8 * d], 10, false);
+    b.disc(Mat::Rubber, WHITE, center + DVec3::Y * 0.03, DVec3::Y * (0.79 * d), 10);
 }
 
 /// A wooden water tank on legs.

@@ -107,7 +107,7 @@ pub fn cell_ground(b: &mut Builder, rng: &mut Rng, cell: &Cell) {
 
 fn roadway(b: &mut Builder, rng: &mut Rng, cell: &Cell) {
     let (outer, block) = (cell.rect.polygon(), cell.block());
-    for k in 0..4 {
+    for (k, &corner) in outer.iter().enumerate() {
         let side = Side::new(cell, k);
         let (u0, u1) = (side.ends[0] + CORNER, side.length - side.ends[1] - CORNER);
         let count = ((u1 - u0) / 6.0).round();
@@ -116,7 +116,6 @@ fn roadway(b: &mut Builder, rng: &mut Rng, cell: &Cell) {
             let tint = shade(WHITE, rng.range(0.8, 1.0));
             b.panel(&side.frame, Mat::Asphalt, tint, u, [-side.half, 0.0], 0.0);
         }
-        let corner = outer[k];
         let mut points = vec![corner];
         let ring = arc(cell, k, 0.0);
         // The two ends of the corner piece on the centre lines, beside the ends of the arc.

@@ -37,7 +37,7 @@ pub fn tuft(b: &mut Builder, rng: &mut Rng, center: DVec3, radius: f64, count: u
         let d = rng.direction();
         let r = radius * rng.range(0.25, 1.0).cbrt();
         let light = 0.72 + 0.28 * (0.5 + 0.5 * d.y) + rng.range(-0.12, 0.08);
-        let size = (0.46 * radius).clamp(0.13, 0.46) * rng.range(0.7, 1.2);
+        let size = (0.41 * radius).clamp(0.13, 0.44) * rng.range(0.7, 1.2);
         leaf(b, rng, center + d * r, d, size, shade(tint, light));
     }
 }
@@ -56,7 +56,7 @@ fn branch(b: &mut Builder, rng: &mut Rng, from: DVec3, to: DVec3, radius: f64, s
 pub fn tree(b: &mut Builder, rng: &mut Rng, kind: Tree) {
     match kind {
         Tree::Street => {
-            crowned(b, rng, Crown { bole: 2.7, height: 7.6, radius: 2.4, branches: 6, tufts: 26, leaves: 12 })
+            crowned(b, rng, Crown { bole: 2.7, height: 7.6, radius: 2.4, branches: 6, tufts: 26, leaves: 14 })
         }
         Tree::Park => {
             crowned(b, rng, Crown { bole: 2.6, height: 10.0, radius: 3.9, branches: 8, tufts: 44, leaves: 15 })

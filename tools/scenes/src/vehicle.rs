@@ -234,8 +234,8 @@ fn car(b: &mut Builder, f: &Frame, body: &Body, paint: Tint) {
 /// A wheel in its dark arch; `sign` tells on which side.
 fn wheel_at(b: &mut Builder, f: &Frame, u: f64, n: f64, r: f64, sign: f64) {
     let at = |d: f64| f.at(u + sign * d, r, n);
-    b.disc(Mat::Rubber, [0.6; 3], at(0.004), f.u * (sign * (r + 0.06)), 12);
-    b.tube(Mat::Rubber, WHITE, [at(-0.2), at(0.015)], [r, r], 12, true);
+    b.disc(Mat::Rubber, [0.6; 3], at(0.004), f.u * (sign * (r + 0.06)), 10);
+    b.tube(Mat::Rubber, WHITE, [at(-0.2), at(0.015)], [r, r], 10, true);
     b.disc(Mat::Metal, shade(WHITE, 0.8), at(0.022), f.u * (sign * 0.62 * r), 9);
 }
 

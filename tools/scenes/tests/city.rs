@@ -1,0 +1,250 @@
+//! The generated city as a whole: counts, determinism, the fixed centre, sound geometry, and the way through it.
+
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{Mesh, SourceScene};
+use brickwalk_scenes::{CameraPath, Error, Kind, MAX_TRIANGLES, MIN_TRIANGLES, Settings};
+use brickwalk_scenes::{generate, near_path, path_above, placed_triangles, write_paths};
+use glam::{DAffine3, DMat3, DVec3};
+
+fn city(triangles: u64, seed: u64, instanced: bool) -> SourceScene {
+    let settings = Settings { kind: Kind::City, triangles, seed, instanced };
+    generate(&settings, &Progress::hidden()).expect("a count in range")
+}
+
+fn same_mesh(a: &Mesh, b: &Mesh) -> bool {
+    a.name == b.name
+        && a.primitives.len() == b.primitives.len()
+        && a.primitives.iter().zip(&b.primitives).all(|(p, q)| {
+            p.material == q.material && p.positions == q.positions && p.colors == q.colors && p.indices == q.indices
+        })
+}
+
+/// Every triangle in world space.
+fn triangles(scene: &SourceScene) -> impl Iterator<Item = [DVec3; 3]> {
+    scene.placements.iter().flat_map(|placement| {
+        let m = placement.world_from_mesh;
+        let column = |c: usize| DVec3::new(m[c], m[4 + c], m[8 + c]);
+        let a = DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
+        scene.meshes[placement.mesh as usize].primitives.iter().flat_map(move |p| {
+            p.indices
+                .chunks_exact(3)
+                .map(move |t| [0, 1, 2].map(|k| a.transform_point3(DVec3::from_array(p.positions[t[k] as usize]))))
+        })
+    })
+}
+
+/// Distance from a point to a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let n = ab.cross(ac);
+    let inside = |u: DVec3, v: DVec3| (v - u).cross(p - u).dot(n) >= 0.0;
+    if inside(a, b) && inside(b, c) && inside(c, a) {
+        return ap.dot(n).abs() / n.length();
+    }
+    let edge = |u: DVec3, v: DVec3| {
+        let t = ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0);
+        (p - u - (v - u) * t).length()
+    };
+    edge(a, b).min(edge(b, c)).min(edge(c, a))
+}
+
+#[test]
+fn counts_are_as_asked() {
+    for (wanted, least) in [(10_000, 0.97), (30_000, 0.97), (100_000, 0.95), (333_333, 0.95), (1_000_000, 0.97)] {
+        for seed in [0, 1, 77] {
+            let scene = city(wanted, seed, false);
+            let got = placed_triangles(&scene);
+            assert!(got <= wanted && got as f64 >= least * wanted as f64, "seed {seed}: {got} of {wanted}");
+            assert_eq!(scene.sources.len(), 1);
+            assert_eq!(scene.sources[0].name, format!("city seed={seed} triangles={wanted}"));
+        }
+    }
+}
+
+#[test]
+fn counts_out_of_range_name_the_range() {
+    for triangles in [0, MIN_TRIANGLES - 1, MAX_TRIANGLES + 1, u64::MAX] {
+        let settings = Settings { triangles, ..Settings::default() };
+        let error = generate(&settings, &Progress::hidden()).expect_err("out of range");
+        assert!(matches!(error, Error::Triangles { asked, .. } if asked == triangles));
+        assert!(error.to_string().contains("10000 to 20000000"), "{error}");
+    }
+    assert!("town".parse::<Kind>().expect_err("no such kind").to_string().contains("city"));
+    assert_eq!("city".parse::<Kind>().expect("a kind").to_string(), "city");
+}
+
+#[test]
+fn one_seed_gives_one_city_on_any_number_of_threads() {
+    let on = |threads: usize, seed: u64| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| city(300_000, seed, false))
+    };
+    let (one, three, other) = (on(1, 5), on(3, 5), on(3, 6));
+    let same = |a: &SourceScene, b: &SourceScene| {
+        a.meshes.len() == b.meshes.len() && a.meshes.iter().zip(&b.meshes).all(|(p, q)| same_mesh(p, q))
+    };
+    assert!(same(&one, &three));
+    assert!(!same(&one, &other), "another seed must give another city");
+}
+
+#[test]
+fn a_larger_city_has_the_same_centre() {
+    let (small, large) = (city(400_000, 3, false), city(1_200_000, 3, false));
+    // The last block of the small city is cut to the budget, and the surroundings follow it.
+    let whole = small.meshes.len() - 2;
+    assert!(whole >= 5, "only {whole} whole blocks");
+    for k in 0..whole {
+        assert!(same_mesh(&small.meshes[k], &large.meshes[k]), "block {k}");
+    }
+    assert!(!same_mesh(&small.meshes[whole], &large.meshes[whole]), "the cut block must differ");
+}
+
+#[test]
+fn geometry_is_sound() {
+    let scene = city(1_000_000, 2, false);
+    for mesh in &scene.meshes {
+        assert!(!mesh.primitives.is_empty(), "{}", mesh.name);
+        for p in &mesh.primitives {
+            assert!((p.material as usize) < scene.materials.len());
+            let colors = p.colors.as_ref().expect("vertex colours");
+            assert_eq!(colors.len(), p.positions.len());
+            assert!(p.positions.iter().flatten().all(|x| x.is_finite()), "{}", mesh.name);
+            assert!(colors.iter().flatten().all(|c| (0.0..=1.0).contains(c)), "{} {}", mesh.name, p.material);
+            assert!(p.indices.len() % 3 == 0 && p.indices.iter().all(|&i| (i as usize) < p.positions.len()));
+        }
+    }
+    for [a, b, c] in triangles(&scene) {
+        let area = 0.5 * (b - a).cross(c - a).length();
+        assert!(area > 1e-8, "a triangle of {area} m² at {a}");
+    }
+    for m in &scene.materials {
+        assert!(m.base_color.iter().all(|c| (0.0..=1.0).contains(c)));
+    }
+}
+
+#[test]
+fn instances_are_the_same_triangles() {
+    let (baked, instanced) = (city(500_000, 4, false), city(500_000, 4, true));
+    assert_eq!(placed_triangles(&baked), placed_triangles(&instanced));
+    assert!(instanced.placements.len() > 10 * baked.placements.len());
+    let stored = |s: &SourceScene| s.meshes.iter().map(Mesh::triangle_count).sum::<u64>();
+    assert!(stored(&instanced) < stored(&baked) * 9 / 10);
+    let moments = |s: &SourceScene| {
+        triangles(s)
+            .fold([DVec3::ZERO; 2], |[sum, squares], [a, b, c]| [sum + a + b + c, squares + a * a + b * b + c * c])
+    };
+    let (p, q) = (moments(&baked), moments(&instanced));
+    for k in 0..2 {
+        // Half a million vertices of up to 400 m, added in another order: 10⁻⁹ of the sum of squares is far above it.
+        assert!((p[k] - q[k]).abs().max_element() < 1e-9 * p[1].max_element(), "{} {}", p[k], q[k]);
+    }
+}
+
+fn position(path: &CameraPath, k: usize) -> DVec3 {
+    DVec3::from_array(path.keyframes[k].position)
+}
+
+#[test]
+fn the_walk_keeps_clear_of_everything() {
+    for seed in [0, 1, 2] {
+        let path = near_path(seed, 300);
+        let scene = city(900_000, seed, false);
+        let all: Vec<[DVec3; 3]> = triangles(&scene).collect();
+        let clearance = |p: DVec3, radius: f64| {
+            all.iter()
+                .filter(|t| {
+                    let (low, high) = (t[0].min(t[1]).min(t[2]) - radius, t[0].max(t[1]).max(t[2]) + radius);
+                    p.cmpge(low).all() && p.cmple(high).all()
+                })
+                .map(|t| distance(p, *t))
+                .fold(f64::INFINITY, f64::min)
+        };
+        for k in 0..300 {
+            let p = position(&path, k);
+            let near = clearance(p, 0.5);
+            assert!(near > 0.5, "seed {seed}, frame {k} at {p}: something within {near} m");
+        }
+        // Beside the way, where cars stand, it would not be.
+        let beside = (0..300).filter(|&k| {
+            let (p, t) = (position(&path, k), DVec3::from_array(path.keyframes[k].target));
+            let side = (t - p).cross(DVec3::Y).normalize();
+            clearance(p + side * 4.1 - DVec3::Y * 0.7, 0.5) < 0.5
+        });
+        assert!(beside.count() > 10, "the test does not see cars");
+    }
+}
+
+#[test]
+fn the_walk_goes_half_a_metre_a_frame() {
+    let (short, long) = (near_path(9, 30), near_path(9, 300));
+    assert_eq!((short.keyframes.len(), long.keyframes.len()), (30, 300));
+    assert_eq!(short.keyframes[..], long.keyframes[..30], "the short walk is the beginning of the long one");
+    for k in 1..300 {
+        let step = (position(&long, k) - position(&long, k - 1)).length();
+        // Chords of the turns are shorter than their arcs, corner pieces between them more so.
+        assert!((0.49..=0.5 + 1e-9).contains(&step), "step {step} at {k}");
+        assert_eq!(long.keyframes[k].position[1], 1.7);
+        assert!(long.keyframes[k].time > long.keyframes[k - 1].time);
+    }
+    let heading = |k: usize| DVec3::from_array(long.keyframes[k].target) - position(&long, k);
+    let turned = (1..300).filter(|&k| heading(k).angle_between(heading(k - 1)) > 0.01).count();
+    assert!(turned > 30, "the walk has turns");
+    assert!((1..300).all(|k| heading(k).angle_between(heading(k - 1)) < 0.2), "and none is abrupt");
+}
+
+#[test]
+fn the_path_above_sees_the_whole_city() {
+    let settings = Settings { triangles: 600_000, seed: 1, ..Settings::default() };
+    let path = path_above(&settings, &Progress::hidden()).expect("a path");
+    let scene = generate(&settings, &Progress::hidden()).expect("a scene");
+    let blocks = scene.meshes.iter().filter(|m| m.name.starts_with("block"));
+    let points: Vec<DVec3> =
+        blocks.flat_map(|m| &m.primitives).flat_map(|p| &p.positions).map(|p| DVec3::from_array(*p)).collect();
+    let roofs = points.iter().map(|p| p.y).fold(0.0, f64::max);
+    let slope = (0.5 * path.fov_y_degrees).to_radians().tan();
+    let mut widest = 0f64;
+    for k in &path.keyframes {
+        let (eye, target) = (DVec3::from_array(k.position), DVec3::from_array(k.target));
+        assert!(eye.y > roofs, "{} above {roofs}", eye.y);
+        let forward = (target - eye).normalize();
+        let right = forward.cross(DVec3::Y).normalize();
+        let up = right.cross(forward);
+        for p in &points {
+            let d = *p - eye;
+            let (x, y) = (d.dot(right) / d.dot(forward) / slope, d.dot(up) / d.dot(forward) / slope);
+            assert!(d.dot(forward) > 0.0 && x.abs() <= 4.0 / 3.0 && y.abs() <= 1.0, "{p} is at {x} {y}");
+            widest = widest.max(0.75 * x.abs()).max(y.abs());
+        }
+    }
+    assert!(widest > 0.85, "the city fills the picture to {widest} only");
+}
+
+#[test]
+fn paths_are_written_whole_and_read_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = Settings { triangles: 20_000, seed: 8, ..Settings::default() };
+    let files = write_paths(Kind::City, &settings, &folder.path().join("A.bricks")).expect("paths");
+    let mut names: Vec<String> = std::fs::read_dir(folder.path())
+        .expect("the folder")
+        .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["A.far.json", "A.near-300.json", "A.near.json"]);
+    let text = std::fs::read_to_string(folder.path().join("A.near.json")).expect("the near path");
+    let read: CameraPath = serde_json::from_str(&text).expect("a camera path");
+    assert_eq!(read, near_path(8, 30));
+    let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let keys = |v: &serde_json::Value| v.as_object().expect("an object").keys().cloned().collect::<Vec<_>>();
+    assert_eq!(keys(&value), ["fov_y_degrees", "up", "keyframes"]);
+    assert_eq!(keys(&value["keyframes"][0]), ["time", "position", "target"]);
+    let other = Settings { triangles: 60_000, ..settings.clone() };
+    write_paths(Kind::City, &other, &folder.path().join("B")).expect("paths");
+    let same = |name: &str| {
+        let read = |stem: &str| std::fs::read(folder.path().join(format!("{stem}.{name}.json"))).expect("a file");
+        read("A") == read("B")
+    };
+    assert!(same("near") && !same("far"), "near is the same for every size, far is not");
+    assert_eq!(files.len(), 3);
+    let nowhere = folder.path().join("missing/A");
+    assert!(matches!(write_paths(Kind::City, &settings, &nowhere), Err(Error::Write { .. })));
+}
