@@ -11,12 +11,14 @@ use std::fmt::Write as _;
 
 /// The box in user units; the drawing library places on integers, hence a grid [`FINE`] times as fine.
 const WIDTH: u32 = 440;
-const HEIGHT: u32 = 264;
+const HEIGHT: u32 = 270;
 const FINE: u32 = 4;
-/// Text height in user units.
-const TEXT: u32 = 14;
+/// Line height of text in user units; the drawing library makes the letters 1.24 times smaller.
+const TEXT: u32 = 18;
 /// Above so many frames single values are no longer marked.
 const MARKED_FRAMES: usize = 40;
+/// Above so many frames neighbours are drawn as one point, their mean: more would be a solid band.
+const DRAWN_FRAMES: u64 = 200;
 
 /// A series' colour: on a light and on a dark page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +39,9 @@ pub const PURPLE: Ink = Ink { light: [0x9a, 0x47, 0xb8], dark: [0xd2, 0x92, 0xee
 pub const RED: Ink = Ink { light: [0xc8, 0x28, 0x4e], dark: [0xff, 0x7f, 0x9c] };
 /// See [`BLUE`]; of totals and limits.
 pub const GREY: Ink = Ink { light: [0x56, 0x60, 0x6c], dark: [0xb4, 0xbe, 0xca] };
-/// All inks, in the order in which passes take them.
+/// See [`BLUE`]; of what is read against bars.
+pub const BLACK: Ink = Ink { light: [0x1a, 0x1f, 0x25], dark: [0xff, 0xff, 0xff] };
+/// The inks in the order in which passes take them.
 pub const INKS: [Ink; 6] = [BLUE, ORANGE, GREEN, PURPLE, RED, GREY];
 
 /// Ink of the axes.
@@ -67,7 +71,7 @@ impl Ink {
 /// Style rules, for use under a query for dark pages, that replace every light ink of a plot by its dark one.
 pub fn colour_rules() -> String {
     let mut rules = String::new();
-    for ink in INKS.into_iter().chain([AXIS, GRID, LABEL]) {
+    for ink in INKS.into_iter().chain([BLACK, AXIS, GRID, LABEL]) {
         let (light, dark) = (ink.light_hex(), ink.dark_hex());
         // Writing to a string cannot fail.
         let _ = write!(rules, ".plot [stroke=\"{light}\"]{{stroke:{dark}}}.plot [fill=\"{light}\"]{{fill:{dark}}}");
@@ -158,8 +162,8 @@ pub struct Drawing {
     pub svg: String,
     /// The unit of the vertical axis; empty for plain counts.
     pub unit: &'static str,
-    /// A sentence on values beyond the vertical axis; empty where there are none.
-    pub beyond: String,
+    /// Sentences on values beyond the vertical axis and on frames drawn as one; empty where there are none.
+    pub notes: String,
 }
 
 impl Drawing {
@@ -207,45 +211,77 @@ impl Chart {
         extent
     }
 
+    /// The chart with the means of groups of neighbouring frames, and how many frames a group has. The first frame stays
+    /// alone, because it starts with an empty cache.
+    fn grouped(&self) -> (Self, u64) {
+        let extent = self.extent();
+        let group = ((extent.to - extent.from) as u64).div_ceil(DRAWN_FRAMES).max(1);
+        let mut chart = self.clone();
+        if group == 1 {
+            return (chart, group);
+        }
+        for series in chart.series.iter_mut().filter(|s| s.shape != Shape::Limit) {
+            // Sums and counts by the group's middle frame.
+            let mut groups = std::collections::BTreeMap::<u64, (f64, u32)>::new();
+            for &(frame, value) in &series.points {
+                let (first, frame) = (extent.from as u64, frame as u64);
+                let middle = match frame - first {
+                    0 => first,
+                    later => first + 1 + (later - 1) / group * group + group / 2,
+                };
+                let (sum, count) = groups.entry(middle).or_default();
+                *sum += value;
+                *count += 1;
+            }
+            series.points = groups.into_iter().map(|(at, (sum, count))| (at as f64, sum / f64::from(count))).collect();
+        }
+        (chart, group)
+    }
+
     /// Draws the plot.
     ///
     /// # Errors
     /// The drawing library fails.
     pub fn draw(&self) -> Result<Drawing, ReportError> {
-        let extent = self.extent();
+        let (chart, group) = self.grouped();
+        let extent = chart.extent();
         let cut = extent.first_is_beyond();
         let max = if cut { extent.rest } else { extent.first.max(extent.rest) };
         let (unit, size) = self.unit.scale(max);
         let ticks = ticks(max / size, 4);
         let top = ticks.last().copied().unwrap_or(1.0);
+        let scale = Scale { ticks, top, size, group: group as f64 };
         let mut text = String::new();
-        self.draw_into(&mut text, &extent, &ticks, size)
-            .map_err(|reason| ReportError::Draw { plot: self.title.clone(), reason })?;
-        let beyond = if extent.first > top * size && cut {
-            format!("Frame {:.0} is beyond the axis with {}.", extent.from, self.unit.show(extent.first))
-        } else {
-            String::new()
-        };
-        Ok(Drawing { svg: inner(&text).to_string(), unit, beyond })
+        let failed = |reason| ReportError::Draw { plot: self.title.clone(), reason };
+        chart.draw_into(&mut text, &extent, &scale).map_err(failed)?;
+        let mut notes = Vec::new();
+        if cut && extent.first > top * size {
+            notes.push(format!("Frame {:.0} is beyond the axis with {}.", extent.from, self.unit.show(extent.first)));
+        }
+        if group > 1 {
+            notes.push(format!("Each point is the mean of {group} frames."));
+        }
+        Ok(Drawing { svg: inner(&text).to_string(), unit, notes: notes.join(" ") })
     }
 
-    fn draw_into(&self, text: &mut String, extent: &Extent, y_ticks: &[f64], size: f64) -> Result<(), String> {
-        let top = y_ticks.last().copied().unwrap_or(1.0);
+    fn draw_into(&self, text: &mut String, extent: &Extent, scale: &Scale) -> Result<(), String> {
+        let Scale { top, size, .. } = *scale;
         let clip = |value: f64| (value / size).min(top);
         let marked = extent.frames <= MARKED_FRAMES;
-        let half_bar = if marked { 0.36 } else { 0.5 };
+        let half_bar = if marked { 0.36 } else { 0.5 * scale.group };
         let has_bars = self.series.iter().any(|s| s.shape == Shape::Stacked);
         // A still needs a range, and the outer bars stand half outside of the range of frames.
-        let margin = if has_bars || extent.from == extent.to { 0.6 } else { (extent.to - extent.from) * 0.01 };
+        let margin =
+            if has_bars || extent.from == extent.to { 0.6 * scale.group } else { (extent.to - extent.from) * 0.01 };
         let frames = frame_ticks(extent.from, extent.to);
         let x_axis = Axis { low: extent.from - margin, high: extent.to + margin, ticks: frames };
-        let y_axis = Axis { low: 0.0, high: top, ticks: y_ticks.to_vec() };
+        let y_axis = Axis { low: 0.0, high: top, ticks: scale.ticks.clone() };
         let root = SVGBackend::with_string(text, (WIDTH * FINE, HEIGHT * FINE)).into_drawing_area();
         let mut chart = ChartBuilder::on(&root)
             .margin_top(10 * FINE)
             .margin_right(12 * FINE)
-            .set_label_area_size(LabelAreaPosition::Left, 46 * FINE)
-            .set_label_area_size(LabelAreaPosition::Bottom, 40 * FINE)
+            .set_label_area_size(LabelAreaPosition::Left, 58 * FINE)
+            .set_label_area_size(LabelAreaPosition::Bottom, 46 * FINE)
             .build_cartesian_2d(x_axis, y_axis)
             .map_err(|e| e.to_string())?;
         let label = ("sans-serif", TEXT * FINE).into_font().color(&LABEL.rgb());
@@ -280,7 +316,8 @@ impl Chart {
                 continue;
             }
             if marked {
-                let dots = points.iter().map(|&point| Circle::new(point, 5 * FINE / 2, series.ink.rgb().filled()));
+                let radius = FINE * if extent.frames == 1 { 5 } else { 2 };
+                let dots = points.iter().map(|&point| Circle::new(point, radius, series.ink.rgb().filled()));
                 chart.draw_series(dots).map_err(|e| e.to_string())?;
             }
             chart.draw_series(LineSeries::new(points, style)).map_err(|e| e.to_string())?;
@@ -313,6 +350,19 @@ impl Ranged for Axis {
     fn range(&self) -> std::ops::Range<f64> {
         self.low..self.high
     }
+}
+
+/// The vertical axis, and how coarse the horizontal one is.
+#[derive(Debug)]
+struct Scale {
+    /// Labelled values in units of the axis, from 0.
+    ticks: Vec<f64>,
+    /// The last of them.
+    top: f64,
+    /// The unit of the axis in recorded units.
+    size: f64,
+    /// Frames a point stands for.
+    group: f64,
 }
 
 /// What a plot spans, in recorded units.
@@ -418,13 +468,27 @@ mod tests {
     #[test]
     fn a_dominating_first_frame_is_cut_and_said() {
         let mut points: Vec<(f64, f64)> = (0..10).map(|k| (f64::from(k), 10.0)).collect();
-        assert_eq!(chart(points.clone(), Shape::Line).draw().unwrap().beyond, "");
+        assert_eq!(chart(points.clone(), Shape::Line).draw().unwrap().notes, "");
         points[0].1 = 500.0;
         for shape in [Shape::Line, Shape::Stacked] {
             let drawing = chart(points.clone(), shape).draw().unwrap();
-            assert_eq!(drawing.beyond, "Frame 0 is beyond the axis with 500 ms.");
+            assert_eq!(drawing.notes, "Frame 0 is beyond the axis with 500 ms.");
             assert!(!drawing.svg.contains("500"), "the axis must follow the other frames");
         }
+    }
+
+    #[test]
+    fn many_frames_are_drawn_as_means_of_groups() {
+        let few = chart((0..=200).map(|k| (f64::from(k), 1.0)).collect(), Shape::Line);
+        assert_eq!(few.grouped().1, 1);
+        assert_eq!(few.grouped().0.series[0].points, few.series[0].points);
+        let many = chart((10..=610).map(|k| (f64::from(k), f64::from(k))).collect(), Shape::Line);
+        let (grouped, group) = many.grouped();
+        assert_eq!(group, 3);
+        // 11, 12, 13 have the mean and the middle 12; frame 10 stays alone.
+        assert_eq!(grouped.series[0].points[..3], [(10.0, 10.0), (12.0, 12.0), (15.0, 15.0)]);
+        assert_eq!(grouped.series[0].points.len(), 201);
+        assert_eq!(many.draw().unwrap().notes, "Each point is the mean of 3 frames.");
     }
 
     #[test]

@@ -58,8 +58,9 @@ fn verdict(walk: &Walk) -> Markup {
     html! {
         ul.verdict {
             li.warn[interrupted] {
-                @if interrupted { "Interrupted after " (format::count(finished)) " of " (format::count(asked)) " frames" }
-                @else { (format::count(finished)) " of " (format::count(asked)) " frames finished" }
+                @if interrupted { "Interrupted after " }
+                (format::count(finished)) " of " (format::count(asked)) " frames"
+                @if !interrupted { " finished" }
             }
             @if !walk.passes.is_empty() {
                 @if unresolved > 0.0 { li.warn { (format::count(unresolved)) " pixels are not final" } }
@@ -109,28 +110,25 @@ fn facts(walk: &Walk) -> Markup {
 
 /// A row of medians, so that the page's first screen answers how fast the walk was.
 fn medians(walk: &Walk) -> Markup {
-    let median = |values: Vec<(u64, f64)>| Statistics::of(values.into_iter().map(|v| v.1).collect()).map(|s| s.median);
-    let frame_ms = median(walk.per_frame("ms"));
-    let mut moved: Vec<(u64, f64)> = Vec::new();
-    for values in tables::MOVED.map(|field| walk.per_frame(field)) {
-        for (frame, bytes) in values {
-            match moved.iter_mut().rev().find(|m| m.0 == frame) {
-                Some(sum) => sum.1 += bytes,
-                None => moved.push((frame, bytes)),
-            }
-        }
-    }
+    let median = |fields: &[&str]| {
+        let values = walk.per_frame(fields).into_iter().map(|(_, value)| value).collect();
+        Statistics::of(values).map(|s| s.median)
+    };
     html! {
         @if !walk.passes.is_empty() {
             section {
                 h2 { "Median frame" }
                 ul.tiles {
-                    @if let Some(ms) = frame_ms { li { b { (format::number(ms)) } " ms, all passes" } }
+                    @if let Some(ms) = median(&["ms"]) { li { b { (format::number(ms)) } " ms, all passes" } }
                     @for pass in &walk.passes {
-                        @if let Some(s) = pass.statistics("mrays_per_s") { li { b { (format::number(s.median)) } " Mrays/s, " (pass.name) } }
+                        @if let Some(s) = pass.statistics("mrays_per_s") {
+                            li { b { (format::number(s.median)) } " Mrays/s, " (pass.name) }
+                        }
                     }
-                    @if let Some(bytes) = median(moved) { li { b { (format::bytes(bytes)) } " moved" } }
-                    @if let Some(trips) = median(walk.per_frame("round_trips")) { li { b { (format::number(trips)) } " round trips" } }
+                    @if let Some(bytes) = median(&tables::MOVED) { li { b { (format::bytes(bytes)) } " moved" } }
+                    @if let Some(trips) = median(&["round_trips"]) {
+                        li { b { (tables::value(trips)) } " round trips" }
+                    }
                 }
             }
         }
@@ -140,11 +138,14 @@ fn medians(walk: &Walk) -> Markup {
 /// The gallery: a tap or click on a frame enlarges it; no script is needed.
 fn frames(walk: &Walk, gallery: &Gallery) -> Markup {
     let (embedded, linked): (Vec<&Picture>, Vec<&Picture>) = gallery.pictures.iter().partition(|p| p.png.is_some());
-    let times = walk.per_frame("ms");
+    let times = walk.per_frame(&["ms"]);
     let time = |frame: u64| times.binary_search_by_key(&frame, |t| t.0).ok().map(|at| times[at].1);
     html! {
         @if gallery.pictures.is_empty() {
-            p { @if walk.frames.is_empty() { "No frame was finished, so there is nothing to show or to plot." } @else { "The folder holds no pictures of these frames." } }
+            p {
+                @if walk.frames.is_empty() { "No frame was finished, so there is nothing to show or to plot." }
+                @else { "The folder holds no pictures of these frames." }
+            }
         }
         @if !embedded.is_empty() {
             p.reading { "Choose a frame to enlarge it; its number leads to the file beside this page." }
@@ -159,7 +160,10 @@ fn frames(walk: &Walk, gallery: &Gallery) -> Markup {
             }
         }
         @if !gallery.left_out.is_empty() {
-            p.note { "Left out, because they belong to no record of this walk or hold no PNG: " (gallery.left_out.join(", ")) "." }
+            p.note {
+                "Left out, because they belong to no record of this walk or hold no PNG: "
+                (gallery.left_out.join(", ")) "."
+            }
         }
     }
 }
@@ -172,9 +176,13 @@ fn figure(picture: &Picture, ms: Option<f64>) -> Markup {
         figure {
             label {
                 input type="checkbox" aria-label={ "enlarge frame " (picture.frame) };
-                img src=(PreEscaped(source)) alt={ "frame " (picture.frame) } width=[size.map(|s| s.0)] height=[size.map(|s| s.1)];
+                img src=(PreEscaped(source)) alt={ "frame " (picture.frame) }
+                    width=[size.map(|s| s.0)] height=[size.map(|s| s.1)];
             }
-            figcaption { a href={ "frames/" (picture.name) } { "frame " (picture.frame) } @if let Some(ms) = ms { " · " (format::number(ms)) " ms" } }
+            figcaption {
+                a href={ "frames/" (picture.name) } { "frame " (picture.frame) }
+                @if let Some(ms) = ms { " · " (format::number(ms)) " ms" }
+            }
         }
     }
 }
@@ -194,6 +202,7 @@ fn section_of(title: &str, plots: &[Plot]) -> Result<Markup, ReportError> {
     Ok(html! {
         section {
             h2 { (title) }
+            p.reading { "Numbers beside the names are medians over the frames." }
             div.plots { @for figure in drawn.into_iter().flatten() { (figure) } }
             @for plot in plots.iter().filter(|plot| plot.chart.is_none()) {
                 p.note { (plot.title) ": not drawn, because " (undrawn(plot)) "." }
@@ -225,7 +234,9 @@ fn plot(plot: &Plot) -> Result<Option<Markup>, ReportError> {
                     @for series in &chart.series {
                         @let values = series.points.iter().map(|p| p.1).collect();
                         li {
-                            svg.key viewBox="0 0 16 10" aria-hidden="true" { (key(series.shape, &series.ink.light_hex())) }
+                            svg.key viewBox="0 0 16 10" aria-hidden="true" {
+                                (key(series.shape, &series.ink.light_hex()))
+                            }
                             (series.name) " "
                             @if let Some(s) = Statistics::of(values) { span.value { (chart.unit.show(s.median)) } }
                         }
@@ -233,9 +244,11 @@ fn plot(plot: &Plot) -> Result<Option<Markup>, ReportError> {
                 }
             }
             svg viewBox=(Drawing::view_box()) role="img" aria-label=(chart.title) { (PreEscaped(drawing.svg)) }
-            p.reading { (plot.reading) }
-            @if !drawing.beyond.is_empty() { p.note { (drawing.beyond) } }
-            @if !undrawn.is_empty() { p.note { "Left out: " (undrawn) "." } }
+            div {
+                p.reading { (plot.reading) }
+                @if !drawing.notes.is_empty() { p.note { (drawing.notes) } }
+                @if !undrawn.is_empty() { p.note { "Left out: " (undrawn) "." } }
+            }
         }
     }))
 }
@@ -247,7 +260,9 @@ fn key(shape: Shape, colour: &str) -> Markup {
             Shape::Stacked => { rect x="2" y="0" width="12" height="10" fill=(colour) {} }
             Shape::Line => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="2.5" {} }
             Shape::Total => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="3.5" {} }
-            Shape::Limit => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="2.5" stroke-dasharray="5 4" {} }
+            Shape::Limit => {
+                line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="2.5" stroke-dasharray="5 4" {}
+            }
         }
     }
 }
@@ -257,14 +272,20 @@ fn all_tables(walk: &Walk) -> Markup {
         @if !walk.passes.is_empty() {
             section {
                 h2 { "Throughput, queries and bytes moved" }
-                p.reading { "The columns of Table 3 of CHC+RT, in MiB. Median and p95 are per frame; for Mray/s a high p95 is the fast end, and its total is all rays over all time." }
+                p.reading {
+                    "The columns of Table 3 of CHC+RT, in MiB. Median and p95 are per frame; for Mray/s a high p95 is the fast "
+                    "end, and its total is all rays over all time."
+                }
                 (tables::out_of_core(walk))
             }
             section {
                 h2 { "Moved against needed" }
                 @match tables::needs(walk) {
                     Some(table) => {
-                        p.reading { "BVH and geometry. The first frame starts cold: its target is moved ÷ needed near 1. Later frames keep what is resident: their target is moved ÷ missing near 1." }
+                        p.reading {
+                            "BVH and geometry. The first frame starts cold: its target is moved ÷ needed near 1. Later frames "
+                            "keep what is resident: their target is moved ÷ missing near 1."
+                        }
                         (table)
                     }
                     None => p.note { "This walk did not measure which bricks its rays needed." },
@@ -272,7 +293,10 @@ fn all_tables(walk: &Walk) -> Markup {
             }
             section {
                 h2 { "Every field" }
-                details { summary { "Total, median and p95 of " (walk.fields.len()) " fields" } (tables::all_fields(walk)) }
+                details {
+                    summary { "Total, median and p95 of " (walk.fields.len()) " fields" }
+                    (tables::all_fields(walk))
+                }
                 details { summary { "Frame by frame" } (tables::per_frame(walk)) }
             }
         }
@@ -319,7 +343,10 @@ fn memory(walk: &Walk) -> Markup {
     html! {
         @match walk.summary("memory").and_then(tables::pairs) {
             Some(table) => {
-                p.reading { "Peak of the process without mapped files; mapped pages are listed apart. On a software adapter the cache is part of it." }
+                p.reading {
+                    "Peak of the process without mapped files; mapped pages are listed apart. On a software adapter the cache "
+                    "is part of it."
+                }
                 (table)
             }
             None => p.note { "The system did not tell how much memory the walk used." },

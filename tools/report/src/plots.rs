@@ -1,6 +1,6 @@
 //! Which plots a report has, and how each is read.
 
-use crate::chart::{BLUE, Chart, GREEN, GREY, INKS, Ink, ORANGE, PURPLE, RED, Series, Shape, Unit};
+use crate::chart::{BLACK, BLUE, Chart, GREEN, GREY, INKS, Ink, ORANGE, PURPLE, RED, Series, Shape, Unit};
 use crate::walk::{Pass, Walk};
 
 /// A plot, or the reason why there is none.
@@ -64,13 +64,13 @@ const PASS_PLOTS: [PassPlot; 6] = [
     PassPlot {
         title: "Queries",
         reading: "Pairs (tile, node) whose visibility was asked. Those culled by the interval test cost no ray; the visible \
-                  ones lead to work.",
+                  ones lead to work. Multi-queries ask over several nodes at once and are repeated one by one where they fail.",
         unit: Unit::Count,
         lines: &[
             line("visible", &["queries_visible"], BLUE),
             line("culled by interval", &["queries_interval_culled"], ORANGE),
-            line("over several nodes", &["multi_queries"], GREEN),
-            line("of these repeated", &["multi_queries_failed"], PURPLE),
+            line("multi-queries", &["multi_queries"], GREEN),
+            line("multi-queries repeated", &["multi_queries_failed"], PURPLE),
             total("total", &["queries"]),
         ],
     },
@@ -96,7 +96,7 @@ const PASS_PLOTS: [PassPlot; 6] = [
             layer("geometry", &["bytes_geometry"], ORANGE),
             layer("attributes", &["bytes_attributes"], GREEN),
             layer("textures", &["bytes_textures"], PURPLE),
-            line("missing", &["bytes_needed_missing"], RED),
+            line("missing", &["bytes_needed_missing"], BLACK),
         ],
     },
     PassPlot {
@@ -105,8 +105,8 @@ const PASS_PLOTS: [PassPlot; 6] = [
                   the pass began; moved should be close to missing.",
         unit: Unit::Bytes,
         lines: &[
-            total("needed", &["bytes_needed"]),
-            line("missing", &["bytes_needed_missing"], RED),
+            line("needed", &["bytes_needed"], RED),
+            line("missing", &["bytes_needed_missing"], BLACK),
             line("moved", &["bytes_bvh", "bytes_geometry"], BLUE),
         ],
     },

@@ -13,7 +13,7 @@ const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 const NONE: &str = "–";
 
 /// What a field of the records means, with its unit. Fields that are not listed are shown without.
-const MEANINGS: [(&str, &str); 38] = [
+const MEANINGS: [(&str, &str); 37] = [
     ("rays", "rays traced"),
     ("ms", "wall time from submission to fence, ms"),
     ("ms_phase1", "device time of phase 1: what was known and resident, ms"),
@@ -51,8 +51,10 @@ const MEANINGS: [(&str, &str); 38] = [
     ("cache_used_bytes", "bytes of the cache in use at the end"),
     ("unresolved_pixels", "pixels that are not final"),
     ("non_finite", "pixels whose radiance was not finite"),
-    ("seed", "seed of the samples"),
 ];
+
+/// Fields that tell a state, not an amount: their sum over the frames means nothing.
+const STATES: [&str; 4] = ["bricks_resident_start", "bricks_resident_end", "cache_bytes", "cache_used_bytes"];
 
 fn meaning(field: &str) -> &'static str {
     MEANINGS.iter().find(|(name, _)| *name == field).map_or("", |(_, text)| text)
@@ -63,7 +65,7 @@ fn cell(value: Option<f64>, show: fn(f64) -> String) -> String {
 }
 
 /// A count without, a measured value with a fraction.
-fn value(value: f64) -> String {
+pub fn value(value: f64) -> String {
     if value.fract() == 0.0 { format::count(value) } else { format::number(value) }
 }
 
@@ -72,8 +74,8 @@ pub fn out_of_core(walk: &Walk) -> Markup {
     html! {
         div.wide { table {
             thead { tr {
-                th { "Pass" } th { "Over the frames" } th { "Mray/s" } th { "ms" } th { "Queries" } th { "MiB moved" }
-                th { "of it BVH" } th { "geometry" } th { "attributes" } th { "textures" }
+                th.text { "Pass" } th.text { "Over the frames" } th { "Mray/s" } th { "ms" } th { "Queries" }
+                th { "MiB moved" } th { "of it BVH" } th { "geometry" } th { "attributes" } th { "textures" }
             } }
             @for pass in &walk.passes {
                 tbody {
@@ -81,7 +83,8 @@ pub fn out_of_core(walk: &Walk) -> Markup {
                         tr {
                             @if row == 0 { th scope="rowgroup" rowspan=(PICKS.len()) { (pass.name) } }
                             th scope="row" { (name) }
-                            td { (if *name == "total" { cell(overall_throughput(pass), format::number) } else { picked(pass, "mrays_per_s", *pick, format::number) }) }
+                            @if *name == "total" { td { (cell(overall_throughput(pass), format::number)) } }
+                            @else { td { (picked(pass, "mrays_per_s", *pick, format::number)) } }
                             td { (picked(pass, "ms", *pick, format::number)) }
                             td { (picked(pass, "queries", *pick, value)) }
                             td { (cell(pass.statistics_of_sum(&MOVED).map(pick), format::mebibytes)) }
@@ -102,6 +105,11 @@ fn picked(pass: &Pass, field: &str, pick: fn(crate::walk::Statistics) -> f64, sh
     cell(pass.statistics(field).map(pick), show)
 }
 
+/// The total of a field whose values add up to `sum`; `None` where a total has no meaning.
+fn total(pass: &Pass, field: &str, sum: f64) -> Option<f64> {
+    if field == "mrays_per_s" { overall_throughput(pass) } else { (!STATES.contains(&field)).then_some(sum) }
+}
+
 /// All rays of a pass over all of its time, millions per second; `None` where either is unknown or no time passed.
 fn overall_throughput(pass: &Pass) -> Option<f64> {
     let (rays, ms) = (pass.statistics("rays")?.total, pass.statistics("ms")?.total);
@@ -118,17 +126,20 @@ pub fn needs(walk: &Walk) -> Option<Markup> {
     Some(html! {
         div.wide { table {
             thead { tr {
-                th { "Pass" } th { "Frames" } th { "MiB moved" } th { "MiB needed" } th { "MiB missing" } th { "moved ÷ needed" } th { "moved ÷ missing" }
+                th.text { "Pass" } th.text { "Frames" } th { "MiB moved" } th { "MiB needed" } th { "MiB missing" }
+                th { "moved ÷ needed" } th { "moved ÷ missing" }
             } }
             @for pass in measured {
                 tbody {
-                    @for (row, (name, rows)) in [("first", &pass.rows[..1]), ("all later", &pass.rows[1..])].into_iter().enumerate() {
+                    @let parts = [("first", &pass.rows[..1]), ("all later", &pass.rows[1..])];
+                    @for (row, (name, rows)) in parts.into_iter().enumerate() {
                         @let sum = |fields: &[&str]| rows.iter().map(|row| row.sum(fields)).sum::<f64>();
-                        @let (moved, needed, missing) = (sum(&MOVED_GEOMETRY), sum(&["bytes_needed"]), sum(&["bytes_needed_missing"]));
+                        @let moved = sum(&MOVED_GEOMETRY);
+                        @let (needed, missing) = (sum(&["bytes_needed"]), sum(&["bytes_needed_missing"]));
                         tr {
                             @if row == 0 { th scope="rowgroup" rowspan="2" { (pass.name) } }
                             th scope="row" { (name) }
-                            td { (format::mebibytes(moved)) } td { (format::mebibytes(needed)) } td { (format::mebibytes(missing)) }
+                            @for bytes in [moved, needed, missing] { td { (format::mebibytes(bytes)) } }
                             td { (ratio(moved, needed)) } td { (ratio(moved, missing)) }
                         }
                     }
@@ -143,7 +154,11 @@ pub fn all_fields(walk: &Walk) -> Markup {
     html! {
         div.wide { table.fields {
             thead {
-                tr { th rowspan="2" { "Field" } @for pass in &walk.passes { th.group colspan="3" { (pass.name) } } th.text rowspan="2" { "Meaning" } }
+                tr {
+                    th rowspan="2" { "Field" }
+                    @for pass in &walk.passes { th.group colspan="3" { (pass.name) } }
+                    th.text rowspan="2" { "Meaning" }
+                }
                 tr { @for _ in &walk.passes { th { "total" } th { "median" } th { "p95" } } }
             }
             tbody {
@@ -152,7 +167,10 @@ pub fn all_fields(walk: &Walk) -> Markup {
                         th scope="row" { code { (field) } }
                         @for pass in &walk.passes {
                             @match pass.statistics(field) {
-                                Some(s) => { td { (value(s.total)) } td { (value(s.median)) } td { (value(s.p95)) } }
+                                Some(s) => {
+                                    td { (cell(total(pass, field, s.total), value)) }
+                                    td { (value(s.median)) } td { (value(s.p95)) }
+                                }
                                 None => { td { (NONE) } td { (NONE) } td { (NONE) } }
                             }
                         }
@@ -169,7 +187,8 @@ pub fn per_frame(walk: &Walk) -> Markup {
     html! {
         div.wide { table {
             thead { tr {
-                th { "Frame" } th.text { "Pass" } th { "Mray/s" } th { "ms" } th { "Queries" } th { "MiB moved" } th { "of it BVH" } th { "geometry" } th { "Loaded" } th { "Evicted" }
+                th { "Frame" } th.text { "Pass" } th { "Mray/s" } th { "ms" } th { "Queries" } th { "MiB moved" }
+                th { "of it BVH" } th { "geometry" } th { "Loaded" } th { "Evicted" }
             } }
             tbody {
                 @for frame in &walk.frames {
@@ -179,10 +198,10 @@ pub fn per_frame(walk: &Walk) -> Markup {
                         @for row in pass.rows[start..].iter().take_while(|row| row.frame == *frame) {
                             tr {
                                 th scope="row" { (frame) } td.text { (pass.name) }
-                                td { (cell(row.get("mrays_per_s"), format::number)) } td { (cell(row.get("ms"), format::number)) }
+                                @for field in ["mrays_per_s", "ms"] { td { (cell(row.get(field), format::number)) } }
                                 td { (cell(row.get("queries"), value)) } td { (format::mebibytes(row.sum(&MOVED))) }
-                                td { (cell(row.get("bytes_bvh"), format::mebibytes)) } td { (cell(row.get("bytes_geometry"), format::mebibytes)) }
-                                td { (cell(row.get("bricks_loaded"), value)) } td { (cell(row.get("bricks_evicted"), value)) }
+                                @for field in MOVED_GEOMETRY { td { (cell(row.get(field), format::mebibytes)) } }
+                                @for field in ["bricks_loaded", "bricks_evicted"] { td { (cell(row.get(field), value)) } }
                             }
                         }
                     }

@@ -2,7 +2,7 @@
 
 use crate::ReportError;
 use serde_json::{Map, Value};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 /// The summary's format that this crate knows; a higher number means that a field has another meaning.
@@ -199,12 +199,12 @@ impl Walk {
         self.passes.iter().flat_map(|pass| &pass.rows).filter_map(|row| row.get(field)).sum()
     }
 
-    /// The sum of a field over the passes, by ascending frame, as (frame, value).
-    pub fn per_frame(&self, field: &str) -> Vec<(u64, f64)> {
-        let mut sums: std::collections::BTreeMap<u64, f64> = std::collections::BTreeMap::new();
+    /// The sum of some fields over the passes, by ascending frame, as (frame, value); frames without any are skipped.
+    pub fn per_frame(&self, fields: &[&str]) -> Vec<(u64, f64)> {
+        let mut sums = BTreeMap::<u64, f64>::new();
         for row in self.passes.iter().flat_map(|pass| &pass.rows) {
-            if let Some(value) = row.get(field) {
-                *sums.entry(row.frame).or_default() += value;
+            if fields.iter().any(|field| row.get(field).is_some()) {
+                *sums.entry(row.frame).or_default() += row.sum(fields);
             }
         }
         sums.into_iter().collect()

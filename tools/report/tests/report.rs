@@ -77,9 +77,10 @@ fn summary(frames: u64) -> Value {
     json!({
         "format": 1, "version": "0.1.0", "commit": "0123abc",
         "adapter": { "name": "Test <adapter> & co", "driver": "drv", "driver_info": "1.2.3", "backend": "vulkan" },
-        "scene": { "file": "city \"<1M>\".bricks", "file_bytes": 123456789, "bricks": 84, "brick_bytes": 104857600, "triangles": 1000003 },
-        "settings": { "frames": 30, "width": 1280, "height": 720, "schedule": "chc", "fronts": "on", "cache_bytes": 26214400,
-                      "cache_percent": 25.0, "sun": [0.4, 0.8, 0.45] },
+        "scene": { "file": "city \"<1M>\".bricks", "file_bytes": 123456789, "bricks": 84,
+                   "brick_bytes": 104857600, "triangles": 1000003 },
+        "settings": { "frames": 30, "width": 1280, "height": 720, "schedule": "chc", "fronts": "on",
+                      "cache_bytes": 26214400, "cache_percent": 25.0, "sun": [0.4, 0.8, 0.45] },
         "frames": frames,
         "left_out": [{ "what": "texture lookups", "why": "no material has a texture" }],
         "memory": { "peak_bytes": 456789012, "mapped_bytes": 20971520 },
@@ -163,7 +164,10 @@ fn a_complete_walk_has_every_plot_field_and_frame() {
 
 #[test]
 fn the_statistics_are_those_of_the_records() {
-    let with = |frame: u64, rays: u64, ms: f64| json!({ "frame": frame, "pass": "primary", "rays": rays, "ms": ms, "mrays_per_s": rays as f64 / ms * 1e-3 });
+    let with = |frame: u64, rays: u64, ms: f64| {
+        let rate = rays as f64 / ms * 1e-3;
+        json!({ "frame": frame, "pass": "primary", "rays": rays, "ms": ms, "mrays_per_s": rate, "cache_bytes": 7 })
+    };
     // Median 3 ms, p95 linear between the fourth and fifth: 4 + 0.8·(14 − 4) = 12 ms; 24 ms and 60M rays in all.
     let rows: Vec<Value> =
         [1.0, 2.0, 3.0, 4.0, 14.0].iter().zip(0..).map(|(ms, frame)| with(frame, 12_000_000, *ms)).collect();
@@ -174,6 +178,8 @@ fn the_statistics_are_those_of_the_records() {
     ] {
         assert!(html.contains(cells), "{cells}");
     }
+    // A state has no total.
+    assert!(html.contains("<code>cache_bytes</code></th><td>–</td><td>7</td><td>7</td>"));
     // All rays over all time, not the sum of rates.
     assert!(html.contains("<th scope=\"row\">total</th><td>2,500</td><td>24.0</td>"));
 }
@@ -181,8 +187,8 @@ fn the_statistics_are_those_of_the_records() {
 #[test]
 fn ratios_of_moved_to_needed_tell_cold_from_steady() {
     let row = |frame: u64, moved: u64, needed: u64, missing: u64| {
-        json!({ "frame": frame, "pass": "primary", "bytes_bvh": moved >> 1, "bytes_geometry": moved >> 1, "bytes_attributes": 1u64 << 40,
-                "bytes_needed": needed, "bytes_needed_missing": missing })
+        json!({ "frame": frame, "pass": "primary", "bytes_bvh": moved >> 1, "bytes_geometry": moved >> 1,
+                "bytes_attributes": 1u64 << 40, "bytes_needed": needed, "bytes_needed_missing": missing })
     };
     let mib = 1u64 << 20;
     let rows =
