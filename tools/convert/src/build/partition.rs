@@ -1,6 +1,9 @@
 //! Cuts the triangles of an object into bricks: top-down, binned SAH on the centroids of their boxes, each triangle in
 //! exactly one part.
 //!
+//! A few triangles that are much larger than the others of their part would make its box, and with it the number of rays
+//! that need it, as large as themselves. They are taken out of all parts and make up parts of their own.
+//!
 //! Where the cut goes depends on the triangles alone, not on how many a brick may hold, so parts for different limits are
 //! levels of one tree. That tree cut at [`CANONICAL_TRIANGLES`] gives the extents from which the lattice follows.
 
@@ -21,6 +24,12 @@ const TASK_ITEMS: usize = 1 << 12;
 
 /// A side of a cut holds at least this part of the items, which bounds the depth and keeps bricks filled.
 const LEAST_SIDE: usize = 16;
+
+/// How many times cheaper a part must get for its large items to be taken out.
+const LARGE_GAIN: f64 = 1.5;
+
+/// How many times smaller parts of large items are.
+const LARGE_PARTS: usize = 64;
 
 /// The box of a triangle or of a leaf.
 #[derive(Clone, Copy, Debug)]
@@ -87,8 +96,65 @@ pub(super) struct Parts {
 }
 
 /// Cuts `items`, reordering them, into parts of at most `limit` (at least 1).
-pub(super) fn partition(items: &mut [Item], limit: usize) -> Parts {
-    if items.is_empty() { Parts::default() } else { descend(items, 0, limit, false, false) }
+pub(super) fn partition(items: &mut Vec<Item>, limit: usize) -> Parts {
+    if items.is_empty() {
+        return Parts::default();
+    }
+    let mut parts = descend(items, 0, limit, false, false);
+    separate_large(items, &mut parts.bricks, limit);
+    parts
+}
+
+/// Moves the items that are too large for their parts into parts of their own, at the end.
+fn separate_large(items: &mut Vec<Item>, parts: &mut Vec<Range<u32>>, limit: usize) {
+    let mut slices = Vec::with_capacity(parts.len());
+    let mut rest = items.as_mut_slice();
+    for part in parts.iter() {
+        let (slice, after) = rest.split_at_mut(part.len());
+        slices.push(slice);
+        rest = after;
+    }
+    let kept: Vec<usize> = slices.into_par_iter().map(move_large_to_end).collect();
+    if kept.iter().zip(parts.iter()).all(|(kept, part)| *kept == part.len()) {
+        return;
+    }
+    let (mut reordered, mut large) = (Vec::with_capacity(items.len()), Vec::new());
+    for (part, kept) in parts.iter_mut().zip(kept) {
+        let slice = &items[part.start as usize..part.end as usize];
+        let start = reordered.len() as u32;
+        reordered.extend_from_slice(&slice[..kept]);
+        large.extend_from_slice(&slice[kept..]);
+        *part = start..reordered.len() as u32;
+    }
+    // Small, so that far apart ones do not share a part. Canonical extents are those from before, whatever the limit is.
+    let limit = limit.div_ceil(LARGE_PARTS);
+    parts.extend(descend(&mut large, reordered.len(), limit, false, true).bricks);
+    reordered.append(&mut large);
+    *items = reordered;
+}
+
+/// Moves the items without which the others are at least [`LARGE_GAIN`] times cheaper to the end; returns how many stay.
+fn move_large_to_end(items: &mut [Item]) -> usize {
+    let most = items.len() / LEAST_SIDE;
+    if most == 0 {
+        return items.len();
+    }
+    let extent = |item: &Item| Bounds { min: item.min, max: item.max }.extent();
+    let by_extent = |a: &Item, b: &Item| extent(a).total_cmp(&extent(b)).then(a.index.cmp(&b.index));
+    let sure = items.len() - most;
+    items.select_nth_unstable_by(sure, by_extent);
+    items[sure..].sort_unstable_by(by_extent);
+    let mut small = bounds(&items[..sure]).0;
+    let mut costs = Vec::with_capacity(most);
+    let all = bounds(items).0.half_area();
+    for (kept, item) in (sure..).zip(&items[sure..]) {
+        costs.push((kept as f64 * small.half_area() + (items.len() - kept) as f64 * all, kept));
+        small.extend(item.min, item.max);
+    }
+    // The last of the cheapest: as few items as possible are moved.
+    let (cost, kept) =
+        costs.into_iter().fold((f64::INFINITY, 0), |best, next| if next.0 <= best.0 { next } else { best });
+    if cost * LARGE_GAIN <= items.len() as f64 * all { kept } else { items.len() }
 }
 
 fn descend(items: &mut [Item], first: usize, limit: usize, mut is_brick: bool, mut is_chunk: bool) -> Parts {
@@ -277,7 +343,7 @@ mod tests {
             .collect()
     }
 
-    fn check(items: &mut [Item], limit: usize) -> Parts {
+    fn check(items: &mut Vec<Item>, limit: usize) -> Parts {
         let count = items.len();
         let parts = partition(items, limit);
         let mut end = 0;
@@ -302,6 +368,30 @@ mod tests {
         let scattered = scattered(100_000);
         let unsorted: f64 = scattered.chunks(1000).map(|items| bounds(items).0.half_area()).sum();
         assert!(total < unsorted / 20.0, "{total} against {unsorted} without a partition");
+    }
+
+    #[test]
+    fn large_items_have_parts_of_their_own() {
+        let mut items = scattered(20_000);
+        let large = |index| Item { min: [-50.0, -1.0, -1.0], max: [150.0, 11.0, 2.0], index };
+        items.extend((20_000..20_030).map(large));
+        let mut plain = items.clone();
+        let total = |items: &[Item], parts: &[Range<u32>]| -> f64 {
+            let area = |range: &Range<u32>| bounds(&items[range.start as usize..range.end as usize]).0.half_area();
+            parts.iter().map(area).sum()
+        };
+        let without = descend(&mut plain, 0, 1000, false, false).bricks;
+        let parts = check(&mut items, 1000);
+        let of_large = |range: &Range<u32>| {
+            let items = &items[range.start as usize..range.end as usize];
+            items.iter().filter(|item| item.index >= 20_000).count()
+        };
+        let mixed = parts.bricks.iter().filter(|range| ![0, range.len()].contains(&of_large(range))).count();
+        assert_eq!(mixed, 0);
+        assert!(total(&items, &parts.bricks) < 2.0 * total(&plain, &without), "parts of large items are few");
+        let mut few = scattered(20_000);
+        let before = descend(&mut few.clone(), 0, 1000, false, false).bricks;
+        assert_eq!(check(&mut few, 1000).bricks, before, "without large items nothing changes");
     }
 
     #[test]
