@@ -1,7 +1,7 @@
 //! One plot over the frames, drawn as SVG.
 //!
-//! The picture is scaled by its viewBox, so its text has to stay legible at the width of a phone: the box is narrow, and
-//! legend, title and reading aid are HTML beside it. Colours are written as plain SVG attributes, which the rules of
+//! The picture is scaled by its viewBox, so its text has to stay legible at the width of a phone: the box is narrow,
+//! and legend, title and reading aid are HTML beside it. Colours are written as plain SVG attributes, which the rules of
 //! [`colour_rules`] override where the reader prefers a dark page.
 
 use crate::{ReportError, format};
@@ -144,6 +144,9 @@ pub struct Series {
     pub ink: Ink,
 }
 
+/// A bar: frame, low end, high end.
+type Bar = (f64, f64, f64);
+
 /// A plot over the frames. Each series has a point at least, and some point is above zero.
 #[derive(Clone, Debug)]
 pub struct Chart {
@@ -175,7 +178,7 @@ impl Drawing {
 
 impl Chart {
     /// The stacked series with each point replaced by its bar (frame, low, high).
-    fn bars(&self) -> Vec<(Ink, Vec<(f64, f64, f64)>)> {
+    fn bars(&self) -> Vec<(Ink, Vec<Bar>)> {
         let mut tops = std::collections::HashMap::<u64, f64>::new();
         let stacked = self.series.iter().filter(|s| s.shape == Shape::Stacked);
         stacked
@@ -211,8 +214,8 @@ impl Chart {
         extent
     }
 
-    /// The chart with the means of groups of neighbouring frames, and how many frames a group has. The first frame stays
-    /// alone, because it starts with an empty cache.
+    /// The chart with the means of groups of neighbouring frames, and how many frames a group has. The first frame
+    /// stays alone, because it starts with an empty cache.
     fn grouped(&self) -> (Self, u64) {
         let extent = self.extent();
         let group = ((extent.to - extent.from) as u64).div_ceil(DRAWN_FRAMES).max(1);
@@ -300,7 +303,7 @@ impl Chart {
             .draw()
             .map_err(|e| e.to_string())?;
         for (ink, bars) in self.bars() {
-            let rectangle = |(frame, low, high): (f64, f64, f64)| {
+            let rectangle = |(frame, low, high): Bar| {
                 Rectangle::new([(frame - half_bar, clip(low)), (frame + half_bar, clip(high))], ink.rgb().filled())
             };
             let seen = bars.into_iter().filter(|&(_, low, high)| high > low && clip(low) < top);

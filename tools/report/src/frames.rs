@@ -5,7 +5,8 @@ use std::path::Path;
 
 /// At most so many frames are embedded.
 const EMBEDDED_FRAMES: usize = 12;
-/// At most so many bytes of PNG are embedded (a third more as text), so that a page of large frames still opens on a phone.
+/// At most so many bytes of PNG are embedded (a third more as text), so that a page of large frames still opens
+/// on a phone.
 const EMBEDDED_BYTES: u64 = 32 << 20;
 /// The first bytes of every PNG.
 const SIGNATURE: &[u8; 8] = b"\x89PNG\r\n\x1a\n";
@@ -31,8 +32,8 @@ pub struct Gallery {
 }
 
 impl Gallery {
-    /// Lists `frames/*.png` and reads those that the page embeds: evenly chosen, the first and the last among them. A folder
-    /// that does not exist holds no frames.
+    /// Lists `frames/*.png` and reads those that the page embeds: evenly chosen, the first and the last among them. A
+    /// folder that does not exist holds no frames.
     ///
     /// # Errors
     /// The folder or a chosen file cannot be read.

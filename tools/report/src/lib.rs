@@ -1,7 +1,7 @@
 //! Turns the records of a walk into one offline HTML page.
 //!
-//! The input is the folder that `brickwalk walk` writes: `records.jsonl` (one object per frame and pass), `summary.json`
-//! and `frames/*.png`. The output is `report.html` beside them: one file without scripts or references to anything
+//! The input is the folder that `brickwalk walk` writes: `records.jsonl` (one object per frame and pass),
+//! `summary.json` and `frames/*.png`. The output is `report.html` beside them: one file without scripts or references to anything
 //! outside the folder. Plots are SVG, a dozen frames are embedded, and the others are linked by relative paths.
 //!
 //! The page depends on field names only. A field that is missing, zero throughout or unknown does not stop it; the page

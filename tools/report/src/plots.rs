@@ -50,8 +50,8 @@ struct PassPlot {
 const PASS_PLOTS: [PassPlot; 6] = [
     PassPlot {
         title: "Time per phase",
-        reading: "Lower is faster. Phases 1 to 3 are device time (known work, queries, new work), loading and total are wall \
-                  time; parts may overlap, so they need not add up.",
+        reading: "Lower is faster. Phases 1 to 3 are device time (known work, queries, new work), loading and \
+                  total are wall time; parts may overlap, so they need not add up.",
         unit: Unit::Milliseconds,
         lines: &[
             line("phase 1", &["ms_phase1"], BLUE),
@@ -63,8 +63,9 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Queries",
-        reading: "Pairs (tile, node) whose visibility was asked. Those culled by the interval test cost no ray; the visible \
-                  ones lead to work. Multi-queries ask over several nodes at once and are repeated one by one where they fail.",
+        reading: "Pairs (tile, node) whose visibility was asked. Those culled by the interval test cost no ray; \
+                  the visible ones lead to work. Multi-queries ask over several nodes at once and are repeated \
+                  one by one where they fail.",
         unit: Unit::Count,
         lines: &[
             line("visible", &["queries_visible"], BLUE),
@@ -76,8 +77,8 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Pairs",
-        reading: "Pairs (tile, leaf). Visible and invisible: the cut at the end of the pass; intersected: the work done for it; \
-                  pulled up: pairs whose children were merged.",
+        reading: "Pairs (tile, leaf). Visible and invisible: the cut at the end of the pass; intersected: the \
+                  work done for it; pulled up: pairs whose children were merged.",
         unit: Unit::Count,
         lines: &[
             line("visible", &["pairs_visible"], BLUE),
@@ -88,8 +89,8 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Bytes moved",
-        reading: "A bar is what one frame moved to the device. The line is what it needed and did not have: bars of BVH and \
-                  geometry above the line were moved in vain.",
+        reading: "A bar is what one frame moved to the device. The line is what it needed and did not have: bars \
+                  of BVH and geometry above the line were moved in vain.",
         unit: Unit::Bytes,
         lines: &[
             layer("BVH", &["bytes_bvh"], BLUE),
@@ -101,8 +102,8 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Bytes needed",
-        reading: "BVH and geometry. Needed: of all bricks that the rays had to look at; missing: of those not resident when \
-                  the pass began; moved should be close to missing.",
+        reading: "BVH and geometry. Needed: of all bricks that the rays had to look at; missing: of those not \
+                  resident when the pass began; moved should be close to missing.",
         unit: Unit::Bytes,
         lines: &[
             line("needed", &["bytes_needed"], RED),
@@ -112,8 +113,8 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Bricks",
-        reading: "Needed and hit count bricks; loaded, loaded again and evicted count payloads (geometry and attributes are one \
-                  each). Loading again within one pass means that the cache is too small.",
+        reading: "Needed and hit count bricks; loaded, loaded again and evicted count payloads (geometry and \
+                  attributes are one each). Loading again within one pass means that the cache is too small.",
         unit: Unit::Count,
         lines: &[
             total("needed", &["bricks_needed"]),

@@ -1,7 +1,7 @@
 //! The tables of a report.
 
 use crate::format;
-use crate::walk::{Pass, Walk};
+use crate::walk::{Pass, Statistics, Walk};
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -97,11 +97,14 @@ pub fn out_of_core(walk: &Walk) -> Markup {
     }
 }
 
+/// Picks one of a field's statistics.
+type Pick = fn(Statistics) -> f64;
+
 /// The statistics that a table has a row of.
-const PICKS: [(&str, fn(crate::walk::Statistics) -> f64); 4] =
+const PICKS: [(&str, Pick); 4] =
     [("first frame", |s| s.first), ("median", |s| s.median), ("p95", |s| s.p95), ("total", |s| s.total)];
 
-fn picked(pass: &Pass, field: &str, pick: fn(crate::walk::Statistics) -> f64, show: fn(f64) -> String) -> String {
+fn picked(pass: &Pass, field: &str, pick: Pick, show: fn(f64) -> String) -> String {
     cell(pass.statistics(field).map(pick), show)
 }
 

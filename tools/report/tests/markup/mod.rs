@@ -10,8 +10,7 @@ const VOID: [&str; 4] = ["meta", "input", "img", "br"];
 pub fn check(html: &str) -> Result<(), String> {
     let mut rest = html.strip_prefix("<!DOCTYPE html>").ok_or("no doctype")?;
     let mut open: Vec<&str> = Vec::new();
-    loop {
-        let Some(start) = rest.find('<') else { break };
+    while let Some(start) = rest.find('<') {
         text(&rest[..start])?;
         rest = &rest[start + 1..];
         let around = || rest.chars().take(60).collect::<String>();
