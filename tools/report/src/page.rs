@@ -211,14 +211,14 @@ fn section_of(title: &str, plots: &[Plot]) -> Result<Markup, ReportError> {
     })
 }
 
-/// Why series are not drawn: which are zero and which are not recorded.
+/// Why series are not drawn: which are zero and which are not measured.
 fn undrawn(plot: &Plot) -> String {
     fn are(names: &[String], what: &str) -> Option<String> {
         let verb = if names.len() == 1 { "is" } else { "are" };
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         (!names.is_empty()).then(|| format!("{} {verb} {what}", format::list(&names)))
     }
-    let parts = [are(&plot.zero, "zero in every frame"), are(&plot.missing, "not recorded")];
+    let parts = [are(&plot.zero, "zero in every frame"), are(&plot.missing, "not measured")];
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }
 

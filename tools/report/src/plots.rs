@@ -14,7 +14,7 @@ pub struct Plot {
     pub chart: Option<Chart>,
     /// Series that are zero in all frames.
     pub zero: Vec<String>,
-    /// Series that no record has.
+    /// Series that no record has, or that this walk did not measure.
     pub missing: Vec<String>,
 }
 
@@ -45,11 +45,14 @@ struct PassPlot {
     reading: &'static str,
     unit: Unit,
     lines: &'static [Line],
+    /// Whether the plot says nothing where needs were not measured.
+    of_needs: bool,
 }
 
 const PASS_PLOTS: [PassPlot; 6] = [
     PassPlot {
         title: "Time per phase",
+        of_needs: false,
         reading: "Lower is faster. Phases 1 to 3 are device time (known work, queries, new work), loading and \
                   total are wall time; parts may overlap, so they need not add up.",
         unit: Unit::Milliseconds,
@@ -63,6 +66,7 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Queries",
+        of_needs: false,
         reading: "Pairs (tile, node) whose visibility was asked. Those culled by the interval test cost no ray; \
                   the visible ones lead to work. Multi-queries ask over several nodes at once and are repeated \
                   one by one where they fail.",
@@ -77,6 +81,7 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Pairs",
+        of_needs: false,
         reading: "Pairs (tile, leaf). Visible and invisible: the cut at the end of the pass; intersected: the \
                   work done for it; pulled up: pairs whose children were merged.",
         unit: Unit::Count,
@@ -89,6 +94,7 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Bytes moved",
+        of_needs: false,
         reading: "A bar is what one frame moved to the device. The line is what it needed and did not have: bars \
                   of BVH and geometry above the line were moved in vain.",
         unit: Unit::Bytes,
@@ -102,6 +108,7 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Bytes needed",
+        of_needs: true,
         reading: "BVH and geometry. Needed: of all bricks that the rays had to look at; missing: of those not \
                   resident when the pass began; moved should be close to missing.",
         unit: Unit::Bytes,
@@ -113,6 +120,7 @@ const PASS_PLOTS: [PassPlot; 6] = [
     },
     PassPlot {
         title: "Bricks",
+        of_needs: false,
         reading: "Needed and hit count bricks; loaded, loaded again and evicted count payloads (geometry and \
                   attributes are one each). Loading again within one pass means that the cache is too small.",
         unit: Unit::Count,
@@ -133,9 +141,12 @@ pub fn of_pass(pass: &Pass) -> Vec<Plot> {
 
 fn of_lines(plot: &PassPlot, pass: &Pass) -> Plot {
     let (mut series, mut zero, mut missing) = (Vec::new(), Vec::new(), Vec::new());
+    let measured = pass.has_nonzero("bytes_needed");
     for line in plot.lines {
         let has_one = |field: &&&str| pass.rows.iter().any(|row| row.get(field).is_some());
-        if line.fields.iter().find(has_one).is_none() {
+        // Needs are measured on request; a walk that did not measure them records zero.
+        let unmeasured = !measured && line.fields.iter().any(|field| field.starts_with("bytes_needed"));
+        if unmeasured || line.fields.iter().find(has_one).is_none() {
             missing.push(line.name.to_string());
         } else if !line.fields.iter().any(|field| pass.has_nonzero(field)) {
             zero.push(line.name.to_string());
@@ -145,11 +156,9 @@ fn of_lines(plot: &PassPlot, pass: &Pass) -> Plot {
             series.push(Series { name: line.name.into(), points, shape: line.shape, ink: line.ink });
         }
     }
-    let chart = (!series.is_empty()).then(|| Chart {
-        title: format!("{}, {}", plot.title, pass.name),
-        unit: plot.unit,
-        series,
-    });
+    let drawn = !series.is_empty() && (measured || !plot.of_needs);
+    let title = format!("{}, {}", plot.title, pass.name);
+    let chart = drawn.then_some(Chart { title, unit: plot.unit, series });
     Plot { title: plot.title, reading: plot.reading, chart, zero, missing }
 }
 

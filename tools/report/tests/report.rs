@@ -215,7 +215,7 @@ fn an_almost_empty_summary_and_record_suffice() {
     assert!(titles(&html).is_empty());
     assert!(
         html.contains(
-            "Time per phase: not drawn, because phase 1, phase 2, phase 3, loading and total are not recorded."
+            "Time per phase: not drawn, because phase 1, phase 2, phase 3, loading and total are not measured."
         )
     );
 
@@ -268,6 +268,28 @@ fn zero_series_are_left_out_with_a_sentence() {
     // Nothing is left out where nothing is zero.
     let html = report(walk(&records(3, &["primary"]), &summary(3), 3).path());
     assert!(!html.contains("Left out: ") && !html.contains("not drawn"));
+}
+
+#[test]
+fn needs_that_were_not_measured_are_no_zeros() {
+    let with_needs = |bytes: u64| {
+        let mut rows = records(3, &["primary"]);
+        for row in &mut rows {
+            row["bytes_needed"] = bytes.into();
+            row["bytes_needed_missing"] = 0.into();
+        }
+        report(walk(&rows, &summary(3), 3).path())
+    };
+    let html = with_needs(0);
+    assert!(!titles(&html).contains(&"Bytes needed"));
+    assert!(html.contains("Left out: missing is not measured."));
+    assert!(html.contains("Bytes needed: not drawn, because needed and missing are not measured."));
+    assert!(html.contains("did not measure which bricks"));
+    // Where nothing was missing, that is a measurement.
+    let html = with_needs(5);
+    assert!(titles(&html).contains(&"Bytes needed"));
+    assert!(html.contains("Left out: missing is zero in every frame."));
+    assert!(!html.contains("not measure"));
 }
 
 #[test]
