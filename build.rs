@@ -24,7 +24,8 @@ fn main() {
     let mut structures = None;
     for name in &names {
         for pages in [wgsl::Pages { cache: 1, texels: 1 }, wgsl::Pages { cache: 3, texels: 2 }] {
-            let text = wgsl::assemble(name, pages, &read).unwrap_or_else(|| panic!("{name}: an included file is missing"));
+            let text =
+                wgsl::assemble(name, pages, &read).unwrap_or_else(|| panic!("{name}: an included file is missing"));
             let module =
                 naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(&text)));
             naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default())
@@ -71,8 +72,22 @@ fn embedded(names: &[String]) -> String {
 /// Compile-time assertions: size and member offsets of every structure that `layout` mirrors, values of its constants.
 fn layout_checks(module: &naga::Module) -> String {
     let mirrored = [
-        "Params", "Ray", "Hit", "Surface", "TileBounds", "TileList", "TopNode2", "Leaf", "Instance", "Brick", "Slot",
-        "Demand", "Pair", "Material", "Texture", "GBuffer",
+        "Params",
+        "Ray",
+        "Hit",
+        "Surface",
+        "TileBounds",
+        "TileList",
+        "TopNode2",
+        "Leaf",
+        "Instance",
+        "Brick",
+        "Slot",
+        "Demand",
+        "Pair",
+        "Material",
+        "Texture",
+        "GBuffer",
     ];
     let mut s = String::new();
     for name in mirrored {

@@ -37,7 +37,8 @@ fn main() {
     atomic::create_folder(&folder).expect("a folder");
     let scene = folder.join("city.bricks");
     if !scene.exists() {
-        let words = ["brickwalk", "scene", "city", "--triangles", &options.triangles, "-o"].map(std::ffi::OsString::from);
+        let words =
+            ["brickwalk", "scene", "city", "--triangles", &options.triangles, "-o"].map(std::ffi::OsString::from);
         let Cli { command, .. } = Cli::parse_from(words.into_iter().chain([scene.clone().into()]));
         assert!(matches!(command, Command::Scene(_)));
         brickwalk::app::run(&command).expect("a city");
@@ -48,8 +49,13 @@ fn main() {
     let _ = writeln!(
         text,
         "Adapter {} ({}), upload by {}, commit {}, {} bricks of {:.1} MB, tile {} px, 1 ray a pixel and pass.\n",
-        head["adapter"]["name"], head["adapter"]["driver_info"], head["adapter"]["upload"], head["commit"],
-        head["scene"]["bricks"], head["scene"]["brick_bytes"].as_f64().unwrap_or(0.0) * 1e-6, options.tile
+        head["adapter"]["name"],
+        head["adapter"]["driver_info"],
+        head["adapter"]["upload"],
+        head["commit"],
+        head["scene"]["bricks"],
+        head["scene"]["brick_bytes"].as_f64().unwrap_or(0.0) * 1e-6,
+        options.tile
     );
     out_of_core(&folder.join("cold"), &mut text);
     in_core(&options, &scene, &mut text);
@@ -90,7 +96,10 @@ fn records(folder: &Path, pass: &str) -> Vec<Value> {
 
 fn out_of_core(folder: &Path, text: &mut String) {
     let _ = writeln!(text, "## Out of core, near path, cache 20 %\n");
-    let _ = writeln!(text, "| pass | cold: loaded / needed | steady: loaded / needed and missing | round trips - batches, most |");
+    let _ = writeln!(
+        text,
+        "| pass | cold: loaded / needed | steady: loaded / needed and missing | round trips - batches, most |"
+    );
     let _ = writeln!(text, "| --- | --- | --- | --- |");
     let n = |r: &Value, field: &str| r[field].as_f64().unwrap_or(0.0);
     let moved = |r: &Value| n(r, "bytes_bvh") + n(r, "bytes_geometry");
@@ -103,7 +112,10 @@ fn out_of_core(folder: &Path, text: &mut String) {
         let _ = writeln!(
             text,
             "| {pass} | {:.2} / {:.2} MB = {cold:.3} | {:.2} / {:.2} MB = {:.3} | {trips} |",
-            moved(&rows[0]) * 1e-6, n(&rows[0], "bytes_needed_missing") * 1e-6, loaded * 1e-6, missing * 1e-6,
+            moved(&rows[0]) * 1e-6,
+            n(&rows[0], "bytes_needed_missing") * 1e-6,
+            loaded * 1e-6,
+            missing * 1e-6,
             loaded / missing.max(1.0)
         );
     }
@@ -113,7 +125,9 @@ fn out_of_core(folder: &Path, text: &mut String) {
         text,
         "\nPeak memory {:.0} MB of the process (mapped file pages {:.0} MB apart), of which the cache {:.0} MB, the host cache \
          at most 1024 MiB.\n",
-        n(memory, "peak_bytes") * 1e-6, n(memory, "mapped_bytes") * 1e-6, cache * 1e-6
+        n(memory, "peak_bytes") * 1e-6,
+        n(memory, "mapped_bytes") * 1e-6,
+        cache * 1e-6
     );
 }
 
@@ -127,7 +141,9 @@ fn in_core(options: &Options, scene: &Path, text: &mut String) {
                 let more = format!("--cache 100% --effects primary --schedule {schedule}");
                 let rows = records(&walk(options, scene, path, &more, "timed"), "primary");
                 let frames = rows.iter().skip(5.min(rows.len() - 1));
-                let ms = |r: &Value| ["ms_phase1", "ms_phase2", "ms_phase3"].iter().filter_map(|f| r[*f].as_f64()).sum::<f64>();
+                let ms = |r: &Value| {
+                    ["ms_phase1", "ms_phase2", "ms_phase3"].iter().filter_map(|f| r[*f].as_f64()).sum::<f64>()
+                };
                 times[side].push(frames.clone().map(ms).sum::<f64>() / frames.count() as f64);
             }
         }

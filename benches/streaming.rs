@@ -62,7 +62,9 @@ fn streaming(c: &mut Criterion) {
 
     for (name, options) in [("file", "--host-cache 0"), ("host cache", "--host-cache 4G")] {
         let words = format!("brickwalk walk s -o o --cache 100% {options}");
-        let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
+        let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else {
+            unreachable!("it says walk")
+        };
         let extent = Extent { width: 64, height: 64, tile: 64 };
         let mut session = Session::open(file.clone(), &path, &args.stream, extent).expect("a session");
         let upload = session.executor.gpu().upload.name();

@@ -9,6 +9,22 @@
 #include "shared/brick.wgsl"
 #include "shared/walk_brick.wgsl"
 
+// A group of the top level: the node, and its entered children, inner ones and leaves alike, by priority in the high byte,
+// so that bricks are met near to far.
+fn top_group(ray: BoxRay, node: u32, t_max: f32) -> vec2<u32> {
+    let at = 5u * node;
+    let n1 = top8[at + 1u];
+    let entered = node_hits(ray, top8[at], top8[at + 2u], top8[at + 3u], top8[at + 4u], vec3<f32>(0.0), vec3<f32>(0.0), params.instance_pad, t_max).mask;
+    var bits = 0u;
+    for (var i = 0u; i < 8u; i++) {
+        let what = (select(n1.z, n1.w, i >= 4u) >> (8u * (i & 3u))) & 255u;
+        if (entered & (1u << i)) != 0u && what != 0u {
+            bits |= 0x80000000u >> (i ^ ray.flip);
+        }
+    }
+    return vec2<u32>(node, bits);
+}
+
 override COUNT: bool = false; // count nodes and triangles visited
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
@@ -22,7 +38,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if !(ray.t_min <= ray.t_max) {
         return;
     }
-    atomicAdd(&counters[COUNTER_RAYS], 1u);
     if params.top_count == 0u {
         return;
     }
@@ -35,66 +50,47 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     r.box = world;
     var stack: array<vec2<u32>, STACK_SIZE>;
     var depth = 0u;
-    var floor = 0u;                         // stack depth at which the brick ends; 0: in the top level
+    var floor = 0u;                         // stack depth at which the brick ends
     var in_brick = false;
-    var group = root_group(world.flip);
-    var leaf_bits = 0u;                     // leaves of the last top-level node still to enter
-    var leaf_base = 0u;
-    var nodes = 0u;
+    var group = top_group(world, 0u, best.t);
+    var nodes = 1u;
     var triangles = 0u;
     loop {
-        if in_brick && group.y <= 0x00ffffffu && depth == floor {
-            in_brick = false;
-            r.box.flip = world.flip;
-            depth -= 1u;
-            group = stack[depth];
-        }
-        if !in_brick && leaf_bits != 0u {
-            let bit = firstTrailingBit(leaf_bits);
-            leaf_bits &= leaf_bits - 1u;
-            let leaf = leaf_base + bit;
-            if depth + 1u >= STACK_SIZE {
-                atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
-                break;
-            }
-            stack[depth] = group;
-            depth += 1u;
-            floor = depth;
-            in_brick = true;
-            enter_leaf(&r, world, ray.direction, world_frame, leaf);
-            enter_brick(&r, leaves[leaf].brick);
-            group = root_group(r.box.flip);
-        }
         if group.y <= 0x00ffffffu {
+            if in_brick && depth == floor {
+                in_brick = false;
+                r.box.flip = world.flip;
+            }
             if depth == 0u {
                 break;
             }
             depth -= 1u;
             group = stack[depth];
-            continue;
         }
-        let child = nearest_child(group, r.box.flip);
-        group.y = child.y;
-        if group.y > 0x00ffffffu {
+        let bit = firstLeadingBit(group.y);
+        let rest = vec2<u32>(group.x, group.y & ~(1u << bit));
+        if rest.y > 0x00ffffffu {
             if depth == STACK_SIZE {
                 atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
                 break;
             }
-            stack[depth] = group;
+            stack[depth] = rest;
             depth += 1u;
         }
-        nodes += 1u;
+        let slot = (31u - bit) ^ r.box.flip;
         if in_brick {
-            let visited = visit_node(&r, child.x, best.t);
+            let child = group.x + countOneBits(group.y & 0xffu & ((1u << slot) - 1u));
+            let visited = visit_node(&r, child, best.t);
+            nodes += 1u;
             group = visited.xy;
             var bits = visited.z;
             if bits != 0u {
-                let first = cache_vec4(r.page, r.nodes + 5u * child.x + 1u).y;
+                let first = cache_vec4(r.page, r.nodes + 5u * child + 1u).y;
                 triangles += countOneBits(bits);
                 while bits != 0u {
-                    let bit = firstTrailingBit(bits);
+                    let triangle = firstTrailingBit(bits);
                     bits &= bits - 1u;
-                    if test_triangle(&r, &best, first + bit) && any_hit {
+                    if test_triangle(&r, &best, first + triangle) && any_hit {
                         break;
                     }
                 }
@@ -102,15 +98,20 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                     break;
                 }
             }
+            continue;
+        }
+        let inner = top8[5u * group.x].w >> 24u;
+        let n1 = top8[5u * group.x + 1u];
+        if (inner & (1u << slot)) != 0u {
+            group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
+            nodes += 1u;
         } else {
-            let at = 5u * child.x;
-            let n0 = top8[at];
-            let n1 = top8[at + 1u];
-            let entered = node_hits(world, n0, top8[at + 2u], top8[at + 3u], top8[at + 4u], vec3<f32>(0.0), vec3<f32>(0.0), params.instance_pad, best.t).mask;
-            let bits = traversal_mask(entered, n1, world.flip);
-            group = vec2<u32>(n1.x, (bits & 0xff000000u) | (n0.w >> 24u));
-            leaf_bits = bits & 0x00ffffffu;
-            leaf_base = n1.y;
+            let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
+            floor = depth;
+            in_brick = true;
+            enter_leaf(&r, world, ray.direction, world_frame, leaf);
+            enter_brick(&r, leaves[leaf].brick);
+            group = root_group(r.box.flip);
         }
     }
     if best.leaf != NONE {

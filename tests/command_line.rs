@@ -76,7 +76,11 @@ fn bad_scenes_are_refused_with_status_1() {
     std::fs::write(at("flipped.bricks"), &flipped).expect("a file");
     refuse(&["verify", text(&at("flipped.bricks"))], 1, &["flipped.bricks", "brick"]);
     refuse(&["walk", text(&scene), "-o", text(&out), "--cache", "1K"], 1, &["cache", "two largest bricks"]);
-    refuse(&["walk", text(&scene), "-o", text(&out), "--cache", "20%", "--schedule", "plain"], 1, &["plain", "--cache"]);
+    refuse(
+        &["walk", text(&scene), "-o", text(&out), "--cache", "20%", "--schedule", "plain"],
+        1,
+        &["plain", "--cache"],
+    );
     refuse(&["walk", text(&scene), "-o", text(&out), "--path", text(&at("none.json"))], 1, &["none.json"]);
     std::fs::write(at("bad.json"), "{\"fov_y_degrees\": 60}").expect("a file");
     refuse(&["walk", text(&scene), "-o", text(&out), "--path", text(&at("bad.json"))], 1, &["bad.json"]);
@@ -95,7 +99,8 @@ fn bad_inputs_of_conversion_leave_the_old_file_alone() {
     refuse(&["convert", "missing.glb", "-o", text(&old)], 1, &["missing.glb"]);
     refuse(&["convert", text(&old), "-o", text(&old)], 1, &["old.bricks"]);
     assert_eq!(std::fs::read(&old).expect("the old file"), b"precious");
-    let names: Vec<OsString> = std::fs::read_dir(&folder).expect("a folder").map(|e| e.expect("an entry").file_name()).collect();
+    let names: Vec<OsString> =
+        std::fs::read_dir(&folder).expect("a folder").map(|e| e.expect("an entry").file_name()).collect();
     assert_eq!(names.len(), 2, "nothing half-written: {names:?}");
 }
 
@@ -122,8 +127,11 @@ fn records_and_summary_hold_every_field_and_agree() {
     let scene = city(folder.path(), "60K", "1K");
     let out = folder.path().join("out");
     let path = scene.with_extension("near.json");
-    let printed =
-        walk(&scene, &out, &format!("--frames 3 --size 96x64 --cache 20% --json --measure-needed --path {}", path.display()));
+    let printed = walk(
+        &scene,
+        &out,
+        &format!("--frames 3 --size 96x64 --cache 20% --json --measure-needed --path {}", path.display()),
+    );
     let lines = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
     assert_eq!(printed, lines, "--json prints the records");
     let records: Vec<serde_json::Value> = lines.lines().map(|l| serde_json::from_str(l).expect("a record")).collect();

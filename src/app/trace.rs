@@ -30,7 +30,8 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     let mut session = Session::open(scene, &args.scene, &args.stream, EXTENT)?;
     let progress = Progress::new();
     progress.phase("rays", rays.len() as u64);
-    let (hits, stats) = trace(&mut session, &rays, args.any, &progress).with_context(|| args.scene.display().to_string())?;
+    let (hits, stats) =
+        trace(&mut session, &rays, args.any, &progress).with_context(|| args.scene.display().to_string())?;
     progress.finish();
     if args.any {
         let any: Vec<bool> = hits.iter().map(|h| h.triangle != NONE).collect();
@@ -82,7 +83,9 @@ pub fn device_ray(ray: &Ray, frame: &Frame) -> DeviceRay {
     // The exponent field, also of a subnormal: scaled into 1..2 by exact powers of two.
     let exponent = largest.log2().floor().clamp(-1074.0, 1023.0) as i32;
     let half = |e: i32| f64::from(e / 2).exp2() * f64::from(e - e / 2).exp2();
-    let direction = ray.direction.map(|d| (d * f64::from(-(exponent / 2)).exp2() * f64::from(exponent / 2 - exponent).exp2()) as f32);
+    let direction = ray
+        .direction
+        .map(|d| (d * f64::from(-(exponent / 2)).exp2() * f64::from(exponent / 2 - exponent).exp2()) as f32);
     let t_scale = frame.unit / half(exponent);
     let bound = |t: f64| {
         let t = t / t_scale;

@@ -6,8 +6,8 @@ use super::session::{Session, open_scene};
 use super::summary;
 use crate::gpu::rays::Extent;
 use crate::render::{FrameOutput, Light, RenderSettings, Renderer};
-use crate::schedule::fronts::Fronts;
 use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::schedule::fronts::Fronts;
 use crate::stats::Record;
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
@@ -59,7 +59,8 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        let output = renderer.frame(frame, &path.frame(frame, args.frames)).with_context(|| args.scene.display().to_string())?;
+        let output =
+            renderer.frame(frame, &path.frame(frame, args.frames)).with_context(|| args.scene.display().to_string())?;
         write_frame(&frames_folder, frame, args, &output)?;
         for record in output.records {
             let line = lines.push(&record)?;
@@ -136,4 +137,3 @@ fn finish(args: &WalkArgs, renderer: &Renderer, records: &[Record], frames: u32)
     brickwalk_report::write(&args.output)?;
     Ok(())
 }
-

@@ -70,6 +70,13 @@ pub struct Gpu {
     pub upload: UploadPath,
 }
 
+/// Adapters of the given backends.
+fn adapters(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = backends;
+    pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
+}
+
 /// Storage buffers a kernel needs besides cache and texel pages.
 const FIXED_STORAGE_BUFFERS: u32 = 19;
 
@@ -77,23 +84,22 @@ impl Gpu {
     /// Opens the adapter whose name contains `wanted` (any case), or by itself a discrete GPU, else an integrated one,
     /// else whatever there is. `BRICKWALK_UPLOAD=staged` forces the staging buffer where pages could be mapped.
     pub fn open(wanted: Option<&str>) -> Result<Self, DeviceError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        // OpenGL is a fallback alone: merely asking for it makes its libraries talk on standard error.
+        let mut adapters = adapters(wgpu::Backends::PRIMARY);
+        if adapters.is_empty() {
+            adapters = self::adapters(wgpu::Backends::GL);
+        }
         let found = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
         if let Some(wanted) = wanted {
             let wanted = wanted.to_lowercase();
             adapters.retain(|a| a.get_info().name.to_lowercase().contains(&wanted));
         }
-        let rank = |a: &wgpu::Adapter| {
-            let info = a.get_info();
-            let kind = match info.device_type {
-                wgpu::DeviceType::DiscreteGpu => 0,
-                wgpu::DeviceType::IntegratedGpu => 1,
-                wgpu::DeviceType::VirtualGpu => 2,
-                wgpu::DeviceType::Cpu => 3,
-                wgpu::DeviceType::Other => 4,
-            };
-            (info.backend == wgpu::Backend::Gl, kind)
+        let rank = |a: &wgpu::Adapter| match a.get_info().device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Cpu => 3,
+            wgpu::DeviceType::Other => 4,
         };
         let Some(adapter) = adapters.into_iter().min_by_key(rank) else {
             let found = if found.is_empty() { "none".to_string() } else { found };

@@ -120,7 +120,9 @@ impl GpuExecutor {
         });
         let readback = Readback::new(&gpu, (bricks * size_of::<layout::Demand>() + layout::COUNTERS * 4) as u64);
         let timing = Timing::new(&gpu, MOST_DISPATCHES as u32);
-        let groups = Groups::new(&gpu, &kernels, &resident, &cache, &texels, &passes, &pixels, &tiles, &demand, &counters, &params);
+        let groups = Groups::new(
+            &gpu, &kernels, &resident, &cache, &texels, &passes, &pixels, &tiles, &demand, &counters, &params,
+        );
         Ok(Self {
             gpu,
             scene,
@@ -353,11 +355,15 @@ impl GpuExecutor {
             let cache = kernel == "intersect_list" || kernel == "intersect_all";
             Dispatch { kernel, params, groups, cache, shading: false, phase }
         };
-        let shading = |kernel, params, cache| Dispatch { kernel, params, groups: per_ray, cache, shading: true, phase: None };
+        let shading =
+            |kernel, params, cache| Dispatch { kernel, params, groups: per_ray, cache, shading: true, phase: None };
         let selected = |mask, want, flags| Params { select_mask: mask, select_want: want, flags, ..params };
         let intersect = |mask, want, phase| {
             let p = selected(mask, want, params.flags);
-            vec![kernel("tile_select_intersect", p, per_tile, Some(phase)), kernel("intersect_list", p, per_ray, Some(phase))]
+            vec![
+                kernel("tile_select_intersect", p, per_tile, Some(phase)),
+                kernel("intersect_list", p, per_ray, Some(phase)),
+            ]
         };
         let query = |mask, want, flags| {
             let p = selected(mask, want, flags);
@@ -373,7 +379,7 @@ impl GpuExecutor {
             Step::Generate if pass == Pass::Primary => vec![kernel("generate_primary", params, per_ray, None)],
             Step::Generate => vec![shading("generate_shadow", params, false)],
             Step::StartHits => vec![kernel("start_hits", params, per_ray, None)],
-            Step::CountRays => vec![bounds],
+            Step::CountRays => vec![Dispatch { phase: None, ..bounds }],
             Step::Lists => {
                 vec![
                     bounds,
@@ -434,7 +440,14 @@ impl Executor for GpuExecutor {
     fn set_pairs(&mut self, pairs: &[PairQuery]) -> Result<(), ExecutorError> {
         let records: Vec<layout::Pair> = pairs
             .iter()
-            .map(|p| layout::Pair { x0: p.x[0], y0: p.y[0], x1: p.x[1], y1: p.y[1], node: p.node, ..Default::default() })
+            .map(|p| layout::Pair {
+                x0: p.x[0],
+                y0: p.y[0],
+                x1: p.x[1],
+                y1: p.y[1],
+                node: p.node,
+                ..Default::default()
+            })
             .collect();
         if (self.tiles.pair_rays.size() / 4) < records.len() as u64 {
             let room = records.len().next_power_of_two();
@@ -523,8 +536,10 @@ impl Groups {
             size: std::num::NonZeroU64::new(size_of::<Params>() as u64),
         };
         let rays = |pass: &RayBuffers| {
-            let mut entries =
-                vec![wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(params_binding.clone()) }];
+            let mut entries = vec![wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::Buffer(params_binding.clone()),
+            }];
             let buffers = [&pass.rays, &pass.hits, &pass.surfaces, demand, counters];
             entries.extend(numbered(&buffers, 1));
             group("rays", &kernels.rays, &entries)

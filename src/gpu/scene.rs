@@ -161,7 +161,8 @@ impl Placed {
     fn new(resident: &Resident, instance: &bricks::Instance, frame: &Frame) -> Self {
         let object = &resident.objects[instance.object as usize];
         let scale = exp2(object.step_log2 - object.unit_log2);
-        let mut record = layout::Instance { base: instance.base, flags: instance.flags, scale: 1.0, ..Default::default() };
+        let mut record =
+            layout::Instance { base: instance.base, flags: instance.flags, scale: 1.0, ..Default::default() };
         if instance.flags & bricks::INSTANCE_IDENTITY != 0 {
             for k in 0..3 {
                 record.object_from_world[k][k] = 1.0;
@@ -170,11 +171,8 @@ impl Placed {
             return Self { record, reference: frame.reference, scale, pad: 0.0 };
         }
         let m = &instance.world_from_object;
-        let linear = DMat3::from_cols(
-            DVec3::new(m[0], m[4], m[8]),
-            DVec3::new(m[1], m[5], m[9]),
-            DVec3::new(m[2], m[6], m[10]),
-        );
+        let linear =
+            DMat3::from_cols(DVec3::new(m[0], m[4], m[8]), DVec3::new(m[1], m[5], m[9]), DVec3::new(m[2], m[6], m[10]));
         let translation = DVec3::new(m[3], m[7], m[11]);
         let inverse = linear.inverse();
         let object_unit = exp2(object.unit_log2);

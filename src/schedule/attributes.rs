@@ -8,11 +8,7 @@ use crate::stream::Item;
 ///
 /// # Errors
 /// What the executor says.
-pub fn resolve(
-    executor: &mut dyn Executor,
-    cache: &mut Cache,
-    stats: &mut PassStats,
-) -> Result<(), ExecutorError> {
+pub fn resolve(executor: &mut dyn Executor, cache: &mut Cache, stats: &mut PassStats) -> Result<(), ExecutorError> {
     let report = executor.run(Pass::Primary, &[Step::QueryHits], &cache.states)?;
     let hit: Vec<u32> = report.demand.iter().map(|d| d.0).collect();
     stats.add(report);

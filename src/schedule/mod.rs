@@ -13,8 +13,8 @@ pub mod attributes;
 pub mod cache;
 pub mod chc;
 pub mod fronts;
-pub mod plain;
 mod pair_tree;
+pub mod plain;
 mod states;
 mod types;
 

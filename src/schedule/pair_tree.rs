@@ -63,8 +63,7 @@ impl PairTree {
     pub fn new(width: u32, height: u32, tile: u32) -> Self {
         let (tiles_x, tiles_y) = (width.div_ceil(tile), height.div_ceil(tile));
         let log2 = tiles_x.max(tiles_y).next_power_of_two().trailing_zeros();
-        let root =
-            Pair { square: Square { x: 0, y: 0, log2 }, node: 0, front: Front::Invisible, children: (0, 0) };
+        let root = Pair { square: Square { x: 0, y: 0, log2 }, node: 0, front: Front::Invisible, children: (0, 0) };
         Self { pairs: vec![root], free: [Vec::new(), Vec::new()], tiles_x, tiles_y, tile, width, height }
     }
 

@@ -41,7 +41,7 @@ pub fn trace(
     let resident_before = cache.resident_geometry();
     make_all_resident(executor, cache, stats)?;
     let mut steps = first.to_vec();
-    steps.push(Step::IntersectAll);
+    steps.extend([Step::CountRays, Step::IntersectAll]);
     let report = executor.run(pass, &steps, &cache.states)?;
     stats.bricks_intersected.extend(cache.states.finish_resident());
     stats.add(report);

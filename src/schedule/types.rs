@@ -88,7 +88,7 @@ pub struct Report {
     pub pairs_invisible: u64,
     /// Pairs (tile, leaf) intersected.
     pub pairs_intersected: u64,
-    /// Rays traced; counted by [`Step::Lists`], [`Step::CountRays`] and [`Step::IntersectAll`].
+    /// Rays traced; counted by [`Step::Lists`] and [`Step::CountRays`].
     pub rays: u64,
     /// Nodes visited, when the executor counts.
     pub nodes: u64,
