@@ -95,7 +95,7 @@ impl GpuExecutor {
         let texels = Texels::new(&gpu, &scene)?;
         let cache = CachePages::new(&gpu, page_sizes);
         let most_pages = gpu.max_cache_pages(texels.pages.len());
-        if cache.len() > most_pages {
+        if cache.page_count() > most_pages {
             let text = format!(
                 "{:?} holds caches of at most {} bytes ({most_pages} pages); ask for a smaller --cache",
                 gpu.info.name,
@@ -103,7 +103,7 @@ impl GpuExecutor {
             );
             return Err(ExecutorError::Device(text));
         }
-        let pages = Pages { cache: cache.len(), texels: texels.pages.len() };
+        let pages = Pages { cache: cache.page_count(), texels: texels.pages.len() };
         let kernels = Kernels::new(&gpu, pages, setup.count);
         let resident = SceneBuffers::new(&gpu, scene.resident());
         let passes = [RayBuffers::new(&gpu, extent.rays()), RayBuffers::new(&gpu, extent.rays())];

@@ -45,7 +45,7 @@ impl CachePages {
     }
 
     /// Number of pages.
-    pub fn len(&self) -> usize {
+    pub fn page_count(&self) -> usize {
         self.pages.len()
     }
 

@@ -225,14 +225,10 @@ impl Placed {
 /// Bounds of an object's bricks in its lattice steps.
 fn object_bounds(resident: &Resident, object: &bricks::Object) -> [[i64; 3]; 2] {
     let first = object.first_brick as usize;
-    let mut bounds = [[0; 3]; 2];
-    for (i, brick) in resident.bricks[first..first + object.brick_count as usize].iter().enumerate() {
-        for k in 0..3 {
-            bounds[0][k] = if i == 0 { brick.min[k] } else { bounds[0][k].min(brick.min[k]) };
-            bounds[1][k] = if i == 0 { brick.max[k] } else { bounds[1][k].max(brick.max[k]) };
-        }
-    }
-    bounds
+    let own = &resident.bricks[first..first + object.brick_count as usize];
+    let least = |k: usize| own.iter().map(|b| b.min[k]).min().unwrap_or(0);
+    let greatest = |k: usize| own.iter().map(|b| b.max[k]).max().unwrap_or(0);
+    [std::array::from_fn(least), std::array::from_fn(greatest)]
 }
 
 fn rebase_top8(node: &bricks::TopNode8, frame: &Frame, scale: f64) -> bricks::Node {
