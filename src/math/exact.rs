@@ -170,11 +170,11 @@ pub struct RayFrame {
     pub ky: u32,
     /// Axis of the largest component of d, the lowest on ties.
     pub kz: u32,
-    /// d[kx] / d[kz].
+    /// `d[kx] / d[kz]`.
     pub sx: f32,
-    /// d[ky] / d[kz].
+    /// `d[ky] / d[kz]`.
     pub sy: f32,
-    /// 1 / d[kz], correctly rounded.
+    /// `1 / d[kz]`, correctly rounded.
     pub iz: f32,
     /// 1 / d, correctly rounded; magnitude at most 2^96 (also for 0, of either sign) but on axis kz.
     pub inv: [f32; 3],

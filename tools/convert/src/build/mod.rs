@@ -1,10 +1,10 @@
 //! Cuts a scene into bricks and writes the scene file.
 //!
 //! The order of the work is what makes images independent of how a scene is cut (numerics.md, "Positions"): triangles are
-//! numbered in the order of the source ([`objects`]), a partition that ignores all settings gives the sizes from which each
-//! object's lattice follows ([`partition`], [`lattice`]), every position is rounded to it once, and only then are bricks
-//! encoded ([`brick`]). Trees take their topology from floating-point builders ([`binary`], [`wide`]), but their boxes are
-//! exact integers ([`node`]). Everything is the same for any number of threads.
+//! numbered in the order of the source (`objects`), a partition that ignores all settings gives the sizes from which each
+//! object's lattice follows (`partition`, `lattice`), every position is rounded to it once, and only then are bricks
+//! encoded (`brick`). Trees take their topology from floating-point builders (`binary`, `wide`), but their boxes are
+//! exact integers (`node`). Everything is the same for any number of threads.
 
 mod attributes;
 mod binary;
