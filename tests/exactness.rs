@@ -49,8 +49,8 @@ fn report(name: &str, tally: &Tally, least_hits: usize, hits: usize) {
     println!("{name}: {tally}");
     assert_eq!(tally.mismatches, 0, "{name}: {tally}");
     assert!(hits >= least_hits, "{name}: only {hits} hits; the view shows nothing");
-    // Excuses are rare: rays this close to an edge, or hits this close together (Sponza has sheets in one plane).
-    assert!(tally.excused() * 20 <= tally.total() + 100, "{name}: {tally}");
+    // A third of the given rays are aimed at edges and vertices, where f32 may not tell; Sponza has sheets in one plane.
+    assert!(tally.excused() * 5 <= tally.total() * 2, "{name}: {tally}");
 }
 
 /// Frames along a path: every primary and every shadow ray.
@@ -66,7 +66,7 @@ fn check_walk(name: &str, scene: &Path, size: &str, path: Option<CameraPath>) {
     let path = path.unwrap_or_else(|| path_from_bounds(manifest.min, manifest.max));
     let (mut primary, mut shadow) = (Tally::default(), Tally::default());
     let (mut hit_count, mut shadow_count) = (0, 0);
-    let mut swapped = Tally::default();
+    let mut spoiled = Tally::default();
     for k in 0..args.frames {
         let camera = path.frame(k, args.frames);
         renderer.frame(k, &camera).expect("a frame");
@@ -77,10 +77,11 @@ fn check_walk(name: &str, scene: &Path, size: &str, path: Option<CameraPath>) {
         let pairs: Vec<_> = asked.iter().zip(&hits).collect();
         add(&mut primary, pairs.par_iter().map(|(ray, hit)| judge(&truth, ray, found(hit))).collect());
         hit_count += hits.iter().filter(|hit| hit.id != NONE).count();
-        // Negative control: the hit of a ray elsewhere in the picture is no hit of this one.
-        let half = hits.len() / 2;
-        let wrong = asked.iter().zip(hits.iter().cycle().skip(half)).step_by(16);
-        add(&mut swapped, wrong.map(|(ray, hit)| judge(&truth, ray, found(hit))).collect());
+        // Negative controls: a hit that is lost, and one that is half as far, must be noticed.
+        let met: Vec<_> = pairs.iter().filter(|(_, hit)| hit.id != NONE).take(64).collect();
+        add(&mut spoiled, met.iter().map(|(ray, _)| judge(&truth, ray, None)).collect());
+        let nearer = |hit: &Hit| found(hit).map(|(id, t)| (id, t / 2.0));
+        add(&mut spoiled, met.iter().map(|(ray, hit)| judge(&truth, ray, nearer(hit))).collect());
         let rays = renderer.executor.read_rays(Pass::Shadow).expect("rays");
         let hits = renderer.executor.read_hits(Pass::Shadow).expect("hits");
         let traced: Vec<_> = rays.iter().zip(&hits).filter(|(ray, _)| ray.t_min <= ray.t_max).collect();
@@ -88,12 +89,12 @@ fn check_walk(name: &str, scene: &Path, size: &str, path: Option<CameraPath>) {
         let verdict = |(ray, hit): &(&Ray, &Hit)| judge_any(&truth, &truth_ray(&frame, ray), hit.id != NONE);
         add(&mut shadow, traced.par_iter().map(verdict).collect());
     }
-    report(&format!("{name}, primary"), &primary, 60, hit_count);
-    report(&format!("{name}, shadow"), &shadow, 20, shadow_count);
-    assert!(swapped.mismatches > hit_count as u64 / 64, "the judge must notice wrong hits: {swapped}");
+    report(&format!("{name}, primary"), &primary, 15, hit_count);
+    report(&format!("{name}, shadow"), &shadow, 8, shadow_count);
+    assert!(spoiled.mismatches * 2 > spoiled.total(), "the judge must notice wrong hits: {spoiled}");
 }
 
-/// Rays between random points of the scene's bounds, half of them aimed at vertices of hit triangles' bricks.
+/// Rays between random points of the scene's bounds, half of them aimed at points of triangles: inside, on edges, at vertices.
 fn check_trace(name: &str, scene: &Path, rays: i32) {
     let file = open_scene(scene).expect("the scene");
     let truth = Truth::load(&file).expect("truth");
@@ -114,9 +115,16 @@ fn check_trace(name: &str, scene: &Path, rays: i32) {
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let mut point = || min + (max - min) * DVec3::new(random(), random(), random());
+    let corners: Vec<[DVec3; 3]> =
+        truth.ids().filter_map(|id| truth.vertices(id)).map(|v| v.map(DVec3::from_array)).collect();
     let rays: Vec<npy::Ray> = (0..rays)
         .map(|i| {
-            let (from, to) = (point(), point());
+            let (from, mut to) = (point(), point());
+            if i % 2 == 0 {
+                let [a, b, c] = corners[i as usize * 7919 % corners.len()];
+                let w = [[1.0, 1.0, 1.0], [2.0, 1.0, 0.0], [0.0, 0.0, 3.0]][i as usize / 2 % 3];
+                to = (a * w[0] + b * w[1] + c * w[2]) / 3.0;
+            }
             // Directions of all lengths; some bounded intervals.
             let length = 10f64.powi(i % 7 - 3);
             let direction = (to - from) * length;
@@ -138,22 +146,25 @@ fn check_trace(name: &str, scene: &Path, rays: i32) {
         count += usize::from(hit.triangle != NONE);
         if let (Some(truth), Some((id, _))) = (truth.closest(&dumped), found)
             && truth.id == id
+            // Across a sliver the weights of its near vertices are all but undetermined.
+            && !name.contains("Slivers")
         {
             let error = (truth.u - f64::from(hit.u)).abs().max((truth.v - f64::from(hit.v)).abs());
             assert!(error < 0.02, "weights of the source's vertices: {hit:?} is not {truth:?}");
         }
     }
-    report(&format!("{name}, trace"), &tally, rays.len() / 12, count);
-    report(&format!("{name}, trace --any"), &occlusion, rays.len() / 12, count);
+    report(&format!("{name}, trace"), &tally, rays.len() / 6, count);
+    report(&format!("{name}, trace --any"), &occlusion, rays.len() / 6, count);
 }
 
 #[test]
 fn soups_are_exact() {
     for kind in [SoupKind::Uniform, SoupKind::Clustered, SoupKind::Slivers] {
         let folder = common::folder();
-        let scene = made(folder.path(), soup(kind, 3000, 11), 256);
-        check_walk(&format!("{kind:?} soup"), &scene, "80x56", None);
-        check_trace(&format!("{kind:?} soup"), &scene, 2400);
+        let scene = made(folder.path(), soup(kind, if kind == SoupKind::Slivers { 20_000 } else { 3000 }, 11), 256);
+        let (size, rays) = if kind == SoupKind::Slivers { ("48x32", 400) } else { ("80x56", 2400) };
+        check_walk(&format!("{kind:?} soup"), &scene, size, None);
+        check_trace(&format!("{kind:?} soup"), &scene, rays);
     }
 }
 
