@@ -16,7 +16,7 @@ use std::time::Duration;
 fn scene() -> PathBuf {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("streaming.bricks");
     if !path.exists() {
-        let words = ["brickwalk", "scene", "city", "--triangles", "1.5M", "-o"].map(std::ffi::OsString::from);
+        let words = ["brickwalk", "scene", "city", "--triangles", "1500K", "-o"].map(std::ffi::OsString::from);
         let cli = Cli::parse_from(words.into_iter().chain([path.clone().into()]));
         brickwalk::app::run(&cli.command).expect("a city");
     }
