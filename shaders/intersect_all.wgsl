@@ -11,10 +11,11 @@
 
 // A group of the top level: the node, and its entered children, inner ones and leaves alike, by priority in the high byte,
 // so that bricks are met near to far.
-fn top_group(ray: BoxRay, node: u32, t_max: f32) -> vec2<u32> {
+fn top_group(ray: FramedRay, node: u32, t_max: f32) -> vec2<u32> {
     let at = 5u * node;
     let n1 = top8[at + 1u];
     let entered = node_hits(ray, top8[at], top8[at + 2u], top8[at + 3u], top8[at + 4u], vec3<f32>(0.0), vec3<f32>(0.0), params.instance_pad, t_max).mask;
+    nodes_visited += 1u;
     var bits = 0u;
     for (var i = 0u; i < 8u; i++) {
         let what = (select(n1.z, n1.w, i >= 4u) >> (8u * (i & 3u))) & 255u;
@@ -25,8 +26,6 @@ fn top_group(ray: BoxRay, node: u32, t_max: f32) -> vec2<u32> {
     return vec2<u32>(node, bits);
 }
 
-override COUNT: bool = false; // count nodes and triangles visited
-
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
@@ -35,31 +34,25 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     let ray = rays[index];
-    if !(ray.t_min <= ray.t_max) {
-        return;
-    }
-    if params.top_count == 0u {
+    if !(ray.t_min <= ray.t_max) || params.top_count == 0u {
         return;
     }
     let any_hit = (params.flags & PARAM_ANY_HIT) != 0u;
     let before = hits[index];
-    var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0);
-    let world = box_ray(ray.origin, ray.direction, ray.t_min);
-    let world_frame = ray_frame(ray.direction);
+    let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
     var r: BrickRay;
-    r.box = world;
+    r.ray = world;
     var stack: array<vec2<u32>, STACK_SIZE>;
     var depth = 0u;
     var floor = 0u;                         // stack depth at which the brick ends
     var in_brick = false;
     var group = top_group(world, 0u, best.t);
-    var nodes = 1u;
-    var triangles = 0u;
     loop {
-        if group.y <= 0x00ffffffu {
+        if !has_children(group) {
             if in_brick && depth == floor {
                 in_brick = false;
-                r.box.flip = world.flip;
+                r.ray.flip = world.flip;
             }
             if depth == 0u {
                 break;
@@ -67,36 +60,20 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             depth -= 1u;
             group = stack[depth];
         }
-        let bit = firstLeadingBit(group.y);
-        let rest = vec2<u32>(group.x, group.y & ~(1u << bit));
-        if rest.y > 0x00ffffffu {
+        let nearest = nearest_child(group, r.ray.flip);
+        if has_children(nearest.rest) {
             if depth == STACK_SIZE {
                 atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
                 break;
             }
-            stack[depth] = rest;
+            stack[depth] = nearest.rest;
             depth += 1u;
         }
-        let slot = (31u - bit) ^ r.box.flip;
+        let slot = nearest.slot;
         if in_brick {
-            let child = group.x + countOneBits(group.y & 0xffu & ((1u << slot) - 1u));
-            let visited = visit_node(&r, child, best.t);
-            nodes += 1u;
-            group = visited.xy;
-            var bits = visited.z;
-            if bits != 0u {
-                let first = cache_vec4(r.page, r.nodes + 5u * child + 1u).y;
-                triangles += countOneBits(bits);
-                while bits != 0u {
-                    let triangle = firstTrailingBit(bits);
-                    bits &= bits - 1u;
-                    if test_triangle(&r, &best, first + triangle) && any_hit {
-                        break;
-                    }
-                }
-                if any_hit && best.leaf != NONE {
-                    break;
-                }
+            group = visit_node(&r, &best, child_index(group, slot), any_hit);
+            if any_hit && best.leaf != NONE {
+                break;
             }
             continue;
         }
@@ -104,24 +81,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let n1 = top8[5u * group.x + 1u];
         if (inner & (1u << slot)) != 0u {
             group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
-            nodes += 1u;
         } else {
             let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
             floor = depth;
             in_brick = true;
-            enter_leaf(&r, world, ray.direction, world_frame, leaf);
+            enter_leaf(&r, world, leaf);
             enter_brick(&r, leaves[leaf].brick);
-            group = root_group(r.box.flip);
+            group = root_group(r.ray.flip);
         }
     }
-    if best.leaf != NONE {
-        let leaf = best.leaf;
-        enter_leaf(&r, world, ray.direction, world_frame, leaf);
-        enter_brick(&r, leaves[leaf].brick);
-        write_hit(&r, best, ray.direction, index);
-    }
-    if COUNT {
-        atomicAdd(&counters[COUNTER_NODES], nodes);
-        atomicAdd(&counters[COUNTER_TRIANGLES], triangles);
-    }
+    finish_walk(&r, world, best, index);
 }

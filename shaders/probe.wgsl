@@ -63,7 +63,7 @@ fn triangles(@builtin(global_invocation_id) id: vec3<u32>) {
     put(at + 3u, f.iz);
     put3(at + 4u, f.inv);
 
-    let h = intersect_triangle(f, barrier3(a - o), barrier3(b - o), barrier3(c - o), d, x3.w);
+    let h = intersect_triangle(f, barrier3(a - o), barrier3(b - o), barrier3(c - o), x3.w);
     results[at + 7u] = u32(h.hit);
     put(at + 8u, h.t);
     put(at + 9u, h.u);

@@ -30,8 +30,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if occluded && !needed {
         return;
     }
-    let world = box_ray(ray.origin, ray.direction, ray.t_min);
-    let world_frame = ray_frame(ray.direction);
+    let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var r: BrickRay;
     for (var next = entry.first; next < entry.first + entry.selected; next++) {
         let position = selection[next];
@@ -43,10 +42,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             }
             continue;
         }
-        enter_leaf(&r, world, ray.direction, world_frame, leaf);
+        enter_leaf(&r, world, leaf);
         let at = 5u * leaves[leaf].brick;
         let n1 = roots[at + 1u];
-        let entered = node_hits(r.box, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, hit.t);
+        let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, hit.t);
         var near = T_INFINITE;
         var any = false;
         for (var i = 0u; i < 8u; i++) {

@@ -8,15 +8,15 @@
 #include "shared/leaf.wgsl"
 
 // Whether the ray enters a box of the top level in its range, padded as in node_hits.
-fn enters(ray: BoxRay, node: u32, t_max: f32) -> bool {
+fn enters(ray: FramedRay, node: u32, t_max: f32) -> bool {
     let lo = top2[node].min;
     let hi = top2[node].max;
     let reach = max(abs(lo - ray.origin), abs(hi - ray.origin));
     let m = max(reach.x, max(reach.y, reach.z));
     let o = abs(ray.origin);
     let delta = vec3<f32>(64.0 * UNIT * m + params.instance_pad * (m + max(o.x, max(o.y, o.z)))) + 8.0 * UNIT * max(abs(lo), abs(hi));
-    let a = (lo - delta - ray.origin) * ray.inverse;
-    let b = (hi + delta - ray.origin) * ray.inverse;
+    let a = (lo - delta - ray.origin) * ray.frame.inv;
+    let b = (hi + delta - ray.origin) * ray.frame.inv;
     let near = min(a, b);
     let far = max(a, b);
     return max(max(near.x, near.y), max(near.z, ray.t_min)) <= min(min(far.x, far.y), min(far.z, t_max));
@@ -42,14 +42,14 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
             if ray.t_min > ray.t_max || occluded {
                 continue;
             }
-            let world = box_ray(ray.origin, ray.direction, ray.t_min);
+            let world = framed_ray(ray.origin, ray.direction, ray.t_min);
             if node.right != NONE {
                 seen += u32(enters(world, node.left, hit.t) || enters(world, node.right, hit.t));
             } else if enters(world, pair.node, hit.t) {
                 var r: BrickRay;
-                enter_leaf(&r, world, ray.direction, ray_frame(ray.direction), node.left);
+                enter_leaf(&r, world, node.left);
                 let brick = 5u * leaves[node.left].brick;
-                let entered = node_hits(r.box, roots[brick], roots[brick + 2u], roots[brick + 3u], roots[brick + 4u], r.offset_high, r.offset_low, 0.0, hit.t).mask;
+                let entered = node_hits(r.ray, roots[brick], roots[brick + 2u], roots[brick + 3u], roots[brick + 4u], r.offset_high, r.offset_low, 0.0, hit.t).mask;
                 seen += u32(traversal_mask(entered, roots[brick + 1u], 0u) != 0u);
             }
         }

@@ -1,5 +1,5 @@
 // Walks the binary top level for each tile, near child first, and lists the leaves its rays may meet. Run twice: first to
-// count (PASS_COUNT), then, after tile_scan has placed the lists, to write them.
+// count, then, after tile_scan has placed the lists, to WRITE them.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"

@@ -9,6 +9,7 @@ struct Best {
     v: f32,
     w: f32,
     det: f32,
+    source: u32,              // triangle that the ray starts from
 }
 
 // Points `r` at the brick's geometry in the cache.
@@ -54,21 +55,21 @@ fn triangle_indices(r: ptr<function, BrickRay>, triangle: u32) -> vec3<u32> {
 }
 
 // Tests one triangle and keeps the nearer hit; at equal distance the lower global id, so that no order shows.
-// Returns whether it is the best so far.
+// The triangle that the ray starts from is never met (numerics.md, "Secondary rays"). Returns whether it is the best so far.
 fn test_triangle(r: ptr<function, BrickRay>, best: ptr<function, Best>, triangle: u32) -> bool {
     let index = triangle_indices(r, triangle);
-    let a = barrier3(vertex(r, index.x) - (*r).origin);
-    let b = barrier3(vertex(r, index.y) - (*r).origin);
-    let c = barrier3(vertex(r, index.z) - (*r).origin);
-    let h = intersect_triangle((*r).frame, a, b, c, (*r).direction, (*r).box.t_min);
+    let a = barrier3(vertex(r, index.x) - (*r).ray.origin);
+    let b = barrier3(vertex(r, index.y) - (*r).ray.origin);
+    let c = barrier3(vertex(r, index.z) - (*r).ray.origin);
+    let h = intersect_triangle((*r).ray.frame, a, b, c, (*r).ray.t_min);
     if !h.hit || h.t > (*best).t {
         return false;
     }
     let id = (*r).base + cache_word((*r).page, (*r).ids + triangle);
-    if h.t == (*best).t && id >= (*best).id {
+    if (h.t == (*best).t && id >= (*best).id) || id == (*best).source {
         return false;
     }
-    *best = Best(h.t, id, (*r).leaf, triangle, h.u, h.v, h.w, h.det);
+    *best = Best(h.t, id, (*r).leaf, triangle, h.u, h.v, h.w, h.det, (*best).source);
     return true;
 }
 
@@ -76,7 +77,7 @@ fn test_triangle(r: ptr<function, BrickRay>, best: ptr<function, Best>, triangle
 fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>, ray: u32) {
     let instance = leaves[best.leaf].instance;
     let index = triangle_indices(r, best.triangle);
-    let s = surface_point(vertex(r, index.x), vertex(r, index.y), vertex(r, index.z), best.u, best.v, best.w, best.det, (*r).direction);
+    let s = surface_point(vertex(r, index.x), vertex(r, index.y), vertex(r, index.z), best.u, best.v, best.w, best.det, (*r).ray.direction);
     hits[ray] = Hit(best.t, best.id, divide(best.v, best.det), divide(best.w, best.det));
     var point = offset_origin(s);
     var normal = s.n;
@@ -101,7 +102,7 @@ fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>,
         let sign = bitcast<vec3<u32>>(select(normal, -world_direction, normal == vec3<f32>(0.0))) >> vec3<u32>(31u);
         point = offset_origin(SurfacePoint(p, error, normal, sign.x | (sign.y << 1u) | (sign.z << 2u)));
     }
-    surfaces[ray] = Surface(point, best.leaf, normal, best.triangle, area, 0u, 0u, 0u);
+    surfaces[ray] = Surface(point, best.leaf, normal, best.triangle, area, best.source, 0u, 0u);
 }
 
 // A vector of length one, the same bits in every pipeline.

@@ -239,9 +239,9 @@ fn shear(f: RayFrame, v: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(barrier(p.x - barrier(f.sx * p.z)), barrier(p.y - barrier(f.sy * p.z)), p.z);
 }
 
-// Closest-hit candidate of the ray (0, d), f = ray_frame(d), with a triangle whose vertices are relative to the ray's origin.
+// Closest-hit candidate of the ray from 0 with frame f with a triangle whose vertices are relative to the ray's origin.
 // Closed on its edges, two-sided, t >= t_min >= 0. Accept it when t < best.t, or t == best.t and its id is lower.
-fn intersect_triangle(f: RayFrame, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, d: vec3<f32>, t_min: f32) -> TriangleHit {
+fn intersect_triangle(f: RayFrame, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, t_min: f32) -> TriangleHit {
     let miss = TriangleHit(false, 0.0, 0.0, 0.0, 0.0, 0.0);
     let sa = shear(f, a);
     let sb = shear(f, b);

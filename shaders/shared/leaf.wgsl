@@ -1,10 +1,7 @@
 // A ray at a leaf of the top level: transformed into the frame of the leaf's instance.
 
 struct BrickRay {
-    box: BoxRay,
-    origin: vec3<f32>,        // in the object's frame
-    direction: vec3<f32>,
-    frame: RayFrame,
+    ray: FramedRay,           // in the object's frame
     offset_high: vec3<f32>,   // brick origin in the object's frame
     offset_low: vec3<f32>,
     leaf: u32,
@@ -37,24 +34,17 @@ fn object_point(instance: u32, p: vec3<f32>) -> vec3<f32> {
                      row_point(instances[instance].object_from_world[2], p));
 }
 
-// Points `r` at leaf `leaf`. The ray of the instance is made anew only where the instance is not the world.
-fn enter_leaf(r: ptr<function, BrickRay>, world: BoxRay, world_direction: vec3<f32>, world_frame: RayFrame, leaf: u32) {
+// Points `r` at a leaf. The ray of the instance is made anew only where the instance is not the world.
+fn enter_leaf(r: ptr<function, BrickRay>, world: FramedRay, leaf: u32) {
     let l = leaves[leaf];
     (*r).leaf = leaf;
     (*r).offset_high = l.offset_high;
     (*r).offset_low = l.offset_low;
     (*r).base = instances[l.instance].base;
     if (instances[l.instance].flags & INSTANCE_IDENTITY) != 0u {
-        (*r).box = world;
-        (*r).origin = world.origin;
-        (*r).direction = world_direction;
-        (*r).frame = world_frame;
+        (*r).ray = world;
     } else {
-        let d = object_direction(l.instance, world_direction);
         let o = object_point(l.instance, world.origin);
-        (*r).box = box_ray(o, d, world.t_min);
-        (*r).origin = o;
-        (*r).direction = d;
-        (*r).frame = ray_frame(d);
+        (*r).ray = framed_ray(o, object_direction(l.instance, world.direction), world.t_min);
     }
 }

@@ -1,30 +1,21 @@
 // The padded test of a ray against the eight child boxes of a wide node (numerics.md, "Boxes").
 
-struct BoxRay {
+// A ray with all that traversal derives from it once, in the world's frame or an instance's.
+struct FramedRay {
     origin: vec3<f32>,
-    t_min: f32,
-    inverse: vec3<f32>,   // clamped reciprocal direction, finite
+    t_min: f32,           // not negative
+    direction: vec3<f32>,
     flip: u32,            // slot ^ flip ascends away from the ray's origin
+    frame: RayFrame,
 }
 
 const UNIT: f32 = 5.9604645e-8;       // 2^-24
-const INVERSE_LIMIT: f32 = 7.9228163e28; // 2^96
 
-fn clamped_inverse(d: f32) -> f32 {
-    let sign = bitcast<u32>(d) & 0x80000000u;
-    // Below 2^-96, denormals and zeros included, the limit itself with the sign of d.
-    if abs(d) < 1.2621775e-29 {
-        return bitcast<f32>(bitcast<u32>(INVERSE_LIMIT) | sign);
-    }
-    return 1.0 / d;
-}
-
-fn box_ray(origin: vec3<f32>, direction: vec3<f32>, t_min: f32) -> BoxRay {
-    let inverse = vec3<f32>(clamped_inverse(direction.x), clamped_inverse(direction.y), clamped_inverse(direction.z));
+fn framed_ray(origin: vec3<f32>, direction: vec3<f32>, t_min: f32) -> FramedRay {
     let negative = (bitcast<vec3<u32>>(direction) >> vec3<u32>(31u));
     // Slots are placed by octant: slot bit 2 is x, bit 1 y, bit 0 z, set for the upper half of the parent.
     let flip = (negative.x << 2u) | (negative.y << 1u) | negative.z;
-    return BoxRay(origin, max(t_min, 0.0), inverse, flip);
+    return FramedRay(origin, max(t_min, 0.0), direction, flip, ray_frame(direction));
 }
 
 fn bytes4(word: u32) -> vec4<f32> {
@@ -38,7 +29,7 @@ struct NodeHits {
 
 // Words of a node: [0] origin xyz, exponents and inner mask; [1] child base, triangle base, meta; [2..5] lo x y z, hi x y z.
 // `offset` turns node space into the ray's; `slack` adds to the padding in units of 2^-24 of the largest distance.
-fn node_hits(ray: BoxRay, n0: vec4<u32>, n2: vec4<u32>, n3: vec4<u32>, n4: vec4<u32>, offset_high: vec3<f32>, offset_low: vec3<f32>, slack: f32, t_max: f32) -> NodeHits {
+fn node_hits(ray: FramedRay, n0: vec4<u32>, n2: vec4<u32>, n3: vec4<u32>, n4: vec4<u32>, offset_high: vec3<f32>, offset_low: vec3<f32>, slack: f32, t_max: f32) -> NodeHits {
     let p = bitcast<vec3<f32>>(n0.xyz);
     let s = bitcast<vec3<f32>>((vec3<u32>(n0.w, n0.w >> 8u, n0.w >> 16u) & vec3<u32>(255u)) << vec3<u32>(23u));
     let pc = (p + offset_high) + offset_low;
@@ -48,11 +39,12 @@ fn node_hits(ray: BoxRay, n0: vec4<u32>, n2: vec4<u32>, n3: vec4<u32>, n4: vec4<
     let o = abs(ray.origin);
     // The last term covers the roundings of a wide brick's offset and is below the others for near bricks.
     let delta = vec3<f32>(64.0 * UNIT * m + slack * (m + max(o.x, max(o.y, o.z)))) + 4.0 * UNIT * abs(pc) + 2.0 * UNIT * abs(offset_low);
-    let negative = ray.inverse < vec3<f32>(0.0);
-    let scale = s * ray.inverse;
+    let inverse = ray.frame.inv;
+    let negative = inverse < vec3<f32>(0.0);
+    let scale = s * inverse;
     let signed_delta = select(delta, -delta, negative);
-    let near0 = (w - signed_delta) * ray.inverse;
-    let far0 = (w + signed_delta) * ray.inverse;
+    let near0 = (w - signed_delta) * inverse;
+    let far0 = (w + signed_delta) * inverse;
     // lo x: n2.xy, lo y: n2.zw, lo z: n3.xy, hi x: n3.zw, hi y: n4.xy, hi z: n4.zw
     let near_x = select(n2.xy, n3.zw, negative.x);
     let far_x = select(n3.zw, n2.xy, negative.x);

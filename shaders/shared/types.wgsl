@@ -55,7 +55,7 @@ struct Surface {
     normal: vec3<f32>,    // geometric unit normal toward the ray's side, world space
     triangle: u32,        // triangle within the brick
     area: f32,            // twice the triangle's area in the world, device units
-    padding0: u32,
+    source: u32,          // id of the triangle that the ray starts from, which it does not meet; NONE: of none
     padding1: u32,
     padding2: u32,
 }

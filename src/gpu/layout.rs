@@ -52,7 +52,7 @@ mirror! {
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
     struct Hit { t: f32, id: u32, u: f32, v: f32 }
     struct Surface {
-        point: [f32; 3], leaf: u32, normal: [f32; 3], triangle: u32, area: f32, padding0: u32, padding1: u32, padding2: u32,
+        point: [f32; 3], leaf: u32, normal: [f32; 3], triangle: u32, area: f32, source: u32, padding1: u32, padding2: u32,
     }
     struct TileBounds {
         origin_min: [f32; 3], t_min: f32, origin_max: [f32; 3], t_max: f32,
