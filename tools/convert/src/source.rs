@@ -1,4 +1,125 @@
 //! What importers and generators produce and the builder consumes: meshes in f64, placed by matrices.
+//!
+//! A [`Source`] is read part by part, so that no more than a few parts need to be in memory. A [`SourceScene`] holds
+//! everything and is a source through [`InMemory`].
+
+use std::borrow::Cow;
+
+/// Triangles that a part of a source should have at most, unless it lies in memory anyway.
+pub const PART_TRIANGLES: u32 = 1 << 17;
+
+/// A scene that is read part by part.
+///
+/// Its parts, in the order of meshes and of parts within them, hold the same triangles each time they are read, from any
+/// number of threads at once.
+pub trait Source: Send + Sync {
+    /// Everything but geometry and texels.
+    fn outline(&self) -> &Outline;
+
+    /// The triangles of part `part` of mesh `mesh`, as many as its [`PartOutline`] says.
+    ///
+    /// # Errors
+    /// The input cannot be read, or what it holds is no geometry.
+    fn part(&self, mesh: usize, part: usize) -> Result<Cow<'_, Primitive>, SourceError>;
+
+    /// The texels of texture `index`.
+    ///
+    /// # Errors
+    /// The image is missing or cannot be decoded. This is no reason not to convert: the builder warns and leaves it out.
+    fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError>;
+}
+
+/// Why a source could not be read: one line that names the file, the thing in it and the remedy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct SourceError(pub String);
+
+/// A scene without its geometry and texels.
+#[derive(Clone, Debug, Default)]
+pub struct Outline {
+    /// Meshes, each stored once.
+    pub meshes: Vec<MeshOutline>,
+    /// Uses of meshes, in the order in which global triangle ids accumulate (inputs as given, nodes depth first).
+    pub placements: Vec<Placement>,
+    /// Materials; primitives index them.
+    pub materials: Vec<bricks::Material>,
+    /// Names of the textures, for messages; materials index them.
+    pub textures: Vec<String>,
+    /// Input files.
+    pub sources: Vec<bricks::Source>,
+    /// What was ignored or repaired, one line each.
+    pub warnings: Vec<String>,
+    /// Whether any source has animation.
+    pub has_animation: bool,
+}
+
+/// A mesh without its geometry.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshOutline {
+    /// Name, or its index in the source.
+    pub name: String,
+    /// Its parts in the order of its triangles.
+    pub parts: Vec<PartOutline>,
+}
+
+impl MeshOutline {
+    /// Number of triangles, degenerate ones counted.
+    pub fn triangle_count(&self) -> u64 {
+        self.parts.iter().map(|part| u64::from(part.triangles)).sum()
+    }
+}
+
+/// A run of triangles of one primitive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PartOutline {
+    /// Index of the primitive in its mesh; a large primitive has several parts, one after the other.
+    pub primitive: u32,
+    /// Number of its triangles, degenerate ones counted.
+    pub triangles: u32,
+}
+
+/// A [`SourceScene`] as a source: a part is a primitive.
+#[derive(Clone, Debug, Default)]
+pub struct InMemory {
+    outline: Outline,
+    meshes: Vec<Mesh>,
+    textures: Vec<SourceTexture>,
+}
+
+impl From<SourceScene> for InMemory {
+    fn from(scene: SourceScene) -> Self {
+        let part =
+            |(primitive, p): (u32, &Primitive)| PartOutline { primitive, triangles: (p.indices.len() / 3) as u32 };
+        let mesh = |mesh: &Mesh| MeshOutline {
+            name: mesh.name.clone(),
+            parts: (0u32..).zip(&mesh.primitives).map(part).collect(),
+        };
+        let outline = Outline {
+            meshes: scene.meshes.iter().map(mesh).collect(),
+            placements: scene.placements,
+            materials: scene.materials,
+            textures: scene.textures.iter().map(|texture| texture.name.clone()).collect(),
+            sources: scene.sources,
+            warnings: scene.warnings,
+            has_animation: scene.has_animation,
+        };
+        Self { outline, meshes: scene.meshes, textures: scene.textures }
+    }
+}
+
+impl Source for InMemory {
+    fn outline(&self) -> &Outline {
+        &self.outline
+    }
+
+    fn part(&self, mesh: usize, part: usize) -> Result<Cow<'_, Primitive>, SourceError> {
+        Ok(Cow::Borrowed(&self.meshes[mesh].primitives[part]))
+    }
+
+    fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError> {
+        Ok(Cow::Borrowed(&self.textures[index]))
+    }
+}
 
 /// A scene in memory, before it is rounded to a lattice and cut into bricks.
 #[derive(Clone, Debug, Default)]
