@@ -45,13 +45,17 @@ fn main() {
 
 /// The commit of the sources, or "unknown" outside a checkout.
 fn commit() -> String {
-    println!("cargo::rerun-if-changed=.git/HEAD");
-    println!("cargo::rerun-if-changed=.git/refs/heads");
-    let output = std::process::Command::new("git").args(["rev-parse", "--short=12", "HEAD"]).output();
-    match output {
-        Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).trim().to_string(),
-        _ => "unknown".to_string(),
+    let git = |arguments: &[&str]| {
+        let output = std::process::Command::new("git").arg("rev-parse").args(arguments).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
+    };
+    // The log of HEAD grows with every commit, checkout and rebase. A file that does not exist would make every build run anew.
+    for file in ["HEAD", "logs/HEAD"] {
+        if let Some(path) = git(&["--git-path", file]).filter(|path| Path::new(path).exists()) {
+            println!("cargo::rerun-if-changed={path}");
+        }
     }
+    git(&["--short=12", "HEAD"]).unwrap_or_else(|| "unknown".to_string())
 }
 
 /// A table of all shader files, kernels and shared ones.
