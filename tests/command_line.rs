@@ -70,11 +70,16 @@ fn bad_scenes_are_refused_with_status_1() {
         refuse(&["walk", text(&at("cut.bricks")), "-o", text(&out)], 1, &["cut.bricks"]);
         refuse(&["verify", text(&at("cut.bricks"))], 1, &["cut.bricks"]);
     }
-    // A flipped byte in the middle of the payloads: verify names the brick, a walk that meets it fails with its name.
+    // A flipped byte in the geometry of brick 7: verify names the brick, a walk that loads it fails with its name.
     let mut flipped = whole.clone();
-    flipped[whole.len() / 3] ^= 16;
+    let geometry = bricks::SceneFile::open(&scene).expect("the scene").resident().bricks[7].geometry;
+    flipped[geometry.offset as usize + 100] ^= 16;
     std::fs::write(at("flipped.bricks"), &flipped).expect("a file");
-    refuse(&["verify", text(&at("flipped.bricks"))], 1, &["flipped.bricks", "brick"]);
+    refuse(&["verify", text(&at("flipped.bricks"))], 1, &["flipped.bricks", "brick 7"]);
+    let everything = ["--cache", "100%", "--schedule", "plain", "--frames", "1", "--size", "32x32"];
+    let (damaged, flipped_out) = (at("flipped.bricks"), at("flipped"));
+    let words = [&["walk", text(&damaged), "-o", text(&flipped_out)], &everything[..]].concat();
+    refuse(&words, 1, &["flipped.bricks", "brick 7"]);
     refuse(&["walk", text(&scene), "-o", text(&out), "--cache", "1K"], 1, &["cache", "two largest bricks"]);
     refuse(
         &["walk", text(&scene), "-o", text(&out), "--cache", "20%", "--schedule", "plain"],
