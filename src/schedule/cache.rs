@@ -75,6 +75,9 @@ impl Cache {
         let start = Instant::now();
         let before = self.residency.counters();
         self.residency.unpin_all();
+        if let Some(trace) = &mut self.trace {
+            trace.begin_batch();
+        }
         let mut loads = Vec::new();
         for &item in items.iter().take(most) {
             let Ok(placed) = self.residency.insert(item) else { break };

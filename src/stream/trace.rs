@@ -3,13 +3,15 @@
 //! The file's first line describes the cache, every other line one pass:
 //!
 //! ```text
-//! {"format":1,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"sizes":[[1024,512],[2048,512]]}
-//! {"frame":0,"pass":"primary","requests":["g0","g1","a1"]}
+//! {"format":2,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"passes":1,"sizes":[[1024,512],[2048,512]]}
+//! {"frame":0,"pass":"primary","requests":["g0","g1","a1"],"batches":[1]}
 //! ```
 //!
-//! `sizes` are the bytes of geometry and attributes of every brick; `g1` is the geometry of brick 1, `a1` its attributes.
-//! A request is one use of an item by a pass, resident or not. The order of requests was chosen knowing what was resident
-//! (resident bricks come first), so a replay shows what another cache makes of these requests, not of the same frames.
+//! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick; `g1` is the
+//! geometry of brick 1, `a1` its attributes. A request is one use of an item by a pass, resident or not. `batches` are the
+//! positions in `requests` at which a batch of loads began: what a batch loads is not evicted before the next one begins.
+//! The order of requests was chosen knowing what was resident (resident bricks come first), so a replay shows what another
+//! cache makes of these requests, not of the same frames.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufWriter, Write};
@@ -21,7 +23,7 @@ use super::item::{Item, Policy};
 use super::residency::{Residency, ResidencyError};
 
 /// The format number of a trace.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Why a trace cannot be written, read or replayed.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +61,8 @@ pub struct PassRequests {
     pub pass: String,
     /// What it used.
     pub requests: Vec<Item>,
+    /// Positions in `requests` at which batches of loads begin, ascending.
+    pub batches: Vec<usize>,
 }
 
 /// The sequence of requests of a walk.
@@ -83,7 +87,14 @@ struct Head {
     policy: String,
     budget_bytes: u64,
     page_bytes: u64,
+    passes: usize,
     sizes: Vec<(u64, u64)>,
+}
+
+/// The part of the first line by which another format is told.
+#[derive(Deserialize)]
+struct Format {
+    format: u32,
 }
 
 /// Every other line.
@@ -92,6 +103,7 @@ struct Line {
     frame: u32,
     pass: String,
     requests: Vec<String>,
+    batches: Vec<usize>,
 }
 
 impl Trace {
@@ -102,7 +114,14 @@ impl Trace {
 
     /// Begins a pass; requests count towards it.
     pub fn begin_pass(&mut self, frame: u32, pass: &str) {
-        self.passes.push(PassRequests { frame, pass: pass.to_owned(), requests: Vec::new() });
+        self.passes.push(PassRequests { frame, pass: pass.to_owned(), ..PassRequests::default() });
+    }
+
+    /// Notes that a batch of loads begins with the next request: what it loads is pinned until the next batch.
+    pub fn begin_batch(&mut self) {
+        if let Some(pass) = self.passes.last_mut() {
+            pass.batches.push(pass.requests.len());
+        }
     }
 
     /// Notes a request of the pass that began last; before the first one it is dropped.
@@ -127,13 +146,15 @@ impl Trace {
             policy: self.policy.name().to_owned(),
             budget_bytes: self.budget_bytes,
             page_bytes: self.page_bytes,
+            passes: self.passes.len(),
             sizes: self.sizes.clone(),
         };
         let mut line = |value: serde_json::Result<String>| writeln!(out, "{}", value.map_err(std::io::Error::from)?);
         line(serde_json::to_string(&head))?;
-        for PassRequests { frame, pass, requests } in &self.passes {
+        for PassRequests { frame, pass, requests, batches } in &self.passes {
+            let (pass, batches) = (pass.clone(), batches.clone());
             let requests = requests.iter().map(|item| item.code()).collect();
-            line(serde_json::to_string(&Line { frame: *frame, pass: pass.clone(), requests }))?;
+            line(serde_json::to_string(&Line { frame: *frame, pass, requests, batches }))?;
         }
         Ok(out.flush()?)
     }
@@ -162,29 +183,51 @@ impl Trace {
     /// # Errors
     /// [`TraceError::Line`] says which line is wrong.
     pub fn read(input: impl BufRead) -> Result<Self, TraceError> {
-        let mut trace: Option<Self> = None;
-        for (number, text) in input.lines().enumerate() {
+        let mut trace: Option<(Self, usize)> = None;
+        for (number, text) in input.split(b'\n').enumerate() {
             let text = text?;
             let wrong = |reason: String| TraceError::Line { line: number + 1, reason };
             match &mut trace {
                 None => {
-                    let head: Head = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-                    if head.format != FORMAT {
-                        return Err(wrong(format!("format {}, expected {FORMAT}; record it again", head.format)));
+                    let Format { format } = parse(&text).map_err(wrong)?;
+                    if format != FORMAT {
+                        return Err(wrong(format!("format {format}, expected {FORMAT}; record it again")));
                     }
+                    let head: Head = parse(&text).map_err(wrong)?;
                     let policy = head.policy.parse().map_err(wrong)?;
-                    trace = Some(Self::new(head.sizes, head.budget_bytes, head.page_bytes, policy));
+                    trace = Some((Self::new(head.sizes, head.budget_bytes, head.page_bytes, policy), head.passes));
                 }
-                Some(trace) => {
-                    let line: Line = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-                    let requests: Result<Vec<Item>, _> = line.requests.iter().map(|code| code.parse()).collect();
+                Some((trace, _)) => {
+                    let Line { frame, pass, requests, batches } = parse(&text).map_err(wrong)?;
+                    let requests: Result<Vec<Item>, _> = requests.iter().map(|code| code.parse()).collect();
                     let requests = requests.map_err(|error| wrong(error.to_string()))?;
-                    trace.passes.push(PassRequests { frame: line.frame, pass: line.pass, requests });
+                    if !batches.is_sorted() || batches.last().is_some_and(|&at| at > requests.len()) {
+                        return Err(wrong("batches are not ascending positions in the requests".to_owned()));
+                    }
+                    trace.passes.push(PassRequests { frame, pass, requests, batches });
                 }
             }
         }
-        trace.ok_or(TraceError::Line { line: 1, reason: "the file is empty".to_owned() })
+        let wrong = |line, reason: String| TraceError::Line { line, reason };
+        let (trace, passes) = trace.ok_or_else(|| wrong(1, "the file is empty".to_owned()))?;
+        if trace.passes.len() != passes {
+            let found = trace.passes.len();
+            return Err(wrong(
+                found + 1,
+                format!("it is the last of {found} passes, expected {passes}; copy it again"),
+            ));
+        }
+        Ok(trace)
     }
+}
+
+/// A line's value; the error has the column alone, as the caller names the line.
+fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
+    serde_json::from_slice(line).map_err(|error| {
+        let text = error.to_string();
+        let reason = text.split(" at line ").next().unwrap_or(&text);
+        format!("{reason} at column {}; is it what --requests-out wrote?", error.column())
+    })
 }
 
 /// What to replay a trace against.
@@ -221,6 +264,8 @@ pub struct ReplayResult {
     pub loads: u64,
     /// Bytes loaded.
     pub loaded_bytes: u64,
+    /// Items evicted to make room.
+    pub evicted: u64,
     /// Distinct items: no cache that begins empty loads fewer.
     pub distinct: u64,
     /// Bytes of the distinct items: no cache that begins empty loads fewer.
@@ -232,10 +277,17 @@ impl ReplayResult {
     pub fn hit_rate(&self) -> f64 {
         if self.requests == 0 { 1.0 } else { self.hits as f64 / self.requests as f64 }
     }
+
+    /// Loads of what had been loaded before.
+    pub fn reloads(&self) -> u64 {
+        self.loads - self.distinct
+    }
 }
 
-/// Replays `trace` against a cache that begins empty: bricks of `sizes`, `budget_bytes` in pages of `page_bytes`. Nothing is
-/// pinned.
+/// Replays `trace` against a cache that begins empty: bricks of `sizes`, `budget_bytes` in pages of `page_bytes`.
+///
+/// A cache with a policy pins batches as the walk did, and begins a new batch where one does not fit: with the recorded
+/// sizes, budget, pages and policy it does exactly what the recorded cache did.
 ///
 /// # Errors
 /// A request for a brick without a size, or a cache that cannot be made ([`Residency::new`], for Bélády too).
@@ -262,20 +314,49 @@ pub fn replay(
     }
     match against {
         Replay::Cache(_) => {
-            for &item in &requests {
-                if cache.slot(item).is_some() {
-                    result.hits += 1;
-                    cache.touch(item);
-                } else if cache.insert(item).is_ok() {
-                    // Always: nothing is pinned.
-                    result.loads += 1;
-                    result.loaded_bytes += cache.bytes(item);
-                }
+            for pass in &trace.passes {
+                result.hits += replay_pass(&mut cache, pass);
             }
+            let counters = cache.counters().total();
+            (result.loads, result.loaded_bytes) = (counters.loaded, counters.loaded_bytes);
+            result.evicted = counters.evicted;
         }
         Replay::Belady => belady(&requests, sizes.len(), cache.budget_bytes(), |item| cache.bytes(item), &mut result),
     }
     Ok(result)
+}
+
+/// One pass against a cache; returns the hits.
+fn replay_pass(cache: &mut Residency, pass: &PassRequests) -> u64 {
+    cache.begin_pass();
+    cache.unpin_all();
+    let mut hits = 0;
+    let mut batches = pass.batches.iter().peekable();
+    let mut in_batch = false;
+    for (position, &item) in pass.requests.iter().enumerate() {
+        while batches.next_if(|&&begin| begin <= position).is_some() {
+            cache.unpin_all();
+            in_batch = true;
+        }
+        if cache.bytes(item) == 0 {
+            continue;
+        }
+        if cache.slot(item).is_some() {
+            hits += 1;
+            cache.touch(item);
+            continue;
+        }
+        if cache.insert(item).is_err() {
+            // The batch is full. With nothing pinned every item finds a place.
+            cache.unpin_all();
+            let placed = cache.insert(item);
+            debug_assert!(placed.is_ok());
+        }
+        if in_batch {
+            cache.pin(item);
+        }
+    }
+    hits
 }
 
 /// Bélády's rule, greedily, into `result`. Every item fits into the budget alone.
@@ -299,6 +380,7 @@ fn belady(requests: &[Item], bricks: usize, budget: u64, bytes: impl Fn(Item) ->
             while used > budget {
                 let Some((_, old)) = resident.pop_last() else { break };
                 used -= bytes(old);
+                result.evicted += 1;
             }
         }
         resident.insert((next_use[now], item));

@@ -92,12 +92,8 @@ pub struct WorkersStats {
     pub cached_bytes: u64,
     /// Loads that failed.
     pub failed: u64,
-    /// Payloads brought into the host cache ahead of need.
-    pub prefetched: u64,
-    /// Bytes of those.
-    pub prefetched_bytes: u64,
-    /// Prefetches dropped: cancelled, a full queue, no room in the host cache, or a payload that cannot be had (a later
-    /// load of which says why).
+    /// Prefetches dropped: cancelled, a full queue, no room in the host cache, loaded meanwhile, or a payload that cannot
+    /// be had (a later load of which says why). The host cache counts those that arrived.
     pub prefetch_dropped: u64,
 }
 
@@ -108,8 +104,6 @@ struct Tally {
     cached: AtomicU64,
     cached_bytes: AtomicU64,
     failed: AtomicU64,
-    prefetched: AtomicU64,
-    prefetched_bytes: AtomicU64,
     prefetch_dropped: AtomicU64,
 }
 
@@ -133,16 +127,11 @@ pub(super) struct Job<D> {
     answers: Sender<Answer<D>>,
 }
 
-/// An item to bring into the host cache, and the state of [`Shared::prefetch_round`] when it was asked for.
-pub(super) type Wish = (Item, u64);
-
 /// What the threads share.
 pub(super) struct Shared {
     source: Arc<dyn PayloadSource>,
     host_cache: Arc<HostCache>,
     tally: Tally,
-    /// Prefetches of earlier rounds are dropped.
-    prefetch_round: AtomicU64,
     stop: AtomicBool,
 }
 
@@ -150,7 +139,9 @@ pub(super) struct Shared {
 pub struct Workers<D: Destination> {
     /// `None` only while dropping.
     jobs: Option<Sender<Job<D>>>,
-    wishes: Option<Sender<Wish>>,
+    wishes: Option<Sender<Item>>,
+    /// The other end of `wishes`, to take back those that wait.
+    waiting: Receiver<Item>,
     /// Carries nothing; closed when the last thread has ended.
     ended: Receiver<Infallible>,
     threads: Vec<JoinHandle<()>>,
@@ -178,23 +169,17 @@ impl<D: Destination> Workers<D> {
         host_cache: Arc<HostCache>,
         threads: usize,
         prefetch_queue: usize,
-        body: fn(&Shared, &Receiver<Job<D>>, &Receiver<Wish>),
+        body: fn(&Shared, &Receiver<Job<D>>, &Receiver<Item>),
     ) -> Result<Self, StreamError> {
         let count = threads.max(1);
-        let shared = Arc::new(Shared {
-            source,
-            host_cache,
-            tally: Tally::default(),
-            prefetch_round: AtomicU64::new(0),
-            stop: AtomicBool::new(false),
-        });
+        let shared = Arc::new(Shared { source, host_cache, tally: Tally::default(), stop: AtomicBool::new(false) });
         // The pool keeps no receiver of jobs, so that sending fails, and does not wait, when the last thread has ended.
         let (jobs, job_queue) = bounded::<Job<D>>(count.saturating_mul(QUEUED_JOBS_PER_THREAD));
-        let (wishes, wish_queue) = bounded::<Wish>(prefetch_queue);
+        let (wishes, waiting) = bounded::<Item>(prefetch_queue);
         let (alive, ended) = bounded(0);
-        let mut workers = Self { jobs: Some(jobs), wishes: Some(wishes), ended, threads: Vec::new(), shared };
+        let mut workers = Self { jobs: Some(jobs), wishes: Some(wishes), waiting, ended, threads: Vec::new(), shared };
         for number in 0..count {
-            let (job_queue, wish_queue) = (job_queue.clone(), wish_queue.clone());
+            let (job_queue, wish_queue) = (job_queue.clone(), workers.waiting.clone());
             let (alive, shared) = (alive.clone(), workers.shared.clone());
             let thread = std::thread::Builder::new().name(format!("brick worker {number}")).spawn(move || {
                 // Dropped however the thread ends.
@@ -272,14 +257,13 @@ impl<D: Destination> Workers<D> {
         let shared = &*self.shared;
         let mut queued = 0;
         let mut dropped = 0;
-        let round = shared.prefetch_round.load(Ordering::Relaxed);
         if let Some(wishes) = &self.wishes
             && wishes.capacity() != Some(0)
             && shared.host_cache.budget_bytes() > 0
         {
             let bricks = shared.source.brick_count();
             for &item in items.iter().filter(|item| item.brick < bricks && !shared.host_cache.contains(**item)) {
-                match wishes.try_send((item, round)) {
+                match wishes.try_send(item) {
                     Ok(()) => queued += 1,
                     Err(_) => dropped += 1,
                 }
@@ -289,9 +273,9 @@ impl<D: Destination> Workers<D> {
         queued
     }
 
-    /// Drops the prefetches that wait, because the camera went elsewhere.
+    /// Drops the prefetches that wait, because the camera went elsewhere. What a thread has begun it finishes.
     pub fn cancel_prefetch(&self) {
-        self.shared.prefetch_round.fetch_add(1, Ordering::Relaxed);
+        add(&self.shared.tally.prefetch_dropped, self.waiting.try_iter().count() as u64);
     }
 
     /// The host cache.
@@ -309,8 +293,6 @@ impl<D: Destination> Workers<D> {
             cached: get(&tally.cached),
             cached_bytes: get(&tally.cached_bytes),
             failed: get(&tally.failed),
-            prefetched: get(&tally.prefetched),
-            prefetched_bytes: get(&tally.prefetched_bytes),
             prefetch_dropped: get(&tally.prefetch_dropped),
         }
     }
@@ -360,7 +342,7 @@ pub(super) fn collect<D>(
 }
 
 /// A worker thread: loads first, prefetches when there are none.
-fn work<D: Destination>(shared: &Shared, jobs: &Receiver<Job<D>>, wishes: &Receiver<Wish>) {
+fn work<D: Destination>(shared: &Shared, jobs: &Receiver<Job<D>>, wishes: &Receiver<Item>) {
     let mut buffer = Vec::new();
     loop {
         select_biased! {
@@ -407,17 +389,14 @@ fn answer<D: Destination>(shared: &Shared, job: Job<D>, buffer: &mut Vec<u8>) {
     let _ = answers.send((index, destination, result));
 }
 
-/// Prefetches one item, if that is still wanted.
-fn grant(shared: &Shared, (item, round): Wish, buffer: &mut Vec<u8>) {
-    let stale = shared.stop.load(Ordering::Relaxed) || shared.prefetch_round.load(Ordering::Relaxed) != round;
-    let done = !stale
+/// Prefetches one item, unless the threads are to end.
+fn grant(shared: &Shared, item: Item, buffer: &mut Vec<u8>) {
+    let done = !shared.stop.load(Ordering::Relaxed)
         && catch_unwind(AssertUnwindSafe(|| {
             let bytes = shared.source.bytes(item);
-            let Some(reservation) = shared.host_cache.reserve(item, bytes) else { return false };
+            let Some(reservation) = shared.host_cache.reserve_ahead(item, bytes) else { return false };
             let Ok(payload) = read(shared, item, bytes as usize, buffer) else { return false };
             reservation.fill(payload);
-            add(&shared.tally.prefetched, 1);
-            add(&shared.tally.prefetched_bytes, bytes);
             true
         }))
         .unwrap_or_else(|panic| {

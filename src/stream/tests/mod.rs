@@ -2,6 +2,7 @@
 
 mod host_cache;
 mod model;
+mod prefetch;
 mod residency;
 mod scene_file;
 mod trace;

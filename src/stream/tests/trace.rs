@@ -1,7 +1,7 @@
 //! Traces: file format, replay against caches, Bélády's rule against exhaustive search.
 
 use super::model::Random;
-use crate::stream::{Item, Policy, Replay, ReplayResult, Trace, TraceError, replay};
+use crate::stream::{Counters, Item, Policy, Replay, ReplayResult, Residency, Trace, TraceError, replay};
 
 fn trace_of(bricks: &[u32], sizes: Vec<(u64, u64)>) -> Trace {
     let mut trace = Trace::new(sizes, 1 << 20, 1 << 20, Policy::RoundRobin);
@@ -17,6 +17,7 @@ fn lines_round_trip() {
     assert_eq!(trace.requests().count(), 0, "there is no pass yet");
     trace.begin_pass(0, "primary");
     trace.request(Item::geometry(1));
+    trace.begin_batch();
     trace.request(Item::attributes(0));
     trace.begin_pass(1, "sha\"dow");
     let mut bytes = Vec::new();
@@ -25,9 +26,9 @@ fn lines_round_trip() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
         lines[0],
-        r#"{"format":1,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"sizes":[[1024,512],[2048,0]]}"#
+        r#"{"format":2,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"passes":2,"sizes":[[1024,512],[2048,0]]}"#
     );
-    assert_eq!(lines[1], r#"{"frame":0,"pass":"primary","requests":["g1","a0"]}"#);
+    assert_eq!(lines[1], r#"{"frame":0,"pass":"primary","requests":["g1","a0"],"batches":[1]}"#);
     assert_eq!(lines.len(), 3);
     assert_eq!(Trace::read(&bytes[..]).unwrap(), trace);
 
@@ -41,14 +42,21 @@ fn lines_round_trip() {
 
 #[test]
 fn a_wrong_line_is_named() {
-    let good = r#"{"format":1,"policy":"lru","budget_bytes":64,"page_bytes":64,"sizes":[[16,16]]}"#;
+    let good = r#"{"format":2,"policy":"lru","budget_bytes":64,"page_bytes":64,"passes":1,"sizes":[[16,16]]}"#;
+    let pass = r#"{"frame":0,"pass":"a","requests":["g0"],"batches":[0]}"#;
     let cases = [
         ("".to_owned(), 1),
         ("{}".to_owned(), 1),
-        (good.replace("\"format\":1", "\"format\":2"), 1),
+        (good.replace("\"format\":2", "\"format\":1"), 1),
         (good.replace("lru", "fifo"), 1),
-        (format!("{good}\n{{\"frame\":0,\"pass\":\"a\",\"requests\":[\"g0\"]}}\n{{\"frame\":1"), 3),
-        (format!("{good}\n{{\"frame\":0,\"pass\":\"a\",\"requests\":[\"h0\"]}}"), 2),
+        (format!("{good}\n{pass}\n{{\"frame\":1"), 3),
+        (format!("{good}\n{}", pass.replace("g0", "h0")), 2),
+        (format!("{good}\n{}", pass.replace("[0]", "[2]")), 2),
+        (format!("{good}\n{}", pass.replace("[0]", "[1,0]")), 2),
+        (format!("{good}\n{}", pass.replace('a', "\u{0}")), 2),
+        // Whole lines are missing, or too many.
+        (good.to_owned(), 1),
+        (format!("{good}\n{pass}\n{pass}"), 3),
     ];
     for (text, expected) in cases {
         match Trace::read(text.as_bytes()) {
@@ -56,7 +64,10 @@ fn a_wrong_line_is_named() {
             other => panic!("{text}: {other:?}"),
         }
     }
-    assert!(Trace::read(good.as_bytes()).is_ok());
+    assert!(matches!(Trace::read(&b"\xff\xfe"[..]), Err(TraceError::Line { line: 1, .. })), "not UTF-8");
+    for end in ["", "\n"] {
+        assert!(Trace::read(format!("{good}\n{pass}{end}").as_bytes()).is_ok());
+    }
 }
 
 #[test]
@@ -67,8 +78,18 @@ fn a_cycle_longer_than_the_cache() {
     let trace = trace_of(&cycle, sizes.clone());
     let results = Replay::ALL.map(|against| replay(&trace, &sizes, 48, 48, against).unwrap());
     let [ring, lru, belady] = results;
-    let none = ReplayResult { requests: 400, hits: 0, loads: 400, loaded_bytes: 6400, distinct: 4, distinct_bytes: 64 };
+    let none = ReplayResult {
+        requests: 400,
+        loads: 400,
+        loaded_bytes: 6400,
+        // What is left in the end was not evicted.
+        evicted: 397,
+        distinct: 4,
+        distinct_bytes: 64,
+        ..ReplayResult::default()
+    };
     assert_eq!((ring, lru), (none, none));
+    assert_eq!((ring.reloads(), belady.evicted), (396, belady.loads - 3));
     // After the first three loads one of three requests misses.
     assert_eq!(belady.loads, 3 + 397_u64.div_ceil(3));
     assert_eq!(belady.hits + belady.loads, 400);
@@ -109,6 +130,68 @@ fn belady_is_the_optimum_for_one_size() {
     }
     // Control: the comparison can fail, as the other policies show.
     assert!(worse > 50, "{worse}");
+}
+
+/// What a cache does when it pins each batch that it loads, as the render loop does, and the trace of it.
+fn walk(seed: u64, policy: Policy) -> (Trace, Counters) {
+    let mut random = Random(seed);
+    let sizes: Vec<(u64, u64)> = (0..30).map(|_| (16 * (1 + random.below(9)), 16 * random.below(3))).collect();
+    let budget = Residency::least_budget(&sizes) + 16 * random.below(40);
+    let mut cache = Residency::new(&sizes, budget, 256, policy).unwrap();
+    let mut trace = Trace::new(sizes, budget, 256, policy);
+    for frame in 0..20 {
+        cache.begin_pass();
+        cache.unpin_all();
+        trace.begin_pass(frame, "primary");
+        let wanted: Vec<Item> = (0..20).filter_map(|_| Item::from_index(random.below(60) as usize)).collect();
+        let (resident, missing): (Vec<Item>, Vec<Item>) = wanted.iter().partition(|&&item| cache.slot(item).is_some());
+        for item in resident {
+            cache.touch(item);
+            trace.request(item);
+        }
+        let mut rest: Vec<Item> = missing.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
+        while !rest.is_empty() {
+            cache.unpin_all();
+            trace.begin_batch();
+            let loaded = rest.iter().take(8).take_while(|&&item| {
+                let placed = cache.insert(item).is_ok();
+                if placed {
+                    cache.pin(item);
+                    trace.request(item);
+                }
+                placed
+            });
+            let loaded = loaded.count();
+            rest.drain(..loaded);
+        }
+    }
+    (trace, cache.counters())
+}
+
+#[test]
+fn a_replay_with_the_recorded_cache_does_what_it_did() {
+    let mut differ = 0;
+    for seed in 0..100 {
+        for policy in Policy::ALL {
+            let (trace, counters) = walk(seed, policy);
+            let counters = counters.total();
+            let again = |trace: &Trace, budget| {
+                replay(trace, &trace.sizes, budget, trace.page_bytes, Replay::Cache(policy)).unwrap()
+            };
+            let result = again(&trace, trace.budget_bytes);
+            assert_eq!(
+                (result.loads, result.loaded_bytes, result.evicted),
+                (counters.loaded, counters.loaded_bytes, counters.evicted),
+                "seed {seed}, {policy}"
+            );
+            // Control: without the batches, or in another cache, it is another story.
+            let mut bare = trace.clone();
+            bare.passes.iter_mut().for_each(|pass| pass.batches.clear());
+            differ += u32::from(again(&bare, trace.budget_bytes) != result);
+            assert_ne!(again(&trace, trace.budget_bytes + 1600), result, "seed {seed}, {policy}");
+        }
+    }
+    assert!(differ > 20, "{differ}");
 }
 
 #[test]
