@@ -154,7 +154,7 @@ fn wrong_usage_is_exit_status_2_and_help_is_0() {
         assert!(stdout(&output).is_empty() && !stderr(&output).is_empty(), "{line}");
     }
     assert!(done(folder, "--version").starts_with("brickwalk "));
-    for command in ["", "demo", "convert", "scene", "info", "verify", "walk", "trace", "compare"] {
+    for command in ["", "demo", "convert", "scene", "info", "verify", "walk", "trace", "replay", "compare"] {
         assert!(done(folder, &format!("{command} --help")).contains("Usage: brickwalk"), "{command}");
     }
     assert!(names(folder).is_empty());

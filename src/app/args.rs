@@ -39,6 +39,8 @@ pub enum Command {
     Walk(WalkArgs),
     /// Find the closest hits of given rays
     Trace(TraceArgs),
+    /// Replay a trace of brick requests against other cache sizes and policies
+    Replay(ReplayArgs),
     /// Measure how far an image is from a reference: RMSE, relMSE, bias, FLIP
     Compare(CompareArgs),
 }
@@ -191,12 +193,14 @@ pub struct StreamArgs {
     /// 0 is exact, more is faster and misses hits
     #[arg(long, value_name = "PIXELS", default_value = "0", value_parser = query_threshold)]
     pub query_threshold: u32,
-    /// Bricks to load ahead; this version loads none
-    #[arg(long, value_name = "N", default_value = "0", hide = true, value_parser = |s: &str| only(s, "0"))]
-    pub prefetch: String,
-    /// Write the trace of brick requests to this file, to be replayed against other caches [default: none]
+    /// Payloads (geometry or attributes of a brick) that the workers may read into the host cache while a frame renders:
+    /// the nearest in the view that the camera's motion leads to; 0 is off. It changes no picture, and saves time only
+    /// where the disk is slow and cores are idle (walk)
+    #[arg(long, value_name = "N", default_value = "0", value_parser = prefetch)]
+    pub prefetch: u32,
+    /// Write the trace of brick requests to this file, for replay against other caches [default: none]
     #[arg(long, value_name = "F")]
-    pub requests_out: Option<String>,
+    pub requests_out: Option<PathBuf>,
     /// Use the graphics adapter whose name contains NAME, upper and lower case alike [default: a GPU, else software]
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
@@ -315,13 +319,34 @@ impl TraceArgs {
         let meaningless = [
             (self.stream.fronts == "on", "--fronts on"),
             (self.stream.query_threshold > 0, "--query-threshold"),
-            (self.stream.requests_out.is_some(), "--requests-out"),
+            (self.stream.prefetch > 0, "--prefetch"),
         ];
         match meaningless.iter().find(|(given, _)| *given) {
             Some((_, option)) => Err(super::Usage(format!("{option} is for walk; leave it out of trace"))),
             None => Ok(()),
         }
     }
+}
+
+/// What the columns of `replay` are.
+const REPLAY: &str = "A request is one use of a payload (geometry or attributes of a brick) by a pass; a load is a request \
+     that found it missing; a reload is a load of what had been loaded before. Every cache begins empty. belady-greedy evicts \
+     what is used again last: a bound that needs to know the future and ignores pages. Sizes below the two largest bricks are \
+     skipped.";
+
+/// Options of `replay`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = format!("{REPLAY}\n\n{UNITS}"))]
+pub struct ReplayArgs {
+    /// The trace that walk or trace wrote with --requests-out
+    #[arg(value_name = "F")]
+    pub requests: PathBuf,
+    /// Caches beside the recorded one: sizes, or shares P% of all bricks [default: 5% 10% 20% 50% 100%]
+    #[arg(long, value_name = "SIZE|P%", num_args = 1.., value_delimiter = ',')]
+    pub cache: Vec<CacheSize>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Options of `compare`.
@@ -448,11 +473,6 @@ fn one_of(text: &str, known: &[&str]) -> Result<String, String> {
     if known.contains(&text) { Ok(text.into()) } else { Err(unknown(text, known, &[])) }
 }
 
-/// Accepts exactly one value: the one that this version does.
-fn only(text: &str, value: &'static str) -> Result<String, String> {
-    if text == value { Ok(text.into()) } else { Err(format!("this version has only {value}")) }
-}
-
 /// Refuses an option that this version only knows by name.
 fn not_built(_: &str) -> Result<String, String> {
     Err("this option is not in this version; leave it out".into())
@@ -481,6 +501,10 @@ fn threads(text: &str) -> Result<u32, String> {
 
 fn query_threshold(text: &str) -> Result<u32, String> {
     ranged(text, 0, 40_000)
+}
+
+fn prefetch(text: &str) -> Result<u32, String> {
+    ranged(text, 0, 65_536)
 }
 
 fn brick_triangles(text: &str) -> Result<u32, String> {

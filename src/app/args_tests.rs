@@ -24,7 +24,7 @@ fn defaults_of_walk_are_the_documented_ones() {
     assert_eq!(w.frames, 30);
     assert_eq!(w.size, ImageSize { width: 1280, height: 720 });
     assert_eq!(w.effects, Effects { shadow: true });
-    assert_eq!((w.spp, w.seed), (1, 0));
+    assert_eq!((w.spp, w.seed, w.stream.prefetch), (1, 0, 0));
     assert_eq!(w.stream.cache, CacheSize::Percent(25.0));
     assert_eq!(w.stream.host_cache, 1 << 30);
     assert_eq!(w.secondary, Secondary::Exact);
@@ -43,7 +43,7 @@ fn options_arrive() {
     let w = walk(
         "--path p.json --frames 3 --size 64x32 --cache 12M --host-cache 2G --schedule plain --effects primary --spp 4 \
          --seed 9 --aov --json --sun -1,2,-3 --sun-angle 0 --sun-intensity 5 --sky-intensity 0 --tile 32 --workers 2 \
-         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru --prefetch 0 \
+         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru --prefetch 16 \
          --requests-out f.jsonl --measure-needed",
     )
     .unwrap();
@@ -57,7 +57,7 @@ fn options_arrive() {
     assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
     assert_eq!(w.stream.adapter.as_deref(), Some("llvm"));
     assert_eq!((w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()), ("on", 20, "lru"));
-    assert!(w.measure_needed && w.stream.requests_out.is_some());
+    assert!(w.measure_needed && w.stream.prefetch == 16 && w.stream.requests_out == Some("f.jsonl".into()));
     assert_eq!(walk("--hash-threads 3").unwrap().stream.worker_count(), 3);
     assert!(walk("").unwrap().stream.worker_count() >= 1);
 }
@@ -95,7 +95,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--fronts yes", "known: on, off"),
         ("--query-threshold 40001", "0 to 40000"),
         ("--evict fifo", "known: round-robin, lru"),
-        ("--prefetch 3", "only 0"),
+        ("--prefetch 65537", "0 to 65536"),
         ("--environment f.hdr", "not in this version"),
         ("--nonsense", "--nonsense"),
     ] {
@@ -123,6 +123,8 @@ fn other_commands_check_too() {
         ("info s.bricks --id 4294967296", "4294967296"),
         ("verify", "S.bricks"),
         ("trace s.bricks -o h.npy", "--rays"),
+        ("replay", "<F>"),
+        ("replay f.jsonl --cache 0%", "above 0 %"),
         ("compare a.png", "<B>"),
         ("walk s.bricks", "--output"),
     ] {
@@ -138,14 +140,14 @@ fn trace_refuses_what_is_for_walks() {
         Command::Trace(args) => args.check(),
         other => panic!("{other:?}"),
     };
-    assert!(check("").is_ok() && check("--any --cache 1M --evict lru").is_ok());
-    for options in ["--fronts on", "--query-threshold 20", "--requests-out f"] {
+    assert!(check("").is_ok() && check("--any --cache 1M --evict lru --requests-out f").is_ok());
+    for options in ["--fronts on", "--query-threshold 20", "--prefetch 4"] {
         assert!(check(options).unwrap_err().to_string().contains(options.split(' ').next().unwrap()), "{options}");
     }
 }
 
 #[test]
-fn convert_and_scene_arrive() {
+fn options_of_other_commands_arrive() {
     let Command::Convert(c) =
         parse("convert a.gltf b.glb -o s.bricks --brick-triangles 4K --threads 2 --lattice -12 --drop-non-finite")
             .unwrap()
@@ -157,6 +159,9 @@ fn convert_and_scene_arrive() {
     assert!(c.drop_non_finite);
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
     assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (SceneKind::City, 200_000, 7, 16384));
+    let Command::Replay(r) = parse("replay f.jsonl --cache 5% 1M,2M --cache 7K --json").unwrap() else { panic!() };
+    assert_eq!(r.cache[..2], [CacheSize::Percent(5.0), CacheSize::Bytes(1 << 20)]);
+    assert!(r.cache.len() == 4 && r.json);
     let Command::Demo(d) = parse("demo").unwrap() else { panic!() };
     assert_eq!(d.output, PathBuf::from("demo-out"));
 }
@@ -169,7 +174,7 @@ fn help_explains_units_and_defaults() {
     let cli = Cli::command();
     let mut names: Vec<_> = cli.get_subcommands().map(|c| c.get_name().to_string()).collect();
     names.sort();
-    assert_eq!(names, ["compare", "convert", "demo", "info", "scene", "trace", "verify", "walk"]);
+    assert_eq!(names, ["compare", "convert", "demo", "info", "replay", "scene", "trace", "verify", "walk"]);
     for name in names {
         let help = parse(&format!("{name} --help")).unwrap_err();
         assert_eq!(help.exit_code(), 0, "{name}");

@@ -7,6 +7,7 @@ pub mod convert;
 pub mod demo;
 pub mod info;
 pub mod output;
+pub mod replay;
 pub mod scene;
 pub mod session;
 pub mod sizes;
@@ -65,6 +66,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
             args.check()?;
             trace::run(args)
         }
+        Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),
     }
 }

@@ -1,14 +1,15 @@
 //! Everything a walk or a trace works with, opened from the command line's options.
 
 use super::args::{Schedule as ScheduleArg, StreamArgs};
+use super::sizes::{CacheSize, option_bytes};
 use crate::gpu::device::Gpu;
 use crate::gpu::executor::{GpuExecutor, Setup};
 use crate::gpu::probe;
 use crate::gpu::rays::Extent;
 use crate::render::Schedule;
 use crate::schedule::cache::{BrickBytes, Cache};
-use crate::stream::{HostCache, Policy, Residency, Trace, Workers};
-use anyhow::{Context, Result, bail};
+use crate::stream::{HostCache, Policy, Residency, ResidencyError, Trace, Workers};
+use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
 use std::path::Path;
 use std::sync::Arc;
@@ -43,6 +44,26 @@ pub fn brick_bytes(scene: &SceneFile) -> Vec<BrickBytes> {
     scene.resident().bricks.iter().map(record).collect()
 }
 
+/// Bytes of the cache that `--cache` asks for, of a scene with bricks of `sizes`. Pages end before what does not fit into
+/// them: a cache that is to hold everything gets that room, too, and no more.
+pub fn cache_budget(cache: CacheSize, sizes: &[(u64, u64)], page_bytes: u64) -> u64 {
+    let all = sizes.iter().fold(0u64, |sum, size| sum.saturating_add(size.0).saturating_add(size.1));
+    let for_all = Residency::budget_for_all(sizes, page_bytes);
+    let asked = cache.bytes(all);
+    if asked >= all { asked.max(for_all).min(for_all.max(16)) } else { asked }
+}
+
+/// Writes the trace of requests, if one was asked for.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_requests(args: &StreamArgs, cache: &Cache) -> Result<()> {
+    if let (Some(file), Some(trace)) = (&args.requests_out, &cache.trace) {
+        trace.write_file(file).with_context(|| file.display().to_string())?;
+    }
+    Ok(())
+}
+
 impl Session {
     /// Opens device, cache and workers for `scene`.
     ///
@@ -50,6 +71,13 @@ impl Session {
     /// No device, a device that fails the start-up probe, a cache too small or too large.
     pub fn open(scene: Arc<SceneFile>, path: &Path, args: &StreamArgs, extent: Extent) -> Result<Self> {
         let name = path.display();
+        if let Some(file) = &args.requests_out {
+            // Said before the work rather than after it.
+            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+            if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
+                bail!("{}: --requests-out needs a file in a folder that exists", file.display());
+            }
+        }
         let gpu = Gpu::open(args.adapter.as_deref())?;
         let report = probe::run(&gpu.device, &gpu.queue);
         let failures = report.failures();
@@ -62,26 +90,29 @@ impl Session {
         }
         let bytes = brick_bytes(&scene);
         let sizes: Vec<(u64, u64)> = bytes.iter().map(|b| (b.geometry, b.attributes)).collect();
-        let all: u64 = sizes.iter().map(|s| s.0 + s.1).sum();
         let page_bytes = gpu.page_bytes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
-        let asked = args.cache.bytes(all);
-        // Pages end before what does not fit into them: a cache that is to hold everything gets that room, too.
-        let budget = if asked >= all { asked.max(for_all).min(for_all.max(16)) } else { asked };
+        let budget = cache_budget(args.cache, &sizes, page_bytes);
         let schedule = match args.schedule {
             ScheduleArg::Plain if budget < for_all => bail!(
-                "{name}: --schedule plain keeps everything resident and needs --cache {for_all} (or 100%), not {budget}; \
-                 give it that, or use --schedule chc"
+                "{name}: --schedule plain keeps everything resident: give --cache 100% ({for_all} bytes) rather than \
+                 {budget} bytes, or use --schedule chc"
             ),
             ScheduleArg::Plain => Schedule::Plain,
             ScheduleArg::Chc | ScheduleArg::Auto => Schedule::Chc,
         };
         let policy = if args.evict == "lru" { Policy::Lru } else { Policy::RoundRobin };
-        let residency =
-            Residency::new(&sizes, budget, page_bytes, policy).with_context(|| format!("{name}: --cache"))?;
+        let residency = Residency::new(&sizes, budget, page_bytes, policy).map_err(|error| match error {
+            ResidencyError::CacheTooSmall { needed, given } => anyhow!(
+                "{name}: a cache of {given} bytes is too small: the two largest bricks need {needed} bytes; give \
+                 --cache {} or more, or convert the scene with fewer --brick-triangles",
+                option_bytes(needed)
+            ),
+            other => anyhow!(other).context(format!("{name}: --cache")),
+        })?;
         let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
         let host = HostCache::new(args.host_cache);
-        let workers = Workers::new(scene.clone(), host, args.worker_count(), 0)?;
+        let workers = Workers::new(scene.clone(), host, args.worker_count(), args.prefetch as usize)?;
         // The threshold counts pixels of a tile of 200 x 200.
         let threshold = (f64::from(args.query_threshold) * f64::from(extent.tile).powi(2) / 40_000.0) as u32;
         let setup = Setup { extent, threshold, count: false };

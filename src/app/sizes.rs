@@ -78,6 +78,16 @@ pub fn human_bytes(bytes: u64) -> String {
     format!("{value:.1} {}", UNITS[unit])
 }
 
+/// At least `bytes`, as [`size_bytes`] reads it: in the largest unit that adds less than 1 %, or 1 KiB.
+pub fn option_bytes(bytes: u64) -> String {
+    let units = [(30, 'G'), (20, 'M'), (10, 'K')];
+    let fits = |shift: u32| bytes >> shift >= if shift == 10 { 10 } else { 100 };
+    match units.into_iter().find(|&(shift, _)| fits(shift)) {
+        Some((shift, unit)) => format!("{}{unit}", bytes.div_ceil(1 << shift)),
+        None => bytes.to_string(),
+    }
+}
+
 /// A count with a comma between groups of three digits.
 pub fn human_count(count: u64) -> String {
     let digits = count.to_string();
@@ -275,6 +285,15 @@ mod tests {
         assert_eq!(human_bytes(1536), "1536 B");
         assert_eq!(human_bytes(24 << 20), "24.0 MiB");
         assert_eq!(human_bytes(u64::MAX), "16384.0 PiB");
+        for (bytes, text) in [(1, "1"), (10_239, "10239"), (10_240, "10K"), (10_241, "11K"), (150 << 20, "150M")] {
+            assert_eq!(option_bytes(bytes), text);
+        }
+        for shift in 0..64 {
+            for bytes in [1u64 << shift, (1 << shift) + 1, u64::MAX >> shift] {
+                let read = size_bytes(&option_bytes(bytes)).unwrap_or(u64::MAX);
+                assert!(read >= bytes && read - bytes <= (bytes / 100).max(1 << 10), "{bytes}");
+            }
+        }
         assert_eq!(human_count(0), "0");
         assert_eq!(human_count(123), "123");
         assert_eq!(human_count(1234567), "1,234,567");

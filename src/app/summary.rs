@@ -9,7 +9,8 @@ use serde_json::{Map, Value, json};
 const FORMAT: u32 = 1;
 
 /// The summary of a walk of `frames` finished frames.
-pub fn of_walk(args: &WalkArgs, renderer: &Renderer, records: &[Record], frames: u32) -> Value {
+pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], frames: u32) -> Value {
+    let streaming = streaming(renderer);
     let gpu = renderer.executor.gpu();
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
@@ -48,6 +49,7 @@ pub fn of_walk(args: &WalkArgs, renderer: &Renderer, records: &[Record], frames:
             "cache_bytes": renderer.cache.residency.budget_bytes(),
             "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / brick_bytes.max(1) as f64,
             "host_cache_bytes": args.stream.host_cache,
+            "prefetch": args.stream.prefetch,
             "secondary": "exact",
             "spp": args.spp,
             "seed": args.seed,
@@ -57,11 +59,36 @@ pub fn of_walk(args: &WalkArgs, renderer: &Renderer, records: &[Record], frames:
         "frames": frames,
         "left_out": left_out(renderer),
         "texture_bytes_resident": renderer.executor.texture_bytes(),
+        "host_cache": streaming.0,
+        "prefetch": streaming.1,
         "memory": memory(),
         "passes": passes(records),
         "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
         "non_finite": records.iter().map(|r| r.non_finite).sum::<u64>(),
     })
+}
+
+/// What the host cache did, and what came of prefetching: payloads brought ahead of need, those that a load then found
+/// there, the rest of them, and requests that were dropped.
+fn streaming(renderer: &mut Renderer) -> (Value, Value) {
+    let workers = renderer.executor.workers();
+    let (host, stats) = (workers.host_cache().stats(), workers.stats());
+    let cache = json!({
+        "hits": host.hits,
+        "misses": host.misses,
+        "evicted": host.evicted,
+        "used_bytes": host.used_bytes,
+    });
+    let prefetch = json!({
+        "prefetched": host.prefetched,
+        "prefetched_bytes": host.prefetched_bytes,
+        "used": host.prefetched_used,
+        "used_bytes": host.prefetched_used_bytes,
+        "wasted": host.prefetched - host.prefetched_used,
+        "wasted_bytes": host.prefetched_bytes - host.prefetched_used_bytes,
+        "dropped": stats.prefetch_dropped,
+    });
+    (cache, prefetch)
 }
 
 /// What rendering left out because the scene does not need it, and why.

@@ -2,7 +2,7 @@
 
 use super::args::TraceArgs;
 use super::output::npy::{self, Hit, Ray};
-use super::session::{Session, open_scene};
+use super::session::{Session, open_scene, write_requests};
 use crate::gpu::executor::View;
 use crate::gpu::layout::{self, NONE, Params, T_INFINITE};
 use crate::gpu::rays::Extent;
@@ -39,6 +39,7 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     } else {
         npy::write_hits(&args.output, &hits)?;
     }
+    write_requests(&args.stream, &session.cache)?;
     if args.json {
         let hit = hits.iter().filter(|h| h.triangle != NONE).count();
         super::print_json(&serde_json::json!({

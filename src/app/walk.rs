@@ -2,13 +2,15 @@
 
 use super::args::WalkArgs;
 use super::output::{atomic, exr, png};
-use super::session::{Session, open_scene};
+use super::session::{Session, open_scene, write_requests};
 use super::summary;
 use crate::gpu::rays::Extent;
 use crate::render::{FrameOutput, Light, RenderSettings, Renderer};
+use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::fronts::Fronts;
 use crate::stats::Record;
+use crate::stream::{BrickBox, Item, Prefetcher};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
@@ -49,6 +51,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         let _ = std::fs::remove_file(args.output.join(stale));
     }
     let mut renderer = renderer(session, args);
+    let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
     let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
     let progress = Progress::new();
     progress.phase("frames", args.frames.into());
@@ -59,8 +62,11 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        let output =
-            renderer.frame(frame, &path.frame(frame, args.frames)).with_context(|| args.scene.display().to_string())?;
+        let camera = path.frame(frame, args.frames);
+        let output = renderer.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
+        if let Some(prefetcher) = prefetcher.as_mut().filter(|_| frame + 1 < args.frames) {
+            look_ahead(&mut renderer, prefetcher, &camera);
+        }
         write_frame(&frames_folder, frame, args, &output)?;
         for record in output.records {
             let line = lines.push(&record)?;
@@ -73,7 +79,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         progress.advance(1);
     }
     progress.finish();
-    finish(args, &renderer, &records, finished)?;
+    finish(args, &mut renderer, &records, finished)?;
     if finished < args.frames {
         bail!("interrupted after {finished} of {} frames; {} holds what is done", args.frames, args.output.display());
     }
@@ -107,6 +113,25 @@ pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
     Renderer { scene, executor, cache, settings, light, size, tile: args.stream.tile, fronts }
 }
 
+/// What watches the camera for `--prefetch`; `None` when that is off.
+pub fn prefetcher(renderer: &Renderer, most: u32) -> Option<Prefetcher> {
+    let aspect = f64::from(renderer.size.0) / f64::from(renderer.size.1);
+    (most > 0).then(|| Prefetcher::new(BrickBox::of_scene(renderer.scene.resident()), aspect, most as usize))
+}
+
+/// Between two frames: has the workers read ahead what the motion up to `camera` leads to, in place of what they were asked
+/// for before and have not begun. Changes nothing but the host cache.
+pub fn look_ahead(renderer: &mut Renderer, prefetcher: &mut Prefetcher, camera: &Camera) {
+    let workers = renderer.executor.workers();
+    workers.cancel_prefetch();
+    let host = workers.host_cache();
+    host.begin_round();
+    let residency = &renderer.cache.residency;
+    let at_hand = |item: Item| residency.slot(item).is_some() || host.contains(item);
+    let items = prefetcher.after_frame(camera, at_hand);
+    workers.prefetch(&items);
+}
+
 fn write_frame(folder: &Path, frame: u32, args: &WalkArgs, output: &FrameOutput) -> Result<()> {
     let pixels = &output.pixels;
     let name = folder.join(format!("{frame:04}.png"));
@@ -127,13 +152,11 @@ fn write_frame(folder: &Path, frame: u32, args: &WalkArgs, output: &FrameOutput)
     Ok(())
 }
 
-fn finish(args: &WalkArgs, renderer: &Renderer, records: &[Record], frames: u32) -> Result<()> {
+fn finish(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], frames: u32) -> Result<()> {
     let summary = summary::of_walk(args, renderer, records, frames);
     let text = serde_json::to_string_pretty(&summary)? + "\n";
     atomic::write(&args.output.join("summary.json"), text.as_bytes())?;
-    if let (Some(file), Some(trace)) = (&args.stream.requests_out, &renderer.cache.trace) {
-        trace.write_file(Path::new(file)).with_context(|| format!("{file}: cannot write the request trace"))?;
-    }
+    write_requests(&args.stream, &renderer.cache)?;
     brickwalk_report::write(&args.output)?;
     Ok(())
 }

@@ -1,0 +1,228 @@
+//! Prefetching and replay through the command line: prefetching changes no output but the host cache's numbers, and a
+//! replay of the recorded requests in the recorded cache does what the walk's own records say.
+
+mod common;
+
+use common::{brickwalk, city, folder, frames, succeed, walk};
+use serde_json::Value;
+use std::path::Path;
+
+fn near(scene: &Path) -> String {
+    format!("--frames 6 --size 96x64 --path {}", scene.with_extension("near.json").display())
+}
+
+fn json(file: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(file).expect("a file")).expect("JSON")
+}
+
+/// The sum of a field over all records of a walk.
+fn total(output: &Path, field: &str) -> u64 {
+    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
+    let value = |line: &str| serde_json::from_str::<Value>(line).expect("a record")[field].as_u64().expect("a count");
+    text.lines().map(value).sum()
+}
+
+fn replayed(trace: &Path, options: &[&str]) -> Value {
+    let words = ["replay", trace.to_str().expect("UTF-8"), "--json"];
+    serde_json::from_str(&succeed(words.iter().chain(options))).expect("JSON")
+}
+
+/// Runs a command that must find its input bad; returns its one line.
+fn refused(words: &[&str]) -> String {
+    let output = brickwalk(words);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{words:?}: {text}");
+    assert!(text.starts_with("brickwalk: ") && text.lines().count() == 1, "{words:?}: {text}");
+    assert!(!text.contains("internal error") && output.stdout.is_empty(), "{words:?}: {text}");
+    text
+}
+
+/// Bricks whose geometry or attributes a trace asks for.
+fn requested(trace: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(trace).expect("a trace");
+    let passes = text.lines().skip(1).map(|line| serde_json::from_str::<Value>(line).expect("a pass"));
+    passes
+        .flat_map(|pass| pass["requests"].as_array().expect("requests").clone())
+        .map(|code| code.as_str().expect("a code").to_owned())
+        .collect()
+}
+
+/// Copies a scene with a flipped bit in the geometry of each of `damaged`.
+fn damage(scene: &Path, copy: &Path, damaged: &[u32]) {
+    let mut bytes = std::fs::read(scene).expect("the scene");
+    let file = bricks::SceneFile::open(scene).expect("a scene");
+    for &brick in damaged {
+        let span = file.span(bricks::Payload::Geometry(brick));
+        bytes[(span.offset + span.bytes / 2) as usize] ^= 0x10;
+    }
+    std::fs::write(copy, bytes).expect("a copy");
+}
+
+#[test]
+fn prefetching_changes_nothing_but_the_host_cache() {
+    let folder = folder();
+    let scene = city(folder.path(), "60K", "1K");
+    let run = |scene: &Path, name: &str, options: &str| {
+        let output = folder.path().join(name);
+        let requests = output.with_extension("jsonl");
+        walk(scene, &output, &format!("{} --cache 10% {options} --requests-out {}", near(scene), requests.display()));
+        let summary = json(&output.join("summary.json"));
+        (frames(&output), std::fs::read(&requests).expect("a trace"), summary)
+    };
+    let (pictures, requests, without) = run(&scene, "without", "--prefetch 0");
+    let (with_pictures, with_requests, with) = run(&scene, "with", "--prefetch 16");
+    assert!(with_pictures == pictures, "prefetching changes a picture");
+    assert!(with_requests == requests, "prefetching changes what is asked of the device's cache");
+    for field in ["bricks_loaded", "bricks_evicted", "bytes_geometry", "bytes_attributes", "round_trips"] {
+        let [a, b] = ["with", "without"].map(|name| total(&folder.path().join(name), field));
+        assert_eq!(a, b, "{field}");
+    }
+    let count = |summary: &Value, field: &str| summary["prefetch"][field].as_u64().expect("a count");
+    assert!(count(&with, "used") > 0, "{}", with["prefetch"]);
+    assert_eq!(count(&with, "used") + count(&with, "wasted"), count(&with, "prefetched"));
+    let misses = |summary: &Value| summary["host_cache"]["misses"].as_u64().expect("a count");
+    // A load is either read from the file or found in the host cache, brought there by prefetching or by a load.
+    assert_eq!(misses(&with) + count(&with, "used"), misses(&without));
+    // Controls: without it nothing is prefetched, nor without a host cache; another seed makes other pictures.
+    assert_eq!(count(&without, "prefetched"), 0);
+    let (_, _, off) = run(&scene, "off", "--prefetch 16 --host-cache 0");
+    assert_eq!(count(&off, "prefetched"), 0);
+    assert!(run(&scene, "seed", "--prefetch 16 --seed 1").0 != pictures, "a different seed must change some frame");
+
+    // Damaged bricks that no ray asks for are prefetched in vain, and the walk is none the worse.
+    let asked = requested(&folder.path().join("with.jsonl"));
+    let bricks = bricks::SceneFile::open(&scene).expect("a scene").resident().bricks.len() as u32;
+    let unasked: Vec<u32> = (0..bricks).filter(|brick| !asked.contains(&format!("g{brick}"))).collect();
+    let damaged = folder.path().join("damaged.bricks");
+    damage(&scene, &damaged, &unasked);
+    std::fs::copy(scene.with_extension("near.json"), damaged.with_extension("near.json")).expect("a path");
+    let (damaged_pictures, _, summary) = run(&damaged, "vain", "--prefetch 64");
+    assert!(damaged_pictures == pictures);
+    assert!(count(&summary, "dropped") > 0, "{}", summary["prefetch"]);
+    // Control: one that the last frame asks for first is named, prefetched or not.
+    let last = asked.iter().rev().find(|code| code.starts_with('g')).expect("geometry");
+    damage(&scene, &damaged, &[last[1..].parse().expect("a brick")]);
+    for prefetch in ["0", "64"] {
+        let out = folder.path().join("refused");
+        let path = damaged.with_extension("near.json");
+        let [file, out, path] = [&damaged, &out, &path].map(|p| p.to_str().expect("UTF-8"));
+        let options = ["--frames", "6", "--size", "96x64", "--cache", "10%", "--path", path, "--prefetch", prefetch];
+        let line = refused(&[&["walk", file, "-o", out][..], &options].concat());
+        assert!(line.contains(&format!("brick {} geometry", &last[1..])), "{line}");
+    }
+}
+
+#[test]
+fn a_replay_reproduces_the_walk() {
+    let folder = folder();
+    let scene = city(folder.path(), "60K", "1K");
+    let least = bricks::SceneFile::open(&scene).expect("a scene");
+    let sizes: Vec<(u64, u64)> =
+        least.resident().bricks.iter().map(|brick| (brick.geometry.bytes, brick.attributes.bytes)).collect();
+    let least = brickwalk::stream::Residency::least_budget(&sizes);
+    let mut loads = Vec::new();
+    for (i, options) in [
+        "--cache 10% --evict round-robin".to_owned(),
+        "--cache 10% --evict lru".to_owned(),
+        // As small as it may be: batches do not fit and are cut short.
+        format!("--cache {least} --evict round-robin"),
+        format!("--cache {least} --evict lru --fronts on"),
+        "--cache 100% --schedule plain".to_owned(),
+    ]
+    .iter()
+    .enumerate()
+    {
+        let out = folder.path().join(format!("walk{i}"));
+        let trace = folder.path().join(format!("trace{i}.jsonl"));
+        walk(&scene, &out, &format!("{} {options} --requests-out {}", near(&scene), trace.display()));
+        let replayed = replayed(&trace, &[]);
+        assert_eq!(replayed["format"], 1);
+        let rows = replayed["results"].as_array().expect("rows");
+        let recorded: Vec<&Value> = rows.iter().filter(|row| row["recorded"] == true).collect();
+        assert_eq!(recorded.len(), 1, "{options}");
+        let row = recorded[0];
+        let bytes: u64 =
+            ["bytes_bvh", "bytes_geometry", "bytes_attributes"].iter().map(|field| total(&out, field)).sum();
+        assert_eq!(row["loads"], total(&out, "bricks_loaded"), "{options}");
+        assert_eq!(row["evicted"], total(&out, "bricks_evicted"), "{options}");
+        assert_eq!(row["loaded_bytes"], bytes, "{options}");
+        loads.push(row["loads"].as_u64().expect("a count"));
+        // Per size: round robin, LRU, Bélády, which knows the future.
+        for three in rows.chunks(3) {
+            let loads: Vec<u64> = three.iter().map(|row| row["loads"].as_u64().expect("a count")).collect();
+            assert!(loads[2] <= loads[0] && loads[2] <= loads[1], "{options}: {three:?}");
+            assert!(loads[2] >= replayed["distinct"].as_u64().expect("a count"));
+            for row in three {
+                let n = |field: &str| row[field].as_u64().expect("a count");
+                assert_eq!(n("hits") + n("loads"), replayed["requests"].as_u64().expect("a count"));
+                assert!(n("cache_bytes") >= least);
+            }
+        }
+    }
+    // Controls: the walks differ, so the numbers cannot agree by accident; a small cache has something to choose.
+    assert!(loads[0] != loads[2] && loads[2] > loads[4], "{loads:?}");
+    let [ring, belady] = [0, 2].map(|i| {
+        let rows = replayed(&folder.path().join("trace2.jsonl"), &["--cache", "100%"]);
+        rows["results"][i]["loads"].as_u64().expect("a count")
+    });
+    assert!(belady < ring, "{belady} {ring}");
+
+    // Sizes asked for: too small ones are named and skipped.
+    let trace = folder.path().join("trace0.jsonl");
+    let rows = replayed(&trace, &["--cache", "16", "30%,40%"]);
+    assert_eq!(rows["skipped_cache_bytes"], serde_json::json!([16]));
+    assert_eq!(rows["results"].as_array().expect("rows").len(), 9, "recorded, 30 %, 40 %");
+    let text = succeed(["replay", trace.to_str().expect("UTF-8"), "--cache", "16"]);
+    assert!(text.contains("as recorded") && text.contains(&format!("Skipped, below the two largest bricks ({least}")));
+}
+
+#[test]
+fn a_trace_that_is_not_whole_is_refused() {
+    let folder = folder();
+    let scene = city(folder.path(), "12K", "1K");
+    let rays = folder.path().join("rays.npy");
+    // One ray straight down, written as NumPy writes it.
+    let header = format!("{:<117}\n", "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 8), }");
+    let mut npy = b"\x93NUMPY\x01\x00".to_vec();
+    npy.extend((header.len() as u16).to_le_bytes());
+    npy.extend(header.bytes());
+    [0.0, 500.0, 0.0, 0.0, -1.0, 0.0, 0.0, f64::INFINITY].iter().for_each(|x: &f64| npy.extend(x.to_le_bytes()));
+    std::fs::write(&rays, npy).expect("rays");
+    let whole = folder.path().join("whole.jsonl");
+    let [scene, rays, whole] = [&scene, &rays, &whole].map(|path| path.to_str().expect("UTF-8"));
+    let hits = format!("{rays}.hits.npy");
+    let missing = format!("{scene}.no/such/folder.jsonl");
+    let words = |requests| ["trace", scene, "--rays", rays, "-o", &hits, "--cache", "30%", "--requests-out", requests];
+    let line = refused(&words(&missing));
+    assert!(line.contains("--requests-out") && !Path::new(&hits).exists(), "{line}");
+    succeed(words(whole));
+    assert!(replayed(Path::new(whole), &[])["requests"].as_u64() > Some(0), "trace records requests, too");
+
+    let good = std::fs::read(whole).expect("a trace");
+    let last_line = good[..good.len() - 1].iter().rposition(|&byte| byte == b'\n').expect("two lines") + 1;
+    let huge = br#"{"format":2,"policy":"lru","budget_bytes":18446744073709551600,"page_bytes":16,"passes":0,"sizes":[[18446744073709551600,16]]}"#;
+    let file = folder.path().join("bad.jsonl");
+    let name = file.to_str().expect("UTF-8");
+    for bad in [
+        &b""[..],
+        b"no trace",
+        b"\xff\xfe\x00",
+        b"{\"format\":1}",
+        &good[..good.len() / 2],
+        &good[..good.len() - 3],
+        // Cut between two lines.
+        &good[..last_line],
+        &[&good[..], b"{}"].concat(),
+        huge,
+        &std::fs::read(scene).expect("a scene"),
+    ] {
+        std::fs::write(&file, bad).expect("a file");
+        let line = refused(&["replay", name]);
+        assert!(line.contains("bad.jsonl"), "{line}");
+    }
+    assert!(refused(&["replay", &missing]).contains("cannot be opened"));
+    assert!(refused(&["replay", folder.path().to_str().expect("UTF-8")]).contains("folder"));
+    // Control: whole, it is read.
+    std::fs::write(&file, &good).expect("a file");
+    succeed(["replay", name]);
+}
