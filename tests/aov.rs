@@ -38,7 +38,7 @@ fn layers_hold_what_the_rays_of_the_path_meet() {
     let out = folder.path().join("out");
     let options = format!("--frames 1 --size {WIDTH}x{HEIGHT} --tile 16 --cache 30% --aov --path {}", path.display());
     common::walk(&scene, &out, &options);
-    let channels = load(&out.join("frames/0000.exr")).expect("an EXR").channels;
+    let channels = load(out.join("frames/0000.exr")).expect("an EXR").channels;
     let Channel::Integer(ids) = &channels["triangle.id"] else { panic!("triangle.id is an integer") };
     let depth = floats(&channels, "depth.Z");
     let normals = ["normal.X", "normal.Y", "normal.Z"].map(|name| floats(&channels, name));
