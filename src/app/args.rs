@@ -3,6 +3,7 @@
 
 use super::sizes::{CacheSize, Direction, ImageSize, non_negative, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
+use brickwalk_scenes::Kind;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -120,7 +121,7 @@ pub struct BuildArgs {
 pub struct SceneArgs {
     /// What to generate: city (blocks of houses along streets)
     #[arg(value_name = "KIND")]
-    pub kind: SceneKind,
+    pub kind: Kind,
     /// The file to write; S.near.json and S.far.json, camera paths, are written beside it
     #[arg(short, long, value_name = "S.bricks")]
     pub output: PathBuf,
@@ -458,14 +459,6 @@ impl std::fmt::Display for Effects {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(if self.shadow { "primary,shadow" } else { "primary" })
     }
-}
-
-named_values! {
-    /// What `scene` generates.
-    SceneKind {
-        /// Blocks of houses along streets.
-        City = "city",
-    } later &["pipes", "terrain", "stadium"]
 }
 
 /// Accepts the values of a list.

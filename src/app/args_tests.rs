@@ -158,7 +158,7 @@ fn options_of_other_commands_arrive() {
     assert_eq!((c.build.brick_triangles, c.build.threads, c.build.lattice), (4000, Some(2), Some(-12)));
     assert!(c.drop_non_finite);
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
-    assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (SceneKind::City, 200_000, 7, 16384));
+    assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (Kind::City, 200_000, 7, 16384));
     let Command::Replay(r) = parse("replay f.jsonl --cache 5% 1M,2M --cache 7K --json").unwrap() else { panic!() };
     assert_eq!(r.cache[..2], [CacheSize::Percent(5.0), CacheSize::Bytes(1 << 20)]);
     assert!(r.cache.len() == 4 && r.json);

@@ -1,12 +1,12 @@
 //! `scene`: generated scenes, and camera paths through them.
 
 use super::Usage;
-use super::args::{SceneArgs, SceneKind};
+use super::args::SceneArgs;
 use super::convert::{build_settings, refuse_folder, summarise};
 use anyhow::{Context, Result};
 use brickwalk_convert::build::build;
 use brickwalk_convert::progress::Progress;
-use brickwalk_scenes::{Error, Kind, Settings, generate, write_paths};
+use brickwalk_scenes::{Error, Settings, generate, write_paths};
 use std::time::Instant;
 
 /// Runs `scene`.
@@ -15,10 +15,7 @@ use std::time::Instant;
 /// A count of triangles that the kind cannot have, or a file cannot be written.
 pub fn run(args: &SceneArgs) -> Result<()> {
     let start = Instant::now();
-    let kind = match args.kind {
-        SceneKind::City => Kind::City,
-    };
-    let settings = Settings { kind, triangles: args.triangles, seed: args.seed, instanced: args.instanced };
+    let settings = Settings { kind: args.kind, triangles: args.triangles, seed: args.seed, instanced: args.instanced };
     let progress = Progress::new();
     refuse_folder(&args.output)?;
     let paths = in_pool(args.build.threads, || -> Result<_> {
@@ -27,8 +24,8 @@ pub fn run(args: &SceneArgs) -> Result<()> {
             Error::Triangles { .. } => Usage(format!("--triangles: {error}")).into(),
             error => anyhow::Error::new(error),
         })?;
-        build(scene, &build_settings(&args.build), &args.output, &progress)?;
-        Ok(write_paths(kind, &settings, &args.output)?)
+        build(scene.whole(), &build_settings(&args.build), &args.output, &progress)?;
+        Ok(write_paths(&scene, &args.output)?)
     })??;
     progress.finish();
     summarise(&args.output, start)?;

@@ -15,6 +15,7 @@ mod open;
 mod path;
 mod rng;
 mod roof;
+mod scene;
 mod site;
 mod soup;
 mod street;
@@ -24,13 +25,13 @@ mod vehicle;
 mod window;
 
 use brickwalk_convert::progress::Progress;
-use brickwalk_convert::source::SourceScene;
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-pub use city::{MAX_TRIANGLES, MIN_TRIANGLES, placed_triangles};
-pub use path::{CameraPath, Keyframe, LONG_FRAMES, NEAR_FRAMES, near_path, path_above, write_paths};
+pub use path::{CameraPath, Keyframe, LONG_FRAMES, NEAR_FRAMES, write_paths};
+pub use scene::Scene;
 pub use soup::{SoupKind, rotated_instances, soup};
 
 /// Kinds of generated scenes.
@@ -40,11 +41,28 @@ pub enum Kind {
     City,
 }
 
+impl Kind {
+    /// Every kind.
+    pub const ALL: [Self; 1] = [Self::City];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::City => "city",
+        }
+    }
+
+    /// The numbers of triangles it can have.
+    pub fn triangles(self) -> RangeInclusive<u64> {
+        match self {
+            Self::City => 10_000..=150_000_000,
+        }
+    }
+}
+
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::City => "city",
-        })
+        f.write_str(self.name())
     }
 }
 
@@ -52,10 +70,7 @@ impl FromStr for Kind {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self, Error> {
-        match name {
-            "city" => Ok(Self::City),
-            _ => Err(Error::Kind { name: name.into() }),
-        }
+        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| Error::Kind { name: name.into() })
     }
 }
 
@@ -64,11 +79,12 @@ impl FromStr for Kind {
 pub struct Settings {
     /// Kind of the scene.
     pub kind: Kind,
-    /// Triangles wanted, instances multiplied out: [`MIN_TRIANGLES`]..=[`MAX_TRIANGLES`].
+    /// Triangles wanted, instances multiplied out: [`Kind::triangles`].
     pub triangles: u64,
     /// Seed.
     pub seed: u64,
-    /// Trees and vehicles as instances of shared meshes instead of copies within the blocks. The triangles are the same.
+    /// City: trees and vehicles as instances of shared meshes instead of copies within the blocks. The triangles are the
+    /// same. The other kinds always store once what they have many of.
     pub instanced: bool,
 }
 
@@ -82,20 +98,19 @@ impl Default for Settings {
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// No such kind.
-    #[error("there is no generated scene {name:?}; the kinds are: city")]
+    #[error("there is no generated scene {name:?}; the kinds are: {}", Kind::ALL.map(Kind::name).join(", "))]
     Kind {
         /// What was asked for.
         name: String,
     },
     /// A count out of range.
-    #[error("a city of {asked} triangles is not possible; ask for {min} to {max}")]
+    #[error("a scene {kind} of {asked} triangles is not possible; ask for {} to {}",
+        kind.triangles().start(), kind.triangles().end())]
     Triangles {
+        /// The kind.
+        kind: Kind,
         /// What was asked for.
         asked: u64,
-        /// Fewest.
-        min: u64,
-        /// Most.
-        max: u64,
     },
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
@@ -107,8 +122,8 @@ pub enum Error {
     },
 }
 
-/// Generates a scene. Metres, Y up, right-handed; flat-shaded triangles with vertex colours, no textures. The number of
-/// triangles is at most the one asked for and short of it by less than 5 %.
+/// Generates a scene: what there is and how large, the geometry when it is read. The number of triangles is at most the one
+/// asked for and short of it by less than 5 %.
 ///
 /// Each block of the city is one mesh, placed once with the identity; `settings.instanced` takes trees and vehicles out of
 /// the blocks. The city's first crossing is at the origin, the street at y = 0.
@@ -116,10 +131,22 @@ pub enum Error {
 /// # Errors
 ///
 /// [`Error::Triangles`] for a count out of range.
-pub fn generate(settings: &Settings, progress: &Progress) -> Result<SourceScene, Error> {
-    match settings.kind {
-        Kind::City => city::generate(settings, progress),
+pub fn generate(settings: &Settings, progress: &Progress) -> Result<Scene, Error> {
+    let Settings { kind, triangles: asked, .. } = *settings;
+    if !kind.triangles().contains(&asked) {
+        return Err(Error::Triangles { kind, asked });
     }
+    progress.phase(kind.name(), asked);
+    let scene = match kind {
+        Kind::City => city::generate(settings, progress),
+    };
+    progress.finish();
+    Ok(scene)
+}
+
+/// The source entry of a generated scene.
+fn source_of_settings(settings: &Settings) -> bricks::Source {
+    source_of(format!("{} seed={} triangles={}", settings.kind, settings.seed, settings.triangles))
 }
 
 /// The source entry of a generated scene: no bytes, and the xxh3-64 of none.

@@ -3,7 +3,7 @@
 //! Every face has vertices of its own, so that faces stay flat-shaded however normals are made from them.
 
 use crate::material::{Mat, Tint};
-use brickwalk_convert::source::{Mesh, Primitive};
+use brickwalk_convert::source::Primitive;
 use glam::{DAffine3, DVec2, DVec3};
 
 /// Faces of a box, in the frame's axes.
@@ -140,22 +140,29 @@ impl Builder {
         }
     }
 
-    /// The mesh, its materials in ascending order.
-    pub fn into_mesh(self, name: String) -> Mesh {
-        let primitives = self.parts.into_iter().enumerate().filter(|(_, p)| !p.indices.is_empty()).map(|(m, mut p)| {
-            p.positions.shrink_to_fit();
-            p.colors.shrink_to_fit();
-            p.indices.shrink_to_fit();
-            Primitive {
-                material: m as u32,
-                positions: p.positions,
-                normals: None,
-                uvs: None,
-                colors: Some(p.colors),
-                indices: p.indices,
-            }
-        });
-        Mesh { name, primitives: primitives.collect() }
+    /// Numbers of triangles of the primitives that [`Self::into_primitives`] makes.
+    pub fn counts(&self) -> Vec<u32> {
+        self.parts.iter().map(|p| p.indices.len() as u32 / 3).filter(|count| *count > 0).collect()
+    }
+
+    /// One primitive a material, in ascending order; none without triangles.
+    pub fn into_primitives(self) -> Vec<Primitive> {
+        let primitives = self.parts.into_iter().enumerate().filter(|(_, p)| !p.indices.is_empty());
+        primitives
+            .map(|(m, mut p)| {
+                p.positions.shrink_to_fit();
+                p.colors.shrink_to_fit();
+                p.indices.shrink_to_fit();
+                Primitive {
+                    material: m as u32,
+                    positions: p.positions,
+                    normals: None,
+                    uvs: None,
+                    colors: Some(p.colors),
+                    indices: p.indices,
+                }
+            })
+            .collect()
     }
 
     /// A convex polygon, counter-clockwise as seen from outside, a tint a vertex.

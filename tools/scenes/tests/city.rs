@@ -1,14 +1,21 @@
 //! The generated city as a whole: counts, determinism, the fixed centre, sound geometry, and the way through it.
 
 use brickwalk_convert::progress::Progress;
-use brickwalk_convert::source::{Mesh, SourceScene};
-use brickwalk_scenes::{CameraPath, Error, Kind, MAX_TRIANGLES, MIN_TRIANGLES, Settings};
-use brickwalk_scenes::{generate, near_path, path_above, placed_triangles, write_paths};
+use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source, SourceScene};
+use brickwalk_scenes::{CameraPath, Error, Kind, Scene, Settings, generate, write_paths};
 use glam::{DAffine3, DMat3, DVec3};
 
-fn city(triangles: u64, seed: u64, instanced: bool) -> SourceScene {
+fn lazy(triangles: u64, seed: u64, instanced: bool) -> Scene {
     let settings = Settings { kind: Kind::City, triangles, seed, instanced };
     generate(&settings, &Progress::hidden()).expect("a count in range")
+}
+
+fn city(triangles: u64, seed: u64, instanced: bool) -> SourceScene {
+    lazy(triangles, seed, instanced).whole()
+}
+
+fn near_path(seed: u64, frames: u32) -> CameraPath {
+    lazy(10_000, seed, false).near_path(frames)
 }
 
 fn same_mesh(a: &Mesh, b: &Mesh) -> bool {
@@ -52,22 +59,47 @@ fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
 fn counts_are_as_asked() {
     for (wanted, least) in [(10_000, 0.97), (30_000, 0.97), (100_000, 0.95), (333_333, 0.95), (1_000_000, 0.97)] {
         for seed in [0, 1, 77] {
-            let scene = city(wanted, seed, false);
-            let got = placed_triangles(&scene);
+            let scene = lazy(wanted, seed, false);
+            let got = scene.placed_triangles();
             assert!(got <= wanted && got as f64 >= least * wanted as f64, "seed {seed}: {got} of {wanted}");
-            assert_eq!(scene.sources.len(), 1);
-            assert_eq!(scene.sources[0].name, format!("city seed={seed} triangles={wanted}"));
+            let sources = &scene.outline().sources;
+            assert_eq!(sources.len(), 1);
+            assert_eq!(sources[0].name, format!("city seed={seed} triangles={wanted}"));
         }
     }
 }
 
 #[test]
+fn parts_are_what_the_outline_says_in_any_order() {
+    for instanced in [false, true] {
+        let scene = lazy(150_000, 6, instanced);
+        let (outline, whole) = (scene.outline(), scene.whole());
+        let mut parts: Vec<(usize, usize)> = outline
+            .meshes
+            .iter()
+            .enumerate()
+            .flat_map(|(m, mesh)| (0..mesh.parts.len()).map(move |p| (m, p)))
+            .collect();
+        // Every third first, so that meshes leave the few that are kept and come back.
+        parts.sort_by_key(|(m, p)| ((m + p) % 3, *p, *m));
+        for (m, p) in parts {
+            let (said, part) = (outline.meshes[m].parts[p], scene.part(m, p).expect("a part"));
+            assert_eq!((said.triangles, said.primitive), (part.indices.len() as u32 / 3, p as u32));
+            assert!((1..=PART_TRIANGLES).contains(&said.triangles));
+            let one = |primitive| Mesh { name: String::new(), primitives: vec![primitive] };
+            assert!(same_mesh(&one(part.into_owned()), &one(whole.meshes[m].primitives[p].clone())), "{m} {p}");
+        }
+        assert!(scene.texture(0).is_err());
+    }
+}
+
+#[test]
 fn counts_out_of_range_name_the_range() {
-    for triangles in [0, MIN_TRIANGLES - 1, MAX_TRIANGLES + 1, u64::MAX] {
+    for triangles in [0, 9_999, 150_000_001, u64::MAX] {
         let settings = Settings { triangles, ..Settings::default() };
-        let error = generate(&settings, &Progress::hidden()).expect_err("out of range");
+        let error = generate(&settings, &Progress::hidden()).err().expect("out of range");
         assert!(matches!(error, Error::Triangles { asked, .. } if asked == triangles));
-        assert!(error.to_string().contains("10000 to 20000000"), "{error}");
+        assert!(error.to_string().contains("10000 to 150000000"), "{error}");
     }
     assert!("town".parse::<Kind>().expect_err("no such kind").to_string().contains("city"));
     assert_eq!("city".parse::<Kind>().expect("a kind").to_string(), "city");
@@ -124,8 +156,9 @@ fn geometry_is_sound() {
 
 #[test]
 fn instances_are_the_same_triangles() {
-    let (baked, instanced) = (city(500_000, 4, false), city(500_000, 4, true));
-    assert_eq!(placed_triangles(&baked), placed_triangles(&instanced));
+    let (baked, instanced) = (lazy(500_000, 4, false), lazy(500_000, 4, true));
+    assert_eq!(baked.placed_triangles(), instanced.placed_triangles());
+    let (baked, instanced) = (baked.whole(), instanced.whole());
     assert!(instanced.placements.len() > 10 * baked.placements.len());
     let stored = |s: &SourceScene| s.meshes.iter().map(Mesh::triangle_count).sum::<u64>();
     assert!(stored(&instanced) < stored(&baked) * 9 / 10);
@@ -194,9 +227,9 @@ fn the_walk_goes_half_a_metre_a_frame() {
 
 #[test]
 fn the_path_above_sees_the_whole_city() {
-    let settings = Settings { triangles: 600_000, seed: 1, ..Settings::default() };
-    let path = path_above(&settings, &Progress::hidden()).expect("a path");
-    let scene = generate(&settings, &Progress::hidden()).expect("a scene");
+    let scene = lazy(600_000, 1, false);
+    let path = scene.far_path();
+    let scene = scene.whole();
     let blocks = scene.meshes.iter().filter(|m| m.name.starts_with("block"));
     let points: Vec<DVec3> =
         blocks.flat_map(|m| &m.primitives).flat_map(|p| &p.positions).map(|p| DVec3::from_array(*p)).collect();
@@ -222,8 +255,8 @@ fn the_path_above_sees_the_whole_city() {
 #[test]
 fn paths_are_written_whole_and_read_back() {
     let folder = tempfile::tempdir().expect("a folder");
-    let settings = Settings { triangles: 20_000, seed: 8, ..Settings::default() };
-    let files = write_paths(Kind::City, &settings, &folder.path().join("A.bricks")).expect("paths");
+    let scene = lazy(20_000, 8, false);
+    let files = write_paths(&scene, &folder.path().join("A.bricks")).expect("paths");
     let mut names: Vec<String> = std::fs::read_dir(folder.path())
         .expect("the folder")
         .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
@@ -237,8 +270,7 @@ fn paths_are_written_whole_and_read_back() {
     let keys = |v: &serde_json::Value| v.as_object().expect("an object").keys().cloned().collect::<Vec<_>>();
     assert_eq!(keys(&value), ["fov_y_degrees", "up", "keyframes"]);
     assert_eq!(keys(&value["keyframes"][0]), ["time", "position", "target"]);
-    let other = Settings { triangles: 60_000, ..settings.clone() };
-    write_paths(Kind::City, &other, &folder.path().join("B")).expect("paths");
+    write_paths(&lazy(60_000, 8, false), &folder.path().join("B")).expect("paths");
     let same = |name: &str| {
         let read = |stem: &str| std::fs::read(folder.path().join(format!("{stem}.{name}.json"))).expect("a file");
         read("A") == read("B")
@@ -246,5 +278,5 @@ fn paths_are_written_whole_and_read_back() {
     assert!(same("near") && !same("far"), "near is the same for every size, far is not");
     assert_eq!(files.len(), 3);
     let nowhere = folder.path().join("missing/A");
-    assert!(matches!(write_paths(Kind::City, &settings, &nowhere), Err(Error::Write { .. })));
+    assert!(matches!(write_paths(&scene, &nowhere), Err(Error::Write { .. })));
 }
