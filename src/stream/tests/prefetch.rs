@@ -166,3 +166,19 @@ fn what_is_brought_ahead_displaces_nothing_in_use() {
     assert_eq!((stats.prefetched, stats.prefetched_bytes), (2, 32));
     assert_eq!((stats.prefetched_used, stats.prefetched_used_bytes), (1, 16), "a second look-up counts no second use");
 }
+
+#[test]
+fn a_prefetch_that_a_load_overtakes_was_not_ahead() {
+    for overtaken in [true, false] {
+        let cache = HostCache::new(64);
+        let room = cache.reserve_ahead(Item::geometry(0), 16).unwrap();
+        if overtaken {
+            assert!(cache.get(Item::geometry(0)).is_none(), "still on the way");
+        }
+        room.fill(&[0; 16]);
+        assert!(cache.get(Item::geometry(0)).is_some());
+        let stats = cache.stats();
+        let ahead = u64::from(!overtaken);
+        assert_eq!((stats.inserted, stats.prefetched, stats.prefetched_used), (1, ahead, ahead));
+    }
+}
