@@ -2,11 +2,19 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Progress of one job through named phases. Cheap to clone; any thread may report.
+/// Somebody asked a job to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Interrupted;
+
+/// Progress of one job through named phases, and the wish that it stop. Cheap to clone; any thread may report.
 #[derive(Clone, Debug)]
 pub struct Progress {
     bar: ProgressBar,
+    interrupted: Arc<AtomicBool>,
 }
 
 impl Progress {
@@ -14,12 +22,12 @@ impl Progress {
     pub fn new() -> Self {
         let target =
             if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        Self { bar: ProgressBar::with_draw_target(None, target) }
+        Self { bar: ProgressBar::with_draw_target(None, target), interrupted: Arc::default() }
     }
 
     /// Draws nothing.
     pub fn hidden() -> Self {
-        Self { bar: ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()) }
+        Self { bar: ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()), interrupted: Arc::default() }
     }
 
     /// Starts the phase `name` of `total` steps (0: unknown).
@@ -36,6 +44,19 @@ impl Progress {
     /// Advances the current phase by `steps`.
     pub fn advance(&self, steps: u64) {
         self.bar.inc(steps);
+    }
+
+    /// Asks the job to stop as soon as it can; what it has begun it takes back or leaves so that it can be continued.
+    pub fn interrupt(&self) {
+        self.interrupted.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether to go on.
+    ///
+    /// # Errors
+    /// Somebody asked to stop.
+    pub fn check(&self) -> Result<(), Interrupted> {
+        if self.interrupted.load(Ordering::Relaxed) { Err(Interrupted) } else { Ok(()) }
     }
 
     /// Ends the job and clears the bar.

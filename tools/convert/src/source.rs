@@ -16,7 +16,13 @@ pub trait Source: Send + Sync {
     /// Everything but geometry and texels.
     fn outline(&self) -> &Outline;
 
-    /// The triangles of part `part` of mesh `mesh`, as many as its [`PartOutline`] says.
+    /// Whether all geometry lies in memory, so that reading a part costs nothing.
+    fn is_in_memory(&self) -> bool {
+        false
+    }
+
+    /// The triangles of part `part` of mesh `mesh`, as many as its [`PartOutline`] says. The caller may be a task of a
+    /// thread pool and hold memory for one part a thread: the work is done on the calling thread.
     ///
     /// # Errors
     /// The input cannot be read, or what it holds is no geometry.
@@ -110,6 +116,10 @@ impl From<SourceScene> for InMemory {
 impl Source for InMemory {
     fn outline(&self) -> &Outline {
         &self.outline
+    }
+
+    fn is_in_memory(&self) -> bool {
+        true
     }
 
     fn part(&self, mesh: usize, part: usize) -> Result<Cow<'_, Primitive>, SourceError> {

@@ -1,12 +1,12 @@
 //! What shading reads of a vertex and of a triangle: normals, texture coordinates, colours, mean colours.
 
 use super::intern::{Key, mix};
-use super::objects::{Baking, Part};
+use super::objects::{Baking, Placed};
 use bricks::{AttributeVertex, Material, NONE};
 
 /// An attribute vertex as 128 bits, for interning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct VertexBits([u32; 4]);
+pub(super) struct VertexBits(pub [u32; 4]);
 
 impl Key for VertexBits {
     fn hash(&self) -> u64 {
@@ -28,9 +28,9 @@ impl VertexBits {
     }
 }
 
-/// The attributes of a vertex of a part with the given octahedral normal.
-pub(super) fn vertex(part: &Part, vertex: u32, normal: u32) -> VertexBits {
-    let primitive = part.primitive;
+/// The attributes of a vertex of a placed part with the given octahedral normal.
+pub(super) fn vertex(placed: &Placed, vertex: u32, normal: u32) -> VertexBits {
+    let primitive = placed.primitive;
     let uv = primitive.uvs.as_ref().map_or([0.0; 2], |uvs| uvs[vertex as usize]);
     // Adding zero turns -0 into 0, so that equal coordinates have equal bits.
     let [u, v] = uv.map(|x| if x.is_finite() { (x + 0.0).to_bits() } else { 0 });
@@ -39,9 +39,9 @@ pub(super) fn vertex(part: &Part, vertex: u32, normal: u32) -> VertexBits {
 }
 
 /// The octahedral normal of a vertex in object space; `None` if the source has none that is usable.
-pub(super) fn source_normal(part: &Part, vertex: u32) -> Option<u32> {
-    let normal = part.primitive.normals.as_ref()?[vertex as usize].map(f64::from);
-    let normal = match &part.baking {
+pub(super) fn source_normal(placed: &Placed, vertex: u32) -> Option<u32> {
+    let normal = placed.primitive.normals.as_ref()?[vertex as usize].map(f64::from);
+    let normal = match &placed.part.baking {
         None => normal,
         Some(baking) => {
             let m = &baking.normals;

@@ -5,16 +5,13 @@ use super::binary::{BinaryTree, Box3};
 use super::intern::Interner;
 use super::lattice::{Lattice, pow2};
 use super::node;
-use super::objects::ObjectPlan;
+use super::triangle::Triangle as Rounded;
 use super::wide::{WideTree, collapse, collapse_levels};
 use bricks::{
     AttributeLayout, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, LEAF_TRIANGLES, MAX_BRICK_HEIGHT, NEAR_STEPS,
     ORIGIN_STEPS, SURFACE_ROTATION_SHIFT, Span, WIDE_HIGH_STEPS,
 };
 use bytemuck::Zeroable;
-
-/// No attribute vertex yet: the source has no usable normal there.
-const FLAT: u32 = u32::MAX;
 
 /// Levels of a binary tree whose wide tree is seldom too high.
 const SPLIT_LEVELS: u32 = 48;
@@ -24,8 +21,6 @@ const SPLIT_LEVELS: u32 = 48;
 pub(super) struct BrickContext<'a> {
     /// Index of the object.
     pub index: u32,
-    /// The object.
-    pub object: &'a ObjectPlan<'a>,
     /// Its lattice.
     pub lattice: Lattice,
     /// Mean colours by material.
@@ -54,83 +49,49 @@ struct Triangle {
     attributes: [u32; 3],
 }
 
-/// The triangles of a brick after rounding, with their distinct vertices.
+/// The triangles of a brick with their distinct vertices.
 struct Contents {
     triangles: Vec<Triangle>,
     positions: Interner<[i64; 3]>,
     attributes: Interner<VertexBits>,
     mean_albedo: [f32; 3],
     mean_emission: [f32; 3],
-    dropped: u32,
 }
 
-/// Encodes the triangles in `slots`. Also returns the number of triangles dropped for lack of area; there is no brick if
-/// none is left.
-pub(super) fn encode(context: &BrickContext, slots: &[u32]) -> (Option<EncodedBrick>, u32) {
-    let contents = round(context, slots);
-    let dropped = contents.dropped;
-    ((!contents.triangles.is_empty()).then(|| lay_out(context, &contents)), dropped)
+/// Encodes triangles, about `count` of them and at least one, in order of their ids.
+pub(super) fn encode(context: &BrickContext, triangles: impl Iterator<Item = Rounded>, count: usize) -> EncodedBrick {
+    lay_out(context, &collect(context, triangles, count))
 }
 
-/// Rounds, drops what has no area, rotates, and numbers the distinct vertices.
-fn round(context: &BrickContext, slots: &[u32]) -> Contents {
-    let mut vertices: Interner<u64> = Interner::with_capacity(slots.len());
-    // By number of the source vertex: its position and attribute vertex.
-    let mut corners: Vec<(u32, u32)> = Vec::with_capacity(slots.len());
-    let mut positions: Interner<[i64; 3]> = Interner::with_capacity(slots.len());
-    let mut attributes: Interner<VertexBits> = Interner::with_capacity(slots.len());
-    let mut triangles = Vec::with_capacity(slots.len());
+/// Rotates triangles and numbers their distinct vertices.
+fn collect(context: &BrickContext, rounded: impl Iterator<Item = Rounded>, count: usize) -> Contents {
+    let mut positions: Interner<[i64; 3]> = Interner::with_capacity(count);
+    let mut attributes: Interner<VertexBits> = Interner::with_capacity(count);
+    let mut triangles = Vec::with_capacity(count);
     let (mut albedo, mut emission, mut area_sum) = ([0.0f64; 3], [0.0f64; 3], 0.0f64);
-    let mut dropped = 0;
-    for &slot in slots {
-        let part_index = context.object.part_of(slot);
-        let part = &context.object.parts[part_index];
-        let triangle = slot - part.first_slot;
-        let source = part.vertices(triangle);
-        let found = source.map(|vertex| {
-            let (number, is_new) = vertices.intern((part_index as u64) << 32 | u64::from(vertex));
-            if is_new {
-                let position = positions.intern(context.lattice.round(part.position(vertex))).0;
-                let attribute = attributes::source_normal(part, vertex)
-                    .map_or(FLAT, |normal| attributes.intern(attributes::vertex(part, vertex, normal)).0);
-                corners.push((position, attribute));
-            }
-            corners[number as usize]
-        });
-        let points = found.map(|(position, _)| positions.values()[position as usize]);
-        if attributes::is_degenerate(&points) {
-            dropped += 1;
-            continue;
-        }
-        let mut numbers = found.map(|(_, attribute)| attribute);
-        if numbers.contains(&FLAT) {
-            let normal = attributes::face_normal(&points, part.baking.as_ref());
-            for (number, vertex) in numbers.iter_mut().zip(source).filter(|(number, _)| **number == FLAT) {
-                *number = attributes.intern(attributes::vertex(part, vertex, normal)).0;
-            }
-        }
-
+    for triangle in rounded {
+        let (points, vertices) = (triangle.corners, triangle.attributes.map(VertexBits));
         let [x, y, z] = attributes::cross(&points);
         let area = (x * x + y * y + z * z).sqrt();
         area_sum += area;
-        let mean = &context.materials[part.primitive.material as usize];
+        let mean = &context.materials[triangle.material as usize];
         for k in 0..3 {
-            let color: f32 = numbers.iter().map(|&number| attributes.values()[number as usize].rgb()[k]).sum();
+            let color: f32 = vertices.iter().map(|vertex| vertex.rgb()[k]).sum();
             albedo[k] += area * f64::from(mean.albedo[k] * color / 3.0);
             emission[k] += area * f64::from(mean.emission[k]);
         }
 
         let rotation = (0..3).fold(0, |least, k| if points[k] < points[least] { k } else { least });
-        let rotate = |corner: [u32; 3]| std::array::from_fn(|k| corner[(k + rotation) % 3]);
+        let turned = |k: usize| (k + rotation) % 3;
         triangles.push(Triangle {
-            id: part.first_id + triangle,
-            surface: part.primitive.material | (rotation as u32) << SURFACE_ROTATION_SHIFT,
-            positions: rotate(found.map(|(position, _)| position)),
-            attributes: rotate(numbers),
+            id: triangle.id,
+            surface: triangle.material | (rotation as u32) << SURFACE_ROTATION_SHIFT,
+            positions: std::array::from_fn(|k| positions.intern(points[turned(k)]).0),
+            attributes: std::array::from_fn(|k| attributes.intern(vertices[turned(k)]).0),
         });
     }
     let mean = |sum: [f64; 3]| sum.map(|x| if area_sum > 0.0 { (x / area_sum) as f32 } else { 0.0 });
-    Contents { triangles, positions, attributes, mean_albedo: mean(albedo), mean_emission: mean(emission), dropped }
+    Contents { triangles, positions, attributes, mean_albedo: mean(albedo), mean_emission: mean(emission) }
 }
 
 /// The wide tree over the boxes of the triangles, of at most `levels` levels; 8 always suffice.

@@ -109,6 +109,12 @@ pub enum BuildError {
     /// Worker threads could not be started.
     #[error("cannot start worker threads: {0}; try fewer with --threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// A part of the source could not be read.
+    #[error(transparent)]
+    Source(#[from] crate::source::SourceError),
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] crate::progress::Interrupted),
     /// The scene file could not be written.
     #[error(transparent)]
     File(#[from] bricks::Error),

@@ -1,74 +1,112 @@
-//! Collects the boxes of an object's triangles, and refuses or drops what has no place in a brick.
+//! Collects the boxes of triangles, and refuses or drops what has no place in a brick.
 
 use super::error::BuildError;
 use super::lattice::COORDINATE_LIMIT;
-use super::objects::{ObjectPlan, Part};
+use super::objects::{Piece, Placed};
 use super::partition::{Bounds, Item};
-use rayon::prelude::*;
+use super::parts::Reader;
+use crate::progress::Progress;
 
-/// Triangles of one task.
-const TASK_TRIANGLES: u32 = 1 << 14;
-
-/// The triangles of an object that may be stored.
-#[derive(Debug, Default)]
+/// What a run of triangles holds.
+#[derive(Clone, Debug)]
 pub(super) struct Gathered {
-    /// Their boxes in object space; the index is the slot. In order of slots.
-    pub items: Vec<Item>,
+    /// Bounds of those that may be stored.
+    pub bounds: Bounds,
+    /// Bounds of twice their centroids.
+    pub centroids: Bounds,
+    /// How many may be stored.
+    pub stored: u64,
     /// Triangles with two equal vertices.
     pub zero_area: u32,
     /// Triangles with a vertex that is not finite.
     pub non_finite: u32,
+    /// Which materials are used, a bit each.
+    pub materials: Vec<u64>,
 }
 
-/// Collects the triangles of `object`. The first bad vertex in order of slots is the error.
-pub(super) fn gather(object: &ObjectPlan, drop_non_finite: bool) -> Result<Gathered, BuildError> {
-    let tasks: Vec<(&Part, u32)> = object
-        .parts
-        .iter()
-        .flat_map(|part| (0..part.triangles).step_by(TASK_TRIANGLES as usize).map(move |first| (part, first)))
-        .collect();
-    let results: Vec<Result<Gathered, BuildError>> =
-        tasks.par_iter().map(|&(part, first)| gather_range(part, first, drop_non_finite)).collect();
-    let mut all = Gathered { items: Vec::with_capacity(object.slots as usize), ..Gathered::default() };
-    for result in results {
-        let part = result?;
-        all.items.extend(part.items);
-        all.zero_area += part.zero_area;
-        all.non_finite += part.non_finite;
+impl Gathered {
+    /// Of nothing; `materials` of them exist.
+    pub fn nothing(materials: usize) -> Self {
+        Self {
+            bounds: Bounds::EMPTY,
+            centroids: Bounds::EMPTY,
+            stored: 0,
+            zero_area: 0,
+            non_finite: 0,
+            materials: vec![0; materials.div_ceil(64)],
+        }
     }
-    Ok(all)
+
+    /// Of both.
+    pub fn add(&mut self, other: &Self) {
+        self.bounds = self.bounds.union(other.bounds);
+        self.centroids = self.centroids.union(other.centroids);
+        self.stored += other.stored;
+        self.zero_area += other.zero_area;
+        self.non_finite += other.non_finite;
+        self.materials.iter_mut().zip(&other.materials).for_each(|(own, other)| *own |= other);
+    }
 }
 
-fn gather_range(part: &Part, first: u32, drop_non_finite: bool) -> Result<Gathered, BuildError> {
-    let end = part.triangles.min(first + TASK_TRIANGLES);
-    let mut out = Gathered { items: Vec::with_capacity((end - first) as usize), ..Gathered::default() };
-    for triangle in first..end {
-        let vertices = part.vertices(triangle);
-        let corners = vertices.map(|vertex| part.position(vertex));
-        // NaN fails the comparison too.
-        let is_small = |p: &[f64; 3]| p.iter().all(|x| x.abs() <= COORDINATE_LIMIT);
-        if let Some(corner) = corners.iter().position(|corner| !is_small(corner)) {
-            let position = part.primitive.positions[vertices[corner] as usize];
-            let finite_matrix = part.baking.is_none_or(|baking| baking.matrix.is_finite());
-            let (mesh, primitive, vertex) = (part.mesh.name.clone(), part.primitive_index, vertices[corner]);
-            if position.iter().all(|x| x.is_finite()) && finite_matrix {
-                let (position, limit) = (corners[corner], COORDINATE_LIMIT);
-                return Err(BuildError::OutOfRange { mesh, primitive, vertex, position, limit });
+/// Collects the boxes of a run of triangles, in order of slots; the index of an item is its slot. The first bad vertex is
+/// the error.
+pub(super) fn gather(
+    reader: &Reader,
+    run: &[Piece],
+    drop_non_finite: bool,
+    progress: &Progress,
+) -> Result<(Vec<Item>, Gathered), BuildError> {
+    progress.check()?;
+    let count = run.iter().map(|piece| piece.end - piece.first).sum::<u32>();
+    let mut items = Vec::with_capacity(count as usize);
+    let mut all = Gathered::nothing(reader.outline().materials.len());
+    for piece in run {
+        let primitive = reader.get(piece)?;
+        let placed = Placed { part: piece.part, primitive: &primitive };
+        all.materials[primitive.material as usize / 64] |= 1 << (primitive.material % 64);
+        for triangle in piece.first..piece.end {
+            let vertices = placed.vertices(triangle);
+            let corners = vertices.map(|vertex| placed.position(vertex));
+            // NaN fails the comparison too.
+            let is_small = |p: &[f64; 3]| p.iter().all(|x| x.abs() <= COORDINATE_LIMIT);
+            if let Some(corner) = corners.iter().position(|corner| !is_small(corner)) {
+                refuse(reader, &placed, vertices[corner], corners[corner], drop_non_finite)?;
+                all.non_finite += 1;
+                continue;
             }
-            if !drop_non_finite {
-                return Err(BuildError::NonFinite { mesh, primitive, vertex, position });
+            let [a, b, c] = corners;
+            if a == b || b == c || c == a {
+                all.zero_area += 1;
+                continue;
             }
-            out.non_finite += 1;
-            continue;
+            let mut bounds = Bounds::EMPTY;
+            corners.iter().for_each(|&corner| bounds.extend(corner, corner));
+            let item = Item { min: bounds.min, max: bounds.max, index: piece.part.first_slot + triangle };
+            all.bounds.extend(item.min, item.max);
+            let centroid = item.centroids2();
+            all.centroids.extend(centroid, centroid);
+            items.push(item);
         }
-        let [a, b, c] = corners;
-        if a == b || b == c || c == a {
-            out.zero_area += 1;
-            continue;
-        }
-        let mut bounds = Bounds::EMPTY;
-        corners.iter().for_each(|&corner| bounds.extend(corner, corner));
-        out.items.push(Item { min: bounds.min, max: bounds.max, index: part.first_slot + triangle });
     }
-    Ok(out)
+    all.stored = items.len() as u64;
+    progress.advance(u64::from(count));
+    Ok((items, all))
+}
+
+/// The error of a vertex too far out, if it is one: what is not finite may be dropped.
+fn refuse(
+    reader: &Reader,
+    placed: &Placed,
+    vertex: u32,
+    corner: [f64; 3],
+    drop_non_finite: bool,
+) -> Result<(), BuildError> {
+    let position = placed.primitive.positions[vertex as usize];
+    let finite_matrix = placed.part.baking.is_none_or(|baking| baking.matrix.is_finite());
+    let outline = &reader.outline().meshes[placed.part.mesh as usize];
+    let (mesh, primitive) = (outline.name.clone(), outline.parts[placed.part.part as usize].primitive);
+    if position.iter().all(|x| x.is_finite()) && finite_matrix {
+        return Err(BuildError::OutOfRange { mesh, primitive, vertex, position: corner, limit: COORDINATE_LIMIT });
+    }
+    if drop_non_finite { Ok(()) } else { Err(BuildError::NonFinite { mesh, primitive, vertex, position }) }
 }

@@ -3,7 +3,7 @@
 use super::error::BuildError;
 use super::matrix::Affine;
 use super::settings::BuildSettings;
-use crate::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene};
+use crate::source::{IDENTITY, MeshOutline, Outline, Placement, Primitive};
 use bricks::Provenance;
 
 /// Ratio of scales above which a matrix is not inverted: error bounds of rays in the object's space grow with it.
@@ -20,15 +20,13 @@ pub(super) struct Baking {
     pub mirrored: bool,
 }
 
-/// A primitive within an object. Its triangles have consecutive slots (numbers within the object's input) and ids.
+/// A part of a mesh within an object. Its triangles have consecutive slots (numbers within the object's input) and ids.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part<'a> {
-    /// The mesh, for messages.
-    pub mesh: &'a Mesh,
-    /// Index of the primitive in the mesh.
-    pub primitive_index: u32,
-    /// The primitive.
-    pub primitive: &'a Primitive,
+pub(super) struct Part {
+    /// Index of the mesh.
+    pub mesh: u32,
+    /// Index of the part in the mesh.
+    pub part: u32,
     /// How it is brought into the object; `None`: as it is.
     pub baking: Option<Baking>,
     /// Slot of its first triangle.
@@ -39,11 +37,20 @@ pub(super) struct Part<'a> {
     pub triangles: u32,
 }
 
-impl Part<'_> {
+/// A part with its geometry.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed<'a> {
+    /// The part.
+    pub part: &'a Part,
+    /// Its geometry.
+    pub primitive: &'a Primitive,
+}
+
+impl Placed<'_> {
     /// A position in object space.
     pub fn position(&self, vertex: u32) -> [f64; 3] {
         let position = self.primitive.positions[vertex as usize];
-        self.baking.map_or(position, |baking| baking.matrix.point(position))
+        self.part.baking.map_or(position, |baking| baking.matrix.point(position))
     }
 
     /// The vertices of a triangle of the part, in source order.
@@ -53,32 +60,63 @@ impl Part<'_> {
     }
 }
 
+/// Some triangles of a part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece<'a> {
+    /// The part.
+    pub part: &'a Part,
+    /// Its first triangle.
+    pub first: u32,
+    /// After its last triangle.
+    pub end: u32,
+}
+
 /// An object to be built.
 #[derive(Debug)]
-pub(super) struct ObjectPlan<'a> {
+pub(super) struct ObjectPlan {
     /// "the scene" or the mesh, for messages.
     pub name: String,
-    /// Its primitives, by first slot.
-    pub parts: Vec<Part<'a>>,
+    /// Its parts, by first slot.
+    pub parts: Vec<Part>,
     /// Number of slots.
     pub slots: u32,
     /// Ids of one instance.
     pub triangle_ids: u32,
 }
 
-impl<'a> ObjectPlan<'a> {
+impl ObjectPlan {
     /// The part that a slot belongs to.
     pub fn part_of(&self, slot: u32) -> usize {
         self.parts.partition_point(|part| part.first_slot <= slot) - 1
     }
 
-    fn push(&mut self, mesh: &'a Mesh, baking: Option<Baking>, mut first_id: u32) {
-        for (primitive_index, primitive) in (0u32..).zip(&mesh.primitives) {
-            // The sum over all placements was checked to fit.
-            let triangles = (primitive.indices.len() / 3) as u32;
+    /// All its triangles, in runs of about `triangles` of them and at most twice as many, in order of slots.
+    pub fn runs(&self, triangles: u32) -> Vec<Vec<Piece<'_>>> {
+        let mut runs = Vec::new();
+        let (mut run, mut length) = (Vec::new(), 0);
+        for part in &self.parts {
+            for first in (0..part.triangles).step_by(triangles as usize) {
+                let end = part.triangles.min(first.saturating_add(triangles));
+                run.push(Piece { part, first, end });
+                length += end - first;
+                if length >= triangles {
+                    runs.push(std::mem::take(&mut run));
+                    length = 0;
+                }
+            }
+        }
+        if !run.is_empty() {
+            runs.push(run);
+        }
+        runs
+    }
+
+    fn push(&mut self, mesh: u32, outline: &MeshOutline, baking: Option<Baking>, mut first_id: u32) {
+        for (part, &crate::source::PartOutline { triangles, .. }) in (0u32..).zip(&outline.parts) {
             if triangles > 0 {
                 let first_slot = self.slots;
-                self.parts.push(Part { mesh, primitive_index, primitive, baking, first_slot, first_id, triangles });
+                self.parts.push(Part { mesh, part, baking, first_slot, first_id, triangles });
+                // The sum over all placements was checked to fit.
                 self.slots += triangles;
                 first_id += triangles;
             }
@@ -103,7 +141,7 @@ pub(super) struct InstancePlan<'a> {
 #[derive(Debug)]
 pub(super) struct Plan<'a> {
     /// The world, then meshes in their order in the source.
-    pub objects: Vec<ObjectPlan<'a>>,
+    pub objects: Vec<ObjectPlan>,
     /// In order of placements, without the world.
     pub instances: Vec<InstancePlan<'a>>,
     /// Triangles with every placement multiplied out.
@@ -113,8 +151,8 @@ pub(super) struct Plan<'a> {
 }
 
 /// Plans objects and instances; `scene` must have passed [`check`].
-pub(super) fn plan<'a>(scene: &'a SourceScene, settings: &BuildSettings) -> Result<Plan<'a>, BuildError> {
-    let counts: Vec<u64> = scene.meshes.iter().map(Mesh::triangle_count).collect();
+pub(super) fn plan<'a>(scene: &'a Outline, settings: &BuildSettings) -> Result<Plan<'a>, BuildError> {
+    let counts: Vec<u64> = scene.meshes.iter().map(MeshOutline::triangle_count).collect();
     let mut bases = Vec::with_capacity(scene.placements.len());
     let mut triangle_ids = 0u64;
     for placement in &scene.placements {
@@ -138,7 +176,7 @@ pub(super) fn plan<'a>(scene: &'a SourceScene, settings: &BuildSettings) -> Resu
         object_of_mesh[index] = objects.len() as u32;
         let name = format!("mesh \"{}\"", mesh.name);
         let mut object = ObjectPlan { name, parts: Vec::new(), slots: 0, triangle_ids: counts[index] as u32 };
-        object.push(mesh, None, 0);
+        object.push(index as u32, mesh, None, 0);
         objects.push(object);
     }
 
@@ -162,7 +200,7 @@ pub(super) fn plan<'a>(scene: &'a SourceScene, settings: &BuildSettings) -> Resu
             normals: matrix.normal_matrix(),
             mirrored: matrix.determinant() < 0.0,
         });
-        objects[0].push(mesh, baking, base);
+        objects[0].push(placement.mesh, mesh, baking, base);
     }
     Ok(Plan { objects, instances, triangle_ids, provenance })
 }
@@ -176,7 +214,7 @@ fn is_invertible(placement: &Placement) -> bool {
 
 /// Which meshes are stored once and placed by instances: those with enough triangles that are placed twice or more, and
 /// smaller ones once the budget for copies of them is spent.
-fn choose_instanced(scene: &SourceScene, counts: &[u64], invertible: &[bool], settings: &BuildSettings) -> Vec<bool> {
+fn choose_instanced(scene: &Outline, counts: &[u64], invertible: &[bool], settings: &BuildSettings) -> Vec<bool> {
     let mut uses = vec![0u64; scene.meshes.len()];
     for (placement, invertible) in scene.placements.iter().zip(invertible) {
         uses[placement.mesh as usize] += u64::from(*invertible);
@@ -200,43 +238,24 @@ fn choose_instanced(scene: &SourceScene, counts: &[u64], invertible: &[bool], se
         .collect()
 }
 
-fn trace_ids(provenance: &mut Vec<Provenance>, placement: &Placement, mesh: &Mesh, mut first_id: u32) {
-    for (primitive, source) in (0u32..).zip(&mesh.primitives) {
-        let count = (source.indices.len() / 3) as u32;
+fn trace_ids(provenance: &mut Vec<Provenance>, placement: &Placement, mesh: &MeshOutline, mut first_id: u32) {
+    for parts in mesh.parts.chunk_by(|a, b| a.primitive == b.primitive) {
+        let count = parts.iter().map(|part| part.triangles).sum();
         if count > 0 {
-            let (node, mesh) = (placement.name.clone(), mesh.name.clone());
+            let (node, mesh, primitive) = (placement.name.clone(), mesh.name.clone(), parts[0].primitive);
             provenance.push(Provenance { first_id, count, source: placement.source, node, mesh, primitive });
             first_id += count;
         }
     }
 }
 
+/// An error unless `ok`.
+pub(super) fn rule(ok: bool, what: String, found: usize, expected: String) -> Result<(), BuildError> {
+    if ok { Ok(()) } else { Err(BuildError::Inconsistent { what, found: found.to_string(), expected }) }
+}
+
 /// Checks that everything that is referred to exists.
-pub(super) fn check(scene: &SourceScene) -> Result<(), BuildError> {
-    let rule = |ok: bool, what: String, found: usize, expected: String| {
-        if ok { Ok(()) } else { Err(BuildError::Inconsistent { what, found: found.to_string(), expected }) }
-    };
-    for mesh in &scene.meshes {
-        for (index, primitive) in mesh.primitives.iter().enumerate() {
-            let what = |of: &str| format!("mesh \"{}\", primitive {index}: {of}", mesh.name);
-            let vertices = primitive.positions.len();
-            let lengths = [
-                ("normals", primitive.normals.as_ref().map(Vec::len)),
-                ("texture coordinates", primitive.uvs.as_ref().map(Vec::len)),
-                ("colours", primitive.colors.as_ref().map(Vec::len)),
-            ];
-            for (of, length) in lengths {
-                let length = length.unwrap_or(vertices);
-                rule(length == vertices, what(of), length, format!("{vertices}, one a vertex"))?;
-            }
-            let indices = primitive.indices.len();
-            rule(indices % 3 == 0, what("indices"), indices, "three a triangle".to_owned())?;
-            let largest = primitive.indices.iter().max().map_or(0, |&index| index as usize);
-            rule(indices == 0 || largest < vertices, what("index"), largest, format!("less than {vertices}"))?;
-            let (material, materials) = (primitive.material as usize, scene.materials.len());
-            rule(indices == 0 || material < materials, what("material"), material, format!("less than {materials}"))?;
-        }
-    }
+pub(super) fn check(scene: &Outline) -> Result<(), BuildError> {
     for placement in &scene.placements {
         let (mesh, meshes) = (placement.mesh as usize, scene.meshes.len());
         rule(mesh < meshes, format!("node \"{}\": mesh", placement.name), mesh, format!("less than {meshes}"))?;

@@ -44,8 +44,13 @@ pub(super) struct Item {
 
 impl Item {
     /// Twice the centroid.
-    fn centroid2(&self, axis: usize) -> f64 {
+    pub fn centroid2(&self, axis: usize) -> f64 {
         self.min[axis] + self.max[axis]
+    }
+
+    /// Twice the centroid.
+    pub fn centroids2(&self) -> [f64; 3] {
+        std::array::from_fn(|axis| self.centroid2(axis))
     }
 }
 
@@ -70,7 +75,8 @@ impl Bounds {
         }
     }
 
-    fn union(mut self, other: Self) -> Self {
+    /// Of both.
+    pub fn union(mut self, other: Self) -> Self {
         self.extend(other.min, other.max);
         self
     }
@@ -86,51 +92,84 @@ impl Bounds {
     }
 }
 
-/// The parts of an object, as ranges of the reordered items, in order.
-#[derive(Debug, Default)]
-pub(super) struct Parts {
-    /// Parts of at most the number of items asked for.
-    pub bricks: Vec<Range<u32>>,
+/// How far items are cut.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rule {
+    /// Most items of a part, at least 1.
+    pub limit: usize,
+    /// Whether the items are those of an object; otherwise they are the large ones that were taken out of its parts. From
+    /// an object its canonical extents are taken, and the items that are too large for their parts.
+    pub is_object: bool,
+}
+
+impl Rule {
+    /// How the large items that were taken out of the parts are cut: into small parts, so that far apart ones do not share
+    /// one.
+    pub fn of_large(self) -> Self {
+        Self { limit: self.limit.div_ceil(LARGE_PARTS), is_object: false }
+    }
+}
+
+/// What items were cut into.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Cuts {
+    /// Indices of the items, by part, ascending within each.
+    pub order: Vec<u32>,
+    /// Number of items of each part.
+    pub parts: Vec<u32>,
     /// Largest extents of the parts of at most [`CANONICAL_TRIANGLES`] items.
     pub extents: Vec<f64>,
+    /// Items that are too large for their parts, in no particular order.
+    pub large: Vec<Item>,
 }
 
-/// Cuts `items`, reordering them, into parts of at most `limit` (at least 1).
-pub(super) fn partition(items: &mut Vec<Item>, limit: usize) -> Parts {
+/// Cuts items, reordering them. What comes out depends on the set of the items, not on their order.
+pub(super) fn cut(items: &mut [Item], rule: Rule) -> Cuts {
     if items.is_empty() {
-        return Parts::default();
+        return Cuts::default();
     }
-    let mut parts = descend(items, 0, limit, false, false);
-    separate_large(items, &mut parts.bricks, limit);
-    parts
-}
-
-/// Moves the items that are too large for their parts into parts of their own, at the end.
-fn separate_large(items: &mut Vec<Item>, parts: &mut Vec<Range<u32>>, limit: usize) {
-    let mut slices = Vec::with_capacity(parts.len());
-    let mut rest = items.as_mut_slice();
-    for part in parts.iter() {
+    let found = descend(items, 0, rule.limit, false, !rule.is_object);
+    let mut slices = Vec::with_capacity(found.parts.len());
+    let mut rest = items;
+    for part in &found.parts {
         let (slice, after) = rest.split_at_mut(part.len());
         slices.push(slice);
         rest = after;
     }
-    let kept: Vec<usize> = slices.into_par_iter().map(move_large_to_end).collect();
-    if kept.iter().zip(parts.iter()).all(|(kept, part)| *kept == part.len()) {
-        return;
+    let finish = |slice: &mut [Item]| {
+        let kept = if rule.is_object { move_large_to_end(slice) } else { slice.len() };
+        let mut order: Vec<u32> = slice[..kept].iter().map(|item| item.index).collect();
+        order.sort_unstable();
+        (order, slice[kept..].to_vec())
+    };
+    let finished: Vec<(Vec<u32>, Vec<Item>)> = slices.into_par_iter().map(finish).collect();
+    let mut cuts = Cuts { extents: found.extents, ..Cuts::default() };
+    cuts.order.reserve_exact(finished.iter().map(|(order, _)| order.len()).sum());
+    for (order, large) in finished {
+        cuts.parts.push(order.len() as u32);
+        cuts.order.extend(order);
+        cuts.large.extend(large);
     }
-    let (mut reordered, mut large) = (Vec::with_capacity(items.len()), Vec::new());
-    for (part, kept) in parts.iter_mut().zip(kept) {
-        let slice = &items[part.start as usize..part.end as usize];
-        let start = reordered.len() as u32;
-        reordered.extend_from_slice(&slice[..kept]);
-        large.extend_from_slice(&slice[kept..]);
-        *part = start..reordered.len() as u32;
-    }
-    // Small, so that far apart ones do not share a part. Canonical extents are those from before, whatever the limit is.
-    let limit = limit.div_ceil(LARGE_PARTS);
-    parts.extend(descend(&mut large, reordered.len(), limit, false, true).bricks);
-    reordered.append(&mut large);
-    *items = reordered;
+    cuts
+}
+
+/// Cuts items, with the large ones in parts of their own after the others.
+pub(super) fn cut_all(items: &mut [Item], limit: usize) -> Cuts {
+    let rule = Rule { limit, is_object: true };
+    let mut cuts = cut(items, rule);
+    let large = cut(&mut std::mem::take(&mut cuts.large), rule.of_large());
+    cuts.parts.extend(large.parts);
+    cuts.order.extend(large.order);
+    cuts
+}
+
+/// Parts as ranges of the reordered items, in order.
+#[derive(Debug, Default)]
+struct Parts {
+    /// Parts of at most the number of items asked for.
+    parts: Vec<Range<u32>>,
+    /// Largest extents of the parts of at most [`CANONICAL_TRIANGLES`] items.
+    extents: Vec<f64>,
 }
 
 /// Moves the items without which the others are at least [`LARGE_GAIN`] times cheaper to the end; returns how many stay.
@@ -161,7 +200,7 @@ fn descend(items: &mut [Item], first: usize, limit: usize, mut is_brick: bool, m
     let mut parts = Parts::default();
     if !is_brick && items.len() <= limit {
         is_brick = true;
-        parts.bricks.push(first as u32..(first + items.len()) as u32);
+        parts.parts.push(first as u32..(first + items.len()) as u32);
     }
     if !is_chunk && items.len() <= CANONICAL_TRIANGLES {
         is_chunk = true;
@@ -170,14 +209,14 @@ fn descend(items: &mut [Item], first: usize, limit: usize, mut is_brick: bool, m
     if is_brick && is_chunk {
         return parts;
     }
-    let middle = split(items, items.len().div_ceil(LEAST_SIDE), false);
+    let middle = split(items, least_side(items.len()), false);
     let (left, right) = items.split_at_mut(middle);
     let is_task = left.len() + right.len() > TASK_ITEMS;
     let mut left = move || descend(left, first, limit, is_brick, is_chunk);
     let mut right = move || descend(right, first + middle, limit, is_brick, is_chunk);
     let (left, right) = if is_task { rayon::join(left, right) } else { (left(), right()) };
     for side in [left, right] {
-        parts.bricks.extend(side.bricks);
+        parts.parts.extend(side.parts);
         parts.extents.extend(side.extents);
     }
     parts
@@ -190,20 +229,27 @@ pub(super) fn split(items: &mut [Item], least_side: usize, median: bool) -> usiz
     let (_, centroids) = bounds(items);
     let cut = if median { None } else { sah_cut(items, &centroids, least_side) };
     if let Some(cut) = cut {
-        let middle = cut.apply(items);
-        if middle >= least_side && items.len() - middle >= least_side {
-            return middle;
-        }
+        return cut.apply(items);
     }
-    let axis = (0..3).fold(0, |best, k| {
-        let extent = |k: usize| centroids.max[k] - centroids.min[k];
-        if extent(k) > extent(best) { k } else { best }
-    });
+    let axis = longest_axis(&centroids);
     let middle = items.len() / 2;
     items.select_nth_unstable_by(middle, |a, b| {
         a.centroid2(axis).total_cmp(&b.centroid2(axis)).then(a.index.cmp(&b.index))
     });
     middle
+}
+
+/// Items that either side of a cut of a part has at least.
+pub(super) fn least_side(items: usize) -> usize {
+    items.div_ceil(LEAST_SIDE)
+}
+
+/// The axis along which items are halved where no cut is better.
+pub(super) fn longest_axis(centroids: &Bounds) -> usize {
+    (0..3).fold(0, |best, k| {
+        let extent = |k: usize| centroids.max[k] - centroids.min[k];
+        if extent(k) > extent(best) { k } else { best }
+    })
 }
 
 /// Bounds of the boxes, and of twice their centroids.
@@ -212,7 +258,7 @@ pub(super) fn bounds(items: &[Item]) -> (Bounds, Bounds) {
         let mut all = (Bounds::EMPTY, Bounds::EMPTY);
         for item in items {
             all.0.extend(item.min, item.max);
-            let centroid = std::array::from_fn(|k| item.centroid2(k));
+            let centroid = item.centroids2();
             all.1.extend(centroid, centroid);
         }
         all
@@ -241,17 +287,22 @@ impl Binning {
 }
 
 /// Bins below `bin` go left.
-struct Cut {
+pub(super) struct Cut {
     binning: Binning,
     bin: usize,
 }
 
 impl Cut {
+    /// Whether an item goes left.
+    pub fn is_left(&self, item: &Item) -> bool {
+        self.binning.bin(item) < self.bin
+    }
+
     /// Moves the left items to the front; returns their number.
     fn apply(&self, items: &mut [Item]) -> usize {
         let (mut low, mut high) = (0, items.len());
         while low < high {
-            if self.binning.bin(&items[low]) < self.bin {
+            if self.is_left(&items[low]) {
                 low += 1;
             } else {
                 high -= 1;
@@ -268,61 +319,89 @@ struct Bin {
     bounds: Bounds,
 }
 
-type Bins = [[Bin; BINS]; 3];
+impl Bin {
+    const EMPTY: Self = Self { count: 0, bounds: Bounds::EMPTY };
 
-fn sah_cut(items: &[Item], centroids: &Bounds, least_side: usize) -> Option<Cut> {
-    let binnings: [Binning; 3] = std::array::from_fn(|axis| {
-        let (low, high) = (centroids.min[axis], centroids.max[axis]);
-        Binning { axis, low, scale: if high > low { BINS as f64 / (high - low) } else { 0.0 } }
-    });
-    let empty: Bins = [[Bin { count: 0, bounds: Bounds::EMPTY }; BINS]; 3];
-    let fill = |items: &[Item]| {
-        let mut bins = empty;
+    fn union(self, other: Self) -> Self {
+        Self { count: self.count + other.count, bounds: self.bounds.union(other.bounds) }
+    }
+}
+
+/// Items counted by bin and axis. Counts, minima and maxima do not depend on the order in which items are counted.
+#[derive(Clone)]
+pub(super) struct Bins {
+    binnings: [Binning; 3],
+    bins: [[Bin; BINS]; 3],
+}
+
+impl Bins {
+    /// No items; `centroids` are the bounds of twice the centroids of those to come.
+    pub fn new(centroids: &Bounds) -> Self {
+        let binnings = std::array::from_fn(|axis| {
+            let (low, high) = (centroids.min[axis], centroids.max[axis]);
+            Binning { axis, low, scale: if high > low { BINS as f64 / (high - low) } else { 0.0 } }
+        });
+        Self { binnings, bins: [[Bin::EMPTY; BINS]; 3] }
+    }
+
+    /// Counts items.
+    pub fn count(mut self, items: &[Item]) -> Self {
         for item in items {
-            for (bins, binning) in bins.iter_mut().zip(&binnings) {
+            for (bins, binning) in self.bins.iter_mut().zip(&self.binnings) {
                 let bin = &mut bins[binning.bin(item)];
                 bin.count += 1;
                 bin.bounds.extend(item.min, item.max);
             }
         }
-        bins
-    };
-    let bins = if items.len() <= PARALLEL_ITEMS {
-        fill(items)
-    } else {
-        // Counts, minima and maxima do not depend on the order in which threads combine them.
-        let merge = |mut a: Bins, b: Bins| {
-            for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
-                *a = Bin { count: a.count + b.count, bounds: a.bounds.union(b.bounds) };
-            }
-            a
-        };
-        items.par_chunks(PARALLEL_ITEMS / 4).map(fill).reduce(|| empty, merge)
-    };
-    let mut best: Option<(f64, Cut)> = None;
-    for (bins, binning) in bins.iter().zip(binnings) {
-        if binning.scale == 0.0 {
-            continue;
+        self
+    }
+
+    /// The items of both, counted in the same bins.
+    pub fn merge(mut self, other: Self) -> Self {
+        for (own, other) in self.bins.iter_mut().flatten().zip(other.bins.iter().flatten()) {
+            *own = own.union(*other);
         }
-        let mut right_costs = [0.0; BINS];
-        let mut right = Bin { count: 0, bounds: Bounds::EMPTY };
-        for bin in (1..BINS).rev() {
-            right = Bin { count: right.count + bins[bin].count, bounds: right.bounds.union(bins[bin].bounds) };
-            right_costs[bin] = if right.count > 0 { right.count as f64 * right.bounds.half_area() } else { 0.0 };
-        }
-        let mut left = Bin { count: 0, bounds: Bounds::EMPTY };
-        for bin in 1..BINS {
-            left = Bin { count: left.count + bins[bin - 1].count, bounds: left.bounds.union(bins[bin - 1].bounds) };
-            if left.count < least_side || items.len() - left.count < least_side {
+        self
+    }
+
+    /// The cheapest cut with at least `least_side` of the `count` items on either side.
+    pub fn cheapest(&self, count: usize, least_side: usize) -> Option<Cut> {
+        let mut best: Option<(f64, Cut)> = None;
+        for (bins, &binning) in self.bins.iter().zip(&self.binnings) {
+            if binning.scale == 0.0 {
                 continue;
             }
-            let cost = left.count as f64 * left.bounds.half_area() + right_costs[bin];
-            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, Cut { binning, bin }));
+            let mut right_costs = [0.0; BINS];
+            let mut right = Bin::EMPTY;
+            for bin in (1..BINS).rev() {
+                right = right.union(bins[bin]);
+                right_costs[bin] = if right.count > 0 { right.count as f64 * right.bounds.half_area() } else { 0.0 };
+            }
+            let mut left = Bin::EMPTY;
+            for bin in 1..BINS {
+                left = left.union(bins[bin - 1]);
+                if left.count < least_side || count - left.count < least_side {
+                    continue;
+                }
+                let cost = left.count as f64 * left.bounds.half_area() + right_costs[bin];
+                if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                    best = Some((cost, Cut { binning, bin }));
+                }
             }
         }
+        best.map(|(_, cut)| cut)
     }
-    best.map(|(_, cut)| cut)
+}
+
+fn sah_cut(items: &[Item], centroids: &Bounds, least_side: usize) -> Option<Cut> {
+    let empty = Bins::new(centroids);
+    let bins = if items.len() <= PARALLEL_ITEMS {
+        empty.count(items)
+    } else {
+        let fill = |items: &[Item]| empty.clone().count(items);
+        items.par_chunks(PARALLEL_ITEMS / 4).map(fill).reduce(|| empty.clone(), Bins::merge)
+    };
+    bins.cheapest(items.len(), least_side)
 }
 
 #[cfg(test)]
@@ -343,30 +422,36 @@ mod tests {
             .collect()
     }
 
-    fn check(items: &mut Vec<Item>, limit: usize) -> Parts {
-        let count = items.len();
-        let parts = partition(items, limit);
-        let mut end = 0;
-        for range in &parts.bricks {
-            assert!(range.start == end && !range.is_empty() && range.len() <= limit);
-            end = range.end;
-        }
-        assert_eq!(end as usize, count, "every item in exactly one part");
-        let mut indices: Vec<u32> = items.iter().map(|item| item.index).collect();
+    fn check(items: &[Item], limit: usize) -> Cuts {
+        let cuts = cut_all(&mut items.to_vec(), limit);
+        assert!(cuts.parts.iter().all(|&count| count > 0 && count as usize <= limit));
+        assert_eq!(cuts.parts.iter().sum::<u32>() as usize, items.len(), "every item in exactly one part");
+        let mut indices = cuts.order.clone();
         indices.sort_unstable();
         assert!(indices.iter().zip(0..).all(|(&index, i)| index == i), "a permutation");
-        parts
+        cuts
+    }
+
+    /// The parts as indices of items.
+    fn parts(cuts: &Cuts) -> impl Iterator<Item = &[u32]> {
+        cuts.parts.iter().scan(0, |end, &count| {
+            *end += count as usize;
+            Some(&cuts.order[*end - count as usize..*end])
+        })
+    }
+
+    fn area(items: &[Item], part: &[u32]) -> f64 {
+        bounds(&part.iter().map(|&index| items[index as usize]).collect::<Vec<_>>()).0.half_area()
     }
 
     #[test]
     fn parts_cover_and_are_compact() {
-        let mut items = scattered(100_000);
-        let parts = check(&mut items, 1000);
-        assert!(parts.bricks.len() < 300, "{} parts", parts.bricks.len());
-        let area = |range: &Range<u32>| bounds(&items[range.start as usize..range.end as usize]).0.half_area();
-        let total: f64 = parts.bricks.iter().map(area).sum();
-        let scattered = scattered(100_000);
-        let unsorted: f64 = scattered.chunks(1000).map(|items| bounds(items).0.half_area()).sum();
+        let items = scattered(100_000);
+        let cuts = check(&items, 1000);
+        assert!(cuts.parts.len() < 300, "{} parts", cuts.parts.len());
+        assert!(parts(&cuts).all(|part| part.is_sorted()));
+        let total: f64 = parts(&cuts).map(|part| area(&items, part)).sum();
+        let unsorted: f64 = items.chunks(1000).map(|items| bounds(items).0.half_area()).sum();
         assert!(total < unsorted / 20.0, "{total} against {unsorted} without a partition");
     }
 
@@ -375,29 +460,22 @@ mod tests {
         let mut items = scattered(20_000);
         let large = |index| Item { min: [-50.0, -1.0, -1.0], max: [150.0, 11.0, 2.0], index };
         items.extend((20_000..20_030).map(large));
-        let mut plain = items.clone();
-        let total = |items: &[Item], parts: &[Range<u32>]| -> f64 {
-            let area = |range: &Range<u32>| bounds(&items[range.start as usize..range.end as usize]).0.half_area();
-            parts.iter().map(area).sum()
-        };
-        let without = descend(&mut plain, 0, 1000, false, false).bricks;
-        let parts = check(&mut items, 1000);
-        let of_large = |range: &Range<u32>| {
-            let items = &items[range.start as usize..range.end as usize];
-            items.iter().filter(|item| item.index >= 20_000).count()
-        };
-        let mixed = parts.bricks.iter().filter(|range| ![0, range.len()].contains(&of_large(range))).count();
+        let total = |cuts: &Cuts| -> f64 { parts(cuts).map(|part| area(&items, part)).sum() };
+        let without = cut(&mut items.clone(), Rule { limit: 1000, is_object: false });
+        let cuts = check(&items, 1000);
+        let of_large = |part: &[u32]| part.iter().filter(|&&index| index >= 20_000).count();
+        let mixed = parts(&cuts).filter(|part| ![0, part.len()].contains(&of_large(part))).count();
         assert_eq!(mixed, 0);
-        assert!(total(&items, &parts.bricks) < 2.0 * total(&plain, &without), "parts of large items are few");
-        let mut few = scattered(20_000);
-        let before = descend(&mut few.clone(), 0, 1000, false, false).bricks;
-        assert_eq!(check(&mut few, 1000).bricks, before, "without large items nothing changes");
+        assert!(total(&cuts) < 2.0 * total(&without), "parts of large items are few");
+        let few = scattered(20_000);
+        let before = cut(&mut few.clone(), Rule { limit: 1000, is_object: false });
+        assert_eq!(check(&few, 1000).order, before.order, "without large items nothing changes");
     }
 
     #[test]
     fn the_limit_does_not_move_canonical_extents() {
         let extents = |limit| {
-            let mut extents = partition(&mut scattered(100_000), limit).extents;
+            let mut extents = cut_all(&mut scattered(100_000), limit).extents;
             extents.sort_by(f64::total_cmp);
             extents
         };
@@ -407,40 +485,41 @@ mod tests {
         assert_eq!(extents(70_000), expected);
         let mut other = scattered(100_000);
         other.truncate(90_000);
-        assert_ne!(partition(&mut other, 100).extents.len(), 0);
-        assert_ne!(extents(16384).len(), partition(&mut scattered(10_000), 100).extents.len());
+        assert_ne!(cut_all(&mut other, 100).extents.len(), 0);
+        assert_ne!(extents(16384).len(), cut_all(&mut scattered(10_000), 100).extents.len());
     }
 
     #[test]
     fn equal_centroids_are_halved() {
         let one = Item { min: [1.0; 3], max: [2.0; 3], index: 0 };
-        let mut items: Vec<Item> = (0..1_000_000).map(|index| Item { index, ..one }).collect();
-        let parts = check(&mut items, 1000);
-        assert_eq!(parts.bricks.len(), 1024);
+        let items: Vec<Item> = (0..1_000_000).map(|index| Item { index, ..one }).collect();
+        assert_eq!(check(&items, 1000).parts.len(), 1024);
     }
 
     #[test]
     fn a_geometric_series_stays_shallow() {
-        let mut items: Vec<Item> = (0..200_000)
+        let items: Vec<Item> = (0..200_000)
             .map(|index| {
                 let x = 0.9999f64.powi(index as i32);
                 Item { min: [x, 0.0, 0.0], max: [x, 1e-3, 1e-3], index }
             })
             .collect();
-        let parts = check(&mut items, 4);
-        assert!(parts.bricks.len() < 200_000);
+        assert!(check(&items, 4).parts.len() < 200_000);
     }
 
     #[test]
-    fn threads_do_not_change_the_order() {
-        let order = |threads| {
+    fn neither_threads_nor_the_order_of_items_change_anything() {
+        let order = |threads, items: &[Item]| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let mut items = scattered(150_000);
-            let bricks = pool.install(|| partition(&mut items, 500)).bricks;
-            (bricks, items.iter().map(|item| item.index).collect::<Vec<_>>())
+            let cuts = pool.install(|| cut_all(&mut items.to_vec(), 500));
+            (cuts.parts, cuts.order)
         };
-        let one = order(1);
-        assert_eq!(one, order(3));
-        assert_ne!(one.1, (0..150_000).collect::<Vec<_>>());
+        let mut items = scattered(150_000);
+        let one = order(1, &items);
+        assert_eq!(one, order(3, &items));
+        items.reverse();
+        assert_eq!(one, order(3, &items));
+        items.truncate(149_999);
+        assert_ne!(one, order(1, &items));
     }
 }

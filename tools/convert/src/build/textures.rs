@@ -2,7 +2,7 @@
 
 use super::error::BuildError;
 use crate::source::SourceTexture;
-use bricks::{MAX_TEXTURE_SIZE, Material, NONE, Texture, WRAP_MIRROR, WRAP_REPEAT};
+use bricks::{MAX_TEXTURE_SIZE, Material, NONE, Texture, WRAP_MIRROR, WRAP_REPEAT, Writer};
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
@@ -17,23 +17,48 @@ pub(super) struct EncodedTexture {
     pub mean: [f32; 3],
 }
 
-/// Which textures some material uses, and `materials` with the indices among those.
-pub(super) fn used(count: usize, materials: &[Material]) -> (Vec<u32>, Vec<Material>) {
+/// Which textures some material uses, ascending.
+pub(super) fn used(count: usize, materials: &[Material]) -> Vec<usize> {
     let mut is_used = vec![false; count];
     for material in materials.iter().filter(|material| material.base_color_texture != NONE) {
         is_used[material.base_color_texture as usize] = true;
     }
-    let mut new_of_old = vec![NONE; count];
-    let mut textures = Vec::new();
-    for old in (0..count).filter(|&old| is_used[old]) {
-        new_of_old[old] = textures.len() as u32;
-        textures.push(old as u32);
+    (0..count).filter(|&index| is_used[index]).collect()
+}
+
+/// The textures that are stored.
+#[derive(Clone, Debug)]
+pub(super) struct Stored {
+    /// Their records.
+    pub records: Vec<Texture>,
+    /// Their mean linear RGB.
+    pub means: Vec<[f32; 3]>,
+    /// Their indices, by index in the source.
+    new_of_old: Vec<u32>,
+}
+
+impl Stored {
+    /// None of `count`.
+    pub fn new(count: usize) -> Self {
+        Self { records: Vec::new(), means: Vec::new(), new_of_old: vec![NONE; count] }
     }
-    let renumbered = materials.iter().map(|material| match material.base_color_texture {
-        NONE => *material,
-        old => Material { base_color_texture: new_of_old[old as usize], ..*material },
-    });
-    (textures, renumbered.collect())
+
+    /// Writes texture `index` of the source.
+    pub fn push(&mut self, index: usize, texture: EncodedTexture, writer: &mut Writer) -> Result<(), BuildError> {
+        self.new_of_old[index] = self.records.len() as u32;
+        self.records.push(Texture { texels: writer.write(&texture.texels)?, ..texture.record });
+        self.means.push(texture.mean);
+        Ok(())
+    }
+
+    /// Materials with the indices among the stored textures; without one where it is not stored.
+    pub fn renumber(&self, materials: &[Material]) -> Vec<Material> {
+        let renumber = |material: &Material| match material.base_color_texture {
+            NONE => *material,
+            old => Material { base_color_texture: self.new_of_old[old as usize], ..*material },
+        };
+        materials.iter().map(renumber).collect()
+    }
 }
 
 /// Makes the mip chain of a texture.
@@ -207,10 +232,13 @@ mod tests {
     #[test]
     fn unused_textures_are_left_out() {
         let material = |texture| Material { base_color_texture: texture, ..bytemuck::Zeroable::zeroed() };
-        let (textures, materials) = used(4, &[material(3), material(NONE), material(1), material(3)]);
-        assert_eq!(textures, [1, 3]);
-        let indices: Vec<u32> = materials.iter().map(|material| material.base_color_texture).collect();
-        assert_eq!(indices, [1, NONE, 0, 1]);
+        let materials = [material(3), material(NONE), material(1), material(3), material(2)];
+        assert_eq!(used(5, &materials), [1, 2, 3]);
+        // Texture 2 could not be read.
+        let stored = Stored { records: vec![], means: vec![], new_of_old: vec![NONE, 0, NONE, 1, NONE] };
+        let renumbered = stored.renumber(&materials);
+        let indices: Vec<u32> = renumbered.iter().map(|material| material.base_color_texture).collect();
+        assert_eq!(indices, [1, NONE, 0, 1, NONE]);
     }
 
     #[test]

@@ -1,0 +1,187 @@
+//! The resident part: what the bricks, objects and instances add up to.
+
+use super::binary::Box3;
+use super::cut::ObjectCut;
+use super::error::BuildError;
+use super::lattice::{Lattice, pow2};
+use super::matrix::Affine;
+use super::objects::Plan;
+use super::settings::{BuildSettings, BuildSummary};
+use super::top_level::{self, TopLevel, world_box};
+use crate::source::Outline;
+use bricks::{
+    BRICK_WIDE, Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Leaf, MATERIAL_BLEND, MATERIAL_MASK, Manifest,
+    Material, Node, Object, Resident,
+};
+use rayon::prelude::*;
+use std::time::Duration;
+
+/// The records of the objects; `bricks` are in their order.
+pub(super) fn object_records(plan: &Plan, lattices: &[Lattice], bricks: &[Brick]) -> Vec<Object> {
+    let mut first_brick = 0;
+    (0u32..)
+        .zip(plan.objects.iter().zip(lattices))
+        .map(|(index, (object, lattice))| {
+            let own = bricks[first_brick as usize..].iter().take_while(|brick| brick.object == index);
+            let (brick_count, triangle_count) =
+                own.fold((0, 0), |(bricks, triangles), brick| (bricks + 1, triangles + brick.triangle_count));
+            let record = Object {
+                step_log2: lattice.step_log2,
+                unit_log2: lattice.unit_log2,
+                first_brick,
+                brick_count,
+                triangle_ids: object.triangle_ids,
+                triangle_count,
+                _reserved: [0; 2],
+            };
+            first_brick += brick_count;
+            record
+        })
+        .collect()
+}
+
+/// The records of the instances, the world's first.
+pub(super) fn instance_records(plan: &Plan) -> Vec<Instance> {
+    let world =
+        Instance { object: 0, base: 0, flags: INSTANCE_IDENTITY, _reserved: 0, world_from_object: Instance::IDENTITY };
+    let placed = plan.instances.iter().map(|instance| Instance {
+        object: instance.object,
+        base: instance.base,
+        flags: if instance.matrix.determinant() < 0.0 { INSTANCE_MIRRORED } else { 0 },
+        _reserved: 0,
+        world_from_object: instance.matrix.0,
+    });
+    std::iter::once(world).chain(placed).collect()
+}
+
+/// The trees over the bricks of all instances.
+pub(super) fn build_top(
+    objects: &[Object],
+    instances: &[Instance],
+    lattices: &[Lattice],
+    bricks: &[Brick],
+) -> Result<TopLevel, BuildError> {
+    let leaves: Vec<Leaf> = (0u32..)
+        .zip(instances)
+        .flat_map(|(index, instance)| {
+            let object = &objects[instance.object as usize];
+            (object.first_brick..object.first_brick + object.brick_count)
+                .map(move |brick| Leaf { instance: index, brick })
+        })
+        .collect();
+    let boxes: Vec<Box3> = leaves
+        .par_iter()
+        .map(|leaf| {
+            let (instance, brick) = (&instances[leaf.instance as usize], &bricks[leaf.brick as usize]);
+            let own = Box3 { min: brick.min, max: brick.max };
+            match leaf.instance {
+                0 => own,
+                _ => {
+                    let matrix = Affine(instance.world_from_object);
+                    world_box(own, &lattices[instance.object as usize], &matrix, &lattices[0])
+                }
+            }
+        })
+        .collect();
+    top_level::build(&leaves, &boxes)
+}
+
+/// Triangles left out, instances multiplied out.
+pub(super) struct Dropped {
+    zero_area: u64,
+    non_finite: u64,
+}
+
+impl Dropped {
+    /// Counts them; `zero_area` are those dropped after rounding, by object.
+    pub fn count(resident: &Resident, cuts: &[ObjectCut], zero_area: &[u32]) -> Self {
+        let mut dropped = Self { zero_area: 0, non_finite: 0 };
+        for instance in &resident.instances {
+            let object = instance.object as usize;
+            dropped.zero_area += u64::from(zero_area[object]) + u64::from(cuts[object].zero_area);
+            dropped.non_finite += u64::from(cuts[object].non_finite);
+        }
+        dropped
+    }
+
+    /// Says so.
+    pub fn warn(&self, warnings: &mut Vec<String>) {
+        if self.zero_area > 0 {
+            warnings.push(format!("{} triangles without area were left out", self.zero_area));
+        }
+        if self.non_finite > 0 {
+            warnings.push(format!("{} triangles with vertices that are not finite were left out", self.non_finite));
+        }
+    }
+}
+
+/// What the scene has; a bit of `used_materials` for each material that is used.
+pub(super) fn manifest(
+    resident: &Resident,
+    scene: &Outline,
+    plan: Plan,
+    used_materials: &[u64],
+    settings: &BuildSettings,
+    dropped: &Dropped,
+    warnings: Vec<String>,
+) -> Manifest {
+    let step = pow2(resident.objects[0].step_log2);
+    let (min, max) = resident
+        .top2
+        .first()
+        .map_or(([1.0; 3], [-1.0; 3]), |root| (root.min.map(|x| x as f64 * step), root.max.map(|x| x as f64 * step)));
+    let is_used = |index: usize| used_materials[index / 64] >> (index % 64) & 1 != 0;
+    let any = |test: &dyn Fn(&Material) -> bool| {
+        resident.materials.iter().enumerate().any(|(index, material)| is_used(index) && test(material))
+    };
+    let instanced = resident.instances.iter().map(|instance| &resident.objects[instance.object as usize]);
+    Manifest {
+        generator: concat!("brickwalk ", env!("CARGO_PKG_VERSION")).to_owned(),
+        sources: scene.sources.clone(),
+        brick_triangles: settings.brick_triangles,
+        triangle_ids: plan.triangle_ids,
+        triangles_stored: resident.objects.iter().map(|object| u64::from(object.triangle_count)).sum(),
+        triangles_instanced: instanced.map(|object| u64::from(object.triangle_count)).sum(),
+        dropped_zero_area: dropped.zero_area,
+        dropped_non_finite: dropped.non_finite,
+        min,
+        max,
+        has_textures: any(&|material| material.base_color_texture != bricks::NONE),
+        has_alpha_mask: any(&|material| material.flags & MATERIAL_MASK != 0),
+        has_alpha_blend: any(&|material| material.flags & MATERIAL_BLEND != 0),
+        has_emission: any(&|material| material.emission.iter().any(|x| *x > 0.0)),
+        has_instances: resident.instances.len() > 1,
+        has_animation: scene.has_animation,
+        has_wide_bricks: resident.bricks.iter().any(|brick| brick.flags & BRICK_WIDE != 0),
+        instance_scale_ratio: plan.instances.iter().fold(1.0, |most, instance| instance.matrix.scale_ratio().max(most)),
+        warnings,
+        provenance: plan.provenance,
+    }
+}
+
+/// What was built.
+pub(super) fn summary(resident: &Resident, bytes_file: u64, phases: Vec<(&'static str, Duration)>) -> BuildSummary {
+    let manifest = &resident.manifest;
+    let nodes = resident.bricks.iter().map(|brick| u64::from(brick.node_count)).sum();
+    BuildSummary {
+        objects: resident.objects.len() as u64,
+        instances: resident.instances.len() as u64 - 1,
+        bricks: resident.bricks.len() as u64,
+        wide_bricks: resident.bricks.iter().filter(|brick| brick.flags & BRICK_WIDE != 0).count() as u64,
+        leaves: resident.leaves.len() as u64,
+        triangle_ids: manifest.triangle_ids,
+        triangles_stored: manifest.triangles_stored,
+        triangles_instanced: manifest.triangles_instanced,
+        dropped_zero_area: manifest.dropped_zero_area,
+        dropped_non_finite: manifest.dropped_non_finite,
+        world_step_log2: resident.objects[0].step_log2,
+        nodes,
+        bytes_nodes: nodes * size_of::<Node>() as u64,
+        bytes_geometry: resident.bricks.iter().map(|brick| brick.geometry.bytes).sum(),
+        bytes_attributes: resident.bricks.iter().map(|brick| brick.attributes.bytes).sum(),
+        bytes_textures: resident.textures.iter().map(|texture| texture.texels.bytes).sum(),
+        bytes_file,
+        warnings: manifest.warnings.clone(),
+        phases,
+    }
+}

@@ -1,0 +1,112 @@
+//! Encodes bricks in parallel and writes them in order.
+
+use super::brick::{BrickContext, EncodedBrick};
+use super::error::BuildError;
+use crate::progress::Progress;
+use bricks::{Brick, Writer};
+use rayon::prelude::*;
+
+/// A brick to be encoded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Job {
+    /// Its object.
+    pub object: u32,
+    /// Where its triangles begin.
+    pub first: usize,
+    /// Number of its triangles, dropped ones counted.
+    pub count: usize,
+}
+
+/// Bricks as they are written.
+#[derive(Debug)]
+pub(super) struct BrickWriter<'a> {
+    /// The scene file.
+    pub writer: &'a mut Writer,
+    /// Records of what is written.
+    pub records: Vec<Brick>,
+    /// Triangles dropped after rounding, by object.
+    pub dropped: Vec<u32>,
+    /// Triangles a thread encodes before what is encoded is written, which bounds the memory.
+    pub batch_triangles: usize,
+}
+
+impl BrickWriter<'_> {
+    /// Encodes and writes bricks. `encode` makes one, or none if no triangle of it has an area; it also returns how many
+    /// have none.
+    pub fn write(
+        &mut self,
+        jobs: &[Job],
+        encode: impl Fn(&Job) -> (Option<EncodedBrick>, u32) + Sync,
+        progress: &Progress,
+    ) -> Result<(), BuildError> {
+        let mut ready: Vec<EncodedBrick> = Vec::new();
+        let mut rest = jobs;
+        while !rest.is_empty() || !ready.is_empty() {
+            progress.check()?;
+            let (batch, after) = rest.split_at(self.batch_length(rest));
+            rest = after;
+            // One batch is written while the next is encoded.
+            let (written, encoded) = rayon::join(
+                || self.write_batch(std::mem::take(&mut ready)),
+                || {
+                    let encode = |job: &Job| {
+                        let (brick, dropped) = encode(job);
+                        progress.advance(job.count as u64);
+                        (brick, job.object, dropped)
+                    };
+                    batch.par_iter().with_max_len(1).map(encode).collect::<Vec<_>>()
+                },
+            );
+            written?;
+            for (brick, object, dropped) in encoded {
+                ready.extend(brick);
+                self.dropped[object as usize] += dropped;
+            }
+        }
+        Ok(())
+    }
+
+    /// How many of the next bricks are encoded before they are written.
+    fn batch_length(&self, jobs: &[Job]) -> usize {
+        let budget = self.batch_triangles * rayon::current_num_threads();
+        let mut triangles = 0;
+        jobs.iter()
+            .take_while(|job| {
+                let before = triangles;
+                triangles += job.count;
+                before < budget
+            })
+            .count()
+    }
+
+    fn write_batch(&mut self, bricks: Vec<EncodedBrick>) -> Result<(), BuildError> {
+        for brick in bricks {
+            let geometry = self.writer.write(&brick.geometry)?;
+            let attributes = self.writer.write(&brick.attributes)?;
+            self.records.push(Brick { geometry, attributes, ..brick.record });
+        }
+        Ok(())
+    }
+}
+
+/// The bricks of all objects, in order; `bricks` are the numbers of triangles of each by object.
+pub(super) fn jobs<'a>(bricks: impl Iterator<Item = &'a [u32]>) -> Result<Vec<Job>, BuildError> {
+    let mut jobs = Vec::new();
+    for (object, bricks) in (0u32..).zip(bricks) {
+        let mut first = 0;
+        for &count in bricks {
+            jobs.push(Job { object, first, count: count as usize });
+            first += count as usize;
+        }
+    }
+    let (found, limit) = (jobs.len() as u64, u64::from(u32::MAX / 2));
+    if found > limit { Err(BuildError::TooMany { what: "bricks", found, limit }) } else { Ok(jobs) }
+}
+
+/// The contexts of the objects' bricks.
+pub(super) fn contexts<'a>(
+    lattices: &[super::lattice::Lattice],
+    materials: &'a [super::attributes::MeanColors],
+) -> Vec<BrickContext<'a>> {
+    (0u32..).zip(lattices).map(|(index, &lattice)| BrickContext { index, lattice, materials }).collect()
+}
