@@ -3,6 +3,7 @@
 
 mod common;
 
+use bricks::SceneFile;
 use brickwalk::app::args::{Cli, Command};
 use brickwalk::app::output::npy;
 use brickwalk::app::session::{Session, open_scene};
@@ -22,6 +23,7 @@ use clap::Parser;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 const OPTIONS: &str = "--cache 35% --tile 16 --frames 3 --size";
 
@@ -53,10 +55,16 @@ fn report(name: &str, tally: &Tally, least_hits: usize, hits: usize) {
     assert!(tally.excused() * 5 <= tally.total() * 2, "{name}: {tally}");
 }
 
-/// Frames along a path: every primary and every shadow ray.
-fn check_walk(name: &str, scene: &Path, size: &str, path: Option<CameraPath>) {
+/// A walk along a path, and `rays` rays of `trace`.
+fn check(name: &str, scene: &Path, size: &str, path: Option<CameraPath>, rays: usize) {
     let file = open_scene(scene).expect("the scene");
     let truth = Truth::load(&file).expect("truth");
+    check_walk(name, scene, &file, &truth, size, path);
+    check_trace(name, scene, &file, &truth, rays);
+}
+
+/// Frames along a path: every primary and every shadow ray.
+fn check_walk(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, size: &str, path: Option<CameraPath>) {
     let words = format!("brickwalk walk s -o o {OPTIONS} {size}");
     let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
@@ -75,19 +83,25 @@ fn check_walk(name: &str, scene: &Path, size: &str, path: Option<CameraPath>) {
         let hits = renderer.executor.read_hits(Pass::Primary).expect("hits");
         let asked: Vec<TruthRay> = rays.iter().map(|ray| truth_ray(&frame, ray)).collect();
         let pairs: Vec<_> = asked.iter().zip(&hits).collect();
-        add(&mut primary, pairs.par_iter().map(|(ray, hit)| judge(&truth, ray, found(hit))).collect());
+        add(&mut primary, pairs.par_iter().map(|(ray, hit)| judge(truth, ray, found(hit))).collect());
         hit_count += hits.iter().filter(|hit| hit.id != NONE).count();
         // Negative controls: a hit that is lost, and one that is half as far, must be noticed.
         let met: Vec<_> = pairs.iter().filter(|(_, hit)| hit.id != NONE).take(64).collect();
-        add(&mut spoiled, met.iter().map(|(ray, _)| judge(&truth, ray, None)).collect());
+        add(&mut spoiled, met.iter().map(|(ray, _)| judge(truth, ray, None)).collect());
         let nearer = |hit: &Hit| found(hit).map(|(id, t)| (id, t / 2.0));
-        add(&mut spoiled, met.iter().map(|(ray, hit)| judge(&truth, ray, nearer(hit))).collect());
+        add(&mut spoiled, met.iter().map(|(ray, hit)| judge(truth, ray, nearer(hit))).collect());
         let rays = renderer.executor.read_rays(Pass::Shadow).expect("rays");
-        let hits = renderer.executor.read_hits(Pass::Shadow).expect("hits");
-        let traced: Vec<_> = rays.iter().zip(&hits).filter(|(ray, _)| ray.t_min <= ray.t_max).collect();
+        let occluders = renderer.executor.read_hits(Pass::Shadow).expect("hits");
+        // A shadow ray leaves the primary hit of its pixel and does not meet that triangle again.
+        let traced: Vec<(TruthRay, bool)> = (rays.iter().zip(&hits).zip(&occluders))
+            .filter(|((ray, _), _)| ray.t_min <= ray.t_max)
+            .map(|((ray, from), occluder)| (truth_ray(&frame, ray).excluding(from.id), occluder.id != NONE))
+            .collect();
+        assert!(traced.iter().all(|(ray, _)| ray.exclude != Some(NONE)), "shadow rays leave hits");
         shadow_count += traced.len();
-        let verdict = |(ray, hit): &(&Ray, &Hit)| judge_any(&truth, &truth_ray(&frame, ray), hit.id != NONE);
-        add(&mut shadow, traced.par_iter().map(verdict).collect());
+        add(&mut shadow, traced.par_iter().map(|(ray, occluded)| judge_any(truth, ray, *occluded)).collect());
+        // Control: the opposite answer must be noticed.
+        add(&mut spoiled, traced.iter().take(64).map(|(ray, occluded)| judge_any(truth, ray, !occluded)).collect());
     }
     report(&format!("{name}, primary"), &primary, 15, hit_count);
     report(&format!("{name}, shadow"), &shadow, 8, shadow_count);
@@ -95,9 +109,7 @@ fn check_walk(name: &str, scene: &Path, size: &str, path: Option<CameraPath>) {
 }
 
 /// Rays between random points of the scene's bounds, half of them aimed at points of triangles: inside, on edges, at vertices.
-fn check_trace(name: &str, scene: &Path, rays: i32) {
-    let file = open_scene(scene).expect("the scene");
-    let truth = Truth::load(&file).expect("truth");
+fn check_trace(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, rays: usize) {
     let Command::Trace(args) =
         Cli::parse_from("brickwalk trace s --rays r -o h --cache 35%".split_whitespace()).command
     else {
@@ -121,12 +133,12 @@ fn check_trace(name: &str, scene: &Path, rays: i32) {
         .map(|i| {
             let (from, mut to) = (point(), point());
             if i % 2 == 0 {
-                let [a, b, c] = corners[i as usize * 7919 % corners.len()];
-                let w = [[1.0, 1.0, 1.0], [2.0, 1.0, 0.0], [0.0, 0.0, 3.0]][i as usize / 2 % 3];
+                let [a, b, c] = corners[i * 7919 % corners.len()];
+                let w = [[1.0, 1.0, 1.0], [2.0, 1.0, 0.0], [0.0, 0.0, 3.0]][i / 2 % 3];
                 to = (a * w[0] + b * w[1] + c * w[2]) / 3.0;
             }
             // Directions of all lengths; some bounded intervals.
-            let length = 10f64.powi(i % 7 - 3);
+            let length = 10f64.powi((i % 7) as i32 - 3);
             let direction = (to - from) * length;
             let t_max = if i % 3 == 0 { 0.7 / length } else { f64::INFINITY };
             npy::Ray { origin: from.to_array(), direction: direction.to_array(), t_min: 0.0, t_max }
@@ -135,15 +147,11 @@ fn check_trace(name: &str, scene: &Path, rays: i32) {
     let progress = Progress::hidden();
     let (closest, _) = trace(&mut session, &rays, false, &progress).expect("hits");
     let (any, _) = trace(&mut session, &rays, true, &progress).expect("hits");
-    let (mut tally, mut occlusion, mut count) = (Tally::default(), Tally::default(), 0);
-    for ((ray, hit), any) in rays.iter().zip(&closest).zip(&any) {
+    let judged = |((ray, hit), any): ((&npy::Ray, &npy::Hit), &npy::Hit)| {
         let frame = Frame::near(file.resident(), DVec3::from_array(ray.origin));
         let device = device_ray(ray, &frame);
         let dumped = truth_ray(&frame, &device.ray);
         let found = (hit.triangle != NONE).then(|| (hit.triangle, hit.t / device.t_scale));
-        tally.add(judge(&truth, &dumped, found));
-        occlusion.add(judge_any(&truth, &dumped, any.triangle != NONE));
-        count += usize::from(hit.triangle != NONE);
         if let (Some(truth), Some((id, _))) = (truth.closest(&dumped), found)
             && truth.id == id
             // Across a sliver the weights of its near vertices are all but undetermined.
@@ -152,7 +160,15 @@ fn check_trace(name: &str, scene: &Path, rays: i32) {
             let error = (truth.u - f64::from(hit.u)).abs().max((truth.v - f64::from(hit.v)).abs());
             assert!(error < 0.02, "weights of the source's vertices: {hit:?} is not {truth:?}");
         }
-    }
+        (judge(truth, &dumped, found), judge_any(truth, &dumped, any.triangle != NONE))
+    };
+    let (mut tally, mut occlusion) = (Tally::default(), Tally::default());
+    let verdicts: Vec<_> = rays.par_iter().zip(&closest).zip(&any).map(judged).collect();
+    verdicts.into_iter().for_each(|(closest, any)| {
+        tally.add(closest);
+        occlusion.add(any);
+    });
+    let count = closest.iter().filter(|hit| hit.triangle != NONE).count();
     report(&format!("{name}, trace"), &tally, rays.len() / 6, count);
     report(&format!("{name}, trace --any"), &occlusion, rays.len() / 6, count);
 }
@@ -162,9 +178,8 @@ fn soups_are_exact() {
     for kind in [SoupKind::Uniform, SoupKind::Clustered, SoupKind::Slivers] {
         let folder = common::folder();
         let scene = made(folder.path(), soup(kind, if kind == SoupKind::Slivers { 20_000 } else { 3000 }, 11), 256);
-        let (size, rays) = if kind == SoupKind::Slivers { ("48x32", 400) } else { ("80x56", 2400) };
-        check_walk(&format!("{kind:?} soup"), &scene, size, None);
-        check_trace(&format!("{kind:?} soup"), &scene, rays);
+        let (size, rays) = if kind == SoupKind::Slivers { ("48x32", 2000) } else { ("128x96", 8000) };
+        check(&format!("{kind:?} soup"), &scene, size, None, rays);
     }
 }
 
@@ -173,8 +188,7 @@ fn rotated_overlapping_instances_are_exact() {
     let folder = common::folder();
     let scene = made(folder.path(), rotated_instances(5), 256);
     assert!(open_scene(&scene).expect("the scene").resident().instances.len() > 8, "they stay instances");
-    check_walk("instances", &scene, "80x56", None);
-    check_trace("instances", &scene, 2400);
+    check("instances", &scene, "128x96", None, 8000);
 }
 
 #[test]
@@ -182,8 +196,7 @@ fn a_city_of_500k_triangles_is_exact() {
     let folder = common::folder();
     let scene = common::city(folder.path(), "500K", "4K");
     let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
-    check_walk("city", &scene, "36x24", Some(path));
-    check_trace("city", &scene, 300);
+    check("city", &scene, "144x96", Some(path), 4000);
 }
 
 #[test]
@@ -194,6 +207,5 @@ fn sponza_is_exact() {
     let input = scenes.join("sponza/Sponza.gltf");
     let words = ["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()];
     common::succeed(words.into_iter().chain(["--brick-triangles", "1K"].map(std::ffi::OsStr::new)));
-    check_walk("sponza", &scene, "36x24", None);
-    check_trace("sponza", &scene, 300);
+    check("sponza", &scene, "144x96", None, 4000);
 }

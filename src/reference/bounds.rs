@@ -45,10 +45,33 @@
 //! Whatever the plane's slope, the clamp keeps z within the extent of the perturbed triangle, 32 u of padding and 4 u
 //! of rounding. It never moves t away from the perturbed triangle's own distance, which lies within. The two intervals
 //! are intersected; if Σ U may vanish only the second one stands.
+//!
+//! # Boxes
+//!
+//! Of a triangle only its world box is known. Let V and A be the greatest distances of a point of the box from the
+//! reference point R and from the ray's origin (Euclidean, world units), so that abs(v) ≤ V and abs(a) ≤ A for its
+//! vertices. Every term of ε_edge grows with these. With abs(S) ≤ 1, e = (e_x, e_y) has at most the length
+//! (1 + √2) abs(δa) + √2 (δS + u) abs(a_z) + u (1 + √2) abs(a).
+//!
+//! *Identity.* abs(δa) ≤ u (V + A) and δS ≤ 2u, so that 4 ε_edge ≤ 4 · 1.6181 · u (2.42 V + 9.1 A) < 16u V + 64u A.
+//!
+//! *Instances.* In object units, with the Frobenius norms s of A and m of M and κ = s m ≥ 3: abs(a) ≤ m A. The reference
+//! point R′ of the instance is the lattice point nearest to M (R − T), held per component to an interval around the
+//! object, which p is in; so abs(v) and abs(c′) are at most m V + √3/2 cell. With abs(o) ≤ V + A,
+//! abs(δa) ≤ u (m (8 V + 6 A) + 2.6 cell). The dominant component of d in the object is at least abs(d) / (√3 s) of the
+//! world's, so that δd / d_z ≤ 4√3 u κ plus √3 `NOISE` κ²; be this at most φ; then δS ≤ 2 φ / (1 − φ) + 2u. Times s
+//! gives world units, and 4 ε_edge is below u κ (128 V + 144 A) + 20 κ φ / (1 − φ) A + 48 u s cell, plus what f64
+//! rounds: 4 · 1.6181 · (1 + √2) · √3 `NOISE` (κ² (abs(R) + abs(T) + abs(o) + s abs(p)) + s abs(R′)).
+//!
+//! A point of the boundary within 4 ε_edge across an axis has a point of the ray at the same height, so no farther than
+//! that; this point of the ray is in the box grown by as much. And a kernel's hit, clamped, is within the perturbed
+//! triangle's slabs grown by 36 u abs(a), and so in the grown box as well (φ abs(a) more for instances).
 
+use super::bvh::Padding;
+use super::decode::TruthObject;
 use super::predicate::crossing;
 use super::ray::TruthRay;
-use super::truth::Truth;
+use super::truth::{Truth, TruthInstance};
 use bricks::ORIGIN_STEPS;
 use glam::{DMat3, DVec3};
 
@@ -149,11 +172,9 @@ impl Local {
                 d_error: [0.0; 3],
             };
         };
-        let linear =
-            DMat3::from_cols(DVec3::new(m[0], m[4], m[8]), DVec3::new(m[1], m[5], m[9]), DVec3::new(m[2], m[6], m[10]));
+        let (linear, translation) = (linear(m), translation(m));
         let inverse = linear.inverse();
         let magnitude = DMat3::from_cols(inverse.x_axis.abs(), inverse.y_axis.abs(), inverse.z_axis.abs());
-        let translation = DVec3::new(m[3], m[7], m[11]);
         let (reference, o, d) = (DVec3::from(ray.reference), DVec3::from(ray.origin), DVec3::from(ray.direction));
         let cell = step * ORIGIN_STEPS as f64;
         let offset = inverse * (reference - translation);
@@ -186,11 +207,14 @@ impl Local {
     }
 }
 
-/// Ratio of the greatest to the least scale of a matrix, bounded from above.
-pub(super) fn scale_ratio(m: &[f64; 12]) -> (f64, f64) {
-    let linear =
-        DMat3::from_cols(DVec3::new(m[0], m[4], m[8]), DVec3::new(m[1], m[5], m[9]), DVec3::new(m[2], m[6], m[10]));
-    (frobenius(&linear) * frobenius(&linear.inverse()), frobenius(&linear))
+/// The linear part of a row-major 3x4 matrix.
+fn linear(m: &[f64; 12]) -> DMat3 {
+    DMat3::from_cols(DVec3::new(m[0], m[4], m[8]), DVec3::new(m[1], m[5], m[9]), DVec3::new(m[2], m[6], m[10]))
+}
+
+/// The last column of a row-major 3x4 matrix.
+fn translation(m: &[f64; 12]) -> DVec3 {
+    DVec3::new(m[3], m[7], m[11])
 }
 
 fn frobenius(m: &DMat3) -> f64 {
@@ -293,17 +317,55 @@ pub fn assess(truth: &Truth, ray: &TruthRay, id: u32) -> Option<Assessment> {
     truth.find(id).map(|index| assess_index(truth, ray, index))
 }
 
-/// How far from its true place any triangle near the ray can be for a kernel, in world units, four times over: ε_edge
-/// of every triangle is below a quarter of it.
-pub(super) fn scene_pad(truth: &Truth, ray: &TruthRay) -> f64 {
-    let bounds = truth.bvh.bounds();
-    if bounds.min[0] > bounds.max[0] {
-        return 0.0;
+/// Object lengths to world lengths, bounded from above; exactly 1 for the identity.
+pub(super) fn stretch(instance: &TruthInstance) -> f64 {
+    instance.world_from_object.as_ref().map_or(1.0, |m| frobenius(&linear(m)))
+}
+
+/// What [`padding`] must know of a scene's instances: the worst of each.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Extremes {
+    /// κ: greatest ratio of scales, bounded from above by Frobenius norms (then at least 3); 0 if all are the identity.
+    scale_ratio: f64,
+    /// Greatest size of a cell of reference points, world units.
+    cell: f64,
+    /// Greatest magnitude of what enters the f64 transform of an instance, but for the ray; world units.
+    reach: f64,
+}
+
+impl Extremes {
+    pub(super) fn of(objects: &[TruthObject], instances: &[TruthInstance]) -> Self {
+        let mut worst = Self::default();
+        for instance in instances {
+            let Some(m) = &instance.world_from_object else { continue };
+            let object = &objects[instance.object as usize];
+            let step = f64::from(object.step_log2).exp2();
+            let (size, cell) = (frobenius(&linear(m)), step * ORIGIN_STEPS as f64);
+            let corner = DVec3::from(std::array::from_fn(|k| {
+                object.bounds[0][k].unsigned_abs().max(object.bounds[1][k].unsigned_abs()) as f64 * step
+            }));
+            let reach = translation(m).length() + size * (corner.length() + 4.0 * cell);
+            worst.scale_ratio = worst.scale_ratio.max(size * frobenius(&linear(m).inverse()));
+            worst.cell = worst.cell.max(size * cell);
+            worst.reach = worst.reach.max(reach);
+        }
+        worst
     }
+}
+
+/// By how much boxes must be grown so that the ray meets the box of every triangle that comes within four times its own
+/// ε_edge of the ray, and of every triangle that a kernel may find (see "Boxes" above).
+pub(super) fn padding(truth: &Truth, ray: &TruthRay) -> Padding {
+    let Extremes { scale_ratio: k, cell, reach } = truth.extremes;
+    if k == 0.0 {
+        return Padding { per_reference: 16.0 * U, per_origin: 64.0 * U, constant: 0.0 };
+    }
+    let share = 7.0 * U * k + 2.0 * NOISE * k * k;
+    let turned = if share < 1.0 { share / (1.0 - share) } else { f64::INFINITY };
     let length = |v: [f64; 3]| DVec3::from(v).length();
-    let far: [f64; 3] =
-        std::array::from_fn(|k| (bounds.min[k] - ray.reference[k]).abs().max((bounds.max[k] - ray.reference[k]).abs()));
-    let world = length(far) + length(ray.origin);
-    // Each step's constants sum to less than 32 u times the sizes; an instance's frame adds a cell of its lattice.
-    128.0 * U * truth.scale_ratio * (world + truth.cell) * SLACK
+    Padding {
+        per_reference: 128.0 * U * k,
+        per_origin: k * (144.0 * U + 20.0 * turned),
+        constant: 48.0 * U * cell + 32.0 * NOISE * k * k * (length(ray.reference) + length(ray.origin) + reach),
+    }
 }

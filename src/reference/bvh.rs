@@ -9,6 +9,35 @@ const BINS: usize = 16;
 /// Relative margin of the slab test: many times the roundings of a subtraction, a product and a division.
 const MARGIN: f64 = 64.0 * f64::EPSILON;
 
+/// How far boxes are grown on all sides: by more, the farther they are.
+///
+/// The pad of a box is `per_reference` times its greatest distance from the ray's reference point, `per_origin` times
+/// its greatest distance from the ray's origin, and `constant`, in world units. It never shrinks from a box to one
+/// around it, so that what a tree prunes holds nothing within its pad.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Padding {
+    pub(super) per_reference: f64,
+    pub(super) per_origin: f64,
+    pub(super) constant: f64,
+}
+
+impl Padding {
+    /// Boxes as they are.
+    pub(super) const NONE: Padding = Padding { per_reference: 0.0, per_origin: 0.0, constant: 0.0 };
+
+    /// The pad of a box for a ray.
+    pub(super) fn of(&self, ray: &TruthRay, bounds: &Bounds) -> f64 {
+        let (mut reference, mut origin) = (0.0, 0.0);
+        for k in 0..3 {
+            let (min, max) = (bounds.min[k] - ray.reference[k], bounds.max[k] - ray.reference[k]);
+            reference += (min * min).max(max * max);
+            let (min, max) = (min - ray.origin[k], max - ray.origin[k]);
+            origin += (min * min).max(max * max);
+        }
+        self.per_reference * reference.sqrt() + self.per_origin * origin.sqrt() + self.constant
+    }
+}
+
 /// An axis-aligned box, world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bounds {
@@ -78,19 +107,14 @@ impl Bvh {
         Self { nodes, order }
     }
 
-    /// The box around everything.
-    pub(super) fn bounds(&self) -> Bounds {
-        self.nodes[0].bounds
-    }
-
-    /// Calls `visit` for every item whose box, grown by `pad` on all sides, the ray meets at some t in t_min..=limit,
+    /// Calls `visit` for every item of a leaf whose box, grown by `padding`, the ray meets at some t in t_min..=limit,
     /// nearer nodes first; `visit` returns the limit from then on.
-    pub(super) fn visit(&self, ray: &TruthRay, pad: f64, mut limit: f64, mut visit: impl FnMut(u32) -> f64) {
+    pub(super) fn visit(&self, ray: &TruthRay, padding: Padding, mut limit: f64, mut visit: impl FnMut(u32) -> f64) {
         if self.order.is_empty() {
             return;
         }
-        let slabs = Slabs { ray, pad };
-        let mut stack = vec![(0u32, f64::NEG_INFINITY)];
+        let slabs = Slabs { ray, padding };
+        let mut stack = Vec::from_iter(slabs.entry(&self.nodes[0].bounds, limit).map(|entry| (0u32, entry)));
         while let Some((index, entry)) = stack.pop() {
             if entry > limit {
                 continue;
@@ -104,11 +128,10 @@ impl Bvh {
             }
             let children = [node.first, node.first + 1];
             let entries = children.map(|child| slabs.entry(&self.nodes[child as usize].bounds, limit));
-            let near = usize::from(entries[1] < entries[0]);
+            let near = usize::from(entries[1].unwrap_or(f64::INFINITY) < entries[0].unwrap_or(f64::INFINITY));
+            // The nearer one last, on top of the stack.
             for child in [1 - near, near] {
-                if entries[child] <= limit {
-                    stack.push((children[child], entries[child]));
-                }
+                stack.extend(entries[child].map(|entry| (children[child], entry)));
             }
         }
     }
@@ -168,22 +191,23 @@ fn split(items: &mut [u32], bounds: &[Bounds]) -> usize {
 
 struct Slabs<'a> {
     ray: &'a TruthRay,
-    pad: f64,
+    padding: Padding,
 }
 
 impl Slabs<'_> {
-    /// A lower bound of the t at which the ray enters the box; +∞ if it misses it within t_min..=limit.
-    fn entry(&self, bounds: &Bounds, limit: f64) -> f64 {
+    /// A lower bound of the t at which the ray enters the box; `None` if it misses it within t_min..=limit.
+    fn entry(&self, bounds: &Bounds, limit: f64) -> Option<f64> {
         let ray = self.ray;
         let (mut near, mut far) = (ray.t_min, limit);
+        let grown = self.padding.of(ray, bounds);
         for k in 0..3 {
             let (min, max) = (bounds.min[k] - ray.reference[k], bounds.max[k] - ray.reference[k]);
-            let pad = self.pad + MARGIN * (min.abs().max(max.abs()) + ray.origin[k].abs());
+            let pad = grown + MARGIN * (min.abs().max(max.abs()) + ray.origin[k].abs());
             let (low, high) = (min - ray.origin[k] - pad, max - ray.origin[k] + pad);
             let d = ray.direction[k];
             if d == 0.0 {
                 if low > 0.0 || high < 0.0 {
-                    return f64::INFINITY;
+                    return None;
                 }
                 continue;
             }
@@ -191,6 +215,6 @@ impl Slabs<'_> {
             near = near.max(t0.min(t1) - MARGIN * t0.min(t1).abs());
             far = far.min(t0.max(t1) + MARGIN * t0.max(t1).abs());
         }
-        if near <= far { near } else { f64::INFINITY }
+        (near <= far).then_some(near)
     }
 }

@@ -12,11 +12,15 @@
 //!
 //! Then one of the two triangles has an edge within ε_edge of the ray, or the two distances cannot be told apart, or
 //! a hit lies at an end of the ray's interval.
+//!
+//! The triangle that a ray excludes is as if it were not there: it may not be named, need not be found, and is no part
+//! of a patch, which then has a hole where its neighbours' edges lack a side.
 
-use super::bounds::{Assessment, assess_index, distance_to_segment, orientation, scene_pad};
+use super::bounds::{Assessment, assess_index, distance_to_segment, orientation, padding, stretch};
+use super::bvh::Padding;
 use super::ray::TruthRay;
 use super::truth::Truth;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt;
 
 /// Why f32 could not have told.
@@ -36,6 +40,11 @@ pub enum Fault {
     /// There is no triangle of this id.
     NoSuchTriangle {
         /// The id.
+        id: u32,
+    },
+    /// The triangle named is the one that the ray excludes.
+    Excluded {
+        /// The triangle named.
         id: u32,
     },
     /// The triangle named is not met, by more than ε_edge.
@@ -210,6 +219,9 @@ fn difference(
     let mut named = None;
     if let Some((id, t)) = found {
         let index = truth.find(id).ok_or(Fault::NoSuchTriangle { id })?;
+        if truth.is_excluded(ray, index) {
+            return Err(Fault::Excluded { id });
+        }
         let at = assess_index(truth, ray, index);
         if !at.possibly_met() {
             return Err(Fault::NotMet { id });
@@ -247,20 +259,29 @@ struct Candidate {
 struct Nearby<'a> {
     truth: &'a Truth,
     ray: &'a TruthRay,
+    limit: f64,
     candidates: Vec<Candidate>,
 }
 
+/// The triangles whose boxes, grown by `padding`, the ray meets up to t = `limit`, but for the excluded one.
+fn gather(truth: &Truth, ray: &TruthRay, padding: Padding, limit: f64) -> Vec<Candidate> {
+    let mut candidates = Vec::new();
+    truth.bvh.visit(ray, padding, limit, |index| {
+        let index = index as usize;
+        if !truth.is_excluded(ray, index) {
+            candidates.push(Candidate { index, at: assess_index(truth, ray, index) });
+        }
+        limit
+    });
+    candidates
+}
+
 impl<'a> Nearby<'a> {
-    /// All triangles whose boundary is within a few ε_edge of the ray, or that it meets, up to t = `limit`.
+    /// All triangles whose boundary is within 4 of their ε_edge of the ray, or that it meets, up to t = `limit`.
     fn new(truth: &'a Truth, ray: &'a TruthRay, limit: f64) -> Self {
         let limit = limit + 1e-3 * limit.abs();
-        let mut candidates = Vec::new();
-        truth.bvh.visit(ray, scene_pad(truth, ray), limit, |index| {
-            let index = index as usize;
-            candidates.push(Candidate { index, at: assess_index(truth, ray, index) });
-            limit
-        });
-        Self { truth, ray, candidates }
+        let candidates = gather(truth, ray, padding(truth, ray), limit);
+        Self { truth, ray, limit, candidates }
     }
 
     fn id(&self, index: usize) -> u32 {
@@ -279,17 +300,27 @@ impl<'a> Nearby<'a> {
 
     /// Fails if a kernel had to find something before `t`, other than triangle `named`.
     fn nothing_certain_before(&self, t: f64, named: Option<usize>) -> Result<(), Fault> {
-        let mut instances: HashMap<u32, Vec<&Candidate>> = HashMap::new();
-        for candidate in self.candidates.iter().filter(|c| Some(c.index) != named && self.is_before(&c.at, t)) {
-            if candidate.at.certainly_met() {
-                return Err(Fault::Missed { id: self.id(candidate.index) });
+        let counts = |c: &&Candidate| Some(c.index) != named && self.is_before(&c.at, t);
+        let before: Vec<&Candidate> = self.candidates.iter().filter(counts).collect();
+        if let Some(candidate) = before.iter().find(|c| c.at.certainly_met()) {
+            return Err(Fault::Missed { id: self.id(candidate.index) });
+        }
+        let instance = |c: &Candidate| self.truth.placed[c.index].instance;
+        // A patch has a triangle that may be met.
+        let instances: BTreeSet<u32> = before.iter().filter(|c| c.at.possibly_met()).map(|c| instance(c)).collect();
+        for of in instances {
+            let close =
+                |c: &&&Candidate| instance(c) == of && (c.at.inside || c.at.edge_distance <= 4.0 * c.at.edge_epsilon);
+            let e = before.iter().filter(close).map(|c| c.at.edge_epsilon).fold(0.0, f64::max);
+            // The patch reaches 4E around the ray, whatever the ε_edge of its triangles.
+            let constant = 4.001 * e * stretch(&self.truth.instances[of as usize]);
+            let around = gather(self.truth, self.ray, Padding { constant, ..Padding::NONE }, self.limit);
+            let patch: Vec<&Candidate> = around.iter().filter(|c| counts(c) && instance(c) == of).collect();
+            if let Some(index) = covering(self.truth, &patch, e) {
+                return Err(Fault::Gap { id: self.id(index) });
             }
-            instances.entry(self.truth.placed[candidate.index].instance).or_default().push(candidate);
         }
-        match instances.values().find_map(|candidates| covering(self.truth, candidates)) {
-            Some(index) => Err(Fault::Gap { id: self.id(index) }),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     /// Fails if a triangle of the same vertices in the same order, of the same instance, has a lower id.
@@ -307,17 +338,15 @@ impl<'a> Nearby<'a> {
 }
 
 /// A triangle out of a patch that covers the ray however its vertices are rounded, if there is one among triangles of
-/// one instance.
+/// one instance, all that are within 4E of the ray among them.
 ///
-/// Let E be the greatest ε_edge among the triangles near the ray. The patch is the largest set of triangles in which
+/// E, here `e`, is the greatest ε_edge among the triangles near the ray. The patch is the largest set of triangles in which
 /// every edge within 4E of the ray has a triangle of certain winding on either side. Suppose that the ray is not on the
 /// patch as the kernel has it, but a triangle of the patch is within E. Then the nearest point of the patch is within
 /// 2E and lies on an edge that in truth is within 3E. Not within an edge: there is a triangle on the other side. Not at
 /// a vertex: all edges of the patch that meet there are within 3E, each with triangles on both sides, so that they go
 /// all the way round. So the kernel must have met a triangle of the patch.
-fn covering(truth: &Truth, candidates: &[&Candidate]) -> Option<usize> {
-    let close = |c: &&&Candidate| c.at.inside || c.at.edge_distance <= 4.0 * c.at.edge_epsilon;
-    let e = candidates.iter().filter(close).map(|c| c.at.edge_epsilon).fold(0.0, f64::max);
+fn covering(truth: &Truth, candidates: &[&Candidate], e: f64) -> Option<usize> {
     let near = |c: &&&Candidate| c.at.edge_distance <= 4.0 * e && c.at.winding_is_certain(e);
     let mut patch: Vec<&Candidate> = candidates.iter().filter(near).copied().collect();
     loop {

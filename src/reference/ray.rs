@@ -16,12 +16,14 @@ pub struct TruthRay {
     pub t_min: f64,
     /// Greatest parameter; +∞ for none.
     pub t_max: f64,
+    /// Global id of a triangle that the ray does not meet: the one that a secondary ray starts from.
+    pub exclude: Option<u32>,
 }
 
 impl TruthRay {
     /// A ray from a world-space origin; the reference point is the world's origin.
     pub fn new(origin: [f64; 3], direction: [f64; 3], t_min: f64, t_max: f64) -> Self {
-        Self { reference: [0.0; 3], origin, direction, t_min, t_max }
+        Self { reference: [0.0; 3], origin, direction, t_min, t_max, exclude: None }
     }
 
     /// The ray of a kernel: `o` and `d` in device units relative to `reference_point_world`, and `unit` world units (a
@@ -42,7 +44,13 @@ impl TruthRay {
             direction: d.map(|x| f64::from(x) * unit),
             t_min: t_min.into(),
             t_max: t_max.into(),
+            exclude: None,
         }
+    }
+
+    /// The ray, passing through triangle `id` (global). Other triangles at the same place it meets.
+    pub fn excluding(self, id: u32) -> Self {
+        Self { exclude: Some(id), ..self }
     }
 
     /// Whether every number is finite (`t_max` may be +∞), the direction has a length, and the interval is not empty.

@@ -6,6 +6,9 @@ use crate::math::exact::{intersect_triangle, ray_frame};
 use bricks::ORIGIN_STEPS;
 use glam::{DMat3, DVec3};
 
+mod exclusion;
+mod padding;
+
 /// A reproducible stream (splitmix64).
 struct Random(u64);
 

@@ -1,11 +1,11 @@
 //! The scene in f64 and its closest hits.
 
-use super::bounds::scale_ratio;
-use super::bvh::{Bounds, Bvh};
+use super::bounds::Extremes;
+use super::bvh::{Bounds, Bvh, Padding};
 use super::decode::{self, DecodeError, TruthObject, TruthTriangle};
 use super::predicate::{Crossing, crossing, order};
 use super::ray::TruthRay;
-use bricks::{INSTANCE_IDENTITY, ORIGIN_STEPS, SceneFile};
+use bricks::{INSTANCE_IDENTITY, SceneFile};
 use std::cmp::Ordering;
 
 /// An object placed in the world.
@@ -48,10 +48,8 @@ pub struct Truth {
     /// By increasing id.
     pub(super) placed: Vec<Placed>,
     pub(super) bvh: Bvh,
-    /// Greatest ratio of scales of an instance, bounded from above; at least 1.
-    pub(super) scale_ratio: f64,
-    /// Greatest size of a cell of reference points of an instance other than the identity, world units.
-    pub(super) cell: f64,
+    /// Of the instances.
+    pub(super) extremes: Extremes,
 }
 
 impl Truth {
@@ -88,16 +86,8 @@ impl Truth {
         if let Some(pair) = placed.windows(2).find(|pair| pair[0].id == pair[1].id) {
             return Err(DecodeError::Id { id: pair[0].id.into() });
         }
-        let (mut ratio, mut cell) = (1.0f64, 0.0f64);
-        for instance in &instances {
-            if let Some(matrix) = &instance.world_from_object {
-                let (of_scales, size) = scale_ratio(matrix);
-                let step = f64::from(objects[instance.object as usize].step_log2).exp2();
-                ratio = ratio.max(of_scales);
-                cell = cell.max(2.0 * size * step * ORIGIN_STEPS as f64);
-            }
-        }
-        let mut truth = Self { objects, instances, placed, bvh: Bvh::build(&[]), scale_ratio: ratio, cell };
+        let extremes = Extremes::of(&objects, &instances);
+        let mut truth = Self { objects, instances, placed, bvh: Bvh::build(&[]), extremes };
         let bounds: Vec<Bounds> = (0..truth.placed.len()).map(|i| Bounds::of(&truth.world_vertices(i))).collect();
         truth.bvh = Bvh::build(&bounds);
         Ok(truth)
@@ -148,14 +138,14 @@ impl Truth {
         })
     }
 
-    /// The closest hit in the ray's closed interval, the lowest id at equal distance; both decided exactly.
+    /// The closest hit in the ray's closed interval but for the excluded triangle, the lowest id at equal distance; both decided exactly.
     /// `None` for an invalid ray.
     pub fn closest(&self, ray: &TruthRay) -> Option<TruthHit> {
         if !ray.is_valid() {
             return None;
         }
         let mut best = None;
-        self.bvh.visit(ray, 0.0, ray.t_max, |index| {
+        self.bvh.visit(ray, Padding::NONE, ray.t_max, |index| {
             self.consider(ray, index as usize, &mut best);
             best.as_ref().map_or(ray.t_max, |(crossing, _): &(Crossing, usize)| beyond(crossing.t))
         });
@@ -172,21 +162,29 @@ impl Truth {
         self.hit(best)
     }
 
-    /// Whether the ray meets anything in its closed interval. False for an invalid ray.
+    /// Whether the ray meets anything in its closed interval but the excluded triangle. False for an invalid ray.
     pub fn any(&self, ray: &TruthRay) -> bool {
         if !ray.is_valid() {
             return false;
         }
         let mut found = false;
-        self.bvh.visit(ray, 0.0, ray.t_max, |index| {
+        self.bvh.visit(ray, Padding::NONE, ray.t_max, |index| {
             found = found || self.crossing(ray, index as usize).is_some();
             if found { f64::NEG_INFINITY } else { ray.t_max }
         });
         found
     }
 
+    /// Whether the ray passes through this triangle.
+    pub(super) fn is_excluded(&self, ray: &TruthRay, index: usize) -> bool {
+        ray.exclude == Some(self.placed[index].id)
+    }
+
     /// Where the ray meets a triangle within its interval.
     fn crossing(&self, ray: &TruthRay, index: usize) -> Option<Crossing> {
+        if self.is_excluded(ray, index) {
+            return None;
+        }
         crossing(ray, self.world_vertices(index)).filter(|hit| ray.t_min <= hit.t && hit.t <= ray.t_max)
     }
 
