@@ -20,6 +20,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                       along(params.base.y, x, params.step_x.y, y, params.step_y.y),
                       along(params.base.z, x, params.step_x.z, y, params.step_y.z));
     rays[index] = Ray(params.origin.xyz, 0.0, d, T_INFINITE);
-    hits[index] = Hit(T_INFINITE, NONE, 0.0, 0.0);
-    surfaces[index] = Surface(vec3<f32>(0.0), NONE, vec3<f32>(0.0), 0u, 0.0, NONE, 0u, 0u);
+    start_hit(index, T_INFINITE, NONE);
 }

@@ -30,6 +30,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
     }
     rays[index] = ray;
-    hits[index] = Hit(ray.t_max, NONE, 0.0, 0.0);
-    surfaces[index] = Surface(vec3<f32>(0.0), NONE, vec3<f32>(0.0), 0u, 0.0, primary_hits[index].id, 0u, 0u);
+    start_hit(index, ray.t_max, primary_hits[index].id);
 }

@@ -9,6 +9,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let index = global.y * params.width + global.x;
-    hits[index] = Hit(rays[index].t_max, NONE, 0.0, 0.0);
-    surfaces[index] = Surface(vec3<f32>(0.0), NONE, vec3<f32>(0.0), 0u, 0.0, NONE, 0u, 0u);
+    start_hit(index, rays[index].t_max, NONE);
 }
