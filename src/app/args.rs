@@ -195,8 +195,8 @@ pub struct StreamArgs {
     #[arg(long, value_name = "PIXELS", default_value = "0", value_parser = query_threshold)]
     pub query_threshold: u32,
     /// Payloads (geometry or attributes of a brick) that the workers may read into the host cache while a frame renders:
-    /// the nearest in the view that the camera's motion leads to; 0 is off. It changes no picture, and saves time only
-    /// where the disk is slow and cores are idle (walk)
+    /// the nearest in the view that the camera's motion leads to; 0 is off. It changes no picture. On 2
+    /// cores with software Vulkan no gain was measured; summary.json says how much of it was used (walk)
     #[arg(long, value_name = "N", default_value = "0", value_parser = prefetch)]
     pub prefetch: u32,
     /// Write the trace of brick requests to this file, for replay against other caches [default: none]
