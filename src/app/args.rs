@@ -174,8 +174,9 @@ pub struct StreamArgs {
         value_parser = |s: &str| if s == "0" { Ok(0) } else { size_bytes(s) })]
     pub host_cache: u64,
     /// How bricks to intersect are found: chc (tiles against the top level, loading what rays need), plain (everything
-    /// resident, one traversal per ray; the cache must hold the scene), auto (the cheaper one)
-    #[arg(long, value_name = "NAME", default_value = "auto")]
+    /// resident, one traversal per ray; the cache must hold the scene), auto (stands for chc in this
+    /// version)
+    #[arg(long, value_name = "NAME", default_value = "chc")]
     pub schedule: Schedule,
     /// Width and height of a screen tile in pixels, a power of two from 8 to 512
     #[arg(long, value_name = "PIXELS", default_value = "64", value_parser = tile)]
