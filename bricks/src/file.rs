@@ -30,7 +30,9 @@ pub enum Access {
 /// It may be shared between threads. A file that is replaced by renaming while open stays the one that was opened.
 pub struct SceneFile {
     path: PathBuf,
-    file: File,
+    /// What the file is read by on opening and by [`Self::verify`]: never a map.
+    file: Box<dyn Source>,
+    /// What payloads are copied from.
     source: Box<dyn Source>,
     file_bytes: u64,
     resident_bytes: u64,
@@ -43,18 +45,17 @@ impl SceneFile {
     /// Reads and checks the header, the directory and the resident part, and nothing else.
     pub fn open(path: impl AsRef<Path>) -> Result<SceneFile, Error> {
         let (path, file) = open_file(path.as_ref())?;
-        let duplicate = file.try_clone().map_err(|source| open_error(&path, source))?;
-        let source: Box<dyn Source> = match MapSource::new(duplicate) {
+        let source: Box<dyn Source> = match MapSource::new(duplicate(&path, &file)?) {
             Ok(map) => Box::new(map),
-            Err(_) => Box::new(read_source(&path, &file)?),
+            Err(_) => Box::new(ReadSource::new(duplicate(&path, &file)?)),
         };
-        Self::load(path, file, source)
+        Self::load(path, Box::new(ReadSource::new(file)), source)
     }
 
     /// Opens a scene file with the given access; as [`Self::open`], but a map that fails is an error.
     pub fn open_with(path: impl AsRef<Path>, access: Access) -> Result<SceneFile, Error> {
         let (path, file) = open_file(path.as_ref())?;
-        let duplicate = file.try_clone().map_err(|source| open_error(&path, source))?;
+        let duplicate = duplicate(&path, &file)?;
         let source: Box<dyn Source> = match access {
             Access::Map => Box::new(MapSource::new(duplicate).map_err(|source| Error::Io {
                 path: path.clone(),
@@ -64,14 +65,18 @@ impl SceneFile {
             })?),
             Access::Read => Box::new(ReadSource::new(duplicate)),
         };
-        Self::load(path, file, source)
+        Self::load(path, Box::new(ReadSource::new(file)), source)
+    }
+
+    /// Opens a scene file that is part of the program; `name` stands for its path in messages. As [`Self::open`].
+    pub fn from_bytes(name: impl Into<PathBuf>, bytes: &'static [u8]) -> Result<SceneFile, Error> {
+        Self::load(name.into(), Box::new(bytes), Box::new(bytes))
     }
 
     /// Reads the resident part. It comes by positional reads, so that a failing disk is an error here, not a signal.
-    fn load(path: PathBuf, file: File, source: Box<dyn Source>) -> Result<SceneFile, Error> {
-        let positional = read_source(&path, &file)?;
-        let reader = Reader { path: &path, source: &positional };
-        let header = reader.header(length_of(&path, &file)?)?;
+    fn load(path: PathBuf, file: Box<dyn Source>, source: Box<dyn Source>) -> Result<SceneFile, Error> {
+        let reader = Reader { path: &path, source: &*file };
+        let header = reader.header(length_of(&path, &*file)?)?;
         let directory = reader.directory(&header)?;
         let resident = Resident {
             manifest: reader.manifest(&directory)?,
@@ -95,7 +100,7 @@ impl SceneFile {
         &self.resident
     }
 
-    /// The path it was opened with.
+    /// The path, or the name, it was opened with.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -144,8 +149,8 @@ impl SceneFile {
 
     /// Reads every byte of the file anew, as [`verify_file`](crate::verify_file) does, from the file that was opened.
     pub fn verify(&self, progress: &mut dyn FnMut(u64, u64)) -> Result<VerifyReport, Error> {
-        let length = length_of(&self.path, &self.file)?;
-        Ok(verify_source(&self.path, &read_source(&self.path, &self.file)?, length, progress))
+        let length = length_of(&self.path, &*self.file)?;
+        Ok(verify_source(&self.path, &*self.file, length, progress))
     }
 
     #[cold]
@@ -174,14 +179,14 @@ pub(crate) fn open_file(path: &Path) -> Result<(PathBuf, File), Error> {
     Ok((path.to_owned(), file))
 }
 
-/// Positional reads from another handle of `file`.
-pub(crate) fn read_source(path: &Path, file: &File) -> Result<ReadSource, Error> {
-    file.try_clone().map(ReadSource::new).map_err(|source| open_error(path, source))
+/// Another handle of `file`.
+fn duplicate(path: &Path, file: &File) -> Result<File, Error> {
+    file.try_clone().map_err(|source| open_error(path, source))
 }
 
 /// Length of `file` now.
-pub(crate) fn length_of(path: &Path, file: &File) -> Result<u64, Error> {
-    file.metadata().map(|metadata| metadata.len()).map_err(|source| open_error(path, source))
+pub(crate) fn length_of(path: &Path, file: &dyn Source) -> Result<u64, Error> {
+    file.length().map_err(|source| open_error(path, source))
 }
 
 fn open_error(path: &Path, source: io::Error) -> Error {

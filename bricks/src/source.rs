@@ -1,10 +1,13 @@
-//! Where the bytes of a scene file come from: a memory map, or reads at positions.
+//! Where the bytes of a scene file come from: a memory map, reads at positions, or memory.
 
 use std::fs::File;
 use std::io;
 
 /// Bytes at positions of a file that does not change.
 pub(crate) trait Source: Send + Sync {
+    /// Length of the file now.
+    fn length(&self) -> io::Result<u64>;
+
     /// Fills `out` with the bytes at `offset`; [`io::ErrorKind::UnexpectedEof`] if the file ends before.
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()>;
 }
@@ -22,6 +25,10 @@ impl ReadSource {
 }
 
 impl Source for ReadSource {
+    fn length(&self) -> io::Result<u64> {
+        self.file.metadata().map(|metadata| metadata.len())
+    }
+
     #[cfg(unix)]
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         std::os::unix::fs::FileExt::read_exact_at(&self.file, out, offset)
@@ -64,9 +71,13 @@ impl MapSource {
 }
 
 impl Source for MapSource {
+    fn length(&self) -> io::Result<u64> {
+        self.file.metadata().map(|metadata| metadata.len())
+    }
+
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         let end = offset.checked_add(out.len() as u64).ok_or(io::ErrorKind::UnexpectedEof)?;
-        if end > self.map.len() as u64 || end > self.file.metadata()?.len() {
+        if end > self.map.len() as u64 || end > self.length()? {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         // SAFETY: `offset .. offset + out.len()` lies within the map (checked above), which stays mapped and readable
@@ -76,6 +87,20 @@ impl Source for MapSource {
         unsafe {
             std::ptr::copy_nonoverlapping(self.map.as_ptr().add(offset as usize), out.as_mut_ptr(), out.len());
         }
+        Ok(())
+    }
+}
+
+/// A file that is part of the program.
+impl Source for &'static [u8] {
+    fn length(&self) -> io::Result<u64> {
+        Ok(self.len() as u64)
+    }
+
+    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        let rest = usize::try_from(offset).ok().and_then(|start| self.get(start..));
+        let bytes = rest.and_then(|rest| rest.get(..out.len())).ok_or(io::ErrorKind::UnexpectedEof)?;
+        out.copy_from_slice(bytes);
         Ok(())
     }
 }

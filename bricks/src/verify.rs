@@ -1,12 +1,12 @@
 //! Reads a whole file and lists everything that is wrong with it.
 
 use crate::error::{Error, Flaw, Part};
-use crate::file::{Directory, Reader, length_of, open_file, read_source};
+use crate::file::{Directory, Reader, length_of, open_file};
 use crate::layout::{Header, MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
 use crate::manifest::Manifest;
 use crate::records::{Brick, Texture};
 use crate::resident::Resident;
-use crate::source::Source;
+use crate::source::{ReadSource, Source};
 use crate::validate;
 use std::path::Path;
 
@@ -41,7 +41,8 @@ impl VerifyReport {
 /// Only if the file cannot be opened. Parts that cannot be read are problems in the report.
 pub fn verify_file(path: impl AsRef<Path>, progress: &mut dyn FnMut(u64, u64)) -> Result<VerifyReport, Error> {
     let (path, file) = open_file(path.as_ref())?;
-    Ok(verify_source(&path, &read_source(&path, &file)?, length_of(&path, &file)?, progress))
+    let source = ReadSource::new(file);
+    Ok(verify_source(&path, &source, length_of(&path, &source)?, progress))
 }
 
 /// As [`verify_file`], for a file of `length` bytes.

@@ -1,4 +1,4 @@
-//! Both ways of reading give the same bytes, from many threads, and refuse requests that make no sense.
+//! All ways of reading give the same bytes, from many threads, and refuse requests that make no sense.
 
 mod common;
 
@@ -6,12 +6,17 @@ use bricks::{Access, Error, Payload, SceneFile};
 use common::written;
 
 #[test]
-fn map_and_read_agree() {
+fn map_read_and_bytes_agree() {
     let (_folder, path, scene) = written();
-    for open in
-        [SceneFile::open(&path), SceneFile::open_with(&path, Access::Map), SceneFile::open_with(&path, Access::Read)]
-    {
+    let bytes: &'static [u8] = std::fs::read(&path).unwrap().leak();
+    for open in [
+        SceneFile::open(&path),
+        SceneFile::open_with(&path, Access::Map),
+        SceneFile::open_with(&path, Access::Read),
+        SceneFile::from_bytes(&path, bytes),
+    ] {
         let file = open.unwrap();
+        assert!(file.verify(&mut |_, _| {}).unwrap().is_ok());
         assert_eq!(*file.resident(), scene.resident);
         assert_eq!(file.path(), path);
         assert_eq!(file.file_bytes(), std::fs::metadata(&path).unwrap().len());
@@ -27,6 +32,9 @@ fn map_and_read_agree() {
             }
         }
     }
+    // Negative control: bytes that end early.
+    let error = SceneFile::from_bytes("short", &bytes[..bytes.len() - 1]).unwrap_err();
+    assert!(matches!(error, Error::Length { .. }), "{error}");
 }
 
 #[test]
