@@ -3,6 +3,7 @@
 use super::device::{Gpu, UploadPath};
 use crate::schedule::{ExecutorError, Load};
 use crate::stream::{Destination, Item, Workers};
+use std::collections::BTreeSet;
 
 /// A mapped range that a worker fills.
 pub struct MappedRange {
@@ -58,7 +59,7 @@ impl CachePages {
             .collect()
     }
 
-    /// Copies payloads to their slots: workers write straight into mapped memory.
+    /// Copies payloads to their slots: workers write straight into mapped memory, of the pages or of the staging buffer.
     ///
     /// # Errors
     /// The first payload that could not be read or verified; a device that does not map.
@@ -72,47 +73,33 @@ impl CachePages {
         if loads.is_empty() {
             return Ok(());
         }
+        let in_place = loads.iter().map(|load| Target {
+            item: load.item,
+            buffer: load.slot.page as usize,
+            offset: load.slot.offset.into(),
+            bytes: bytes(load.item),
+        });
+        let in_place: Vec<Target> = in_place.collect();
         match self.path {
-            UploadPath::Mapped => self.load_mapped(gpu, workers, loads, bytes),
-            UploadPath::Staged => self.load_staged(gpu, workers, loads, bytes),
+            UploadPath::Mapped => fill(gpu, workers, &self.pages, &in_place),
+            UploadPath::Staged => self.load_staged(gpu, workers, &in_place),
         }
     }
 
-    fn load_mapped(
-        &mut self,
-        gpu: &Gpu,
-        workers: &mut Workers<MappedRange>,
-        loads: &[Load],
-        bytes: impl Fn(Item) -> u64,
-    ) -> Result<(), ExecutorError> {
-        let mut touched: Vec<u32> = loads.iter().map(|l| l.slot.page).collect();
-        touched.sort_unstable();
-        touched.dedup();
-        for &page in &touched {
-            map(gpu, &self.pages[page as usize])?;
-        }
-        let mut jobs = Vec::with_capacity(loads.len());
-        for load in loads {
-            let start = u64::from(load.slot.offset);
-            let range = start..start + bytes(load.item);
-            let view = self.pages[load.slot.page as usize].get_mapped_range_mut(range).map_err(device_error)?;
-            jobs.push((load.item, MappedRange { view }));
-        }
-        let result = workers.load(jobs).map(drop);
-        for &page in &touched {
-            self.pages[page as usize].unmap();
-        }
-        Ok(result?)
-    }
-
+    /// Fills the staging buffer from its start, then copies to the places in the pages.
     fn load_staged(
         &mut self,
         gpu: &Gpu,
         workers: &mut Workers<MappedRange>,
-        loads: &[Load],
-        bytes: impl Fn(Item) -> u64,
+        in_place: &[Target],
     ) -> Result<(), ExecutorError> {
-        let total: u64 = loads.iter().map(|l| bytes(l.item)).sum();
+        let mut total = 0;
+        let staged = in_place.iter().map(|target| {
+            let offset = total;
+            total += target.bytes;
+            Target { buffer: 0, offset, ..*target }
+        });
+        let staged: Vec<Target> = staged.collect();
         let staging = match self.staging.take().filter(|s| s.size() >= total) {
             Some(staging) => staging,
             None => gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -122,31 +109,48 @@ impl CachePages {
                 mapped_at_creation: false,
             }),
         };
-        map(gpu, &staging)?;
-        let mut jobs = Vec::with_capacity(loads.len());
-        let mut at = 0;
-        for load in loads {
-            let length = bytes(load.item);
-            let view = staging.get_mapped_range_mut(at..at + length).map_err(device_error)?;
-            jobs.push((load.item, MappedRange { view }));
-            at += length;
+        let staging = self.staging.insert(staging);
+        fill(gpu, workers, std::slice::from_ref(staging), &staged)?;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        for (from, to) in staged.iter().zip(in_place) {
+            encoder.copy_buffer_to_buffer(staging, from.offset, &self.pages[to.buffer], to.offset, to.bytes);
         }
-        let result = workers.load(jobs).map(drop);
-        staging.unmap();
-        if result.is_ok() {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let mut at = 0;
-            for load in loads {
-                let length = bytes(load.item);
-                let page = &self.pages[load.slot.page as usize];
-                encoder.copy_buffer_to_buffer(&staging, at, page, u64::from(load.slot.offset), length);
-                at += length;
-            }
-            gpu.queue.submit([encoder.finish()]);
-        }
-        self.staging = Some(staging);
-        Ok(result?)
+        gpu.queue.submit([encoder.finish()]);
+        Ok(())
     }
+}
+
+/// Where a payload goes.
+#[derive(Clone, Copy)]
+struct Target {
+    item: Item,
+    /// Index of the buffer.
+    buffer: usize,
+    offset: u64,
+    bytes: u64,
+}
+
+/// Maps the buffers that `targets` lie in, has the workers fill them, and unmaps.
+fn fill(
+    gpu: &Gpu,
+    workers: &mut Workers<MappedRange>,
+    buffers: &[wgpu::Buffer],
+    targets: &[Target],
+) -> Result<(), ExecutorError> {
+    let touched: BTreeSet<usize> = targets.iter().map(|target| target.buffer).collect();
+    for &buffer in &touched {
+        map(gpu, &buffers[buffer])?;
+    }
+    let mut jobs = Vec::with_capacity(targets.len());
+    for &Target { item, buffer, offset, bytes } in targets {
+        let view = buffers[buffer].get_mapped_range_mut(offset..offset + bytes).map_err(device_error)?;
+        jobs.push((item, MappedRange { view }));
+    }
+    let result = workers.load(jobs).map(drop);
+    for &buffer in &touched {
+        buffers[buffer].unmap();
+    }
+    Ok(result?)
 }
 
 /// Maps a whole buffer for writing, once the device is done with it.
