@@ -117,8 +117,8 @@ impl Session {
         let threshold = (f64::from(args.query_threshold) * f64::from(extent.tile).powi(2) / 40_000.0) as u32;
         let setup = Setup { extent, threshold, count: false };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
-        let executor = GpuExecutor::new(gpu, scene.clone(), workers, page_sizes.into_iter(), setup)
-            .with_context(|| format!("{name}"))?;
+        let executor =
+            GpuExecutor::new(gpu, scene.clone(), workers, &page_sizes, setup).with_context(|| format!("{name}"))?;
         Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule })
     }
 }

@@ -1,7 +1,9 @@
 //! The wgpu executor: turns steps into dispatches, one submission and one readback a round trip.
 
 use super::device::Gpu;
-use super::kernels::{Kernels, TEXEL_BINDING};
+use super::dispatch::{Dispatch, dispatches};
+use super::groups::{Buffers, Groups};
+use super::kernels::Kernels;
 use super::layout::{self, Params};
 use super::pages::{CachePages, MappedRange};
 use super::rays::{Extent, PixelBuffers, RayBuffers, TileBuffers, storage};
@@ -34,33 +36,15 @@ pub struct GpuExecutor {
     gpu: Gpu,
     scene: Arc<SceneFile>,
     workers: Workers<MappedRange>,
-    kernels: Kernels,
-    resident: SceneBuffers,
-    cache: CachePages,
-    texels: Texels,
+    kernels: Arc<Kernels>,
+    buffers: Buffers,
+    groups: Groups,
     extent: Extent,
-    passes: [RayBuffers; 2],
-    pixels: PixelBuffers,
-    tiles: TileBuffers,
-    demand: wgpu::Buffer,
-    counters: wgpu::Buffer,
-    params: wgpu::Buffer,
     readback: Readback,
     timing: Timing,
-    groups: Groups,
     view: Params,
     threshold: u32,
     pair_count: u32,
-}
-
-/// Bind groups; made anew when a buffer is.
-struct Groups {
-    scene: wgpu::BindGroup,
-    cache: wgpu::BindGroup,
-    rays: [wgpu::BindGroup; 2],
-    tiles: wgpu::BindGroup,
-    shading: wgpu::BindGroup,
-    empty: wgpu::BindGroup,
 }
 
 /// How an executor is set up.
@@ -75,7 +59,7 @@ pub struct Setup {
 }
 
 impl GpuExecutor {
-    /// Sets up buffers and pipelines. `page_sizes`: bytes of the cache's pages.
+    /// Sets up buffers, and pipelines for them. `page_sizes`: bytes of the cache's pages.
     ///
     /// # Errors
     /// Textures that cannot be read; a picture or a cache beyond the device's limits, with what it allows.
@@ -83,7 +67,34 @@ impl GpuExecutor {
         gpu: Gpu,
         scene: Arc<SceneFile>,
         workers: Workers<MappedRange>,
-        page_sizes: impl Iterator<Item = u64>,
+        page_sizes: &[u64],
+        setup: Setup,
+    ) -> Result<Self, ExecutorError> {
+        // A cache of nothing has a page, too.
+        let pages = Pages { cache: page_sizes.len().max(1), texels: Texels::page_count(&gpu, &scene) };
+        let most_pages = gpu.max_cache_pages(pages.texels);
+        if pages.cache > most_pages {
+            let text = format!(
+                "{:?} holds caches of at most {} bytes ({most_pages} pages); ask for a smaller --cache",
+                gpu.info.name,
+                most_pages as u64 * gpu.page_bytes()
+            );
+            return Err(ExecutorError::Device(text));
+        }
+        let kernels = Arc::new(Kernels::new(&gpu, pages, setup.count));
+        Self::with_kernels(gpu, kernels, scene, workers, page_sizes, setup)
+    }
+
+    /// Sets up buffers for pipelines that exist, made for at least as many pages as there are. [`Setup::count`] is theirs.
+    ///
+    /// # Errors
+    /// Textures that cannot be read; a picture beyond the device's limits, with what it allows.
+    pub fn with_kernels(
+        gpu: Gpu,
+        kernels: Arc<Kernels>,
+        scene: Arc<SceneFile>,
+        workers: Workers<MappedRange>,
+        page_sizes: &[u64],
         setup: Setup,
     ) -> Result<Self, ExecutorError> {
         let most = Extent::most_rays(&gpu);
@@ -92,57 +103,39 @@ impl GpuExecutor {
             let text = format!("{:?} holds pictures of at most {most} pixels; ask for a smaller --size", gpu.info.name);
             return Err(ExecutorError::Device(text));
         }
-        let texels = Texels::new(&gpu, &scene)?;
-        let cache = CachePages::new(&gpu, page_sizes);
-        let most_pages = gpu.max_cache_pages(texels.pages.len());
-        if cache.page_count() > most_pages {
-            let text = format!(
-                "{:?} holds caches of at most {} bytes ({most_pages} pages); ask for a smaller --cache",
-                gpu.info.name,
-                most_pages as u64 * gpu.page_bytes()
-            );
-            return Err(ExecutorError::Device(text));
-        }
-        let pages = Pages { cache: cache.page_count(), texels: texels.pages.len() };
-        let kernels = Kernels::new(&gpu, pages, setup.count);
-        let resident = SceneBuffers::new(&gpu, scene.resident());
-        let passes = [RayBuffers::new(&gpu, extent.rays()), RayBuffers::new(&gpu, extent.rays())];
-        let pixels = PixelBuffers::new(&gpu, extent.rays());
-        let tiles = TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE));
         let bricks = scene.resident().bricks.len();
-        let demand = storage(&gpu, "demand", bricks, size_of::<layout::Demand>());
-        let counters = storage(&gpu, "counters", layout::COUNTERS, 4);
-        let params = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("params"),
-            size: (MOST_DISPATCHES as u64) * params_stride(&gpu),
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let buffers = Buffers {
+            scene: SceneBuffers::new(&gpu, scene.resident()),
+            cache: CachePages::new(&gpu, page_sizes),
+            texels: Texels::new(&gpu, &scene)?,
+            passes: [RayBuffers::new(&gpu, extent.rays()), RayBuffers::new(&gpu, extent.rays())],
+            pixels: PixelBuffers::new(&gpu, extent.rays()),
+            tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),
+            demand: storage(&gpu, "demand", bricks, size_of::<layout::Demand>()),
+            counters: storage(&gpu, "counters", layout::COUNTERS, 4),
+            params: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("params"),
+                size: (MOST_DISPATCHES as u64) * params_stride(&gpu),
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+        };
         let readback = Readback::new(&gpu, (bricks * size_of::<layout::Demand>() + layout::COUNTERS * 4) as u64);
         let timing = Timing::new(&gpu, MOST_DISPATCHES as u32);
-        let groups = Groups::new(
-            &gpu, &kernels, &resident, &cache, &texels, &passes, &pixels, &tiles, &demand, &counters, &params,
-        );
+        let groups = Groups::new(&gpu, &kernels, &buffers);
+        let (view, threshold) = (Params::default(), setup.threshold);
         Ok(Self {
             gpu,
             scene,
             workers,
             kernels,
-            resident,
-            cache,
-            texels,
+            buffers,
+            groups,
             extent,
-            passes,
-            pixels,
-            tiles,
-            demand,
-            counters,
-            params,
             readback,
             timing,
-            groups,
-            view: Params::default(),
-            threshold: setup.threshold,
+            view,
+            threshold,
             pair_count: 0,
         })
     }
@@ -152,9 +145,14 @@ impl GpuExecutor {
         &self.gpu
     }
 
+    /// The pipelines.
+    pub fn kernels(&self) -> &Arc<Kernels> {
+        &self.kernels
+    }
+
     /// Bytes of textures on the device.
     pub fn texture_bytes(&self) -> u64 {
-        self.texels.bytes
+        self.buffers.texels.bytes
     }
 
     /// The workers that read payloads.
@@ -164,7 +162,7 @@ impl GpuExecutor {
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     pub fn begin_frame(&mut self, view: &View) {
-        self.resident.rebase(&self.gpu, self.scene.resident(), view.frame);
+        self.buffers.scene.rebase(&self.gpu, self.scene.resident(), view.frame);
         self.view = view.params;
     }
 
@@ -173,7 +171,7 @@ impl GpuExecutor {
         let untraced = layout::Ray { t_min: 1.0, t_max: 0.0, direction: [1.0, 0.0, 0.0], ..Default::default() };
         let mut all = rays.to_vec();
         all.resize(self.extent.rays(), untraced);
-        self.gpu.queue.write_buffer(&self.passes[pass as usize].rays, 0, bytemuck::cast_slice(&all));
+        self.gpu.queue.write_buffer(&self.buffers.passes[pass as usize].rays, 0, bytemuck::cast_slice(&all));
     }
 
     /// Reads the rays of a pass back, row by row.
@@ -181,7 +179,7 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.read(|s| &s.passes[pass as usize].rays)
+        self.read(|s| &s.buffers.passes[pass as usize].rays)
     }
 
     /// Reads the hits of a pass back.
@@ -189,7 +187,7 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.read(|s| &s.passes[pass as usize].hits)
+        self.read(|s| &s.buffers.passes[pass as usize].hits)
     }
 
     /// Reads the surfaces of a pass back.
@@ -197,7 +195,7 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.read(|s| &s.passes[pass as usize].surfaces)
+        self.read(|s| &s.buffers.passes[pass as usize].surfaces)
     }
 
     /// Reads the G-buffer back.
@@ -205,7 +203,7 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read(|s| &s.pixels.gbuffer)
+        self.read(|s| &s.buffers.pixels.gbuffer)
     }
 
     /// Reads the radiance summed over samples back; w counts them.
@@ -213,7 +211,7 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.read(|s| &s.pixels.radiance)
+        self.read(|s| &s.buffers.pixels.radiance)
     }
 
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
@@ -222,19 +220,26 @@ impl GpuExecutor {
     }
 
     fn rebind(&mut self) {
-        self.groups = Groups::new(
-            &self.gpu,
-            &self.kernels,
-            &self.resident,
-            &self.cache,
-            &self.texels,
-            &self.passes,
-            &self.pixels,
-            &self.tiles,
-            &self.demand,
-            &self.counters,
-            &self.params,
-        );
+        self.groups = Groups::new(&self.gpu, &self.kernels, &self.buffers);
+    }
+
+    /// The parameters of all dispatches of a submission.
+    fn params(&self) -> Params {
+        let extent = self.extent;
+        Params {
+            zero: 0,
+            width: extent.width,
+            height: extent.height,
+            tile: extent.tile,
+            tiles_x: extent.tiles_x(),
+            tiles: extent.tiles(),
+            list_capacity: self.buffers.tiles.capacity,
+            threshold: self.threshold,
+            pair_count: self.pair_count,
+            top_count: self.scene.resident().top2.len() as u32,
+            instance_pad: self.buffers.scene.instance_pad,
+            ..self.view
+        }
     }
 
     fn write_slots(&self, bricks: &BrickStates) {
@@ -256,24 +261,25 @@ impl GpuExecutor {
                 }
             })
             .collect();
-        self.gpu.queue.write_buffer(&self.resident.slots, 0, bytemuck::cast_slice(&slots));
+        self.gpu.queue.write_buffer(&self.buffers.scene.slots, 0, bytemuck::cast_slice(&slots));
     }
 
     /// One submission: all steps, then counters and demand read back.
     fn submit(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         self.write_slots(bricks);
-        let dispatches: Vec<Dispatch> = steps.iter().flat_map(|&step| self.dispatches(pass, step)).collect();
+        let params = self.params();
+        let dispatches: Vec<Dispatch> = steps.iter().flat_map(|&step| dispatches(pass, step, &params)).collect();
         let stride = params_stride(&self.gpu);
         let mut params = vec![0u8; stride as usize * dispatches.len()];
         for (i, dispatch) in dispatches.iter().enumerate() {
             let at = i * stride as usize;
             params[at..at + size_of::<Params>()].copy_from_slice(bytemuck::bytes_of(&dispatch.params));
         }
-        self.gpu.queue.write_buffer(&self.params, 0, &params);
+        self.gpu.queue.write_buffer(&self.buffers.params, 0, &params);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        encoder.clear_buffer(&self.counters, 0, None);
+        encoder.clear_buffer(&self.buffers.counters, 0, None);
         let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX }; bricks.len()];
-        self.gpu.queue.write_buffer(&self.demand, 0, bytemuck::cast_slice(&unasked));
+        self.gpu.queue.write_buffer(&self.buffers.demand, 0, bytemuck::cast_slice(&unasked));
         for (i, dispatch) in dispatches.iter().enumerate() {
             let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some(dispatch.kernel),
@@ -288,7 +294,7 @@ impl GpuExecutor {
             compute.dispatch_workgroups(x, y, 1);
         }
         self.timing.resolve(&mut encoder, dispatches.len() as u32);
-        self.readback.copy(&mut encoder, &[&self.counters, &self.demand]);
+        self.readback.copy(&mut encoder, &[&self.buffers.counters, &self.buffers.demand]);
         self.gpu.queue.submit([encoder.finish()]);
         let bytes = self.readback.wait(&self.gpu)?;
         let (counters, demand) = bytes.split_at(layout::COUNTERS * 4);
@@ -296,7 +302,7 @@ impl GpuExecutor {
         let demand: Vec<layout::Demand> = bytemuck::pod_collect_to_vec(&demand[..bricks.len() * 8]);
         let mut report = read_report(&counters, &demand)?;
         if steps.contains(&Step::QueryPairs) && self.pair_count > 0 {
-            let rays: Vec<u32> = self.read(|s| &s.tiles.pair_rays)?;
+            let rays: Vec<u32> = self.read(|s| &s.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_count as usize].to_vec();
         }
         let times = self.timing.read(&self.gpu, dispatches.len())?;
@@ -316,112 +322,16 @@ impl GpuExecutor {
             return Err(ExecutorError::Device(text));
         }
         let capacity = entries.saturating_add(entries / 4).min(most);
-        self.tiles = TileBuffers::new(&self.gpu, self.extent, capacity);
+        self.buffers.tiles = TileBuffers::new(&self.gpu, self.extent, capacity);
         self.rebind();
         Ok(())
-    }
-}
-
-/// One dispatch of a kernel.
-struct Dispatch {
-    kernel: &'static str,
-    params: Params,
-    groups: [u32; 2],
-    cache: bool,
-    shading: bool,
-    phase: Option<usize>,
-}
-
-impl GpuExecutor {
-    /// The dispatches that a step consists of.
-    fn dispatches(&self, pass: Pass, step: Step) -> Vec<Dispatch> {
-        let extent = self.extent;
-        let mut params = self.view;
-        params.zero = 0;
-        params.width = extent.width;
-        params.height = extent.height;
-        params.tile = extent.tile;
-        params.tiles_x = extent.tiles_x();
-        params.tiles = extent.tiles();
-        params.list_capacity = self.tiles.capacity;
-        params.threshold = self.threshold;
-        params.pair_count = self.pair_count;
-        params.top_count = self.scene.resident().top2.len() as u32;
-        params.instance_pad = self.resident.instance_pad;
-        params.flags = if pass == Pass::Shadow { layout::PARAM_ANY_HIT } else { 0 };
-        let per_ray = [extent.width.div_ceil(8), extent.height.div_ceil(8)];
-        let per_tile = [extent.tiles().div_ceil(64), 1];
-        let kernel = |kernel, params, groups, phase| {
-            let cache = kernel == "intersect_list" || kernel == "intersect_all";
-            Dispatch { kernel, params, groups, cache, shading: false, phase }
-        };
-        let shading =
-            |kernel, params, cache| Dispatch { kernel, params, groups: per_ray, cache, shading: true, phase: None };
-        let selected = |mask, want, flags| Params { select_mask: mask, select_want: want, flags, ..params };
-        let intersect = |mask, want, phase| {
-            let p = selected(mask, want, params.flags);
-            vec![
-                kernel("tile_select_intersect", p, per_tile, Some(phase)),
-                kernel("intersect_list", p, per_ray, Some(phase)),
-            ]
-        };
-        let query = |mask, want, flags| {
-            let p = selected(mask, want, flags);
-            vec![
-                kernel("tile_select", p, per_tile, Some(1)),
-                kernel("query", p, per_ray, Some(1)),
-                kernel("query_reduce", p, per_tile, Some(1)),
-            ]
-        };
-        let across = extent.tiles().min(65_535);
-        let bounds = kernel("tile_bounds", params, [across, extent.tiles().div_ceil(across)], Some(1));
-        match step {
-            Step::Generate if pass == Pass::Primary => vec![kernel("generate_primary", params, per_ray, None)],
-            Step::Generate => vec![shading("generate_shadow", params, false)],
-            Step::StartHits => vec![kernel("start_hits", params, per_ray, None)],
-            Step::CountRays => vec![Dispatch { phase: None, ..bounds }],
-            Step::Lists => {
-                vec![
-                    bounds,
-                    kernel("tile_walk_count", params, per_tile, Some(1)),
-                    kernel("tile_scan", params, [1, 1], Some(1)),
-                    kernel("tile_walk_write", params, per_tile, Some(1)),
-                ]
-            }
-            Step::IntersectResident => {
-                intersect(layout::STATE_GEOMETRY | layout::STATE_DONE, layout::STATE_GEOMETRY, 0)
-            }
-            Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, 2),
-            Step::IntersectAll => vec![kernel("intersect_all", params, per_ray, Some(0))],
-            Step::QueryMissing => query(layout::STATE_GEOMETRY | layout::STATE_DONE, 0, params.flags),
-            Step::QueryPairs => {
-                let across = self.pair_count.clamp(1, 65_535);
-                vec![kernel("query_pairs", params, [across, self.pair_count.div_ceil(across)], Some(1))]
-            }
-            Step::QueryNeeded => {
-                let exact = Params { threshold: 0, ..params };
-                let mut dispatches = query(0, 0, params.flags | layout::PARAM_NEEDED);
-                for dispatch in &mut dispatches {
-                    dispatch.params.threshold = exact.threshold;
-                    dispatch.phase = None;
-                }
-                dispatches
-            }
-            Step::ClearAttributes => vec![shading("clear_gbuffer", params, false)],
-            Step::QueryHits => vec![kernel("hit_demand", params, per_ray, None)],
-            Step::Resolve => vec![shading("resolve", params, true)],
-            Step::Shade { shadows } => {
-                let flags = if shadows { layout::SHADE_SHADOWS } else { 0 };
-                vec![shading("shade", Params { flags, ..params }, false)]
-            }
-        }
     }
 }
 
 impl Executor for GpuExecutor {
     fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
         let entries: Vec<u32> = lists.iter().flatten().copied().collect();
-        if entries.len() > self.tiles.capacity as usize {
+        if entries.len() > self.buffers.tiles.capacity as usize {
             self.grow_lists(u32::try_from(entries.len()).unwrap_or(u32::MAX))?;
         }
         let mut first = 0;
@@ -431,9 +341,9 @@ impl Executor for GpuExecutor {
             first += list.len() as u32;
         }
         let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX }; entries.len()];
-        self.gpu.queue.write_buffer(&self.tiles.lists, 0, bytemuck::cast_slice(&records));
-        self.gpu.queue.write_buffer(&self.tiles.list, 0, bytemuck::cast_slice(&entries));
-        self.gpu.queue.write_buffer(&self.tiles.pair_demand, 0, bytemuck::cast_slice(&unasked));
+        self.gpu.queue.write_buffer(&self.buffers.tiles.lists, 0, bytemuck::cast_slice(&records));
+        self.gpu.queue.write_buffer(&self.buffers.tiles.list, 0, bytemuck::cast_slice(&entries));
+        self.gpu.queue.write_buffer(&self.buffers.tiles.pair_demand, 0, bytemuck::cast_slice(&unasked));
         Ok(())
     }
 
@@ -449,13 +359,13 @@ impl Executor for GpuExecutor {
                 ..Default::default()
             })
             .collect();
-        if (self.tiles.pair_rays.size() / 4) < records.len() as u64 {
+        if (self.buffers.tiles.pair_rays.size() / 4) < records.len() as u64 {
             let room = records.len().next_power_of_two();
-            self.tiles.pairs = storage(&self.gpu, "pairs", room, size_of::<layout::Pair>());
-            self.tiles.pair_rays = storage(&self.gpu, "pair rays", room, 4);
+            self.buffers.tiles.pairs = storage(&self.gpu, "pairs", room, size_of::<layout::Pair>());
+            self.buffers.tiles.pair_rays = storage(&self.gpu, "pair rays", room, 4);
             self.rebind();
         }
-        self.gpu.queue.write_buffer(&self.tiles.pairs, 0, bytemuck::cast_slice(&records));
+        self.gpu.queue.write_buffer(&self.buffers.tiles.pairs, 0, bytemuck::cast_slice(&records));
         self.pair_count = records.len() as u32;
         Ok(())
     }
@@ -466,12 +376,12 @@ impl Executor for GpuExecutor {
             crate::stream::Kind::Geometry => resident.bricks[item.brick as usize].geometry.bytes,
             crate::stream::Kind::Attributes => resident.bricks[item.brick as usize].attributes.bytes,
         };
-        self.cache.load(&self.gpu, &mut self.workers, loads, bytes)
+        self.buffers.cache.load(&self.gpu, &mut self.workers, loads, bytes)
     }
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let report = self.submit(pass, steps, bricks)?;
-        if report.list_entries <= self.tiles.capacity {
+        if report.list_entries <= self.buffers.tiles.capacity {
             return Ok(report);
         }
         // The lists did not fit and were left empty, so nothing has been intersected: once more, with room.
@@ -510,77 +420,4 @@ fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, Ex
 /// Bytes from one set of parameters to the next: the device's alignment for dynamic offsets.
 fn params_stride(gpu: &Gpu) -> u64 {
     (size_of::<Params>() as u64).next_multiple_of(u64::from(gpu.limits.min_uniform_buffer_offset_alignment.max(16)))
-}
-
-impl Groups {
-    #[allow(clippy::too_many_arguments)]
-    fn new(
-        gpu: &Gpu,
-        kernels: &Kernels,
-        scene: &SceneBuffers,
-        cache: &CachePages,
-        texels: &Texels,
-        passes: &[RayBuffers; 2],
-        pixels: &PixelBuffers,
-        tiles: &TileBuffers,
-        demand: &wgpu::Buffer,
-        counters: &wgpu::Buffer,
-        params: &wgpu::Buffer,
-    ) -> Self {
-        let group = |label, layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry]| {
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries })
-        };
-        let params_binding = wgpu::BufferBinding {
-            buffer: params,
-            offset: 0,
-            size: std::num::NonZeroU64::new(size_of::<Params>() as u64),
-        };
-        let rays = |pass: &RayBuffers| {
-            let mut entries = vec![wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::Buffer(params_binding.clone()),
-            }];
-            let buffers = [&pass.rays, &pass.hits, &pass.surfaces, demand, counters];
-            entries.extend(numbered(&buffers, 1));
-            group("rays", &kernels.rays, &entries)
-        };
-        let tile_buffers = [
-            &tiles.bounds,
-            &tiles.lists,
-            &tiles.list,
-            &tiles.selection,
-            &tiles.pair_demand,
-            &tiles.pairs,
-            &tiles.pair_rays,
-        ];
-        let primary = &passes[Pass::Primary as usize];
-        let fixed = [
-            &texels.materials,
-            &texels.textures,
-            &pixels.gbuffer,
-            &pixels.radiance,
-            &primary.rays,
-            &primary.hits,
-            &primary.surfaces,
-        ];
-        let mut shading = numbered(&fixed, 0);
-        shading.extend(numbered(&texels.pages.iter().collect::<Vec<_>>(), TEXEL_BINDING));
-        Self {
-            scene: group("scene", &kernels.scene, &scene.bindings()),
-            cache: group("cache", &kernels.cache, &cache.bindings()),
-            rays: [rays(&passes[0]), rays(&passes[1])],
-            tiles: group("tiles", &kernels.tiles, &numbered(&tile_buffers, 0)),
-            shading: group("shading", &kernels.shading, &shading),
-            empty: group("none", &kernels.none, &[]),
-        }
-    }
-}
-
-/// Whole buffers as entries from binding `first` on.
-fn numbered<'a>(buffers: &[&'a wgpu::Buffer], first: u32) -> Vec<wgpu::BindGroupEntry<'a>> {
-    let entry = |(i, b): (usize, &&'a wgpu::Buffer)| wgpu::BindGroupEntry {
-        binding: first + i as u32,
-        resource: b.as_entire_binding(),
-    };
-    buffers.iter().enumerate().map(entry).collect()
 }

@@ -36,6 +36,8 @@ enum Groups {
 
 /// All pipelines and the layouts of their groups.
 pub struct Kernels {
+    /// Numbers of pages that they bind.
+    pub pages: Pages,
     /// Group 0: the resident part of the scene.
     pub scene: wgpu::BindGroupLayout,
     /// Group 1: parameters and rays.
@@ -123,7 +125,7 @@ impl Kernels {
             });
             pipelines.insert(name, pipeline);
         }
-        Self { scene, rays, cache, tiles, shading, none, pipelines }
+        Self { pages, scene, rays, cache, tiles, shading, none, pipelines }
     }
 
     /// The pipeline of a specialisation of the table above.

@@ -1,7 +1,9 @@
 //! The wgpu executor: device, layouts, kernels, cache pages, timing.
 
 pub mod device;
+pub mod dispatch;
 pub mod executor;
+pub mod groups;
 pub mod kernels;
 pub mod layout;
 pub mod pages;

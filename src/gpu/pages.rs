@@ -25,7 +25,7 @@ pub struct CachePages {
 
 impl CachePages {
     /// Allocates pages of the given sizes; a cache of nothing still has one page, so that there is something to bind.
-    pub fn new(gpu: &Gpu, sizes: impl Iterator<Item = u64>) -> Self {
+    pub fn new(gpu: &Gpu, sizes: &[u64]) -> Self {
         let mapped = match gpu.upload {
             UploadPath::Mapped => wgpu::BufferUsages::MAP_WRITE,
             UploadPath::Staged => wgpu::BufferUsages::empty(),
@@ -38,25 +38,16 @@ impl CachePages {
                 mapped_at_creation: false,
             })
         };
-        let mut pages: Vec<_> = sizes.map(page).collect();
+        let mut pages: Vec<_> = sizes.iter().map(|&bytes| page(bytes)).collect();
         if pages.is_empty() {
             pages.push(page(0));
         }
         Self { pages, staging: None, path: gpu.upload }
     }
 
-    /// Number of pages.
-    pub fn page_count(&self) -> usize {
-        self.pages.len()
-    }
-
-    /// Bindings of group 2: each page as vectors and as words.
-    pub fn bindings(&self) -> Vec<wgpu::BindGroupEntry<'_>> {
-        let twice = self.pages.iter().flat_map(|page| [page, page]);
-        twice
-            .enumerate()
-            .map(|(i, page)| wgpu::BindGroupEntry { binding: i as u32, resource: page.as_entire_binding() })
-            .collect()
+    /// The pages, at least one.
+    pub fn pages(&self) -> &[wgpu::Buffer] {
+        &self.pages
     }
 
     /// Copies payloads to their slots: workers write straight into mapped memory, of the pages or of the staging buffer.

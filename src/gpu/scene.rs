@@ -97,13 +97,9 @@ impl SceneBuffers {
         buffers
     }
 
-    /// Bindings of group 0.
-    pub fn bindings(&self) -> Vec<wgpu::BindGroupEntry<'_>> {
+    /// All of them, in the order of their bindings.
+    pub fn buffers(&self) -> [&wgpu::Buffer; 7] {
         [&self.top8, &self.top2, &self.leaves, &self.instances, &self.bricks, &self.roots, &self.slots]
-            .into_iter()
-            .enumerate()
-            .map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() })
-            .collect()
     }
 
     /// Moves everything to `frame`, if it is not there yet.
