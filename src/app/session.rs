@@ -64,6 +64,19 @@ pub fn write_requests(args: &StreamArgs, cache: &Cache) -> Result<()> {
     Ok(())
 }
 
+/// Refuses a device with a failed check.
+fn require(gpu: &Gpu, checks: &[probe::Check]) -> Result<()> {
+    let failures = probe::failures(checks);
+    if failures.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "{} does not compute as exact rendering needs: {}; choose another with --adapter",
+        gpu.info.name,
+        failures.join(", ")
+    );
+}
+
 impl Session {
     /// Opens device, cache and workers for `scene`.
     ///
@@ -79,15 +92,7 @@ impl Session {
             }
         }
         let gpu = Gpu::open(args.adapter.as_deref())?;
-        let report = probe::run(&gpu.device, &gpu.queue);
-        let failures = report.failures();
-        if !failures.is_empty() {
-            bail!(
-                "{} does not compute as exact rendering needs: {}; choose another with --adapter",
-                gpu.info.name,
-                failures.join(", ")
-            );
-        }
+        require(&gpu, &probe::run(&gpu.device, &gpu.queue).checks)?;
         let bytes = brick_bytes(&scene);
         let sizes: Vec<(u64, u64)> = bytes.iter().map(|b| (b.geometry, b.attributes)).collect();
         let page_bytes = gpu.page_bytes();
@@ -119,6 +124,7 @@ impl Session {
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let executor =
             GpuExecutor::new(gpu, scene.clone(), workers, &page_sizes, setup).with_context(|| format!("{name}"))?;
+        require(executor.gpu(), &probe::compare_pipelines(&executor))?;
         Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule })
     }
 }

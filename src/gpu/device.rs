@@ -54,7 +54,8 @@ impl UploadPath {
     }
 }
 
-/// A device with everything of it that the executor asks about.
+/// A device with everything of it that the executor asks about. Clones share the device.
+#[derive(Clone)]
 pub struct Gpu {
     /// The device.
     pub device: wgpu::Device,

@@ -86,6 +86,11 @@ const COUNTING: &[Specialisation] = &[
 impl Kernels {
     /// Compiles every kernel for `pages`. `count` makes intersection kernels count nodes and triangles.
     pub fn new(gpu: &Gpu, pages: Pages, count: bool) -> Self {
+        Self::from_sources(gpu, pages, count, &|kernel| source(kernel, pages))
+    }
+
+    /// [`Self::new`] from the texts that `source` gives for the names of kernels.
+    pub(super) fn from_sources(gpu: &Gpu, pages: Pages, count: bool, source: &dyn Fn(&str) -> String) -> Self {
         use Bound::{Params, Read, Write};
         let device = &gpu.device;
         let scene = layout(device, "scene", &[Read; 7]);
@@ -113,7 +118,7 @@ impl Kernels {
             });
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(kernel),
-                source: wgpu::ShaderSource::Wgsl(source(kernel, pages).into()),
+                source: wgpu::ShaderSource::Wgsl(source(kernel).into()),
             });
             let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(name),

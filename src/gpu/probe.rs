@@ -3,16 +3,23 @@
 //! WGSL promises little about floats: compilers may contract, division and square root may be off by some ulps. The kernels
 //! are built to give equal bits all the same (`shaders/shared/exact.wgsl`), provided that + - * round to nearest and
 //! nothing sees through `barrier`. The probe runs them on fixed cases, those made to tell included, and compares every
-//! result with the twin in [`crate::math::exact`] bit for bit.
+//! result with the twin in [`crate::math::exact`] bit for bit. The pipelines that trace rays are then compared with each
+//! other, see [`compare_pipelines`].
 
 use super::wgsl::{self, Pages};
 use crate::math::exact;
+use bricks::SceneFile;
 use cases::{ArithmeticCase, TriangleCase};
 use serde::Serialize;
 use std::sync::mpsc;
 use std::time::Instant;
 
 mod cases;
+mod rays;
+mod traversal;
+mod twin;
+
+pub use traversal::compare_pipelines;
 
 /// What the probe found on a device.
 #[derive(Clone, Debug, Serialize)]
@@ -36,43 +43,60 @@ pub struct ProbeReport {
 /// One function or property, over all cases that concern it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// Function of exact.wgsl, or the property.
+    /// Function of exact.wgsl, the property, or the pipeline.
     pub name: &'static str,
+    /// What it was compared with.
+    pub against: &'static str,
     /// Cases compared.
     pub cases: u32,
-    /// Cases with another result than the twin's.
+    /// Cases with another result.
     pub different: u32,
     /// The first of these, in words.
     pub first: Option<String>,
 }
 
-impl ProbeReport {
-    /// One line for everything that differs; empty if the device may render in exact mode.
-    pub fn failures(&self) -> Vec<String> {
-        let line = |c: &Check| {
-            let first = c.first.as_deref().unwrap_or_default();
-            format!("{} differs in {} of {} cases (first: {first})", c.name, c.different, c.cases)
-        };
-        self.checks.iter().filter(|c| c.different > 0).map(line).collect()
-    }
+/// One line for everything that differs; empty if the device may render in exact mode.
+pub fn failures(checks: &[Check]) -> Vec<String> {
+    let line = |c: &Check| {
+        let first = c.first.as_deref().unwrap_or_default();
+        format!("{} differs from {} in {} of {} cases (first: {first})", c.name, c.against, c.different, c.cases)
+    };
+    checks.iter().filter(|c| c.different > 0).map(line).collect()
+}
+
+/// The scene that the traversal pipelines are compared with: several bricks, one of them wide; sheets in one plane, some
+/// twice; slivers; turned and mirrored instances. `scene_tests.rs` says how it is made.
+fn scene() -> Result<SceneFile, bricks::Error> {
+    SceneFile::from_bytes("the probe's scene", include_bytes!("probe/scene.bricks"))
 }
 
 impl Check {
-    fn new(name: &'static str) -> Self {
-        Self { name, cases: 0, different: 0, first: None }
+    fn new(name: &'static str, against: &'static str) -> Self {
+        Self { name, against, cases: 0, different: 0, first: None }
     }
 
     /// Compares words of a result; +0 and -0 are one value.
     fn compare(&mut self, found: &[u32], expected: &[u32], case: &dyn std::fmt::Debug) {
-        let value = |x: u32| if x == 1 << 31 { 0 } else { x };
+        let value = |x: &u32| if *x == 1 << 31 { 0 } else { *x };
+        self.count(found.iter().map(value).eq(expected.iter().map(value)), found, expected, case);
+    }
+
+    /// Compares words of a result bit for bit.
+    fn compare_bits(&mut self, found: &[u32], expected: &[u32], case: &dyn std::fmt::Debug) {
+        self.count(found == expected, found, expected, case);
+    }
+
+    fn count(&mut self, same: bool, found: &[u32], expected: &[u32], case: &dyn std::fmt::Debug) {
         self.cases += 1;
-        if found.iter().map(|&x| value(x)).eq(expected.iter().map(|&x| value(x))) {
-            return;
+        if !same {
+            self.different += 1;
+            self.first.get_or_insert_with(|| format!("{found:08x?} instead of {expected:08x?} for {case:?}"));
         }
-        self.different += 1;
-        self.first.get_or_insert_with(|| format!("{found:08x?} instead of {expected:08x?} for {case:?}"));
     }
 }
+
+/// What results of exact.wgsl are compared with.
+const TWIN: &str = "its twin";
 
 /// Words of results per case of the kernel `arithmetic`.
 const ARITHMETIC_WORDS: usize = 12;
@@ -129,7 +153,13 @@ fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> Probe
 }
 
 fn no_results(name: &'static str, reason: String) -> Check {
-    Check { name, cases: 1, different: 1, first: Some(format!("the device returned no results: {reason}")) }
+    Check {
+        name,
+        against: TWIN,
+        cases: 1,
+        different: 1,
+        first: Some(format!("the device returned no results: {reason}")),
+    }
 }
 
 /// Runs one entry point over all cases; `result_words` words a case come back.
@@ -198,7 +228,7 @@ fn ordinary(x: f32) -> bool {
 
 fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results: &[u32]) {
     let names = ["rounding of +", "rounding of -", "rounding of *", "barrier", "divide", "square_root", "diffprod"];
-    let mut checks = names.map(Check::new);
+    let mut checks = names.map(|name| Check::new(name, TWIN));
     for (case, found) in cases.iter().zip(results.chunks_exact(ARITHMETIC_WORDS)) {
         let [a, b, c, d] = case.words.map(f32::from_bits);
         if !case.words.iter().all(|&x| ordinary(f32::from_bits(x))) {
@@ -232,7 +262,8 @@ fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results:
 }
 
 fn check_triangles(report: &mut ProbeReport, cases: &[TriangleCase], results: &[u32]) {
-    let mut checks = ["ray_frame", "intersect_triangle", "surface_point", "offset_origin"].map(Check::new);
+    let mut checks =
+        ["ray_frame", "intersect_triangle", "surface_point", "offset_origin"].map(|name| Check::new(name, TWIN));
     for (case, found) in cases.iter().zip(results.chunks_exact(TRIANGLE_WORDS)) {
         let [a, b, c] = case.vertices;
         let f = exact::ray_frame(case.direction);
@@ -256,5 +287,7 @@ fn check_triangles(report: &mut ProbeReport, cases: &[TriangleCase], results: &[
     report.checks.extend(checks);
 }
 
+#[cfg(test)]
+mod scene_tests;
 #[cfg(test)]
 mod tests;

@@ -110,20 +110,14 @@ impl SceneBuffers {
         self.frame = Some(frame);
         let world = &resident.objects[0];
         let world_scale = exp2(world.step_log2 - world.unit_log2);
-        let instances: Vec<Placed> = resident.instances.iter().map(|i| Placed::new(resident, i, &frame)).collect();
-        self.instance_pad = instances.iter().map(|i| i.pad).fold(0.0, f32::max);
+        let Placement { instances, leaves, instance_pad } = Placement::new(resident, &frame);
+        self.instance_pad = instance_pad;
         let top8: Vec<bricks::Node> = resident.top8.iter().map(|n| rebase_top8(n, &frame, world_scale)).collect();
         let top2: Vec<layout::TopNode2> = resident.top2.iter().map(|n| rebase_top2(n, &frame, world_scale)).collect();
-        let leaves: Vec<layout::Leaf> = resident
-            .leaves
-            .iter()
-            .map(|leaf| instances[leaf.instance as usize].leaf(leaf, &resident.bricks[leaf.brick as usize]))
-            .collect();
-        let records: Vec<layout::Instance> = instances.iter().map(|i| i.record).collect();
         gpu.queue.write_buffer(&self.top8, 0, bytemuck::cast_slice(&top8));
         gpu.queue.write_buffer(&self.top2, 0, bytemuck::cast_slice(&top2));
         gpu.queue.write_buffer(&self.leaves, 0, bytemuck::cast_slice(&leaves));
-        gpu.queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&records));
+        gpu.queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&instances));
     }
 }
 
@@ -140,6 +134,30 @@ fn brick_record(brick: &Brick) -> layout::Brick {
         surfaces: words(attributes.surfaces),
         attribute_indices: words(attributes.indices),
         ..Default::default()
+    }
+}
+
+/// Instances and leaves as kernels see them in a frame.
+pub struct Placement {
+    /// Instances.
+    pub instances: Vec<layout::Instance>,
+    /// Leaves of the top level.
+    pub leaves: Vec<layout::Leaf>,
+    /// Relative padding of top-level boxes for the rounding of instance rays.
+    pub instance_pad: f32,
+}
+
+impl Placement {
+    /// Of everything in `resident`.
+    pub fn new(resident: &Resident, frame: &Frame) -> Self {
+        let placed: Vec<Placed> = resident.instances.iter().map(|i| Placed::new(resident, i, frame)).collect();
+        let leaf =
+            |leaf: &bricks::Leaf| placed[leaf.instance as usize].leaf(leaf, &resident.bricks[leaf.brick as usize]);
+        Self {
+            leaves: resident.leaves.iter().map(leaf).collect(),
+            instance_pad: placed.iter().map(|i| i.pad).fold(0.0, f32::max),
+            instances: placed.iter().map(|i| i.record).collect(),
+        }
     }
 }
 

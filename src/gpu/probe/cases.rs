@@ -42,7 +42,7 @@ impl TriangleCase {
 }
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
-struct Rng(u64);
+pub struct Rng(pub u64);
 
 impl Rng {
     fn next(&mut self) -> u64 {
@@ -52,12 +52,13 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    fn below(&mut self, n: u32) -> u32 {
+    /// A number below n.
+    pub fn below(&mut self, n: u32) -> u32 {
         (self.next() >> 32) as u32 % n
     }
 
     /// A number in [-1, 1).
-    fn signed(&mut self) -> f32 {
+    pub fn signed(&mut self) -> f32 {
         (self.next() >> 40) as f32 / 8_388_608.0 - 1.0
     }
 

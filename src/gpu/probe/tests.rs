@@ -1,6 +1,12 @@
 //! The probe passes where it must and names what is broken on purpose.
 
 use super::*;
+use crate::gpu::device::Gpu;
+use crate::gpu::executor::{GpuExecutor, Setup};
+use crate::gpu::kernels::{self, Kernels};
+use crate::gpu::rays::Extent;
+use crate::stream::{HostCache, Workers};
+use std::sync::Arc;
 
 /// A device of the first adapter, or a note why the test is skipped.
 fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
@@ -18,8 +24,36 @@ fn a_sound_device_passes() {
     let Some((device, queue)) = device() else { return };
     let report = run(&device, &queue);
     println!("{report:?}");
-    assert_eq!(report.failures(), Vec::<String>::new());
+    assert_eq!(failures(&report.checks), Vec::<String>::new());
     assert!(report.checks.iter().all(|c| c.cases > 500), "{report:?}");
+}
+
+/// An executor over the probe's own scene, with as many pages as asked and one kernel's text changed.
+fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<GpuExecutor> {
+    let Ok(gpu) = Gpu::open(None) else {
+        println!("skipped: no adapter");
+        return None;
+    };
+    let pages = Pages { cache: pages, texels: 1 };
+    let source = |kernel: &str| change(kernel, kernels::source(kernel, pages));
+    let kernels = Arc::new(Kernels::from_sources(&gpu, pages, false, &source));
+    let scene = Arc::new(scene().unwrap());
+    let workers = Workers::new(scene.clone(), HostCache::new(0), 1, 0).unwrap();
+    let extent = Extent { width: 8, height: 8, tile: 8 };
+    let setup = Setup { extent, threshold: 0, count: false };
+    Some(GpuExecutor::with_kernels(gpu, kernels, scene, workers, &[], setup).unwrap())
+}
+
+#[test]
+fn sound_pipelines_agree() {
+    for pages in [1, 3] {
+        let Some(executor) = executor(pages, &|_, text| text) else { return };
+        let start = Instant::now();
+        let checks = compare_pipelines(&executor);
+        println!("{pages} pages: {:?}", start.elapsed());
+        assert_eq!(failures(&checks), Vec::<String>::new());
+        assert!(checks.len() == 8 && checks.iter().all(|check| check.cases > 500), "{checks:?}");
+    }
 }
 
 #[test]
@@ -68,7 +102,7 @@ fn planted_defects_are_named() {
         let text = source();
         assert!(text.contains(sound), "{sound}");
         let report = run_source(&device, &queue, &text.replace(sound, broken));
-        let failures = report.failures();
+        let failures = failures(&report.checks);
         assert!(failures.iter().any(|f| f.starts_with(name)), "{name}: {broken}: {failures:?}");
     }
 }
