@@ -5,6 +5,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::executor::{GpuExecutor, Setup};
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::rays::Extent;
+use crate::gpu::scene::Frame;
 use crate::stream::{HostCache, Workers};
 use std::sync::Arc;
 
@@ -54,6 +55,90 @@ fn sound_pipelines_agree() {
         assert_eq!(failures(&checks), Vec::<String>::new());
         assert!(checks.len() == 8 && checks.iter().all(|check| check.cases > 500), "{checks:?}");
     }
+}
+
+#[test]
+fn a_pipeline_that_differs_is_named() {
+    let (list, all) = ("intersect_list", "intersect_all");
+    let (closest, any) = (" (closest hit) differs from ", " (any hit) differs from ");
+    // Kernel, what is changed in its text, the lines that must be there.
+    let defects = [
+        // t off by one ulp.
+        (
+            list,
+            "*best = Best(h.t,",
+            "*best = Best(bitcast<f32>(bitcast<u32>(h.t) + 1u),",
+            vec![
+                format!("{list}{closest}brute force"),
+                format!("{list}{any}brute force"),
+                format!("{list}{closest}{all}"),
+                format!("{list}{any}{all}"),
+            ],
+        ),
+        // Of equally near triangles that with the highest id.
+        (
+            all,
+            "id >= (*best).id",
+            "id <= (*best).id",
+            vec![format!("{all}{closest}brute force"), format!("{list}{closest}{all}")],
+        ),
+        // The open end of the range.
+        (
+            all,
+            "h.t > (*best).t",
+            "h.t >= (*best).t",
+            vec![format!("{all}{any}brute force"), format!("{list}{any}{all}")],
+        ),
+        // Wide bricks without the low parts.
+        (
+            list,
+            "barrier3(barrier3(high + (*r).offset_high) + barrier3(low + (*r).offset_low))",
+            "barrier3(high + (*r).offset_high)",
+            vec![format!("{list}{closest}brute force"), format!("{list}{any}brute force")],
+        ),
+        // The same hits, but rays that start elsewhere: brute force does not tell.
+        (
+            list,
+            "surfaces[ray] = Surface(point,",
+            "surfaces[ray] = Surface(point + point * 0x1p-22,",
+            vec![format!("{list}{closest}{all}"), format!("{list}{any}{all}")],
+        ),
+    ];
+    for (kernel, sound, broken, lines) in defects {
+        let change = |name: &str, text: String| {
+            assert!(name != kernel || text.contains(sound), "{sound}");
+            if name == kernel { text.replace(sound, broken) } else { text }
+        };
+        let Some(executor) = executor(1, &change) else { return };
+        let failures = failures(&compare_pipelines(&executor));
+        for line in lines {
+            assert!(failures.iter().any(|f| f.starts_with(&line)), "{broken}: {line}: {failures:#?}");
+        }
+        // The other pipeline is right.
+        let other = if kernel == list { all } else { list };
+        assert!(!failures.iter().any(|f| f.starts_with(other) && f.contains("brute force")), "{broken}: {failures:#?}");
+        assert!(failures.iter().all(|f| f.contains("(first: ") && f.contains(" for ray ")), "{failures:#?}");
+    }
+}
+
+#[test]
+fn rays_of_the_probe_are_of_every_kind() {
+    let scene = scene().unwrap();
+    let frame = Frame::near(scene.resident(), glam::DVec3::ZERO);
+    let twin = twin::Twin::new(&scene, &frame).unwrap();
+    let (mut hits, mut ties, mut ends, mut edges, mut untraced) = (0, 0, 0, 0, 0);
+    for ray in rays::rays(&twin, frame.unit) {
+        let met = twin.hits(&ray);
+        let closest = twin::closest(&ray, &met);
+        hits += usize::from(!met.is_empty());
+        ties += usize::from(met.iter().filter(|hit| hit.t == closest.t).count() > 1);
+        ends += usize::from(!met.is_empty() && closest.t == ray.t_max);
+        edges += usize::from(!met.is_empty() && (closest.u == 0.0 || closest.v == 0.0));
+        untraced += usize::from(ray.t_min > ray.t_max);
+    }
+    println!("{hits} hits, {ties} ties, {ends} at the end of the range, {edges} on edges, {untraced} untraced");
+    assert!((800..rays::RAYS - 100).contains(&hits), "{hits} hits");
+    assert!(ties > 50 && ends > 2 && edges > 50 && untraced > 2);
 }
 
 #[test]
