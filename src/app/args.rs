@@ -1,6 +1,7 @@
 //! The command line: every subcommand, every option with its unit and default. Values are validated here, so that commands
 //! receive only what they can use; what is wrong ends as usage with exit status 2.
 
+use super::inputs::InputArgs;
 use super::sizes::{CacheSize, Direction, ImageSize, non_negative, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
 use brickwalk_scenes::Kind;
@@ -28,7 +29,7 @@ pub struct Cli {
 pub enum Command {
     /// Generate a city larger than the demo's cache, convert it, walk through it, write a report
     Demo(DemoArgs),
-    /// Convert scenes (.gltf, .glb) into one .bricks file
+    /// Convert scenes (.gltf, .glb, .obj, .ply, .stl) into one .bricks file
     Convert(ConvertArgs),
     /// Generate a scene and camera paths through it
     Scene(SceneArgs),
@@ -77,9 +78,9 @@ pub struct DemoArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct ConvertArgs {
-    /// Scene files (.gltf, .glb) or folders of them; triangle ids count through them in this order
-    #[arg(required = true, value_name = "INPUT")]
-    pub inputs: Vec<PathBuf>,
+    /// What to convert.
+    #[command(flatten)]
+    pub inputs: InputArgs,
     /// The file to write
     #[arg(short, long, value_name = "S.bricks")]
     pub output: PathBuf,

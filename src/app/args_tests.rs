@@ -154,7 +154,7 @@ fn options_of_other_commands_arrive() {
     else {
         panic!()
     };
-    assert_eq!(c.inputs.len(), 2);
+    assert_eq!(c.inputs.inputs.len(), 2);
     assert_eq!((c.build.brick_triangles, c.build.threads, c.build.lattice), (4000, Some(2), Some(-12)));
     assert!(c.drop_non_finite);
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };

@@ -4,14 +4,11 @@ use super::args::{BuildArgs, ConvertArgs};
 use super::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildSettings, build};
-use brickwalk_convert::import::{ImportSettings, import};
+use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, import, load_all};
 use brickwalk_convert::progress::Progress;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// Extensions that are looked for in folders, lower case.
-const EXTENSIONS: [&str; 2] = ["gltf", "glb"];
 
 /// Deepest nesting of folders that is searched.
 const MAX_DEPTH: u32 = 64;
@@ -22,11 +19,13 @@ const MAX_DEPTH: u32 = 64;
 /// An input cannot be read or is bad, or the output cannot be written; an old output then stays as it was.
 pub fn run(args: &ConvertArgs) -> Result<()> {
     let start = Instant::now();
-    let inputs = expand(&args.inputs)?;
+    let inputs = expand(&args.inputs.inputs)?;
     refuse_overwriting(&inputs, &args.output)?;
     let progress = Progress::new();
     let threads = args.build.threads.map(|n| n as usize);
-    let scene = import(&inputs, &ImportSettings { threads }, &progress)?;
+    let scratch = args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
+    let imported = import(&inputs, &ImportSettings { threads, scratch }, &progress)?;
+    let scene = load_all(&imported)?;
     let settings = BuildSettings {
         drop_non_finite: args.drop_non_finite,
         instance_min_triangles: args.instance_min_triangles,
@@ -70,22 +69,23 @@ pub fn summarise(path: &Path, start: Instant) -> Result<()> {
 }
 
 /// The files that the inputs name: a folder stands for the scene files in it and below, sorted bytewise by path.
-fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+fn expand(inputs: &[Input]) -> Result<Vec<Input>> {
     let mut files = Vec::new();
     for input in inputs {
-        if !input.is_dir() {
+        if !input.path.is_dir() {
             files.push(input.clone());
             continue;
         }
         let mut found = Vec::new();
-        search(input, 0, &mut found)?;
+        search(&input.path, 0, &mut found)?;
         ensure!(
             !found.is_empty(),
-            "{}: there is no .gltf or .glb file in this folder; name the scene files themselves",
-            input.display()
+            "{}: there is no file with the extension {} in this folder; name the scene files themselves",
+            input.path.display(),
+            EXTENSIONS.join(", ")
         );
         found.sort_by(|a, b| a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes()));
-        files.append(&mut found);
+        files.extend(found.into_iter().map(|path| Input { path, ..input.clone() }));
     }
     Ok(files)
 }
@@ -119,12 +119,12 @@ pub fn refuse_folder(output: &Path) -> Result<()> {
 }
 
 /// Refuses an output that is an input or a folder.
-fn refuse_overwriting(inputs: &[PathBuf], output: &Path) -> Result<()> {
+fn refuse_overwriting(inputs: &[Input], output: &Path) -> Result<()> {
     refuse_folder(output)?;
     let Ok(target) = output.canonicalize() else { return Ok(()) };
     for input in inputs {
-        if input.canonicalize().is_ok_and(|input| input == target) {
-            bail!("{}: the output would overwrite this input; give -o another name", input.display());
+        if input.path.canonicalize().is_ok_and(|input| input == target) {
+            bail!("{}: the output would overwrite this input; give -o another name", input.path.display());
         }
     }
     Ok(())
@@ -143,10 +143,16 @@ mod tests {
         for name in ["b.gltf", "B.GLB", "a.glb", "notes.txt", "sub/c.glb", "sub/deep/a.gltf", "noextension"] {
             std::fs::write(at(name), b"").unwrap();
         }
-        let files = expand(&[at("a.glb"), folder.path().into(), at("missing.gltf")]).unwrap();
-        let expected = ["a.glb", "B.GLB", "a.glb", "b.gltf", "sub/c.glb", "sub/deep/a.gltf", "missing.gltf"].map(at);
+        let mut inputs = [at("a.glb"), folder.path().into(), at("missing.gltf")].map(Input::from);
+        inputs[1].metres = 0.5;
+        let files = expand(&inputs).unwrap();
+        let metres: Vec<_> = files.iter().map(|file| file.metres).collect();
+        assert_eq!(metres, [1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 1.0]);
+        let files: Vec<_> = files.into_iter().map(|file| file.path).collect();
+        let expected =
+            ["a.glb", "B.GLB", "a.glb", "b.gltf", "c.STL", "sub/c.glb", "sub/deep/a.gltf", "missing.gltf"].map(at);
         assert_eq!(files, expected);
-        let error = expand(&[at("empty")]).unwrap_err().to_string();
+        let error = expand(&[at("empty").into()]).unwrap_err().to_string();
         assert!(error.contains("empty: there is no"), "{error}");
     }
 
@@ -156,8 +162,13 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("a.glb"), b"").unwrap();
         std::fs::create_dir(at("sub")).unwrap();
-        assert!(refuse_overwriting(&[at("a.glb")], &at("b.bricks")).is_ok());
-        assert!(refuse_overwriting(&[at("a.glb")], &at("sub/../a.glb")).unwrap_err().to_string().contains("overwrite"));
-        assert!(refuse_overwriting(&[at("a.glb")], &at("sub")).unwrap_err().to_string().contains("folder"));
+        assert!(refuse_overwriting(&[at("a.glb").into()], &at("b.bricks")).is_ok());
+        assert!(
+            refuse_overwriting(&[at("a.glb").into()], &at("sub/../a.glb"))
+                .unwrap_err()
+                .to_string()
+                .contains("overwrite")
+        );
+        assert!(refuse_overwriting(&[at("a.glb").into()], &at("sub")).unwrap_err().to_string().contains("folder"));
     }
 }

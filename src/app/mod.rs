@@ -6,6 +6,7 @@ pub mod compare;
 pub mod convert;
 pub mod demo;
 pub mod info;
+mod inputs;
 pub mod output;
 pub mod replay;
 pub mod scene;
@@ -142,6 +143,10 @@ pub fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
 fn install_panic_hook() {
     static SPOKEN: AtomicBool = AtomicBool::new(false);
     std::panic::set_hook(Box::new(|info| {
+        // A decoder that gave up on a damaged input: the importer tells.
+        if brickwalk_convert::import::catches_panics() {
+            return;
+        }
         if SPOKEN.swap(true, Ordering::Relaxed) {
             return;
         }

@@ -33,6 +33,12 @@ pub trait Source: Send + Sync {
     /// # Errors
     /// The image is missing or cannot be decoded. This is no reason not to convert: the builder warns and leaves it out.
     fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError>;
+
+    /// What was repaired in the parts that have been read, one line each: warnings that cannot be known before. Once every
+    /// part has been read they are the same whatever the order.
+    fn repairs(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// Why a source could not be read: one line that names the file, the thing in it and the remedy.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// What is read, as error messages list it.
-pub(super) const ACCEPTED: &str = ".gltf and .glb";
+pub(super) const ACCEPTED: &str = ".gltf, .glb, .obj, .ply and .stl";
 
 /// The usual remedy for a defect that only the producer of a file can repair.
 pub(super) const EXPORT_AGAIN: &str = "export the file again";

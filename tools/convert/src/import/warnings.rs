@@ -36,15 +36,18 @@ impl Warnings {
 
     /// One line for each kind, in the order of first occurrence.
     pub fn into_lines(self) -> Vec<String> {
-        let file = self.file;
-        self.entries
-            .into_iter()
-            .map(|Entry { what, first, count }| match (first.is_empty(), count) {
-                (true, _) => format!("{file}: {what}"),
-                (false, 1) => format!("{file}: {first}: {what}"),
-                (false, _) => format!("{file}: {first} and {} more: {what}", count - 1),
-            })
-            .collect()
+        let line = |entry: &Entry| describe(&self.file, &entry.what, &entry.first, entry.count);
+        self.entries.iter().map(line).collect()
+    }
+}
+
+/// The line that says that `what` happened in `file`, `count` times, the first time at `first` (empty: in the file as a
+/// whole).
+pub(super) fn describe(file: &str, what: &str, first: &str, count: u64) -> String {
+    match (first.is_empty(), count) {
+        (true, _) => format!("{file}: {what}"),
+        (false, 1) => format!("{file}: {first}: {what}"),
+        (false, _) => format!("{file}: {first} and {} more: {what}", count - 1),
     }
 }
 

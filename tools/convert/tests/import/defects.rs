@@ -1,8 +1,6 @@
 //! What is refused: the error names the file, the thing and the remedy in one line.
 
 use crate::writer::*;
-use brickwalk_convert::import::{ImportSettings, import};
-use brickwalk_convert::progress::Progress;
 use serde_json::{Value, json};
 
 /// The error after `value` was put at `pointer` of a sound file, which itself must import.
@@ -42,17 +40,30 @@ fn every_reference_is_checked() {
         ("/scene", "default scene"),
         ("/scenes/0/nodes/0", "scene 0"),
         ("/nodes/0/mesh", "node 0"),
-        ("/meshes/0/primitives/0/material", "mesh 0 \"door\" primitive 0"),
         ("/meshes/0/primitives/0/indices", "mesh 0 \"door\" primitive 0"),
         ("/meshes/0/primitives/0/attributes/POSITION", "mesh 0 \"door\" primitive 0"),
         ("/accessors/0/bufferView", "mesh 0 \"door\" primitive 0: POSITION: accessor 0"),
         ("/accessors/0/sparse/indices/bufferView", "accessor 0"),
         ("/accessors/0/sparse/values/bufferView", "accessor 0"),
         ("/bufferViews/0/buffer", "accessor 0"),
+    ];
+    // What these lead to leaves geometry intact, so they are warnings.
+    let looks = [
+        ("/meshes/0/primitives/0/material", "mesh 0 \"door\" primitive 0"),
         ("/materials/0/pbrMetallicRoughness/baseColorTexture/index", "material 0"),
         ("/textures/0/source", "material 0"),
         ("/textures/0/sampler", "material 0"),
     ];
+    for (pointer, place) in looks {
+        for index in [100u64, 1 << 32, u64::MAX] {
+            let mut file = sound();
+            *file.root.pointer_mut(pointer).unwrap() = json!(index);
+            let scene = file.scene();
+            assert!(scene.materials.iter().all(|material| material.base_color_texture == bricks::NONE));
+            let told = |line: &String| line.contains(place) && line.contains(&index.to_string());
+            assert!(scene.warnings.iter().any(told), "{pointer}: {:?}", scene.warnings);
+        }
+    }
     for (pointer, place) in references {
         // The second would be index 0 in 32 bits.
         for index in [100u64, 1 << 32, u64::MAX] {
@@ -209,7 +220,7 @@ fn buffers_must_be_there_and_long_enough() {
         ("missing.bin", "cannot read missing.bin"),
         ("folder.bin", "not a regular file"),
         ("short.bin", "byteLength states"),
-        ("/dev/zero", "absolute path"),
+        ("/dev/zero", "path is absolute"),
         ("http://example.com/a.bin", "not a relative path"),
         ("../a.bin", "out of the folder"),
         ("%2e%2e/a.bin", "out of the folder"),
@@ -226,16 +237,16 @@ fn buffers_must_be_there_and_long_enough() {
     // Without a URI only a GLB has a buffer.
     let path = write(folder.path(), "test.gltf", &file.json(None));
     let error = error_text(import_one(&path));
-    assert!(error.contains("buffer 0 of buffer view 0 has no data"), "{error}");
+    assert!(error.contains("buffer view 0: buffer 0 has no data"), "{error}");
 }
 
 #[test]
 fn required_extensions_are_named_in_one_error() {
     let mut file = Writer::triangle();
     file.root["extensionsRequired"] =
-        json!(["KHR_draco_mesh_compression", "KHR_lights_punctual", "EXT_meshopt_compression", "A\nB"]);
+        json!(["KHR_draco_mesh_compression", "EXT_other", "KHR_lights_punctual", "MPEG_media", "A\nB"]);
     let error = file.error();
-    assert!(error.contains("requires KHR_draco_mesh_compression, EXT_meshopt_compression, A B, which"), "{error}");
+    assert!(error.contains("requires EXT_other, MPEG_media, A B, which"), "{error}");
 }
 
 #[test]
@@ -243,14 +254,42 @@ fn compressed_geometry_is_not_taken_for_zeros() {
     let mut file = Writer::triangle();
     file.root["accessors"][0].as_object_mut().unwrap().remove("bufferView");
     file.scene();
-    file.root["meshes"][0]["primitives"][0]["extensions"] = json!({"KHR_draco_mesh_compression": {}});
-    assert!(file.error().contains("Draco"));
+    let draco =
+        |view: usize| json!({"KHR_draco_mesh_compression": {"bufferView": view, "attributes": {"POSITION": 0}}});
+    let last = file.view(b"DRACO\x02\x02\x01\x01\0\0 but cut off");
+    for view in [last, 0, last + 1, 1 << 40] {
+        file.root["meshes"][0]["primitives"][0]["extensions"] = draco(view);
+        let error = file.error();
+        assert!(error.contains("mesh 0 primitive 0: Draco") || error.contains("refers to buffer view"), "{error}");
+    }
     let mut file = Writer::triangle();
-    file.push("buffers", json!({"byteLength": 80, "uri": "data:,"}));
-    file.root["buffers"] = json!([{"byteLength": file.bytes.len()}, {"byteLength": 1000}]);
-    file.root["bufferViews"][0]["buffer"] = json!(1);
-    file.root["bufferViews"][0]["extensions"] = json!({"EXT_meshopt_compression": {}});
-    assert!(file.error().contains("EXT_meshopt_compression"));
+    let sound = json!({
+        "buffer": 0, "byteOffset": 0, "byteLength": 36, "byteStride": 12, "count": 3, "mode": "ATTRIBUTES"
+    });
+    // Plain numbers are not what the codec writes.
+    let wrong = [
+        ("byteLength", json!(36)),
+        ("byteLength", json!(0)),
+        ("byteLength", json!(1000)),
+        ("byteOffset", json!(u64::MAX)),
+        ("byteStride", json!(0)),
+        ("byteStride", json!(10)),
+        ("byteStride", json!(260)),
+        ("count", json!(1u64 << 32)),
+        ("count", json!(u64::MAX)),
+        ("mode", json!("NOTHING")),
+        ("mode", json!("TRIANGLES")),
+        ("filter", json!("OCTAHEDRAL")),
+        ("filter", json!("NOTHING")),
+        ("buffer", json!(1)),
+    ];
+    for (field, value) in wrong {
+        let mut extension = sound.clone();
+        extension[field] = value;
+        file.root["bufferViews"][0]["extensions"] = json!({"EXT_meshopt_compression": extension});
+        let error = file.error();
+        assert!(error.contains("buffer view 0: meshopt compression: "), "{field}: {error}");
+    }
 }
 
 #[test]
@@ -284,14 +323,13 @@ fn bytes_that_are_no_gltf() {
 
 #[test]
 fn other_kinds_of_files_are_refused_before_anything_is_read() {
-    for name in ["test.gl.obj", "test.gl.ply", "test.gl.STL", "test.gl", "test.gltf.fbx"] {
+    for name in ["test.gl.objx", "test.gl.usd", "test.gl", "test.gltf.fbx"] {
         let error = error_text(import_bytes(name, b""));
-        assert!(error.contains(".gltf and .glb"), "{error}");
+        assert!(error.contains(".gltf, .glb, .obj, .ply and .stl"), "{error}");
     }
     // The second input is at fault, although the first is missing.
-    let paths = ["/missing/test.gltf".into(), "/missing/test.gl.obj".into()];
-    let result = import(&paths, &ImportSettings::default(), &Progress::hidden());
-    assert!(error_text(result).contains("test.gl.obj"));
+    let paths = ["/missing/test.gltf", "/missing/test.gl.objx"].map(|path| std::path::Path::new(path).into());
+    assert!(error_text(import_all(&paths)).contains("test.gl.objx"));
     let error = error_text(import_one(std::path::Path::new("/missing/test.gltf")));
     assert!(error.contains("/missing/test.gltf: cannot be read"), "{error}");
 }

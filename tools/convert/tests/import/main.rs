@@ -1,7 +1,8 @@
-//! Importing glTF: features and defects on small files made here, the scene files of BRICKWALK_SCENES, mutated bytes.
+//! Importing: features and defects on small files made here, the scene files of BRICKWALK_SCENES, mutated bytes.
 
 mod defects;
 mod features;
+mod formats;
 mod fuzz;
 mod oracle;
 mod scenes;

@@ -1,9 +1,12 @@
-//! Accessors (glTF 2.0, sections 3.6.2 and 5.1): typed, strided, possibly sparse views of buffers, checked once and then
-//! read by index.
+//! Accessors (glTF 2.0, sections 3.6.2 and 5.1): typed, strided, possibly sparse views of buffers. They are checked once;
+//! elements are read when they are wanted.
 
 use super::document::{Accessor as Json, Index};
-use super::file::{File, Problem, item, slice};
+use super::file::{File, Problem, item};
 use crate::import::error::one_line;
+use crate::import::table::Table;
+use std::io;
+use std::sync::atomic::Ordering;
 
 /// Type of one component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,53 +87,90 @@ pub(super) struct Shape {
 
 /// An accessor whose every element is known to lie within its buffers.
 #[derive(Clone, Debug)]
-pub(super) struct Accessor<'a> {
+pub(super) struct Accessor {
     /// Number of elements.
-    pub count: usize,
+    pub count: u64,
     /// Components of an element, at most 4.
     pub width: usize,
+    /// Whether integers are fractions of their largest value.
+    pub normalized: bool,
+    /// What components are divided by.
+    scale: f64,
     component: Component,
-    normalized: bool,
-    /// Element `i` begins at `i * stride`; `None`: all zeros.
-    base: Option<&'a [u8]>,
-    stride: usize,
-    sparse: Option<Sparse<'a>>,
+    /// The elements; `None`: all zeros.
+    base: Option<Table>,
+    sparse: Option<Box<Sparse>>,
 }
 
-/// Replaced elements: ascending indices and, tightly packed, values.
+/// Replaced elements: ascending indices, and values in the same order.
 #[derive(Clone, Debug)]
-struct Sparse<'a> {
-    count: usize,
-    indices: &'a [u8],
+struct Sparse {
+    indices: Table,
     component: Component,
-    values: &'a [u8],
+    values: Table,
 }
 
-impl Sparse<'_> {
-    fn index(&self, i: usize) -> usize {
-        self.component.read(self.indices, i * self.component.bytes()) as usize
+impl Sparse {
+    fn index(&self, row: &[u8]) -> u64 {
+        self.component.read(row, 0) as u64
     }
 
-    /// Position of element `element` among the replaced ones.
-    fn find(&self, element: usize) -> Option<usize> {
-        let (mut low, mut high) = (0, self.count);
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if self.index(middle) < element { low = middle + 1 } else { high = middle }
-        }
-        (low < self.count && self.index(low) == element).then_some(low)
+    /// Which of the elements `wanted`, which ascend without repetition, are replaced: their positions in that list, and
+    /// the rows of the values.
+    fn find(&self, wanted: &[u64]) -> io::Result<(Vec<usize>, Vec<u64>)> {
+        let (mut positions, mut rows) = (Vec::new(), Vec::new());
+        let (Some(&first), Some(&last)) = (wanted.first(), wanted.last()) else { return Ok((positions, rows)) };
+        let start = self.indices.partition_point(|row| self.index(row) < first)?;
+        let mut position = 0;
+        self.indices.run(start, self.indices.count(), |i, row| {
+            let index = self.index(row);
+            while wanted.get(position).is_some_and(|&element| element < index) {
+                position += 1;
+            }
+            if wanted.get(position) == Some(&index) {
+                positions.push(position);
+                rows.push(i);
+            }
+            index < last
+        })?;
+        Ok((positions, rows))
     }
 }
 
-impl<'a> Accessor<'a> {
+impl Accessor {
     /// Checks accessor `index` of `file` against `shape` and against its buffers.
-    pub fn resolve(file: &'a File, index: Index, shape: &Shape) -> Result<Self, Problem> {
+    pub fn resolve(file: &File, index: Index, shape: &Shape) -> Result<Self, Problem> {
         let json = item(&file.document.accessors, index, "accessor")?;
-        Self::check(file, json, shape)
+        Self::check(file, index, json, shape)
             .map_err(|problem| Problem { what: format!("accessor {index}: {}", problem.what), ..problem })
     }
 
-    fn check(file: &'a File, json: &Json, shape: &Shape) -> Result<Self, Problem> {
+    /// An accessor of floats that extensions decoded, `width` components a row.
+    pub fn of_floats(table: Table, width: usize) -> Self {
+        let count = table.count();
+        Self { count, width, component: Component::F32, normalized: false, scale: 1.0, base: Some(table), sparse: None }
+    }
+
+    /// An accessor of indices that extensions decoded.
+    pub fn of_indices(table: Table) -> Self {
+        let count = table.count();
+        Self {
+            count,
+            width: 1,
+            component: Component::U32,
+            normalized: false,
+            scale: 1.0,
+            base: Some(table),
+            sparse: None,
+        }
+    }
+
+    /// The same values, divided by `scale` as normalised integers are.
+    pub fn scaled(self, scale: f64) -> Self {
+        Self { scale, ..self }
+    }
+
+    fn check(file: &File, index: Index, json: &Json, shape: &Shape) -> Result<Self, Problem> {
         let component = Component::of(json.component_type.0)?;
         let width = shape.kinds.iter().find(|(name, _)| *name == json.kind).map(|(_, width)| *width);
         let (Some(width), true) = (width, shape.components.contains(&component)) else {
@@ -144,43 +184,40 @@ impl<'a> Accessor<'a> {
                 components.join(", ")
             )));
         };
-        let too_long =
-            || Problem::new(format!("states {} elements, more than the file and its buffers can hold", json.count));
-        let element = (component.bytes() * width) as u64;
-        let (base, stride) = match json.buffer_view {
+        let element = component.bytes() * width;
+        let count = json.count.0;
+        let base = match json.buffer_view {
             Some(view) => {
                 let (bytes, stride) = file.view(view)?;
-                let stride = stride.filter(|&s| s != 0).unwrap_or(element);
-                if stride < element {
+                let stride = stride.filter(|&s| s != 0).unwrap_or(element as u64);
+                if stride < element as u64 {
                     return Err(Problem::new(format!("stride {stride} is less than an element of {element} bytes")));
                 }
-                let span = match json.count.0 {
-                    0 => Some(0),
-                    n => (n - 1).checked_mul(stride).and_then(|bytes| bytes.checked_add(element)),
-                };
-                let bytes = span
-                    .and_then(|span| json.byte_offset.0.checked_add(span))
-                    .and_then(|end| slice(bytes, json.byte_offset.0, end))
-                    .ok_or_else(|| {
-                        Problem::new(format!(
-                            "{} elements at byte {} do not fit buffer view {view} of {} bytes",
-                            json.count,
-                            json.byte_offset,
-                            bytes.len()
-                        ))
-                    })?;
-                (Some(bytes), stride)
+                let held = bytes.len();
+                let rows = bytes.slice(json.byte_offset.0, held);
+                let table = rows.and_then(|rows| Table::new(rows, count, stride, element));
+                Some(table.ok_or_else(|| {
+                    let offset = json.byte_offset;
+                    Problem::new(format!(
+                        "{count} elements at byte {offset} do not fit buffer view {view} of {held} bytes"
+                    ))
+                })?)
             }
             // Without a buffer view nothing in the file backs the count. An element that anything uses is named by an
             // index or accompanied by other attributes, of at least a byte each.
-            None if json.count.0 > file.input_bytes => return Err(too_long()),
-            None => (None, element),
+            None if count > file.input_bytes => {
+                let what = format!("states {count} elements, more than the file and its buffers can hold");
+                return Err(Problem::new(what));
+            }
+            None => None,
         };
-        let count = usize::try_from(json.count.0).map_err(|_| too_long())?;
-        let stride = usize::try_from(stride).map_err(|_| too_long())?;
-        let sparse = json.sparse.as_deref().map(|sparse| check_sparse(file, sparse, count, element)).transpose()?;
-        let normalized = (json.normalized || shape.always_normalized) && component.scale() != 1.0;
-        Ok(Self { count, width, component, normalized, base, stride, sparse })
+        let sparse = match json.sparse.as_deref() {
+            Some(sparse) => Some(Box::new(check_sparse(file, index, sparse, count, element)?)),
+            None => None,
+        };
+        let normalized = json.normalized || shape.always_normalized;
+        let scale = if normalized { component.scale() } else { 1.0 };
+        Ok(Self { count, width, normalized, scale, component, base, sparse })
     }
 
     /// Whether no buffer holds any of its elements: all are zero.
@@ -188,63 +225,84 @@ impl<'a> Accessor<'a> {
         self.base.is_none() && self.sparse.is_none()
     }
 
-    /// Element `i`, below the count; components beyond its width are zero.
-    pub fn get<const N: usize>(&self, i: usize) -> [f64; N] {
+    /// The elements `wanted`, which ascend without repetition; components beyond the width are zero. Fails when they are
+    /// not below the count, or when the file has changed.
+    pub fn gather<const N: usize>(&self, wanted: &[u64]) -> io::Result<Vec<[f64; N]>> {
+        if wanted.last().is_some_and(|&last| last >= self.count) {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        let mut elements = vec![[0.0; N]; wanted.len()];
+        if let Some(base) = &self.base {
+            base.gather(wanted, |position, row| elements[position] = self.decode(row))?;
+        }
+        if let Some(sparse) = &self.sparse {
+            let (positions, rows) = sparse.find(wanted)?;
+            sparse.values.gather(&rows, |i, row| elements[positions[i]] = self.decode(row))?;
+        }
+        Ok(elements)
+    }
+
+    fn decode<const N: usize>(&self, row: &[u8]) -> [f64; N] {
         let mut element = [0.0; N];
         let component = self.component.bytes();
-        let replaced = self.sparse.as_ref().and_then(|sparse| Some((sparse.values, sparse.find(i)?)));
-        let (bytes, start) = match (replaced, self.base) {
-            (Some((values, at)), _) => (values, at * component * self.width),
-            (None, Some(base)) => (base, i * self.stride),
-            (None, None) => return element,
-        };
         for (c, value) in element.iter_mut().enumerate().take(self.width) {
-            *value = self.component.read(bytes, start + c * component);
-            if self.normalized {
-                *value = (*value / self.component.scale()).max(-1.0);
+            *value = self.component.read(row, c * component);
+            if self.scale != 1.0 {
+                *value = (*value / self.scale).max(-1.0);
             }
         }
         element
     }
 }
 
-/// Checks the replaced elements of an accessor of `count` elements of `element` bytes.
-fn check_sparse<'a>(
-    file: &'a File,
+/// Checks the replaced elements of accessor `index` of `count` elements of `element` bytes.
+fn check_sparse(
+    file: &File,
+    index: Index,
     json: &super::document::Sparse,
-    count: usize,
-    element: u64,
-) -> Result<Sparse<'a>, Problem> {
+    count: u64,
+    element: usize,
+) -> Result<Sparse, Problem> {
     let component = Component::of(json.indices.component_type.0)?;
     if !matches!(component, Component::U8 | Component::U16 | Component::U32) {
         return Err(Problem::new(format!("sparse indices are {}, but must be unsigned integers", component.name())));
     }
-    if json.count.0 > count as u64 {
+    if json.count.0 > count {
         return Err(Problem::new(format!("replaces {} of {count} elements", json.count)));
     }
-    let part = |view: Index, offset: u64, size: u64, what: &str| {
+    let part = |view: Index, offset: u64, size: usize, what: &str| {
         let (bytes, _) = file.view(view)?;
-        let end = json.count.0.checked_mul(size).and_then(|span| span.checked_add(offset));
-        end.and_then(|end| slice(bytes, offset, end)).ok_or_else(|| {
-            let held = bytes.len();
+        let held = bytes.len();
+        let rows = bytes.slice(offset, held);
+        rows.and_then(|rows| Table::new(rows, json.count.0, size as u64, size)).ok_or_else(|| {
+            let count = json.count;
             Problem::new(format!(
-                "{} sparse {what} at byte {offset} do not fit buffer view {view} of {held} bytes",
-                json.count
+                "{count} sparse {what} at byte {offset} do not fit buffer view {view} of {held} bytes"
             ))
         })
     };
-    let indices = part(json.indices.buffer_view, json.indices.byte_offset.0, component.bytes() as u64, "indices")?;
+    let indices = part(json.indices.buffer_view, json.indices.byte_offset.0, component.bytes(), "indices")?;
     let values = part(json.values.buffer_view, json.values.byte_offset.0, element, "values")?;
-    let sparse = Sparse { count: json.count.0 as usize, indices, component, values };
-    let mut next = 0;
-    for i in 0..sparse.count {
-        let index = sparse.index(i);
+    let sparse = Sparse { indices, component, values };
+    // In range: `item` found the accessor. Many primitives may use it; once is enough to know that indices ascend.
+    let checked = &file.checked_sparse[index.0 as usize];
+    if checked.load(Ordering::Relaxed) {
+        return Ok(sparse);
+    }
+    let (mut next, mut wrong) = (0, None);
+    let run = sparse.indices.run(0, json.count.0, |i, row| {
+        let index = sparse.index(row);
         if index < next || index >= count {
-            return Err(Problem::new(format!(
-                "sparse index {i} is {index}, but must ascend and be below the {count} elements"
-            )));
+            wrong = Some((i, index));
         }
         next = index + 1;
+        wrong.is_none()
+    });
+    run.map_err(|e| Problem::new(format!("sparse indices cannot be read: {e}")))?;
+    if let Some((i, index)) = wrong {
+        let what = format!("sparse index {i} is {index}, but must ascend and be below the {count} elements");
+        return Err(Problem::new(what));
     }
+    checked.store(true, Ordering::Relaxed);
     Ok(sparse)
 }

@@ -153,7 +153,16 @@ pub(super) struct Primitive {
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct PrimitiveExtensions {
     #[serde(rename = "KHR_draco_mesh_compression")]
-    pub draco: Option<IgnoredAny>,
+    pub draco: Option<Draco>,
+}
+
+/// KHR_draco_mesh_compression.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Draco {
+    pub buffer_view: Index,
+    /// Unique ids of attributes in the compressed mesh.
+    pub attributes: BTreeMap<String, Uint>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -210,7 +219,31 @@ pub(super) struct BufferView {
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct BufferViewExtensions {
     #[serde(rename = "EXT_meshopt_compression")]
-    pub meshopt: Option<IgnoredAny>,
+    pub meshopt: Option<Box<Meshopt>>,
+    #[serde(rename = "KHR_meshopt_compression")]
+    pub khr_meshopt: Option<Box<Meshopt>>,
+}
+
+impl BufferViewExtensions {
+    /// The compression, by either name.
+    pub fn compression(&self) -> Option<&Meshopt> {
+        self.meshopt.as_deref().or(self.khr_meshopt.as_deref())
+    }
+}
+
+/// EXT_meshopt_compression, and KHR_meshopt_compression, which adds a filter and a version of the codec.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Meshopt {
+    pub buffer: Index,
+    #[serde(default)]
+    pub byte_offset: Uint,
+    pub byte_length: Uint,
+    pub byte_stride: Uint,
+    pub count: Uint,
+    pub mode: String,
+    #[serde(default)]
+    pub filter: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -290,6 +323,22 @@ pub(super) struct TextureTransform {
 pub(super) struct Texture {
     pub source: Option<Index>,
     pub sampler: Option<Index>,
+    #[serde(default)]
+    pub extensions: TextureExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct TextureExtensions {
+    #[serde(rename = "KHR_texture_basisu")]
+    pub basisu: Option<ImageSource>,
+    #[serde(rename = "EXT_texture_webp")]
+    pub webp: Option<ImageSource>,
+}
+
+/// The image of a texture in another format.
+#[derive(Debug, Deserialize)]
+pub(super) struct ImageSource {
+    pub source: Option<Index>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -1,26 +1,37 @@
 //! Opens a glTF file: its JSON, its buffers, what it requires.
 
 use super::document::{Document, Index, VersionOnly};
-use super::{glb, uri};
+use super::glb;
+use crate::import::bytes::{Bytes, Spool};
 use crate::import::error::{EXPORT_AGAIN, ImportError, one_line, show};
+use crate::import::uri;
 use crate::import::warnings::Warnings;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use xxhash_rust::xxh3::Xxh3;
 
-/// A glTF file in memory: the JSON parsed, every buffer loaded and as long as stated, nothing else checked.
+/// A glTF file: the JSON parsed, every buffer found and as long as stated, nothing else checked.
 pub(super) struct File {
     /// The path as messages show it.
     pub label: String,
-    /// Folder of the file, to which URIs are relative.
-    pub folder: PathBuf,
     /// The JSON.
     pub document: Document,
     /// Bytes of each buffer; `None` for a buffer that only an extension fills.
-    pub buffers: Vec<Option<Vec<u8>>>,
+    pub buffers: Vec<Option<Bytes>>,
+    /// Decoded bytes of the buffer views that are compressed by EXT_meshopt_compression and in use.
+    pub decoded_views: BTreeMap<usize, Bytes>,
+    /// Accessors whose sparse indices have been run through.
+    pub checked_sparse: Vec<AtomicBool>,
+    /// Where each image is, or why nowhere.
+    pub images: Vec<Result<Bytes, String>>,
     /// Length of the file and its buffers together: what bounds counts that no buffer view bounds.
     pub input_bytes: u64,
     /// Name, length and hash.
     pub source: bricks::Source,
+    /// Takes what has to be decoded.
+    pub spool: Arc<Spool>,
 }
 
 /// Something wrong within a file, before it is known where it was found.
@@ -38,82 +49,98 @@ impl Problem {
 }
 
 impl File {
-    /// Reads the file and its buffers. Extensions that are ignored are noted in `warnings`.
-    pub fn open(path: &Path, warnings: &mut Warnings) -> Result<Self, ImportError> {
+    /// Opens the file and its buffers. Extensions that are ignored are noted in `warnings`.
+    pub fn open(path: &Path, spool: Arc<Spool>, warnings: &mut Warnings) -> Result<Self, ImportError> {
         let label = show(path);
-        let mut bytes = read(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
+        let unreadable = |reason: String| ImportError::Read { file: label.clone(), reason };
+        let bytes = Bytes::of_file(path).map_err(unreadable)?;
         let mut hash = Xxh3::new();
-        hash.update(&bytes);
-        let length = bytes.len() as u64;
+        bytes.hash(&mut hash).map_err(|e| unreadable(e.to_string()))?;
 
-        let is_glb = bytes.starts_with(glb::MAGIC);
         let syntax = |problem: String| {
             let remedy = "export the file again as glTF 2.0";
             ImportError::Syntax { file: label.clone(), problem, remedy }
         };
+        let reader = bytes.open().map_err(|e| unreadable(e.to_string()))?;
+        let mut magic = [0; 4];
+        let is_glb = reader.read_at(0, &mut magic).is_ok() && &magic == glb::MAGIC;
         let chunks = if is_glb {
-            glb::chunks(&bytes).map_err(&syntax)?
+            glb::chunks(bytes.len(), |at, out| reader.read_at(at, out)).map_err(&syntax)?
         } else {
             glb::Chunks { json: 0..bytes.len(), bin: None }
         };
-        let document = parse(&bytes[chunks.json]).map_err(&syntax)?;
+        let piece = |range: &std::ops::Range<u64>| bytes.slice(range.start, range.end);
+        let json = piece(&chunks.json).ok_or_else(|| syntax("a chunk lies outside the file".into()))?;
+        let mut document = parse(&json.read().map_err(unreadable)?).map_err(&syntax)?;
         check_extensions(&label, &document, warnings)?;
 
-        // What remains of the file's bytes is the binary chunk; moving it to the front spares a copy.
-        let mut bin = chunks.bin.map(|range| {
-            bytes.truncate(range.end);
-            bytes.drain(..range.start);
-            std::mem::take(&mut bytes)
-        });
-        drop(bytes);
-
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        let mut found = Found { folder, spool: &spool, files: BTreeMap::new() };
+        let mut bin = chunks.bin.as_ref().and_then(piece);
         let mut buffers = Vec::with_capacity(document.buffers.len());
-        for (index, buffer) in document.buffers.iter().enumerate() {
+        let mut input_bytes = bytes.len();
+        for (index, buffer) in document.buffers.iter_mut().enumerate() {
             let fault = |problem: String, remedy| {
                 let place = format!("buffer {index}");
                 ImportError::Content { file: label.clone(), place, problem, remedy }
             };
-            let data = match &buffer.uri {
-                Some(text) => match uri::resolve(text) {
-                    Ok(uri::Target::Data(data)) => Some(data),
-                    Ok(uri::Target::File(below)) => {
-                        let data = read(&folder.join(&below)).map_err(|reason| {
-                            let problem = format!("cannot read {}: {reason}", show(&below));
-                            fault(problem, "put the file of the buffer beside the glTF file")
-                        })?;
-                        hash.update(&data);
-                        Some(data)
-                    }
-                    Err(problem) => {
-                        let problem = format!("{problem} ({})", one_line(text));
-                        return Err(fault(
-                            problem,
+            let data = match buffer.uri.take() {
+                Some(text) => {
+                    let (data, is_new) = found.get(&text).map_err(|missing| match missing {
+                        Missing::Uri(problem) => fault(
+                            format!("{problem} ({})", one_line(&text)),
                             "put the buffer beside the glTF file and refer to it by a relative path",
-                        ));
+                        ),
+                        Missing::File(problem) => fault(problem, "put the file of the buffer beside the glTF file"),
+                        Missing::Spool(problem) => fault(problem, "make room there"),
+                    })?;
+                    if is_new {
+                        input_bytes += data.len();
+                        data.hash(&mut hash).map_err(|e| unreadable(e.to_string()))?;
                     }
-                },
+                    Some(data)
+                }
                 None if index == 0 => bin.take(),
                 None => None,
             };
             buffers.push(match data {
-                Some(mut data) => {
+                Some(data) => {
                     let stated = buffer.byte_length.0;
-                    if (data.len() as u64) < stated {
-                        let problem = format!("has {} bytes, but byteLength states {stated}", data.len());
-                        return Err(fault(problem, EXPORT_AGAIN));
-                    }
-                    // In range: stated is at most the length.
-                    data.truncate(stated as usize);
-                    Some(data)
+                    let whole = data.slice(0, stated).ok_or_else(|| {
+                        fault(format!("has {} bytes, but byteLength states {stated}", data.len()), EXPORT_AGAIN)
+                    })?;
+                    Some(whole)
                 }
                 None => None,
             });
         }
-        let input_bytes = length + buffers.iter().flatten().map(|b| b.len() as u64).sum::<u64>();
+        let uris: Vec<_> = document.images.iter_mut().map(|image| image.uri.take()).collect();
+        let located = uris.into_iter().map(|text| match text {
+            Some(text) => found.get(&text).map(|(data, _)| Some(data)).map_err(|missing| match missing {
+                Missing::Uri(problem) => problem.to_owned(),
+                Missing::File(problem) | Missing::Spool(problem) => problem,
+            }),
+            None => Ok(None),
+        });
+        let located: Vec<_> = located.collect();
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let source = bricks::Source { name, bytes: length, hash: format!("{:016x}", hash.digest()) };
-        Ok(Self { label, folder, document, buffers, input_bytes, source })
+        let source = bricks::Source { name, bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) };
+        let checked_sparse = document.accessors.iter().map(|_| AtomicBool::new(false)).collect();
+        let decoded_views = BTreeMap::new();
+        let images = Vec::new();
+        let mut file =
+            Self { label, document, buffers, decoded_views, checked_sparse, images, input_bytes, source, spool };
+        file.images = located.into_iter().enumerate().map(|(i, image)| file.image(i, image?)).collect();
+        Ok(file)
+    }
+
+    /// Where image `index` is, if not at its URI.
+    fn image(&self, index: usize, at_uri: Option<Bytes>) -> Result<Bytes, String> {
+        match (at_uri, self.document.images[index].buffer_view) {
+            (Some(bytes), _) => Ok(bytes),
+            (None, Some(view)) => self.view(view).map(|(bytes, _)| bytes).map_err(|problem| problem.what),
+            (None, None) => Err("it has neither a URI nor a buffer view".into()),
+        }
     }
 
     /// The error for `problem` at `place`.
@@ -122,34 +149,65 @@ impl File {
     }
 
     /// The bytes and the stride of a buffer view.
-    pub fn view(&self, index: Index) -> Result<(&[u8], Option<u64>), Problem> {
+    pub fn view(&self, index: Index) -> Result<(Bytes, Option<u64>), Problem> {
         let view = item(&self.document.buffer_views, index, "buffer view")?;
-        let buffer = item(&self.buffers, view.buffer, "buffer")?;
-        let Some(data) = buffer else {
-            return Err(if view.extensions.meshopt.is_some() {
-                let what =
-                    format!("buffer view {index} is compressed by EXT_meshopt_compression and has no plain copy");
-                Problem { what, remedy: "export the file without EXT_meshopt_compression" }
-            } else {
-                Problem::new(format!("buffer {} of buffer view {index} has no data", view.buffer))
-            });
-        };
-        let (offset, length) = (view.byte_offset.0, view.byte_length.0);
-        let bytes = offset.checked_add(length).and_then(|end| slice(data, offset, end));
-        let bytes = bytes.ok_or_else(|| {
-            Problem::new(format!(
-                "buffer view {index} ({length} bytes at {offset}) lies outside buffer {} of {} bytes",
-                view.buffer,
-                data.len()
-            ))
-        })?;
+        if let Some(compressed) = &view.extensions.compression() {
+            // In range: `item` found it.
+            let decoded = self.decoded_views.get(&(index.0 as usize));
+            let bytes = decoded.ok_or_else(|| Problem::new(format!("buffer view {index} could not be decoded")))?;
+            return Ok((bytes.clone(), Some(compressed.byte_stride.0)));
+        }
+        let bytes = self.piece(view.buffer, view.byte_offset.0, view.byte_length.0);
+        let bytes = bytes.map_err(|problem| Problem::new(format!("buffer view {index}: {}", problem.what)))?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+    }
+
+    /// `length` bytes at `offset` of a buffer.
+    pub fn piece(&self, buffer: Index, offset: u64, length: u64) -> Result<Bytes, Problem> {
+        let data = item(&self.buffers, buffer, "buffer")?;
+        let data = data.as_ref().ok_or_else(|| Problem::new(format!("buffer {buffer} has no data")))?;
+        let bytes = offset.checked_add(length).and_then(|end| data.slice(offset, end));
+        bytes.ok_or_else(|| {
+            let held = data.len();
+            Problem::new(format!("{length} bytes at {offset} lie outside buffer {buffer} of {held} bytes"))
+        })
     }
 }
 
-/// `bytes[start..end]`, if within.
-pub(super) fn slice(bytes: &[u8], start: u64, end: u64) -> Option<&[u8]> {
-    bytes.get(usize::try_from(start).ok()?..usize::try_from(end).ok()?)
+/// The files that URIs lead to, each found once, and the data of data URIs, in the spool.
+struct Found<'a> {
+    folder: PathBuf,
+    spool: &'a Spool,
+    files: BTreeMap<PathBuf, Result<Bytes, String>>,
+}
+
+/// Why a URI leads nowhere.
+enum Missing {
+    /// It is not one that is followed.
+    Uri(&'static str),
+    /// The file is not there.
+    File(String),
+    /// Its data cannot be kept.
+    Spool(String),
+}
+
+impl Found<'_> {
+    /// The bytes that `text` leads to, and whether it is the first that does.
+    fn get(&mut self, text: &str) -> Result<(Bytes, bool), Missing> {
+        match uri::resolve(text).map_err(Missing::Uri)? {
+            uri::Target::Data(data) => Ok((self.spool.add(&data).map_err(Missing::Spool)?, true)),
+            uri::Target::File(below) => {
+                let mut is_new = false;
+                let folder = &self.folder;
+                let found = self.files.entry(below).or_insert_with_key(|below| {
+                    is_new = true;
+                    let bytes = Bytes::of_file(&folder.join(below));
+                    bytes.map_err(|reason| format!("cannot read {}: {reason}", show(below)))
+                });
+                Ok((found.clone().map_err(Missing::File)?, is_new))
+            }
+        }
+    }
 }
 
 /// `list[index]`, or a problem that says how many there are.
@@ -158,15 +216,6 @@ pub(super) fn item<'a, T>(list: &'a [T], index: Index, kind: &str) -> Result<&'a
         .ok()
         .and_then(|i| list.get(i))
         .ok_or_else(|| Problem::new(format!("refers to {kind} {index}, but the file has {}", list.len())))
-}
-
-/// Reads a regular file whole; devices and pipes, which may never end, are refused.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
-    let metadata = std::fs::metadata(path).map_err(|e| e.to_string())?;
-    if !metadata.is_file() {
-        return Err("not a regular file".into());
-    }
-    std::fs::read(path).map_err(|e| e.to_string())
 }
 
 /// Parses the JSON and checks the version.
@@ -197,9 +246,14 @@ fn parse(json: &[u8]) -> Result<Document, String> {
 /// Extensions that are applied.
 const APPLIED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 

@@ -1,43 +1,46 @@
 //! The GLB container (glTF 2.0, section 4): a header and chunks, of which the first is JSON and the second may be BIN.
 
+use std::io;
 use std::ops::Range;
 
 /// The first bytes of a GLB file.
 pub(super) const MAGIC: &[u8; 4] = b"glTF";
 
-const HEADER_BYTES: usize = 12;
-const CHUNK_HEADER_BYTES: usize = 8;
+const HEADER_BYTES: u64 = 12;
+const CHUNK_HEADER_BYTES: u64 = 8;
 
 /// Where the chunks lie.
 #[derive(Debug, PartialEq)]
 pub(super) struct Chunks {
     /// The JSON text.
-    pub json: Range<usize>,
+    pub json: Range<u64>,
     /// The binary buffer, if any; padded by up to 3 bytes.
-    pub bin: Option<Range<usize>>,
+    pub bin: Option<Range<u64>>,
 }
 
-/// Finds the chunks of a GLB file; the error says what is wrong. Chunks behind the second are ignored, as are bytes behind
-/// the length that the header states.
-pub(super) fn chunks(file: &[u8]) -> Result<Chunks, String> {
-    let word = |at: usize| {
-        let bytes = file.get(at..at + 4).ok_or("the GLB file ends within a header")?;
-        Ok::<_, String>(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+/// Finds the chunks of a GLB file of `held` bytes, of which `read` fills its second argument with those from the first
+/// on; the error says what is wrong. Chunks behind the second are ignored, as are bytes behind the length that the header
+/// states.
+pub(super) fn chunks(held: u64, read: impl Fn(u64, &mut [u8]) -> io::Result<()>) -> Result<Chunks, String> {
+    let word = |at: u64| {
+        let mut bytes = [0; 4];
+        read(at, &mut bytes).map_err(|_| "the GLB file ends within a header")?;
+        Ok::<_, String>(u32::from_le_bytes(bytes))
     };
     let version = word(4)?;
     if version != 2 {
         return Err(format!("GLB version {version} is not 2"));
     }
-    let length = word(8)? as usize;
-    if length < HEADER_BYTES || length > file.len() {
-        return Err(format!("the GLB header states {length} bytes, the file has {}", file.len()));
+    let length = u64::from(word(8)?);
+    if length < HEADER_BYTES || length > held {
+        return Err(format!("the GLB header states {length} bytes, the file has {held}"));
     }
-    let chunk = |at: usize, kind: &[u8; 4]| -> Result<Option<Range<usize>>, String> {
+    let chunk = |at: u64, kind: &[u8; 4]| -> Result<Option<Range<u64>>, String> {
         let start = at + CHUNK_HEADER_BYTES;
         if word(at + 4)? != u32::from_le_bytes(*kind) {
             return Ok(None);
         }
-        let bytes = word(at)? as usize;
+        let bytes = u64::from(word(at)?);
         match length.checked_sub(start) {
             Some(left) if bytes <= left => Ok(Some(start..start + bytes)),
             _ => Err(format!("a GLB chunk of {bytes} bytes does not fit the {length} bytes of the file")),
@@ -53,6 +56,14 @@ pub(super) fn chunks(file: &[u8]) -> Result<Chunks, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn chunks(file: &[u8]) -> Result<Chunks, String> {
+        super::chunks(file.len() as u64, |at, out| {
+            let bytes = file.get(at as usize..).and_then(|rest| rest.get(..out.len()));
+            out.copy_from_slice(bytes.ok_or(io::ErrorKind::UnexpectedEof)?);
+            Ok(())
+        })
+    }
 
     fn glb(json: &[u8], bin: Option<&[u8]>) -> Vec<u8> {
         let mut file =

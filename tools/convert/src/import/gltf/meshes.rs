@@ -1,12 +1,15 @@
-//! Meshes (glTF 2.0, section 3.7): primitives are checked first, which gives their triangle counts, then read.
+//! Meshes (glTF 2.0, section 3.7): primitives are checked first, which gives their triangle counts, then read in parts.
 
 use super::accessor::{Accessor, Component, Shape};
 use super::document::{Document, Primitive as Json, TextureTransform};
+use super::draco;
 use super::file::{File, Problem, item};
 use super::label;
 use super::materials::base_color_set;
+use crate::import::vertices::Vertices;
 use crate::import::warnings::Warnings;
 use crate::source::Primitive;
+use std::io;
 
 /// How elements form triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +21,7 @@ enum Topology {
 
 impl Topology {
     /// Triangles of `elements` vertices or indices; left-over elements form none.
-    fn triangles(self, elements: usize) -> usize {
+    fn triangles(self, elements: u64) -> u64 {
         match self {
             Self::Triangles => elements / 3,
             Self::Strip | Self::Fan => elements.saturating_sub(2),
@@ -26,32 +29,42 @@ impl Topology {
     }
 
     /// The elements of triangle `i`, in the order that the specification gives, so that all faces of a strip wind alike.
-    fn corners(self, i: usize) -> [usize; 3] {
+    fn corners(self, i: u64) -> [u64; 3] {
         match self {
             Self::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],
             Self::Strip => [i, i + 1 + i % 2, i + 2 - i % 2],
             Self::Fan => [i + 1, i + 2, 0],
         }
     }
+
+    /// The elements of triangles `first` to `end`, ascending, without repetition.
+    fn elements(self, first: u64, end: u64) -> Vec<u64> {
+        match self {
+            _ if first == end => Vec::new(),
+            Self::Triangles => (3 * first..3 * end).collect(),
+            Self::Strip => (first..end + 2).collect(),
+            Self::Fan => std::iter::once(0).chain(first + 1..end + 2).collect(),
+        }
+    }
 }
 
 /// A primitive whose accessors have been checked.
-pub(super) struct Checked<'a> {
+pub(super) struct Checked {
     /// Material of the file; `None`: the default one.
     material: Option<usize>,
     /// `None`: it has no triangles to read.
-    geometry: Option<Geometry<'a>>,
+    geometry: Option<Geometry>,
 }
 
-struct Geometry<'a> {
+struct Geometry {
     topology: Topology,
-    triangles: usize,
-    positions: Accessor<'a>,
-    normals: Option<Accessor<'a>>,
-    uvs: Option<Accessor<'a>>,
+    triangles: u64,
+    positions: Accessor,
+    normals: Option<Accessor>,
+    uvs: Option<Accessor>,
     transform: Option<UvTransform>,
-    colors: Option<Accessor<'a>>,
-    indices: Option<Accessor<'a>>,
+    colors: Option<Accessor>,
+    indices: Option<Accessor>,
 }
 
 const FLOAT_OR_QUANTIZED: &[Component] =
@@ -87,9 +100,6 @@ pub(super) fn check_references(document: &Document) -> Result<(), (usize, usize,
             for &accessor in primitive.attributes.values().chain(&primitive.indices) {
                 item(&document.accessors, accessor, "accessor").map_err(|problem| (m, p, problem))?;
             }
-            if let Some(material) = primitive.material {
-                item(&document.materials, material, "material").map_err(|problem| (m, p, problem))?;
-            }
         }
     }
     Ok(())
@@ -97,40 +107,57 @@ pub(super) fn check_references(document: &Document) -> Result<(), (usize, usize,
 
 /// Checks one primitive of `file`. Those without triangles (points, lines, no positions) stay as empty ones, so that
 /// primitives keep their numbers; the reason is noted for `place`.
-pub(super) fn check<'a>(
-    file: &'a File,
+pub(super) fn check(
+    file: &File,
     json: &Json,
+    decoded: &draco::Primitives,
     warnings: &mut Warnings,
     place: &dyn Fn() -> String,
-) -> Result<Checked<'a>, Problem> {
-    // In range: `check_references` checked it.
-    let material = json.material.map(|m| m.0 as usize);
+) -> Result<Checked, Problem> {
+    let material = json.material.and_then(|index| match item(&file.document.materials, index, "material") {
+        Ok(_) => Some(index.0 as usize),
+        Err(problem) => {
+            warnings.add("its material is not in the file; the default one is used", || {
+                format!("{} ({})", place(), problem.what)
+            });
+            None
+        }
+    });
     let topology = match json.mode.map_or(4, |mode| mode.0) {
         0..=3 => {
             warnings.add("points and lines are left out", place);
             return Ok(Checked { material, geometry: None });
         }
         4 => Topology::Triangles,
+        // Draco decodes to a list of triangles whatever was compressed.
+        5 | 6 if json.extensions.draco.is_some() => Topology::Triangles,
         5 => Topology::Strip,
         6 => Topology::Fan,
         mode => return Err(Problem::new(format!("mode {mode} is not one of glTF"))),
     };
+    let compressed = match &json.extensions.draco {
+        Some(draco) => Some((draco, draco::find(&file.document, decoded, draco)?)),
+        None => None,
+    };
     let attribute = |name: &str, shape: &Shape| {
         let Some(&index) = json.attributes.get(name) else { return Ok(None) };
-        Accessor::resolve(file, index, shape)
-            .map(Some)
-            .map_err(|problem| Problem { what: format!("{name}: {}", problem.what), ..problem })
+        let plain = Accessor::resolve(file, index, shape)
+            .map_err(|problem| Problem { what: format!("{name}: {}", problem.what), ..problem })?;
+        let Some((draco, decoded)) = compressed else { return Ok(Some(plain)) };
+        match decoded.attribute(draco, name) {
+            Some(values) if values.width == plain.width => {
+                let scale = if plain.normalized { decoded.scale(draco, name) } else { 1.0 };
+                Ok(Some(values.clone().scaled(scale)))
+            }
+            Some(values) => Err(Problem::new(format!("{name} has {} components in the Draco data", values.width))),
+            None if plain.is_empty_of_data() => Err(draco::missing(name)),
+            None => Ok(Some(plain)),
+        }
     };
     let Some(positions) = attribute("POSITION", &POSITION)? else {
         warnings.add("without POSITION; left out", place);
         return Ok(Checked { material, geometry: None });
     };
-    if json.extensions.draco.is_some() && positions.is_empty_of_data() {
-        return Err(Problem {
-            what: "is compressed by KHR_draco_mesh_compression and has no plain copy".into(),
-            remedy: "export the file without Draco compression",
-        });
-    }
     let normals = attribute("NORMAL", &NORMAL)?;
     let colors = attribute("COLOR_0", &COLOR)?;
     let texture = material.and_then(|m| base_color_set(&file.document.materials[m]));
@@ -144,13 +171,11 @@ pub(super) fn check<'a>(
             return Err(Problem::new(format!("{name} has {} elements, POSITION {}", other.count, positions.count)));
         }
     }
-    if u32::try_from(positions.count).is_err() {
-        return Err(Problem::new(format!("{} vertices are more than indices can name", positions.count)));
-    }
     if !json.targets.is_empty() {
         warnings.add("has morph targets; its geometry is taken at rest", place);
     }
     let indices = match json.indices {
+        _ if let Some((_, decoded)) = compressed => Some(decoded.indices.clone()),
         Some(index) => Some(
             Accessor::resolve(file, index, &INDICES)
                 .map_err(|problem| Problem { what: format!("indices: {}", problem.what), ..problem })?,
@@ -158,7 +183,7 @@ pub(super) fn check<'a>(
         None => None,
     };
     let elements = indices.as_ref().map_or(positions.count, |a| a.count);
-    if topology == Topology::Triangles && elements % 3 != 0 {
+    if topology == Topology::Triangles && !elements.is_multiple_of(3) {
         warnings.add("ends within a triangle, which is left out", place);
     }
     let triangles = topology.triangles(elements);
@@ -167,17 +192,17 @@ pub(super) fn check<'a>(
     Ok(Checked { material, geometry: Some(geometry) })
 }
 
-/// A primitive that was read, and what was repaired in it.
+/// A part that was read, and what was repaired in it.
 pub(super) struct Read {
     pub primitive: Primitive,
     /// Kinds of repair.
     pub repairs: Vec<&'static str>,
 }
 
-impl Checked<'_> {
+impl Checked {
     /// Number of triangles.
     pub fn triangles(&self) -> u64 {
-        self.geometry.as_ref().map_or(0, |g| g.triangles as u64)
+        self.geometry.as_ref().map_or(0, |g| g.triangles)
     }
 
     /// Material of the file; `None`: the default one.
@@ -185,110 +210,90 @@ impl Checked<'_> {
         self.material
     }
 
-    /// Reads the primitive; its material is `material`.
-    pub fn read(&self, material: u32) -> Result<Read, Problem> {
+    /// Reads triangles `first` to `end`, at most the number of triangles; their material is `material`.
+    pub fn read(&self, first: u64, end: u64, material: u32) -> Result<Read, Problem> {
         let mut repairs = Vec::new();
         let Some(geometry) = &self.geometry else {
             return Ok(Read { primitive: Primitive { material, ..Default::default() }, repairs });
         };
-        let mut indices = geometry.corner_vertices()?;
-        let selection = Selection::of(&mut indices, geometry.positions.count);
-        let positions = selection.gather(|i| geometry.positions.get::<3>(i));
-        let mut repair = |values: &mut f32, otherwise: f32, what| {
-            if !values.is_finite() {
-                *values = otherwise;
+        let unreadable = |e: io::Error| Problem {
+            what: format!("cannot be read: {e}"),
+            remedy: "keep the file and its buffers in place while it is converted",
+        };
+        let Vertices { used, indices } = geometry.vertices(first, end, unreadable)?;
+        let positions = geometry.positions.gather::<3>(&used).map_err(unreadable)?;
+        let mut repair = |value: &mut f32, otherwise: f32, what| {
+            if !value.is_finite() {
+                *value = otherwise;
                 if !repairs.contains(&what) {
                     repairs.push(what);
                 }
             }
         };
-        let normals = geometry.normals.as_ref().map(|normals| {
-            selection.gather(|i| {
-                let mut normal = normals.get::<3>(i).map(|c| c as f32);
+        let normals = geometry.normals.as_ref().map(|normals| normals.gather::<3>(&used)).transpose();
+        let normals = normals.map_err(unreadable)?.map(|normals| {
+            let normal = |normal: [f64; 3]| {
+                let mut normal = normal.map(|c| c as f32);
                 if normal.iter().any(|c| !c.is_finite()) {
                     normal.iter_mut().for_each(|c| repair(c, 0.0, "normals that are not finite are set to zero"));
                     normal = [0.0; 3];
                 }
                 normal
-            })
+            };
+            normals.into_iter().map(normal).collect()
         });
-        let uvs = geometry.uvs.as_ref().map(|uvs| {
-            selection.gather(|i| {
-                let uv = uvs.get::<2>(i);
+        let uvs = geometry.uvs.as_ref().map(|uvs| uvs.gather::<2>(&used)).transpose();
+        let uvs = uvs.map_err(unreadable)?.map(|uvs| {
+            let uv = |uv: [f64; 2]| {
                 let mut uv = geometry.transform.as_ref().map_or(uv, |t| t.apply(uv)).map(|c| c as f32);
                 uv.iter_mut().for_each(|c| repair(c, 0.0, "texture coordinates that are not finite are set to zero"));
                 uv
-            })
+            };
+            uvs.into_iter().map(uv).collect()
         });
-        let colors = geometry.colors.as_ref().map(|colors| {
-            selection.gather(|i| {
-                let mut color = colors.get::<4>(i).map(|c| c as f32);
-                if colors.width == 3 {
+        let colors = geometry.colors.as_ref().map(|colors| Ok((colors.width, colors.gather::<4>(&used)?))).transpose();
+        let colors = colors.map_err(unreadable)?.map(|(width, colors)| {
+            let color = |color: [f64; 4]| {
+                let mut color = color.map(|c| c as f32);
+                if width == 3 {
                     color[3] = 1.0;
                 }
                 color.iter_mut().for_each(|c| repair(c, 1.0, "colours that are not finite are set to one"));
                 color.map(|c| c.clamp(0.0, 1.0))
-            })
+            };
+            colors.into_iter().map(color).collect()
         });
         Ok(Read { primitive: Primitive { material, positions, normals, uvs, colors, indices }, repairs })
     }
 }
 
-impl Geometry<'_> {
-    /// The vertices of the corners of all triangles, each below the number of positions.
-    fn corner_vertices(&self) -> Result<Vec<u32>, Problem> {
-        let vertices = self.positions.count;
-        let mut corners = Vec::with_capacity(3 * self.triangles);
-        for triangle in 0..self.triangles {
+impl Geometry {
+    /// The vertices of triangles `first` to `end`, each below the number of positions.
+    fn vertices(&self, first: u64, end: u64, unreadable: impl Fn(io::Error) -> Problem) -> Result<Vertices, Problem> {
+        let count = self.positions.count;
+        let elements = self.topology.elements(first, end);
+        let vertices: Option<Vec<[f64; 1]>> = match &self.indices {
+            Some(indices) => Some(indices.gather(&elements).map_err(unreadable)?),
+            None => None,
+        };
+        // Elements are consecutive but for the first one of a fan, which is element 0.
+        let last = elements.last().copied().unwrap_or(0);
+        let position = |element: u64| if element == 0 { 0 } else { elements.len() - 1 - (last - element) as usize };
+        let mut corners = Vec::with_capacity(3 * (end - first) as usize);
+        for triangle in first..end {
             for element in self.topology.corners(triangle) {
-                let vertex = match &self.indices {
+                let vertex = match &vertices {
                     // Exact: indices are integers of at most 32 bits.
-                    Some(indices) => indices.get::<1>(element)[0] as usize,
+                    Some(vertices) => vertices[position(element)][0] as u64,
                     None => element,
                 };
-                if vertex >= vertices {
-                    return Err(Problem::new(format!(
-                        "index {element} is {vertex}, but there are {vertices} vertices"
-                    )));
+                if vertex >= count {
+                    return Err(Problem::new(format!("index {element} is {vertex}, but there are {count} vertices")));
                 }
-                // `check` refused more vertices than u32 can name.
-                corners.push(vertex as u32);
+                corners.push(vertex);
             }
         }
-        Ok(corners)
-    }
-}
-
-/// Which vertices to read. Exporters may share one large vertex buffer among many primitives; copying it for each would
-/// take memory out of proportion to the file, so then only the vertices in use are read.
-enum Selection {
-    /// All of so many.
-    All(usize),
-    /// These, ascending.
-    Used(Vec<u32>),
-}
-
-impl Selection {
-    /// Chooses; `corners` are renumbered to match.
-    fn of(corners: &mut [u32], vertices: usize) -> Self {
-        if vertices <= corners.len() {
-            return Self::All(vertices);
-        }
-        let mut used = corners.to_vec();
-        used.sort_unstable();
-        used.dedup();
-        for corner in corners {
-            // Present: `used` holds every corner.
-            *corner = used.partition_point(|vertex| vertex < corner) as u32;
-        }
-        Self::Used(used)
-    }
-
-    fn gather<T>(&self, mut read: impl FnMut(usize) -> T) -> Vec<T> {
-        match self {
-            Self::All(count) => (0..*count).map(read).collect(),
-            Self::Used(vertices) => vertices.iter().map(|&vertex| read(vertex as usize)).collect(),
-        }
+        Ok(Vertices::of(corners))
     }
 }
 
@@ -328,17 +333,14 @@ mod tests {
                 let n = topology.triangles(elements);
                 let most = (0..n).flat_map(|i| topology.corners(i)).max();
                 assert!(most.is_none_or(|most| most < elements), "{topology:?} {elements}");
+                for (first, end) in [(0, n), (n / 2, n), (n / 3, n / 2)] {
+                    let mut corners: Vec<_> = (first..end).flat_map(|i| topology.corners(i)).collect();
+                    corners.sort_unstable();
+                    corners.dedup();
+                    assert_eq!(topology.elements(first, end), corners, "{topology:?} {first} {end}");
+                }
             }
         }
-    }
-
-    #[test]
-    fn only_used_vertices_are_kept() {
-        let mut corners = [90, 7, 90, 7, 50, 8];
-        let Selection::Used(used) = Selection::of(&mut corners, 100) else { panic!("all kept") };
-        assert_eq!(used, [7, 8, 50, 90]);
-        assert_eq!(corners, [3, 0, 3, 0, 2, 1]);
-        assert!(matches!(Selection::of(&mut [0, 1, 2], 3), Selection::All(3)));
     }
 
     #[test]

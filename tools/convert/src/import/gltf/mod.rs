@@ -1,36 +1,77 @@
 //! glTF 2.0, as JSON or GLB.
 //!
-//! The node hierarchy of the default scene becomes placements, in depth-first order; each mesh in use is stored once.
-//! Geometry is taken at rest. The `gltf` crate's validation is not used: its list of extensions is too short, and its
-//! readers trust what they are given. Instead everything that is followed is checked here, where it is followed.
+//! The node hierarchy of one scene becomes placements, in depth-first order; each mesh in use is stored once. Geometry is
+//! taken at rest. The `gltf` crate's validation is not used: its list of extensions is too short, and its readers trust
+//! what they are given. Instead everything that is followed is checked here, where it is followed.
+//!
+//! Opening a file parses its JSON and checks the ranges of what is in use; geometry is read part by part when it is asked
+//! for, images are decoded one by one.
 
 mod accessor;
 mod document;
+mod draco;
 mod file;
 mod glb;
 mod materials;
 mod meshes;
+mod meshopt;
 mod nodes;
-mod transform;
-mod uri;
 
-use super::TriangleBudget;
-use super::error::{ImportError, one_line};
+use super::affine::multiply;
+use super::bytes::{Bytes, Spool};
+use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
+use super::image::decode_texture;
+use super::repairs::Repairs;
 use super::warnings::Warnings;
-use crate::progress::Progress;
-use crate::source::{Mesh, Placement, Primitive, SourceScene};
+use super::{Opened, Parts, TriangleBudget};
+use crate::source::{
+    MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, SourceError, SourceTexture,
+};
 use file::{File, Problem};
-use rayon::prelude::*;
+use materials::Texture;
+use meshes::Checked;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Most triangles stored for a byte of input. A triangle of its own takes several bytes; many meshes may share accessors
-/// (to differ in material, say), but without a bound a small file could demand any amount of memory.
+/// (to differ in material, say), but without a bound a small file could demand any amount of work.
 const MAX_SHARING: u64 = 64;
 
-/// Imports one .gltf or .glb file.
-pub(super) fn load(path: &Path, budget: &mut TriangleBudget, progress: &Progress) -> Result<SourceScene, ImportError> {
-    let mut warnings = Warnings::new(super::error::show(path));
-    let file = File::open(path, &mut warnings)?;
+/// Instances whose transformations are read at once.
+const INSTANCES_AT_ONCE: u64 = 1 << 14;
+
+/// A glTF file, opened.
+struct Gltf {
+    label: String,
+    /// Meshes in use.
+    meshes: Vec<Mesh>,
+    /// Names and images of the textures in use.
+    textures: Vec<(String, Texture)>,
+    /// Where each image is, or why nowhere.
+    images: Vec<Result<Bytes, String>>,
+    /// Number of materials of the file; the default one follows them.
+    materials: usize,
+    repairs: Repairs,
+}
+
+/// A mesh in use.
+struct Mesh {
+    /// As messages show it.
+    label: String,
+    primitives: Vec<Checked>,
+    /// Primitive and first triangle of each part.
+    parts: Vec<(u32, u64)>,
+}
+
+/// Opens one .gltf or .glb file: of its scenes the one that is asked for, by name or number.
+pub(super) fn open(
+    path: &Path,
+    scene: Option<&str>,
+    spool: &Arc<Spool>,
+    budget: &mut TriangleBudget,
+) -> Result<Opened, ImportError> {
+    let mut warnings = Warnings::new(show(path));
+    let mut file = File::open(path, spool.clone(), &mut warnings)?;
     let document = &file.document;
     meshes::check_references(document).map_err(|(mesh, primitive, problem)| {
         file.fault(meshes::primitive_place(document, mesh, primitive), problem)
@@ -39,142 +80,197 @@ pub(super) fn load(path: &Path, budget: &mut TriangleBudget, progress: &Progress
     if has_animation {
         warnings.add("animations are ignored; geometry is taken at rest", String::new);
     }
+    meshopt::decode_views(&mut file)?;
+    let document = &file.document;
+    let uses = nodes::uses(&file, scene, &mut warnings)?;
+    let mut is_used = vec![false; document.meshes.len()];
+    uses.iter().for_each(|one| is_used[one.mesh] = true);
+    let (meshes, numbers) = check_meshes(&file, &is_used, &mut warnings)?;
+    count(&file, &uses, &meshes, &numbers, budget)?;
 
-    let uses = nodes::uses(&file, &mut warnings)?;
-    let checked = check_meshes(&file, &uses, &mut warnings)?;
+    let mut is_used = vec![false; document.materials.len()];
+    let mut needs_default = false;
+    for primitive in meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        match primitive.material() {
+            Some(material) => is_used[material] = true,
+            None => needs_default = true,
+        }
+    }
+    let (mut materials, textures) = materials::load(&file, &is_used, &mut warnings);
+    if needs_default {
+        materials.push(materials::default_material());
+    }
+    let image_name = |texture: &Texture| {
+        let image = texture.images[0];
+        display_name(image, document.images[image].name.as_deref())
+    };
+    let textures: Vec<_> = textures.into_iter().map(|texture| (image_name(&texture), texture)).collect();
+    let outline = Outline {
+        meshes: meshes.iter().zip(numbers_used(&numbers)).map(|(mesh, m)| mesh.outline(document, m)).collect(),
+        placements: place(&file, &uses, &numbers)?,
+        materials,
+        textures: textures.iter().map(|(name, _)| name.clone()).collect(),
+        sources: vec![file.source],
+        warnings: warnings.into_lines(),
+        has_animation,
+    };
+    let materials = file.document.materials.len();
+    let repairs = Repairs::new(file.label.clone());
+    let parts = Gltf { label: file.label, meshes, textures, images: file.images, materials, repairs };
+    Ok(Opened { outline, parts: Box::new(parts) })
+}
+
+impl Parts for Gltf {
+    fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError> {
+        let in_mesh = &self.meshes[mesh];
+        let (number, first) = in_mesh.parts[part];
+        let primitive = &in_mesh.primitives[number as usize];
+        let end = primitive.triangles().min(first + u64::from(PART_TRIANGLES));
+        let material = primitive.material().unwrap_or(self.materials) as u32;
+        let place = || format!("{} primitive {number}", in_mesh.label);
+        let read = primitive.read(first, end, material).map_err(|Problem { what, remedy }| {
+            let file = self.label.clone();
+            SourceError(ImportError::Content { file, place: place(), problem: what, remedy }.to_string())
+        })?;
+        for repair in read.repairs {
+            self.repairs.add(repair, (mesh, number), place);
+        }
+        Ok(read.primitive)
+    }
+
+    fn texture(&self, index: usize) -> Result<SourceTexture, SourceError> {
+        let (name, texture) = &self.textures[index];
+        let mut first_problem = None;
+        for &image in &texture.images {
+            let bytes = self.images[image].as_ref().map_err(String::clone);
+            match bytes.and_then(|bytes| decode_texture(bytes, name.clone(), texture.wrap)) {
+                Ok(texture) => return Ok(texture),
+                Err(problem) => first_problem.get_or_insert((image, problem)),
+            };
+        }
+        // At least one image was tried.
+        let (image, problem) = first_problem.unwrap_or_default();
+        let place = label("image", image, Some(name).filter(|name| **name != image.to_string()).map(String::as_str));
+        Err(SourceError(format!(
+            "{}: {place}: the image cannot be used, white takes its place ({problem})",
+            self.label
+        )))
+    }
+
+    fn repairs(&self) -> Vec<String> {
+        self.repairs.lines()
+    }
+}
+
+impl Mesh {
+    fn outline(&self, document: &document::Document, number: usize) -> MeshOutline {
+        let part = |&(primitive, first): &(u32, u64)| {
+            let triangles = self.primitives[primitive as usize].triangles() - first;
+            // In range: at most `PART_TRIANGLES`.
+            PartOutline { primitive, triangles: triangles.min(PART_TRIANGLES.into()) as u32 }
+        };
+        let name = display_name(number, document.meshes[number].name.as_deref());
+        MeshOutline { name, parts: self.parts.iter().map(part).collect() }
+    }
+
+    fn triangles(&self) -> u64 {
+        self.primitives.iter().map(Checked::triangles).sum()
+    }
+}
+
+/// Checks the meshes in use. Also gives the new number of each mesh of the file that is in use.
+fn check_meshes(
+    file: &File,
+    is_used: &[bool],
+    warnings: &mut Warnings,
+) -> Result<(Vec<Mesh>, Vec<Option<u32>>), ImportError> {
+    let document = &file.document;
+    let decoded = draco::decode(file, is_used);
+    let mut meshes = Vec::new();
+    let mut numbers = Vec::with_capacity(is_used.len());
+    for (m, &is_used) in is_used.iter().enumerate() {
+        if !is_used {
+            numbers.push(None);
+            continue;
+        }
+        let mut primitives = Vec::with_capacity(document.meshes[m].primitives.len());
+        let mut parts = Vec::new();
+        for (p, json) in document.meshes[m].primitives.iter().enumerate() {
+            let place = || meshes::primitive_place(document, m, p);
+            let primitive = meshes::check(file, json, &decoded, warnings, &place);
+            let primitive = primitive.map_err(|problem| file.fault(place(), problem))?;
+            // A primitive without triangles has one empty part.
+            let firsts = (0..primitive.triangles().max(1)).step_by(PART_TRIANGLES as usize);
+            parts.extend(firsts.map(|first| (p as u32, first)));
+            primitives.push(primitive);
+        }
+        numbers.push(Some(meshes.len() as u32));
+        let label = label("mesh", m, document.meshes[m].name.as_deref());
+        meshes.push(Mesh { label, primitives, parts });
+    }
+    Ok((meshes, numbers))
+}
+
+/// The meshes of the file that have a new number.
+fn numbers_used(numbers: &[Option<u32>]) -> impl Iterator<Item = usize> {
+    numbers.iter().enumerate().filter_map(|(m, number)| number.map(|_| m))
+}
+
+/// Counts triangles and instances against what the file can hold and ids can number.
+fn count(
+    file: &File,
+    uses: &[nodes::Use],
+    meshes: &[Mesh],
+    numbers: &[Option<u32>],
+    budget: &mut TriangleBudget,
+) -> Result<(), ImportError> {
     let mut instanced = 0u64;
-    for one in &uses {
-        let instances = one.instances.as_ref().map_or(1, |i| i.count as u64);
+    for one in uses {
+        let instances = one.instances.as_ref().map_or(1, |i| i.count);
         // Instances have attributes of their own but for a few nodes that share them; the buffers bound what that may
         // multiply to.
         instanced = instanced.saturating_add(one.instances.as_ref().map_or(0, |_| instances));
         if instanced > file.input_bytes {
             let what = format!("brings the instances to {instanced}, more than the file and its buffers can hold");
-            return Err(file.fault(nodes::node_place(document, one.node), Problem::new(what)));
+            return Err(file.fault(nodes::node_place(&file.document, one.node), Problem::new(what)));
         }
-        let triangles = checked[one.mesh].iter().flatten().map(|p| p.triangles()).sum();
+        let triangles = numbers[one.mesh].map_or(0, |mesh| meshes[mesh as usize].triangles());
         budget.add(&file.label, instances, triangles)?;
     }
-
-    let stored: u64 = checked.iter().flatten().flatten().map(|p| p.triangles()).sum();
+    let stored: u64 = meshes.iter().map(Mesh::triangles).sum();
     if stored / MAX_SHARING > file.input_bytes {
         let what = format!("its meshes repeat the same accessors to {stored} triangles");
         let remedy = "use one mesh for several nodes instead of copies of it";
         return Err(file.fault("meshes".into(), Problem { what, remedy }));
     }
-
-    let (meshes, numbers, needs_default) = read_meshes(&file, &checked, &mut warnings, progress)?;
-    let placements = place(&file, &uses, &numbers)?;
-
-    let mut is_used = vec![false; document.materials.len()];
-    for material in checked.iter().flatten().flatten().filter_map(|p| p.material()) {
-        is_used[material] = true;
-    }
-    let (mut materials, textures) = materials::load(&file, &is_used, &mut warnings, progress)?;
-    if needs_default {
-        materials.push(materials::default_material());
-    }
-    drop(checked);
-    drop(uses);
-    let sources = vec![file.source];
-    Ok(SourceScene { meshes, placements, materials, textures, sources, warnings: warnings.into_lines(), has_animation })
-}
-
-/// The checked primitives of every mesh in use; `None` for the others.
-fn check_meshes<'a>(
-    file: &'a File,
-    uses: &[nodes::Use],
-    warnings: &mut Warnings,
-) -> Result<Vec<Option<Vec<meshes::Checked<'a>>>>, ImportError> {
-    let document = &file.document;
-    let mut is_used = vec![false; document.meshes.len()];
-    for one in uses {
-        is_used[one.mesh] = true;
-    }
-    let mut checked = Vec::with_capacity(is_used.len());
-    for (m, is_used) in is_used.into_iter().enumerate() {
-        checked.push(match is_used {
-            false => None,
-            true => {
-                let mut primitives = Vec::with_capacity(document.meshes[m].primitives.len());
-                for (p, json) in document.meshes[m].primitives.iter().enumerate() {
-                    let place = || meshes::primitive_place(document, m, p);
-                    let primitive = meshes::check(file, json, warnings, &place);
-                    primitives.push(primitive.map_err(|problem| file.fault(place(), problem))?);
-                }
-                Some(primitives)
-            }
-        });
-    }
-    Ok(checked)
-}
-
-/// Reads the meshes in use, in order, primitives in parallel. Also gives the new number of each mesh and whether any
-/// primitive uses the default material, which is to follow those of the file.
-fn read_meshes(
-    file: &File,
-    checked: &[Option<Vec<meshes::Checked>>],
-    warnings: &mut Warnings,
-    progress: &Progress,
-) -> Result<(Vec<Mesh>, Vec<u32>, bool), ImportError> {
-    let document = &file.document;
-    let default_material = document.materials.len();
-    let mut numbers = Vec::with_capacity(checked.len());
-    let mut meshes = Vec::new();
-    let mut jobs = Vec::new();
-    for (m, primitives) in checked.iter().enumerate() {
-        numbers.push(meshes.len() as u32);
-        if let Some(primitives) = primitives {
-            let name = display_name(m, document.meshes[m].name.as_deref());
-            meshes.push(Mesh { name, primitives: Vec::with_capacity(primitives.len()) });
-            jobs.extend(primitives.iter().enumerate().map(|(p, primitive)| (m, p, primitive)));
-        }
-    }
-    progress.phase("geometry", jobs.len() as u64);
-    let results: Vec<Result<meshes::Read, Problem>> = jobs
-        .par_iter()
-        .map(|(_, _, primitive)| {
-            let read = primitive.read(primitive.material().unwrap_or(default_material) as u32);
-            progress.advance(1);
-            read
-        })
-        .collect();
-    // In order, so that the error and the warnings do not depend on the threads.
-    let mut needs_default = false;
-    for ((m, p, primitive), result) in jobs.into_iter().zip(results) {
-        let place = || meshes::primitive_place(document, m, p);
-        let read = result.map_err(|problem| file.fault(place(), problem))?;
-        for repair in read.repairs {
-            warnings.add(repair, place);
-        }
-        needs_default |= primitive.material().is_none();
-        let primitives: &mut Vec<Primitive> = &mut meshes[numbers[m] as usize].primitives;
-        primitives.push(read.primitive);
-    }
-    Ok((meshes, numbers, needs_default))
+    Ok(())
 }
 
 /// The placements of all uses, instances multiplied out.
-fn place(file: &File, uses: &[nodes::Use], numbers: &[u32]) -> Result<Vec<Placement>, ImportError> {
+fn place(file: &File, uses: &[nodes::Use], numbers: &[Option<u32>]) -> Result<Vec<Placement>, ImportError> {
     let document = &file.document;
     let mut placements = Vec::with_capacity(uses.len());
     for one in uses {
         let name = display_name(one.node, document.nodes[one.node].name.as_deref());
-        let mesh = numbers[one.mesh];
+        // Every mesh in use has a number.
+        let Some(mesh) = numbers[one.mesh] else { continue };
         let Some(instances) = &one.instances else {
             placements.push(Placement { name, mesh, source: 0, world_from_mesh: one.world });
             continue;
         };
-        for i in 0..instances.count {
-            let fault = |problem: Problem| {
-                let problem = Problem { what: format!("instance {i}: {}", problem.what), ..problem };
-                file.fault(nodes::node_place(document, one.node), problem)
-            };
-            let world_from_mesh = transform::multiply(&one.world, &instances.matrix(i).map_err(fault)?);
-            if !world_from_mesh.iter().all(|c| c.is_finite()) {
-                return Err(fault(Problem::new("its transformation is not finite")));
+        let fault = |what: String, remedy| file.fault(nodes::node_place(document, one.node), Problem { what, remedy });
+        for first in (0..instances.count).step_by(INSTANCES_AT_ONCE as usize) {
+            let end = instances.count.min(first + INSTANCES_AT_ONCE);
+            let matrices = instances.matrices(first, end);
+            let matrices = matrices.map_err(|e| fault(format!("its instances cannot be read: {e}"), EXPORT_AGAIN))?;
+            for (i, matrix) in (first..).zip(matrices) {
+                let matrix = matrix.map_err(|what| fault(format!("instance {i}: {what}"), EXPORT_AGAIN))?;
+                let world_from_mesh = multiply(&one.world, &matrix);
+                if !world_from_mesh.iter().all(|c| c.is_finite()) {
+                    return Err(fault(format!("instance {i}: its transformation is not finite"), EXPORT_AGAIN));
+                }
+                placements.push(Placement { name: name.clone(), mesh, source: 0, world_from_mesh });
             }
-            placements.push(Placement { name: name.clone(), mesh, source: 0, world_from_mesh });
         }
     }
     Ok(placements)

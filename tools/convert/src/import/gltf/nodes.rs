@@ -4,13 +4,14 @@ use super::accessor::{Accessor, Component, Shape};
 use super::document::{Document, Index, Uint};
 use super::file::{File, Problem, item};
 use super::label;
-use super::transform::{Affine, from_columns, from_parts, multiply};
-use crate::import::error::ImportError;
+use crate::import::affine::{Affine, from_columns, from_parts, multiply};
+use crate::import::error::{ImportError, one_line};
 use crate::import::warnings::Warnings;
 use crate::source::IDENTITY;
+use std::io;
 
 /// A node with a mesh, placed in the world.
-pub(super) struct Use<'a> {
+pub(super) struct Use {
     /// The node.
     pub node: usize,
     /// The mesh, in range.
@@ -18,23 +19,29 @@ pub(super) struct Use<'a> {
     /// world_from_node.
     pub world: Affine,
     /// EXT_mesh_gpu_instancing: transformations between node and mesh; `None`: one placement.
-    pub instances: Option<Instances<'a>>,
+    pub instances: Option<Instances>,
 }
 
 /// Accessors of instance transformations, all of the same count.
-pub(super) struct Instances<'a> {
+pub(super) struct Instances {
     /// Number of instances.
-    pub count: usize,
-    translation: Option<Accessor<'a>>,
-    rotation: Option<Accessor<'a>>,
-    scale: Option<Accessor<'a>>,
+    pub count: u64,
+    translation: Option<Accessor>,
+    rotation: Option<Accessor>,
+    scale: Option<Accessor>,
 }
 
-impl Instances<'_> {
-    /// node_from_mesh of instance `i`.
-    pub fn matrix(&self, i: usize) -> Result<Affine, Problem> {
-        let get = |accessor: &Option<Accessor>| accessor.as_ref().map(|a| a.get::<3>(i));
-        from_parts(get(&self.translation), self.rotation.as_ref().map(|a| a.get::<4>(i)), get(&self.scale))
+impl Instances {
+    /// node_from_mesh of instances `first` to `end`.
+    pub fn matrices(&self, first: u64, end: u64) -> io::Result<Vec<Result<Affine, &'static str>>> {
+        let wanted: Vec<u64> = (first..end).collect();
+        let get = |accessor: &Option<Accessor>| accessor.as_ref().map(|a| a.gather::<3>(&wanted)).transpose();
+        let translations = get(&self.translation)?;
+        let rotations = self.rotation.as_ref().map(|a| a.gather::<4>(&wanted)).transpose()?;
+        let scales = get(&self.scale)?;
+        let at = |values: &Option<Vec<[f64; 3]>>, i: usize| values.as_ref().map(|values| values[i]);
+        let matrix = |i| from_parts(at(&translations, i), rotations.as_ref().map(|r| r[i]), at(&scales, i));
+        Ok((0..wanted.len()).map(matrix).collect())
     }
 }
 
@@ -43,12 +50,13 @@ pub(super) fn node_place(document: &Document, node: usize) -> String {
     label("node", node, document.nodes.get(node).and_then(|n| n.name.as_deref()))
 }
 
-/// Every use of a mesh in the default scene (else scene 0, else all root nodes), depth first.
-pub(super) fn uses<'a>(file: &'a File, warnings: &mut Warnings) -> Result<Vec<Use<'a>>, ImportError> {
+/// Every use of a mesh in the scene that is asked for (else the default scene, else scene 0, else all root nodes), depth
+/// first.
+pub(super) fn uses(file: &File, asked: Option<&str>, warnings: &mut Warnings) -> Result<Vec<Use>, ImportError> {
     let document = &file.document;
     let parents = parents(file)?;
     check_acyclic(file, &parents)?;
-    let roots = roots(file, &parents)?;
+    let roots = roots(file, asked, &parents)?;
 
     let mut uses = Vec::new();
     let mut visited = 0;
@@ -61,7 +69,7 @@ pub(super) fn uses<'a>(file: &'a File, warnings: &mut Warnings) -> Result<Vec<Us
             Some(matrix) => from_columns(matrix),
             None => from_parts(node.translation, node.rotation, node.scale),
         };
-        let world = multiply(&parent, &local.map_err(fault)?);
+        let world = multiply(&parent, &local.map_err(|what| fault(Problem::new(what)))?);
         if !world.iter().all(|c| c.is_finite()) {
             return Err(fault(Problem::new("its transformation is too large")));
         }
@@ -132,7 +140,7 @@ fn check_acyclic(file: &File, parents: &[Option<usize>]) -> Result<(), ImportErr
 }
 
 /// The nodes at which the walk begins, each once.
-fn roots(file: &File, parents: &[Option<usize>]) -> Result<Vec<usize>, ImportError> {
+fn roots(file: &File, asked: Option<&str>, parents: &[Option<usize>]) -> Result<Vec<usize>, ImportError> {
     let document = &file.document;
     let place = |index: usize| label("scene", index, document.scenes[index].name.as_deref());
     for (index, scene) in document.scenes.iter().enumerate() {
@@ -140,15 +148,16 @@ fn roots(file: &File, parents: &[Option<usize>]) -> Result<Vec<usize>, ImportErr
             item(&document.nodes, node, "node").map_err(|problem| file.fault(place(index), problem))?;
         }
     }
-    let chosen: Index = match document.scene {
-        Some(scene) => {
+    let chosen: Index = match (asked, document.scene) {
+        (Some(asked), _) => find_scene(document, asked).map_err(|problem| file.fault("scenes".into(), problem))?,
+        (None, Some(scene)) => {
             item(&document.scenes, scene, "scene").map_err(|problem| file.fault("default scene".into(), problem))?;
             scene
         }
-        None if document.scenes.is_empty() => {
+        (None, None) if document.scenes.is_empty() => {
             return Ok((0..parents.len()).filter(|&node| parents[node].is_none()).collect());
         }
-        None => Uint(0),
+        (None, None) => Uint(0),
     };
     let chosen = chosen.0 as usize;
     let mut listed = vec![false; parents.len()];
@@ -170,8 +179,21 @@ fn roots(file: &File, parents: &[Option<usize>]) -> Result<Vec<usize>, ImportErr
     Ok(roots)
 }
 
+/// The scene named `asked`, else the one of that number.
+fn find_scene(document: &Document, asked: &str) -> Result<Index, Problem> {
+    let named = document.scenes.iter().position(|scene| scene.name.as_deref() == Some(asked));
+    let numbered = || asked.parse().ok().filter(|&number: &usize| number < document.scenes.len());
+    named.or_else(numbered).map(|scene| Uint(scene as u64)).ok_or_else(|| {
+        let scenes = document.scenes.iter().enumerate().take(16);
+        let known: Vec<_> = scenes.map(|(i, scene)| label("scene", i, scene.name.as_deref())).collect();
+        let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+        let what = format!("none is \"{}\"; there are: {known}", one_line(asked));
+        Problem { what, remedy: "give --scene the name or the number of one of them" }
+    })
+}
+
 /// The accessors of EXT_mesh_gpu_instancing, if the node has it.
-fn instances(file: &File, node: usize) -> Result<Option<Instances<'_>>, Problem> {
+fn instances(file: &File, node: usize) -> Result<Option<Instances>, Problem> {
     const VECTOR: Shape = Shape { kinds: &[("VEC3", 3)], components: &[Component::F32], always_normalized: false };
     const ROTATION: Shape = Shape {
         kinds: &[("VEC4", 4)],

@@ -1,6 +1,5 @@
-//! Affine transformations of nodes in f64, row-major 3x4 (glTF 2.0, section 3.5.3).
+//! Affine transformations in f64, row-major 3x4. Their parts are those of glTF 2.0, section 3.5.3.
 
-use super::file::Problem;
 use crate::source::IDENTITY;
 
 /// A row-major 3x4 matrix.
@@ -22,9 +21,9 @@ pub(super) fn multiply(a: &Affine, b: &Affine) -> Affine {
 }
 
 /// The matrix of a column-major 4x4 one, whose last row must be 0 0 0 1.
-pub(super) fn from_columns(m: &[f64; 16]) -> Result<Affine, Problem> {
+pub(super) fn from_columns(m: &[f64; 16]) -> Result<Affine, &'static str> {
     if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
-        return Err(Problem::new("the last row of its matrix is not 0 0 0 1"));
+        return Err("the last row of its matrix is not 0 0 0 1");
     }
     Ok(std::array::from_fn(|i| m[4 * (i % 4) + i / 4]))
 }
@@ -34,13 +33,13 @@ pub(super) fn from_parts(
     translation: Option<[f64; 3]>,
     rotation: Option<[f64; 4]>,
     scale: Option<[f64; 3]>,
-) -> Result<Affine, Problem> {
+) -> Result<Affine, &'static str> {
     let mut matrix = IDENTITY;
     if let Some(q) = rotation {
         // Dividing by the largest component first keeps the squares in range.
         let largest = q.iter().fold(0.0f64, |m, c| m.max(c.abs()));
         if largest == 0.0 || !largest.is_finite() {
-            return Err(Problem::new("its rotation is not a quaternion of non-zero length"));
+            return Err("its rotation is not a quaternion of non-zero length");
         }
         let [x, y, z, w] = q.map(|c| c / largest);
         let s = 2.0 / (x * x + y * y + z * z + w * w);

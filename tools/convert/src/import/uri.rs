@@ -1,4 +1,4 @@
-//! URIs of glTF: data URIs and percent-encoded relative paths (glTF 2.0, sections 2.8 and 3.6; RFC 2397, RFC 3986).
+//! References to other files. URIs of glTF: data URIs and percent-encoded relative paths (glTF 2.0, sections 2.8 and 3.6; RFC 2397, RFC 3986).
 
 use std::path::{Component, Path, PathBuf};
 
@@ -29,23 +29,28 @@ pub(super) fn resolve(uri: &str) -> Result<Target, &'static str> {
     if path.contains('\0') {
         return Err("the URI holds a zero byte");
     }
+    below(&path).map(Target::File)
+}
+
+/// A path below a folder, without `.` and `..`; the error says why `path` is none.
+pub(super) fn below(path: &str) -> Result<PathBuf, &'static str> {
     let mut below = PathBuf::new();
-    for component in Path::new(&path).components() {
+    for component in Path::new(path).components() {
         match component {
             Component::Normal(name) => below.push(name),
             Component::CurDir => {}
             Component::ParentDir => {
                 if !below.pop() {
-                    return Err("the URI leads out of the folder of the file");
+                    return Err("the path leads out of the folder of the file");
                 }
             }
-            Component::RootDir | Component::Prefix(_) => return Err("the URI is an absolute path"),
+            Component::RootDir | Component::Prefix(_) => return Err("the path is absolute"),
         }
     }
     if below.as_os_str().is_empty() {
-        return Err("the URI names no file");
+        return Err("the path names no file");
     }
-    Ok(Target::File(below))
+    Ok(below)
 }
 
 /// Whether `uri` begins with `scheme:`.

@@ -1,0 +1,84 @@
+//! Several opened files as one source.
+
+use super::affine::{Affine, multiply};
+use super::{Opened, Parts};
+use crate::source::{IDENTITY, Outline, Primitive, Source, SourceError, SourceTexture};
+use std::borrow::Cow;
+
+/// Opened inputs, one after the other; geometry and images are read when they are asked for.
+#[derive(Default)]
+pub struct Imported {
+    outline: Outline,
+    inputs: Vec<Input>,
+}
+
+/// An opened input, and how many meshes, materials and textures precede its own.
+struct Input {
+    parts: Box<dyn Parts>,
+    meshes: usize,
+    materials: u32,
+    textures: usize,
+}
+
+impl Imported {
+    /// Appends an input, placed by `transform`; the error says what is wrong with the placement. Each list of an input is
+    /// smaller than the bytes it was read from, so sums stay within u32 for everything that fits memory.
+    pub(super) fn append(&mut self, opened: Opened, transform: &Affine) -> Result<(), String> {
+        let Opened { outline: mut part, parts } = opened;
+        let whole = &mut self.outline;
+        let meshes = whole.meshes.len();
+        let (materials, textures) = (whole.materials.len() as u32, whole.textures.len());
+        for material in &mut part.materials {
+            if material.base_color_texture != bricks::NONE {
+                material.base_color_texture += textures as u32;
+            }
+        }
+        for placement in &mut part.placements {
+            placement.mesh += meshes as u32;
+            placement.source += whole.sources.len() as u32;
+            if *transform != IDENTITY {
+                placement.world_from_mesh = multiply(transform, &placement.world_from_mesh);
+                if !placement.world_from_mesh.iter().all(|c| c.is_finite()) {
+                    return Err(format!("takes node {} beyond the range of numbers", placement.name));
+                }
+            }
+        }
+        whole.meshes.append(&mut part.meshes);
+        whole.placements.append(&mut part.placements);
+        whole.materials.append(&mut part.materials);
+        whole.textures.append(&mut part.textures);
+        whole.sources.append(&mut part.sources);
+        whole.warnings.append(&mut part.warnings);
+        whole.has_animation |= part.has_animation;
+        self.inputs.push(Input { parts, meshes, materials, textures });
+        Ok(())
+    }
+
+    /// The input for which `first` is at most `index`, the last such.
+    fn input(&self, index: usize, first: impl Fn(&Input) -> usize) -> &Input {
+        // The first input begins at 0, so at least one begins at or before any index.
+        &self.inputs[self.inputs.partition_point(|input| first(input) <= index) - 1]
+    }
+}
+
+impl Source for Imported {
+    fn outline(&self) -> &Outline {
+        &self.outline
+    }
+
+    fn part(&self, mesh: usize, part: usize) -> Result<Cow<'_, Primitive>, SourceError> {
+        let input = self.input(mesh, |input| input.meshes);
+        let mut primitive = input.parts.part(mesh - input.meshes, part)?;
+        primitive.material += input.materials;
+        Ok(Cow::Owned(primitive))
+    }
+
+    fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError> {
+        let input = self.input(index, |input| input.textures);
+        input.parts.texture(index - input.textures).map(Cow::Owned)
+    }
+
+    fn repairs(&self) -> Vec<String> {
+        self.inputs.iter().flat_map(|input| input.parts.repairs()).collect()
+    }
+}

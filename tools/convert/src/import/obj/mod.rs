@@ -1,0 +1,234 @@
+//! OBJ with MTL (Wavefront, "Object files"): polygons, triangulated as fans.
+//!
+//! Each object or group with faces is a mesh; a primitive is a run of faces of one material, so that triangles keep their
+//! order in the file. The text is run through once; its numbers go to the spool.
+
+mod mtl;
+mod parse;
+
+use super::bytes::{Bytes, Spool, Stream};
+use super::error::{ImportError, one_line, show};
+use super::image::decode_texture;
+use super::plain::{self, doubles, fault, floats, unreadable};
+use super::repairs::Repairs;
+use super::table::Table;
+use super::text::Lines;
+use super::vertices::Vertices;
+use super::warnings::Warnings;
+use super::{Opened, Parts, TriangleBudget, uri};
+use crate::source::{MeshOutline, Outline, Primitive, SourceError, SourceTexture};
+use bricks::NONE;
+use parse::{Parsed, Run};
+use std::collections::{BTreeMap, HashMap};
+use std::io;
+use std::path::Path;
+use xxhash_rust::xxh3::Xxh3;
+
+/// Largest file of materials.
+const MAX_MATERIALS_BYTES: u64 = 256 << 20;
+
+/// An OBJ file, opened.
+struct Obj {
+    label: String,
+    positions: Table,
+    colors: Option<Table>,
+    uvs: Table,
+    normals: Table,
+    /// Position, texture coordinates and normal, or `NONE`, of three corners a row.
+    triangles: Table,
+    /// Parts of each mesh: run and first triangle.
+    parts: Vec<Vec<(Run, u64)>>,
+    textures: Vec<Texture>,
+    repairs: Repairs,
+}
+
+/// A picture.
+struct Texture {
+    name: String,
+    wrap: u32,
+    bytes: Result<Bytes, String>,
+}
+
+/// Opens one .obj file.
+pub(super) fn open(
+    path: &Path,
+    axes: &[f64; 12],
+    spool: &Spool,
+    budget: &mut TriangleBudget,
+) -> Result<Opened, ImportError> {
+    let label = show(path);
+    let bytes = Bytes::of_file(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
+    let mut warnings = Warnings::new(label.clone());
+    let stream = bytes.stream().map_err(|e| unreadable(path, &e))?;
+    let (parsed, stream) = parse::parse(path, stream, spool, &mut warnings, budget)?;
+    let mut hash = Stream::finish(stream).map_err(|e| unreadable(path, &e))?;
+    if parsed.triangles.count() == 0 {
+        return Err(fault(path, "faces", "the file has none"));
+    }
+    let Looks { materials, textures } = looks(path, &parsed, &mut warnings, &mut hash);
+
+    let mut meshes: Vec<MeshOutline> = Vec::new();
+    let mut parts: Vec<Vec<(Run, u64)>> = Vec::new();
+    let mut last = None;
+    for (i, run) in parsed.runs.iter().enumerate() {
+        if last != Some(run.object) {
+            let name = &parsed.objects[run.object as usize];
+            let name = if name.is_empty() { plain::stem(path) } else { name.clone() };
+            meshes.push(MeshOutline { name, parts: Vec::new() });
+            parts.push(Vec::new());
+            last = Some(run.object);
+        }
+        let end = parsed.runs.get(i + 1).map_or(parsed.triangles.count(), |next| next.first);
+        // Just pushed if there was none.
+        if let (Some(mesh), Some(of_mesh)) = (meshes.last_mut(), parts.last_mut()) {
+            let primitive = mesh.parts.last().map_or(0, |part| part.primitive + 1);
+            let mut first = run.first;
+            for part in plain::parts(primitive, end - run.first) {
+                mesh.parts.push(part);
+                of_mesh.push((*run, first));
+                first += u64::from(part.triangles);
+            }
+        }
+    }
+    let source =
+        bricks::Source { name: plain::file_name(path), bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) };
+    let outline = Outline {
+        placements: meshes.iter().enumerate().map(|(m, mesh)| plain::placement(m, &mesh.name, axes)).collect(),
+        meshes,
+        materials,
+        textures: textures.iter().map(|texture| texture.name.clone()).collect(),
+        sources: vec![source],
+        warnings: warnings.into_lines(),
+        ..Outline::default()
+    };
+    let Parsed { positions, colors, uvs, normals, triangles, .. } = parsed;
+    let repairs = Repairs::new(label.clone());
+    Ok(Opened {
+        outline,
+        parts: Box::new(Obj { label, positions, colors, uvs, normals, triangles, parts, textures, repairs }),
+    })
+}
+
+/// Materials and pictures.
+struct Looks {
+    materials: Vec<bricks::Material>,
+    textures: Vec<Texture>,
+}
+
+/// The materials that `parsed` uses, from the files that it names.
+fn looks(path: &Path, parsed: &Parsed, warnings: &mut Warnings, hash: &mut Xxh3) -> Looks {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut known = HashMap::new();
+    for library in &parsed.libraries {
+        match read_library(folder, library, hash) {
+            Ok(definitions) => {
+                for definition in definitions {
+                    known.entry(definition.name.clone()).or_insert(definition);
+                }
+            }
+            Err(problem) => {
+                warnings.add("the materials cannot be read", || format!("{} ({problem})", one_line(library)))
+            }
+        }
+    }
+    let mut textures: Vec<Texture> = Vec::new();
+    let mut numbers = BTreeMap::new();
+    let mut materials = Vec::with_capacity(parsed.materials.len());
+    for name in &parsed.materials {
+        let place = || format!("material \"{}\"", one_line(name));
+        let Some(definition) = known.get(name) else {
+            // Faces before any `usemtl` have the unnamed material.
+            if !name.is_empty() {
+                warnings.add("is in none of the files of materials; white is used", place);
+            }
+            materials.push(plain::material());
+            continue;
+        };
+        let mut material = definition.material;
+        if let Some((file, wrap)) = &definition.texture {
+            material.base_color_texture = *numbers.entry((file, *wrap)).or_insert_with(|| {
+                let bytes = beside(folder, file).and_then(|path| Bytes::of_file(&path));
+                textures.push(Texture { name: one_line(file), wrap: *wrap, bytes });
+                textures.len() as u32 - 1
+            });
+        }
+        if definition.has_other_maps {
+            warnings.add("maps other than map_Kd are not read", place);
+        }
+        materials.push(material);
+    }
+    Looks { materials, textures }
+}
+
+fn read_library(folder: &Path, library: &str, hash: &mut Xxh3) -> Result<Vec<mtl::Definition>, String> {
+    let bytes = Bytes::of_file(&beside(folder, library)?)?;
+    if bytes.len() > MAX_MATERIALS_BYTES {
+        return Err("it is too large".into());
+    }
+    bytes.hash(hash).map_err(|e| e.to_string())?;
+    mtl::read(&mut Lines::new(bytes.stream().map_err(|e| e.to_string())?)).map_err(|e| e.to_string())
+}
+
+/// A file in or below `folder`; its path may be written as on Windows.
+fn beside(folder: &Path, file: &str) -> Result<std::path::PathBuf, String> {
+    uri::below(&file.replace('\\', "/")).map(|below| folder.join(below)).map_err(str::to_owned)
+}
+
+impl Parts for Obj {
+    fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError> {
+        let (run, first) = self.parts[mesh][part];
+        // The first triangle of the next part of this run, or of the run after it.
+        let rest = self.parts[mesh].get(part + 1).or_else(|| self.parts.get(mesh + 1)?.first());
+        let end = rest.map_or(self.triangles.count(), |(_, first)| *first);
+        let primitive = self.read(run, first, end);
+        let mut primitive = primitive.map_err(|e| SourceError(format!("{}: cannot be read again: {e}", self.label)))?;
+        plain::repair(&mut primitive, |what| self.repairs.add(what, (mesh, part as u32), || format!("mesh {mesh}")));
+        Ok(primitive)
+    }
+
+    fn texture(&self, index: usize) -> Result<SourceTexture, SourceError> {
+        let Texture { name, wrap, bytes } = &self.textures[index];
+        let decoded = bytes.as_ref().map_err(String::clone).and_then(|b| decode_texture(b, name.clone(), *wrap));
+        decoded.map_err(|problem| {
+            let file = &self.label;
+            SourceError(format!("{file}: image {name}: the image cannot be used, white takes its place ({problem})"))
+        })
+    }
+
+    fn repairs(&self) -> Vec<String> {
+        self.repairs.lines()
+    }
+}
+
+impl Obj {
+    fn read(&self, run: Run, first: u64, end: u64) -> io::Result<Primitive> {
+        let mut corners: Vec<[u32; 3]> = Vec::with_capacity(3 * (end - first) as usize);
+        self.triangles.run(first, end, |_, row| {
+            let word = |bytes: &[u8; 4]| u32::from_le_bytes(*bytes);
+            let words = row.as_chunks::<4>().0;
+            corners.extend(words.as_chunks::<3>().0.iter().map(|corner| corner.each_ref().map(word)));
+            true
+        })?;
+        let Vertices { used, indices } = Vertices::of(corners);
+        let positions: Vec<u64> = used.iter().map(|[position, ..]| u64::from(*position)).collect();
+        let colors = self.colors.as_ref().map(|colors| floats::<4>(colors, &positions)).transpose()?;
+        Ok(Primitive {
+            material: run.material,
+            positions: doubles(&self.positions, &positions)?,
+            normals: if run.has_normals { Some(optional(&self.normals, used.iter().map(|v| v[2]))?) } else { None },
+            uvs: if run.has_uvs { Some(optional(&self.uvs, used.iter().map(|v| v[1]))?) } else { None },
+            colors,
+            indices,
+        })
+    }
+}
+
+/// The floats of the rows `wanted`, in any order; zero for `NONE` and for those that are not there.
+fn optional<const N: usize>(table: &Table, wanted: impl Iterator<Item = u32>) -> io::Result<Vec<[f32; N]>> {
+    let is_there = |row: &u64| *row < table.count();
+    let Vertices { used, indices } = Vertices::of(wanted.map(u64::from).collect());
+    let values = floats::<N>(table, &used[..used.partition_point(is_there)])?;
+    Ok(indices.iter().map(|&i| values.get(i as usize).copied().unwrap_or([0.0; N])).collect())
+}
+
+const _: () = assert!(NONE == u32::MAX, "what is absent sorts behind what is there");
