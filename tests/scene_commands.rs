@@ -117,7 +117,7 @@ fn bad_input_is_one_line_and_exit_status_1() {
         ("convert missing.gltf -o out.bricks", "missing.gltf"),
         ("convert text.gltf -o out.bricks", "text.gltf"),
         ("convert text.png -o out.bricks", "text.png"),
-        ("convert empty -o out.bricks", "no .gltf or .glb"),
+        ("convert empty -o out.bricks", "no .gltf, .glb, .obj"),
         ("convert text.gltf -o text.gltf", "overwrite"),
         ("convert text.gltf -o empty", "folder"),
         ("scene city -o no/such/out.bricks --triangles 12K", "out.bricks"),

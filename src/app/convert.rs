@@ -3,8 +3,8 @@
 use super::args::{BuildArgs, ConvertArgs};
 use super::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
-use brickwalk_convert::build::{BuildSettings, build};
-use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, import, load_all};
+use brickwalk_convert::build::{BuildSettings, build_source};
+use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, import};
 use brickwalk_convert::progress::Progress;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -24,15 +24,14 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let progress = Progress::new();
     let threads = args.build.threads.map(|n| n as usize);
     let scratch = args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
-    let imported = import(&inputs, &ImportSettings { threads, scratch }, &progress)?;
-    let scene = load_all(&imported)?;
+    let source = import(&inputs, &ImportSettings { threads, scratch }, &progress)?;
     let settings = BuildSettings {
         drop_non_finite: args.drop_non_finite,
         instance_min_triangles: args.instance_min_triangles,
         bake_budget_triangles: args.bake_budget,
         ..build_settings(&args.build)
     };
-    build(scene, &settings, &args.output, &progress)?;
+    build_source(&source, &settings, &args.output, &progress)?;
     progress.finish();
     summarise(&args.output, start)
 }
@@ -80,9 +79,9 @@ fn expand(inputs: &[Input]) -> Result<Vec<Input>> {
         search(&input.path, 0, &mut found)?;
         ensure!(
             !found.is_empty(),
-            "{}: there is no file with the extension {} in this folder; name the scene files themselves",
+            "{}: there is no {} file in this folder; name the scene files themselves",
             input.path.display(),
-            EXTENSIONS.join(", ")
+            EXTENSIONS.map(|extension| format!(".{extension}")).join(", ")
         );
         found.sort_by(|a, b| a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes()));
         files.extend(found.into_iter().map(|path| Input { path, ..input.clone() }));
@@ -140,7 +139,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         std::fs::create_dir_all(at("sub/deep")).unwrap();
         std::fs::create_dir(at("empty")).unwrap();
-        for name in ["b.gltf", "B.GLB", "a.glb", "notes.txt", "sub/c.glb", "sub/deep/a.gltf", "noextension"] {
+        for name in ["b.gltf", "B.GLB", "a.glb", "notes.txt", "c.STL", "sub/c.glb", "sub/deep/a.gltf", "noextension"] {
             std::fs::write(at(name), b"").unwrap();
         }
         let mut inputs = [at("a.glb"), folder.path().into(), at("missing.gltf")].map(Input::from);

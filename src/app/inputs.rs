@@ -47,7 +47,7 @@ impl Args for InputArgs {
                 ValueParser::new(transform),
                 "Placement of the input: steps in the order in which they happen (translate X Y Z, scale S or scale X Y \
                  Z, rotate x|y|z DEGREES; metres, Y up), as in \"scale 0.5 rotate y 90 translate 10 0 -5\"; or the 12 or \
-                 16 numbers of a matrix, row by row",
+                 16 numbers of a matrix, row by row [default: where it is]",
             ))
             .arg(option(
                 "scene",

@@ -130,6 +130,7 @@ fn run(
         textures: textures.records,
     };
     let dropped = Dropped::count(&resident, &cuts, &rounded_away);
+    warnings.extend(source.repairs());
     dropped.warn(&mut warnings);
     resident.manifest = assemble::manifest(&resident, outline, plan, &used_materials, settings, &dropped, warnings);
     clock.end("top level");

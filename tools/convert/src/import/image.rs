@@ -7,8 +7,8 @@ use crate::source::SourceTexture;
 use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use image::ImageFormat;
 
-/// Longest side of an image, in texels: what devices commonly allow.
-const MAX_SIDE: u32 = 16384;
+/// Longest side of an image, in texels.
+const MAX_SIDE: u32 = bricks::MAX_TEXTURE_SIZE;
 
 /// Most bytes of RGBA texels for a byte of an image file, so that a few bytes cannot demand gigabytes. Deflate reaches
 /// 1032:1, and a grey texel of one byte becomes four.

@@ -41,7 +41,7 @@ pub fn load_all(source: &dyn Source) -> Result<SourceScene, SourceError> {
             }
             Err(problem) => {
                 renumbered.push(NONE);
-                warnings.push(problem.to_string());
+                warnings.push(format!("{problem}; it is left out"));
             }
         }
     }

@@ -115,9 +115,9 @@ impl Lines {
         }
     }
 
-    /// The number of the line read last, from 1.
-    pub fn number(&self) -> u64 {
-        self.number.max(1)
+    /// Number of lines so far.
+    pub fn count(&self) -> u64 {
+        self.number
     }
 
     /// What is left.

@@ -232,7 +232,7 @@ fn stl_binary_and_ascii() {
     text += "endsolid square\n";
     assert_eq!(corners(&read("a.stl", text.as_bytes())), SQUARE);
     for (from, to, expected) in [
-        ("vertex 0e0 1 0\n", "", "line 16: a facet has fewer than three"),
+        ("vertex 0e0 1 0\n", "", "line 13: a facet has fewer than three"),
         ("endloop", "", "more than three vertices"),
         ("0e0 1 0", "0e0 one 0", "\"one\" is not a number"),
         ("endloop\nendfacet\nendsolid square\n", "", "ends within a facet"),

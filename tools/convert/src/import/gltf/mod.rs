@@ -151,10 +151,7 @@ impl Parts for Gltf {
         // At least one image was tried.
         let (image, problem) = first_problem.unwrap_or_default();
         let place = label("image", image, Some(name).filter(|name| **name != image.to_string()).map(String::as_str));
-        Err(SourceError(format!(
-            "{}: {place}: the image cannot be used, white takes its place ({problem})",
-            self.label
-        )))
+        Err(SourceError(format!("{}: {place}: the image cannot be used ({problem})", self.label)))
     }
 
     fn repairs(&self) -> Vec<String> {

@@ -191,7 +191,7 @@ impl Parts for Obj {
         let decoded = bytes.as_ref().map_err(String::clone).and_then(|b| decode_texture(b, name.clone(), *wrap));
         decoded.map_err(|problem| {
             let file = &self.label;
-            SourceError(format!("{file}: image {name}: the image cannot be used, white takes its place ({problem})"))
+            SourceError(format!("{file}: image {name}: the image cannot be used ({problem})"))
         })
     }
 

@@ -83,7 +83,7 @@ fn texture(text: &str) -> Option<(String, u32)> {
             _ => 1,
         };
         for i in 0..values {
-            let (value, behind) = rest.split_once(|c: char| c.is_ascii_whitespace())?;
+            let (value, behind) = rest.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((rest, ""));
             if i > 0 && number(value.as_bytes()).is_err() {
                 break;
             }

@@ -96,7 +96,7 @@ pub(super) fn parse(
     };
     let label = show(path);
     loop {
-        let number = lines.number() + 1;
+        let number = lines.count() + 1;
         let Some(line) = lines.next().map_err(|e| unreadable(path, &e))? else { break };
         let before = parser.triangles.count();
         parser.line(line, number, warnings).map_err(|stop| match stop {
