@@ -79,4 +79,5 @@ fn triangles(@builtin(global_invocation_id) id: vec3<u32>) {
     put3(at + 17u, s.n);
     results[at + 20u] = s.down;
     put3(at + 21u, offset_origin(s));
+    put(at + 24u, s.area);
 }

@@ -81,32 +81,25 @@ fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>,
     hits[ray] = Hit(best.t, best.id, divide(best.v, best.det), divide(best.w, best.det));
     var point = offset_origin(s);
     var normal = s.n;
-    let across = cross(vertex(r, index.y) - vertex(r, index.x), vertex(r, index.z) - vertex(r, index.x));
-    var area = length(across);
+    var area = s.area;
     if (instances[instance].flags & INSTANCE_IDENTITY) == 0u {
         let m = instances[instance];
         // Normals go by the inverse transpose: the columns of object_from_world.
-        let n = vec3<f32>(
-            barrier(barrier(barrier(m.object_from_world[0].x * s.n.x) + barrier(m.object_from_world[1].x * s.n.y)) + barrier(m.object_from_world[2].x * s.n.z)),
-            barrier(barrier(barrier(m.object_from_world[0].y * s.n.x) + barrier(m.object_from_world[1].y * s.n.y)) + barrier(m.object_from_world[2].y * s.n.z)),
-            barrier(barrier(barrier(m.object_from_world[0].z * s.n.x) + barrier(m.object_from_world[1].z * s.n.y)) + barrier(m.object_from_world[2].z * s.n.z)));
-        normal = unit(n);
+        let rows = m.object_from_world;
+        let n = vec3<f32>(row_direction(vec4<f32>(rows[0].x, rows[1].x, rows[2].x, 0.0), s.n),
+                          row_direction(vec4<f32>(rows[0].y, rows[1].y, rows[2].y, 0.0), s.n),
+                          row_direction(vec4<f32>(rows[0].z, rows[1].z, rows[2].z, 0.0), s.n));
+        let stretch = length_of(n);
+        normal = vec3<f32>(divide(n.x, stretch), divide(n.y, stretch), divide(n.z, stretch));
         // Area vectors go by the cofactor matrix, det * inverse transpose.
-        let rows = m.world_from_object;
-        area *= length(n) * abs(dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz)));
+        area = barrier(barrier(area * stretch) * m.volume);
         let p = vec3<f32>(row_point(m.world_from_object[0], point), row_point(m.world_from_object[1], point), row_point(m.world_from_object[2], point));
         // The rounding of the transforms there and back (numerics.md, "Instances"), along the normal.
         let reach = max(max(abs(p.x), max(abs(p.y), abs(p.z))), max(abs(m.world_from_object[0].w), max(abs(m.world_from_object[1].w), abs(m.world_from_object[2].w))));
         let error = 16.0 * UNIT * m.scale * reach;
         // A zero component moves away from where the ray points.
         let sign = bitcast<vec3<u32>>(select(normal, -world_direction, normal == vec3<f32>(0.0))) >> vec3<u32>(31u);
-        point = offset_origin(SurfacePoint(p, error, normal, sign.x | (sign.y << 1u) | (sign.z << 2u)));
+        point = offset_origin(SurfacePoint(p, error, normal, sign.x | (sign.y << 1u) | (sign.z << 2u), area));
     }
     surfaces[ray] = Surface(point, best.leaf, normal, best.triangle, area, best.source, 0u, 0u);
-}
-
-// A vector of length one, the same bits in every pipeline.
-fn unit(v: vec3<f32>) -> vec3<f32> {
-    let l = length_of(v);
-    return vec3<f32>(divide(v.x, l), divide(v.y, l), divide(v.z, l));
 }

@@ -292,6 +292,7 @@ struct SurfacePoint {
     delta: f32,         // distance along n that clears the surface
     n: vec3<f32>,       // unit geometric normal on the side that the ray came from
     down: u32,          // bit k: component k of the origin moves down (n[k] < 0; if n[k] is 0, away from where d points)
+    area: f32,          // twice the triangle's area
 }
 
 // Length of x, whose squares stay within the normal range.
@@ -356,7 +357,7 @@ fn surface_point(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, u: f32, v: f32, w: f3
     let near = weighted(weights, abs(a), abs(b), abs(c));
     let m = abs(n);
     let across = barrier(barrier(barrier(m.x * near.x) + barrier(m.y * near.y)) + barrier(m.z * near.z));
-    return SurfacePoint(weighted(weights, a, b, c), barrier(OFFSET_ULPS * across), n, below.x | below.y << 1u | below.z << 2u);
+    return SurfacePoint(weighted(weights, a, b, c), barrier(OFFSET_ULPS * across), n, below.x | below.y << 1u | below.z << 2u, area);
 }
 
 // p + step, at least one ulp from p toward the side of `down`.

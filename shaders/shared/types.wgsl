@@ -98,7 +98,7 @@ struct Instance {
     base: u32,            // global id of triangle 0
     flags: u32,           // INSTANCE_* bits
     scale: f32,           // bound of the ratio of scales
-    padding: u32,
+    volume: f32,          // volume in the world of a unit cube of the object's, in device units
 }
 
 struct Brick {

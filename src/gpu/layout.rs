@@ -63,7 +63,7 @@ mirror! {
     struct Leaf { offset_high: [f32; 3], instance: u32, offset_low: [f32; 3], brick: u32 }
     struct Instance {
         object_from_world: [[f32; 4]; 3], world_from_object: [[f32; 4]; 3],
-        base: u32, flags: u32, scale: f32, padding: u32,
+        base: u32, flags: u32, scale: f32, volume: f32,
     }
     struct Brick {
         vertices: u32, ids: u32, indices: u32, flags: u32,

@@ -279,8 +279,8 @@ fn check_triangles(report: &mut ProbeReport, cases: &[TriangleCase], results: &[
         if h.hit {
             let s = exact::surface_point(a, b, c, &h, case.direction);
             let mut expected = bits(&[s.p[0], s.p[1], s.p[2], s.delta, s.n[0], s.n[1], s.n[2]]);
-            expected.push(s.down);
-            checks[2].compare(&found[13..21], &expected, case);
+            expected.extend([s.down, s.area.to_bits()]);
+            checks[2].compare(&[&found[13..21], &found[24..25]].concat(), &expected, case);
             checks[3].compare(&found[21..24], &bits(&exact::offset_origin(&s)), case);
         }
     }

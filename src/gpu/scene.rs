@@ -175,8 +175,13 @@ impl Placed {
     fn new(resident: &Resident, instance: &bricks::Instance, frame: &Frame) -> Self {
         let object = &resident.objects[instance.object as usize];
         let scale = exp2(object.step_log2 - object.unit_log2);
-        let mut record =
-            layout::Instance { base: instance.base, flags: instance.flags, scale: 1.0, ..Default::default() };
+        let mut record = layout::Instance {
+            base: instance.base,
+            flags: instance.flags,
+            scale: 1.0,
+            volume: 1.0,
+            ..Default::default()
+        };
         if instance.flags & bricks::INSTANCE_IDENTITY != 0 {
             for k in 0..3 {
                 record.object_from_world[k][k] = 1.0;
@@ -213,6 +218,7 @@ impl Placed {
         let norm = |m: &DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
         let ratio = (norm(&linear) * norm(&inverse)).max(1.0);
         record.scale = ratio as f32;
+        record.volume = forward.determinant().abs() as f32;
         // numerics.md, "Instances": 3.5 u κ on the direction and 3.7 u κ (|o| + |c|) on the origin; c, seen from the world,
         // is bounded by |t| and the scene's own extent, which the kernel's reach holds. 32 leaves a wide margin.
         let pad = (32.0 * f64::from(f32::EPSILON) / 2.0 * ratio) as f32;

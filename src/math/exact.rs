@@ -297,6 +297,8 @@ pub struct SurfacePoint {
     pub n: [f32; 3],
     /// Bit k: component k of the origin moves down (`n[k] < 0`; if it is 0, away from where the ray points).
     pub down: u32,
+    /// Twice the triangle's area.
+    pub area: f32,
 }
 
 /// ((x0 y0 + x1 y1) + x2 y2).
@@ -358,7 +360,7 @@ pub fn surface_point(a: [f32; 3], b: [f32; 3], c: [f32; 3], hit: &TriangleHit, d
     weights = weights.map(|x| divide(x, total));
 
     let near = weighted(weights, magnitude(a), magnitude(b), magnitude(c));
-    SurfacePoint { p: weighted(weights, a, b, c), delta: barrier(OFFSET_ULPS * dot(magnitude(n), near)), n, down }
+    SurfacePoint { p: weighted(weights, a, b, c), delta: barrier(OFFSET_ULPS * dot(magnitude(n), near)), n, down, area }
 }
 
 /// p + step, at least one ulp from p toward the side of `down`.
