@@ -145,7 +145,7 @@ fn wrong_usage_is_exit_status_2_and_help_is_0() {
         "walk s.bricks -o out --frames 0",
         "walk s.bricks -o out --effects ao",
         "walk s.bricks -o out --schedule demand",
-        "scene pipes -o s.bricks",
+        "scene pipe -o s.bricks",
         "scene city -o s.bricks --triangles 3",
         "trace s.bricks --rays r.npy -o h.npy --fronts on",
     ] {

@@ -120,19 +120,21 @@ pub struct BuildArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct SceneArgs {
-    /// What to generate: city (blocks of houses along streets)
+    /// What to generate: city (blocks of houses along streets), pipes (a plant in an open frame of steel), terrain
+    /// (mountains, woods and meadows around a pond)
     #[arg(value_name = "KIND")]
     pub kind: Kind,
     /// The file to write; S.near.json and S.far.json, camera paths, are written beside it
     #[arg(short, long, value_name = "S.bricks")]
     pub output: PathBuf,
-    /// Triangles of the scene, about
+    /// Triangles of the scene with its instances, about; up to 150M
     #[arg(long, value_name = "COUNT", default_value = "1M", value_parser = positive_count)]
     pub triangles: u64,
     /// Seed; the same seed and count make the same scene
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Store trees and vehicles once and place them as instances; the triangles are the same
+    /// Store the city's trees and vehicles once and place them as instances; the triangles are the same. Terrain always does
+    /// so with what grows on it
     #[arg(long)]
     pub instanced: bool,
     /// How to cut and round.

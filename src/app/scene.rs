@@ -4,7 +4,7 @@ use super::Usage;
 use super::args::SceneArgs;
 use super::convert::{build_settings, refuse_folder, summarise};
 use anyhow::{Context, Result};
-use brickwalk_convert::build::build;
+use brickwalk_convert::build::build_source;
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Error, Settings, generate, write_paths};
 use std::time::Instant;
@@ -24,7 +24,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
             Error::Triangles { .. } => Usage(format!("--triangles: {error}")).into(),
             error => anyhow::Error::new(error),
         })?;
-        build(scene.whole(), &build_settings(&args.build), &args.output, &progress)?;
+        build_source(&scene, &build_settings(&args.build), &args.output, &progress)?;
         Ok(write_paths(&scene, &args.output)?)
     })??;
     progress.finish();

@@ -4,26 +4,22 @@
 //! what is left of the budget, piece by piece; the rest of its ring stays meadow, and fields surround everything.
 
 use crate::block::block;
-use crate::layout::{Layout, ring};
-use crate::material::materials;
+use crate::layout::Layout;
+use crate::material::city_materials;
 use crate::mesh::Builder;
 use crate::path::{self, CameraPath, Way};
+use crate::rings::{cell_of, empty_cells, grow, last_ring};
 use crate::rng::Rng;
-use crate::scene::{EMPTY, Recipe, parts, union};
+use crate::scene::{Draft, EMPTY, Recipe, rows, union};
 use crate::site::{Library, Site, Use};
 use crate::street;
 use crate::{Scene, Settings};
 use brickwalk_convert::progress::Progress;
-use brickwalk_convert::source::{IDENTITY, MeshOutline, Outline, Placement, Primitive};
-use glam::{DAffine3, DVec2, DVec3};
-use rayon::prelude::*;
+use brickwalk_convert::source::{IDENTITY, Primitive};
+use glam::{DVec2, DVec3};
 
-/// Blocks made at once.
-const BATCH: usize = 64;
 /// What a block takes on average, to guess how many are still needed.
 const USUAL: u64 = 30_000;
-/// Less is not worth beginning a block.
-const LEAST: u64 = 4_000;
 
 /// Where a mesh of the city comes from.
 enum Origin {
@@ -48,7 +44,6 @@ struct City {
 
 /// What is known of a block without its geometry.
 struct Plan {
-    triangles: u64,
     counts: Vec<u32>,
     bounds: [DVec3; 2],
     uses: Vec<Use>,
@@ -63,9 +58,9 @@ impl City {
         site.finish()
     }
 
-    fn plan(&self, index: usize, budget: u64) -> Plan {
+    fn plan(&self, index: usize, budget: u64) -> (u64, Plan) {
         let (mesh, uses, triangles) = self.block(index, budget);
-        Plan { triangles, counts: mesh.counts(), bounds: mesh.bounds(), uses }
+        (triangles, Plan { counts: mesh.counts(), bounds: mesh.bounds(), uses })
     }
 
     fn block_name(&self, index: usize) -> String {
@@ -76,11 +71,11 @@ impl City {
     /// The meadows and fields around the blocks.
     fn surroundings(&self) -> Builder {
         let blocks = self.bounds.len();
-        let (mut b, last) = (Builder::new(), last_ring(blocks));
-        for (i, j) in Layout::ring_cells(last).into_iter().skip(blocks - (4 * last * last) as usize) {
+        let mut b = Builder::new();
+        for (i, j) in empty_cells(blocks) {
             street::meadow(&mut b, &self.layout.cell(i, j));
         }
-        street::country(&mut b, &mut Rng::new(self.seed, &[6]), &self.layout, last);
+        street::country(&mut b, &mut Rng::new(self.seed, &[6]), &self.layout, last_ring(blocks));
         b
     }
 }
@@ -117,15 +112,6 @@ impl Recipe for City {
     }
 }
 
-/// The ring of the last of `blocks` blocks.
-fn last_ring(blocks: usize) -> i64 {
-    let mut last = 0;
-    while (4 * (last + 1) * (last + 1)) < blocks as i64 {
-        last += 1;
-    }
-    last
-}
-
 /// Triangles of the surroundings of `blocks` blocks.
 fn surrounding_triangles(blocks: usize) -> u64 {
     let last = last_ring(blocks) as u64;
@@ -135,103 +121,35 @@ fn surrounding_triangles(blocks: usize) -> u64 {
     18 * meadows + 2 * (all * all - cells * cells)
 }
 
-/// Cell of the block with number `index`.
-fn cell_of(index: usize) -> (i64, i64) {
-    let r = last_ring(index + 1);
-    let cell = Layout::ring_cells(r)[index - (4 * r * r) as usize];
-    debug_assert_eq!(ring(cell.0, cell.1), r);
-    cell
-}
-
-/// The row-major 3x4 matrix of `a`.
-pub fn rows(a: &DAffine3) -> [f64; 12] {
-    let (m, t) = (a.matrix3, a.translation);
-    let mut out = [0.0; 12];
-    for r in 0..3 {
-        for c in 0..3 {
-            out[4 * r + c] = m.col(c)[r];
-        }
-        out[4 * r + 3] = t[r];
-    }
-    out
-}
-
-/// Writes down what the city has.
-struct Draft {
-    city: City,
-    outline: Outline,
-    /// Meshes of the scene that items of the library have become.
-    shared: Vec<Option<u32>>,
-}
-
-impl Draft {
-    fn mesh(&mut self, name: String, origin: Origin, counts: Vec<u32>) -> u32 {
-        self.outline.meshes.push(MeshOutline { name, parts: parts(counts) });
-        self.city.origins.push(origin);
-        self.city.origins.len() as u32 - 1
-    }
-
-    fn place(&mut self, name: String, mesh: u32, world_from_mesh: [f64; 12]) {
-        self.outline.placements.push(Placement { name, mesh, source: 0, world_from_mesh });
-    }
-
-    /// Adds the next block.
-    fn block(&mut self, budget: u64, plan: Plan) {
-        let number = self.city.bounds.len();
-        let name = self.city.block_name(number);
-        let mesh = self.mesh(name.clone(), Origin::Block(number, budget), plan.counts);
-        self.place(name, mesh, IDENTITY);
-        self.city.bounds.push(plan.bounds);
-        // Shared meshes become meshes of the scene when they are first used.
-        for one in plan.uses {
-            let item = &self.city.library.items[one.item];
-            let (name, counts) = (item.name.clone(), item.mesh.counts());
-            let mesh = match self.shared[one.item] {
-                Some(mesh) => mesh,
-                None => self.mesh(name.clone(), Origin::Item(one.item), counts),
-            };
-            self.shared[one.item] = Some(mesh);
-            self.place(name, mesh, rows(&one.world_from_mesh));
-        }
-    }
-}
-
 /// See [`crate::generate`]. Builds every block once, to count.
 pub fn generate(settings: &Settings, progress: &Progress) -> Scene {
-    let Settings { triangles: wanted, seed, instanced, .. } = *settings;
+    let Settings { triangles, seed, instanced, .. } = *settings;
     let (layout, library) = (Layout::new(seed), Library::new(seed));
-    let outline =
-        Outline { materials: materials(), sources: vec![crate::source_of_settings(settings)], ..Outline::default() };
-    let shared = vec![None; library.items.len()];
-    let city = City { seed, instanced, layout, library, origins: Vec::new(), bounds: Vec::new() };
-    let mut draft = Draft { city, outline, shared };
-    let mut total = 0;
-    'all: loop {
-        let count = draft.city.bounds.len();
-        let guess = ((wanted - total) / USUAL + 1) as usize;
-        let batch = count..count + guess.min(BATCH);
-        let plans: Vec<Plan> = batch.into_par_iter().map(|index| draft.city.plan(index, u64::MAX)).collect();
-        for plan in plans {
-            let count = draft.city.bounds.len();
-            let left = wanted.saturating_sub(total + surrounding_triangles(count + 1));
-            let triangles = plan.triangles;
-            if triangles <= left {
-                draft.block(u64::MAX, plan);
-                progress.advance(triangles);
-                total += triangles;
-                continue;
-            }
-            if left >= LEAST || count == 0 {
-                let plan = draft.city.plan(count, left);
-                draft.block(left, plan);
-            }
-            break 'all;
+    // Meshes of the scene that items of the library have become.
+    let mut shared: Vec<Option<u32>> = vec![None; library.items.len()];
+    let mut city = City { seed, instanced, layout, library, origins: Vec::new(), bounds: Vec::new() };
+    let blocks = grow(triangles, USUAL, progress, surrounding_triangles, |index, budget| city.plan(index, budget));
+    let mut draft = Draft::new(city_materials(), settings);
+    for (number, (budget, plan)) in blocks.into_iter().enumerate() {
+        let name = city.block_name(number);
+        let mesh = draft.mesh(name.clone(), plan.counts);
+        city.origins.push(Origin::Block(number, budget));
+        draft.place(name, mesh, IDENTITY);
+        city.bounds.push(plan.bounds);
+        for one in plan.uses {
+            // Shared meshes become meshes of the scene when they are first used.
+            let item = &city.library.items[one.item];
+            let mesh = *shared[one.item].get_or_insert_with(|| {
+                city.origins.push(Origin::Item(one.item));
+                draft.mesh(item.name.clone(), item.mesh.counts())
+            });
+            draft.place(item.name.clone(), mesh, rows(&one.world_from_mesh));
         }
     }
-    let counts = draft.city.surroundings().counts();
-    let mesh = draft.mesh("surroundings".into(), Origin::Surroundings, counts);
+    let mesh = draft.mesh("surroundings".into(), city.surroundings().counts());
+    city.origins.push(Origin::Surroundings);
     draft.place("surroundings".into(), mesh, IDENTITY);
-    Scene::new(draft.outline, Box::new(draft.city))
+    Scene::new(draft.outline, Box::new(city))
 }
 
 #[cfg(test)]

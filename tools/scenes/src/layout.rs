@@ -1,6 +1,7 @@
 //! Where things are: the grid of streets, the order in which blocks are built, what each block is.
 
-use crate::rng::Rng;
+use crate::rings::ring;
+use crate::rng::{Rng, noise};
 use glam::DVec2;
 
 /// Lines of the grid on either side of the origin.
@@ -182,14 +183,7 @@ impl Layout {
     /// A centre of 300 m and lesser ones, from smooth noise.
     fn density(&self, p: DVec2) -> f64 {
         let core = (-p.length_squared() / (2.0 * 150.0f64.powi(2))).exp();
-        let q = p / 330.0;
-        let (fx, fz) = (q.x - q.x.floor(), q.y - q.y.floor());
-        let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
-        let corner =
-            |dx: i64, dz: i64| Rng::new(self.seed, &[2, q.x.floor() as i64 + dx, q.y.floor() as i64 + dz]).unit();
-        let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-        let noise =
-            mix(mix(corner(0, 0), corner(1, 0), smooth(fx)), mix(corner(0, 1), corner(1, 1), smooth(fx)), smooth(fz));
+        let noise = noise(self.seed, &[2], p / 330.0);
         (core + 0.85 * noise * noise * (1.0 - core)).clamp(0.0, 1.0)
     }
 
@@ -221,17 +215,6 @@ impl Layout {
             Zone::Perimeter
         }
     }
-
-    /// The cells of ring `r`, the first beside cell (r, r) of the diagonal through cell (0, 0), then around.
-    pub fn ring_cells(r: i64) -> Vec<(i64, i64)> {
-        let mut cells = Vec::with_capacity((8 * r + 4) as usize);
-        cells.extend((-r..=r).rev().map(|i| (i, r)));
-        cells.extend((-r..=r).rev().map(|j| (-r - 1, j)));
-        cells.extend((-r - 1..r).map(|i| (i, -r - 1)));
-        cells.extend((-r - 1..r).map(|j| (r, j)));
-        cells.dedup();
-        cells
-    }
 }
 
 /// Half the width of an avenue, kerb to kerb.
@@ -239,31 +222,9 @@ pub const AVENUE: f64 = 7.8;
 /// Half the width of a street, kerb to kerb.
 pub const STREET: f64 = 5.2;
 
-/// How many cells lie between cell (i, j) and the crossing at the origin. Ring r has 8 r + 4 cells.
-pub fn ring(i: i64, j: i64) -> i64 {
-    let index = |k: i64| if k >= 0 { k } else { -1 - k };
-    index(i).max(index(j))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::HashSet;
-
-    #[test]
-    fn rings_tile_the_plane_once() {
-        let mut seen = HashSet::new();
-        for r in 0..6 {
-            let cells = Layout::ring_cells(r);
-            assert_eq!(cells.len() as i64, 8 * r + 4);
-            for (i, j) in cells {
-                assert_eq!(ring(i, j), r, "cell {i} {j}");
-                assert!(seen.insert((i, j)), "cell {i} {j} twice");
-            }
-        }
-        assert_eq!(seen.len(), 12 * 12);
-        assert_eq!(Layout::ring_cells(0)[0], (0, 0));
-    }
 
     #[test]
     fn lines_ascend_and_leave_room_for_blocks() {

@@ -1,7 +1,7 @@
 //! Generated scenes of any size, and camera paths through them.
 //!
-//! A scene depends on its settings alone: not on the number of threads, nor on the machine's clock. The city's detail per
-//! block is fixed; asking for more triangles adds blocks around the same centre.
+//! A scene depends on its settings alone: not on the number of threads, nor on the machine's clock. The detail of a place is
+//! fixed; asking for more triangles adds more of it around the same centre.
 
 mod block;
 mod building;
@@ -13,13 +13,18 @@ mod material;
 mod mesh;
 mod open;
 mod path;
+mod pieces;
+mod pipes;
+mod rings;
 mod rng;
 mod roof;
 mod scene;
 mod site;
+mod solid;
 mod soup;
 mod street;
 mod style;
+mod terrain;
 mod vegetation;
 mod vehicle;
 mod window;
@@ -39,23 +44,30 @@ pub use soup::{SoupKind, rotated_instances, soup};
 pub enum Kind {
     /// Streets, buildings, trees, cars.
     City,
+    /// A plant in an open frame of steel, full of pipes.
+    Pipes,
+    /// Mountains, woods and meadows around a pond.
+    Terrain,
 }
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Self; 1] = [Self::City];
+    pub const ALL: [Self; 3] = [Self::City, Self::Pipes, Self::Terrain];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::City => "city",
+            Self::Pipes => "pipes",
+            Self::Terrain => "terrain",
         }
     }
 
     /// The numbers of triangles it can have.
     pub fn triangles(self) -> RangeInclusive<u64> {
         match self {
-            Self::City => 10_000..=150_000_000,
+            Self::City | Self::Pipes => 10_000..=150_000_000,
+            Self::Terrain => 50_000..=150_000_000,
         }
     }
 }
@@ -126,7 +138,8 @@ pub enum Error {
 /// asked for and short of it by less than 5 %.
 ///
 /// Each block of the city is one mesh, placed once with the identity; `settings.instanced` takes trees and vehicles out of
-/// the blocks. The city's first crossing is at the origin, the street at y = 0.
+/// the blocks. The city's first crossing is at the origin, the street at y = 0. Each bay of the plant and each tile of the
+/// terrain is one mesh, too; what grows and lies on the terrain is stored once.
 ///
 /// # Errors
 ///
@@ -139,14 +152,11 @@ pub fn generate(settings: &Settings, progress: &Progress) -> Result<Scene, Error
     progress.phase(kind.name(), asked);
     let scene = match kind {
         Kind::City => city::generate(settings, progress),
+        Kind::Pipes => pipes::generate(settings, progress),
+        Kind::Terrain => terrain::generate(settings, progress),
     };
     progress.finish();
     Ok(scene)
-}
-
-/// The source entry of a generated scene.
-fn source_of_settings(settings: &Settings) -> bricks::Source {
-    source_of(format!("{} seed={} triangles={}", settings.kind, settings.seed, settings.triangles))
 }
 
 /// The source entry of a generated scene: no bytes, and the xxh3-64 of none.

@@ -1,4 +1,4 @@
-//! The materials of the generated city. Vertex colours multiply the base colour and bring the variety.
+//! The materials of generated scenes. Vertex colours multiply the base colour and bring the variety.
 
 use bricks::{MATERIAL_DOUBLE_SIDED, Material, NONE};
 
@@ -15,7 +15,7 @@ pub fn shade(tint: Tint, k: f64) -> Tint {
 
 macro_rules! materials {
     ($($name:ident: $color:expr, $roughness:expr, $flags:expr;)*) => {
-        /// Index of a material of the city.
+        /// Index of a material.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Mat { $($name),* }
 
@@ -31,7 +31,7 @@ macro_rules! materials {
     };
 }
 
-// Base colours are linear albedos. `Paint`, `CarPaint` and `Fabric` are near white: their tint is the colour.
+// Base colours are linear albedos. `Paint`, `CarPaint`, `Fabric`, `Soil` and `Ceramic` are near white: their tint is the colour.
 materials! {
     Asphalt: [0.105, 0.105, 0.11], 0.95, 0;
     Marking: [0.72, 0.72, 0.70], 0.8, 0;
@@ -58,6 +58,16 @@ materials! {
     Rubber: [0.03, 0.03, 0.03], 0.9, 0;
     Fabric: [0.85, 0.85, 0.85], 0.9, MATERIAL_DOUBLE_SIDED;
     Water: [0.05, 0.12, 0.14], 0.05, 0;
+    Steel: [0.78, 0.79, 0.80], 0.45, 0;
+    Soil: [1.0, 1.0, 1.0], 1.0, 0;
+    Ceramic: [0.95, 0.95, 0.95], 0.2, 0;
+}
+
+/// The materials of the city, the first of all.
+pub fn city_materials() -> Vec<Material> {
+    let mut all = materials();
+    all.truncate(Mat::Water as usize + 1);
+    all
 }
 
 /// A plain material.

@@ -82,6 +82,8 @@ impl Frame {
 #[derive(Clone, Debug, Default)]
 struct Part {
     positions: Vec<[f64; 3]>,
+    /// Empty in a mesh whose normals are its faces'.
+    normals: Vec<[f32; 3]>,
     colors: Vec<[f32; 4]>,
     indices: Vec<u32>,
 }
@@ -93,12 +95,18 @@ pub struct Mark(Vec<(usize, usize)>);
 #[derive(Clone, Debug)]
 pub struct Builder {
     parts: Vec<Part>,
+    smooth: bool,
 }
 
 impl Builder {
     /// An empty mesh.
     pub fn new() -> Self {
-        Self { parts: vec![Part::default(); Mat::COUNT] }
+        Self { parts: vec![Part::default(); Mat::COUNT], smooth: false }
+    }
+
+    /// An empty mesh that may have smooth surfaces: it gives a normal to every vertex.
+    pub fn smooth() -> Self {
+        Self { smooth: true, ..Self::new() }
     }
 
     /// Number of triangles.
@@ -124,12 +132,13 @@ impl Builder {
     pub fn rollback(&mut self, mark: &Mark) {
         for (part, &(vertices, indices)) in self.parts.iter_mut().zip(&mark.0) {
             part.positions.truncate(vertices);
+            part.normals.truncate(vertices);
             part.colors.truncate(vertices);
             part.indices.truncate(indices);
         }
     }
 
-    /// Adds a transformed copy of `other`.
+    /// Adds a transformed copy of `other`, which must be flat.
     pub fn append(&mut self, other: &Self, transform: &DAffine3) {
         for (part, from) in self.parts.iter_mut().zip(&other.parts) {
             let base = part.positions.len() as u32;
@@ -151,12 +160,13 @@ impl Builder {
         primitives
             .map(|(m, mut p)| {
                 p.positions.shrink_to_fit();
+                p.normals.shrink_to_fit();
                 p.colors.shrink_to_fit();
                 p.indices.shrink_to_fit();
                 Primitive {
                     material: m as u32,
                     positions: p.positions,
-                    normals: None,
+                    normals: self.smooth.then_some(p.normals),
                     uvs: None,
                     colors: Some(p.colors),
                     indices: p.indices,
@@ -174,6 +184,13 @@ impl Builder {
             part.colors.push([r, g, b, 1.0]);
         }
         let count = part.positions.len() as u32 - base;
+        if self.smooth {
+            let at = |k: u32| DVec3::from_array(part.positions[(base + k) as usize]);
+            // Twice the area as a vector, whatever corners are nearly straight.
+            let area = (2..count).fold(DVec3::ZERO, |sum, k| sum + (at(k - 1) - at(0)).cross(at(k) - at(0)));
+            let normal = area.normalize_or(DVec3::Y).as_vec3().to_array();
+            part.normals.extend((0..count).map(|_| normal));
+        }
         for k in 2..count {
             part.indices.extend([base, base + k - 1, base + k]);
         }
@@ -182,6 +199,41 @@ impl Builder {
     /// A convex polygon, counter-clockwise as seen from outside.
     pub fn fan(&mut self, m: Mat, tint: Tint, points: &[DVec3]) {
         self.polygon(m, points.iter().map(|p| (*p, tint)));
+    }
+
+    /// A smooth surface of `rows` times `columns` vertices, whose outside is on the side of (next column) × (next row); `at`
+    /// gives position, normal and tint. Where two neighbours of a row coincide, a quad is a triangle.
+    pub fn lattice(
+        &mut self,
+        m: Mat,
+        rows: usize,
+        columns: usize,
+        mut at: impl FnMut(usize, usize) -> (DVec3, DVec3, Tint),
+    ) {
+        debug_assert!(self.smooth, "a flat mesh has no smooth surface");
+        let part = &mut self.parts[m as usize];
+        let base = part.positions.len();
+        for row in 0..rows {
+            for column in 0..columns {
+                let (p, n, [r, g, b]) = at(row, column);
+                part.positions.push(p.to_array());
+                part.normals.push(n.as_vec3().to_array());
+                part.colors.push([r, g, b, 1.0]);
+            }
+        }
+        for row in 1..rows {
+            for column in 1..columns {
+                let index = |row: usize, column: usize| base + row * columns + column;
+                let [a, b] = [index(row - 1, column - 1), index(row - 1, column)];
+                let [c, d] = [index(row, column), index(row, column - 1)];
+                if part.positions[a] != part.positions[b] {
+                    part.indices.extend([a, b, c].map(|k| k as u32));
+                }
+                if part.positions[c] != part.positions[d] {
+                    part.indices.extend([a, c, d].map(|k| k as u32));
+                }
+            }
+        }
     }
 
     /// A quad whose first two vertices have the tint `low` and the others `high`.

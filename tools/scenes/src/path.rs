@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Height of a walker's eyes above what he walks on, metres.
 pub const EYE: f64 = 1.7;
 /// Up.
-const UP: [f64; 3] = [0.0, 1.0, 0.0];
+pub const UP: [f64; 3] = [0.0, 1.0, 0.0];
 /// Metres from frame to frame of a walk.
 const STEP: f64 = 0.5;
 /// Radius of the walk's turns, metres; they stay within the crossings.

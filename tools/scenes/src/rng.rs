@@ -66,3 +66,16 @@ impl Rng {
         glam::DVec3::new(r * angle.cos(), y, r * angle.sin())
     }
 }
+
+/// Smooth noise in [0, 1] over the plane: random values at whole numbers, of the thing named by `key`, and cubics between.
+pub fn noise(seed: u64, key: &[i64], q: glam::DVec2) -> f64 {
+    let (fx, fz) = (q.x - q.x.floor(), q.y - q.y.floor());
+    let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
+    let corner = |dx: i64, dz: i64| {
+        let mut name = key.to_vec();
+        name.extend([q.x.floor() as i64 + dx, q.y.floor() as i64 + dz]);
+        Rng::new(seed, &name).unit()
+    };
+    let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    mix(mix(corner(0, 0), corner(1, 0), smooth(fx)), mix(corner(0, 1), corner(1, 1), smooth(fx)), smooth(fz))
+}

@@ -1,10 +1,12 @@
 //! A generated scene as a source: counts, names and bounds are kept, geometry is made again whenever it is read.
 
+use crate::Settings;
 use crate::path::CameraPath;
 use brickwalk_convert::source::{
-    Mesh, MeshOutline, Outline, PartOutline, Primitive, Source, SourceError, SourceScene, SourceTexture,
+    Mesh, MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, Source, SourceError, SourceScene,
+    SourceTexture,
 };
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use lru::LruCache;
 use std::borrow::Cow;
 use std::num::NonZeroUsize;
@@ -12,7 +14,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Makes the meshes of a scene, each alone and the same each time, from any thread.
 pub trait Recipe: Send + Sync {
-    /// The primitives of mesh `index`, each at most [`brickwalk_convert::source::PART_TRIANGLES`] and one a part.
+    /// The primitives of mesh `index`, as the outline has them.
     ///
     /// Runs on one thread: whoever waits for the mesh must not be given other work.
     fn mesh(&self, index: usize) -> Vec<Primitive>;
@@ -30,7 +32,7 @@ type Made = Arc<OnceLock<Vec<Primitive>>>;
 /// A generated scene: a [`Source`] whose parts are made when they are read. Metres, Y up, right-handed; vertex colours, no
 /// textures.
 ///
-/// The meshes read last are kept, two for each thread of the pool in which the scene was generated, as the parts of a mesh
+/// The meshes read last are kept, one for each thread of the pool in which the scene was generated, as the parts of a mesh
 /// are made together.
 pub struct Scene {
     outline: Outline,
@@ -41,7 +43,7 @@ pub struct Scene {
 impl Scene {
     /// A scene of `recipe`, whose meshes have the parts that `outline` says.
     pub(crate) fn new(outline: Outline, recipe: Box<dyn Recipe>) -> Self {
-        let kept = NonZeroUsize::MIN.saturating_add(2 * rayon::current_num_threads());
+        let kept = NonZeroUsize::MIN.saturating_add(rayon::current_num_threads());
         Self { outline, recipe, recent: Mutex::new(LruCache::new(kept)) }
     }
 
@@ -87,7 +89,16 @@ impl Source for Scene {
             let mut recent = self.recent.lock().unwrap_or_else(PoisonError::into_inner);
             recent.get_or_insert(mesh, Made::default).clone()
         };
-        Ok(Cow::Owned(made.get_or_init(|| self.recipe.mesh(mesh))[part].clone()))
+        let primitives = made.get_or_init(|| self.recipe.mesh(mesh));
+        let parts = &self.outline.meshes[mesh].parts;
+        let PartOutline { primitive, triangles } = parts[part];
+        let whole = &primitives[primitive as usize];
+        if whole.indices.len() == 3 * triangles as usize {
+            return Ok(Cow::Owned(whole.clone()));
+        }
+        let before = parts[..part].iter().filter(|p| p.primitive == primitive);
+        let first: usize = before.map(|p| 3 * p.triangles as usize).sum();
+        Ok(Cow::Owned(cut(whole, &whole.indices[first..first + 3 * triangles as usize])))
     }
 
     fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError> {
@@ -95,9 +106,63 @@ impl Source for Scene {
     }
 }
 
-/// The parts of a mesh whose primitives have `counts` triangles.
-pub fn parts(counts: impl IntoIterator<Item = u32>) -> Vec<PartOutline> {
-    (0..).zip(counts).map(|(primitive, triangles)| PartOutline { primitive, triangles }).collect()
+/// The triangles `indices` of `whole`, with no vertices but theirs.
+fn cut(whole: &Primitive, indices: &[u32]) -> Primitive {
+    const UNUSED: u32 = u32::MAX;
+    let mut new = vec![UNUSED; whole.positions.len()];
+    let mut old = Vec::new();
+    let renumbered = indices.iter().map(|&k| {
+        let slot = &mut new[k as usize];
+        if *slot == UNUSED {
+            *slot = old.len() as u32;
+            old.push(k as usize);
+        }
+        *slot
+    });
+    let indices = renumbered.collect();
+    Primitive {
+        material: whole.material,
+        positions: old.iter().map(|&k| whole.positions[k]).collect(),
+        normals: whole.normals.as_ref().map(|all| old.iter().map(|&k| all[k]).collect()),
+        uvs: None,
+        colors: whole.colors.as_ref().map(|all| old.iter().map(|&k| all[k]).collect()),
+        indices,
+    }
+}
+
+/// An outline under construction.
+pub struct Draft {
+    /// What there is so far.
+    pub outline: Outline,
+}
+
+impl Draft {
+    /// Nothing yet, of `materials`.
+    pub fn new(materials: Vec<bricks::Material>, settings: &Settings) -> Self {
+        let name = format!("{} seed={} triangles={}", settings.kind, settings.seed, settings.triangles);
+        let sources = vec![crate::source_of(name)];
+        Self { outline: Outline { materials, sources, ..Outline::default() } }
+    }
+
+    /// Adds a mesh whose primitives have `counts` triangles; returns its index.
+    pub fn mesh(&mut self, name: String, counts: impl IntoIterator<Item = u32>) -> u32 {
+        let mut parts = Vec::new();
+        for (primitive, count) in (0..).zip(counts) {
+            let mut left = count;
+            while left > 0 {
+                let triangles = left.min(PART_TRIANGLES);
+                parts.push(PartOutline { primitive, triangles });
+                left -= triangles;
+            }
+        }
+        self.outline.meshes.push(MeshOutline { name, parts });
+        self.outline.meshes.len() as u32 - 1
+    }
+
+    /// Places a mesh.
+    pub fn place(&mut self, name: String, mesh: u32, world_from_mesh: [f64; 12]) {
+        self.outline.placements.push(Placement { name, mesh, source: 0, world_from_mesh });
+    }
 }
 
 /// Least and greatest coordinates of nothing.
@@ -106,4 +171,17 @@ pub const EMPTY: [DVec3; 2] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
 /// The bounds of two bounds.
 pub fn union(a: [DVec3; 2], b: [DVec3; 2]) -> [DVec3; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// The row-major 3x4 matrix of `a`.
+pub fn rows(a: &DAffine3) -> [f64; 12] {
+    let (m, t) = (a.matrix3, a.translation);
+    let mut out = [0.0; 12];
+    for r in 0..3 {
+        for c in 0..3 {
+            out[4 * r + c] = m.col(c)[r];
+        }
+        out[4 * r + 3] = t[r];
+    }
+    out
 }

@@ -3,6 +3,7 @@
 
 use crate::layout::Cell;
 use crate::mesh::{Builder, Frame};
+use crate::pieces::Pieces;
 use crate::rng::Rng;
 use crate::vegetation::{Tree, tree};
 use crate::vehicle::{Vehicle, vehicle};
@@ -73,44 +74,30 @@ pub struct Site<'a> {
     pub cell: Cell,
     library: &'a Library,
     instanced: bool,
-    budget: u64,
-    mesh: Builder,
+    pieces: Pieces,
     uses: Vec<Use>,
-    triangles: u64,
 }
 
 impl<'a> Site<'a> {
     /// An empty block that takes at most `budget` triangles. With `instanced`, shared meshes are listed instead of copied.
     pub fn new(cell: Cell, library: &'a Library, instanced: bool, budget: u64) -> Self {
-        Self { cell, library, instanced, budget, mesh: Builder::new(), uses: Vec::new(), triangles: 0 }
+        Self { cell, library, instanced, pieces: Pieces::new(Builder::new(), budget), uses: Vec::new() }
     }
 
-    /// Builds something with random numbers of its own; left out whole when the budget does not allow it, without
-    /// consequence for what follows.
+    /// See [`Pieces::piece`].
     pub fn piece(&mut self, rng: &mut Rng, build: impl FnOnce(&mut Builder, &mut Rng)) {
-        let mut own = rng.fork();
-        let mark = self.mesh.mark();
-        let before = self.mesh.triangles();
-        build(&mut self.mesh, &mut own);
-        let added = self.mesh.triangles() - before;
-        if self.triangles + added > self.budget {
-            self.mesh.rollback(&mark);
-        } else {
-            self.triangles += added;
-        }
+        self.pieces.piece(rng, build);
     }
 
     fn place(&mut self, item: usize, f: &Frame, scale: f64) {
-        let triangles = self.library.items[item].triangles;
-        if self.triangles + triangles > self.budget {
+        if !self.pieces.spend(self.library.items[item].triangles) {
             return;
         }
-        self.triangles += triangles;
         let world_from_mesh = DAffine3::from_mat3_translation(DMat3::from_cols(f.u, f.v, f.n) * scale, f.o);
         if self.instanced {
             self.uses.push(Use { item, world_from_mesh });
         } else {
-            self.mesh.append(&self.library.items[item].mesh, &world_from_mesh);
+            self.pieces.append(&self.library.items[item].mesh, &world_from_mesh);
         }
     }
 
@@ -132,6 +119,7 @@ impl<'a> Site<'a> {
 
     /// What was built.
     pub fn finish(self) -> (Builder, Vec<Use>, u64) {
-        (self.mesh, self.uses, self.triangles)
+        let (mesh, triangles) = self.pieces.finish();
+        (mesh, self.uses, triangles)
     }
 }

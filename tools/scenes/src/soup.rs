@@ -89,7 +89,7 @@ pub fn rotated_instances(seed: u64) -> SourceScene {
             let matrix = DMat3::from_quat(turn) * DMat3::from_diagonal(size * uneven * mirror);
             let at = inside(&mut rng, 2.5);
             let a = DAffine3::from_mat3_translation(matrix, at);
-            Placement { name: format!("sphere {k}"), mesh: 0, source: 0, world_from_mesh: crate::city::rows(&a) }
+            Placement { name: format!("sphere {k}"), mesh: 0, source: 0, world_from_mesh: crate::scene::rows(&a) }
         })
         .collect();
     scene(format!("rotated instances seed={seed}"), vec![mesh], placements)

@@ -1,9 +1,12 @@
 //! The generated city as a whole: counts, determinism, the fixed centre, sound geometry, and the way through it.
 
+mod common;
+
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source, SourceScene};
 use brickwalk_scenes::{CameraPath, Error, Kind, Scene, Settings, generate, write_paths};
-use glam::{DAffine3, DMat3, DVec3};
+use common::{clearance, position, same_mesh, triangles};
+use glam::DVec3;
 
 fn lazy(triangles: u64, seed: u64, instanced: bool) -> Scene {
     let settings = Settings { kind: Kind::City, triangles, seed, instanced };
@@ -16,43 +19,6 @@ fn city(triangles: u64, seed: u64, instanced: bool) -> SourceScene {
 
 fn near_path(seed: u64, frames: u32) -> CameraPath {
     lazy(10_000, seed, false).near_path(frames)
-}
-
-fn same_mesh(a: &Mesh, b: &Mesh) -> bool {
-    a.name == b.name
-        && a.primitives.len() == b.primitives.len()
-        && a.primitives.iter().zip(&b.primitives).all(|(p, q)| {
-            p.material == q.material && p.positions == q.positions && p.colors == q.colors && p.indices == q.indices
-        })
-}
-
-/// Every triangle in world space.
-fn triangles(scene: &SourceScene) -> impl Iterator<Item = [DVec3; 3]> {
-    scene.placements.iter().flat_map(|placement| {
-        let m = placement.world_from_mesh;
-        let column = |c: usize| DVec3::new(m[c], m[4 + c], m[8 + c]);
-        let a = DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
-        scene.meshes[placement.mesh as usize].primitives.iter().flat_map(move |p| {
-            p.indices
-                .chunks_exact(3)
-                .map(move |t| [0, 1, 2].map(|k| a.transform_point3(DVec3::from_array(p.positions[t[k] as usize]))))
-        })
-    })
-}
-
-/// Distance from a point to a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
-fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let n = ab.cross(ac);
-    let inside = |u: DVec3, v: DVec3| (v - u).cross(p - u).dot(n) >= 0.0;
-    if inside(a, b) && inside(b, c) && inside(c, a) {
-        return ap.dot(n).abs() / n.length();
-    }
-    let edge = |u: DVec3, v: DVec3| {
-        let t = ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0);
-        (p - u - (v - u) * t).length()
-    };
-    edge(a, b).min(edge(b, c)).min(edge(c, a))
 }
 
 #[test]
@@ -173,35 +139,22 @@ fn instances_are_the_same_triangles() {
     }
 }
 
-fn position(path: &CameraPath, k: usize) -> DVec3 {
-    DVec3::from_array(path.keyframes[k].position)
-}
-
 #[test]
 fn the_walk_keeps_clear_of_everything() {
     for seed in [0, 1, 2] {
         let path = near_path(seed, 300);
         let scene = city(900_000, seed, false);
         let all: Vec<[DVec3; 3]> = triangles(&scene).collect();
-        let clearance = |p: DVec3, radius: f64| {
-            all.iter()
-                .filter(|t| {
-                    let (low, high) = (t[0].min(t[1]).min(t[2]) - radius, t[0].max(t[1]).max(t[2]) + radius);
-                    p.cmpge(low).all() && p.cmple(high).all()
-                })
-                .map(|t| distance(p, *t))
-                .fold(f64::INFINITY, f64::min)
-        };
         for k in 0..300 {
             let p = position(&path, k);
-            let near = clearance(p, 0.5);
+            let near = clearance(&all, p, 0.5);
             assert!(near > 0.5, "seed {seed}, frame {k} at {p}: something within {near} m");
         }
         // Beside the way, where cars stand, it would not be.
         let beside = (0..300).filter(|&k| {
             let (p, t) = (position(&path, k), DVec3::from_array(path.keyframes[k].target));
             let side = (t - p).cross(DVec3::Y).normalize();
-            clearance(p + side * 4.1 - DVec3::Y * 0.7, 0.5) < 0.5
+            clearance(&all, p + side * 4.1 - DVec3::Y * 0.7, 0.5) < 0.5
         });
         assert!(beside.count() > 10, "the test does not see cars");
     }
