@@ -237,7 +237,7 @@ fn buffers_must_be_there_and_long_enough() {
     // Without a URI only a GLB has a buffer.
     let path = write(folder.path(), "test.gltf", &file.json(None));
     let error = error_text(import_one(&path));
-    assert!(error.contains("buffer view 0: buffer 0 has no data"), "{error}");
+    assert!(error.contains("buffer view 0: buffer 0: has no data"), "{error}");
 }
 
 #[test]

@@ -107,7 +107,7 @@ fn obj_defects() {
 }
 
 /// The square as PLY: colours, an element and a list that nobody knows, a quad, a triangle.
-fn ply(encoding: &str) -> Vec<u8> {
+pub fn ply(encoding: &str) -> Vec<u8> {
     let header = format!(
         "ply\nformat {encoding} 1.0\ncomment made by hand\nelement other 2\nproperty list uchar short what\n\
          element vertex 4\nproperty double x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
@@ -202,7 +202,7 @@ fn ply_defects() {
 }
 
 /// The square as binary STL.
-fn stl() -> Vec<u8> {
+pub fn stl() -> Vec<u8> {
     let mut bytes = b"solid but binary".to_vec();
     bytes.resize(80, b' ');
     bytes.extend(2u32.to_le_bytes());
@@ -365,4 +365,50 @@ fn scans() {
         assert_eq!(scene.meshes.iter().map(|m| m.triangle_count()).sum::<u64>(), expected, "{file}");
         assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     }
+}
+
+/// The first difference of the corners of all triangles, in their order.
+///
+/// The plain Sponza holds what another program decoded from the compressed one: integers times a step, plus the least
+/// coordinate, in f32. Coordinates are below 2^12, so an f32 is 2^-12 at most from the next; two roundings of each program
+/// make 2^-10, a hundredth of a step of the quantisation (4000 / 2^14).
+fn sponza_difference(plain: &SourceScene, compressed: &SourceScene) -> Option<String> {
+    let primitives = |scene: &SourceScene| scene.meshes.iter().map(|mesh| mesh.primitives.len()).sum::<usize>();
+    if primitives(plain) != 103 || primitives(compressed) != 103 {
+        return Some("primitives".into());
+    }
+    let pairs =
+        plain.meshes.iter().flat_map(|m| &m.primitives).zip(compressed.meshes.iter().flat_map(|m| &m.primitives));
+    pairs.enumerate().find_map(|(i, (a, b))| {
+        if a.indices.len() != b.indices.len() {
+            return Some(format!("triangles of primitive {i}"));
+        }
+        a.indices.iter().zip(&b.indices).enumerate().find_map(|(corner, (&x, &y))| {
+            let (x, y) = (x as usize, y as usize);
+            let positions = a.positions[x].iter().zip(b.positions[y]).all(|(x, y)| (x - y).abs() <= 2f64.powi(-10));
+            let normals = near(a.normals.as_ref().map(|n| &n[x]), b.normals.as_ref().map(|n| &n[y]), 1e-6);
+            let uvs = near(a.uvs.as_ref().map(|uv| &uv[x]), b.uvs.as_ref().map(|uv| &uv[y]), 1e-5);
+            let same = [("position", positions), ("normal", normals), ("texture coordinates", uvs)];
+            let what = same.iter().find(|(_, same)| !same)?.0;
+            Some(format!("{what} of corner {corner} of primitive {i}: {:?} {:?}", a.positions[x], b.positions[y]))
+        })
+    })
+}
+
+/// Whether both are there and differ by no more than `tolerance`.
+fn near<const N: usize>(a: Option<&[f32; N]>, b: Option<&[f32; N]>, tolerance: f32) -> bool {
+    let (Some(a), Some(b)) = (a, b) else { return false };
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance)
+}
+
+#[test]
+fn the_compressed_sponza_is_the_plain_one() {
+    let Some(folder) = scenes() else { return };
+    let plain = import_one(&folder.join("sponza/Sponza.gltf")).unwrap();
+    let mut compressed = import_one(&folder.join("sponza_draco/sponza_cd.glb")).unwrap();
+    assert_eq!(sponza_difference(&plain, &compressed), None);
+    let primitive = &mut compressed.meshes[0].primitives[7];
+    let corner = primitive.indices[3] as usize;
+    primitive.positions[corner][1] += 0.01;
+    assert!(sponza_difference(&plain, &compressed).is_some_and(|text| text.starts_with("position")));
 }

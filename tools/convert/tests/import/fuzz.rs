@@ -1,8 +1,51 @@
 //! Mutated bytes: importing may fail, but neither panics nor allocates out of proportion.
 
+use crate::formats::{ply, stl};
+use crate::scenes::scenes;
 use crate::writer::*;
+use brickwalk_convert::source::SourceScene;
 use proptest::prelude::*;
 use serde_json::json;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// The system's allocator; it remembers the largest request.
+struct Largest;
+
+static LARGEST_BYTES: AtomicUsize = AtomicUsize::new(0);
+
+/// No file of these tests has as many bytes, and none is decoded to as many at once.
+const MOST_BYTES: usize = 256 << 20;
+
+// SAFETY: every request is passed on to the system's allocator as it is.
+unsafe impl GlobalAlloc for Largest {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        LARGEST_BYTES.fetch_max(layout.size(), Ordering::Relaxed);
+        // SAFETY: the caller's obligations are those of the system's allocator.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: the memory came from the system's allocator with this layout.
+        unsafe { System.dealloc(memory, layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        LARGEST_BYTES.fetch_max(layout.size(), Ordering::Relaxed);
+        // SAFETY: as in `alloc`.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        LARGEST_BYTES.fetch_max(size, Ordering::Relaxed);
+        // SAFETY: as in `alloc` and `dealloc`.
+        unsafe { System.realloc(memory, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Largest = Largest;
 
 /// A small file with most of what importing follows.
 fn rich() -> Writer {
@@ -37,7 +80,15 @@ const TOKENS: [&str; 12] =
 
 /// What importing costs must not depend on what counts claim.
 fn assert_harmless(name: &str, bytes: &[u8]) {
-    match import_bytes(name, bytes) {
+    let start = Instant::now();
+    judge(import_bytes(name, bytes), bytes);
+    assert!(start.elapsed() < Duration::from_secs(10));
+    let largest = LARGEST_BYTES.load(Ordering::Relaxed);
+    assert!(largest < MOST_BYTES, "{largest} bytes were asked for at once");
+}
+
+fn judge(result: Result<SourceScene, String>, bytes: &[u8]) {
+    match result {
         Ok(scene) => {
             let triangles: u64 = scene.meshes.iter().map(|m| m.triangle_count()).sum();
             assert!(triangles <= 64 * bytes.len() as u64, "{triangles} triangles of {} bytes", bytes.len());
@@ -97,6 +148,109 @@ proptest! {
         }
         let json = root.to_string().replace("BIN", &format!("data:,{bin}"));
         assert_harmless("test.gltf", json.as_bytes());
+    }
+}
+
+/// An OBJ file with most of what importing follows.
+const OBJ: &str = "mtllib a.mtl\no one\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0.5\nvn 0 0 1\nusemtl red\n\
+    f 1/1/1 2/2/1 3/1/1 4/2/1\ng two\nf -4 -3 \\\n -2\nf 1//1 2//1 3//1\nl 1 2\n";
+
+/// Words that stand where others should.
+const WORDS: [&str; 14] = [
+    "0",
+    "-1",
+    "4294967295",
+    "4294967296",
+    "-9223372036854775808",
+    "18446744073709551616",
+    "1e308",
+    "nan",
+    "uint",
+    "list",
+    "double",
+    "element",
+    "f",
+    "",
+];
+
+/// `text` with some of its words replaced.
+fn with_words(text: &[u8], edits: &[(prop::sample::Index, usize)]) -> Vec<u8> {
+    let mut words: Vec<&[u8]> = text.split_inclusive(|&c| c == b' ' || c == b'\n').collect();
+    let replaced: Vec<Vec<u8>> = WORDS.iter().map(|word| format!("{word} ").into_bytes()).collect();
+    for (at, word) in edits {
+        let at = at.index(words.len());
+        words[at] = &replaced[*word];
+    }
+    words.concat()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn mutated_obj_ply_and_stl_do_no_harm(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        cut in any::<prop::sample::Index>(),
+    ) {
+        let files = [
+            ("a.obj", OBJ.as_bytes().to_vec()),
+            ("a.ply", ply("ascii")),
+            ("a.ply", ply("binary_little_endian")),
+            ("a.ply", ply("binary_big_endian")),
+            ("a.stl", stl()),
+            ("a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n".to_vec()),
+        ];
+        for (name, mut bytes) in files {
+            assert_harmless(name, &bytes[..cut.index(bytes.len())]);
+            for (at, value) in &edits {
+                let at = at.index(bytes.len());
+                bytes[at] = *value;
+            }
+            assert_harmless(name, &bytes);
+        }
+    }
+
+    #[test]
+    fn replaced_words_do_no_harm(edits in prop::collection::vec((any::<prop::sample::Index>(), 0..WORDS.len()), 1..4)) {
+        assert_harmless("a.obj", &with_words(OBJ.as_bytes(), &edits));
+        for encoding in ["ascii", "binary_little_endian"] {
+            assert_harmless("a.ply", &with_words(&ply(encoding), &edits));
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Compressed geometry and images: the decoders are those of others.
+    #[test]
+    fn mutated_compressed_data_does_no_harm(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
+    ) {
+        let Some(folder) = scenes() else { return Ok(()) };
+        // A file of bytes, and the file that is imported.
+        for (data, scene) in [
+            ("stress/DracoCompressed/0.bin", "stress/DracoCompressed/CesiumMilkTruck.gltf"),
+            ("stress/DucksMeshopt/Duck-vp-12-vt-12-vn-12.glb", "stress/DucksMeshopt/Duck-vp-12-vt-12-vn-12.glb"),
+            ("stress/BoxTexturedWebp/CesiumLogoFlat.webp", "stress/BoxTexturedWebp/BoxTexturedWebp.gltf"),
+        ] {
+            let (data, scene) = (folder.join(data), folder.join(scene));
+            let copies = tempfile::tempdir().unwrap();
+            for entry in std::fs::read_dir(scene.parent().unwrap()).unwrap() {
+                let path = entry.unwrap().path();
+                std::fs::copy(&path, copies.path().join(path.file_name().unwrap())).unwrap();
+            }
+            let mut bytes = std::fs::read(&data).unwrap();
+            for (at, value) in &edits {
+                let at = at.index(bytes.len());
+                bytes[at] = *value;
+            }
+            write(copies.path(), &data.file_name().unwrap().to_string_lossy(), &bytes);
+            let start = Instant::now();
+            judge(import_one(&copies.path().join(scene.file_name().unwrap())), &bytes);
+            assert!(start.elapsed() < Duration::from_secs(10));
+            assert!(LARGEST_BYTES.load(Ordering::Relaxed) < MOST_BYTES);
+        }
     }
 }
 

@@ -4,7 +4,8 @@
 //! truncates indices to 32 bits, so that index 4294967296 would pass for 0. What is not listed here is skipped without
 //! being kept, so that a defect of a camera or an animation cannot spoil the geometry.
 
-use serde::de::{Error, IgnoredAny, Unexpected, Visitor};
+use crate::import::error::one_line;
+use serde::de::{DeserializeOwned, Error, IgnoredAny, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -49,6 +50,17 @@ impl fmt::Display for Uint {
     }
 }
 
+/// Something that leaves geometry alone: malformed, it is not there, and the reason is kept.
+#[derive(Debug)]
+pub(super) struct Lenient<T>(pub Result<T, String>);
+
+impl<'de, T: DeserializeOwned> Deserialize<'de> for Lenient<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(deserializer)?;
+        Ok(Self(T::deserialize(value).map_err(|e| one_line(&e.to_string()))))
+    }
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Document {
@@ -67,13 +79,13 @@ pub(super) struct Document {
     #[serde(default)]
     pub buffers: Vec<Buffer>,
     #[serde(default)]
-    pub materials: Vec<Material>,
+    pub materials: Vec<Lenient<Material>>,
     #[serde(default)]
-    pub textures: Vec<Texture>,
+    pub textures: Vec<Lenient<Texture>>,
     #[serde(default)]
-    pub images: Vec<Image>,
+    pub images: Vec<Lenient<Image>>,
     #[serde(default)]
-    pub samplers: Vec<Sampler>,
+    pub samplers: Vec<Lenient<Sampler>>,
     #[serde(default)]
     pub animations: Vec<IgnoredAny>,
     #[serde(default)]

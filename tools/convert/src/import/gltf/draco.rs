@@ -15,10 +15,14 @@ use std::collections::BTreeMap;
 const MAX_FACES_A_BYTE: u64 = 64;
 
 /// Primitives may have as many faces or points at any rate.
-const FREE_FACES: u64 = 1 << 16;
+const FREE_FACES: u64 = 1 << 20;
 
-/// Most bytes of attributes of a point: a dozen attributes of four floats.
-const MAX_POINT_BYTES: u64 = 192;
+/// Most bytes of attributes for a byte of a compressed primitive, beside those of the free faces. Constants take next to
+/// nothing, but positions are rarely constant.
+const MAX_RATIO: u64 = 1024;
+
+/// Bytes of attributes that any primitive may have.
+const FREE_BYTES: u64 = 64 << 20;
 
 /// A decoded primitive: a list of triangles.
 pub(super) struct Decoded {
@@ -86,7 +90,7 @@ fn decode_view(file: &File, view: Index) -> Result<Decoded, String> {
     let limits = DecodeLimits::permissive()
         .with_max_faces(faces)
         .with_max_points(faces)
-        .with_max_decoded_bytes(faces * MAX_POINT_BYTES);
+        .with_max_decoded_bytes(FREE_BYTES.max(bytes.len() as u64 * MAX_RATIO));
     let mesh = quietly(|| {
         let mut mesh = Mesh::new();
         let mut buffer = DecoderBuffer::new(&bytes).with_limits(limits);

@@ -18,8 +18,8 @@ pub(super) struct File {
     pub label: String,
     /// The JSON.
     pub document: Document,
-    /// Bytes of each buffer; `None` for a buffer that only an extension fills.
-    pub buffers: Vec<Option<Bytes>>,
+    /// Bytes of each buffer, or why there are none.
+    pub buffers: Vec<Result<Bytes, Problem>>,
     /// Decoded bytes of the buffer views that are compressed by EXT_meshopt_compression and in use.
     pub decoded_views: BTreeMap<usize, Bytes>,
     /// Accessors whose sparse indices have been run through.
@@ -35,7 +35,7 @@ pub(super) struct File {
 }
 
 /// Something wrong within a file, before it is known where it was found.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Problem {
     pub what: String,
     pub remedy: &'static str,
@@ -80,46 +80,34 @@ impl File {
         let mut buffers = Vec::with_capacity(document.buffers.len());
         let mut input_bytes = bytes.len();
         for (index, buffer) in document.buffers.iter_mut().enumerate() {
-            let fault = |problem: String, remedy| {
-                let place = format!("buffer {index}");
-                ImportError::Content { file: label.clone(), place, problem, remedy }
-            };
             let data = match buffer.uri.take() {
-                Some(text) => {
-                    let (data, is_new) = found.get(&text).map_err(|missing| match missing {
-                        Missing::Uri(problem) => fault(
-                            format!("{problem} ({})", one_line(&text)),
-                            "put the buffer beside the glTF file and refer to it by a relative path",
-                        ),
-                        Missing::File(problem) => fault(problem, "put the file of the buffer beside the glTF file"),
-                        Missing::Spool(problem) => fault(problem, "make room there"),
-                    })?;
+                Some(text) => found.get(&text).and_then(|(data, is_new)| {
                     if is_new {
                         input_bytes += data.len();
-                        data.hash(&mut hash).map_err(|e| unreadable(e.to_string()))?;
+                        data.hash(&mut hash).map_err(|e| Missing::File(format!("cannot be read: {e}")))?;
                     }
-                    Some(data)
-                }
-                None if index == 0 => bin.take(),
-                None => None,
+                    Ok(data)
+                }),
+                None if index == 0 => bin.take().ok_or(Missing::Nothing),
+                None => Err(Missing::Nothing),
             };
-            buffers.push(match data {
-                Some(data) => {
-                    let stated = buffer.byte_length.0;
-                    let whole = data.slice(0, stated).ok_or_else(|| {
-                        fault(format!("has {} bytes, but byteLength states {stated}", data.len()), EXPORT_AGAIN)
-                    })?;
-                    Some(whole)
-                }
-                None => None,
+            let stated = buffer.byte_length.0;
+            let whole = data.and_then(|data| {
+                let held = data.len();
+                data.slice(0, stated)
+                    .ok_or_else(|| Missing::File(format!("has {held} bytes, but byteLength states {stated}")))
             });
+            // Only an error for what needs the buffer. One without a URI may be there for extensions to fill.
+            let is_told = !matches!(whole, Err(Missing::Nothing));
+            let whole = whole.map_err(Missing::problem);
+            if let (Err(problem), true) = (&whole, is_told) {
+                warnings.add("the buffer cannot be used", || format!("buffer {index} ({})", problem.what));
+            }
+            buffers.push(whole);
         }
-        let uris: Vec<_> = document.images.iter_mut().map(|image| image.uri.take()).collect();
+        let uris: Vec<_> = document.images.iter_mut().map(|image| image.0.as_mut().ok()?.uri.take()).collect();
         let located = uris.into_iter().map(|text| match text {
-            Some(text) => found.get(&text).map(|(data, _)| Some(data)).map_err(|missing| match missing {
-                Missing::Uri(problem) => problem.to_owned(),
-                Missing::File(problem) | Missing::Spool(problem) => problem,
-            }),
+            Some(text) => found.get(&text).map(|(data, _)| Some(data)).map_err(|missing| missing.problem().what),
             None => Ok(None),
         });
         let located: Vec<_> = located.collect();
@@ -136,7 +124,8 @@ impl File {
 
     /// Where image `index` is, if not at its URI.
     fn image(&self, index: usize, at_uri: Option<Bytes>) -> Result<Bytes, String> {
-        match (at_uri, self.document.images[index].buffer_view) {
+        let json = self.document.images[index].0.as_ref().map_err(String::clone)?;
+        match (at_uri, json.buffer_view) {
             (Some(bytes), _) => Ok(bytes),
             (None, Some(view)) => self.view(view).map(|(bytes, _)| bytes).map_err(|problem| problem.what),
             (None, None) => Err("it has neither a URI nor a buffer view".into()),
@@ -165,7 +154,8 @@ impl File {
     /// `length` bytes at `offset` of a buffer.
     pub fn piece(&self, buffer: Index, offset: u64, length: u64) -> Result<Bytes, Problem> {
         let data = item(&self.buffers, buffer, "buffer")?;
-        let data = data.as_ref().ok_or_else(|| Problem::new(format!("buffer {buffer} has no data")))?;
+        let named = |problem: &Problem| Problem { what: format!("buffer {buffer}: {}", problem.what), ..*problem };
+        let data = data.as_ref().map_err(named)?;
         let bytes = offset.checked_add(length).and_then(|end| data.slice(offset, end));
         bytes.ok_or_else(|| {
             let held = data.len();
@@ -181,20 +171,36 @@ struct Found<'a> {
     files: BTreeMap<PathBuf, Result<Bytes, String>>,
 }
 
-/// Why a URI leads nowhere.
+/// Why there are no bytes.
 enum Missing {
-    /// It is not one that is followed.
-    Uri(&'static str),
-    /// The file is not there.
+    /// There is no URI.
+    Nothing,
+    /// The URI is not one that is followed.
+    Uri(String),
+    /// The file is not there, or not as stated.
     File(String),
-    /// Its data cannot be kept.
+    /// What was decoded cannot be kept.
     Spool(String),
+}
+
+impl Missing {
+    fn problem(self) -> Problem {
+        match self {
+            Self::Nothing => Problem::new("has no data"),
+            Self::Uri(what) => {
+                Problem { what, remedy: "put it beside the glTF file and refer to it by a relative path" }
+            }
+            Self::File(what) => Problem { what, remedy: "put it beside the glTF file as it was exported" },
+            Self::Spool(what) => Problem { what, remedy: "make room there" },
+        }
+    }
 }
 
 impl Found<'_> {
     /// The bytes that `text` leads to, and whether it is the first that does.
     fn get(&mut self, text: &str) -> Result<(Bytes, bool), Missing> {
-        match uri::resolve(text).map_err(Missing::Uri)? {
+        let refused = |problem| Missing::Uri(format!("{problem} ({})", one_line(text)));
+        match uri::resolve(text).map_err(refused)? {
             uri::Target::Data(data) => Ok((self.spool.add(&data).map_err(Missing::Spool)?, true)),
             uri::Target::File(below) => {
                 let mut is_new = false;

@@ -1,6 +1,6 @@
 //! Materials and the textures of their base colours (glTF 2.0, sections 3.8 and 3.9).
 
-use super::document::{Document, Index, Material as Json, TextureTransform, Uint};
+use super::document::{Document, Index, Lenient, Material as Json, TextureTransform, Uint};
 use super::file::{File, Problem, item};
 use super::label;
 use crate::import::warnings::Warnings;
@@ -45,7 +45,17 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
     let mut materials = Vec::with_capacity(document.materials.len() + 1);
     let mut textures = Vec::new();
     let mut known = BTreeMap::new();
-    for (index, json) in document.materials.iter().enumerate() {
+    for (index, Lenient(json)) in document.materials.iter().enumerate() {
+        let json = match json {
+            Ok(json) => json,
+            Err(problem) => {
+                warnings.add("the material is malformed, white takes its place", || {
+                    format!("material {index} ({problem})")
+                });
+                materials.push(default_material());
+                continue;
+            }
+        };
         let place = || label("material", index, json.name.as_deref());
         let mut material = convert(json, warnings, &place);
         if let Some(info) = &json.pbr_metallic_roughness.base_color_texture {
@@ -112,10 +122,11 @@ fn texture(
     warnings: &mut Warnings,
     place: &dyn Fn() -> String,
 ) -> Result<Texture, Problem> {
-    let texture = item(&document.textures, index, "texture")?;
+    let malformed = |problem: &String| Problem::new(format!("texture {index}: {problem}"));
+    let texture = item(&document.textures, index, "texture")?.0.as_ref().map_err(malformed)?;
     let mut wrap = [WRAP_REPEAT; 2];
     if let Some(sampler) = texture.sampler {
-        let sampler = item(&document.samplers, sampler, "sampler")?;
+        let sampler = item(&document.samplers, sampler, "sampler")?.0.as_ref().map_err(malformed)?;
         for (wrap, code) in wrap.iter_mut().zip([sampler.wrap_s, sampler.wrap_t]) {
             *wrap = match code.map(|code| code.0) {
                 None | Some(10497) => WRAP_REPEAT,

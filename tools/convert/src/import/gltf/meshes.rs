@@ -115,6 +115,7 @@ pub(super) fn check(
     place: &dyn Fn() -> String,
 ) -> Result<Checked, Problem> {
     let material = json.material.and_then(|index| match item(&file.document.materials, index, "material") {
+        // A malformed one is told where materials are read.
         Ok(_) => Some(index.0 as usize),
         Err(problem) => {
             warnings.add("its material is not in the file; the default one is used", || {
@@ -160,7 +161,7 @@ pub(super) fn check(
     };
     let normals = attribute("NORMAL", &NORMAL)?;
     let colors = attribute("COLOR_0", &COLOR)?;
-    let texture = material.and_then(|m| base_color_set(&file.document.materials[m]));
+    let texture = material.and_then(|m| base_color_set(file.document.materials[m].0.as_ref().ok()?));
     let (set, transform) = texture.unwrap_or_default();
     let uvs = attribute(&format!("TEXCOORD_{set}"), &TEXCOORD)?;
     if uvs.is_none() && texture.is_some() {

@@ -102,7 +102,7 @@ pub(super) fn open(
     }
     let image_name = |texture: &Texture| {
         let image = texture.images[0];
-        display_name(image, document.images[image].name.as_deref())
+        display_name(image, document.images[image].0.as_ref().ok().and_then(|image| image.name.as_deref()))
     };
     let textures: Vec<_> = textures.into_iter().map(|texture| (image_name(&texture), texture)).collect();
     let outline = Outline {

@@ -12,6 +12,9 @@ use std::collections::HashMap;
 use std::io::BufReader;
 use std::path::Path;
 
+/// Most files of materials; further ones are passed over.
+const MAX_LIBRARIES: usize = 64;
+
 /// What an OBJ file holds.
 pub(super) struct Parsed {
     /// Three f64 a row.
@@ -147,7 +150,7 @@ impl Parser<'_> {
             }
             b"mtllib" => {
                 let library = text();
-                if !self.libraries.contains(&library) && self.libraries.len() < 1024 {
+                if !self.libraries.contains(&library) && self.libraries.len() < MAX_LIBRARIES {
                     self.libraries.push(library);
                 }
             }

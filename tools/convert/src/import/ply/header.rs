@@ -4,6 +4,9 @@ use crate::import::bytes::Stream;
 use crate::import::error::one_line;
 use std::io::{BufRead, BufReader, Read};
 
+/// Most kinds of rows.
+const MAX_ELEMENTS: usize = 256;
+
 /// Longest header.
 const MAX_HEADER: u64 = 1 << 20;
 
@@ -152,6 +155,9 @@ pub(super) fn read(stream: &mut BufReader<Stream>) -> Result<Header, String> {
                 let name = words.next().ok_or_else(|| bad("an element has no name"))?.to_owned();
                 let count = words.next().and_then(|count| count.parse().ok());
                 let count = count.ok_or_else(|| bad("the number of an element's rows is not a count"))?;
+                if elements.len() == MAX_ELEMENTS {
+                    return Err(bad("there are too many elements"));
+                }
                 if elements.iter().any(|element| element.name == name) {
                     return Err(bad("an element of this name was there before"));
                 }
