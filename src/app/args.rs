@@ -121,7 +121,7 @@ pub struct BuildArgs {
 #[command(after_help = UNITS)]
 pub struct SceneArgs {
     /// What to generate: city (blocks of houses along streets), pipes (a plant in an open frame of steel), terrain
-    /// (mountains, woods and meadows around a pond)
+    /// (mountains, woods and meadows around a pond), stadium (an ornate teapot in a stadium)
     #[arg(value_name = "KIND")]
     pub kind: Kind,
     /// The file to write; S.near.json and S.far.json, camera paths, are written beside it

@@ -22,6 +22,7 @@ mod scene;
 mod site;
 mod solid;
 mod soup;
+mod stadium;
 mod street;
 mod style;
 mod terrain;
@@ -48,11 +49,13 @@ pub enum Kind {
     Pipes,
     /// Mountains, woods and meadows around a pond.
     Terrain,
+    /// An ornate teapot in a stadium.
+    Stadium,
 }
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Self; 3] = [Self::City, Self::Pipes, Self::Terrain];
+    pub const ALL: [Self; 4] = [Self::City, Self::Pipes, Self::Terrain, Self::Stadium];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
@@ -60,6 +63,7 @@ impl Kind {
             Self::City => "city",
             Self::Pipes => "pipes",
             Self::Terrain => "terrain",
+            Self::Stadium => "stadium",
         }
     }
 
@@ -68,6 +72,7 @@ impl Kind {
         match self {
             Self::City | Self::Pipes => 10_000..=150_000_000,
             Self::Terrain => 50_000..=150_000_000,
+            Self::Stadium => 500_000..=150_000_000,
         }
     }
 }
@@ -139,7 +144,8 @@ pub enum Error {
 ///
 /// Each block of the city is one mesh, placed once with the identity; `settings.instanced` takes trees and vehicles out of
 /// the blocks. The city's first crossing is at the origin, the street at y = 0. Each bay of the plant and each tile of the
-/// terrain is one mesh, too; what grows and lies on the terrain is stored once.
+/// terrain is one mesh, too; what grows and lies on the terrain is stored once. The stadium is whole in every size: more
+/// triangles go into its seats and into the teapot.
 ///
 /// # Errors
 ///
@@ -154,6 +160,7 @@ pub fn generate(settings: &Settings, progress: &Progress) -> Result<Scene, Error
         Kind::City => city::generate(settings, progress),
         Kind::Pipes => pipes::generate(settings, progress),
         Kind::Terrain => terrain::generate(settings, progress),
+        Kind::Stadium => stadium::generate(settings, progress),
     };
     progress.finish();
     Ok(scene)
