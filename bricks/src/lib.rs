@@ -35,4 +35,4 @@ pub use payload::Payload;
 pub use records::*;
 pub use resident::Resident;
 pub use verify::{VerifyReport, verify_file};
-pub use writer::Writer;
+pub use writer::{Partial, Writer};

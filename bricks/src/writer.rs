@@ -7,10 +7,10 @@ use crate::records::Span;
 use crate::resident::Resident;
 use crate::validate;
 use std::borrow::Cow;
-use std::fs;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Bytes collected before they are written.
@@ -19,6 +19,8 @@ const BUFFER_BYTES: usize = 1 << 20;
 /// Writes a scene file under a temporary name in the folder of its own: payloads first, then the resident part. Only
 /// [`Self::finish`] gives it its name, in one step and after everything is on the disk. If the writer is dropped before,
 /// the temporary file is removed; whatever had the name keeps it.
+///
+/// A writer that began with [`Self::reserve`] can instead leave its temporary file, to be continued by another process.
 #[derive(Debug)]
 pub struct Writer {
     path: PathBuf,
@@ -32,36 +34,52 @@ pub struct Writer {
 impl Writer {
     /// Starts a file that will be called `path`. Its folder must exist.
     pub fn create(path: impl AsRef<Path>) -> Result<Writer, Error> {
-        let path = path.as_ref().to_owned();
-        let error =
-            |action: &str, source| Error::Io { path: path.clone(), action: action.to_owned(), part: None, source };
-        if path.is_dir() {
-            return Err(error("write a file of this name; give another", io::ErrorKind::IsADirectory.into()));
-        }
-        let target = fs::canonicalize(&path).unwrap_or_else(|_| path.clone());
-        let Some(name) = target.file_name() else {
-            return Err(error("write a file without a name; give one", io::ErrorKind::InvalidInput.into()));
-        };
-        let mut prefix = std::ffi::OsString::from(".");
-        prefix.push(name);
-        prefix.push(".");
+        let (path, target, name) = names(path.as_ref())?;
         let mut builder = tempfile::Builder::new();
+        let prefix = format!("{name}.");
         builder.prefix(&prefix).suffix(".partial");
         // The permissions of an ordinary new file, not the private ones of a temporary: the umask applies.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let temporary = builder.tempfile_in(folder_of(&target)).map_err(|source| {
-            error("create a temporary file beside it; check the folder and its permissions", source)
-        })?;
-        let mut writer = Writer {
-            file: BufWriter::with_capacity(BUFFER_BYTES, temporary),
-            path,
-            target,
-            position: 0,
-            spans: Vec::new(),
-        };
-        writer.append(&[0; PAGE_BYTES as usize])?;
-        Ok(writer)
+        let temporary = builder.tempfile_in(folder_of(&target)).map_err(|source| create_error(&path, source))?;
+        Partial { path, target, temporary }.start()
+    }
+
+    /// Reserves the temporary file `.NAME.partial` for a file that will be called `path`, for this process alone. Its folder
+    /// must exist. A file that an earlier process left there is kept until [`Partial::start`].
+    pub fn reserve(path: impl AsRef<Path>) -> Result<Partial, Error> {
+        let (path, target, name) = names(path.as_ref())?;
+        let partial = folder_of(&target).join(format!("{name}.partial"));
+        loop {
+            let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&partial);
+            let file = options.map_err(|source| create_error(&path, source))?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => {
+                    let action = "write it while another process does; wait for that or give another name".to_owned();
+                    return Err(Error::Io { path, action, part: None, source: io::ErrorKind::ResourceBusy.into() });
+                }
+                Err(TryLockError::Error(source)) => return Err(create_error(&path, source)),
+            }
+            // The process that held the lock may have renamed or removed the file meanwhile.
+            if is_same(&file, &partial) {
+                let temporary = TempPath::try_from_path(&partial).map_err(|source| create_error(&path, source))?;
+                return Ok(Partial { path, target, temporary: NamedTempFile::from_parts(file, temporary) });
+            }
+        }
+    }
+
+    /// Hands everything written to the operating system, so that it outlives this process, and returns how many bytes that
+    /// is: what [`Partial::resume`] takes.
+    pub fn checkpoint(&mut self) -> Result<u64, Error> {
+        self.file.flush().map_err(|source| self.write_error(source))?;
+        Ok(self.position)
+    }
+
+    /// Leaves the temporary file.
+    pub fn keep(self) {
+        // What is not flushed is not part of any checkpoint.
+        Partial { path: self.path, target: self.target, temporary: self.file.into_parts().0 }.keep();
     }
 
     /// The path that the file will have.
@@ -194,6 +212,115 @@ impl Writer {
     }
 }
 
+/// A reserved temporary file. Dropping it removes the file.
+#[derive(Debug)]
+pub struct Partial {
+    path: PathBuf,
+    target: PathBuf,
+    temporary: NamedTempFile,
+}
+
+impl Partial {
+    /// Leaves the file as it is.
+    pub fn keep(self) {
+        // It has a name already; that it stays is all that is asked for.
+        let _ = self.temporary.into_temp_path().keep();
+    }
+
+    /// Whether nothing was written, as when the file is new.
+    pub fn is_empty(&self) -> bool {
+        self.temporary.as_file().metadata().is_ok_and(|file| file.len() == 0)
+    }
+
+    /// Starts from nothing.
+    pub fn start(self) -> Result<Writer, Error> {
+        let emptied = self.temporary.as_file().set_len(0);
+        let mut writer = self.writer(0, Vec::new());
+        emptied.map_err(|source| writer.write_error(source))?;
+        writer.append(&[0; PAGE_BYTES as usize])?;
+        Ok(writer)
+    }
+
+    /// Continues after `position` bytes with the payloads `spans`, in the order in which they were written. Their bytes are
+    /// checked; `progress` is called with the length of each.
+    ///
+    /// # Errors
+    /// The file is not what it was at that checkpoint; it is left as it is.
+    pub fn resume(self, position: u64, spans: Vec<Span>, progress: &mut dyn FnMut(u64)) -> Result<Writer, Error> {
+        let checked = self.check(position, &spans, progress);
+        let checked = checked.and_then(|()| {
+            let mut file = self.temporary.as_file();
+            file.set_len(position).and_then(|()| file.seek(SeekFrom::Start(position))).map(|_| ())
+        });
+        if let Err(source) = checked {
+            let action = "continue the file; convert again from the start".to_owned();
+            let error = Error::Io { path: self.path.clone(), action, part: None, source };
+            self.keep();
+            return Err(error);
+        }
+        Ok(self.writer(position, spans))
+    }
+
+    fn check(&self, position: u64, spans: &[Span], progress: &mut dyn FnMut(u64)) -> io::Result<()> {
+        let mut file = self.temporary.as_file();
+        let mut bytes = Vec::new();
+        for span in spans {
+            let inside = span.offset.checked_add(span.bytes).is_some_and(|end| end <= position);
+            if !inside || span.bytes > MAX_PAYLOAD_BYTES {
+                return Err(io::Error::new(io::ErrorKind::InvalidData, "a payload lies outside of what was written"));
+            }
+            bytes.resize(span.bytes as usize, 0);
+            file.seek(SeekFrom::Start(span.offset)).and_then(|_| file.read_exact(&mut bytes))?;
+            if xxh3_64(&bytes) != span.checksum {
+                let what = format!("what was written at byte {} is damaged", span.offset);
+                return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+            }
+            progress(span.bytes);
+        }
+        Ok(())
+    }
+
+    fn writer(self, position: u64, spans: Vec<Span>) -> Writer {
+        let Self { path, target, temporary } = self;
+        Writer { path, target, file: BufWriter::with_capacity(BUFFER_BYTES, temporary), position, spans }
+    }
+}
+
+/// `path`, it with a symbolic link followed, and the start of the names of temporary files for it.
+fn names(path: &Path) -> Result<(PathBuf, PathBuf, String), Error> {
+    let path = path.to_owned();
+    let error = |action: &str, kind: io::ErrorKind| {
+        Err(Error::Io { path: path.clone(), action: action.to_owned(), part: None, source: kind.into() })
+    };
+    if path.is_dir() {
+        return error("write a file of this name; give another", io::ErrorKind::IsADirectory);
+    }
+    let target = fs::canonicalize(&path).unwrap_or_else(|_| path.clone());
+    match target.file_name().map(|name| format!(".{}", name.to_string_lossy())) {
+        Some(name) => Ok((path, target, name)),
+        None => error("write a file without a name; give one", io::ErrorKind::InvalidInput),
+    }
+}
+
+fn create_error(path: &Path, source: io::Error) -> Error {
+    let action = "create a temporary file beside it; check the folder and its permissions".to_owned();
+    Error::Io { path: path.to_owned(), action, part: None, source }
+}
+
+/// Whether the name still leads to the open file.
+#[cfg(unix)]
+fn is_same(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+    file.metadata().map(identity).ok() == fs::metadata(path).map(identity).ok()
+}
+
+/// An open file keeps its name here.
+#[cfg(not(unix))]
+fn is_same(_file: &File, _path: &Path) -> bool {
+    true
+}
+
 /// The bytes of a section.
 fn section_bytes(resident: &Resident, section: Section) -> serde_json::Result<Cow<'_, [u8]>> {
     Ok(Cow::Borrowed(match section {
@@ -220,7 +347,7 @@ fn folder_of(path: &Path) -> &Path {
 /// Makes a rename in `folder` last through a power cut.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> io::Result<()> {
-    fs::File::open(folder)?.sync_all()
+    File::open(folder)?.sync_all()
 }
 
 /// Folders cannot be synced here; the rename is in the file system's journal.

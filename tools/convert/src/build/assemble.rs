@@ -118,10 +118,8 @@ impl Dropped {
 /// What the scene has; a bit of `used_materials` for each material that is used.
 pub(super) fn manifest(
     resident: &Resident,
-    scene: &Outline,
-    plan: Plan,
+    (scene, plan, settings): (&Outline, &Plan, &BuildSettings),
     used_materials: &[u64],
-    settings: &BuildSettings,
     dropped: &Dropped,
     warnings: Vec<String>,
 ) -> Manifest {
@@ -155,7 +153,7 @@ pub(super) fn manifest(
         has_wide_bricks: resident.bricks.iter().any(|brick| brick.flags & BRICK_WIDE != 0),
         instance_scale_ratio: plan.instances.iter().fold(1.0, |most, instance| instance.matrix.scale_ratio().max(most)),
         warnings,
-        provenance: plan.provenance,
+        provenance: plan.provenance.clone(),
     }
 }
 

@@ -80,14 +80,14 @@ pub(super) struct BinaryTree {
 
 impl BinaryTree {
     /// A tree of good quality, of any depth, over at least one box whose coordinates are small against the range of f32:
-    /// PLOC with reinsertion, on one thread.
-    pub fn by_obvhs(boxes: &[Box3]) -> Self {
+    /// PLOC with reinsertion, on one thread; `is_fast` searches fewer neighbours and does not reinsert.
+    pub fn by_obvhs(boxes: &[Box3], is_fast: bool) -> Self {
         let vector = |p: [i64; 3]| Vec3A::from_array(p.map(|x| x as f32));
         let aabbs: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(vector(b.min), vector(b.max))).collect();
         if is_chain(&aabbs) {
             return Self::by_splits(boxes, CHAIN_DEPTH);
         }
-        let config = BvhBuildParams::medium_build();
+        let config = if is_fast { BvhBuildParams::very_fast_build() } else { BvhBuildParams::medium_build() };
         let mut bvh: Bvh2 = PlocBuilder::with_capacity(aabbs.len()).build(
             config.ploc_search_distance,
             &aabbs,
@@ -98,7 +98,7 @@ impl BinaryTree {
         // Where many nodes are as large as the root the search for a better place visits them all and finds none.
         let areas = bvh.nodes.iter().map(|node| f64::from(node.aabb().half_area())).sum::<f64>();
         let root = f64::from(bvh.nodes[0].aabb().half_area());
-        if areas <= root * CROWDED {
+        if !is_fast && areas <= root * CROWDED {
             ReinsertionOptimizer::default().run(&mut bvh, config.reinsertion_batch_ratio, None);
         }
 
@@ -242,8 +242,12 @@ mod tests {
     fn trees_are_trees_and_better_than_chance() {
         for count in [1, 2, 3, 17, 5000] {
             let boxes = boxes(count);
-            let trees =
-                [BinaryTree::by_obvhs(&boxes), BinaryTree::by_splits(&boxes, 64), BinaryTree::by_splits(&boxes, 0)];
+            let trees = [
+                BinaryTree::by_obvhs(&boxes, false),
+                BinaryTree::by_splits(&boxes, 64),
+                BinaryTree::by_splits(&boxes, 0),
+            ];
+            check(&BinaryTree::by_obvhs(&boxes, true), &boxes);
             for tree in &trees {
                 check(tree, &boxes);
             }
@@ -285,10 +289,10 @@ mod tests {
         let chains = [vec![boxes(1)[0]; 16384], (1..16384).map(concentric).collect(), series.collect()];
         for boxes in chains {
             assert!(is_chain_of(&boxes));
-            check(&BinaryTree::by_obvhs(&boxes), &boxes);
+            check(&BinaryTree::by_obvhs(&boxes, false), &boxes);
         }
         let shuffled: Vec<Box3> = (0..16381).map(|i| concentric(1 + i * 7919 % 16381)).collect();
-        check(&BinaryTree::by_obvhs(&shuffled), &shuffled);
+        check(&BinaryTree::by_obvhs(&shuffled, false), &shuffled);
         assert!(!is_chain_of(&boxes(16384)));
     }
 }

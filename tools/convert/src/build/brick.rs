@@ -25,6 +25,8 @@ pub(super) struct BrickContext<'a> {
     pub lattice: Lattice,
     /// Mean colours by material.
     pub materials: &'a [MeanColors],
+    /// Whether trees are built fast rather than well.
+    pub is_fast: bool,
 }
 
 /// A brick ready to be written.
@@ -95,8 +97,8 @@ fn collect(context: &BrickContext, rounded: impl Iterator<Item = Rounded>, count
 }
 
 /// The wide tree over the boxes of the triangles, of at most `levels` levels; 8 always suffice.
-fn build_tree(boxes: &[Box3], levels: u32) -> WideTree {
-    let tree = collapse(&BinaryTree::by_obvhs(boxes), LEAF_TRIANGLES);
+fn build_tree(boxes: &[Box3], is_fast: bool, levels: u32) -> WideTree {
+    let tree = collapse(&BinaryTree::by_obvhs(boxes, is_fast), LEAF_TRIANGLES);
     if tree.height <= levels {
         return tree;
     }
@@ -137,7 +139,7 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     let origin: [i64; 3] = std::array::from_fn(|k| nearest_origin(bounds.min[k] + (bounds.max[k] - bounds.min[k]) / 2));
     let relative = |p: [i64; 3]| -> [i64; 3] { std::array::from_fn(|k| p[k] - origin[k]) };
     let relative_boxes: Vec<Box3> = boxes.iter().map(|b| Box3 { min: relative(b.min), max: relative(b.max) }).collect();
-    let tree = build_tree(&relative_boxes, MAX_BRICK_HEIGHT);
+    let tree = build_tree(&relative_boxes, context.is_fast, MAX_BRICK_HEIGHT);
 
     let mut vertices = Renumbering::new(points.len());
     let mut attribute_vertices = Renumbering::new(contents.attributes.values().len());
@@ -279,7 +281,7 @@ mod tests {
             })
             .collect();
         let heights = [MAX_BRICK_HEIGHT, 14].map(|levels| {
-            let tree = build_tree(&boxes, levels);
+            let tree = build_tree(&boxes, false, levels);
             assert!(tree.height <= levels, "{} levels", tree.height);
             let mut items = tree.items.clone();
             items.sort_unstable();

@@ -12,9 +12,6 @@ use crate::source::MeshOutline;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
-/// Triangles of one task where all geometry is in memory.
-const TASK_TRIANGLES: u32 = 1 << 14;
-
 /// An object cut into the triangles of its bricks.
 #[derive(Debug)]
 pub(super) struct ObjectCut {
@@ -60,13 +57,13 @@ pub(super) fn in_memory(
 }
 
 /// Cuts an object in memory.
-fn cut_object(
+pub(super) fn cut_object(
     reader: &Reader,
     object: &ObjectPlan,
     settings: &BuildSettings,
     progress: &Progress,
 ) -> Result<(ObjectCut, Gathered), BuildError> {
-    let runs = object.runs(TASK_TRIANGLES);
+    let runs = object.runs(reader.task_triangles());
     // Cuts do not depend on the order of the items.
     let items = Mutex::new(Vec::with_capacity(object.slots as usize));
     let gathered: Vec<Result<Gathered, BuildError>> = runs

@@ -9,6 +9,8 @@ use rayon::prelude::*;
 /// A brick to be encoded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Job {
+    /// Its number among the bricks of all objects.
+    pub index: u32,
     /// Its object.
     pub object: u32,
     /// Where its triangles begin.
@@ -30,7 +32,12 @@ pub(super) struct BrickWriter<'a> {
     pub batch_triangles: usize,
 }
 
-impl BrickWriter<'_> {
+impl<'a> BrickWriter<'a> {
+    /// Writes about `bricks` bricks of `objects` objects.
+    pub fn new(writer: &'a mut Writer, bricks: usize, objects: usize, batch_triangles: usize) -> Self {
+        Self { writer, records: Vec::with_capacity(bricks), dropped: vec![0; objects], batch_triangles }
+    }
+
     /// Encodes and writes bricks. `encode` makes one, or none if no triangle of it has an area; it also returns how many
     /// have none.
     pub fn write(
@@ -95,7 +102,7 @@ pub(super) fn jobs<'a>(bricks: impl Iterator<Item = &'a [u32]>) -> Result<Vec<Jo
     for (object, bricks) in (0u32..).zip(bricks) {
         let mut first = 0;
         for &count in bricks {
-            jobs.push(Job { object, first, count: count as usize });
+            jobs.push(Job { index: jobs.len() as u32, object, first, count: count as usize });
             first += count as usize;
         }
     }
@@ -107,6 +114,7 @@ pub(super) fn jobs<'a>(bricks: impl Iterator<Item = &'a [u32]>) -> Result<Vec<Jo
 pub(super) fn contexts<'a>(
     lattices: &[super::lattice::Lattice],
     materials: &'a [super::attributes::MeanColors],
+    is_fast: bool,
 ) -> Vec<BrickContext<'a>> {
-    (0u32..).zip(lattices).map(|(index, &lattice)| BrickContext { index, lattice, materials }).collect()
+    (0u32..).zip(lattices).map(|(index, &lattice)| BrickContext { index, lattice, materials, is_fast }).collect()
 }

@@ -112,6 +112,44 @@ pub enum BuildError {
     /// A part of the source could not be read.
     #[error(transparent)]
     Source(#[from] crate::source::SourceError),
+    /// A file of the scratch folder could not be made, read or written.
+    #[error(
+        "{}: cannot {action} this scratch file or folder: {source}; free some space there or name another folder with --scratch",
+        path.display()
+    )]
+    Scratch {
+        /// The file or folder.
+        path: std::path::PathBuf,
+        /// What was being done.
+        action: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A scratch file is not what was written.
+    #[error("{}: this scratch file is damaged; convert again without --resume", path.display())]
+    ScratchDamaged {
+        /// The file.
+        path: std::path::PathBuf,
+    },
+    /// There is a folder where the scratch folder would be.
+    #[error(
+        "{}: this folder is not the scratch folder of an earlier conversion; remove it or name another folder with --scratch",
+        path.display()
+    )]
+    NotScratch {
+        /// The folder.
+        path: std::path::PathBuf,
+    },
+    /// A conversion that is to be continued is another one.
+    #[error(
+        "{}: the interrupted conversion had other inputs or options; give those (--memory and --threads too) or leave out \
+         --resume",
+        path.display()
+    )]
+    OtherConversion {
+        /// The scratch folder.
+        path: std::path::PathBuf,
+    },
     /// Somebody asked to stop.
     #[error(transparent)]
     Interrupted(#[from] crate::progress::Interrupted),

@@ -90,19 +90,19 @@ impl ObjectPlan {
         self.parts.partition_point(|part| part.first_slot <= slot) - 1
     }
 
-    /// All its triangles, in runs of about `triangles` of them and at most twice as many, in order of slots.
+    /// All its triangles, in runs of at most `triangles`, in order of slots.
     pub fn runs(&self, triangles: u32) -> Vec<Vec<Piece<'_>>> {
         let mut runs = Vec::new();
         let (mut run, mut length) = (Vec::new(), 0);
         for part in &self.parts {
             for first in (0..part.triangles).step_by(triangles as usize) {
                 let end = part.triangles.min(first.saturating_add(triangles));
-                run.push(Piece { part, first, end });
-                length += end - first;
-                if length >= triangles {
+                if length + (end - first) > triangles {
                     runs.push(std::mem::take(&mut run));
                     length = 0;
                 }
+                run.push(Piece { part, first, end });
+                length += end - first;
             }
         }
         if !run.is_empty() {

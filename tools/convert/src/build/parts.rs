@@ -3,9 +3,12 @@
 use super::error::BuildError;
 use super::objects::{Part, Piece, Plan, rule};
 use crate::progress::Progress;
-use crate::source::{Outline, Primitive, Source};
+use crate::source::{Outline, PART_TRIANGLES, Primitive, Source};
 use rayon::prelude::*;
 use std::borrow::Cow;
+
+/// Triangles of one task where all geometry is in memory.
+const TASK_TRIANGLES: u32 = 1 << 14;
 
 /// The parts of a source, by mesh.
 type Loaded<'a> = Vec<Vec<Option<Cow<'a, Primitive>>>>;
@@ -18,6 +21,16 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
+    /// Reads a part each time it is asked for.
+    pub fn lazy(source: &'a dyn Source) -> Self {
+        Self { source, loaded: None }
+    }
+
+    /// Triangles of one task: small where geometry is in memory, else so that parts are read once.
+    pub fn task_triangles(&self) -> u32 {
+        if self.loaded.is_some() || self.source.is_in_memory() { TASK_TRIANGLES } else { PART_TRIANGLES }
+    }
+
     /// Reads all parts that the plan uses. The first error in order of meshes is the one returned.
     pub fn eager(source: &'a dyn Source, plan: &Plan, progress: &Progress) -> Result<Self, BuildError> {
         let outline = source.outline();

@@ -1,13 +1,14 @@
 //! How to build, and what was built.
 
 use super::error::BuildError;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Largest number of triangles a brick may be allowed.
 const LARGEST_BRICK: u32 = 1 << 20;
 
 /// How to build.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BuildSettings {
     /// Most triangles of a brick, 1 to 1,048,576. Changes neither ids nor positions.
     pub brick_triangles: u32,
@@ -22,6 +23,16 @@ pub struct BuildSettings {
     /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they too are stored
     /// once.
     pub bake_budget_triangles: u64,
+    /// Memory to get by with, in bytes, the source not counted if it lies in memory; `None`: a quarter of the machine's.
+    /// What does not fit goes to the scratch folder. Changes nothing but the time.
+    pub memory_bytes: Option<u64>,
+    /// Builds the trees in bricks faster, for rays that take longer. Changes neither ids nor positions.
+    pub fast: bool,
+    /// Folder for the scratch folder; `None`: that of the output.
+    pub scratch: Option<PathBuf>,
+    /// Continues an interrupted conversion of the same source with the same settings, if there is one. Only a conversion
+    /// that did not fit in memory leaves something to continue.
+    pub resume: bool,
 }
 
 impl Default for BuildSettings {
@@ -33,6 +44,10 @@ impl Default for BuildSettings {
             drop_non_finite: false,
             instance_min_triangles: 1000,
             bake_budget_triangles: 4_000_000,
+            memory_bytes: None,
+            fast: false,
+            scratch: None,
+            resume: false,
         }
     }
 }

@@ -1,8 +1,11 @@
 //! Mip chains of textures, averaged in linear light.
 
+use super::attributes::MeanColors;
 use super::error::BuildError;
-use crate::source::SourceTexture;
-use bricks::{MAX_TEXTURE_SIZE, Material, NONE, Texture, WRAP_MIRROR, WRAP_REPEAT, Writer};
+use super::journal::{WordReader, Words};
+use crate::progress::Progress;
+use crate::source::{Outline, Source, SourceTexture};
+use bricks::{MAX_TEXTURE_SIZE, Material, NONE, Span, Texture, WRAP_MIRROR, WRAP_REPEAT, Writer};
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
@@ -26,25 +29,52 @@ pub(super) fn used(count: usize, materials: &[Material]) -> Vec<usize> {
     (0..count).filter(|&index| is_used[index]).collect()
 }
 
-/// The textures that are stored.
-#[derive(Clone, Debug)]
-pub(super) struct Stored {
-    /// Their records.
+/// Materials and textures as they are stored.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Textures {
+    /// All materials, with the indices of the textures that are stored.
+    pub materials: Vec<Material>,
+    /// Records of the textures in use.
     pub records: Vec<Texture>,
-    /// Their mean linear RGB.
-    pub means: Vec<[f32; 3]>,
-    /// Their indices, by index in the source.
+    /// What the source warned of, and which textures were left out.
+    pub warnings: Vec<String>,
+    /// Mean linear RGB of the textures.
+    means: Vec<[f32; 3]>,
+    /// Their indices, by index in the source; [`NONE`] where it is not stored.
     new_of_old: Vec<u32>,
 }
 
-impl Stored {
-    /// None of `count`.
-    pub fn new(count: usize) -> Self {
-        Self { records: Vec::new(), means: Vec::new(), new_of_old: vec![NONE; count] }
+/// Writes the textures in use, `at_once` of which are in memory together. One that cannot be read is left out with a
+/// warning.
+pub(super) fn write(
+    source: &dyn Source,
+    at_once: usize,
+    writer: &mut Writer,
+    progress: &Progress,
+) -> Result<Textures, BuildError> {
+    let Outline { textures: names, materials, warnings, .. } = source.outline();
+    let mut stored =
+        Textures { new_of_old: vec![NONE; names.len()], warnings: warnings.clone(), ..Textures::default() };
+    let used = used(names.len(), materials);
+    progress.phase("textures", used.len() as u64);
+    for some in used.chunks(at_once) {
+        progress.check()?;
+        let read = |&index: &usize| source.texture(index).map(|texture| encode(&texture));
+        let encoded: Vec<_> = some.par_iter().with_max_len(1).map(read).collect();
+        for (&index, texture) in some.iter().zip(encoded) {
+            match texture {
+                Ok(texture) => stored.push(index, texture?, writer)?,
+                Err(error) => stored.warnings.push(format!("{error}; the texture is left out")),
+            }
+            progress.advance(1);
+        }
     }
+    stored.materials = stored.renumber(materials);
+    Ok(stored)
+}
 
-    /// Writes texture `index` of the source.
-    pub fn push(&mut self, index: usize, texture: EncodedTexture, writer: &mut Writer) -> Result<(), BuildError> {
+impl Textures {
+    fn push(&mut self, index: usize, texture: EncodedTexture, writer: &mut Writer) -> Result<(), BuildError> {
         self.new_of_old[index] = self.records.len() as u32;
         self.records.push(Texture { texels: writer.write(&texture.texels)?, ..texture.record });
         self.means.push(texture.mean);
@@ -52,12 +82,46 @@ impl Stored {
     }
 
     /// Materials with the indices among the stored textures; without one where it is not stored.
-    pub fn renumber(&self, materials: &[Material]) -> Vec<Material> {
+    fn renumber(&self, materials: &[Material]) -> Vec<Material> {
         let renumber = |material: &Material| match material.base_color_texture {
             NONE => *material,
             old => Material { base_color_texture: self.new_of_old[old as usize], ..*material },
         };
         materials.iter().map(renumber).collect()
+    }
+
+    /// Mean colours by material.
+    pub fn material_means(&self) -> Vec<MeanColors> {
+        self.materials.iter().map(|material| MeanColors::of(material, &self.means)).collect()
+    }
+
+    /// For the journal: first how far the scene file is written and the payloads.
+    pub fn to_words(&self, position: u64) -> Vec<u64> {
+        let spans: Vec<Span> = self.records.iter().map(|record| record.texels).collect();
+        let mut words = Words::default();
+        words.put(position).put_records(&spans).put_records(&self.records).put_records(&self.means);
+        words.put_records(&self.new_of_old).put(self.warnings.len() as u64);
+        for warning in &self.warnings {
+            words.put_records(warning.as_bytes());
+        }
+        words.0
+    }
+
+    /// From the journal.
+    pub fn from_words(words: &[u64], outline: &Outline) -> Option<Self> {
+        let mut words = WordReader(words);
+        words.take()?;
+        words.take_records::<Span>()?;
+        let (records, means) = (words.take_records()?, words.take_records()?);
+        let new_of_old: Vec<u32> = words.take_records()?;
+        let count = words.take()?;
+        let warnings = (0..count).map(|_| String::from_utf8(words.take_records()?).ok()).collect::<Option<_>>()?;
+        let mut stored = Self { materials: Vec::new(), records, warnings, means, new_of_old };
+        if stored.new_of_old.len() != outline.textures.len() {
+            return None;
+        }
+        stored.materials = stored.renumber(&outline.materials);
+        Some(stored)
     }
 }
 
@@ -235,7 +299,7 @@ mod tests {
         let materials = [material(3), material(NONE), material(1), material(3), material(2)];
         assert_eq!(used(5, &materials), [1, 2, 3]);
         // Texture 2 could not be read.
-        let stored = Stored { records: vec![], means: vec![], new_of_old: vec![NONE, 0, NONE, 1, NONE] };
+        let stored = Textures { new_of_old: vec![NONE, 0, NONE, 1, NONE], ..Textures::default() };
         let renumbered = stored.renumber(&materials);
         let indices: Vec<u32> = renumbered.iter().map(|material| material.base_color_texture).collect();
         assert_eq!(indices, [1, NONE, 0, 1, NONE]);

@@ -319,7 +319,7 @@ mod tests {
     fn collapsed_trees_hold_every_item_once() {
         for count in [1, 2, 3, 4, 8, 9, 25, 3000] {
             let boxes = boxes(count);
-            let binary = BinaryTree::by_obvhs(&boxes);
+            let binary = BinaryTree::by_obvhs(&boxes, false);
             check(&collapse(&binary, 3), &boxes, 3);
             let halved = BinaryTree::by_splits(&boxes, 0);
             for leaf_items in [1, 3] {
@@ -347,7 +347,7 @@ mod tests {
         let corner = |c: i64| [c >> 2 & 1, c >> 1 & 1, c & 1].map(|bit| bit * 10);
         let order = [5, 0, 7, 2, 1, 6, 3, 4];
         let boxes: Vec<Box3> = order.iter().map(|&c| Box3 { min: corner(c), max: corner(c).map(|x| x + 1) }).collect();
-        let tree = collapse(&BinaryTree::by_obvhs(&boxes), 1);
+        let tree = collapse(&BinaryTree::by_obvhs(&boxes, false), 1);
         let root = &tree.nodes[0];
         for (slot, child) in root.children.iter().enumerate() {
             assert_eq!(child.unwrap().bounds.min, corner(slot as i64), "slot {slot}");

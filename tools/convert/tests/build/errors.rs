@@ -77,8 +77,8 @@ fn lattices_that_are_too_fine_are_refused() {
     let scene = plain(vec![sheet(10, 1000.0)]);
     let settings = BuildSettings { lattice_log2: Some(-40), ..settings(100) };
     let BuildError::LatticeTooFine { least, .. } = error(&scene, &settings) else { panic!("another error") };
-    assert!(try_build(&scene, &BuildSettings { lattice_log2: Some(least), ..settings }).is_ok());
-    assert!(try_build(&scene, &BuildSettings { lattice_log2: Some(least - 1), ..settings }).is_err());
+    assert!(try_build(&scene, &BuildSettings { lattice_log2: Some(least), ..settings.clone() }).is_ok());
+    assert!(try_build(&scene, &BuildSettings { lattice_log2: Some(least - 1), ..settings.clone() }).is_err());
 }
 
 #[test]
@@ -115,10 +115,10 @@ fn settings_outside_their_range_are_refused() {
     let scene = plain(vec![sheet(3, 1.0)]);
     let good = settings(100);
     for bad in [
-        BuildSettings { brick_triangles: 0, ..good },
-        BuildSettings { brick_triangles: (1 << 20) + 1, ..good },
-        BuildSettings { threads: Some(0), ..good },
-        BuildSettings { lattice_log2: Some(-200), ..good },
+        BuildSettings { brick_triangles: 0, ..good.clone() },
+        BuildSettings { brick_triangles: (1 << 20) + 1, ..good.clone() },
+        BuildSettings { threads: Some(0), ..good.clone() },
+        BuildSettings { lattice_log2: Some(-200), ..good.clone() },
     ] {
         assert!(matches!(error(&scene, &bad), BuildError::Setting { .. }), "{bad:?}");
     }

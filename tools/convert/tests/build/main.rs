@@ -1,5 +1,6 @@
 //! Builds small scenes and looks into the files: boxes, ids, positions, and that settings change nothing they must not.
 
+mod bounded;
 mod decode;
 mod degenerate;
 mod errors;

@@ -1,0 +1,301 @@
+//! The steps of a conversion, in memory and by way of the disk.
+
+use super::assemble::{self, Dropped};
+use super::bounded::Bounded;
+use super::brick::{self, BrickContext, EncodedBrick};
+use super::budget::Budget;
+use super::cut::{self, ObjectCut};
+use super::encode::{self, BrickWriter, Job};
+use super::error::BuildError;
+use super::journal::{self, Journal, Step};
+use super::lattice::Lattice;
+use super::objects::{ObjectPlan, Placed, Plan};
+use super::parts::Reader;
+use super::scratch::{self, Scratch};
+use super::settings::{BuildSettings, BuildSummary};
+use super::textures::{self, Textures};
+use super::triangle::Triangle;
+use crate::progress::Progress;
+use crate::source::{Outline, Source};
+use bricks::{Brick, Manifest, Partial, Resident, Writer};
+use std::fmt::{self, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use xxhash_rust::xxh3::Xxh3;
+
+/// Triangles a thread encodes before what is encoded is written, where everything is in memory.
+const BATCH_TRIANGLES: usize = 1 << 18;
+
+/// One conversion.
+pub(super) struct Conversion<'a> {
+    /// What is converted.
+    pub source: &'a dyn Source,
+    /// Its outline.
+    pub outline: &'a Outline,
+    /// What is built.
+    pub plan: Plan<'a>,
+    /// How.
+    pub settings: &'a BuildSettings,
+    /// Where to.
+    pub output: &'a Path,
+    /// Who watches.
+    pub progress: &'a Progress,
+}
+
+/// What is written, but for the resident part.
+struct Written {
+    textures: Textures,
+    cuts: Vec<ObjectCut>,
+    used_materials: Vec<u64>,
+    lattices: Vec<Lattice>,
+    bricks: Vec<Brick>,
+    /// Triangles that rounding left without area, by object.
+    rounded_away: Vec<u32>,
+    warnings: Vec<String>,
+}
+
+impl Conversion<'_> {
+    /// Converts with all geometry in memory.
+    pub fn in_memory(&self) -> Result<BuildSummary, BuildError> {
+        let scratch = scratch::path_for(self.output, self.settings);
+        if scratch::earlier(&scratch, self.settings.resume)?.is_some() {
+            return Err(BuildError::OtherConversion { path: scratch });
+        }
+        let mut clock = Clock::new();
+        let mut writer = Writer::create(self.output)?;
+        let written = self.write_in_memory(&mut writer, &mut clock)?;
+        self.finish(written, writer, clock)
+    }
+
+    fn write_in_memory(&self, writer: &mut Writer, clock: &mut Clock) -> Result<Written, BuildError> {
+        let Self { outline, plan, settings, progress, .. } = self;
+        let textures = textures::write(self.source, rayon::current_num_threads(), writer, progress)?;
+        let mut warnings = textures.warnings.clone();
+        clock.end("textures");
+        let reader = Reader::eager(self.source, plan, progress)?;
+        clock.end("read");
+        warnings.extend(self.source.repairs());
+        let (cuts, used_materials) = cut::in_memory(&reader, plan, settings, progress)?;
+        clock.end("partition");
+        let lattices = cut::choose(plan, &outline.meshes, &cuts, settings, &mut warnings)?;
+        let means = textures.material_means();
+        let contexts = encode::contexts(&lattices, &means, settings.fast);
+        let jobs = encode::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
+        progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
+        let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.len(), BATCH_TRIANGLES);
+        let encode = |job: &Job| encode_loaded(&reader, &plan.objects[job.object as usize], &cuts, &contexts, job);
+        bricks.write(&jobs, encode, progress)?;
+        let (bricks, rounded_away) = (bricks.records, bricks.dropped);
+        clock.end("bricks");
+        Ok(Written { textures, cuts, used_materials, lattices, bricks, rounded_away, warnings })
+    }
+
+    /// Converts by way of the disk.
+    pub fn bounded(&self, budget: Budget) -> Result<BuildSummary, BuildError> {
+        let mut clock = Clock::new();
+        let (mut scratch, mut journal, mut writer) = self.begin(&budget)?;
+        clock.end("begin");
+        match self.write_bounded(budget, &scratch, &mut journal, &mut writer, &mut clock) {
+            Ok(written) => self.finish(written, writer, clock),
+            Err(error) => {
+                let is_kept = matches!(error, BuildError::Interrupted(_));
+                scratch.keep(is_kept);
+                if is_kept {
+                    writer.keep();
+                }
+                Err(error)
+            }
+        }
+    }
+
+    /// Starts anew, or goes on where an earlier run was interrupted.
+    fn begin(&self, budget: &Budget) -> Result<(Scratch, Journal, Writer), BuildError> {
+        let partial = Writer::reserve(self.output)?;
+        let path = scratch::path_for(self.output, self.settings);
+        if let Some((mut scratch, mut journal)) = scratch::earlier(&path, self.settings.resume)? {
+            match self.go_on(&mut journal, &scratch, partial, budget) {
+                Ok(Some(writer)) => {
+                    scratch.keep(false);
+                    return Ok((scratch, journal, writer));
+                }
+                // The file was finished, but the scratch folder was not removed any more.
+                Ok(None) => scratch.keep(false),
+                Err(error) => return Err(error),
+            }
+            drop((journal, scratch));
+            return self.start(path, Writer::reserve(self.output)?, budget);
+        }
+        self.start(path, partial, budget)
+    }
+
+    fn start(
+        &self,
+        path: std::path::PathBuf,
+        partial: Partial,
+        budget: &Budget,
+    ) -> Result<(Scratch, Journal, Writer), BuildError> {
+        let (scratch, mut journal) = Scratch::create(path)?;
+        journal.step(Step::Begin, || Ok(vec![self.fingerprint(budget)]))?;
+        Ok((scratch, journal, partial.start()?))
+    }
+
+    /// The writer as the steps of the journal left it; `None` if its file is gone.
+    fn go_on(
+        &self,
+        journal: &mut Journal,
+        scratch: &Scratch,
+        partial: Partial,
+        budget: &Budget,
+    ) -> Result<Option<Writer>, BuildError> {
+        let fingerprint = self.fingerprint(budget);
+        if journal.step(Step::Begin, || Ok(vec![fingerprint]))? != [fingerprint] {
+            partial.keep();
+            return Err(BuildError::OtherConversion { path: scratch.path().to_owned() });
+        }
+        match journal.written()? {
+            Some(_) if partial.is_empty() => Ok(None),
+            Some((position, spans)) => {
+                self.progress.phase("check", spans.iter().map(|span| span.bytes).sum());
+                Ok(Some(partial.resume(position, spans, &mut |bytes| self.progress.advance(bytes))?))
+            }
+            None => Ok(Some(partial.start()?)),
+        }
+    }
+
+    /// A number that only the same conversion has.
+    fn fingerprint(&self, budget: &Budget) -> u64 {
+        let settings = BuildSettings { resume: false, scratch: None, ..self.settings.clone() };
+        let mut hash = Hash(Xxh3::new());
+        // Hashing does not fail.
+        let _ = write!(hash, "{} {budget:?} {settings:?} {:?}", env!("CARGO_PKG_VERSION"), self.outline);
+        hash.0.digest()
+    }
+
+    fn write_bounded(
+        &self,
+        budget: Budget,
+        scratch: &Scratch,
+        journal: &mut Journal,
+        writer: &mut Writer,
+        clock: &mut Clock,
+    ) -> Result<Written, BuildError> {
+        let Self { outline, plan, settings, progress, .. } = self;
+        let mut textures = Textures::default();
+        let words = journal.step(Step::Textures, || {
+            // One at a time, for images may be large.
+            textures = textures::write(self.source, 1, writer, progress)?;
+            Ok(textures.to_words(writer.checkpoint()?))
+        })?;
+        let textures = Textures::from_words(&words, outline).ok_or_else(|| journal.damaged())?;
+        let mut warnings = textures.warnings.clone();
+        clock.end("textures");
+        let reader = Reader::lazy(self.source);
+        let bounded = Bounded { reader: &reader, plan, settings, budget, scratch, progress };
+        let cuts = bounded.cut(journal)?;
+        let is_continued = journal.is_continued();
+        let words = journal.step(Step::Repairs, || {
+            // Repairs are known once all parts have been read, and those of steps that an earlier run did have not.
+            if is_continued {
+                bounded.read_all()?;
+            }
+            Ok(journal::words_of_texts(&self.source.repairs()))
+        })?;
+        warnings.extend(journal::texts_of_words(&words).ok_or_else(|| journal.damaged())?);
+        clock.end("partition");
+        let lattices = cut::choose(plan, &outline.meshes, &cuts.objects, settings, &mut warnings)?;
+        let means = textures.material_means();
+        let contexts = encode::contexts(&lattices, &means, settings.fast);
+        let jobs = encode::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
+        let (chunks, rounded_away) = bounded.distribute(&cuts, &jobs, &lattices, journal)?;
+        clock.end("distribute");
+        let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.objects.len(), budget.batch);
+        bounded.encode(&jobs, chunks, &contexts, &mut bricks, journal)?;
+        let bricks = bricks.records;
+        clock.end("bricks");
+        let (cuts, used_materials) = (cuts.objects, cuts.materials);
+        Ok(Written { textures, cuts, used_materials, lattices, bricks, rounded_away, warnings })
+    }
+
+    /// Builds the resident part and finishes the file.
+    fn finish(&self, written: Written, writer: Writer, mut clock: Clock) -> Result<BuildSummary, BuildError> {
+        let Written { textures, cuts, used_materials, lattices, bricks, rounded_away, mut warnings } = written;
+        self.progress.phase("top level", 0);
+        let objects = assemble::object_records(&self.plan, &lattices, &bricks);
+        let instances = assemble::instance_records(&self.plan);
+        let top = assemble::build_top(&objects, &instances, &lattices, &bricks)?;
+        let mut resident = Resident {
+            manifest: Manifest::default(),
+            objects,
+            instances,
+            leaves: top.leaves,
+            top2: top.top2,
+            top8: top.top8,
+            bricks,
+            materials: textures.materials,
+            textures: textures.records,
+        };
+        let dropped = Dropped::count(&resident, &cuts, &rounded_away);
+        dropped.warn(&mut warnings);
+        let made = (self.outline, &self.plan, self.settings);
+        resident.manifest = assemble::manifest(&resident, made, &used_materials, &dropped, warnings);
+        clock.end("top level");
+        writer.finish(&resident)?;
+        clock.end("finish");
+        let bytes_file = std::fs::metadata(self.output).map_or(0, |file| file.len());
+        Ok(assemble::summary(&resident, bytes_file, clock.phases))
+    }
+}
+
+/// Encodes a brick of triangles whose geometry is in memory.
+fn encode_loaded(
+    reader: &Reader,
+    object: &ObjectPlan,
+    cuts: &[ObjectCut],
+    contexts: &[BrickContext],
+    job: &Job,
+) -> (Option<EncodedBrick>, u32) {
+    let context = &contexts[job.object as usize];
+    let slots = &cuts[job.object as usize].order[job.first..job.first + job.count];
+    let mut triangles = Vec::with_capacity(slots.len());
+    let mut rest = slots;
+    while let Some(&slot) = rest.first() {
+        let part = &object.parts[object.part_of(slot)];
+        let (own, after) = rest.split_at(rest.partition_point(|&slot| slot - part.first_slot < part.triangles));
+        rest = after;
+        // All parts in use were read.
+        let Some(primitive) = reader.loaded(part) else { continue };
+        let placed = Placed { part, primitive };
+        let round = |slot: &u32| Triangle::round(&placed, slot - part.first_slot, &context.lattice, 0);
+        triangles.extend(own.iter().filter_map(round));
+    }
+    let dropped = (slots.len() - triangles.len()) as u32;
+    let count = triangles.len();
+    ((count > 0).then(|| brick::encode(context, triangles.into_iter(), count)), dropped)
+}
+
+/// Measures phases that follow each other.
+struct Clock {
+    start: Instant,
+    phases: Vec<(&'static str, Duration)>,
+}
+
+impl Clock {
+    fn new() -> Self {
+        Self { start: Instant::now(), phases: Vec::new() }
+    }
+
+    fn end(&mut self, phase: &'static str) {
+        self.phases.push((phase, self.start.elapsed()));
+        self.start = Instant::now();
+    }
+}
+
+/// Hashes text as it is formatted.
+struct Hash(Xxh3);
+
+impl Write for Hash {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.update(text.as_bytes());
+        Ok(())
+    }
+}
