@@ -185,3 +185,51 @@ fn writes_a_large_payload() {
     assert!(matches!(error, Error::Io { .. }), "{error}");
     assert!(error.to_string().contains("free some space"), "{error}");
 }
+
+#[test]
+fn a_kept_file_is_continued_after_its_checkpoint() {
+    let (folder, whole, scene) = written();
+    let path = folder.path().join("again.bricks");
+    let partial = folder.path().join(".again.bricks.partial");
+    let payloads: Vec<_> =
+        scene.resident.payloads().map(|(payload, span)| (scene.payloads[&payload].clone(), span)).collect();
+    let mut writer = Writer::reserve(&path).unwrap().start().unwrap();
+    let mut spans = Vec::new();
+    let (mut position, half) = (0, payloads.len() / 2);
+    let mut sorted = payloads.clone();
+    sorted.sort_by_key(|(_, span)| span.offset);
+    for (index, (bytes, _)) in sorted.iter().enumerate() {
+        if index == half {
+            position = writer.checkpoint().unwrap();
+        }
+        let span = writer.write(bytes).unwrap();
+        if index < half {
+            spans.push(span);
+        }
+    }
+    assert!(matches!(Writer::reserve(&path), Err(Error::Io { .. })), "one process at a time");
+    writer.keep();
+    let kept = fs::read(&partial).unwrap();
+    assert!(kept.len() as u64 >= position && !path.exists());
+
+    let reserve = || Writer::reserve(&path).unwrap();
+    assert!(!reserve().is_empty() || !partial.exists(), "dropping a reserved file removes it");
+    fs::write(&partial, &kept).unwrap();
+    let mut spoiled = kept.clone();
+    spoiled[spans[0].offset as usize + 3] ^= 1;
+    fs::write(&partial, &spoiled).unwrap();
+    assert!(reserve().resume(position, spans.clone(), &mut |_| {}).is_err());
+    assert!(fs::read(&partial).unwrap() == spoiled, "what cannot be continued stays");
+    fs::write(&partial, &kept[..position as usize - 1]).unwrap();
+    assert!(reserve().resume(position, spans.clone(), &mut |_| {}).is_err());
+    fs::write(&partial, &kept).unwrap();
+    let mut checked = 0;
+    let mut writer = reserve().resume(position, spans, &mut |bytes| checked += bytes).unwrap();
+    assert!(checked > 0);
+    for (bytes, span) in &sorted[half..] {
+        assert_eq!(writer.write(bytes).unwrap(), *span);
+    }
+    writer.finish(&scene.resident).unwrap();
+    assert!(fs::read(&path).unwrap() == fs::read(&whole).unwrap());
+    assert!(!partial.exists());
+}

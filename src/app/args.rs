@@ -97,9 +97,6 @@ pub struct ConvertArgs {
     /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they are stored once
     #[arg(long, value_name = "COUNT", default_value = "4M", value_parser = positive_count)]
     pub bake_budget: u64,
-    /// Bounded memory for the conversion; comes with a later version.
-    #[arg(long, hide = true, value_parser = not_built)]
-    pub memory: Option<String>,
 }
 
 /// Options of everything that writes a `.bricks` file.
@@ -114,6 +111,19 @@ pub struct BuildArgs {
     /// log2 of the step that positions are rounded to, in world units [default: from the sizes of the bricks]
     #[arg(long, value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-126..=96))]
     pub lattice: Option<i32>,
+    /// Memory to get by with; what does not fit goes to the disk, about 250 bytes a triangle beside the output. The file is
+    /// the same [default: a quarter of the machine's]
+    #[arg(long, value_name = "SIZE", value_parser = size_bytes)]
+    pub memory: Option<u64>,
+    /// Folder for scratch files [default: that of the output]
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<PathBuf>,
+    /// Continue a conversion with the same inputs and options that was interrupted; without this it starts anew
+    #[arg(long)]
+    pub resume: bool,
+    /// Build the trees in bricks faster; rays then take longer
+    #[arg(long)]
+    pub fast: bool,
 }
 
 /// Options of `scene`.

@@ -113,7 +113,7 @@ fn other_commands_check_too() {
         ("convert -o s.bricks", "INPUT"),
         ("convert a.gltf", "--output"),
         ("convert a.gltf -o s.bricks --brick-triangles 0", "from 1"),
-        ("convert a.gltf -o s.bricks --memory 1G", "not in this version"),
+        ("convert a.gltf -o s.bricks --memory 0", "at least 1"),
         ("convert a.gltf -o s.bricks --lattice 999", "999"),
         ("scene pipes -o s.bricks", "the kinds are: city"),
         ("scene castle -o s.bricks", "castle"),

@@ -1,11 +1,11 @@
 //! `convert`: scenes of common formats into one `.bricks` file.
 
 use super::args::{BuildArgs, ConvertArgs};
+use super::interrupt;
 use super::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
-use brickwalk_convert::build::{BuildSettings, build_source};
+use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
 use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, import};
-use brickwalk_convert::progress::Progress;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -21,9 +21,10 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let start = Instant::now();
     let inputs = expand(&args.inputs.inputs)?;
     refuse_overwriting(&inputs, &args.output)?;
-    let progress = Progress::new();
+    let progress = interrupt::job();
     let threads = args.build.threads.map(|n| n as usize);
-    let scratch = args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
+    let beside = || args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
+    let scratch = args.build.scratch.clone().or_else(beside);
     let source = import(&inputs, &ImportSettings { threads, scratch }, &progress)?;
     let settings = BuildSettings {
         drop_non_finite: args.drop_non_finite,
@@ -31,9 +32,9 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         bake_budget_triangles: args.bake_budget,
         ..build_settings(&args.build)
     };
-    build_source(&source, &settings, &args.output, &progress)?;
+    let summary = usage(build_source(&source, &settings, &args.output, &progress))?;
     progress.finish();
-    summarise(&args.output, start)
+    summarise(&args.output, &summary, start)
 }
 
 /// The settings of the builder that options share.
@@ -42,15 +43,30 @@ pub fn build_settings(args: &BuildArgs) -> BuildSettings {
         brick_triangles: args.brick_triangles,
         threads: args.threads.map(|n| n as usize),
         lattice_log2: args.lattice,
+        memory_bytes: args.memory,
+        fast: args.fast,
+        scratch: args.scratch.clone(),
+        resume: args.resume,
         ..BuildSettings::default()
     }
+}
+
+/// Makes a setting that only the builder can judge wrong usage.
+///
+/// # Errors
+/// As of the builder.
+pub fn usage(built: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
+    built.map_err(|error| match error {
+        BuildError::Setting { .. } => super::Usage(error.to_string()).into(),
+        error => error.into(),
+    })
 }
 
 /// Says on standard output what a written scene holds, on standard error what its conversion warned of.
 ///
 /// # Errors
 /// The file cannot be opened, or standard output is closed.
-pub fn summarise(path: &Path, start: Instant) -> Result<()> {
+pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<()> {
     let scene = bricks::SceneFile::open(path)?;
     let resident = scene.resident();
     for warning in &resident.manifest.warnings {
@@ -64,7 +80,9 @@ pub fn summarise(path: &Path, start: Instant) -> Result<()> {
         human_count(resident.bricks.len() as u64),
         human_bytes(scene.file_bytes()),
         start.elapsed().as_secs_f64()
-    ))
+    ))?;
+    let phases = summary.phases.iter().map(|(phase, time)| format!("{phase} {:.1} s", time.as_secs_f64()));
+    super::print(&format!("{}: {}\n", path.display(), phases.collect::<Vec<_>>().join(", ")))
 }
 
 /// The files that the inputs name: a folder stands for the scene files in it and below, sorted bytewise by path.

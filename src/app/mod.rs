@@ -7,6 +7,7 @@ pub mod convert;
 pub mod demo;
 pub mod info;
 mod inputs;
+pub mod interrupt;
 pub mod output;
 pub mod replay;
 pub mod scene;

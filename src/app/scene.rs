@@ -2,10 +2,10 @@
 
 use super::Usage;
 use super::args::SceneArgs;
-use super::convert::{build_settings, refuse_folder, summarise};
+use super::convert::{build_settings, refuse_folder, summarise, usage};
+use super::interrupt;
 use anyhow::{Context, Result};
 use brickwalk_convert::build::build_source;
-use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Error, Settings, generate, write_paths};
 use std::time::Instant;
 
@@ -16,19 +16,19 @@ use std::time::Instant;
 pub fn run(args: &SceneArgs) -> Result<()> {
     let start = Instant::now();
     let settings = Settings { kind: args.kind, triangles: args.triangles, seed: args.seed, instanced: args.instanced };
-    let progress = Progress::new();
+    let progress = interrupt::job();
     refuse_folder(&args.output)?;
-    let paths = in_pool(args.build.threads, || -> Result<_> {
+    let (paths, summary) = in_pool(args.build.threads, || -> Result<_> {
         let scene = generate(&settings, &progress).map_err(|error| match error {
             // The count is an option's value, known only here.
             Error::Triangles { .. } => Usage(format!("--triangles: {error}")).into(),
             error => anyhow::Error::new(error),
         })?;
-        build_source(&scene, &build_settings(&args.build), &args.output, &progress)?;
-        Ok(write_paths(&scene, &args.output)?)
+        let summary = usage(build_source(&scene, &build_settings(&args.build), &args.output, &progress))?;
+        Ok((write_paths(&scene, &args.output)?, summary))
     })??;
     progress.finish();
-    summarise(&args.output, start)?;
+    summarise(&args.output, &summary, start)?;
     for path in paths {
         super::print(&format!("{}: a camera path\n", path.display()))?;
     }

@@ -15,18 +15,7 @@ use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Set by Ctrl-C: the frame at hand is finished, then the records are completed.
-fn interrupted() -> &'static AtomicBool {
-    static FLAG: AtomicBool = AtomicBool::new(false);
-    static HANDLER: std::sync::Once = std::sync::Once::new();
-    HANDLER.call_once(|| {
-        // Without a handler Ctrl-C ends the process at once, which leaves finished frames and whole records, too.
-        let _ = ctrlc::set_handler(|| FLAG.store(true, Ordering::Relaxed));
-    });
-    &FLAG
-}
+use std::sync::atomic::Ordering;
 
 /// Runs the command.
 ///
@@ -55,7 +44,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
     let progress = Progress::new();
     progress.phase("frames", args.frames.into());
-    let stop = interrupted();
+    let stop = super::interrupt::flag();
     let mut records = Vec::new();
     let mut finished = 0;
     for frame in 0..args.frames {

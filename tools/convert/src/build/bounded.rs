@@ -1,6 +1,6 @@
 //! Cuts objects within a budget: small ones together in memory, large ones on the scratch disk until their nodes fit.
 
-use super::budget::Budget;
+use super::budget::{self, Budget};
 use super::cut::{ObjectCut, cut_object, extents};
 use super::error::BuildError;
 use super::external::{self, Node, PackedItem};
@@ -61,6 +61,7 @@ struct Found {
 impl Bounded<'_> {
     /// Cuts all objects.
     pub fn cut(&self, journal: &mut Journal) -> Result<BoundedCuts, BuildError> {
+        budget::give_back();
         let slots = |object: &ObjectPlan| u64::from(object.slots);
         self.progress.phase("partition", self.plan.objects.iter().map(slots).sum());
         let order = self.scratch.spill(ORDER, 0);
@@ -218,6 +219,7 @@ impl Bounded<'_> {
         journal: &mut Journal,
     ) -> Result<Node, BuildError> {
         let words = journal.step(Step::Cut, || {
+            budget::give_back();
             let mut items = external::load(&self.items(node.number, node.length))?;
             let cuts = partition::cut(&mut items, rule);
             drop(items);

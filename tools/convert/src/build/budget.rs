@@ -180,3 +180,20 @@ pub(super) fn default_memory() -> u64 {
     let group = system.cgroup_limits().map(|limits| limits.total_memory).filter(|&limit| limit > 0);
     group.map_or(machine, |group| group.min(machine)) / 4
 }
+
+/// Gives memory that was freed back to the system: the next phase divides it anew.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub(super) fn give_back() {
+    /// Allocations from this size on go back when they are freed.
+    const AT_ONCE_BYTES: i32 = 1 << 20;
+    // SAFETY: both functions may be called at any time from any thread; they change where memory comes from and goes to,
+    // not what is in it.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, AT_ONCE_BYTES);
+        libc::malloc_trim(0);
+    }
+}
+
+/// Other allocators give back by themselves.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(super) fn give_back() {}

@@ -97,14 +97,12 @@ impl Conversion<'_> {
         clock.end("begin");
         match self.write_bounded(budget, &scratch, &mut journal, &mut writer, &mut clock) {
             Ok(written) => self.finish(written, writer, clock),
-            Err(error) => {
-                let is_kept = matches!(error, BuildError::Interrupted(_));
-                scratch.keep(is_kept);
-                if is_kept {
-                    writer.keep();
-                }
-                Err(error)
+            Err(BuildError::Interrupted(_)) => {
+                writer.keep();
+                scratch.keep(true);
+                Err(BuildError::Paused { scratch: scratch.path().to_owned() })
             }
+            Err(error) => Err(error),
         }
     }
 

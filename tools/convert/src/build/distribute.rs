@@ -2,6 +2,7 @@
 
 use super::bounded::{Bounded, BoundedCuts};
 use super::brick::{self, BrickContext};
+use super::budget;
 use super::encode::{BrickWriter, Job};
 use super::error::BuildError;
 use super::journal::{Journal, Step, WordReader, Words};
@@ -45,6 +46,7 @@ impl Bounded<'_> {
         lattices: &[Lattice],
         journal: &mut Journal,
     ) -> Result<(Chunks, Vec<u32>), BuildError> {
+        budget::give_back();
         let mut chunks = self.chunks(jobs);
         let chunk_of: Vec<u32> =
             (0u32..).zip(&chunks.jobs).flat_map(|(chunk, jobs)| jobs.clone().map(move |_| chunk)).collect();
@@ -195,6 +197,7 @@ impl Bounded<'_> {
         bricks: &mut BrickWriter,
         journal: &mut Journal,
     ) -> Result<(), BuildError> {
+        budget::give_back();
         self.progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
         let Chunks { jobs: ranges, files } = chunks;
         let done = ranges.len().min(journal.left());

@@ -153,6 +153,12 @@ pub enum BuildError {
     /// Somebody asked to stop.
     #[error(transparent)]
     Interrupted(#[from] crate::progress::Interrupted),
+    /// Somebody asked to stop a conversion that can be continued.
+    #[error("interrupted; the same command with --resume continues, without it starts anew ({} is kept)", scratch.display())]
+    Paused {
+        /// The scratch folder.
+        scratch: std::path::PathBuf,
+    },
     /// The scene file could not be written.
     #[error(transparent)]
     File(#[from] bricks::Error),

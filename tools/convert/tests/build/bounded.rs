@@ -170,7 +170,7 @@ fn an_interrupted_conversion_is_continued() {
         let source = Interrupting { source: &source, left: parts.into(), progress: progress.clone() };
         let settings = BuildSettings { resume, ..settings.clone() };
         let result = build_source(&source, &settings, &path, &progress);
-        assert!(matches!(result, Err(BuildError::Interrupted(_))), "{result:?}");
+        assert!(matches!(result, Err(BuildError::Paused { .. })), "{result:?}");
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), [".a.bricks.partial", ".a.bricks.scratch", "a.bricks"]);
     };
