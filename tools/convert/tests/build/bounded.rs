@@ -55,13 +55,13 @@ impl Source for Computed {
             let corners = if mesh == 1 {
                 let (x, y) = (f64::from(number / 2 % 300), f64::from(number / 600));
                 let far = [x + 1.0, y + 1.0, 0.0];
-                if number % 2 == 0 {
+                if number.is_multiple_of(2) {
                     [[x, y, 0.0], [x + 1.0, y, 0.0], far]
                 } else {
                     [[x, y, 0.0], far, [x, y + 1.0, 0.0]]
                 }
             } else {
-                let size = if number % 997 == 0 { 40.0 } else { 0.2 };
+                let size = if number.is_multiple_of(997) { 40.0 } else { 0.2 };
                 let center = random.point(50.0);
                 let mut corners = [center; 3];
                 let offsets = [random.point(size), random.point(size)];
