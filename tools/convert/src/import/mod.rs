@@ -1,4 +1,4 @@
-//! Importers: files of common formats as one [`Source`].
+//! Importers: files of common formats as one [`Source`](crate::source::Source).
 //!
 //! Every byte of an input is untrusted: whatever it holds, importing ends with a scene or with one line that names the
 //! file, the thing in it and the remedy. Memory is only allocated for counts that the bytes of the input can hold, and for
