@@ -43,7 +43,7 @@ impl Args for InputArgs {
             .arg(inputs)
             .arg(option(
                 "transform",
-                "\"...\"",
+                "STEPS|MATRIX",
                 ValueParser::new(transform),
                 "Placement of the input: steps in the order in which they happen (translate X Y Z, scale S or scale X Y \
                  Z, rotate x|y|z DEGREES; metres, Y up), as in \"scale 0.5 rotate y 90 translate 10 0 -5\"; or the 12 or \

@@ -1,4 +1,5 @@
-//! Converts scenes of common formats into `.bricks`: importers produce a [`source::SourceScene`], the builder cuts it into bricks.
+//! Converts scenes of common formats into `.bricks`: importers and generators are a [`source::Source`],
+//! the builder cuts it into bricks.
 
 pub mod build;
 pub mod import;
