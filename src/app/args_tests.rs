@@ -115,7 +115,7 @@ fn other_commands_check_too() {
         ("convert a.gltf -o s.bricks --brick-triangles 0", "from 1"),
         ("convert a.gltf -o s.bricks --memory 0", "at least 1"),
         ("convert a.gltf -o s.bricks --lattice 999", "999"),
-        ("scene pipes -o s.bricks", "the kinds are: city"),
+        ("scene ruins -o s.bricks", "the kinds are: city"),
         ("scene castle -o s.bricks", "castle"),
         ("scene city -o s.bricks --triangles 0", "at least 1"),
         ("info", "S.bricks"),
