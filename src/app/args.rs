@@ -121,7 +121,7 @@ pub struct BuildArgs {
     /// Continue a conversion with the same inputs and options that was interrupted; without this it starts anew
     #[arg(long)]
     pub resume: bool,
-    /// Build the trees in bricks faster; rays then take longer
+    /// Build the trees in bricks faster: a sixth less work in all, for trees that cost a ray about 7 % more (city, 3M triangles)
     #[arg(long)]
     pub fast: bool,
 }

@@ -87,7 +87,7 @@ impl BinaryTree {
         if is_chain(&aabbs) {
             return Self::by_splits(boxes, CHAIN_DEPTH);
         }
-        let config = if is_fast { BvhBuildParams::very_fast_build() } else { BvhBuildParams::medium_build() };
+        let config = if is_fast { BvhBuildParams::fast_build() } else { BvhBuildParams::medium_build() };
         let mut bvh: Bvh2 = PlocBuilder::with_capacity(aabbs.len()).build(
             config.ploc_search_distance,
             &aabbs,

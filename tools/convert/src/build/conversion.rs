@@ -57,12 +57,15 @@ struct Written {
 impl Conversion<'_> {
     /// Converts with all geometry in memory.
     pub fn in_memory(&self) -> Result<BuildSummary, BuildError> {
+        let mut clock = Clock::new();
+        // The name of the temporary file is known, so that the next conversion replaces what a killed one left.
+        let partial = Writer::reserve(self.output)?;
         let scratch = scratch::path_for(self.output, self.settings);
         if scratch::earlier(&scratch, self.settings.resume)?.is_some() {
+            partial.keep();
             return Err(BuildError::OtherConversion { path: scratch });
         }
-        let mut clock = Clock::new();
-        let mut writer = Writer::create(self.output)?;
+        let mut writer = partial.start()?;
         let written = self.write_in_memory(&mut writer, &mut clock)?;
         self.finish(written, writer, clock)
     }

@@ -186,6 +186,15 @@ fn an_interrupted_conversion_is_continued() {
     assert!(std::fs::read(&path).unwrap() == all);
     assert_eq!(names(folder.path()), ["a.bricks"]);
 
+    // With memory for everything there is nothing to continue, and what was left is removed.
+    interrupted_anew(&source, &settings, &path);
+    let free = BuildSettings { memory_bytes: Some(1 << 30), ..settings.clone() };
+    let result = build_source(&source, &BuildSettings { resume: true, ..free.clone() }, &path, &Progress::hidden());
+    assert!(matches!(result, Err(BuildError::OtherConversion { .. })), "{result:?}");
+    assert_eq!(names(folder.path()).len(), 3);
+    build_source(&source, &free, &path, &Progress::hidden()).unwrap();
+    assert_eq!(names(folder.path()), ["a.bricks"]);
+
     // Without --resume everything is done anew, and with it too if there is nothing to continue.
     interrupted_anew(&source, &settings, &path);
     build_source(&source, &settings, &path, &Progress::hidden()).unwrap();

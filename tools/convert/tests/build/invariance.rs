@@ -5,6 +5,7 @@ use crate::decode::decode;
 use crate::scenes::*;
 use crate::structure::check;
 use brickwalk_convert::build::BuildSettings;
+use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, SourceScene};
 
 fn mixed() -> SourceScene {
@@ -94,4 +95,52 @@ fn scaling_by_a_power_of_two_changes_exponents_only() {
     }
     let third = scaled(3.0);
     assert!(third.bricks.iter().zip(&one.bricks).any(|(a, b)| a.vertices != b.vertices));
+}
+
+/// Expected cost of a ray that meets a brick, summed over bricks: areas of the boxes over those of the roots, a triangle at
+/// 0.3 of a node.
+fn surface_area_cost(path: &std::path::Path) -> f64 {
+    let file = bricks::SceneFile::open(path).unwrap();
+    let of_brick = |(index, record): (u32, &bricks::Brick)| {
+        let mut bytes = vec![0; record.geometry.bytes as usize];
+        file.copy(bricks::Payload::Geometry(index), &mut bytes).unwrap();
+        let nodes = bytes.chunks_exact(size_of::<bricks::Node>()).take(record.node_count as usize);
+        let area_of = |node: &bricks::Node, slot: usize| {
+            let size = |k: usize| {
+                f64::from(i32::from(node.hi[k][slot]) - i32::from(node.lo[k][slot]))
+                    * 2f64.powi(i32::from(node.exponent[k]) - 127)
+            };
+            size(0) * size(1) + size(1) * size(2) + size(2) * size(0)
+        };
+        let sum: f64 = nodes
+            .map(|node| {
+                let node: bricks::Node = bytemuck::pod_read_unaligned(node);
+                let weight = |slot: usize| match node.meta[slot] {
+                    inner if inner & 0x18 == 0x18 => 1.0,
+                    leaf => 0.3 * f64::from((leaf >> 5).count_ones()),
+                };
+                (0..8).map(|slot| weight(slot) * area_of(&node, slot)).sum::<f64>()
+            })
+            .sum();
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|k| (record.max[k] - record.min[k]) as f64);
+        let step = 2f64.powi(file.resident().objects[0].step_log2 - file.resident().objects[0].unit_log2);
+        sum / ((x * y + y * z + z * x) * step * step)
+    };
+    (0..).zip(&file.resident().bricks).map(of_brick).sum()
+}
+
+#[test]
+fn fast_trees_cost_a_little_more_and_hold_the_same() {
+    let build = |fast| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bricks");
+        let settings = BuildSettings { fast, ..settings(4000) };
+        brickwalk_convert::build::build(mixed(), &settings, &path, &Progress::hidden()).unwrap();
+        let decoded = decode(&path);
+        check(&decoded);
+        (surface_area_cost(&path), decoded.triangles(0))
+    };
+    let ((good, triangles), (fast, same)) = (build(false), build(true));
+    assert!(triangles == same);
+    assert!(fast > good && fast < 1.2 * good, "{fast} against {good}");
 }
