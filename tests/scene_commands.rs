@@ -66,6 +66,20 @@ fn a_generated_scene_is_described_and_verified() {
     assert!(info["largest_brick_triangles"].as_u64().unwrap() <= 1000);
     assert!(info["two_largest_bricks_bytes"].as_u64().unwrap() > 0);
     assert!(done(folder, "info city.bricks").contains("triangles"));
+    let sum = |sizes: &serde_json::Value| -> u64 {
+        let sizes = sizes.as_object().unwrap();
+        let inner = sizes.values().filter_map(|value| value.as_object()).flat_map(|inner| inner.values());
+        inner.chain(sizes.values()).filter_map(|value| value.as_u64()).sum()
+    };
+    assert_eq!(sum(&info["sections"]), info["file_bytes"].as_u64().unwrap());
+    assert!(info["per_triangle"]["traversal"].as_f64().unwrap() > 19.0, "nodes, 6 + 4 bytes, vertices");
+    let bins = info["brick_histogram"].as_array().unwrap();
+    assert_eq!(bins.iter().map(|bin| bin["bricks"].as_u64().unwrap()).sum::<u64>(), info["bricks"].as_u64().unwrap());
+    assert!(info["trees"]["sah"].is_null());
+    let deep: serde_json::Value = serde_json::from_str(&done(folder, "info city.bricks --json --deep")).unwrap();
+    let cost = |name: &str| deep["trees"]["sah"][name].as_f64().unwrap();
+    assert!(cost("nodes") > deep["trees"]["top_level_sah"]["wide_nodes"].as_f64().unwrap());
+    assert!(cost("triangles") > 0.0 && cost("cost") > cost("nodes"));
 
     let ids = info["triangle_ids"].as_u64().unwrap();
     let origin: serde_json::Value =
@@ -154,7 +168,7 @@ fn wrong_usage_is_exit_status_2_and_help_is_0() {
         assert!(stdout(&output).is_empty() && !stderr(&output).is_empty(), "{line}");
     }
     assert!(done(folder, "--version").starts_with("brickwalk "));
-    for command in ["", "demo", "convert", "scene", "info", "verify", "walk", "trace", "replay", "compare"] {
+    for command in ["", "demo", "convert", "scene", "info", "verify", "repair", "walk", "trace", "replay", "compare"] {
         assert!(done(folder, &format!("{command} --help")).contains("Usage: brickwalk"), "{command}");
     }
     assert!(names(folder).is_empty());

@@ -4,11 +4,16 @@ use crate::error::{Error, Flaw, Part};
 use crate::file::{Directory, Reader, length_of, open_file};
 use crate::layout::{Header, MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
 use crate::manifest::Manifest;
-use crate::records::{Brick, Texture};
+use crate::payload::Payload;
+use crate::records::{Brick, Span, Texture};
 use crate::resident::Resident;
 use crate::source::{ReadSource, Source};
 use crate::validate;
+use rayon::prelude::*;
 use std::path::Path;
+
+/// Bytes of payloads that threads share out before progress is reported, unless a single payload is longer.
+const BATCH_BYTES: u64 = 64 << 20;
 
 /// What [`verify_file`] found.
 #[derive(Debug)]
@@ -34,6 +39,9 @@ impl VerifyReport {
 /// What depends on a damaged part cannot be checked: behind a damaged header or directory nothing; if a section is
 /// damaged, the other sections, and the checksums of the payloads that the sections of bricks and textures name.
 ///
+/// Payloads are read by the threads of the current rayon pool, each with a buffer as long as its longest payload; the
+/// problems come in the order of the file all the same.
+///
 /// `progress` is called with the bytes done and in all, first with 0 and last with all of them.
 ///
 /// # Errors
@@ -58,7 +66,6 @@ pub(crate) fn verify_source(
         report: VerifyReport { file_bytes: length, payloads: 0, problems: Vec::new() },
         progress,
         done: 0,
-        buffer: Vec::new(),
     };
     if let Some((header, directory)) = verifier.frame(length) {
         verifier.body(&header, &directory);
@@ -72,7 +79,6 @@ struct Verifier<'a> {
     report: VerifyReport,
     progress: &'a mut dyn FnMut(u64, u64),
     done: u64,
-    buffer: Vec<u8>,
 }
 
 impl Verifier<'_> {
@@ -154,23 +160,31 @@ impl Verifier<'_> {
 
     /// Every payload in order of the file; what is in it only if the resident part is `valid`.
     fn payloads(&mut self, resident: &Resident, payload_end: u64, valid: bool) {
-        let mut payloads: Vec<_> = resident.payloads().collect();
+        // What lies outside is reported by the checks of the resident part, or by those of the section that made them
+        // impossible.
+        let inside = |span: &Span| {
+            span.offset.checked_add(span.bytes).is_some_and(|end| end <= payload_end) && span.bytes <= MAX_PAYLOAD_BYTES
+        };
+        let mut payloads: Vec<_> = resident.payloads().filter(|(_, span)| inside(span)).collect();
         payloads.sort_unstable_by_key(|(payload, span)| (span.offset, *payload));
-        for (payload, span) in payloads {
-            let inside = span.offset.checked_add(span.bytes).is_some_and(|end| end <= payload_end);
-            if !inside || span.bytes > MAX_PAYLOAD_BYTES {
-                // Reported by the checks of the resident part, or by those of the section that made them impossible.
-                continue;
-            }
-            self.buffer.resize(span.bytes as usize, 0);
-            let read = self.reader.payload(payload, span, &mut self.buffer);
-            if self.keep(read).is_some() && valid {
-                let checked = validate::payload(resident, payload, &self.buffer)
-                    .and_then(|()| validate::contents(resident, payload, &self.buffer));
-                self.keep_flaw(checked);
-            }
-            self.report.payloads += 1;
-            self.advance(span.bytes);
+        let mut rest = &payloads[..];
+        while !rest.is_empty() {
+            let mut bytes = 0;
+            let fits = |(_, span): &&(Payload, Span)| {
+                bytes += span.bytes;
+                bytes <= BATCH_BYTES
+            };
+            let (batch, after) = rest.split_at(rest.iter().take_while(fits).count().max(1));
+            rest = after;
+            let reader = &self.reader;
+            let check = |buffer: &mut Vec<u8>, &(payload, span): &(Payload, Span)| {
+                check_payload(reader, resident, (payload, span), valid, buffer).err()
+            };
+            // The collection keeps the order of the batch.
+            let problems: Vec<Option<Error>> = batch.par_iter().map_init(Vec::new, check).collect();
+            self.report.problems.extend(problems.into_iter().flatten());
+            self.report.payloads += batch.len() as u64;
+            self.advance(batch.iter().map(|(_, span)| span.bytes).sum());
         }
     }
 
@@ -207,4 +221,22 @@ impl Verifier<'_> {
         }
         self.advance(end - start);
     }
+}
+
+/// Reads a payload and checks its bytes, and what is in them if the resident part is `valid`.
+fn check_payload(
+    reader: &Reader,
+    resident: &Resident,
+    (payload, span): (Payload, Span),
+    valid: bool,
+    buffer: &mut Vec<u8>,
+) -> Result<(), Error> {
+    // Not initialised anew where it was long enough before: every byte is read.
+    buffer.resize(span.bytes as usize, 0);
+    reader.payload(payload, span, buffer)?;
+    if valid {
+        let checked = validate::payload(resident, payload, buffer);
+        checked.and_then(|()| validate::contents(resident, payload, buffer)).map_err(|flaw| reader.invalid(flaw))?;
+    }
+    Ok(())
 }

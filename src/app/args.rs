@@ -1,7 +1,7 @@
 //! The command line: every subcommand, every option with its unit and default. Values are validated here, so that commands
 //! receive only what they can use; what is wrong ends as usage with exit status 2.
 
-use super::inputs::InputArgs;
+use super::inputs::{FromArgs, InputArgs};
 use super::sizes::{CacheSize, Direction, ImageSize, non_negative, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
 use brickwalk_scenes::Kind;
@@ -37,6 +37,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Check every checksum and reference of a .bricks file
     Verify(VerifyArgs),
+    /// Rebuild the damaged bricks and textures of a .bricks file from what it was converted from
+    Repair(RepairArgs),
     /// Render a camera path to images, records and a report, without a window
     Walk(WalkArgs),
     /// Find the closest hits of given rays
@@ -87,6 +89,14 @@ pub struct ConvertArgs {
     /// How to cut and round.
     #[command(flatten)]
     pub build: BuildArgs,
+    /// What becomes of triangles and meshes.
+    #[command(flatten)]
+    pub mesh: MeshArgs,
+}
+
+/// Options of what becomes of the triangles and meshes of inputs.
+#[derive(Clone, Debug, Args)]
+pub struct MeshArgs {
     /// Drop triangles with a vertex that is not a finite number instead of refusing the input
     #[arg(long)]
     pub drop_non_finite: bool,
@@ -105,6 +115,17 @@ pub struct BuildArgs {
     /// Most triangles of a brick, 1 to 1048576; larger is faster in core, smaller reads less out of core
     #[arg(long, value_name = "COUNT", default_value = "16384", value_parser = brick_triangles)]
     pub brick_triangles: u32,
+    /// Continue a conversion with the same inputs and options that was interrupted; without this it starts anew
+    #[arg(long)]
+    pub resume: bool,
+    /// How to work and to round.
+    #[command(flatten)]
+    pub work: WorkArgs,
+}
+
+/// Options of everything that converts.
+#[derive(Clone, Debug, Args)]
+pub struct WorkArgs {
     /// Threads that convert [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<u32>,
@@ -118,9 +139,6 @@ pub struct BuildArgs {
     /// Folder for scratch files [default: that of the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
-    /// Continue a conversion with the same inputs and options that was interrupted; without this it starts anew
-    #[arg(long)]
-    pub resume: bool,
     /// Build the trees in bricks faster: a sixth less work in all, for trees that cost a ray about 7 % more (city, 3M triangles)
     #[arg(long)]
     pub fast: bool,
@@ -162,6 +180,9 @@ pub struct InfoArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Read all bricks too: the surface-area cost of the whole tree
+    #[arg(long, conflicts_with = "id")]
+    pub deep: bool,
     /// Say which file, node, mesh, primitive and triangle the triangle with this id comes from
     #[arg(long, value_name = "N")]
     pub id: Option<u32>,
@@ -174,6 +195,24 @@ pub struct VerifyArgs {
     /// The scene
     #[arg(value_name = "S.bricks")]
     pub scene: PathBuf,
+}
+
+/// Options of `repair`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct RepairArgs {
+    /// The scene; damaged bricks and textures are written in place, everything else stays as it is
+    #[arg(value_name = "S.bricks")]
+    pub scene: PathBuf,
+    /// What the scene was converted from.
+    #[command(flatten)]
+    pub inputs: FromArgs,
+    /// How to work and to round.
+    #[command(flatten)]
+    pub work: WorkArgs,
+    /// What becomes of triangles and meshes.
+    #[command(flatten)]
+    pub mesh: MeshArgs,
 }
 
 /// Options of what streams bricks to a device.

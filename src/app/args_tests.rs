@@ -155,8 +155,8 @@ fn options_of_other_commands_arrive() {
         panic!()
     };
     assert_eq!(c.inputs.inputs.len(), 2);
-    assert_eq!((c.build.brick_triangles, c.build.threads, c.build.lattice), (4000, Some(2), Some(-12)));
-    assert!(c.drop_non_finite);
+    assert_eq!((c.build.brick_triangles, c.build.work.threads, c.build.work.lattice), (4000, Some(2), Some(-12)));
+    assert!(c.mesh.drop_non_finite);
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
     assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (Kind::City, 200_000, 7, 16384));
     let Command::Replay(r) = parse("replay f.jsonl --cache 5% 1M,2M --cache 7K --json").unwrap() else { panic!() };

@@ -1,6 +1,6 @@
 //! `convert`: scenes of common formats into one `.bricks` file.
 
-use super::args::{BuildArgs, ConvertArgs};
+use super::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
 use super::interrupt;
 use super::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
@@ -22,32 +22,40 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let inputs = expand(&args.inputs.inputs)?;
     refuse_overwriting(&inputs, &args.output)?;
     let progress = interrupt::job();
-    let threads = args.build.threads.map(|n| n as usize);
+    let threads = args.build.work.threads.map(|n| n as usize);
     let beside = || args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
-    let scratch = args.build.scratch.clone().or_else(beside);
+    let scratch = args.build.work.scratch.clone().or_else(beside);
     let source = import(&inputs, &ImportSettings { threads, scratch }, &progress)?;
-    let settings = BuildSettings {
-        drop_non_finite: args.drop_non_finite,
-        instance_min_triangles: args.instance_min_triangles,
-        bake_budget_triangles: args.bake_budget,
-        ..build_settings(&args.build)
-    };
+    let settings = mesh_settings(&args.mesh, build_settings(&args.build));
     let summary = usage(build_source(&source, &settings, &args.output, &progress))?;
     progress.finish();
     summarise(&args.output, &summary, start)
 }
 
-/// The settings of the builder that options share.
+/// The settings of the builder for everything that writes a scene file.
 pub fn build_settings(args: &BuildArgs) -> BuildSettings {
+    BuildSettings { brick_triangles: args.brick_triangles, resume: args.resume, ..work_settings(&args.work) }
+}
+
+/// The settings of the builder for everything that converts.
+pub fn work_settings(args: &WorkArgs) -> BuildSettings {
     BuildSettings {
-        brick_triangles: args.brick_triangles,
         threads: args.threads.map(|n| n as usize),
         lattice_log2: args.lattice,
         memory_bytes: args.memory,
         fast: args.fast,
         scratch: args.scratch.clone(),
-        resume: args.resume,
         ..BuildSettings::default()
+    }
+}
+
+/// `settings` with those of the triangles and meshes of inputs.
+pub fn mesh_settings(args: &MeshArgs, settings: BuildSettings) -> BuildSettings {
+    BuildSettings {
+        drop_non_finite: args.drop_non_finite,
+        instance_min_triangles: args.instance_min_triangles,
+        bake_budget_triangles: args.bake_budget,
+        ..settings
     }
 }
 
@@ -86,7 +94,10 @@ pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<
 }
 
 /// The files that the inputs name: a folder stands for the scene files in it and below, sorted bytewise by path.
-fn expand(inputs: &[Input]) -> Result<Vec<Input>> {
+///
+/// # Errors
+/// A folder cannot be read, or holds no scene file.
+pub fn expand(inputs: &[Input]) -> Result<Vec<Input>> {
     let mut files = Vec::new();
     for input in inputs {
         if !input.path.is_dir() {

@@ -1,6 +1,7 @@
 //! `info`: what a `.bricks` file holds, and where a triangle comes from.
 
 use super::args::InfoArgs;
+use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
 use super::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result};
 use bricks::{BRICK_WIDE, Manifest, Payload, SceneFile};
@@ -20,7 +21,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         let origin = origin(&scene, id)?;
         return if args.json { super::print_json(&origin) } else { super::print(&origin.human()) };
     }
-    let info = Info::of(&scene);
+    let info = Info::of(&scene, args.deep)?;
     if args.json { super::print_json(&info) } else { super::print(&info.human()) }
 }
 
@@ -97,10 +98,16 @@ struct Info<'a> {
     provenance_ranges: usize,
     left_out: Vec<LeftOut>,
     warnings: &'a [String],
+    /// Bytes of the file by what they hold.
+    sections: Sections,
+    /// Bytes a stored triangle.
+    per_triangle: PerTriangle,
+    brick_histogram: Vec<Bin>,
+    trees: Trees,
 }
 
 impl<'a> Info<'a> {
-    fn of(scene: &'a SceneFile) -> Self {
+    fn of(scene: &'a SceneFile, deep: bool) -> Result<Self> {
         let r = scene.resident();
         let m = &r.manifest;
         let bytes = |wanted: fn(&Payload) -> bool| -> u64 {
@@ -110,7 +117,8 @@ impl<'a> Info<'a> {
         largest.sort_unstable_by(|a, b| b.cmp(a));
         // The world object always exists.
         let world = r.objects.first();
-        Self {
+        let sections = Sections::of(scene);
+        Ok(Self {
             format: FORMAT,
             file: scene.path().display().to_string(),
             file_bytes: scene.file_bytes(),
@@ -153,7 +161,11 @@ impl<'a> Info<'a> {
             provenance_ranges: m.provenance.len(),
             left_out: left_out(m),
             warnings: &m.warnings,
-        }
+            per_triangle: PerTriangle::of(r, &sections, scene.file_bytes()),
+            sections,
+            brick_histogram: histogram(&r.bricks),
+            trees: Trees::of(scene, deep)?,
+        })
     }
 
     fn human(&self) -> String {
@@ -202,11 +214,18 @@ impl<'a> Info<'a> {
                 self.tallest_brick_levels
             ),
         );
+        for line in human_histogram(&self.brick_histogram) {
+            row("", line);
+        }
         let (geometry, attributes) = (human_bytes(self.geometry_bytes), human_bytes(self.attribute_bytes));
         row(
             "payloads",
             format!("geometry {geometry}, attributes {attributes}, textures {}", human_bytes(self.texture_bytes)),
         );
+        for line in self.sections.human() {
+            row("sections", line);
+        }
+        row("a triangle", self.per_triangle.human());
         row("least cache", format!("{} (the two largest bricks)", human_bytes(self.two_largest_bricks_bytes)));
         row("lattice", format!("step {:e}, device unit {}, world units", self.lattice_step, self.device_unit));
         row(
@@ -216,6 +235,9 @@ impl<'a> Info<'a> {
                 self.top_level_leaves, self.top_level_nodes_binary, self.top_level_nodes_wide
             ),
         );
+        for (name, value) in self.trees.human() {
+            row(name, value);
+        }
         row("materials", format!("{}, {} textures", self.materials, self.textures));
         for LeftOut { what, why } in &self.left_out {
             row("left out", format!("{what}: {why}"));

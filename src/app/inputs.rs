@@ -109,6 +109,39 @@ impl FromArgMatches for InputArgs {
     }
 }
 
+/// The inputs of a conversion that is repeated: as [`InputArgs`], but after `--from`, and there may be none.
+#[derive(Clone, Debug)]
+pub struct FromArgs {
+    /// The inputs; a path may be that of a folder.
+    pub inputs: Vec<Input>,
+}
+
+impl Args for FromArgs {
+    fn augment_args(command: Command) -> Command {
+        InputArgs::augment_args(command).mut_arg("inputs", |inputs| {
+            inputs.long("from").required(false).action(ArgAction::Append).help(
+                "The inputs of the conversion in their order, with their --transform, --scene, --up and --unit; give its \
+                 other options too [default: what a generated scene is made from]",
+            )
+        })
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for FromArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self { inputs: InputArgs::from_arg_matches(matches)?.inputs })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
 /// What an input is, as far as its name tells.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {

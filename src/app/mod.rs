@@ -9,6 +9,8 @@ pub mod info;
 mod inputs;
 pub mod interrupt;
 pub mod output;
+pub mod quality;
+pub mod repair;
 pub mod replay;
 pub mod scene;
 pub mod session;
@@ -63,6 +65,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Scene(args) => scene::run(args),
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
+        Command::Repair(args) => repair::run(args),
         Command::Walk(args) => walk::run(args),
         Command::Trace(args) => {
             args.check()?;

@@ -18,7 +18,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     let settings = Settings { kind: args.kind, triangles: args.triangles, seed: args.seed, instanced: args.instanced };
     let progress = interrupt::job();
     refuse_folder(&args.output)?;
-    let (paths, summary) = in_pool(args.build.threads, || -> Result<_> {
+    let (paths, summary) = in_pool(args.build.work.threads, || -> Result<_> {
         let scene = generate(&settings, &progress).map_err(|error| match error {
             // The count is an option's value, known only here.
             Error::Triangles { .. } => Usage(format!("--triangles: {error}")).into(),

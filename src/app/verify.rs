@@ -15,18 +15,7 @@ const LISTED: usize = 8;
 /// The file cannot be opened, or something in it is not as it was written; the message names every damaged part, bricks by
 /// their number.
 pub fn run(args: &VerifyArgs) -> Result<()> {
-    let progress = Progress::new();
-    let mut shown = None;
-    // Mebibytes, so that the bar's numbers stay readable.
-    let report = bricks::verify_file(&args.scene, &mut |done, total| {
-        if shown.is_none() {
-            progress.phase("verify MiB", total >> 20);
-        }
-        let (before, now) = (shown.unwrap_or(0), done >> 20);
-        progress.advance(now.saturating_sub(before));
-        shown = Some(now.max(before));
-    })?;
-    progress.finish();
+    let report = watched(&Progress::new(), |progress| bricks::verify_file(&args.scene, progress))?;
     if let Some(message) = problems(&report) {
         bail!("{message}");
     }
@@ -36,6 +25,22 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
         human_bytes(report.file_bytes),
         human_count(report.payloads)
     ))
+}
+
+/// Shows the progress of a `verification`, which reports bytes done and in all.
+pub(super) fn watched<T>(progress: &Progress, verification: impl FnOnce(&mut dyn FnMut(u64, u64)) -> T) -> T {
+    let mut shown = None;
+    // Mebibytes, so that the bar's numbers stay readable.
+    let result = verification(&mut |done, total| {
+        if shown.is_none() {
+            progress.phase("verify MiB", total >> 20);
+        }
+        let (before, now) = (shown.unwrap_or(0), done >> 20);
+        progress.advance(now.saturating_sub(before));
+        shown = Some(now.max(before));
+    });
+    progress.finish();
+    result
 }
 
 /// One line about everything that is wrong, or nothing: the first problem in full, then the other damaged parts.

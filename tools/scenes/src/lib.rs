@@ -111,6 +111,17 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// The settings of the scene whose source is called `name`, as in "city seed=0 triangles=2000000"; [`Self::instanced`]
+    /// is not part of the name. `None` if no generated scene is called so.
+    pub fn of_source(name: &str) -> Option<Self> {
+        let (kind, rest) = name.split_once(" seed=")?;
+        let (seed, triangles) = rest.split_once(" triangles=")?;
+        let (kind, seed, triangles) = (kind.parse().ok()?, seed.parse().ok()?, triangles.parse().ok()?);
+        Some(Self { kind, triangles, seed, instanced: false })
+    }
+}
+
 /// Why a scene could not be generated.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {

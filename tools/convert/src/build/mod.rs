@@ -42,6 +42,7 @@ mod wide;
 
 pub use error::BuildError;
 pub use settings::{BuildSettings, BuildSummary};
+pub use wide::ITEM_COST as TRIANGLE_COST;
 
 use crate::progress::Progress;
 use crate::source::{InMemory, Source, SourceScene};

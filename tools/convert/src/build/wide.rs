@@ -9,7 +9,7 @@ use super::binary::{BinaryTree, Box3, LEAF};
 use bricks::NODE_WIDTH;
 
 /// Cost of a primitive test against that of a node visit.
-const ITEM_COST: f32 = 0.3;
+pub const ITEM_COST: f32 = 0.3;
 
 /// A child of a wide node.
 #[derive(Clone, Copy, Debug)]
