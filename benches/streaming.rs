@@ -1,5 +1,6 @@
 //! Streaming of a warm file into device pages against one thread's memcpy + xxh3 of the same map into an equally mapped
-//! buffer: the physical limit of a verified copy by one thread. The upload path is named.
+//! buffer: the physical limit of a verified copy by one thread. The upload path is named. The indices in a payload are checked
+//! when it is loaded for the first time, which is in the warm-up.
 
 use brickwalk::app::args::{Cli, Command};
 use brickwalk::app::session::{Session, brick_bytes, open_scene};
@@ -12,11 +13,11 @@ use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_grou
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A city of 1.5M triangles, made once.
+/// A city of 6M triangles, made once.
 fn scene() -> PathBuf {
-    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("streaming.bricks");
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("streaming-6M.bricks");
     if !path.exists() {
-        let words = ["brickwalk", "scene", "city", "--triangles", "1500K", "-o"].map(std::ffi::OsString::from);
+        let words = ["brickwalk", "scene", "city", "--triangles", "6M", "-o"].map(std::ffi::OsString::from);
         let cli = Cli::parse_from(words.into_iter().chain([path.clone().into()]));
         brickwalk::app::run(&cli.command).expect("a city");
     }

@@ -14,6 +14,7 @@ use bytemuck::Pod;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// How payloads are read.
@@ -37,6 +38,7 @@ pub struct SceneFile {
     file_bytes: u64,
     resident_bytes: u64,
     resident: Resident,
+    validated: Validated,
 }
 
 impl SceneFile {
@@ -92,7 +94,8 @@ impl SceneFile {
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;
         validate::spans(&resident, header.directory_offset).map_err(|flaw| reader.invalid(flaw))?;
         let resident_bytes = header.directory_bytes + directory.iter().map(|entry| entry.bytes).sum::<u64>();
-        Ok(SceneFile { path, file, source, file_bytes: header.file_bytes, resident_bytes, resident })
+        let validated = Validated::none(&resident);
+        Ok(SceneFile { path, file, source, file_bytes: header.file_bytes, resident_bytes, resident, validated })
     }
 
     /// The resident part; it satisfies [`validate::resident`].
@@ -129,7 +132,8 @@ impl SceneFile {
     }
 
     /// Copies a payload to `out` and checks the copy: its checksum, then every index in it (see
-    /// [`validate::payload`]), so that whoever traverses or shades with it may index freely.
+    /// [`validate::payload`]), so that whoever traverses or shades with it may index freely. Indices are checked the first
+    /// time; after that the checksum says that they are the same.
     ///
     /// `out` must be [`Span::bytes`] long; it needs no alignment. After an error its contents are of no use.
     pub fn copy(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
@@ -144,7 +148,13 @@ impl SceneFile {
         }
         let reader = Reader { path: &self.path, source: &*self.source };
         reader.payload(payload, span, out)?;
-        validate::payload(&self.resident, payload, out).map_err(|flaw| reader.invalid(flaw))
+        let validated = self.validated.of(payload);
+        // Whoever sees the flag copies and checks bytes of its own: nothing else has to be visible with it.
+        if !validated.load(Ordering::Relaxed) {
+            validate::payload(&self.resident, payload, out).map_err(|flaw| reader.invalid(flaw))?;
+            validated.store(true, Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// Reads every byte of the file anew, as [`verify_file`](crate::verify_file) does, from the file that was opened.
@@ -160,6 +170,30 @@ impl SceneFile {
             Payload::Texture(_) => format!("one of {} textures", self.resident.textures.len()),
         };
         Error::Request { path: self.path.clone(), payload, found: payload.to_string(), expected }
+    }
+}
+
+/// The payloads whose indices have been found to be in range.
+struct Validated {
+    geometry: Box<[AtomicBool]>,
+    attributes: Box<[AtomicBool]>,
+    textures: Box<[AtomicBool]>,
+}
+
+impl Validated {
+    fn none(resident: &Resident) -> Self {
+        let none = |count: usize| (0..count).map(|_| AtomicBool::new(false)).collect();
+        let (bricks, textures) = (resident.bricks.len(), resident.textures.len());
+        Self { geometry: none(bricks), attributes: none(bricks), textures: none(textures) }
+    }
+
+    /// The flag of a payload that exists.
+    fn of(&self, payload: Payload) -> &AtomicBool {
+        match payload {
+            Payload::Geometry(brick) => &self.geometry[brick as usize],
+            Payload::Attributes(brick) => &self.attributes[brick as usize],
+            Payload::Texture(texture) => &self.textures[texture as usize],
+        }
     }
 }
 
