@@ -162,6 +162,15 @@ fn options_of_other_commands_arrive() {
     let Command::Replay(r) = parse("replay f.jsonl --cache 5% 1M,2M --cache 7K --json").unwrap() else { panic!() };
     assert_eq!(r.cache[..2], [CacheSize::Percent(5.0), CacheSize::Bytes(1 << 20)]);
     assert!(r.cache.len() == 4 && r.json);
+    let Command::Repair(r) = parse("repair s.bricks --from a.gltf b.stl --up z --from c.ply --fast").unwrap() else {
+        panic!()
+    };
+    let inputs: Vec<_> = r.inputs.inputs.iter().map(|input| (input.path.to_str().unwrap(), input.up)).collect();
+    let (y, z) = (brickwalk_convert::import::Up::Y, brickwalk_convert::import::Up::Z);
+    assert_eq!(inputs, [("a.gltf", y), ("b.stl", z), ("c.ply", y)]);
+    assert_eq!((r.scene, r.work.fast), (PathBuf::from("s.bricks"), true));
+    let Command::Repair(r) = parse("repair s.bricks").unwrap() else { panic!() };
+    assert!(r.inputs.inputs.is_empty());
     let Command::Demo(d) = parse("demo").unwrap() else { panic!() };
     assert_eq!(d.output, PathBuf::from("demo-out"));
 }
@@ -174,7 +183,7 @@ fn help_explains_units_and_defaults() {
     let cli = Cli::command();
     let mut names: Vec<_> = cli.get_subcommands().map(|c| c.get_name().to_string()).collect();
     names.sort();
-    assert_eq!(names, ["compare", "convert", "demo", "info", "replay", "scene", "trace", "verify", "walk"]);
+    assert_eq!(names, ["compare", "convert", "demo", "info", "repair", "replay", "scene", "trace", "verify", "walk"]);
     for name in names {
         let help = parse(&format!("{name} --help")).unwrap_err();
         assert_eq!(help.exit_code(), 0, "{name}");
