@@ -152,7 +152,8 @@ pub struct SceneArgs {
     /// (mountains, woods and meadows around a pond), stadium (an ornate teapot in a stadium)
     #[arg(value_name = "KIND")]
     pub kind: Kind,
-    /// The file to write; S.near.json and S.far.json, camera paths, are written beside it
+    /// The file to write: S.bricks, or S.glb or S.gltf (with S.bin) for other programs; S.near.json and S.far.json, camera
+    /// paths, are written beside it
     #[arg(short, long, value_name = "S.bricks")]
     pub output: PathBuf,
     /// Triangles of the scene with its instances, about; up to 150M

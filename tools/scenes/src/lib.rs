@@ -8,10 +8,12 @@ mod building;
 mod city;
 mod facade;
 mod furniture;
+mod gltf;
 mod layout;
 mod material;
 mod mesh;
 mod open;
+mod output;
 mod path;
 mod pieces;
 mod pipes;
@@ -30,12 +32,14 @@ mod vegetation;
 mod vehicle;
 mod window;
 
-use brickwalk_convert::progress::Progress;
+use brickwalk_convert::progress::{Interrupted, Progress};
+use brickwalk_convert::source::SourceError;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+pub use gltf::{GltfForm, write_gltf};
 pub use path::{CameraPath, Keyframe, LONG_FRAMES, NEAR_FRAMES, write_paths};
 pub use scene::Scene;
 pub use soup::{SoupKind, rotated_instances, soup};
@@ -122,7 +126,7 @@ impl Settings {
     }
 }
 
-/// Why a scene could not be generated.
+/// Why a scene could not be generated or written.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// No such kind.
@@ -148,6 +152,19 @@ pub enum Error {
         /// What the system says.
         source: std::io::Error,
     },
+    /// More than the lengths in a GLB file can say.
+    #[error("{}: a GLB file has less than 4 GiB, and this scene needs more; name it {}, which keeps its buffer in a file \
+        of its own", path.display(), path.with_extension("gltf").display())]
+    GlbSize {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Geometry could not be read.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
 }
 
 /// Generates a scene: what there is and how large, the geometry when it is read. The number of triangles is at most the one

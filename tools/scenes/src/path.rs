@@ -1,6 +1,6 @@
 //! Camera paths through generated scenes.
 
-use crate::{Error, Scene};
+use crate::{Error, Scene, output};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -21,6 +21,8 @@ const AHEAD: f64 = 9.0;
 pub const NEAR_FRAMES: u32 = 30;
 /// Frames of the long walk.
 pub const LONG_FRAMES: u32 = 300;
+/// What the names of scene files end with, and those of their paths do not.
+const SCENE_EXTENSIONS: [&str; 3] = ["bricks", "glb", "gltf"];
 
 /// A camera path, as it is stored in JSON. World units, right-handed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -129,7 +131,7 @@ pub fn around(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64) -> Ca
     CameraPath { fov_y_degrees, up: UP, keyframes: keyframes.collect() }
 }
 
-/// Writes the paths of a scene beside it: for `base` = `dir/S.bricks` or `dir/S` the files `dir/S.near.json` (a walk for 30
+/// Writes the paths of a scene beside it: for `base` = `dir/S.bricks`, `dir/S.glb`, `dir/S.gltf` or `dir/S` the files `dir/S.near.json` (a walk for 30
 /// frames), `dir/S.near-300.json` (the same walk, longer, for 300 frames) and `dir/S.far.json`. Returns their names.
 ///
 /// Each file appears complete or not at all.
@@ -138,8 +140,8 @@ pub fn around(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64) -> Ca
 ///
 /// [`Error::Write`] when a file cannot be written.
 pub fn write_paths(scene: &Scene, base: &Path) -> Result<Vec<PathBuf>, Error> {
-    let stem =
-        if base.extension().is_some_and(|e| e == "bricks") { base.with_extension("") } else { base.to_path_buf() };
+    let is_scene = base.extension().is_some_and(|e| SCENE_EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)));
+    let stem = if is_scene { base.with_extension("") } else { base.to_path_buf() };
     let mut written = Vec::new();
     let near = |frames| scene.near_path(frames);
     for (suffix, path) in [("near", near(NEAR_FRAMES)), ("near-300", near(LONG_FRAMES)), ("far", scene.far_path())] {
@@ -152,21 +154,9 @@ pub fn write_paths(scene: &Scene, base: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(written)
 }
 
-/// Writes through a temporary file in the same folder.
 fn write_json(path: &CameraPath, file: &Path) -> std::io::Result<()> {
-    let folder = match file.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    let mut temporary = tempfile::Builder::new().prefix(".path").suffix(".tmp").tempfile_in(folder)?;
+    let mut temporary = output::temporary(file)?;
     serde_json::to_writer_pretty(&mut temporary, path)?;
     temporary.write_all(b"\n")?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        temporary.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    }
-    temporary.as_file().sync_all()?;
-    temporary.persist(file).map_err(|e| e.error)?;
-    Ok(())
+    output::publish(temporary, file)
 }
