@@ -1,6 +1,7 @@
 //! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that appear
 //! complete or not at all.
 
+use brickwalk::reference::Truth;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -89,6 +90,46 @@ fn a_generated_scene_is_described_and_verified() {
     assert!(line.contains(&format!("0 to {}", ids - 1)), "{line}");
 
     assert!(done(folder, "verify city.bricks").contains("whole"));
+}
+
+/// The greatest difference of a coordinate between triangles of the same id; `None`: other ids.
+fn greatest_difference(a: &Path, b: &Path) -> Option<f64> {
+    let [a, b] = [a, b].map(|file| Truth::load(&bricks::SceneFile::open(file).unwrap()).unwrap());
+    if !a.ids().eq(b.ids()) {
+        return None;
+    }
+    let of_triangle = |id| {
+        let (p, q) = (a.vertices(id).unwrap(), b.vertices(id).unwrap());
+        p.as_flattened().iter().zip(q.as_flattened()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+    };
+    Some(a.ids().map(of_triangle).fold(0.0, f64::max))
+}
+
+#[test]
+fn a_scene_by_way_of_glb_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let city = "scene city --triangles 100K";
+    done(folder, &format!("{city} -o a.bricks --lattice -12"));
+    done(folder, &format!("{city} -o a.glb"));
+    done(folder, "convert a.glb -o b.bricks --lattice -12");
+    let at = |name: &str| folder.join(name);
+    // Each is rounded by half a step of the lattice; f32 relative to anchors within 1 km: 2^-15.
+    let difference = greatest_difference(&at("a.bricks"), &at("b.bricks")).expect("the same ids");
+    assert!(difference <= 2.0f64.powi(-12) + 2.0f64.powi(-15), "{difference}");
+    let origin = |file: &str, id: u32| -> serde_json::Value {
+        let mut origin: serde_json::Value =
+            serde_json::from_str(&done(folder, &format!("info {file} --json --id {id}"))).unwrap();
+        origin.as_object_mut().unwrap().retain(|key, _| key != "file");
+        origin
+    };
+    for id in [0, 1, 40_000, 90_000] {
+        assert_eq!(origin("a.bricks", id), origin("b.bricks", id));
+    }
+
+    assert_ne!(origin("a.bricks", 0), origin("b.bricks", 90_000));
+    done(folder, &format!("{city} -o c.bricks --lattice -12 --seed 1"));
+    assert!(greatest_difference(&at("c.bricks"), &at("b.bricks")).is_none_or(|difference| difference > 1.0));
 }
 
 #[test]

@@ -2,8 +2,8 @@
 # Measures the conversion of generated cities from glTF: rates, phases, peak memory; prints a Markdown table. Scenes and
 # finished rows are kept in the folder, so that an interrupted measurement continues.
 #   tools/measure_conversion.sh FOLDER [TRIANGLES [LARGE]]        defaults: 12M, 20M
-# TRIANGLES as .glb is converted in memory, with --fast, and with --memory a tenth of 300 bytes a triangle; LARGE as .gltf
-# with --memory 1G. Needs GNU time at /usr/bin/time.
+# TRIANGLES as .glb is converted in memory, with --fast, and with --memory 15 bytes a triangle, a tenth of the peak in memory;
+# LARGE as .gltf with --memory 1G. Needs GNU time at /usr/bin/time.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
@@ -19,16 +19,16 @@ mkdir -p "$folder"
 cd "$folder"
 
 case $triangles in
-    *M) tenth=$((${triangles%M} * 30))M ;;
+    *M) tenth=$((${triangles%M} * 15))M ;;
     *) fail "$triangles: give whole millions, as in 12M" ;;
 esac
 
-# The scene NAME of COUNT triangles.
+# scene FILE COUNT: generates a city.
 scene() {
     [ -e "$1" ] || "$brickwalk" scene city --triangles "$2" -o "$1" >&2
 }
 
-# Converts FILE with OPTIONS into a table row, which is kept.
+# row FILE OPTIONS: converts, and prints a row of the table, which is kept.
 row() {
     local file=$1 options=$2
     local key="row-$file-${options// /}"
@@ -58,7 +58,9 @@ scene "city-$triangles.glb" "$triangles"
 scene "city-$large.gltf" "$large"
 echo "# Conversion of cities of $triangles and $large triangles from glTF"
 echo
-echo "Commit $(git -C "$root" rev-parse --short=12 HEAD), $(date +%F), $(nproc) cores, no adapter needed."
+# The last change of what is measured.
+commit=$(git -C "$root" log -1 --format=%h --abbrev=12 -- tools/convert bricks)
+echo "Converter of commit $commit, $(date +%F), $(nproc) cores, no adapter needed."
 echo
 echo "| input, options | triangles | wall s | M triangles/s | processor s | M triangles/processor s | peak MiB | reading alone s | load before | phases |"
 echo "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
