@@ -19,6 +19,7 @@ mod error;
 mod file;
 pub mod layout;
 pub mod manifest;
+pub mod pack;
 mod payload;
 pub mod records;
 mod resident;
