@@ -242,9 +242,10 @@ impl CameraPath {
 
 /// A path through a scene of which only the world bounds are known, 60° high, 10 s long:
 ///
-/// - longer than wide and not taller than long (a hall, a street, a nave): a walk inside, along the longer horizontal axis
-///   from 1/5 to 4/5 of it, at a quarter of the height, looking ahead;
 /// - flatter than a quarter of its width (a city, a landscape): a flight inward above it, looking at the middle;
+/// - longer than wide, not taller than long, and in metres of a size to walk in, 10 long, 2.5 wide, 2.5 to 50 high (a
+///   hall, a street, a nave): a walk inside, along the longer horizontal axis from 1/5 to 4/5 of it, at a quarter of the
+///   height, looking ahead;
 /// - else (an object): a quarter turn around it from outside, a third of the height above the middle.
 ///
 /// Bounds that are empty (`min > max`), not finite or a single point are taken as a unit cube around their middle or the
@@ -277,7 +278,12 @@ pub fn path_from_bounds(min: [f64; 3], max: [f64; 3]) -> CameraPath {
         let to = centre.with_y(min.y + 0.6 * above + 0.4 * size.y) - along * (0.15 * length) - across * (0.1 * width);
         let middle = centre.with_y(min.y + 0.5 * size.y);
         vec![key(0.0, from, middle), key(10.0, to, middle + along * (0.1 * length))]
-    } else if length > 1.25 * width && size.y <= length {
+    } else if length > 1.25 * width
+        && size.y <= length
+        && length >= 10.0
+        && width >= 2.5
+        && (2.5..=50.0).contains(&size.y)
+    {
         let at = |s: f64| centre.with_y(min.y + 0.25 * size.y) + along * ((s - 0.5) * length);
         let sway = across * (0.04 * width);
         let ahead = along * (0.4 * length) + DVec3::Y * (0.03 * size.y);

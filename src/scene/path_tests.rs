@@ -186,6 +186,25 @@ fn default_paths_of_an_object_and_of_a_landscape_see_it_from_outside() {
     }
 }
 
+/// What is long but no hall (a toy, a statue in millimetres, a sheet) is seen from outside.
+#[test]
+fn default_paths_of_long_objects_see_them_from_outside() {
+    let hall = [[0.0; 3], [30.0, 12.0, 18.0]];
+    let inside = |[min, max]: [[f64; 3]; 2]| {
+        (0..8).any(|k| {
+            let at = path_from_bounds(min, max).frame(k, 8).position.to_array();
+            at.iter().zip(min.iter().zip(max)).all(|(x, (min, max))| x >= min && *x <= max)
+        })
+    };
+    assert!(inside(hall));
+    for scale in [0.05, 0.2, 50.0] {
+        assert!(!inside(hall.map(|corner| corner.map(|x| x * scale))), "{scale}");
+    }
+    for thin in [[30.0, 12.0, 0.0], [0.0, 12.0, 30.0], [1.0, 1.0, 0.0], [5.7, 2.0, 0.0]] {
+        assert!(!inside([[0.0; 3], thin]), "{thin:?}");
+    }
+}
+
 /// The shipped paths parse and stay inside Sponza's walls.
 #[test]
 fn shipped_paths_are_inside_sponza() {
