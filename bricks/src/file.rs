@@ -11,9 +11,11 @@ use crate::validate;
 use crate::verify::{VerifyReport, verify_source};
 use crate::{Flaw, Manifest};
 use bytemuck::Pod;
+use std::borrow::Cow;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -70,9 +72,11 @@ impl SceneFile {
         Self::load(path, Box::new(ReadSource::new(file)), source)
     }
 
-    /// Opens a scene file that is part of the program; `name` stands for its path in messages. As [`Self::open`].
-    pub fn from_bytes(name: impl Into<PathBuf>, bytes: &'static [u8]) -> Result<SceneFile, Error> {
-        Self::load(name.into(), Box::new(bytes), Box::new(bytes))
+    /// Opens a scene file that is part of the program, or otherwise in memory; `name` stands for its path in messages. As
+    /// [`Self::open`].
+    pub fn from_bytes(name: impl Into<PathBuf>, bytes: impl Into<Cow<'static, [u8]>>) -> Result<SceneFile, Error> {
+        let bytes = Arc::new(bytes.into());
+        Self::load(name.into(), Box::new(bytes.clone()), Box::new(bytes))
     }
 
     /// Reads the resident part. It comes by positional reads, so that a failing disk is an error here, not a signal.

@@ -1,7 +1,9 @@
 //! Where the bytes of a scene file come from: a memory map, reads at positions, or memory.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io;
+use std::sync::Arc;
 
 /// Bytes at positions of a file that does not change.
 pub(crate) trait Source: Send + Sync {
@@ -91,8 +93,8 @@ impl Source for MapSource {
     }
 }
 
-/// A file that is part of the program.
-impl Source for &'static [u8] {
+/// A file in memory.
+impl Source for Arc<Cow<'static, [u8]>> {
     fn length(&self) -> io::Result<u64> {
         Ok(self.len() as u64)
     }

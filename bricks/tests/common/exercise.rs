@@ -1,0 +1,141 @@
+//! Reads everything in a scene file of any bytes. The fuzz target and the tests share it.
+
+use bricks::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, PAGE_BYTES};
+use bricks::{
+    BRICK_INDEX32, Brick, GeometryLayout, MAX_BRICK_HEIGHT, Node, Payload, Resident, SceneFile, Section, Span, Texture,
+    validate,
+};
+use bytemuck::Pod;
+use std::ops::Range;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// Opens the file in `bytes`, copies every payload, follows its indices and verifies all of it; whether it opened, and how
+/// many payloads were copied.
+///
+/// # Panics
+/// The reader accepts what does not obey the format.
+pub fn exercise(bytes: &[u8]) -> (bool, usize) {
+    let file = match SceneFile::from_bytes("fuzzed.bricks", bytes.to_vec()) {
+        Ok(file) => file,
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.contains("fuzzed.bricks") && !message.contains('\n'), "{message}");
+            return (false, 0);
+        }
+    };
+    validate::resident(file.resident()).expect("what opens is valid");
+    let mut copied = 0;
+    for (payload, span) in file.resident().payloads() {
+        assert!(span.bytes <= bytes.len() as u64, "a payload longer than the file");
+        let mut out = vec![0; span.bytes as usize];
+        if file.copy(payload, &mut out).is_ok() {
+            copied += 1;
+            traverse(file.resident(), payload, &out);
+        }
+    }
+    let report = file.verify(&mut |_, _| {}).expect("bytes in memory can be read");
+    for problem in &report.problems {
+        assert!(problem.part().is_some() && !problem.to_string().contains('\n'));
+    }
+    assert!(!report.is_ok() || copied == file.resident().payloads().count(), "verify finds what copying finds");
+    (true, copied)
+}
+
+/// Follows every index of a geometry payload without any check, as a kernel does.
+pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
+    let Payload::Geometry(index) = payload else { return };
+    let brick = &resident.bricks[index as usize];
+    let layout = GeometryLayout::of(brick);
+    let word = |at: u64| u32::from_le_bytes(bytes[at as usize..at as usize + 4].try_into().unwrap());
+    let mut stack = vec![(0u32, 1u32)];
+    let mut visits = 0;
+    while let Some((index, level)) = stack.pop() {
+        visits += 1;
+        assert!(visits <= brick.node_count && level <= brick.height && brick.height <= MAX_BRICK_HEIGHT);
+        let node: Node = bytemuck::pod_read_unaligned(&bytes[index as usize * 80..][..80]);
+        for slot in 0..8 {
+            if node.inner_mask >> slot & 1 != 0 {
+                let below = node.inner_mask & ((1u32 << slot) - 1) as u8;
+                stack.push((node.child_base + below.count_ones(), level + 1));
+            } else if node.meta[slot] != 0 {
+                let first = node.triangle_base + u32::from(node.meta[slot] & 31);
+                for triangle in first..first + u32::from(node.meta[slot] >> 5).count_ones() {
+                    let id = word(layout.ids + u64::from(triangle) * 4);
+                    assert!(id < resident.objects[brick.object as usize].triangle_ids);
+                    for corner in 0..3 {
+                        let at = u64::from(triangle * 3 + corner);
+                        let vertex = if brick.flags & BRICK_INDEX32 != 0 {
+                            word(layout.indices + at * 4)
+                        } else {
+                            word((layout.indices + at * 2) & !3) >> (at % 2 * 16) & 0xffff
+                        };
+                        assert!(vertex < brick.vertex_count);
+                    }
+                }
+            }
+        }
+    }
+    assert_eq!(visits, brick.node_count);
+}
+
+/// Makes every checksum right that can be found in `bytes`, so that the checks behind them are reached. What leads out of
+/// the file is left as it is.
+pub fn seal(bytes: &mut [u8]) {
+    let Some(mut header) = read::<Header>(bytes, 0) else { return };
+    if bytes.len() < PAGE_BYTES as usize {
+        return;
+    }
+    let directory = header.directory_offset;
+    for (index, section) in (0u64..).zip(Section::ALL) {
+        let at = directory.saturating_add(index * size_of::<DirectoryEntry>() as u64);
+        let Some(mut entry) = read::<DirectoryEntry>(bytes, at) else { return };
+        match section {
+            Section::Bricks => {
+                records::<Brick>(bytes, &entry, |brick| vec![&mut brick.geometry, &mut brick.attributes])
+            }
+            Section::Textures => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.texels]),
+            _ => {}
+        }
+        if let Some(section) = range(bytes, entry.offset, entry.bytes) {
+            entry.checksum = xxh3_64(&bytes[section]);
+            write(bytes, at, &entry);
+        }
+    }
+    if let Some(directory) = range(bytes, directory, DIRECTORY_BYTES) {
+        header.directory_checksum = xxh3_64(&bytes[directory]);
+    }
+    header.file_bytes = bytes.len() as u64;
+    header.checksum = 0;
+    write(bytes, 0, &header);
+    header.checksum = xxh3_64(&bytes[..PAGE_BYTES as usize]);
+    write(bytes, 0, &header);
+}
+
+/// Makes the checksums right that the records of a section state of payloads.
+fn records<T: Pod>(bytes: &mut [u8], entry: &DirectoryEntry, spans: impl Fn(&mut T) -> Vec<&mut Span>) {
+    for index in 0..entry.count.min(entry.bytes / size_of::<T>() as u64) {
+        let at = entry.offset.saturating_add(index * size_of::<T>() as u64);
+        let Some(mut record) = read::<T>(bytes, at) else { return };
+        for span in spans(&mut record) {
+            if let Some(payload) = range(bytes, span.offset, span.bytes) {
+                span.checksum = xxh3_64(&bytes[payload]);
+            }
+        }
+        write(bytes, at, &record);
+    }
+}
+
+/// The bytes at `offset`, if the file has as many.
+fn range(bytes: &[u8], offset: u64, length: u64) -> Option<Range<usize>> {
+    let end = offset.checked_add(length).filter(|&end| end <= bytes.len() as u64)?;
+    Some(offset as usize..end as usize)
+}
+
+fn read<T: Pod>(bytes: &[u8], offset: u64) -> Option<T> {
+    Some(bytemuck::pod_read_unaligned(&bytes[range(bytes, offset, size_of::<T>() as u64)?]))
+}
+
+/// Writes where [`read`] found something.
+fn write<T: Pod>(bytes: &mut [u8], offset: u64, value: &T) {
+    bytes[offset as usize..][..size_of::<T>()].copy_from_slice(bytemuck::bytes_of(value));
+}
