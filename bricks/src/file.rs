@@ -3,6 +3,7 @@
 use crate::error::{Error, Part};
 use crate::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, MAGIC, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
 use crate::layout::{MAX_PAYLOAD_BYTES, unread_kind};
+use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
 use crate::records::Span;
 use crate::resident::Resident;
@@ -94,6 +95,7 @@ impl SceneFile {
             bricks: reader.section(&directory, Section::Bricks)?,
             materials: reader.section(&directory, Section::Materials)?,
             textures: reader.section(&directory, Section::Textures)?,
+            occupancy: reader.section(&directory, Section::Occupancy)?,
         };
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;
         validate::spans(&resident, header.directory_offset).map_err(|flaw| reader.invalid(flaw))?;
@@ -122,7 +124,7 @@ impl SceneFile {
         self.resident_bytes
     }
 
-    /// Where a payload lies in the file.
+    /// Where a payload lies in the file; all zero for proxies that the scene does not have.
     ///
     /// # Panics
     ///
@@ -131,6 +133,7 @@ impl SceneFile {
         match payload {
             Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry,
             Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes,
+            Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies,
             Payload::Texture(texture) => self.resident.textures[texture as usize].texels,
         }
     }
@@ -161,6 +164,21 @@ impl SceneFile {
         Ok(())
     }
 
+    /// The occupancy of a brick in all levels, checked as [`Self::copy`] does.
+    ///
+    /// # Errors
+    /// As of [`Self::copy`]; there is no such brick, or the scene has no proxies.
+    pub fn occupancy(&self, brick: u32) -> Result<OccupancyMap, Error> {
+        let payload = Payload::Proxies(brick);
+        let span = self.resident.span(payload).ok_or_else(|| self.no_such(payload))?;
+        let mut packed = vec![0; span.bytes as usize];
+        self.copy(payload, &mut packed)?;
+        OccupancyMap::unpack(&packed).map_err(|error| {
+            let part = Part::Payload(payload);
+            Reader { path: &self.path, source: &*self.source }.invalid(error.in_part(part))
+        })
+    }
+
     /// Reads every byte of the file anew, as [`verify_file`](crate::verify_file) does, from the file that was opened.
     pub fn verify(&self, progress: &mut dyn FnMut(u64, u64)) -> Result<VerifyReport, Error> {
         let length = length_of(&self.path, &*self.file)?;
@@ -171,6 +189,7 @@ impl SceneFile {
     fn no_such(&self, payload: Payload) -> Error {
         let expected = match payload {
             Payload::Geometry(_) | Payload::Attributes(_) => format!("one of {} bricks", self.resident.bricks.len()),
+            Payload::Proxies(_) => format!("one of {} bricks with proxies", self.resident.occupancy.len()),
             Payload::Texture(_) => format!("one of {} textures", self.resident.textures.len()),
         };
         Error::Request { path: self.path.clone(), payload, found: payload.to_string(), expected }
@@ -181,6 +200,7 @@ impl SceneFile {
 struct Validated {
     geometry: Box<[AtomicBool]>,
     attributes: Box<[AtomicBool]>,
+    proxies: Box<[AtomicBool]>,
     textures: Box<[AtomicBool]>,
 }
 
@@ -188,7 +208,12 @@ impl Validated {
     fn none(resident: &Resident) -> Self {
         let none = |count: usize| (0..count).map(|_| AtomicBool::new(false)).collect();
         let (bricks, textures) = (resident.bricks.len(), resident.textures.len());
-        Self { geometry: none(bricks), attributes: none(bricks), textures: none(textures) }
+        Self {
+            geometry: none(bricks),
+            attributes: none(bricks),
+            proxies: none(resident.occupancy.len()),
+            textures: none(textures),
+        }
     }
 
     /// The flag of a payload that exists.
@@ -196,6 +221,7 @@ impl Validated {
         match payload {
             Payload::Geometry(brick) => &self.geometry[brick as usize],
             Payload::Attributes(brick) => &self.attributes[brick as usize],
+            Payload::Proxies(brick) => &self.proxies[brick as usize],
             Payload::Texture(texture) => &self.textures[texture as usize],
         }
     }
@@ -367,7 +393,7 @@ impl Reader<'_> {
 
     /// Reads the records of a section. `directory` was found right, so the length is less than the file's.
     pub(crate) fn section<T: Pod>(&self, directory: &Directory, section: Section) -> Result<Vec<T>, Error> {
-        let entry = &directory[section as usize - 1];
+        let entry = &directory[section.index()];
         debug_assert!(size_of::<T>() == entry.record_bytes as usize);
         let part = Part::Section(section);
         let mut records = Vec::new();

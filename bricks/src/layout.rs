@@ -4,6 +4,7 @@
 //! header page, payloads (each on a multiple of [`PAGE_BYTES`]), directory (on a multiple of [`PAGE_BYTES`]), sections in
 //! the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
 
+use crate::occupancy::Occupancy;
 use crate::records::{Brick, Instance, Leaf, Material, Object, Texture, TopNode2, TopNode8};
 use bytemuck::{Pod, Zeroable};
 use std::fmt;
@@ -13,7 +14,7 @@ use xxhash_rust::xxh3::xxh3_64;
 pub const MAGIC: [u8; 8] = *b"BRICKS\x1a\n";
 
 /// The version of the format that this crate writes and reads. No other version is read.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Alignment of payloads and of the directory, and length of the header page.
 pub const PAGE_BYTES: u64 = 4096;
@@ -85,8 +86,6 @@ pub struct DirectoryEntry {
     pub checksum: u64,
 }
 
-/// Kind kept for brick occupancy maps. Not in files of this version.
-pub const KIND_OCCUPANCY: u32 = 16;
 /// Kind kept for directional visibility fields. Not in files of this version.
 pub const KIND_VISIBILITY_FIELDS: u32 = 17;
 /// Kind kept for displacement fields. Not in files of this version.
@@ -97,7 +96,6 @@ pub const KIND_LEVELS_OF_DETAIL: u32 = 19;
 /// What a directory kind is called that this version does not have.
 pub(crate) fn unread_kind(kind: u32) -> &'static str {
     match kind {
-        KIND_OCCUPANCY => "kept for occupancy maps",
         KIND_VISIBILITY_FIELDS => "kept for visibility fields",
         KIND_DISPLACEMENT_FIELDS => "kept for displacement fields",
         KIND_LEVELS_OF_DETAIL => "kept for levels of detail",
@@ -127,11 +125,13 @@ pub enum Section {
     Materials = 8,
     /// [`Texture`]s.
     Textures = 9,
+    /// [`Occupancy`] of the bricks, in their order, or nothing.
+    Occupancy = 16,
 }
 
 impl Section {
     /// All sections in the order of the file.
-    pub const ALL: [Section; 9] = [
+    pub const ALL: [Section; 10] = [
         Section::Manifest,
         Section::Objects,
         Section::Instances,
@@ -141,11 +141,20 @@ impl Section {
         Section::Bricks,
         Section::Materials,
         Section::Textures,
+        Section::Occupancy,
     ];
 
     /// The section's number in the directory.
     pub fn kind(self) -> u32 {
         self as u32
+    }
+
+    /// The section's place in [`Self::ALL`] and in the directory.
+    pub fn index(self) -> usize {
+        match self {
+            Section::Occupancy => Section::ALL.len() - 1,
+            numbered_from_one => numbered_from_one as usize - 1,
+        }
     }
 
     /// Bytes of one record; 1 for the manifest.
@@ -160,6 +169,7 @@ impl Section {
             Section::Bricks => size_of::<Brick>(),
             Section::Materials => size_of::<Material>(),
             Section::Textures => size_of::<Texture>(),
+            Section::Occupancy => size_of::<Occupancy>(),
         };
         bytes as u32
     }
@@ -176,6 +186,7 @@ impl Section {
             Section::Bricks => "bricks",
             Section::Materials => "materials",
             Section::Textures => "textures",
+            Section::Occupancy => "occupancy",
         }
     }
 }

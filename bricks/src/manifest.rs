@@ -39,6 +39,8 @@ pub struct Manifest {
     pub has_animation: bool,
     /// Any wide brick.
     pub has_wide_bricks: bool,
+    /// Proxies: an occupancy map for every brick. Not in a scene without bricks.
+    pub has_proxies: bool,
     /// Largest ratio of scales (κ) over the instances' matrices; 1 without instances.
     pub instance_scale_ratio: f64,
     /// Warnings of the conversion, one line each.

@@ -9,6 +9,8 @@ pub enum Payload {
     Geometry(u32),
     /// What shading of hits in a brick reads, laid out as [`crate::AttributeLayout`] says.
     Attributes(u32),
+    /// The [`crate::OccupancyMap`] of a brick, packed.
+    Proxies(u32),
     /// The texels of a texture, all levels.
     Texture(u32),
 }
@@ -18,6 +20,7 @@ impl fmt::Display for Payload {
         match self {
             Payload::Geometry(brick) => write!(f, "brick {brick} geometry"),
             Payload::Attributes(brick) => write!(f, "brick {brick} attributes"),
+            Payload::Proxies(brick) => write!(f, "brick {brick} proxies"),
             Payload::Texture(texture) => write!(f, "texture {texture}"),
         }
     }

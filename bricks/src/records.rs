@@ -130,7 +130,7 @@ pub struct Brick {
     pub geometry: Span,
     /// What shading of hits reads: see [`AttributeLayout`].
     pub attributes: Span,
-    /// Zero; for occupancy maps, visibility and displacement fields.
+    /// The packed [`crate::OccupancyMap`]; all zero in a scene without proxies.
     pub proxies: Span,
     /// Area-weighted mean linear base colour.
     pub mean_albedo: [f32; 3],

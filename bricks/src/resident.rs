@@ -2,6 +2,7 @@
 
 use crate::layout::Section;
 use crate::manifest::Manifest;
+use crate::occupancy::Occupancy;
 use crate::payload::Payload;
 use crate::records::{Brick, Instance, Leaf, Material, Object, Span, Texture, TopNode2, TopNode8};
 
@@ -30,6 +31,8 @@ pub struct Resident {
     pub materials: Vec<Material>,
     /// Textures.
     pub textures: Vec<Texture>,
+    /// The occupancy of each brick, or nothing: then the scene has no proxies.
+    pub occupancy: Vec<Occupancy>,
 }
 
 impl Resident {
@@ -45,23 +48,30 @@ impl Resident {
             Section::Bricks => self.bricks.len(),
             Section::Materials => self.materials.len(),
             Section::Textures => self.textures.len(),
+            Section::Occupancy => self.occupancy.len(),
         }
     }
 
-    /// Where a payload lies, or `None` if there is no such brick or texture.
+    /// Where a payload lies, or `None` if there is no such brick or texture, or no proxies.
     pub fn span(&self, payload: Payload) -> Option<Span> {
         match payload {
             Payload::Geometry(brick) => self.bricks.get(brick as usize).map(|brick| brick.geometry),
             Payload::Attributes(brick) => self.bricks.get(brick as usize).map(|brick| brick.attributes),
+            Payload::Proxies(brick) => {
+                let brick = self.bricks.get(brick as usize);
+                brick.map(|brick| brick.proxies).filter(|span| *span != Span::default())
+            }
             Payload::Texture(texture) => self.textures.get(texture as usize).map(|texture| texture.texels),
         }
     }
 
-    /// Every payload with its span: the bricks' geometry and attributes in order of bricks, then the textures.
+    /// Every payload with its span: the bricks' geometry, attributes and, if any, proxies in order of bricks, then the textures.
     pub fn payloads(&self) -> impl Iterator<Item = (Payload, Span)> + '_ {
         let bricks = (0u32..).zip(&self.bricks);
         let bricks = bricks.flat_map(|(index, brick)| {
-            [(Payload::Geometry(index), brick.geometry), (Payload::Attributes(index), brick.attributes)]
+            let payloads = [Payload::Geometry(index), Payload::Attributes(index), Payload::Proxies(index)];
+            let spans = payloads.into_iter().zip([brick.geometry, brick.attributes, brick.proxies]);
+            spans.filter(|(payload, span)| !matches!(payload, Payload::Proxies(_)) || *span != Span::default())
         });
         let textures = (0u32..).zip(&self.textures);
         bricks.chain(textures.map(|(index, texture)| (Payload::Texture(index), texture.texels)))

@@ -4,6 +4,7 @@ use crate::error::{Error, Flaw, Part};
 use crate::file::{Directory, Reader, length_of, open_file};
 use crate::layout::{Header, MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
 use crate::manifest::Manifest;
+use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
 use crate::records::{Brick, Span, Texture};
 use crate::resident::Resident;
@@ -122,6 +123,7 @@ impl Verifier<'_> {
         let bricks: Option<Vec<Brick>> = self.section(directory, Section::Bricks);
         let materials = self.section(directory, Section::Materials);
         let textures: Option<Vec<Texture>> = self.section(directory, Section::Textures);
+        let occupancy = self.section(directory, Section::Occupancy);
         self.advance(directory.iter().map(|entry| entry.bytes).sum());
 
         let whole = manifest.is_some()
@@ -132,7 +134,8 @@ impl Verifier<'_> {
             && top8.is_some()
             && bricks.is_some()
             && materials.is_some()
-            && textures.is_some();
+            && textures.is_some()
+            && occupancy.is_some();
         let resident = Resident {
             manifest: manifest.unwrap_or_default(),
             objects: objects.unwrap_or_default(),
@@ -143,6 +146,7 @@ impl Verifier<'_> {
             bricks: bricks.unwrap_or_default(),
             materials: materials.unwrap_or_default(),
             textures: textures.unwrap_or_default(),
+            occupancy: occupancy.unwrap_or_default(),
         };
         let valid = whole && self.keep_flaw(validate::resident(&resident));
         let tiled = whole && self.keep_flaw(validate::spans(&resident, header.directory_offset));
@@ -236,7 +240,24 @@ fn check_payload(
     reader.payload(payload, span, buffer)?;
     if valid {
         let checked = validate::payload(resident, payload, buffer);
-        checked.and_then(|()| validate::contents(resident, payload, buffer)).map_err(|flaw| reader.invalid(flaw))?;
+        let checked = checked.and_then(|()| validate::contents(resident, payload, buffer));
+        let occupied = checked.and_then(|()| match payload {
+            Payload::Geometry(index) => occupied(reader, resident, index, buffer),
+            _ => Ok(()),
+        });
+        occupied.map_err(|flaw| reader.invalid(flaw))?;
     }
     Ok(())
+}
+
+/// Checks the vertices of a brick against its occupancy, if it has one and that is whole; what is wrong with it by itself is
+/// found where it is checked.
+fn occupied(reader: &Reader, resident: &Resident, index: u32, geometry: &[u8]) -> Result<(), Flaw> {
+    let payload = Payload::Proxies(index);
+    let Some(span) = resident.span(payload) else { return Ok(()) };
+    let mut packed = vec![0; span.bytes as usize];
+    if reader.payload(payload, span, &mut packed).is_err() {
+        return Ok(());
+    }
+    OccupancyMap::unpack(&packed).map_or(Ok(()), |map| validate::occupied(resident, index, geometry, &map))
 }

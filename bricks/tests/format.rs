@@ -110,6 +110,7 @@ fn structs() -> BTreeMap<String, Table> {
         }),
         table!(Texture { width, height, levels, wrap, texels }),
         table!(Node { origin, exponent, inner_mask, child_base, triangle_base, meta, lo, hi }),
+        table!(Occupancy { cell_log2, _reserved, origin, bits }),
         table!(AttributeVertex { normal, uv, color }),
     ])
 }
@@ -146,6 +147,7 @@ fn sections_are_those_of_the_page() {
         assert_eq!(row[0].trim_matches('`'), section.name());
         assert_eq!(row[1], section.kind().to_string());
         assert_eq!(row[2], section.record_bytes().to_string());
+        assert_eq!(Section::ALL[section.index()], section);
     }
 }
 
@@ -160,8 +162,9 @@ fn numbers_are_those_of_the_page() {
         format!("| `page_bytes` | 12 | 4 | {PAGE_BYTES} |"),
         format!("| `directory_bytes` | 32 | 8 | {DIRECTORY_BYTES} |"),
         format!("{PAGE_BYTES} bytes for\npayloads and the directory, {SECTION_ALIGN} for sections"),
-        format!("{KIND_OCCUPANCY} occupancy maps, {KIND_VISIBILITY_FIELDS} visibility fields"),
-        format!("{KIND_DISPLACEMENT_FIELDS} displacement fields, {KIND_LEVELS_OF_DETAIL} levels of detail"),
+        format!(
+            "{KIND_VISIBILITY_FIELDS} visibility fields, {KIND_DISPLACEMENT_FIELDS} displacement fields, {KIND_LEVELS_OF_DETAIL} levels of detail"
+        ),
         format!("1 to {MAX_TEXTURE_SIZE} texels"),
         format!("at most {MAX_TOP_EXPONENT} |"),
         format!("levels of nodes, 1 to {MAX_BRICK_HEIGHT} |"),

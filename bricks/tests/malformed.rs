@@ -2,7 +2,7 @@
 
 mod common;
 
-use bricks::layout::{KIND_LEVELS_OF_DETAIL, KIND_OCCUPANCY};
+use bricks::layout::{KIND_LEVELS_OF_DETAIL, KIND_VISIBILITY_FIELDS};
 use bricks::*;
 use common::{Image, scene, written};
 use std::fs;
@@ -114,7 +114,6 @@ fn bricks_by_themselves() {
     refused(record(Bricks, 1), "flags 0x7", |r| r.bricks[1].flags = 7);
     refused(record(Bricks, 0), "reserved", |r| r.bricks[0]._reserved0 = 1);
     refused(record(Bricks, 0), "reserved", |r| r.bricks[0]._reserved1[3] = 1);
-    refused(record(Bricks, 0), "proxies", |r| r.bricks[0].proxies.checksum = 1);
     refused(record(Bricks, 0), "0, 27,", |r| r.bricks[0].node_count = 0);
     refused(record(Bricks, 0), "vertices", |r| r.bricks[0].vertex_count = 0);
     refused(record(Bricks, 0), "vertices", |r| r.bricks[0].attribute_vertex_count = 0);
@@ -152,6 +151,34 @@ fn bricks_by_themselves() {
     ] {
         refused(Part::Payload(part), "bytes", |r| spoil(&mut r.bricks[0]));
     }
+}
+
+#[test]
+fn occupancy() {
+    use Section::Occupancy;
+    refused(Part::Section(Occupancy), "2 records", |r| r.occupancy.truncate(2));
+    refused(Part::Section(Occupancy), "4 records", |r| r.occupancy.push(r.occupancy[0]));
+    refused(Part::Section(Section::Manifest), "has_proxies false", |r| r.manifest.has_proxies = false);
+    refused(Part::Section(Section::Manifest), "has_proxies true", |r| r.occupancy.clear());
+    refused(record(Section::Bricks, 1), "a span of proxies", |r| {
+        r.occupancy.clear();
+        (r.manifest.has_proxies, r.bricks[0].proxies) = (false, Span::default());
+    });
+    for bytes in [0, 8, 17, (1 << 16) + 16, u64::MAX] {
+        refused(Part::Payload(Payload::Proxies(1)), "bytes", |r| r.bricks[1].proxies.bytes = bytes);
+    }
+    refused(record(Occupancy, 0), "reserved", |r| r.occupancy[0]._reserved = 1);
+    refused(record(Occupancy, 1), "cell_log2", |r| r.occupancy[1].cell_log2 -= 1);
+    refused(record(Occupancy, 1), "cell_log2", |r| r.occupancy[1].cell_log2 = i32::MAX);
+    refused(record(Occupancy, 2), "origin", |r| r.occupancy[2].origin[2] += 1);
+    refused(record(Occupancy, 2), "origin", |r| r.occupancy[2].origin[0] = i64::MIN);
+    refused(record(Occupancy, 0), "no occupied cell", |r| r.occupancy[0].bits = [0; 512]);
+    refused(record(Occupancy, 2), "bounds", |r| {
+        let far = 1 << 60;
+        let brick = &mut r.bricks[2];
+        brick.origin[0] += far;
+        (brick.min[0], brick.max[0]) = (brick.min[0] + far, brick.max[0] + far);
+    });
 }
 
 #[test]
@@ -340,7 +367,9 @@ fn headers() {
 fn directories() {
     use Section::*;
     file_refused("kind 99 (unknown)", |image| image.edit_entry(Leaves, |e| e.kind = 99));
-    file_refused("kept for occupancy maps", |image| image.edit_entry(Leaves, |e| e.kind = KIND_OCCUPANCY));
+    file_refused("kept for visibility fields", |image| {
+        image.edit_entry(Leaves, |e| e.kind = KIND_VISIBILITY_FIELDS);
+    });
     file_refused("kept for levels of detail", |image| image.edit_entry(Leaves, |e| e.kind = KIND_LEVELS_OF_DETAIL));
     file_refused("kind 3 (instances)", |image| image.edit_entry(Objects, |e| e.kind = 3));
     file_refused("records of 300 bytes", |image| image.edit_entry(Bricks, |e| e.record_bytes = 300));
@@ -352,7 +381,7 @@ fn directories() {
         image.edit_entry(Leaves, |e| (e.count, e.bytes) = (u32::MAX.into(), u64::from(u32::MAX) * 8));
     });
     file_refused("the last section ending at byte", |image| {
-        image.edit_entry(Textures, |e| (e.count, e.bytes) = (0, 0));
+        image.edit_entry(Occupancy, |e| (e.count, e.bytes) = (0, 0));
     });
     file_refused("text that does not parse", |image| {
         image.section(Manifest)[0] = b'[';

@@ -115,6 +115,9 @@ pub struct BuildArgs {
     /// Most triangles of a brick, 1 to 1048576; larger is faster in core, smaller reads less out of core
     #[arg(long, value_name = "COUNT", default_value = "16384", value_parser = brick_triangles)]
     pub brick_triangles: u32,
+    /// Leave out the occupancy maps of bricks, which approximate secondary rays where no brick is loaded
+    #[arg(long)]
+    pub no_proxies: bool,
     /// Continue a conversion with the same inputs and options that was interrupted; without this it starts anew
     #[arg(long)]
     pub resume: bool,

@@ -34,7 +34,12 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
 
 /// The settings of the builder for everything that writes a scene file.
 pub fn build_settings(args: &BuildArgs) -> BuildSettings {
-    BuildSettings { brick_triangles: args.brick_triangles, resume: args.resume, ..work_settings(&args.work) }
+    BuildSettings {
+        brick_triangles: args.brick_triangles,
+        proxies: !args.no_proxies,
+        resume: args.resume,
+        ..work_settings(&args.work)
+    }
 }
 
 /// The settings of the builder for everything that converts.

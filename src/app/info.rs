@@ -76,6 +76,8 @@ struct Info<'a> {
     tallest_brick_levels: u32,
     geometry_bytes: u64,
     attribute_bytes: u64,
+    /// Occupancy maps that are read on demand.
+    proxy_bytes: u64,
     texture_bytes: u64,
     /// Geometry and attributes of the two largest bricks: what a cache must hold at least.
     two_largest_bricks_bytes: u64,
@@ -95,6 +97,7 @@ struct Info<'a> {
     has_instances: bool,
     has_animation: bool,
     has_wide_bricks: bool,
+    has_proxies: bool,
     provenance_ranges: usize,
     left_out: Vec<LeftOut>,
     warnings: &'a [String],
@@ -142,6 +145,7 @@ impl<'a> Info<'a> {
             tallest_brick_levels: r.bricks.iter().map(|b| b.height).max().unwrap_or(0),
             geometry_bytes: bytes(|p| matches!(p, Payload::Geometry(_))),
             attribute_bytes: bytes(|p| matches!(p, Payload::Attributes(_))),
+            proxy_bytes: bytes(|p| matches!(p, Payload::Proxies(_))),
             texture_bytes: bytes(|p| matches!(p, Payload::Texture(_))),
             two_largest_bricks_bytes: largest.iter().take(2).sum(),
             lattice_step: world.map_or(0.0, |o| 2f64.powi(o.step_log2)),
@@ -158,6 +162,7 @@ impl<'a> Info<'a> {
             has_instances: m.has_instances,
             has_animation: m.has_animation,
             has_wide_bricks: m.has_wide_bricks,
+            has_proxies: m.has_proxies,
             provenance_ranges: m.provenance.len(),
             left_out: left_out(m),
             warnings: &m.warnings,
@@ -217,11 +222,14 @@ impl<'a> Info<'a> {
         for line in human_histogram(&self.brick_histogram) {
             row("", line);
         }
-        let (geometry, attributes) = (human_bytes(self.geometry_bytes), human_bytes(self.attribute_bytes));
-        row(
-            "payloads",
-            format!("geometry {geometry}, attributes {attributes}, textures {}", human_bytes(self.texture_bytes)),
-        );
+        let payloads = [
+            ("geometry", self.geometry_bytes),
+            ("attributes", self.attribute_bytes),
+            ("proxies", self.proxy_bytes),
+            ("textures", self.texture_bytes),
+        ];
+        let payloads = payloads.map(|(name, bytes)| format!("{name} {}", human_bytes(bytes)));
+        row("payloads", payloads.join(", "));
         for line in self.sections.human() {
             row("sections", line);
         }

@@ -33,6 +33,8 @@ pub struct Sections {
     pub surfaces: u64,
     /// Indices of attribute vertices.
     pub attribute_indices: u64,
+    /// Occupancy maps that are read on demand.
+    pub proxies: u64,
     /// Texels.
     pub textures: u64,
     /// The directory of the resident part.
@@ -57,6 +59,7 @@ impl Sections {
             sizes.attribute_vertices += attributes.surfaces;
             sizes.surfaces += attributes.indices - attributes.surfaces;
             sizes.attribute_indices += attributes.bytes - attributes.indices;
+            sizes.proxies += brick.proxies.bytes;
         }
         sizes.textures = resident.textures.iter().map(|texture| texture.texels.bytes).sum();
         let bytes = |section: Section| resident.count(section) as u64 * u64::from(section.record_bytes());
@@ -80,7 +83,7 @@ impl Sections {
 
     fn sum(&self) -> u64 {
         let resident = self.directory + self.resident.values().sum::<u64>();
-        self.header + self.geometry() + self.attributes() + self.textures + resident + self.padding
+        self.header + self.geometry() + self.attributes() + self.proxies + self.textures + resident + self.padding
     }
 
     /// Rows for people.
@@ -96,6 +99,7 @@ impl Sections {
             ("attributes: vertices", self.attribute_vertices),
             ("surfaces", self.surfaces),
             ("indices", self.attribute_indices),
+            ("proxies", self.proxies),
             ("textures", self.textures),
             ("padding", self.padding),
         ];
@@ -119,6 +123,8 @@ pub struct PerTriangle {
     pub vertices: f64,
     /// What shading reads, textures apart.
     pub attributes: f64,
+    /// Proxies: occupancy maps read on demand and resident ones.
+    pub proxies: f64,
     /// The file without its textures.
     pub file_without_textures: f64,
     /// The whole file.
@@ -143,6 +149,7 @@ impl PerTriangle {
             ids: share(sizes.ids),
             vertices: share(sizes.vertices),
             attributes: share(sizes.attributes()),
+            proxies: share(sizes.proxies + size_of_val(resident.occupancy.as_slice()) as u64),
             file_without_textures: share(file_bytes - sizes.textures),
             file: share(file_bytes),
             vertex_count: share(vertices),
@@ -152,13 +159,14 @@ impl PerTriangle {
     /// A row for people.
     pub fn human(&self) -> String {
         format!(
-            "{:.1} B for traversal (nodes {:.1}, indices {:.1}, ids {:.1}, vertices {:.1}), {:.1} B of the file without \
-             textures, {:.1} B with; {:.2} vertices",
+            "{:.1} B for traversal (nodes {:.1}, indices {:.1}, ids {:.1}, vertices {:.1}), {:.1} B of proxies, {:.1} B \
+             of the file without textures, {:.1} B with; {:.2} vertices",
             self.traversal,
             self.nodes,
             self.indices,
             self.ids,
             self.vertices,
+            self.proxies,
             self.file_without_textures,
             self.file,
             self.vertex_count

@@ -59,7 +59,7 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     super::print(&format!("{name}: {} rebuilt, {}\n", parts.join(", "), human_bytes(bytes)))
 }
 
-/// The payloads with problems that writing them again solves: geometry, attributes, textures.
+/// The payloads with problems that writing them again solves: geometry, attributes, proxies, textures.
 fn damaged_payloads(report: &VerifyReport) -> Result<BTreeSet<Payload>> {
     let payload = |problem: &Error| match (problem, problem.part()) {
         (
@@ -78,6 +78,7 @@ fn rebuild(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Prog
     same_sources(scene, &source.outline().sources)?;
     let settings = BuildSettings {
         brick_triangles: manifest.brick_triangles,
+        proxies: manifest.has_proxies,
         // Beside the output, which is in a folder of its own.
         scratch: None,
         ..mesh_settings(&args.mesh, work_settings(&args.work))

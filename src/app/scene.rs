@@ -71,6 +71,7 @@ fn refuse_building(args: &BuildArgs) -> Result<()> {
         ("--scratch", args.work.scratch.is_some()),
         ("--resume", args.resume),
         ("--fast", args.work.fast),
+        ("--no-proxies", args.no_proxies),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => {
@@ -136,7 +137,7 @@ mod tests {
             assert!(at(name).exists(), "{name}");
         }
         let before = std::fs::read_dir(folder.path()).unwrap().count();
-        for option in ["--fast", "--resume", "--memory 1G", "--lattice -9", "--scratch ."] {
+        for option in ["--fast", "--resume", "--memory 1G", "--lattice -9", "--scratch .", "--no-proxies"] {
             let error = scene(&options("d.glb", option)).unwrap_err();
             assert!(error.is::<Usage>() && error.to_string().contains(".bricks"), "{option}: {error:?}");
         }

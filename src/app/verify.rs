@@ -74,8 +74,10 @@ fn damaged_bricks(report: &VerifyReport) -> Vec<u32> {
         .iter()
         .filter_map(|problem| match problem.part()? {
             Part::Record(Section::Bricks, brick) => Some(brick),
-            Part::Payload(Payload::Geometry(brick) | Payload::Attributes(brick)) => Some(brick),
-            Part::PaddingAfterPayload(Payload::Geometry(brick) | Payload::Attributes(brick)) => Some(brick),
+            Part::Payload(payload) | Part::PaddingAfterPayload(payload) => match payload {
+                Payload::Geometry(brick) | Payload::Attributes(brick) | Payload::Proxies(brick) => Some(brick),
+                Payload::Texture(_) => None,
+            },
             _ => None,
         })
         .collect();

@@ -71,7 +71,7 @@ fn tree(part: Part, brick: &Brick, bytes: &[u8]) -> Result<(), Flaw> {
 }
 
 /// Checks vertices and returns them in lattice steps from the brick's origin.
-fn vertices(part: Part, brick: &Brick, step_unit_log2: i32, bytes: &[u8]) -> Result<Vec<[i64; 3]>, Flaw> {
+pub(super) fn vertices(part: Part, brick: &Brick, step_unit_log2: i32, bytes: &[u8]) -> Result<Vec<[i64; 3]>, Flaw> {
     let wide = brick.flags & BRICK_WIDE != 0;
     // Exact: a power of two that `validate::resident` bounds.
     let steps_per_unit = 2f64.powi(-step_unit_log2);

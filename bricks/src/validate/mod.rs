@@ -6,15 +6,17 @@
 //!   are a tree no higher than the brick says.
 //! * [`spans`]: payloads fill the file up to the directory and do not overlap.
 //! * [`contents`]: what is slower to check and cannot make an index wrong: vertices on the lattice within their bounds,
-//!   every triangle in exactly one leaf. `verify` does it.
+//!   every triangle in exactly one leaf. `verify` does it, and [`occupied`]: the cells of vertices are occupied.
 
 mod contents;
 mod node;
+mod occupancy;
 mod payload;
 mod scene;
 mod top;
 
 pub use contents::contents;
+pub use occupancy::occupied;
 pub use payload::payload;
 
 use crate::error::{Flaw, Part};
@@ -38,6 +40,7 @@ pub fn resident(resident: &Resident) -> Result<(), Flaw> {
     for (index, record) in (0u32..).zip(&resident.bricks) {
         brick(index, record)?;
     }
+    occupancy::records(resident)?;
     scene::leaves(resident)?;
     top::binary(&resident.top2, resident.leaves.len())?;
     top::wide(&resident.top8, resident.leaves.len())?;
@@ -79,7 +82,6 @@ fn brick(index: u32, brick: &Brick) -> Result<(), Flaw> {
         (format!("flags {:#x}", brick.flags), "known flags")
     })?;
     rule(brick._reserved0 == 0 && brick._reserved1 == [0; 4], part, || ("reserved words", "zero in them"))?;
-    rule(brick.proxies == Span::default(), part, || ("a span of proxies", "none in this version"))?;
     rule(
         brick.node_count > 0 && brick.triangle_count > 0 && brick.vertex_count > 0 && brick.attribute_vertex_count > 0,
         part,

@@ -4,7 +4,7 @@
 //! per array of indices, which compilers vectorise.
 
 use super::node::NodeView;
-use super::rule;
+use super::{occupancy, rule};
 use crate::error::{Flaw, Part};
 use crate::payload::Payload;
 use crate::records::{AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Node};
@@ -13,7 +13,7 @@ use crate::resident::Resident;
 
 /// Checks the bytes of a payload against the resident part, which satisfies [`super::resident`]: every index that
 /// traversal or shading follows lies in its array, nodes form a tree no higher than the brick says with children after
-/// their parents, node 0 is the brick's root, padding is zero. `bytes` needs no alignment.
+/// their parents, node 0 is the brick's root, padding is zero; of an occupancy map that all levels agree. `bytes` needs no alignment.
 pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(), Flaw> {
     let part = Part::Payload(payload);
     let span = resident.span(payload);
@@ -28,6 +28,7 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
         Payload::Attributes(index) => {
             attributes(part, &resident.bricks[index as usize], resident.materials.len() as u32, bytes)
         }
+        Payload::Proxies(index) => occupancy::map(resident, index, bytes),
         Payload::Texture(index) => {
             padding(part, bytes, resident.textures[index as usize].texel_bytes().unwrap_or(0), bytes.len() as u64)
         }

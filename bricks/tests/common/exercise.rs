@@ -2,8 +2,8 @@
 
 use bricks::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, PAGE_BYTES};
 use bricks::{
-    BRICK_INDEX32, Brick, GeometryLayout, MAX_BRICK_HEIGHT, Node, Payload, Resident, SceneFile, Section, Span, Texture,
-    validate,
+    BRICK_INDEX32, Brick, GeometryLayout, MAX_BRICK_HEIGHT, Node, OCCUPANCY_LEVELS, OccupancyMap, Payload, Resident,
+    SceneFile, Section, Span, Texture, validate,
 };
 use bytemuck::Pod;
 use std::ops::Range;
@@ -41,8 +41,12 @@ pub fn exercise(bytes: &[u8]) -> (bool, usize) {
     (true, copied)
 }
 
-/// Follows every index of a geometry payload without any check, as a kernel does.
+/// Follows every index of a geometry payload without any check, as a kernel does, and unpacks proxies.
 pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
+    if let Payload::Proxies(_) = payload {
+        let map = OccupancyMap::unpack(bytes).expect("what was copied is a map");
+        assert!(map.is_occupied(OCCUPANCY_LEVELS - 1, [0; 3]), "some cell is occupied");
+    }
     let Payload::Geometry(index) = payload else { return };
     let brick = &resident.bricks[index as usize];
     let layout = GeometryLayout::of(brick);
@@ -91,7 +95,9 @@ pub fn seal(bytes: &mut [u8]) {
         let Some(mut entry) = read::<DirectoryEntry>(bytes, at) else { return };
         match section {
             Section::Bricks => {
-                records::<Brick>(bytes, &entry, |brick| vec![&mut brick.geometry, &mut brick.attributes])
+                records::<Brick>(bytes, &entry, |brick| {
+                    vec![&mut brick.geometry, &mut brick.attributes, &mut brick.proxies]
+                });
             }
             Section::Textures => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.texels]),
             _ => {}
@@ -117,7 +123,8 @@ fn records<T: Pod>(bytes: &mut [u8], entry: &DirectoryEntry, spans: impl Fn(&mut
         let at = entry.offset.saturating_add(index * size_of::<T>() as u64);
         let Some(mut record) = read::<T>(bytes, at) else { return };
         for span in spans(&mut record) {
-            if let Some(payload) = range(bytes, span.offset, span.bytes) {
+            // A span of nothing has no checksum.
+            if let Some(payload) = range(bytes, span.offset, span.bytes).filter(|payload| !payload.is_empty()) {
                 span.checksum = xxh3_64(&bytes[payload]);
             }
         }

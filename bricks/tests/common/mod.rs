@@ -186,6 +186,17 @@ pub fn brick(
     (brick, geometry, attributes)
 }
 
+/// The cells of the vertices alone: as much as the format asks for.
+fn occupied(brick: &Brick, step_log2: i32, triangles: &[Triangle]) -> (OccupancyGrid, OccupancyMap) {
+    let grid = OccupancyGrid::of(step_log2, brick.min, brick.max);
+    let mut columns = [0; 4096];
+    for &vertex in triangles.iter().flatten() {
+        let [x, y, z] = grid.cell(step_log2, vertex);
+        columns[(x + 64 * y) as usize] |= 1u64 << z;
+    }
+    (grid, OccupancyMap::of_finest(&columns))
+}
+
 /// Bounds of a leaf in steps of the world's lattice, outward.
 fn world_bounds(resident: &Resident, leaf: &Leaf) -> Triangle {
     let brick = &resident.bricks[leaf.brick as usize];
@@ -246,11 +257,15 @@ pub fn scene() -> Scene {
         brick((1, &objects[1]), 0, [0; 3], &small, &ids(0..10), 2),
     ];
     let mut payloads = BTreeMap::new();
-    let mut bricks = Vec::new();
-    for (index, (brick, geometry, attributes)) in (0..).zip(built) {
+    let (mut bricks, mut occupancy) = (Vec::new(), Vec::new());
+    let corners = [near, wide, small];
+    for (index, ((brick, geometry, attributes), triangles)) in (0..).zip(built.into_iter().zip(&corners)) {
+        let (grid, map) = occupied(&brick, objects[brick.object as usize].step_log2, triangles);
+        occupancy.push(map.record(&grid));
         bricks.push(brick);
         payloads.insert(Payload::Geometry(index), geometry);
         payloads.insert(Payload::Attributes(index), attributes);
+        payloads.insert(Payload::Proxies(index), map.pack());
     }
     let texture =
         Texture { width: 4, height: 2, levels: 3, wrap: WRAP_CLAMP | WRAP_MIRROR << 16, texels: Span::default() };
@@ -297,6 +312,7 @@ pub fn scene() -> Scene {
         has_emission: true,
         has_instances: true,
         has_wide_bricks: true,
+        has_proxies: true,
         instance_scale_ratio: 1.0,
         warnings: vec!["a warning".to_owned()],
         provenance: vec![
@@ -319,6 +335,7 @@ pub fn scene() -> Scene {
             material(NONE, MATERIAL_UNLIT, [0.0, 3.0, 0.0]),
         ],
         textures: vec![texture],
+        occupancy,
         ..Resident::default()
     };
     top_level(&mut resident);
@@ -368,6 +385,7 @@ impl Scene {
             match *payload {
                 Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry = span,
                 Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes = span,
+                Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies = span,
                 Payload::Texture(texture) => self.resident.textures[texture as usize].texels = span,
             }
         }
@@ -405,7 +423,7 @@ impl Image {
     }
 
     fn entry_at(&self, section: Section) -> usize {
-        self.header().directory_offset as usize + (section as usize - 1) * size_of::<DirectoryEntry>()
+        self.header().directory_offset as usize + section.index() * size_of::<DirectoryEntry>()
     }
 
     pub fn entry(&self, section: Section) -> DirectoryEntry {
@@ -445,7 +463,7 @@ impl Image {
     /// Changes the bytes of a payload; checksums are right afterwards.
     pub fn edit_payload(&mut self, payload: Payload, edit: impl FnOnce(&mut [u8])) {
         let (section, index) = match payload {
-            Payload::Geometry(index) | Payload::Attributes(index) => (Section::Bricks, index),
+            Payload::Geometry(index) | Payload::Attributes(index) | Payload::Proxies(index) => (Section::Bricks, index),
             Payload::Texture(index) => (Section::Textures, index),
         };
         let bytes = &mut self.bytes.clone();
@@ -459,6 +477,7 @@ impl Image {
                 let mut record = self.record::<Brick>(section, index);
                 match payload {
                     Payload::Geometry(_) => update(&mut record.geometry),
+                    Payload::Proxies(_) => update(&mut record.proxies),
                     _ => update(&mut record.attributes),
                 }
                 let root = bytemuck::pod_read_unaligned(&bytes[record.geometry.offset as usize..][..size_of::<Node>()]);

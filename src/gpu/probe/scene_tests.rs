@@ -127,6 +127,8 @@ fn the_scene_is_what_the_converter_makes() {
     let settings = BuildSettings {
         brick_triangles: 64,
         instance_min_triangles: 1,
+        // Pipelines traverse; they never read a proxy.
+        proxies: false,
         // Fine enough for the ground to lie beyond 2^24 steps.
         lattice_log2: Some(-20),
         ..BuildSettings::default()

@@ -151,6 +151,7 @@ pub(super) fn manifest(
         has_instances: resident.instances.len() > 1,
         has_animation: scene.has_animation,
         has_wide_bricks: resident.bricks.iter().any(|brick| brick.flags & BRICK_WIDE != 0),
+        has_proxies: !resident.occupancy.is_empty(),
         instance_scale_ratio: plan.instances.iter().fold(1.0, |most, instance| instance.matrix.scale_ratio().max(most)),
         warnings,
         provenance: plan.provenance.clone(),
@@ -177,6 +178,8 @@ pub(super) fn summary(resident: &Resident, bytes_file: u64, phases: Vec<(&'stati
         bytes_nodes: nodes * size_of::<Node>() as u64,
         bytes_geometry: resident.bricks.iter().map(|brick| brick.geometry.bytes).sum(),
         bytes_attributes: resident.bricks.iter().map(|brick| brick.attributes.bytes).sum(),
+        bytes_proxies: resident.bricks.iter().map(|brick| brick.proxies.bytes).sum::<u64>()
+            + size_of_val(resident.occupancy.as_slice()) as u64,
         bytes_textures: resident.textures.iter().map(|texture| texture.texels.bytes).sum(),
         bytes_file,
         warnings: manifest.warnings.clone(),

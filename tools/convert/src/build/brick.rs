@@ -6,10 +6,11 @@ use super::intern::Interner;
 use super::lattice::{Lattice, pow2};
 use super::node;
 use super::triangle::Triangle as Rounded;
+use super::voxelise::voxelise;
 use super::wide::{WideTree, collapse, collapse_levels};
 use bricks::{
     AttributeLayout, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, LEAF_TRIANGLES, MAX_BRICK_HEIGHT, NEAR_STEPS,
-    ORIGIN_STEPS, SURFACE_ROTATION_SHIFT, Span, WIDE_HIGH_STEPS,
+    ORIGIN_STEPS, Occupancy, OccupancyGrid, SURFACE_ROTATION_SHIFT, Span, WIDE_HIGH_STEPS,
 };
 use bytemuck::Zeroable;
 
@@ -27,6 +28,8 @@ pub(super) struct BrickContext<'a> {
     pub materials: &'a [MeanColors],
     /// Whether trees are built fast rather than well.
     pub is_fast: bool,
+    /// Whether bricks have proxies.
+    pub has_proxies: bool,
 }
 
 /// A brick ready to be written.
@@ -38,6 +41,8 @@ pub(super) struct EncodedBrick {
     pub geometry: Vec<u8>,
     /// The attribute payload.
     pub attributes: Vec<u8>,
+    /// The occupancy and the proxies payload, if wanted.
+    pub proxies: Option<(Occupancy, Vec<u8>)>,
 }
 
 /// A triangle while its brick is made. Corners are in stored order.
@@ -202,7 +207,13 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     attributes.resize(layout.indices as usize, 0);
     push_indices(&mut attributes, triangles.iter().map(|triangle| triangle.attributes), index32);
     attributes.resize(layout.bytes as usize, 0);
-    EncodedBrick { record, geometry, attributes }
+    let proxies = context.has_proxies.then(|| {
+        let step_log2 = context.lattice.step_log2;
+        let grid = OccupancyGrid::of(step_log2, bounds.min, bounds.max);
+        let map = voxelise(step_log2, &grid, contents.triangles.iter().map(corners));
+        (map.record(&grid), map.pack())
+    });
+    EncodedBrick { record, geometry, attributes, proxies }
 }
 
 /// The multiple of [`ORIGIN_STEPS`] nearest `x`, ties upward.

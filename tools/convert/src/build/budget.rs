@@ -7,7 +7,7 @@
 //! | collecting | per thread a part of the source and the items of a run of triangles; then the items of objects that fit |
 //! | partition | the items of a node that fits with their order; or per thread a block of items and its two sides |
 //! | distribution | per thread a part of the source and triangles not yet appended; the bricks of a window of slots |
-//! | encoding | two chunks of triangles (one is read while the other is encoded), per thread a brick in work and two batches of payloads |
+//! | encoding | two chunks of triangles (one is read while the other is encoded), per thread a brick in work with its occupancy and two batches of payloads |
 //!
 //! A source that lies in memory is not counted, nor is a single image while its texture is made.
 
@@ -23,8 +23,8 @@ use crate::source::{PART_TRIANGLES, Source};
 /// The program, its stacks, and what the allocator does not give back.
 const RESERVE: u64 = 32 << 20;
 
-/// A brick in the tables: its record, its leaf, its nodes of both top-level trees and what builds them.
-const TABLE_BRICK_BYTES: u64 = 1 << 10;
+/// A brick in the tables: its record and occupancy, its leaf, its nodes of both top-level trees and what builds them.
+const TABLE_BRICK_BYTES: u64 = 3 << 9;
 
 /// A triangle of a part at most: its indices and three vertices with all attributes.
 const PART_TRIANGLE_BYTES: u64 = 3 * (4 + 24 + 12 + 8 + 16);
@@ -41,8 +41,14 @@ const WORK_BYTES: u64 = 1280;
 /// A triangle of a chunk, with its place in the order of bricks.
 const CHUNK_BYTES: u64 = size_of::<Triangle>() as u64 + 16;
 
-/// A triangle of encoded payloads.
+/// A triangle of encoded payloads but for proxies.
 const PAYLOAD_BYTES: u64 = 80;
+
+/// Occupancy of a brick in work: cells, levels, and what packs them.
+const OCCUPANCY_WORK_BYTES: u64 = 4 * MAP_BYTES;
+
+/// An occupancy map that packing does not shorten.
+const MAP_BYTES: u64 = bricks::OCCUPANCY_BYTES as u64;
 
 /// Triangles of a chunk beyond which larger ones are no faster.
 const MOST_CHUNK: u64 = 1 << 21;
@@ -79,6 +85,10 @@ struct Needs {
     part: u64,
     run: u64,
     tables: u64,
+    /// A brick in work.
+    work: u64,
+    /// A triangle of encoded payloads.
+    payload: u64,
 }
 
 impl Budget {
@@ -99,11 +109,15 @@ impl Budget {
             true => (PART_TRIANGLES, 0),
             false => (parts.map(|part| part.triangles).max().unwrap_or(0), PART_TRIANGLE_BYTES),
         };
+        let brick = u64::from(settings.brick_triangles);
+        let (occupancy, map) = if settings.proxies { (OCCUPANCY_WORK_BYTES, MAP_BYTES) } else { (0, 0) };
         let needs = Needs {
-            brick: u64::from(settings.brick_triangles),
+            brick,
             part: u64::from(largest) * part_bytes,
             run: u64::from(largest.min(PART_TRIANGLES)),
-            tables: 2 * slots.div_ceil(u64::from(settings.brick_triangles)) * TABLE_BRICK_BYTES,
+            tables: 2 * slots.div_ceil(brick) * TABLE_BRICK_BYTES,
+            work: brick * WORK_BYTES + occupancy,
+            payload: PAYLOAD_BYTES + map.div_ceil(brick),
         };
         let all = needs.all_in_memory(threads as u64, slots, part_bytes);
         if all <= memory {
@@ -123,7 +137,8 @@ impl Budget {
 impl Needs {
     /// Bytes with all geometry in memory.
     fn all_in_memory(&self, threads: u64, slots: u64, part_bytes: u64) -> u64 {
-        let working = threads * (self.brick.min(slots) * WORK_BYTES + 2 * MOST_BATCH.min(slots) * PAYLOAD_BYTES);
+        let working = threads
+            * (self.work.min(slots * WORK_BYTES + OCCUPANCY_WORK_BYTES) + 2 * MOST_BATCH.min(slots) * self.payload);
         RESERVE + self.tables + slots * (part_bytes + ITEM_BYTES) + working
     }
 
@@ -142,7 +157,7 @@ impl Needs {
     }
 
     fn encoding(&self, batch: u64) -> u64 {
-        self.brick * WORK_BYTES + 2 * (batch + self.brick) * PAYLOAD_BYTES
+        self.work + 2 * (batch + self.brick) * self.payload
     }
 
     /// Bytes of the phase that takes the most, each at its least.
@@ -159,7 +174,7 @@ impl Needs {
         let per_thread = rest / (8 * threads);
         let pending = (per_thread / (2 * size_of::<Triangle>() as u64)).clamp(MOST_PENDING / 8, MOST_PENDING);
         let window = rest - threads * self.distributing(pending).min(rest / threads);
-        let batch = (per_thread / (2 * PAYLOAD_BYTES)).clamp(self.brick.min(MOST_BATCH), MOST_BATCH);
+        let batch = (per_thread / (2 * self.payload)).clamp(self.brick.min(MOST_BATCH), MOST_BATCH);
         let chunk = rest.saturating_sub(threads * self.encoding(batch)) / (2 * CHUNK_BYTES);
         Budget {
             threads: threads as usize,

@@ -17,7 +17,7 @@ use super::textures::{self, Textures};
 use super::triangle::Triangle;
 use crate::progress::Progress;
 use crate::source::{Outline, Source};
-use bricks::{Brick, Manifest, Partial, Resident, Writer};
+use bricks::{Brick, Manifest, Occupancy, Partial, Resident, Writer};
 use std::fmt::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -49,6 +49,7 @@ struct Written {
     used_materials: Vec<u64>,
     lattices: Vec<Lattice>,
     bricks: Vec<Brick>,
+    occupancy: Vec<Occupancy>,
     /// Triangles that rounding left without area, by object.
     rounded_away: Vec<u32>,
     warnings: Vec<String>,
@@ -82,15 +83,15 @@ impl Conversion<'_> {
         clock.end("partition");
         let lattices = cut::choose(plan, &outline.meshes, &cuts, settings, &mut warnings)?;
         let means = textures.material_means();
-        let contexts = encode::contexts(&lattices, &means, settings.fast);
+        let contexts = encode::contexts(&lattices, &means, settings);
         let jobs = encode::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
         progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.len(), BATCH_TRIANGLES);
         let encode = |job: &Job| encode_loaded(&reader, &plan.objects[job.object as usize], &cuts, &contexts, job);
         bricks.write(&jobs, encode, progress)?;
-        let (bricks, rounded_away) = (bricks.records, bricks.dropped);
+        let (bricks, occupancy, rounded_away) = (bricks.records, bricks.occupancy, bricks.dropped);
         clock.end("bricks");
-        Ok(Written { textures, cuts, used_materials, lattices, bricks, rounded_away, warnings })
+        Ok(Written { textures, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
     }
 
     /// Converts by way of the disk.
@@ -205,21 +206,22 @@ impl Conversion<'_> {
         clock.end("partition");
         let lattices = cut::choose(plan, &outline.meshes, &cuts.objects, settings, &mut warnings)?;
         let means = textures.material_means();
-        let contexts = encode::contexts(&lattices, &means, settings.fast);
+        let contexts = encode::contexts(&lattices, &means, settings);
         let jobs = encode::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
         let (chunks, rounded_away) = bounded.distribute(&cuts, &jobs, &lattices, journal)?;
         clock.end("distribute");
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.objects.len(), budget.batch);
         bounded.encode(&jobs, chunks, &contexts, &mut bricks, journal)?;
-        let bricks = bricks.records;
+        let (bricks, occupancy) = (bricks.records, bricks.occupancy);
         clock.end("bricks");
         let (cuts, used_materials) = (cuts.objects, cuts.materials);
-        Ok(Written { textures, cuts, used_materials, lattices, bricks, rounded_away, warnings })
+        Ok(Written { textures, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
     }
 
     /// Builds the resident part and finishes the file.
     fn finish(&self, written: Written, writer: Writer, mut clock: Clock) -> Result<BuildSummary, BuildError> {
-        let Written { textures, cuts, used_materials, lattices, bricks, rounded_away, mut warnings } = written;
+        let Written { textures, cuts, used_materials, lattices, bricks, occupancy, rounded_away, mut warnings } =
+            written;
         self.progress.phase("top level", 0);
         let objects = assemble::object_records(&self.plan, &lattices, &bricks);
         let instances = assemble::instance_records(&self.plan);
@@ -234,6 +236,7 @@ impl Conversion<'_> {
             bricks,
             materials: textures.materials,
             textures: textures.records,
+            occupancy,
         };
         let dropped = Dropped::count(&resident, &cuts, &rounded_away);
         dropped.warn(&mut warnings);

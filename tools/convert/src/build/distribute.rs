@@ -11,7 +11,7 @@ use super::objects::{Piece, Placed};
 use super::spill::Spill;
 use super::triangle::Triangle;
 use crate::source::PART_TRIANGLES;
-use bricks::{Brick, Span};
+use bricks::{Brick, Occupancy, Span};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -203,7 +203,9 @@ impl Bounded<'_> {
         let done = ranges.len().min(journal.left());
         for range in &ranges[..done] {
             let words = journal.step(Step::Encode, || Ok(Vec::new()))?;
-            bricks.records.extend(take_written(&words).ok_or_else(|| journal.damaged())?);
+            let (records, occupancy) = take_written(&words).ok_or_else(|| journal.damaged())?;
+            bricks.records.extend(records);
+            bricks.occupancy.extend(occupancy);
             self.progress.advance(jobs[range.clone()].iter().map(|job| job.count as u64).sum());
         }
         std::thread::scope(|scope| {
@@ -219,7 +221,7 @@ impl Bounded<'_> {
             });
             for (range, loaded) in receiver {
                 let (file, loaded) = loaded?;
-                let first = bricks.records.len();
+                let (first, first_occupancy) = (bricks.records.len(), bricks.occupancy.len());
                 journal.step(Step::Encode, || {
                     let encode = |job: &Job| {
                         let (triangles, count) = loaded.brick(job.index);
@@ -229,10 +231,14 @@ impl Bounded<'_> {
                     };
                     bricks.write(&jobs[range.clone()], encode, self.progress)?;
                     let records = &bricks.records[first..];
-                    let spans: Vec<Span> =
-                        records.iter().flat_map(|record| [record.geometry, record.attributes]).collect();
+                    let spans: Vec<Span> = records
+                        .iter()
+                        .flat_map(|record| [record.geometry, record.attributes, record.proxies])
+                        .filter(|span| *span != Span::default())
+                        .collect();
                     let mut words = Words::default();
                     words.put(bricks.writer.checkpoint()?).put_records(&spans).put_records(records);
+                    words.put_records(&bricks.occupancy[first_occupancy..]);
                     Ok(words.0)
                 })?;
                 file.remove();
@@ -242,12 +248,12 @@ impl Bounded<'_> {
     }
 }
 
-/// The records of a chunk from the journal; see [`super::journal::Journal::written`] for what comes before them.
-fn take_written(words: &[u64]) -> Option<Vec<Brick>> {
+/// The records of a chunk and their occupancy from the journal; see [`super::journal::Journal::written`] for what comes before them.
+fn take_written(words: &[u64]) -> Option<(Vec<Brick>, Vec<Occupancy>)> {
     let mut words = WordReader(words);
     words.take()?;
     words.take_records::<Span>()?;
-    words.take_records()
+    Some((words.take_records()?, words.take_records()?))
 }
 
 /// The triangles of a chunk.

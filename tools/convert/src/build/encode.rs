@@ -2,8 +2,9 @@
 
 use super::brick::{BrickContext, EncodedBrick};
 use super::error::BuildError;
+use super::settings::BuildSettings;
 use crate::progress::Progress;
-use bricks::{Brick, Writer};
+use bricks::{Brick, Occupancy, Span, Writer};
 use rayon::prelude::*;
 
 /// A brick to be encoded.
@@ -26,6 +27,8 @@ pub(super) struct BrickWriter<'a> {
     pub writer: &'a mut Writer,
     /// Records of what is written.
     pub records: Vec<Brick>,
+    /// Occupancy of what is written, if bricks have proxies.
+    pub occupancy: Vec<Occupancy>,
     /// Triangles dropped after rounding, by object.
     pub dropped: Vec<u32>,
     /// Triangles a thread encodes before what is encoded is written, which bounds the memory.
@@ -35,7 +38,8 @@ pub(super) struct BrickWriter<'a> {
 impl<'a> BrickWriter<'a> {
     /// Writes about `bricks` bricks of `objects` objects.
     pub fn new(writer: &'a mut Writer, bricks: usize, objects: usize, batch_triangles: usize) -> Self {
-        Self { writer, records: Vec::with_capacity(bricks), dropped: vec![0; objects], batch_triangles }
+        let (records, occupancy) = (Vec::with_capacity(bricks), Vec::new());
+        Self { writer, records, occupancy, dropped: vec![0; objects], batch_triangles }
     }
 
     /// Encodes and writes bricks. `encode` makes one, or none if no triangle of it has an area; it also returns how many
@@ -90,7 +94,12 @@ impl<'a> BrickWriter<'a> {
         for brick in bricks {
             let geometry = self.writer.write(&brick.geometry)?;
             let attributes = self.writer.write(&brick.attributes)?;
-            self.records.push(Brick { geometry, attributes, ..brick.record });
+            let mut proxies = Span::default();
+            if let Some((occupancy, payload)) = &brick.proxies {
+                proxies = self.writer.write(payload)?;
+                self.occupancy.push(*occupancy);
+            }
+            self.records.push(Brick { geometry, attributes, proxies, ..brick.record });
         }
         Ok(())
     }
@@ -114,7 +123,9 @@ pub(super) fn jobs<'a>(bricks: impl Iterator<Item = &'a [u32]>) -> Result<Vec<Jo
 pub(super) fn contexts<'a>(
     lattices: &[super::lattice::Lattice],
     materials: &'a [super::attributes::MeanColors],
-    is_fast: bool,
+    settings: &BuildSettings,
 ) -> Vec<BrickContext<'a>> {
-    (0u32..).zip(lattices).map(|(index, &lattice)| BrickContext { index, lattice, materials, is_fast }).collect()
+    let (is_fast, has_proxies) = (settings.fast, settings.proxies);
+    let context = |(index, &lattice)| BrickContext { index, lattice, materials, is_fast, has_proxies };
+    (0u32..).zip(lattices).map(context).collect()
 }

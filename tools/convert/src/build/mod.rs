@@ -38,6 +38,9 @@ mod spill;
 mod textures;
 mod top_level;
 mod triangle;
+mod voxelise;
+#[cfg(test)]
+mod voxelise_tests;
 mod wide;
 
 pub use error::BuildError;

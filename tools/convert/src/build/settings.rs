@@ -28,6 +28,8 @@ pub struct BuildSettings {
     pub memory_bytes: Option<u64>,
     /// Builds the trees in bricks faster, for rays that take longer. Changes neither ids nor positions.
     pub fast: bool,
+    /// Stores an occupancy map with every brick. Changes nothing else of the scene.
+    pub proxies: bool,
     /// Folder for the scratch folder; `None`: that of the output.
     pub scratch: Option<PathBuf>,
     /// Continues an interrupted conversion of the same source with the same settings, if there is one. Only a conversion
@@ -46,6 +48,7 @@ impl Default for BuildSettings {
             bake_budget_triangles: 4_000_000,
             memory_bytes: None,
             fast: false,
+            proxies: true,
             scratch: None,
             resume: false,
         }
@@ -100,6 +103,8 @@ pub struct BuildSummary {
     pub bytes_geometry: u64,
     /// Bytes of the attributes of all bricks.
     pub bytes_attributes: u64,
+    /// Bytes of the proxies of all bricks, their resident part included.
+    pub bytes_proxies: u64,
     /// Bytes of the textures.
     pub bytes_textures: u64,
     /// Bytes of the file.

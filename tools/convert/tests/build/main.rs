@@ -6,5 +6,6 @@ mod degenerate;
 mod errors;
 mod invariance;
 mod placement;
+mod proxies;
 mod scenes;
 mod structure;
