@@ -65,8 +65,7 @@ fn repair(scene: &Path, options: &str) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(said).into_owned())
 }
 
-const DAMAGED: [Payload; 4] =
-    [Payload::Geometry(2), Payload::Attributes(5), Payload::Proxies(3), Payload::Texture(0)];
+const DAMAGED: [Payload; 4] = [Payload::Geometry(2), Payload::Attributes(5), Payload::Proxies(3), Payload::Texture(0)];
 
 #[test]
 fn damaged_bricks_and_textures_are_rebuilt_to_the_same_bytes() {

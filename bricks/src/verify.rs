@@ -240,24 +240,18 @@ fn check_payload(
     reader.payload(payload, span, buffer)?;
     if valid {
         let checked = validate::payload(resident, payload, buffer);
-        let checked = checked.and_then(|()| validate::contents(resident, payload, buffer));
-        let occupied = checked.and_then(|()| match payload {
-            Payload::Geometry(index) => occupied(reader, resident, index, buffer),
-            _ => Ok(()),
-        });
-        occupied.map_err(|flaw| reader.invalid(flaw))?;
+        let contents = |()| validate::contents(resident, payload, buffer, map_of(reader, resident, payload).as_ref());
+        checked.and_then(contents).map_err(|flaw| reader.invalid(flaw))?;
     }
     Ok(())
 }
 
-/// Checks the vertices of a brick against its occupancy, if it has one and that is whole; what is wrong with it by itself is
-/// found where it is checked.
-fn occupied(reader: &Reader, resident: &Resident, index: u32, geometry: &[u8]) -> Result<(), Flaw> {
-    let payload = Payload::Proxies(index);
-    let Some(span) = resident.span(payload) else { return Ok(()) };
+/// The occupancy that the vertices of a geometry payload lie in. None if it cannot be read: that is found where it is checked.
+fn map_of(reader: &Reader, resident: &Resident, payload: Payload) -> Option<OccupancyMap> {
+    let Payload::Geometry(index) = payload else { return None };
+    let proxies = Payload::Proxies(index);
+    let span = resident.span(proxies)?;
     let mut packed = vec![0; span.bytes as usize];
-    if reader.payload(payload, span, &mut packed).is_err() {
-        return Ok(());
-    }
-    OccupancyMap::unpack(&packed).map_or(Ok(()), |map| validate::occupied(resident, index, geometry, &map))
+    reader.payload(proxies, span, &mut packed).ok()?;
+    OccupancyMap::unpack(&packed).ok()
 }

@@ -1,20 +1,21 @@
 //! Checks that take longer than copying and concern no index: what a converter must have got right.
 
 use super::node::NodeView;
-use super::rule;
+use super::{occupancy, rule};
 use crate::error::{Flaw, Part};
+use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
 use crate::records::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NEAR_STEPS, NODE_WIDTH, Node, WIDE_HIGH_STEPS};
 use crate::resident::Resident;
 
 /// Checks the contents of a payload that [`super::payload`] found right. For geometry: quantisation grids of nodes are
 /// finite, every triangle is in exactly one leaf, the brick is as high as it says, vertices lie on the lattice within the
-/// brick's bounds, every triangle starts with its smallest vertex.
+/// brick's bounds and, if `map` is given, in occupied cells, every triangle starts with its smallest vertex.
 ///
 /// # Panics
 ///
 /// May, if [`super::payload`] did not find `bytes` right.
-pub fn contents(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(), Flaw> {
+pub fn contents(resident: &Resident, payload: Payload, bytes: &[u8], map: Option<&OccupancyMap>) -> Result<(), Flaw> {
     let Payload::Geometry(index) = payload else { return Ok(()) };
     let brick = &resident.bricks[index as usize];
     let object = &resident.objects[brick.object as usize];
@@ -22,6 +23,7 @@ pub fn contents(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(
     let layout = GeometryLayout::of(brick);
     tree(part, brick, &bytes[..layout.vertices as usize])?;
     let vertices = vertices(part, brick, object.step_log2 - object.unit_log2, &bytes[layout.vertices as usize..])?;
+    map.map_or(Ok(()), |map| occupancy::vertices(resident, index, &vertices, map))?;
     rotations(part, brick, &vertices, &bytes[layout.indices as usize..])
 }
 
@@ -71,7 +73,7 @@ fn tree(part: Part, brick: &Brick, bytes: &[u8]) -> Result<(), Flaw> {
 }
 
 /// Checks vertices and returns them in lattice steps from the brick's origin.
-pub(super) fn vertices(part: Part, brick: &Brick, step_unit_log2: i32, bytes: &[u8]) -> Result<Vec<[i64; 3]>, Flaw> {
+fn vertices(part: Part, brick: &Brick, step_unit_log2: i32, bytes: &[u8]) -> Result<Vec<[i64; 3]>, Flaw> {
     let wide = brick.flags & BRICK_WIDE != 0;
     // Exact: a power of two that `validate::resident` bounds.
     let steps_per_unit = 2f64.powi(-step_unit_log2);

@@ -5,8 +5,9 @@
 //! * [`payload`]: the bytes of one payload against the resident part: every index in it, and that the nodes of a brick
 //!   are a tree no higher than the brick says.
 //! * [`spans`]: payloads fill the file up to the directory and do not overlap.
-//! * [`contents`]: what is slower to check and cannot make an index wrong: vertices on the lattice within their bounds,
-//!   every triangle in exactly one leaf. `verify` does it, and [`occupied`]: the cells of vertices are occupied.
+//! * [`contents`]: what is slower to check and cannot make an index wrong: vertices on the lattice within their bounds
+//!   and in occupied cells,
+//!   every triangle in exactly one leaf. `verify` does it.
 
 mod contents;
 mod node;
@@ -16,7 +17,6 @@ mod scene;
 mod top;
 
 pub use contents::contents;
-pub use occupancy::occupied;
 pub use payload::payload;
 
 use crate::error::{Flaw, Part};

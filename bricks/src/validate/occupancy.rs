@@ -1,12 +1,11 @@
 //! Checks of occupancy: the resident records, the maps, and the vertices against the maps.
 
-use super::contents::vertices;
 use super::rule;
 use crate::error::{Flaw, Part};
 use crate::layout::Section;
 use crate::occupancy::{OCCUPANCY_CELLS, OCCUPANCY_LIMIT, OccupancyGrid, OccupancyMap, RESIDENT_LEVEL};
 use crate::payload::Payload;
-use crate::records::{GeometryLayout, Span};
+use crate::records::Span;
 use crate::resident::Resident;
 use bytemuck::Zeroable;
 
@@ -78,23 +77,17 @@ pub(super) fn map(resident: &Resident, index: u32, bytes: &[u8]) -> Result<(), F
     rule(beyond.is_none(), part, || ("an occupied cell beyond the brick's bounds", format!("none after {last:?}")))
 }
 
-/// Checks that the cell of every vertex of a brick with proxies is occupied in `map`. `geometry` is a payload that
-/// [`super::contents`] found right.
-///
-/// # Panics
-///
-/// May, if it did not.
-pub fn occupied(resident: &Resident, index: u32, geometry: &[u8], map: &OccupancyMap) -> Result<(), Flaw> {
+/// Checks that the cells of vertices are occupied. `vertices` are those of brick `index`, in lattice steps from its origin and
+/// within its bounds.
+pub(super) fn vertices(resident: &Resident, index: u32, vertices: &[[i64; 3]], map: &OccupancyMap) -> Result<(), Flaw> {
     let brick = &resident.bricks[index as usize];
-    let object = &resident.objects[brick.object as usize];
-    let part = proxies(index);
-    let grid = OccupancyGrid::of(object.step_log2, brick.min, brick.max);
-    let bytes = &geometry[GeometryLayout::of(brick).vertices as usize..];
+    let step_log2 = resident.objects[brick.object as usize].step_log2;
+    let grid = OccupancyGrid::of(step_log2, brick.min, brick.max);
     let columns = map.finest();
-    for (number, vertex) in vertices(part, brick, object.step_log2 - object.unit_log2, bytes)?.into_iter().enumerate() {
+    for (number, vertex) in vertices.iter().enumerate() {
         // Within the bounds, so within the grid.
-        let [x, y, z] = grid.cell(object.step_log2, std::array::from_fn(|k| vertex[k] + brick.origin[k]));
-        rule(columns[(x + i64::from(OCCUPANCY_CELLS) * y) as usize] >> z & 1 != 0, part, || {
+        let [x, y, z] = grid.cell(step_log2, std::array::from_fn(|k| vertex[k] + brick.origin[k]));
+        rule(columns[(x + i64::from(OCCUPANCY_CELLS) * y) as usize] >> z & 1 != 0, proxies(index), || {
             (format!("an empty cell [{x}, {y}, {z}] with vertex {number}"), "every vertex in an occupied cell")
         })?;
     }
