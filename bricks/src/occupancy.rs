@@ -180,7 +180,7 @@ fn halve(bits: u64) -> u64 {
 /// Appends columns of `cells` bits.
 fn append(bytes: &mut Vec<u8>, columns: &[u64], cells: u32) {
     if cells >= 8 {
-        bytes.extend(columns.iter().flat_map(|column| column.to_le_bytes().into_iter().take(cells as usize / 8)));
+        columns.iter().for_each(|column| bytes.extend_from_slice(&column.to_le_bytes()[..cells as usize / 8]));
         return;
     }
     let bits = columns.iter().rev().fold(0u64, |bits, column| bits << cells | column);
