@@ -92,7 +92,7 @@ fn judge(file: &File, output: &Output, left: bool) -> Option<String> {
         other => return Some(format!("exit {other:?}, output left: {left}: {said}")),
     };
     let is_told = outcome == Outcome::Converts || (!file.says.is_empty() && said.contains(&file.says));
-    let names_file = outcome != Outcome::Refused || said.contains(&file.path) || said.contains("mesh \"");
+    let names_file = outcome != Outcome::Refused || said.contains(&file.path);
     let is_defect = said.contains("internal error");
     (outcome != file.outcome || !is_told || !names_file || is_defect).then(|| format!("{outcome:?}: {said}"))
 }

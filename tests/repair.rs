@@ -125,6 +125,31 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
     assert!(std::fs::read(&scene).expect("the scene") == bytes);
 }
 
+/// What a repair leaves that was killed, and one at the same time.
+#[test]
+fn repairs_are_alone_and_clean_up_after_those_that_were_killed() {
+    let folder = folder();
+    let scene = ground(folder.path());
+    let (whole, before) = (std::fs::read(&scene).expect("the scene"), names(folder.path()));
+    let damaged = damage(&scene, &DAMAGED);
+    let running = bricks::Writer::reserve(folder.path().join("g.bricks.repair")).expect("a lock");
+    let (status, said) = repair(&scene, "--from DIR/g.obj");
+    assert!(status == Some(1) && said.contains("another process is repairing it"), "{status:?} {said}");
+    assert!(std::fs::read(&scene).expect("the scene") == damaged);
+    // As a process that is killed: its files stay, its lock goes.
+    running.keep();
+    let target = scene.canonicalize().expect("a path");
+    let hash = xxhash_rust::xxh3::xxh3_64(target.as_os_str().as_encoded_bytes());
+    let scratch = target.with_file_name(format!(".g.bricks.{hash:016x}.repair"));
+    std::fs::create_dir(&scratch).expect("a folder");
+    std::fs::write(scratch.join("rebuilt.bricks"), b"half").expect("a file");
+    assert_eq!(names(folder.path()).len(), before.len() + 2);
+    let (status, said) = repair(&scene, "--from DIR/g.obj");
+    assert_eq!(status, Some(0), "{said}");
+    assert!(std::fs::read(&scene).expect("the scene") == whole);
+    assert_eq!(names(folder.path()), before, "nothing is left behind");
+}
+
 #[test]
 fn generated_scenes_need_no_input() {
     let folder = folder();

@@ -23,7 +23,7 @@ fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").file_name());
     let mut names: Vec<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
     // The camera paths come after the scene file; a kill may leave a temporary file of theirs.
-    names.retain(|name| !name.ends_with(".json") && !name.starts_with(".scene"));
+    names.retain(|name| !name.ends_with(".json") && !name.ends_with(".json.tmp"));
     names.sort();
     names
 }

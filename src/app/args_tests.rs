@@ -155,10 +155,10 @@ fn options_of_other_commands_arrive() {
         panic!()
     };
     assert_eq!(c.inputs.inputs.len(), 2);
-    assert_eq!((c.build.brick_triangles, c.build.work.threads, c.build.work.lattice), (4000, Some(2), Some(-12)));
+    assert_eq!((c.build.brick_triangles, c.build.work.threads, c.build.work.lattice), (Some(4000), Some(2), Some(-12)));
     assert!(c.mesh.drop_non_finite);
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
-    assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (Kind::City, 200_000, 7, 16384));
+    assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (Kind::City, 200_000, 7, None));
     let Command::Replay(r) = parse("replay f.jsonl --cache 5% 1M,2M --cache 7K --json").unwrap() else { panic!() };
     assert_eq!(r.cache[..2], [CacheSize::Percent(5.0), CacheSize::Bytes(1 << 20)]);
     assert!(r.cache.len() == 4 && r.json);
@@ -166,8 +166,8 @@ fn options_of_other_commands_arrive() {
         panic!()
     };
     let inputs: Vec<_> = r.inputs.inputs.iter().map(|input| (input.path.to_str().unwrap(), input.up)).collect();
-    let (y, z) = (brickwalk_convert::import::Up::Y, brickwalk_convert::import::Up::Z);
-    assert_eq!(inputs, [("a.gltf", y), ("b.stl", z), ("c.ply", y)]);
+    let z = Some(brickwalk_convert::import::Up::Z);
+    assert_eq!(inputs, [("a.gltf", None), ("b.stl", z), ("c.ply", None)]);
     assert_eq!((r.scene, r.work.fast), (PathBuf::from("s.bricks"), true));
     let Command::Repair(r) = parse("repair s.bricks").unwrap() else { panic!() };
     assert!(r.inputs.inputs.is_empty());

@@ -5,7 +5,7 @@ use super::interrupt;
 use super::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
-use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, import};
+use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, TILESET, import};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -34,12 +34,9 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
 
 /// The settings of the builder for everything that writes a scene file.
 pub fn build_settings(args: &BuildArgs) -> BuildSettings {
-    BuildSettings {
-        brick_triangles: args.brick_triangles,
-        proxies: !args.no_proxies,
-        resume: args.resume,
-        ..work_settings(&args.work)
-    }
+    let settings = work_settings(&args.work);
+    let brick_triangles = args.brick_triangles.unwrap_or(settings.brick_triangles);
+    BuildSettings { brick_triangles, proxies: !args.no_proxies, resume: args.resume, ..settings }
 }
 
 /// The settings of the builder for everything that converts.
@@ -98,7 +95,8 @@ pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<
     super::print(&format!("{}: {}\n", path.display(), phases.collect::<Vec<_>>().join(", ")))
 }
 
-/// The files that the inputs name: a folder stands for the scene files in it and below, sorted bytewise by path.
+/// The files that the inputs name: a folder stands for its `tileset.json`, else for the scene files in it and below, sorted
+/// bytewise by path.
 ///
 /// # Errors
 /// A folder cannot be read, or holds no scene file.
@@ -125,6 +123,12 @@ pub fn expand(inputs: &[Input]) -> Result<Vec<Input>> {
 
 fn search(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
     ensure!(depth < MAX_DEPTH, "{}: folders are nested too deeply; name the scene files themselves", folder.display());
+    // The models below are its tiles.
+    let tileset = folder.join(TILESET);
+    if tileset.is_file() {
+        found.push(tileset);
+        return Ok(());
+    }
     let context = || format!("{}: cannot read this folder; check its permissions", folder.display());
     for entry in std::fs::read_dir(folder).with_context(context)? {
         let entry = entry.with_context(context)?;

@@ -35,7 +35,7 @@ impl Args for InputArgs {
             .num_args(1..)
             .value_parser(value_parser!(PathBuf))
             .help(
-                "Scene files (.gltf, .glb, .obj, .ply, .stl) or folders of them; triangle ids count through them in this \
+                "Scene files (.gltf, .glb, .obj, .ply, .stl, the tileset.json of 3D Tiles) or folders of them; triangle ids count through them in this \
                  order. --transform, --scene, --up and --unit belong to the input before them, or to all inputs if they \
                  come before the first",
             );
@@ -59,7 +59,7 @@ impl Args for InputArgs {
                 "up",
                 "y|z",
                 ValueParser::new(up),
-                "The axis that points up in OBJ, PLY and STL files [default: y]",
+                "The axis that points up in OBJ, PLY and STL files and in tilesets [default: z in tilesets, else y]",
             ))
             .arg(option(
                 "unit",
@@ -89,15 +89,17 @@ impl FromArgMatches for InputArgs {
                 true => Err(usage(format!("--{option} does not belong to {}; {remedy}", path.display()))),
                 false => Ok(()),
             };
-            given("scene", scenes.is_own[i], kind != Kind::Plain, "only glTF files have several scenes")?;
+            let has_scenes = !matches!(kind, Kind::Plain | Kind::Tiles);
+            given("scene", scenes.is_own[i], has_scenes, "only glTF files have several scenes")?;
             let remedy = "glTF is in metres with Y up: use --transform instead";
             given("up", ups.is_own[i], kind != Kind::Gltf, remedy)?;
-            given("unit", units.is_own[i], kind != Kind::Gltf, remedy)?;
+            let remedy = if kind == Kind::Tiles { "tilesets are in metres: use --transform instead" } else { remedy };
+            given("unit", units.is_own[i], !matches!(kind, Kind::Gltf | Kind::Tiles), remedy)?;
             let mut input = Input::from(path);
             input.transform = transforms.values[i].unwrap_or(input.transform);
-            input.scene = scenes.values[i].clone().filter(|_| kind != Kind::Plain);
-            input.up = ups.values[i].unwrap_or(input.up);
-            input.metres = units.values[i].unwrap_or(input.metres);
+            input.scene = scenes.values[i].clone().filter(|_| has_scenes);
+            input.up = ups.values[i].filter(|_| kind != Kind::Gltf);
+            input.metres = units.values[i].filter(|_| kind != Kind::Tiles).unwrap_or(input.metres);
             inputs.push(input);
         }
         Ok(Self { inputs })
@@ -148,6 +150,8 @@ enum Kind {
     Gltf,
     /// OBJ, PLY, STL.
     Plain,
+    /// 3D Tiles.
+    Tiles,
     /// A folder, or what the importer will judge.
     Other,
 }
@@ -159,6 +163,7 @@ impl Kind {
             _ if path.is_dir() => Self::Other,
             Some("gltf" | "glb") => Self::Gltf,
             Some("obj" | "ply" | "stl") => Self::Plain,
+            Some("json") => Self::Tiles,
             _ => Self::Other,
         }
     }
@@ -230,16 +235,19 @@ mod tests {
         let inputs =
             parse("--unit|mm|a.stl|--up|z|b.glb|--transform|-1 0 0 4  0 1 0 0  0 0 1 0|--scene|2|c.ply|--unit|ft");
         let [a, b, c] = &inputs.unwrap()[..] else { panic!() };
-        assert_eq!((a.up, a.metres, a.transform[3]), (Up::Z, 0.001, 0.0));
-        assert_eq!((b.up, b.scene.as_deref(), b.transform[3]), (Up::Y, Some("2"), 4.0));
-        assert_eq!((c.up, c.metres, c.scene.as_deref()), (Up::Y, 0.3048, None));
+        assert_eq!((a.up, a.metres, a.transform[3]), (Some(Up::Z), 0.001, 0.0));
+        assert_eq!((b.up, b.scene.as_deref(), b.transform[3]), (None, Some("2"), 4.0));
+        assert_eq!((c.up, c.metres, c.scene.as_deref()), (None, 0.3048, None));
     }
 
     #[test]
     fn options_before_the_first_input_belong_to_all() {
         let inputs = parse("--up|z|--transform|translate 1 2 3|--scene|x|a.obj|b.gltf|--transform|scale 2").unwrap();
         assert_eq!((inputs[0].transform[3], inputs[1].transform[3]), (1.0, 0.0));
-        assert_eq!((inputs[0].up, inputs[0].scene.as_deref(), inputs[1].scene.as_deref()), (Up::Z, None, Some("x")));
+        assert_eq!(
+            (inputs[0].up, inputs[0].scene.as_deref(), inputs[1].scene.as_deref()),
+            (Some(Up::Z), None, Some("x"))
+        );
     }
 
     #[test]
@@ -250,6 +258,8 @@ mod tests {
             ("a.stl|--scene|1", "--scene does not belong to a.stl"),
             ("a.stl|--up|z|--up|y", "given twice"),
             ("a.stl|--up|x", "must be y or z"),
+            ("tileset.json|--scene|1", "--scene does not belong to tileset.json"),
+            ("tileset.json|--unit|mm", "tilesets are in metres"),
             ("a.stl|--unit|km", "mm, cm, m, in or ft"),
             ("a.stl|--transform|sideways", "cannot read"),
         ] {

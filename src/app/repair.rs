@@ -11,7 +11,7 @@ use super::sizes::human_bytes;
 use super::{interrupt, verify};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::layout::PAGE_BYTES;
-use bricks::{Error, Manifest, Part, Payload, SceneFile, VerifyReport};
+use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::import::{ImportSettings, import};
 use brickwalk_convert::progress::Progress;
@@ -19,8 +19,10 @@ use brickwalk_convert::source::Source;
 use brickwalk_scenes::{Kind, Settings, generate};
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::Path;
+use tempfile::TempDir;
+use xxhash_rust::xxh3::xxh3_64;
 
 /// Runs `repair`.
 ///
@@ -42,10 +44,9 @@ pub fn run(args: &RepairArgs) -> Result<()> {
         .with_context(|| format!("{name}: cannot write the file; check its permissions"))?;
 
     let target = args.scene.canonicalize().unwrap_or_else(|_| args.scene.clone());
-    let folder = args.work.scratch.as_deref().or_else(|| target.parent()).unwrap_or(Path::new("."));
-    let scratch = tempfile::Builder::new().prefix(".repair.").tempdir_in(folder).with_context(|| {
-        format!("{}: cannot make a scratch folder; name another place with --scratch", folder.display())
-    })?;
+    // Until the end, so that no other process repairs it.
+    let _reserved = reserve(&args.scene, &target)?;
+    let scratch = scratch_folder(args.work.scratch.as_deref(), &target)?;
     let rebuilt = rebuild(args, &scene, scratch.path(), &progress)?;
     for &payload in &damaged {
         check(&scene, &rebuilt, payload)?;
@@ -57,6 +58,32 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     file.sync_all().with_context(|| format!("{name}: cannot sync the file to the disk; repair it again"))?;
     let parts: Vec<String> = damaged.iter().map(Payload::to_string).collect();
     super::print(&format!("{name}: {} rebuilt, {}\n", parts.join(", "), human_bytes(bytes)))
+}
+
+/// Reserves the repair of the scene for this process, by a file beside it that goes with the last process.
+fn reserve(scene: &Path, target: &Path) -> Result<Partial> {
+    let mut name = target.file_name().unwrap_or_default().to_owned();
+    name.push(".repair");
+    Writer::reserve(target.with_file_name(name)).map_err(|error| match error {
+        Error::Io { source, .. } if source.kind() == ErrorKind::ResourceBusy => {
+            anyhow!("{}: another process is repairing it; wait for that", scene.display())
+        }
+        error => error.into(),
+    })
+}
+
+/// The folder for what is rebuilt: beside the scene, or in `asked`. Its name is always the same for a scene, so that what a
+/// process left that was killed is removed by the next.
+fn scratch_folder(asked: Option<&Path>, target: &Path) -> Result<TempDir> {
+    let folder = asked.or_else(|| target.parent()).unwrap_or(Path::new("."));
+    let context = || format!("{}: cannot make a scratch folder; name another place with --scratch", folder.display());
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    let name = format!(".{name}.{:016x}.repair", xxh3_64(target.as_os_str().as_encoded_bytes()));
+    match std::fs::remove_dir_all(folder.join(&name)) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(error).with_context(context),
+        _ => {}
+    }
+    tempfile::Builder::new().prefix(&name).rand_bytes(0).tempdir_in(folder).with_context(context)
 }
 
 /// The payloads with problems that writing them again solves: geometry, attributes, proxies, textures.

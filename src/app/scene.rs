@@ -66,6 +66,7 @@ enum Written {
 /// Refuses options that have no meaning where nothing is cut into bricks.
 fn refuse_building(args: &BuildArgs) -> Result<()> {
     let given = [
+        ("--brick-triangles", args.brick_triangles.is_some()),
         ("--lattice", args.work.lattice.is_some()),
         ("--memory", args.work.memory.is_some()),
         ("--scratch", args.work.scratch.is_some()),
@@ -137,7 +138,16 @@ mod tests {
             assert!(at(name).exists(), "{name}");
         }
         let before = std::fs::read_dir(folder.path()).unwrap().count();
-        for option in ["--fast", "--resume", "--memory 1G", "--lattice -9", "--scratch .", "--no-proxies"] {
+        let options_of_building = [
+            "--brick-triangles 1K",
+            "--fast",
+            "--resume",
+            "--memory 1G",
+            "--lattice -9",
+            "--scratch .",
+            "--no-proxies",
+        ];
+        for option in options_of_building {
             let error = scene(&options("d.glb", option)).unwrap_err();
             assert!(error.is::<Usage>() && error.to_string().contains(".bricks"), "{option}: {error:?}");
         }

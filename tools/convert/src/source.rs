@@ -34,6 +34,12 @@ pub trait Source: Send + Sync {
     /// The image is missing or cannot be decoded. This is no reason not to convert: the builder warns and leaves it out.
     fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError>;
 
+    /// The file that part `part` of mesh `mesh` comes from, if any, and the number that vertex `vertex` of the part has there:
+    /// in its primitive, from 0. For messages; it may read the part again.
+    fn origin(&self, _mesh: usize, _part: usize, vertex: u32) -> (Option<String>, u64) {
+        (None, vertex.into())
+    }
+
     /// What was repaired in the parts that have been read, one line each: warnings that cannot be known before. Once every
     /// part has been read they are the same whatever the order.
     fn repairs(&self) -> Vec<String> {

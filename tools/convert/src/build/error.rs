@@ -34,6 +34,14 @@ pub enum BuildError {
         /// The number of triangles.
         found: u64,
     },
+    /// A defect of a file.
+    #[error("{file}: {defect}")]
+    InFile {
+        /// The file as given.
+        file: String,
+        /// What is wrong in it.
+        defect: Box<BuildError>,
+    },
     /// A vertex that is not a number or infinite.
     #[error(
         "mesh \"{mesh}\", primitive {primitive}: vertex {vertex} is not finite: {position:?}; \
@@ -45,7 +53,7 @@ pub enum BuildError {
         /// Index of the primitive in the mesh.
         primitive: u32,
         /// Index of the vertex in the primitive.
-        vertex: u32,
+        vertex: u64,
         /// The position in mesh space.
         position: [f64; 3],
     },
@@ -60,7 +68,7 @@ pub enum BuildError {
         /// Index of the primitive in the mesh.
         primitive: u32,
         /// Index of the vertex in the primitive.
-        vertex: u32,
+        vertex: u64,
         /// The position after its placement.
         position: [f64; 3],
         /// Largest magnitude of a coordinate.

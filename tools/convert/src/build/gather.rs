@@ -105,8 +105,18 @@ fn refuse(
     let finite_matrix = placed.part.baking.is_none_or(|baking| baking.matrix.is_finite());
     let outline = &reader.outline().meshes[placed.part.mesh as usize];
     let (mesh, primitive) = (outline.name.clone(), outline.parts[placed.part.part as usize].primitive);
-    if position.iter().all(|x| x.is_finite()) && finite_matrix {
-        return Err(BuildError::OutOfRange { mesh, primitive, vertex, position: corner, limit: COORDINATE_LIMIT });
+    let is_finite = position.iter().all(|x| x.is_finite()) && finite_matrix;
+    if drop_non_finite && !is_finite {
+        return Ok(());
     }
-    if drop_non_finite { Ok(()) } else { Err(BuildError::NonFinite { mesh, primitive, vertex, position }) }
+    let (file, vertex) = reader.origin(placed.part, vertex);
+    let defect = if is_finite {
+        BuildError::OutOfRange { mesh, primitive, vertex, position: corner, limit: COORDINATE_LIMIT }
+    } else {
+        BuildError::NonFinite { mesh, primitive, vertex, position }
+    };
+    Err(match file {
+        Some(file) => BuildError::InFile { file, defect: Box::new(defect) },
+        None => defect,
+    })
 }

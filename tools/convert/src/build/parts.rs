@@ -75,6 +75,11 @@ impl<'a> Reader<'a> {
         self.loaded.as_ref()?[part.mesh as usize][part.part as usize].as_deref()
     }
 
+    /// The file of a part, if any, and the number of its vertex `vertex` there.
+    pub fn origin(&self, part: &Part, vertex: u32) -> (Option<String>, u64) {
+        self.source.origin(part.mesh as usize, part.part as usize, vertex)
+    }
+
     /// Everything but the geometry.
     pub fn outline(&self) -> &'a Outline {
         self.source.outline()

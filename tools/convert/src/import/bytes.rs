@@ -2,6 +2,7 @@
 //!
 //! Nothing is mapped and no file is read whole, so memory does not grow with the input.
 
+use crate::progress::Progress;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -72,9 +73,9 @@ impl Bytes {
         Ok(bytes)
     }
 
-    /// Adds all of them to `hash`.
-    pub fn hash(&self, hash: &mut Xxh3) -> io::Result<()> {
-        let mut stream = self.stream()?;
+    /// Adds all of them to `hash`; fails when the import of `spool` is to stop.
+    pub fn hash(&self, spool: &Spool, hash: &mut Xxh3) -> io::Result<()> {
+        let mut stream = self.stream(spool)?;
         loop {
             let block = stream.fill_buf()?;
             let n = block.len();
@@ -86,9 +87,10 @@ impl Bytes {
         }
     }
 
-    /// Runs through them from the first to the last.
-    pub fn stream(&self) -> io::Result<BufReader<Stream>> {
-        Ok(BufReader::with_capacity(BLOCK, Stream { reader: self.open()?, at: 0, hash: Xxh3::new() }))
+    /// Runs through them from the first to the last; fails when the import of `spool` is to stop.
+    pub fn stream(&self, spool: &Spool) -> io::Result<BufReader<Stream>> {
+        let stream = Stream { reader: self.open()?, at: 0, hash: Xxh3::new(), progress: spool.progress.clone() };
+        Ok(BufReader::with_capacity(BLOCK, stream))
     }
 }
 
@@ -115,6 +117,7 @@ pub(super) struct Stream {
     reader: Reader,
     at: u64,
     hash: Xxh3,
+    progress: Progress,
 }
 
 impl Stream {
@@ -128,6 +131,8 @@ impl Stream {
 
 impl Read for Stream {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        // Not `ErrorKind::Interrupted`, after which readers try again.
+        self.progress.check().map_err(io::Error::other)?;
         let n = (out.len() as u64).min(self.reader.length - self.at) as usize;
         self.reader.read_at(self.at, &mut out[..n])?;
         self.hash.update(&out[..n]);
@@ -176,14 +181,20 @@ fn write_all_at(file: &File, mut offset: u64, mut bytes: &[u8]) -> io::Result<()
 pub(super) struct Spool {
     /// Where it is made; `None`: the system's folder for temporary files.
     folder: Option<PathBuf>,
+    progress: Progress,
     file: OnceLock<Result<Arc<File>, String>>,
     length: AtomicU64,
 }
 
 impl Spool {
-    /// A spool in `folder`.
-    pub fn new(folder: Option<PathBuf>) -> Self {
-        Self { folder, ..Self::default() }
+    /// A spool in `folder` for an import that ends early if `progress` says so.
+    pub fn new(folder: Option<PathBuf>, progress: Progress) -> Self {
+        Self { folder, progress, ..Self::default() }
+    }
+
+    /// The progress of the import.
+    pub fn progress(&self) -> &Progress {
+        &self.progress
     }
 
     /// Appends `bytes`; the error names the folder.
@@ -222,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_folder_that_is_not_there_is_named() {
-        let spool = Spool::new(Some("/nonexistent/folder".into()));
+        let spool = Spool::new(Some("/nonexistent/folder".into()), Progress::hidden());
         assert!(spool.add(b"a").unwrap_err().contains("/nonexistent/folder"));
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// What is read, as error messages list it.
-pub(super) const ACCEPTED: &str = ".gltf, .glb, .obj, .ply and .stl";
+pub(super) const ACCEPTED: &str = ".gltf, .glb, .obj, .ply, .stl and tileset.json";
 
 /// The usual remedy for a defect that only the producer of a file can repair.
 pub(super) const EXPORT_AGAIN: &str = "export the file again";
@@ -68,6 +68,9 @@ pub enum ImportError {
         /// Triangles of all inputs up to and including `file`, placements multiplied out.
         triangles: u64,
     },
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Interrupted(crate::progress::Interrupted),
     /// The worker threads could not be started.
     #[error("cannot start {threads} worker threads: {reason}; use fewer threads")]
     Threads {

@@ -21,9 +21,9 @@ struct Input {
 }
 
 impl Imported {
-    /// Appends an input, placed by `transform`; the error says what is wrong with the placement. Each list of an input is
-    /// smaller than the bytes it was read from, so sums stay within u32 for everything that fits memory.
-    pub(super) fn append(&mut self, opened: Opened, transform: &Affine) -> Result<(), String> {
+    /// Appends an input, placed by each of `transforms`; the error says what is wrong with a placement. Each list of an input
+    /// is smaller than the bytes it was read from, so sums stay within u32 for everything that fits memory.
+    pub(super) fn append(&mut self, opened: Opened, transforms: &[Affine]) -> Result<(), String> {
         let Opened { outline: mut part, parts } = opened;
         let whole = &mut self.outline;
         let meshes = whole.meshes.len();
@@ -36,15 +36,20 @@ impl Imported {
         for placement in &mut part.placements {
             placement.mesh += meshes as u32;
             placement.source += whole.sources.len() as u32;
-            if *transform != IDENTITY {
-                placement.world_from_mesh = multiply(transform, &placement.world_from_mesh);
-                if !placement.world_from_mesh.iter().all(|c| c.is_finite()) {
-                    return Err(format!("takes node {} beyond the range of numbers", placement.name));
+        }
+        for transform in transforms {
+            for placement in &part.placements {
+                let mut placement = placement.clone();
+                if *transform != IDENTITY {
+                    placement.world_from_mesh = multiply(transform, &placement.world_from_mesh);
+                    if !placement.world_from_mesh.iter().all(|c| c.is_finite()) {
+                        return Err(format!("takes node {} beyond the range of numbers", placement.name));
+                    }
                 }
+                whole.placements.push(placement);
             }
         }
         whole.meshes.append(&mut part.meshes);
-        whole.placements.append(&mut part.placements);
         whole.materials.append(&mut part.materials);
         whole.textures.append(&mut part.textures);
         whole.sources.append(&mut part.sources);
@@ -52,6 +57,11 @@ impl Imported {
         whole.has_animation |= part.has_animation;
         self.inputs.push(Input { parts, meshes, materials, textures });
         Ok(())
+    }
+
+    /// Notes a file that was read besides those of the inputs.
+    pub(super) fn add_source(&mut self, source: bricks::Source) {
+        self.outline.sources.push(source);
     }
 
     /// The input for which `first` is at most `index`, the last such.
@@ -71,6 +81,12 @@ impl Source for Imported {
         let mut primitive = input.parts.part(mesh - input.meshes, part)?;
         primitive.material += input.materials;
         Ok(Cow::Owned(primitive))
+    }
+
+    fn origin(&self, mesh: usize, part: usize, vertex: u32) -> (Option<String>, u64) {
+        let input = self.input(mesh, |input| input.meshes);
+        let number = input.parts.vertex(mesh - input.meshes, part, vertex);
+        (Some(input.parts.label().to_owned()), number.unwrap_or(vertex.into()))
     }
 
     fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError> {

@@ -19,6 +19,7 @@ mod repairs;
 mod stl;
 mod table;
 mod text;
+mod tiles;
 mod transform;
 mod uri;
 mod vertices;
@@ -41,8 +42,11 @@ use std::sync::Arc;
 /// Largest number of triangles over all placements: ids are u32 and 4294967295 means "none".
 const MAX_TRIANGLES: u64 = u32::MAX as u64 - 1;
 
-/// Extensions of the files that are read, lower case.
+/// Extensions of the files that folders are searched for, lower case.
 pub const EXTENSIONS: [&str; 5] = ["gltf", "glb", "obj", "ply", "stl"];
+
+/// The file that stands for a whole folder: the root of a set of 3D Tiles.
+pub const TILESET: &str = "tileset.json";
 
 /// How inputs are read.
 #[derive(Clone, Debug, Default)]
@@ -60,8 +64,9 @@ pub struct Input {
     pub path: PathBuf,
     /// The scene of a glTF file, by name or number; `None`: its default scene.
     pub scene: Option<String>,
-    /// The axis that points up in OBJ, PLY and STL, whose frames are right-handed; glTF states its own.
-    pub up: Up,
+    /// The axis that points up in OBJ, PLY, STL and tilesets, whose frames are right-handed; `None`: Z in tilesets, else Y.
+    /// glTF states its own.
+    pub up: Option<Up>,
     /// Metres that a unit of length stands for in OBJ, PLY and STL, finite and positive; glTF states its own.
     pub metres: f64,
     /// Placement of the whole input, in metres with Y up: row-major 3x4, finite.
@@ -78,10 +83,10 @@ pub enum Up {
 }
 
 impl Input {
-    /// What takes OBJ, PLY and STL to metres with Y up.
-    fn axes(&self) -> [f64; 12] {
+    /// What takes OBJ, PLY and STL, or another format whose axis `up` points up by default, to metres with Y up.
+    fn axes(&self, up: Up) -> [f64; 12] {
         let m = self.metres;
-        match self.up {
+        match self.up.unwrap_or(up) {
             Up::Y => [m, 0.0, 0.0, 0.0, 0.0, m, 0.0, 0.0, 0.0, 0.0, m, 0.0],
             Up::Z => [m, 0.0, 0.0, 0.0, 0.0, 0.0, m, 0.0, 0.0, -m, 0.0, 0.0],
         }
@@ -90,7 +95,7 @@ impl Input {
 
 impl From<PathBuf> for Input {
     fn from(path: PathBuf) -> Self {
-        Self { path, scene: None, up: Up::Y, metres: 1.0, transform: IDENTITY }
+        Self { path, scene: None, up: None, metres: 1.0, transform: IDENTITY }
     }
 }
 
@@ -108,7 +113,11 @@ impl From<&Path> for Input {
 /// The first defect in input order that can be known without reading geometry; see [`ImportError`]. Defects that leave
 /// geometry intact are warnings of the outline.
 pub fn import(inputs: &[Input], settings: &ImportSettings, progress: &Progress) -> Result<Imported, ImportError> {
-    let open = || open_all(inputs, settings, progress);
+    let open = || {
+        let opened = open_all(inputs, settings, progress);
+        // Whatever it was that failed: it was asked to.
+        opened.map_err(|error| progress.check().err().map_or(error, ImportError::Interrupted))
+    };
     let Some(threads) = settings.threads else { return open() };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -120,28 +129,60 @@ pub fn import(inputs: &[Input], settings: &ImportSettings, progress: &Progress) 
 fn open_all(inputs: &[Input], settings: &ImportSettings, progress: &Progress) -> Result<Imported, ImportError> {
     // Formats are checked first, so that a wrong argument is told before hours of reading.
     let formats = inputs.iter().map(|input| format(&input.path)).collect::<Result<Vec<_>, _>>()?;
-    let spool = Arc::new(Spool::new(settings.scratch.clone()));
+    let spool = Arc::new(Spool::new(settings.scratch.clone(), progress.clone()));
     let mut budget = TriangleBudget { used: 0 };
     let mut imported = Imported::default();
     progress.phase("inputs", inputs.len() as u64);
     for (input, format) in inputs.iter().zip(formats) {
-        let (path, budget) = (input.path.as_path(), &mut budget);
+        progress.check().map_err(ImportError::Interrupted)?;
+        let (path, budget, axes) = (input.path.as_path(), &mut budget, input.axes(Up::Y));
         let opened = match format {
             Format::Gltf => gltf::open(path, input.scene.as_deref(), &spool, budget)?,
-            Format::Obj => obj::open(path, &input.axes(), &spool, budget)?,
-            Format::Ply => ply::open(path, &input.axes(), &spool, budget)?,
-            Format::Stl => stl::open(path, &input.axes(), &spool, budget)?,
+            Format::Obj => obj::open(path, &axes, &spool, budget)?,
+            Format::Ply => ply::open(path, &axes, &spool, budget)?,
+            Format::Stl => stl::open(path, &axes, &spool, budget)?,
+            Format::Tiles => {
+                append_tiles(&mut imported, input, &spool, budget, progress)?;
+                continue;
+            }
         };
-        imported.append(opened, &input.transform).map_err(|problem| ImportError::Content {
-            file: show(&input.path),
-            place: "transform".into(),
-            problem,
-            remedy: "place it nearer to the origin, or scale it less",
-        })?;
+        imported.append(opened, &[input.transform]).map_err(|problem| misplaced(path, problem))?;
         progress.advance(1);
     }
     progress.finish();
     Ok(imported)
+}
+
+/// Appends every model of a tileset, each opened once however many tiles show it.
+fn append_tiles(
+    imported: &mut Imported,
+    input: &Input,
+    spool: &Arc<Spool>,
+    budget: &mut TriangleBudget,
+    progress: &Progress,
+) -> Result<(), ImportError> {
+    let tileset = tiles::open(&input.path, spool)?;
+    tileset.sources.into_iter().for_each(|source| imported.add_source(source));
+    let world_from_tileset = affine::multiply(&input.transform, &input.axes(Up::Z));
+    progress.phase("tiles", tileset.models.len() as u64);
+    for model in &tileset.models {
+        progress.check().map_err(ImportError::Interrupted)?;
+        let opened = tiles::open_model(model, spool, budget)?;
+        let meshes = &opened.outline.meshes;
+        let triangles = opened.outline.placements.iter().map(|p| meshes[p.mesh as usize].triangle_count()).sum();
+        // Opening it counted one.
+        budget.add(&show(&model.path), model.placements.len() as u64 - 1, triangles)?;
+        let transforms: Vec<_> = model.placements.iter().map(|m| affine::multiply(&world_from_tileset, m)).collect();
+        imported.append(opened, &transforms).map_err(|problem| misplaced(&model.path, problem))?;
+        progress.advance(1);
+    }
+    Ok(())
+}
+
+/// The error for an input that a transformation takes too far.
+fn misplaced(path: &Path, problem: String) -> ImportError {
+    let remedy = "place it nearer to the origin, or scale it less";
+    ImportError::Content { file: show(path), place: "transform".into(), problem, remedy }
 }
 
 /// Formats of files.
@@ -151,6 +192,7 @@ enum Format {
     Obj,
     Ply,
     Stl,
+    Tiles,
 }
 
 /// The format that the extension of `path` tells.
@@ -161,6 +203,7 @@ fn format(path: &Path) -> Result<Format, ImportError> {
         Some("obj") => Ok(Format::Obj),
         Some("ply") => Ok(Format::Ply),
         Some("stl") => Ok(Format::Stl),
+        Some("json") => Ok(Format::Tiles),
         _ => Err(ImportError::Format { file: show(path) }),
     }
 }
@@ -175,6 +218,12 @@ struct Opened {
 trait Parts: Send + Sync {
     /// The triangles of part `part` of mesh `mesh`.
     fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError>;
+
+    /// The file as messages show it.
+    fn label(&self) -> &str;
+
+    /// The number in the file of vertex `vertex` of a part: in its primitive, from 0. `None`: the part cannot be read again.
+    fn vertex(&self, mesh: usize, part: usize, vertex: u32) -> Option<u64>;
 
     /// The texels of texture `index`.
     fn texture(&self, index: usize) -> Result<SourceTexture, SourceError>;

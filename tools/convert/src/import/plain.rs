@@ -1,12 +1,52 @@
 //! What the formats without a scene graph (OBJ, PLY, STL) have in common: one placement a mesh, plain materials, rows of
 //! numbers.
 
+use super::bytes::Bytes;
 use super::error::{EXPORT_AGAIN, ImportError, show};
 use super::table::Table;
-use crate::source::{MeshOutline, PART_TRIANGLES, PartOutline, Placement, Primitive};
+use super::warnings::Warnings;
+use crate::source::{MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive};
 use bricks::{MATERIAL_DOUBLE_SIDED, Material, NONE};
 use std::io;
 use std::path::Path;
+use xxhash_rust::xxh3::Xxh3;
+
+/// A file at the beginning of its import.
+pub(super) struct Start {
+    /// The path as messages show it.
+    pub label: String,
+    /// The file.
+    pub bytes: Bytes,
+    /// What is wrong without being an error.
+    pub warnings: Warnings,
+}
+
+/// Finds the file at `path`.
+pub(super) fn start(path: &Path) -> Result<Start, ImportError> {
+    let label = show(path);
+    let bytes = Bytes::of_file(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
+    let warnings = Warnings::new(label.clone());
+    Ok(Start { label, bytes, warnings })
+}
+
+/// The outline of `meshes` of the file at `path`, which has `hash`: each placed once, white.
+pub(super) fn outline(
+    path: &Path,
+    Start { bytes, warnings, .. }: Start,
+    hash: &Xxh3,
+    axes: &[f64; 12],
+    meshes: Vec<MeshOutline>,
+) -> Outline {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    Outline {
+        placements: meshes.iter().enumerate().map(|(m, mesh)| placement(m, &mesh.name, axes)).collect(),
+        meshes,
+        materials: vec![material()],
+        sources: vec![bricks::Source { name, bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) }],
+        warnings: warnings.into_lines(),
+        ..Outline::default()
+    }
+}
 
 /// White and matt, seen from both sides: scans and exported surfaces do not promise a winding.
 pub(super) fn material() -> Material {
@@ -27,13 +67,8 @@ pub(super) fn stem(path: &Path) -> String {
     super::error::one_line(&path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default())
 }
 
-/// The name of a file without its folder.
-pub(super) fn file_name(path: &Path) -> String {
-    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
 /// Mesh `index`, placed once where it is; `axes` says where that is in metres with Y up.
-pub(super) fn placement(index: usize, name: &str, axes: &[f64; 12]) -> Placement {
+fn placement(index: usize, name: &str, axes: &[f64; 12]) -> Placement {
     Placement { name: name.to_owned(), mesh: index as u32, source: 0, world_from_mesh: *axes }
 }
 

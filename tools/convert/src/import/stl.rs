@@ -4,13 +4,12 @@
 //! leave them zero.
 
 use super::bytes::{Bytes, Spool, Stream};
-use super::error::{ImportError, show};
+use super::error::ImportError;
 use super::plain::{self, fault, no_room, unreadable};
 use super::table::{Table, TableWriter};
 use super::text::Tokens;
-use super::warnings::Warnings;
 use super::{Opened, Parts, TriangleBudget};
-use crate::source::{Outline, Primitive, SourceError, SourceTexture};
+use crate::source::{Primitive, SourceError, SourceTexture};
 use std::path::Path;
 use xxhash_rust::xxh3::Xxh3;
 
@@ -36,9 +35,8 @@ pub(super) fn open(
     spool: &Spool,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
-    let label = show(path);
-    let bytes = Bytes::of_file(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
-    let mut warnings = Warnings::new(label.clone());
+    let mut start = plain::start(path)?;
+    let bytes = &start.bytes;
     let mut head = [0; HEADER_BYTES as usize];
     let n = bytes.len().min(HEADER_BYTES) as usize;
     let read = bytes.open().and_then(|reader| reader.read_at(0, &mut head[..n]));
@@ -52,45 +50,37 @@ pub(super) fn open(
     let is_ascii = !fits && head[..n].trim_ascii_start().starts_with(b"solid");
     let mut hash = Xxh3::new();
     let (triangles, width) = if is_ascii {
-        (ascii(path, &bytes, spool, &mut hash)?, 8)
+        (ascii(path, bytes, spool, &mut hash)?, 8)
     } else {
-        bytes.hash(&mut hash).map_err(|e| unreadable(path, &e))?;
+        bytes.hash(spool, &mut hash).map_err(|e| unreadable(path, &e))?;
         let stated = stated.ok_or_else(|| fault(path, "header", "the file is neither binary nor ASCII STL"))?;
         if stated > held {
             let problem = format!("states {stated} triangles, but the file can hold {held}");
             return Err(fault(path, "header", problem));
         }
         if !fits {
-            warnings.add("bytes behind the last triangle are ignored", String::new);
+            start.warnings.add("bytes behind the last triangle are ignored", String::new);
         }
         // Vertices follow the normal. An empty table needs no bytes.
-        let start = (HEADER_BYTES + 12).min(bytes.len());
-        let rows = bytes.slice(start, bytes.len());
+        let first = (HEADER_BYTES + 12).min(bytes.len());
+        let rows = bytes.slice(first, bytes.len());
         let table = rows.and_then(|rows| Table::new(rows, stated, TRIANGLE_BYTES, 36));
         (table.ok_or_else(|| fault(path, "triangles", "the file is cut off"))?, 4)
     };
     if triangles.count() == 0 {
         return Err(fault(path, "triangles", "the file has none"));
     }
+    let label = start.label.clone();
     budget.add(&label, 1, triangles.count())?;
-    let name = plain::stem(path);
-    let source =
-        bricks::Source { name: plain::file_name(path), bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) };
-    let outline = Outline {
-        placements: vec![plain::placement(0, &name, axes)],
-        meshes: vec![plain::one_primitive(name, triangles.count())],
-        materials: vec![plain::material()],
-        sources: vec![source],
-        warnings: warnings.into_lines(),
-        ..Outline::default()
-    };
+    let mesh = plain::one_primitive(plain::stem(path), triangles.count());
+    let outline = plain::outline(path, start, &hash, axes, vec![mesh]);
     Ok(Opened { outline, parts: Box::new(Stl { label, triangles, width }) })
 }
 
 /// Runs through an ASCII file; its triangles go to the spool. What matters are the three vertices between `loop` and
 /// `endloop`; other words are passed over.
 fn ascii(path: &Path, bytes: &Bytes, spool: &Spool, hash: &mut Xxh3) -> Result<Table, ImportError> {
-    let mut tokens = Tokens::new(bytes.stream().map_err(|e| unreadable(path, &e))?);
+    let mut tokens = Tokens::new(bytes.stream(spool).map_err(|e| unreadable(path, &e))?);
     let mut table = TableWriter::new(spool, 72);
     let mut row = Vec::with_capacity(72);
     while let Some(token) = tokens.next().map_err(|e| unreadable(path, &e))? {
@@ -140,6 +130,14 @@ impl Parts for Stl {
         })?;
         let indices = (0..positions.len() as u32).collect();
         Ok(Primitive { positions, indices, ..Primitive::default() })
+    }
+
+    fn label(&self) -> &str {
+        &self.label
+    }
+
+    fn vertex(&self, _mesh: usize, part: usize, vertex: u32) -> Option<u64> {
+        Some(3 * plain::range(part, self.triangles.count()).0 + u64::from(vertex))
     }
 
     fn texture(&self, _index: usize) -> Result<SourceTexture, SourceError> {

@@ -19,6 +19,11 @@ pub(super) fn is_data(uri: &str) -> bool {
 /// Resolves `uri`; the error says what is wrong with it. Only files in or below the folder of the glTF file are referred
 /// to: other schemes, absolute paths and paths that climb out of the folder are refused.
 pub(super) fn resolve(uri: &str) -> Result<Target, &'static str> {
+    resolve_from(Path::new(""), uri)
+}
+
+/// Resolves `uri` of a file in the folder `from` below that of the first file; the path is below the latter.
+pub(super) fn resolve_from(from: &Path, uri: &str) -> Result<Target, &'static str> {
     if is_data(uri) {
         return data(&uri[5..]).map(Target::Data);
     }
@@ -29,13 +34,13 @@ pub(super) fn resolve(uri: &str) -> Result<Target, &'static str> {
     if path.contains('\0') {
         return Err("the URI holds a zero byte");
     }
-    below(&path).map(Target::File)
+    below(from.join(path)).map(Target::File)
 }
 
 /// A path below a folder, without `.` and `..`; the error says why `path` is none.
-pub(super) fn below(path: &str) -> Result<PathBuf, &'static str> {
+pub(super) fn below(path: impl AsRef<Path>) -> Result<PathBuf, &'static str> {
     let mut below = PathBuf::new();
-    for component in Path::new(path).components() {
+    for component in path.as_ref().components() {
         match component {
             Component::Normal(name) => below.push(name),
             Component::CurDir => {}

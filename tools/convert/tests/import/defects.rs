@@ -325,7 +325,7 @@ fn bytes_that_are_no_gltf() {
 fn other_kinds_of_files_are_refused_before_anything_is_read() {
     for name in ["test.gl.objx", "test.gl.usd", "test.gl", "test.gltf.fbx"] {
         let error = error_text(import_bytes(name, b""));
-        assert!(error.contains(".gltf, .glb, .obj, .ply and .stl"), "{error}");
+        assert!(error.contains(".gltf, .glb, .obj, .ply, .stl and tileset.json"), "{error}");
     }
     // The second input is at fault, although the first is missing.
     let paths = ["/missing/test.gltf", "/missing/test.gl.objx"].map(|path| std::path::Path::new(path).into());

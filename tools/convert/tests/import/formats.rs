@@ -263,7 +263,7 @@ fn axes_units_and_transforms() {
     let folder = tempfile::tempdir().unwrap();
     let path = write(folder.path(), "a.stl", &stl());
     let mut input = Input::from(path);
-    (input.up, input.metres) = (Up::Z, 0.5);
+    (input.up, input.metres) = (Some(Up::Z), 0.5);
     input.transform = [1.0, 0.0, 0.0, 10.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let world = |input: &Input, p: [f64; 3]| {
         let m = import_all(std::slice::from_ref(input)).unwrap().placements[0].world_from_mesh;
@@ -272,7 +272,7 @@ fn axes_units_and_transforms() {
     };
     // Z becomes Y, so that the frame stays right-handed Y becomes -Z; then metres; then the placement in metres.
     assert_eq!(world(&input, [1.0, 2.0, 4.0]), [10.5, 2.0, -1.0]);
-    input.up = Up::Y;
+    input.up = Some(Up::Y);
     assert_eq!(world(&input, [1.0, 2.0, 4.0]), [10.5, 1.0, 2.0]);
     // glTF has axes and units of its own.
     input.path = write(folder.path(), "a.glb", &Writer::triangle().glb());

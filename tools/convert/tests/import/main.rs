@@ -6,4 +6,5 @@ mod formats;
 mod fuzz;
 mod oracle;
 mod scenes;
+mod tiles;
 mod writer;

@@ -89,9 +89,23 @@ pub(super) struct Document {
     #[serde(default)]
     pub animations: Vec<IgnoredAny>,
     #[serde(default)]
+    pub extensions: DocumentExtensions,
+    #[serde(default)]
     pub extensions_used: Vec<String>,
     #[serde(default)]
     pub extensions_required: Vec<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct DocumentExtensions {
+    #[serde(rename = "CESIUM_RTC")]
+    pub rtc: Option<Rtc>,
+}
+
+/// CESIUM_RTC: the point that all coordinates are relative to.
+#[derive(Debug, Deserialize)]
+pub(super) struct Rtc {
+    pub center: [f64; 3],
 }
 
 /// The version alone, for files of other versions, whose other parts have other types.

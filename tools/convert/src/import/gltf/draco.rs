@@ -84,6 +84,7 @@ pub(super) fn decode(file: &File, is_used: &[bool]) -> Primitives {
 }
 
 fn decode_view(file: &File, view: Index) -> Result<Decoded, String> {
+    file.spool.progress().check().map_err(|stop| stop.to_string())?;
     let (bytes, _) = file.view(view).map_err(|problem| problem.what)?;
     let bytes = bytes.read()?;
     let faces = FREE_FACES.max(bytes.len() as u64 * MAX_FACES_A_BYTE);

@@ -49,13 +49,18 @@ impl Problem {
 }
 
 impl File {
-    /// Opens the file and its buffers. Extensions that are ignored are noted in `warnings`.
-    pub fn open(path: &Path, spool: Arc<Spool>, warnings: &mut Warnings) -> Result<Self, ImportError> {
+    /// Opens the file and its buffers: `whole`, of which `bytes` are glTF. Extensions that are ignored are noted in
+    /// `warnings`.
+    pub fn open(
+        path: &Path,
+        [whole, bytes]: [&Bytes; 2],
+        spool: Arc<Spool>,
+        warnings: &mut Warnings,
+    ) -> Result<Self, ImportError> {
         let label = show(path);
         let unreadable = |reason: String| ImportError::Read { file: label.clone(), reason };
-        let bytes = Bytes::of_file(path).map_err(unreadable)?;
         let mut hash = Xxh3::new();
-        bytes.hash(&mut hash).map_err(|e| unreadable(e.to_string()))?;
+        whole.hash(&spool, &mut hash).map_err(|e| unreadable(e.to_string()))?;
 
         let syntax = |problem: String| {
             let remedy = "export the file again as glTF 2.0";
@@ -84,7 +89,7 @@ impl File {
                 Some(text) => found.get(&text).and_then(|(data, is_new)| {
                     if is_new {
                         input_bytes += data.len();
-                        data.hash(&mut hash).map_err(|e| Missing::File(format!("cannot be read: {e}")))?;
+                        data.hash(&spool, &mut hash).map_err(|e| Missing::File(format!("cannot be read: {e}")))?;
                     }
                     Ok(data)
                 }),
@@ -112,7 +117,7 @@ impl File {
         });
         let located: Vec<_> = located.collect();
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let source = bricks::Source { name, bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) };
+        let source = bricks::Source { name, bytes: whole.len(), hash: format!("{:016x}", hash.digest()) };
         let checked_sparse = document.accessors.iter().map(|_| AtomicBool::new(false)).collect();
         let decoded_views = BTreeMap::new();
         let images = Vec::new();
@@ -251,6 +256,7 @@ fn parse(json: &[u8]) -> Result<Document, String> {
 
 /// Extensions that are applied.
 const APPLIED: &[&str] = &[
+    "CESIUM_RTC",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",

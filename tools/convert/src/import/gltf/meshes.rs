@@ -211,6 +211,13 @@ impl Checked {
         self.material
     }
 
+    /// The number of vertex `vertex` of what [`Self::read`] reads of triangles `first` to `end`.
+    pub fn vertex(&self, first: u64, end: u64, vertex: u32) -> Option<u64> {
+        let unreadable = |e: io::Error| Problem::new(e.to_string());
+        let vertices = self.geometry.as_ref()?.vertices(first, end, unreadable).ok()?;
+        vertices.used.get(vertex as usize).copied()
+    }
+
     /// Reads triangles `first` to `end`, at most the number of triangles; their material is `material`.
     pub fn read(&self, first: u64, end: u64, material: u32) -> Result<Read, Problem> {
         let mut repairs = Vec::new();

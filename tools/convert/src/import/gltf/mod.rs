@@ -17,7 +17,7 @@ mod meshes;
 mod meshopt;
 mod nodes;
 
-use super::affine::multiply;
+use super::affine::{Affine, multiply};
 use super::bytes::{Bytes, Spool};
 use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
 use super::image::decode_texture;
@@ -25,7 +25,7 @@ use super::repairs::Repairs;
 use super::warnings::Warnings;
 use super::{Opened, Parts, TriangleBudget};
 use crate::source::{
-    MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, SourceError, SourceTexture,
+    IDENTITY, MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, SourceError, SourceTexture,
 };
 use file::{File, Problem};
 use materials::Texture;
@@ -70,8 +70,27 @@ pub(super) fn open(
     spool: &Arc<Spool>,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
+    let unreadable = |reason| ImportError::Read { file: show(path), reason };
+    let bytes = Bytes::of_file(path).map_err(unreadable)?;
+    open_within(path, [&bytes, &bytes], scene, &IDENTITY, spool, budget)
+}
+
+/// Opens the glTF file that is a piece of the file at `path`, whose bytes are `[all, piece]`, placed by `placing`: a
+/// rotation, and a translation to which the centre of CESIUM_RTC adds.
+pub(super) fn open_within(
+    path: &Path,
+    bytes: [&Bytes; 2],
+    scene: Option<&str>,
+    placing: &Affine,
+    spool: &Arc<Spool>,
+    budget: &mut TriangleBudget,
+) -> Result<Opened, ImportError> {
     let mut warnings = Warnings::new(show(path));
-    let mut file = File::open(path, spool.clone(), &mut warnings)?;
+    let mut file = File::open(path, bytes, spool.clone(), &mut warnings)?;
+    let mut placing = *placing;
+    for (row, center) in file.document.extensions.rtc.iter().flat_map(|rtc| rtc.center.into_iter().enumerate()) {
+        placing[4 * row + 3] += center;
+    }
     let document = &file.document;
     meshes::check_references(document).map_err(|(mesh, primitive, problem)| {
         file.fault(meshes::primitive_place(document, mesh, primitive), problem)
@@ -82,7 +101,7 @@ pub(super) fn open(
     }
     meshopt::decode_views(&mut file)?;
     let document = &file.document;
-    let uses = nodes::uses(&file, scene, &mut warnings)?;
+    let uses = nodes::uses(&file, scene, &placing, &mut warnings)?;
     let mut is_used = vec![false; document.meshes.len()];
     uses.iter().for_each(|one| is_used[one.mesh] = true);
     let (meshes, numbers) = check_meshes(&file, &is_used, &mut warnings)?;
@@ -123,9 +142,7 @@ pub(super) fn open(
 impl Parts for Gltf {
     fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError> {
         let in_mesh = &self.meshes[mesh];
-        let (number, first) = in_mesh.parts[part];
-        let primitive = &in_mesh.primitives[number as usize];
-        let end = primitive.triangles().min(first + u64::from(PART_TRIANGLES));
+        let (number, primitive, first, end) = in_mesh.part(part);
         let material = primitive.material().unwrap_or(self.materials) as u32;
         let place = || format!("{} primitive {number}", in_mesh.label);
         let read = primitive.read(first, end, material).map_err(|Problem { what, remedy }| {
@@ -136,6 +153,15 @@ impl Parts for Gltf {
             self.repairs.add(repair, (mesh, number), place);
         }
         Ok(read.primitive)
+    }
+
+    fn label(&self) -> &str {
+        &self.label
+    }
+
+    fn vertex(&self, mesh: usize, part: usize, vertex: u32) -> Option<u64> {
+        let (_, primitive, first, end) = self.meshes[mesh].part(part);
+        primitive.vertex(first, end, vertex)
     }
 
     fn texture(&self, index: usize) -> Result<SourceTexture, SourceError> {
@@ -168,6 +194,13 @@ impl Mesh {
         };
         let name = display_name(number, document.meshes[number].name.as_deref());
         MeshOutline { name, parts: self.parts.iter().map(part).collect() }
+    }
+
+    /// A part: its primitive with that one's number, and its first triangle and the one behind its last.
+    fn part(&self, part: usize) -> (u32, &Checked, u64, u64) {
+        let (number, first) = self.parts[part];
+        let primitive = &self.primitives[number as usize];
+        (number, primitive, first, primitive.triangles().min(first + u64::from(PART_TRIANGLES)))
     }
 
     fn triangles(&self) -> u64 {

@@ -7,7 +7,6 @@ use super::label;
 use crate::import::affine::{Affine, from_columns, from_parts, multiply};
 use crate::import::error::{ImportError, one_line};
 use crate::import::warnings::Warnings;
-use crate::source::IDENTITY;
 use std::io;
 
 /// A node with a mesh, placed in the world.
@@ -51,8 +50,13 @@ pub(super) fn node_place(document: &Document, node: usize) -> String {
 }
 
 /// Every use of a mesh in the scene that is asked for (else the default scene, else scene 0, else all root nodes), depth
-/// first.
-pub(super) fn uses(file: &File, asked: Option<&str>, warnings: &mut Warnings) -> Result<Vec<Use>, ImportError> {
+/// first; `placing` takes the scene to the world.
+pub(super) fn uses(
+    file: &File,
+    asked: Option<&str>,
+    placing: &Affine,
+    warnings: &mut Warnings,
+) -> Result<Vec<Use>, ImportError> {
     let document = &file.document;
     let parents = parents(file)?;
     check_acyclic(file, &parents)?;
@@ -60,7 +64,7 @@ pub(super) fn uses(file: &File, asked: Option<&str>, warnings: &mut Warnings) ->
 
     let mut uses = Vec::new();
     let mut visited = 0;
-    let mut stack: Vec<(usize, Affine)> = roots.iter().rev().map(|&root| (root, IDENTITY)).collect();
+    let mut stack: Vec<(usize, Affine)> = roots.iter().rev().map(|&root| (root, *placing)).collect();
     while let Some((index, parent)) = stack.pop() {
         visited += 1;
         let node = &document.nodes[index];

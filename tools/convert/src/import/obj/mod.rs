@@ -7,7 +7,7 @@ mod mtl;
 mod parse;
 
 use super::bytes::{Bytes, Spool, Stream};
-use super::error::{ImportError, one_line, show};
+use super::error::{ImportError, one_line};
 use super::image::decode_texture;
 use super::plain::{self, doubles, fault, floats, unreadable};
 use super::repairs::Repairs;
@@ -56,16 +56,15 @@ pub(super) fn open(
     spool: &Spool,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
-    let label = show(path);
-    let bytes = Bytes::of_file(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
-    let mut warnings = Warnings::new(label.clone());
-    let stream = bytes.stream().map_err(|e| unreadable(path, &e))?;
-    let (parsed, stream) = parse::parse(path, stream, spool, &mut warnings, budget)?;
+    let mut start = plain::start(path)?;
+    let label = start.label.clone();
+    let stream = start.bytes.stream(spool).map_err(|e| unreadable(path, &e))?;
+    let (parsed, stream) = parse::parse(path, stream, spool, &mut start.warnings, budget)?;
     let mut hash = Stream::finish(stream).map_err(|e| unreadable(path, &e))?;
     if parsed.triangles.count() == 0 {
         return Err(fault(path, "faces", "the file has none"));
     }
-    let Looks { materials, textures } = looks(path, &parsed, &mut warnings, &mut hash);
+    let Looks { materials, textures } = looks(path, &parsed, spool, &mut start.warnings, &mut hash);
 
     let mut meshes: Vec<MeshOutline> = Vec::new();
     let mut parts: Vec<Vec<(Run, u64)>> = Vec::new();
@@ -90,16 +89,10 @@ pub(super) fn open(
             }
         }
     }
-    let source =
-        bricks::Source { name: plain::file_name(path), bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) };
     let outline = Outline {
-        placements: meshes.iter().enumerate().map(|(m, mesh)| plain::placement(m, &mesh.name, axes)).collect(),
-        meshes,
         materials,
         textures: textures.iter().map(|texture| texture.name.clone()).collect(),
-        sources: vec![source],
-        warnings: warnings.into_lines(),
-        ..Outline::default()
+        ..plain::outline(path, start, &hash, axes, meshes)
     };
     let Parsed { positions, colors, uvs, normals, triangles, .. } = parsed;
     let repairs = Repairs::new(label.clone());
@@ -116,11 +109,11 @@ struct Looks {
 }
 
 /// The materials that `parsed` uses, from the files that it names.
-fn looks(path: &Path, parsed: &Parsed, warnings: &mut Warnings, hash: &mut Xxh3) -> Looks {
+fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, hash: &mut Xxh3) -> Looks {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut known = HashMap::new();
     for library in &parsed.libraries {
-        match read_library(folder, library, hash) {
+        match read_library(folder, library, spool, hash) {
             Ok(definitions) => {
                 for definition in definitions {
                     known.entry(definition.name.clone()).or_insert(definition);
@@ -160,13 +153,13 @@ fn looks(path: &Path, parsed: &Parsed, warnings: &mut Warnings, hash: &mut Xxh3)
     Looks { materials, textures }
 }
 
-fn read_library(folder: &Path, library: &str, hash: &mut Xxh3) -> Result<Vec<mtl::Definition>, String> {
+fn read_library(folder: &Path, library: &str, spool: &Spool, hash: &mut Xxh3) -> Result<Vec<mtl::Definition>, String> {
     let bytes = Bytes::of_file(&beside(folder, library)?)?;
     if bytes.len() > MAX_MATERIALS_BYTES {
         return Err("it is too large".into());
     }
-    bytes.hash(hash).map_err(|e| e.to_string())?;
-    mtl::read(&mut Lines::new(bytes.stream().map_err(|e| e.to_string())?)).map_err(|e| e.to_string())
+    bytes.hash(spool, hash).map_err(|e| e.to_string())?;
+    mtl::read(&mut Lines::new(bytes.stream(spool).map_err(|e| e.to_string())?)).map_err(|e| e.to_string())
 }
 
 /// A file in or below `folder`; its path may be written as on Windows.
@@ -176,14 +169,18 @@ fn beside(folder: &Path, file: &str) -> Result<std::path::PathBuf, String> {
 
 impl Parts for Obj {
     fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError> {
-        let (run, first) = self.parts[mesh][part];
-        // The first triangle of the next part of this run, or of the run after it.
-        let rest = self.parts[mesh].get(part + 1).or_else(|| self.parts.get(mesh + 1)?.first());
-        let end = rest.map_or(self.triangles.count(), |(_, first)| *first);
-        let primitive = self.read(run, first, end);
+        let primitive = self.read(mesh, part);
         let mut primitive = primitive.map_err(|e| SourceError(format!("{}: cannot be read again: {e}", self.label)))?;
         plain::repair(&mut primitive, |what| self.repairs.add(what, (mesh, part as u32), || format!("mesh {mesh}")));
         Ok(primitive)
+    }
+
+    fn label(&self) -> &str {
+        &self.label
+    }
+
+    fn vertex(&self, mesh: usize, part: usize, vertex: u32) -> Option<u64> {
+        self.vertices(mesh, part).ok()?.used.get(vertex as usize).map(|[position, ..]| u64::from(*position))
     }
 
     fn texture(&self, index: usize) -> Result<SourceTexture, SourceError> {
@@ -201,7 +198,12 @@ impl Parts for Obj {
 }
 
 impl Obj {
-    fn read(&self, run: Run, first: u64, end: u64) -> io::Result<Primitive> {
+    /// The vertices of a part: position, texture coordinates and normal.
+    fn vertices(&self, mesh: usize, part: usize) -> io::Result<Vertices<[u32; 3]>> {
+        let first = self.parts[mesh][part].1;
+        // The first triangle of the next part of this run, or of the run after it.
+        let rest = self.parts[mesh].get(part + 1).or_else(|| self.parts.get(mesh + 1)?.first());
+        let end = rest.map_or(self.triangles.count(), |(_, first)| *first);
         let mut corners: Vec<[u32; 3]> = Vec::with_capacity(3 * (end - first) as usize);
         self.triangles.run(first, end, |_, row| {
             let word = |bytes: &[u8; 4]| u32::from_le_bytes(*bytes);
@@ -209,7 +211,12 @@ impl Obj {
             corners.extend(words.as_chunks::<3>().0.iter().map(|corner| corner.each_ref().map(word)));
             true
         })?;
-        let Vertices { used, indices } = Vertices::of(corners);
+        Ok(Vertices::of(corners))
+    }
+
+    fn read(&self, mesh: usize, part: usize) -> io::Result<Primitive> {
+        let run = self.parts[mesh][part].0;
+        let Vertices { used, indices } = self.vertices(mesh, part)?;
         let positions: Vec<u64> = used.iter().map(|[position, ..]| u64::from(*position)).collect();
         let colors = self.colors.as_ref().map(|colors| floats::<4>(colors, &positions)).transpose()?;
         Ok(Primitive {

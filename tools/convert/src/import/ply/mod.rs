@@ -6,15 +6,15 @@
 mod body;
 mod header;
 
-use super::bytes::{Bytes, Spool, Stream};
-use super::error::{ImportError, show};
+use super::bytes::{Spool, Stream};
+use super::error::ImportError;
 use super::plain::{self, doubles, fault, floats, no_room, unreadable};
 use super::repairs::Repairs;
 use super::table::{Table, TableWriter};
 use super::vertices::Vertices;
 use super::warnings::Warnings;
 use super::{Opened, Parts, TriangleBudget};
-use crate::source::{Outline, Primitive, SourceError, SourceTexture};
+use crate::source::{Primitive, SourceError, SourceTexture};
 use body::{Body, Failure};
 use header::{Element, Header, Scalar};
 use std::path::Path;
@@ -43,10 +43,9 @@ pub(super) fn open(
     spool: &Spool,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
-    let label = show(path);
-    let bytes = Bytes::of_file(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
-    let mut warnings = Warnings::new(label.clone());
-    let mut stream = bytes.stream().map_err(|e| unreadable(path, &e))?;
+    let mut start = plain::start(path)?;
+    let label = start.label.clone();
+    let mut stream = start.bytes.stream(spool).map_err(|e| unreadable(path, &e))?;
     let Header { encoding, elements } = header::read(&mut stream).map_err(|what| fault(path, "header", what))?;
     let vertex_count = elements.iter().find(|e| e.name == "vertex").map_or(0, |e| e.count);
 
@@ -60,7 +59,7 @@ pub(super) fn open(
         match element.name.as_str() {
             "vertex" => vertices = Some(read_vertices(&mut body, element, spool).map_err(|(row, f)| failed(f, row))?),
             "face" => {
-                let read = read_faces(&mut body, element, vertex_count, spool, &mut warnings, budget, &label);
+                let read = read_faces(&mut body, element, vertex_count, spool, &mut start.warnings, budget, &label);
                 triangles = Some(read.map_err(|error| match error {
                     FaceError::Row(row, failure) => failed(failure, row),
                     FaceError::Import(error) => error,
@@ -78,17 +77,8 @@ pub(super) fn open(
         problem: "the file has points, but no faces".into(),
         remedy: "give a mesh: point clouds are not read",
     })?;
-    let name = plain::stem(path);
-    let source =
-        bricks::Source { name: plain::file_name(path), bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) };
-    let outline = Outline {
-        placements: vec![plain::placement(0, &name, axes)],
-        meshes: vec![plain::one_primitive(name, triangles.count())],
-        materials: vec![plain::material()],
-        sources: vec![source],
-        warnings: warnings.into_lines(),
-        ..Outline::default()
-    };
+    let mesh = plain::one_primitive(plain::stem(path), triangles.count());
+    let outline = plain::outline(path, start, &hash, axes, vec![mesh]);
     let repairs = Repairs::new(label.clone());
     Ok(Opened { outline, parts: Box::new(Ply { label, vertices, triangles, repairs }) })
 }
@@ -234,17 +224,24 @@ fn read_faces(
     triangles.finish().map_err(|what| FaceError::Row(count, Failure::Spool(what)))
 }
 
+impl Ply {
+    /// The vertices of a part.
+    fn vertices_of(&self, part: usize) -> std::io::Result<Vertices> {
+        let (first, end) = plain::range(part, self.triangles.count());
+        let mut corners = Vec::with_capacity(3 * (end - first) as usize);
+        self.triangles.run(first, end, |_, row| {
+            let corner = |c: &[u8; 4]| u64::from(u32::from_le_bytes(*c));
+            corners.extend(row.as_chunks::<4>().0.iter().map(corner));
+            true
+        })?;
+        Ok(Vertices::of(corners))
+    }
+}
+
 impl Parts for Ply {
     fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError> {
-        let (first, end) = plain::range(part, self.triangles.count());
         let read = || {
-            let mut corners = Vec::with_capacity(3 * (end - first) as usize);
-            self.triangles.run(first, end, |_, row| {
-                let corner = |c: &[u8; 4]| u64::from(u32::from_le_bytes(*c));
-                corners.extend(row.as_chunks::<4>().0.iter().map(corner));
-                true
-            })?;
-            let Vertices { used, indices } = Vertices::of(corners);
+            let Vertices { used, indices } = self.vertices_of(part)?;
             let vertices = &self.vertices;
             Ok::<_, std::io::Error>(Primitive {
                 material: 0,
@@ -258,6 +255,14 @@ impl Parts for Ply {
         let mut primitive = read().map_err(|e| SourceError(format!("{}: cannot be read again: {e}", self.label)))?;
         plain::repair(&mut primitive, |what| self.repairs.add(what, (mesh, 0), || "vertices".into()));
         Ok(primitive)
+    }
+
+    fn label(&self) -> &str {
+        &self.label
+    }
+
+    fn vertex(&self, _mesh: usize, part: usize, vertex: u32) -> Option<u64> {
+        self.vertices_of(part).ok()?.used.get(vertex as usize).copied()
     }
 
     fn texture(&self, _index: usize) -> Result<SourceTexture, SourceError> {
