@@ -164,7 +164,7 @@ fn read_library(folder: &Path, library: &str, spool: &Spool, hash: &mut Xxh3) ->
 
 /// A file in or below `folder`; its path may be written as on Windows.
 fn beside(folder: &Path, file: &str) -> Result<std::path::PathBuf, String> {
-    uri::below(&file.replace('\\', "/")).map(|below| folder.join(below)).map_err(str::to_owned)
+    uri::below(file.replace('\\', "/")).map(|below| folder.join(below)).map_err(str::to_owned)
 }
 
 impl Parts for Obj {
