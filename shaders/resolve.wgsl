@@ -5,7 +5,11 @@
 #include "shared/texels.wgsl"
 #include "shared/shading.wgsl"
 
+// The normal of an attribute vertex; zero if it has none.
 fn octahedral(word: u32) -> vec3<f32> {
+    if word == NO_NORMAL {
+        return vec3<f32>(0.0);
+    }
     let e = unpack2x16snorm(word);
     var n = vec3<f32>(e.x, e.y, 1.0 - abs(e.x) - abs(e.y));
     let t = max(-n.z, 0.0);
@@ -108,7 +112,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let m = instances[leaf.instance].object_from_world;
     var n = m[0].xyz * normal.x + m[1].xyz * normal.y + m[2].xyz * normal.z;
     let size = dot(n, n);
-    // Normals that cancel, and normals turned away from the side that was hit, give way to the geometric one.
+    // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric one.
     n = select(surface.normal, n * inverseSqrt(max(size, 1.0e-30)), size > 1.0e-12);
     if dot(n, surface.normal) < 0.0 {
         n = -n;

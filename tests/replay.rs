@@ -118,7 +118,7 @@ fn a_replay_reproduces_the_walk() {
     let scene = city(folder.path(), "60K", "1K");
     let least = bricks::SceneFile::open(&scene).expect("a scene");
     let sizes: Vec<(u64, u64)> =
-        least.resident().bricks.iter().map(|brick| (brick.geometry.bytes, brick.attributes.bytes)).collect();
+        least.resident().bricks.iter().map(|b| (b.geometry.bytes, bricks::AttributeLayout::of(b).bytes)).collect();
     let least = brickwalk::stream::Residency::least_budget(&sizes);
     let mut loads = Vec::new();
     for (i, options) in [

@@ -1,11 +1,12 @@
 //! An open scene file.
 
+use crate::attributes;
 use crate::error::{Error, Part};
 use crate::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, MAGIC, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
 use crate::layout::{MAX_PAYLOAD_BYTES, unread_kind};
 use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
-use crate::records::Span;
+use crate::records::{AttributeLayout, Brick, Span};
 use crate::resident::Resident;
 use crate::source::{MapSource, ReadSource, Source};
 use crate::validate;
@@ -13,6 +14,7 @@ use crate::verify::{VerifyReport, verify_source};
 use crate::{Flaw, Manifest};
 use bytemuck::Pod;
 use std::borrow::Cow;
+use std::cell::RefCell;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -138,23 +140,32 @@ impl SceneFile {
         }
     }
 
-    /// Copies a payload to `out` and checks the copy: its checksum, then every index in it (see
-    /// [`validate::payload`]), so that whoever traverses or shades with it may index freely. Indices are checked the first
-    /// time; after that the checksum says that they are the same.
+    /// Length of a payload as [`Self::copy`] loads it, in bytes; see [`Resident::loaded_bytes`].
     ///
-    /// `out` must be [`Span::bytes`] long; it needs no alignment. After an error its contents are of no use.
-    pub fn copy(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
-        let span = self.resident.span(payload).ok_or_else(|| self.no_such(payload))?;
-        if out.len() as u64 != span.bytes {
-            return Err(Error::Request {
-                path: self.path.clone(),
-                payload,
-                found: format!("{} bytes", out.len()),
-                expected: format!("{} bytes", span.bytes),
-            });
+    /// # Panics
+    ///
+    /// As [`Self::span`].
+    pub fn loaded_bytes(&self, payload: Payload) -> u64 {
+        match payload {
+            Payload::Attributes(brick) => AttributeLayout::of(&self.resident.bricks[brick as usize]).bytes,
+            _ => self.span(payload).bytes,
         }
-        let reader = Reader { path: &self.path, source: &*self.source };
-        reader.payload(payload, span, out)?;
+    }
+
+    /// Copies a payload to `out`, decoded if it is encoded in the file, and checks the copy: its checksum, then every index
+    /// in it (see [`validate::payload`]), so that whoever traverses or shades with it may index freely. Indices are checked
+    /// the first time; after that the checksum says that they are the same.
+    ///
+    /// `out` must be [`Self::loaded_bytes`] long; it needs no alignment. After an error its contents are of no use.
+    pub fn copy(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
+        let length = self.resident.loaded_bytes(payload).ok_or_else(|| self.no_such(payload))?;
+        let (span, reader) = self.request(payload, length, out)?;
+        match payload {
+            Payload::Attributes(brick) => DECODING.with_borrow_mut(|buffers| {
+                reader.attributes(payload, span, &self.resident.bricks[brick as usize], buffers, out)
+            })?,
+            _ => reader.payload(payload, span, out)?,
+        }
         let validated = self.validated.of(payload);
         // Whoever sees the flag copies and checks bytes of its own: nothing else has to be visible with it.
         if !validated.load(Ordering::Relaxed) {
@@ -179,6 +190,28 @@ impl SceneFile {
         })
     }
 
+    /// Copies a payload to `out` as it is stored and checks its checksum alone.
+    ///
+    /// `out` must be [`Span::bytes`] long. After an error its contents are of no use.
+    pub fn copy_stored(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
+        let span = self.resident.span(payload).ok_or_else(|| self.no_such(payload))?;
+        let (span, reader) = self.request(payload, span.bytes, out)?;
+        reader.payload(payload, span, out)
+    }
+
+    /// Where `payload` lies, and a reader of it, if `out` is of the `length` asked for.
+    fn request(&self, payload: Payload, length: u64, out: &[u8]) -> Result<(Span, Reader<'_>), Error> {
+        if out.len() as u64 != length {
+            return Err(Error::Request {
+                path: self.path.clone(),
+                payload,
+                found: format!("{} bytes", out.len()),
+                expected: format!("{length} bytes"),
+            });
+        }
+        Ok((self.span(payload), Reader { path: &self.path, source: &*self.source }))
+    }
+
     /// Reads every byte of the file anew, as [`verify_file`](crate::verify_file) does, from the file that was opened.
     pub fn verify(&self, progress: &mut dyn FnMut(u64, u64)) -> Result<VerifyReport, Error> {
         let length = length_of(&self.path, &*self.file)?;
@@ -194,6 +227,18 @@ impl SceneFile {
         };
         Error::Request { path: self.path.clone(), payload, found: payload.to_string(), expected }
     }
+}
+
+thread_local! {
+    /// What [`SceneFile::copy`] decodes with; it grows to the longest attributes that the thread meets, and stays.
+    static DECODING: RefCell<Decoding> = RefCell::default();
+}
+
+/// Buffers for decoding, which only ever grow, so that a load neither allocates nor clears memory but for the first.
+#[derive(Default)]
+pub(crate) struct Decoding {
+    stored: Vec<u8>,
+    columns: Vec<u8>,
 }
 
 /// The payloads whose indices have been found to be in range.
@@ -427,6 +472,26 @@ impl Reader<'_> {
         let part = Part::Payload(payload);
         self.bytes(part, span.offset, out)?;
         self.corrupt(part, xxh3_64(out), span.checksum)
+    }
+
+    /// Decodes the attributes of `brick` to `out`, [`AttributeLayout::bytes`] long, from a copy whose checksum was compared.
+    pub(crate) fn attributes(
+        &self,
+        payload: Payload,
+        span: Span,
+        brick: &Brick,
+        buffers: &mut Decoding,
+        out: &mut [u8],
+    ) -> Result<(), Error> {
+        let Decoding { stored, columns } = buffers;
+        let length = span.bytes as usize;
+        if stored.len() < length {
+            stored.resize(length, 0);
+        }
+        let stored = &mut stored[..length];
+        self.payload(payload, span, stored)?;
+        let decoded = attributes::decode(brick, stored, columns, out);
+        decoded.map_err(|error| self.invalid(error.in_part(Part::Payload(payload))))
     }
 }
 

@@ -5,7 +5,8 @@
 //!
 //! * [`SceneFile::open`] checks the header, the directory and every section of the resident part (checksums, then
 //!   [`validate::resident`]). Its cost does not depend on the payloads.
-//! * [`SceneFile::copy`] checks a payload while it is copied out: its checksum, then every index in it.
+//! * [`SceneFile::copy`] checks a payload while it is copied out: its checksum, then every index in it. Geometry and texels
+//!   are used as they lie in the file, attributes are decoded ([`attributes`]).
 //! * [`verify_file`] reads every byte of the file, padding included, and lists all that is wrong.
 //!
 //! Numbers on disk are little-endian and of fixed width; offsets and lengths are `u64`.
@@ -15,6 +16,7 @@ compile_error!("the records of a scene file are used as they lie on disk, which 
 #[cfg(not(target_pointer_width = "64"))]
 compile_error!("scene files are mapped whole, which takes a 64-bit address space");
 
+pub mod attributes;
 mod error;
 mod file;
 pub mod layout;

@@ -7,7 +7,7 @@ use std::fmt;
 pub enum Payload {
     /// What traversal of a brick reads, laid out as [`crate::GeometryLayout`] says.
     Geometry(u32),
-    /// What shading of hits in a brick reads, laid out as [`crate::AttributeLayout`] says.
+    /// What shading of hits in a brick reads, loaded as [`crate::AttributeLayout`] says, stored as [`crate::attributes`] says.
     Attributes(u32),
     /// The [`crate::OccupancyMap`] of a brick, packed.
     Proxies(u32),

@@ -128,7 +128,7 @@ pub struct Brick {
     pub max: [i64; 3],
     /// What traversal reads: see [`GeometryLayout`].
     pub geometry: Span,
-    /// What shading of hits reads: see [`AttributeLayout`].
+    /// What shading of hits reads, encoded: see [`crate::attributes`].
     pub attributes: Span,
     /// The packed [`crate::OccupancyMap`]; all zero in a scene without proxies.
     pub proxies: Span,
@@ -312,11 +312,15 @@ impl Texture {
     }
 }
 
+/// [`AttributeVertex::normal`]: the source has no usable normal, and shading takes the geometric one. No unit vector is
+/// encoded so, since a snorm16 is never -32768.
+pub const NO_NORMAL: u32 = 0x8000_8000;
+
 /// A vertex of the attributes of a brick, 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct AttributeVertex {
-    /// Unit normal in object space, octahedral, two snorm16: x in the low half.
+    /// Unit normal in object space, octahedral, two snorm16: x in the low half; or [`NO_NORMAL`].
     pub normal: u32,
     /// Texture coordinates of set 0.
     pub uv: [f32; 2],
@@ -362,7 +366,7 @@ pub const SURFACE_MATERIAL: u32 = (1 << 30) - 1;
 /// Shift of the rotation in a triangle's surface word.
 pub const SURFACE_ROTATION_SHIFT: u32 = 30;
 
-/// Byte offsets of the arrays in a brick's attribute payload, each 16-aligned, in this order: [`AttributeVertex`]s;
+/// Byte offsets of the arrays in a brick's attributes as they are loaded, each 16-aligned, in this order: [`AttributeVertex`]s;
 /// surface words (u32 a triangle: the material in the low 30 bits, above it the rotation r, such that stored vertex i is
 /// source vertex (i + r) mod 3); indices of attribute vertices (three u16 or u32 a triangle, in stored, rotated order;
 /// u32 under the same flag as the geometry's indices).
@@ -372,7 +376,7 @@ pub struct AttributeLayout {
     pub surfaces: u64,
     /// Offset of the indices.
     pub indices: u64,
-    /// Length of the payload.
+    /// Length of the attributes as they are loaded; in the file they are encoded.
     pub bytes: u64,
 }
 

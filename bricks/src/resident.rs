@@ -4,7 +4,7 @@ use crate::layout::Section;
 use crate::manifest::Manifest;
 use crate::occupancy::Occupancy;
 use crate::payload::Payload;
-use crate::records::{Brick, Instance, Leaf, Material, Object, Span, Texture, TopNode2, TopNode8};
+use crate::records::{AttributeLayout, Brick, Instance, Leaf, Material, Object, Span, Texture, TopNode2, TopNode8};
 
 /// The always-resident part of a scene file: everything but the payloads.
 ///
@@ -62,6 +62,15 @@ impl Resident {
                 brick.map(|brick| brick.proxies).filter(|span| *span != Span::default())
             }
             Payload::Texture(texture) => self.textures.get(texture as usize).map(|texture| texture.texels),
+        }
+    }
+
+    /// Length of a payload as it is loaded by [`crate::SceneFile::copy`], or `None` if there is no such brick or texture. It
+    /// is that of its span but for attributes, which are encoded in the file.
+    pub fn loaded_bytes(&self, payload: Payload) -> Option<u64> {
+        match payload {
+            Payload::Attributes(brick) => self.bricks.get(brick as usize).map(|brick| AttributeLayout::of(brick).bytes),
+            _ => self.span(payload).map(|span| span.bytes),
         }
     }
 

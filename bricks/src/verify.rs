@@ -1,12 +1,12 @@
 //! Reads a whole file and lists everything that is wrong with it.
 
 use crate::error::{Error, Flaw, Part};
-use crate::file::{Directory, Reader, length_of, open_file};
+use crate::file::{Decoding, Directory, Reader, length_of, open_file};
 use crate::layout::{Header, MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
 use crate::manifest::Manifest;
 use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
-use crate::records::{Brick, Span, Texture};
+use crate::records::{AttributeLayout, Brick, Span, Texture};
 use crate::resident::Resident;
 use crate::source::{ReadSource, Source};
 use crate::validate;
@@ -40,7 +40,7 @@ impl VerifyReport {
 /// What depends on a damaged part cannot be checked: behind a damaged header or directory nothing; if a section is
 /// damaged, the other sections, and the checksums of the payloads that the sections of bricks and textures name.
 ///
-/// Payloads are read by the threads of the current rayon pool, each with a buffer as long as its longest payload; the
+/// Payloads are read by the threads of the current rayon pool, each with buffers as long as its longest payload; the
 /// problems come in the order of the file all the same.
 ///
 /// `progress` is called with the bytes done and in all, first with 0 and last with all of them.
@@ -181,11 +181,11 @@ impl Verifier<'_> {
             let (batch, after) = rest.split_at(rest.iter().take_while(fits).count().max(1));
             rest = after;
             let reader = &self.reader;
-            let check = |buffer: &mut Vec<u8>, &(payload, span): &(Payload, Span)| {
-                check_payload(reader, resident, (payload, span), valid, buffer).err()
+            let check = |buffers: &mut (Vec<u8>, Decoding), &(payload, span): &(Payload, Span)| {
+                check_payload(reader, resident, (payload, span), valid, buffers).err()
             };
             // The collection keeps the order of the batch.
-            let problems: Vec<Option<Error>> = batch.par_iter().map_init(Vec::new, check).collect();
+            let problems: Vec<Option<Error>> = batch.par_iter().map_init(Default::default, check).collect();
             self.report.problems.extend(problems.into_iter().flatten());
             self.report.payloads += batch.len() as u64;
             self.advance(batch.iter().map(|(_, span)| span.bytes).sum());
@@ -233,11 +233,20 @@ fn check_payload(
     resident: &Resident,
     (payload, span): (Payload, Span),
     valid: bool,
-    buffer: &mut Vec<u8>,
+    (buffer, decoding): &mut (Vec<u8>, Decoding),
 ) -> Result<(), Error> {
-    // Not initialised anew where it was long enough before: every byte is read.
-    buffer.resize(span.bytes as usize, 0);
-    reader.payload(payload, span, buffer)?;
+    // Buffers are not initialised anew where they were long enough before: every byte is written.
+    match payload {
+        Payload::Attributes(brick) if valid => {
+            let brick = &resident.bricks[brick as usize];
+            buffer.resize(AttributeLayout::of(brick).bytes as usize, 0);
+            reader.attributes(payload, span, brick, decoding, buffer)?;
+        }
+        _ => {
+            buffer.resize(span.bytes as usize, 0);
+            reader.payload(payload, span, buffer)?;
+        }
+    }
     if valid {
         let checked = validate::payload(resident, payload, buffer);
         let contents = |()| validate::contents(resident, payload, buffer, map_of(reader, resident, payload).as_ref());

@@ -56,8 +56,10 @@ fn found(path: &Path, part: Part, at: usize) {
         }
         Part::Payload(payload) => {
             let file = opened.unwrap();
-            let mut out = vec![0; file.span(payload).bytes as usize];
+            let mut out = vec![0; file.loaded_bytes(payload) as usize];
             assert_eq!(file.copy(payload, &mut out).unwrap_err().to_string(), message, "byte {at}");
+            let mut stored = vec![0; file.span(payload).bytes as usize];
+            assert_eq!(file.copy_stored(payload, &mut stored).unwrap_err().to_string(), message, "byte {at}");
         }
         _ => drop(opened.unwrap()),
     }

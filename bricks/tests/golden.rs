@@ -22,7 +22,7 @@ fn golden_file_of_version_2() {
     assert_eq!(file.file_bytes(), bytes.len() as u64);
     assert_eq!(file.resident().payloads().count(), scene.payloads.len());
     for (payload, expected) in &scene.payloads {
-        let mut out = vec![0xaa; file.span(*payload).bytes as usize];
+        let mut out = vec![0xaa; file.loaded_bytes(*payload) as usize];
         file.copy(*payload, &mut out).unwrap();
         assert_eq!(out, *expected, "{payload}");
     }

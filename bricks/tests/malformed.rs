@@ -121,6 +121,7 @@ fn bricks_by_themselves() {
     refused(record(Bricks, 0), "height 25", |r| r.bricks[0].height = MAX_BRICK_HEIGHT + 1);
     refused(record(Bricks, 0), "65537 vertices", |r| r.bricks[0].vertex_count = 65537);
     refused(record(Bricks, 0), "65537 vertices", |r| r.bricks[0].attribute_vertex_count = 65537);
+    refused(record(Bricks, 0), "82 attribute vertices", |r| r.bricks[0].attribute_vertex_count = 82);
     refused(record(Bricks, 0), "origin", |r| r.bricks[0].origin[2] = 1);
     refused(record(Bricks, 0), "origin", |r| r.bricks[0].origin[2] = i64::MIN);
     refused(record(Bricks, 0), "bounds", |r| r.bricks[0].min[0] = r.bricks[0].max[0] + 1);
@@ -145,8 +146,8 @@ fn bricks_by_themselves() {
         (Payload::Geometry(0), |b| b.flags = BRICK_WIDE),
         (Payload::Geometry(0), |b| b.node_count = u32::MAX),
         (Payload::Geometry(0), |b| b.geometry = Span::default()),
-        (Payload::Attributes(0), |b| b.attributes.bytes += 16),
-        (Payload::Attributes(0), |b| b.attribute_vertex_count += 1),
+        (Payload::Attributes(0), |b| b.attributes.bytes += 8),
+        (Payload::Attributes(0), |b| b.attributes.bytes = (1 << 31) + 16),
         (Payload::Attributes(0), |b| b.attributes = Span::default()),
     ] {
         refused(Part::Payload(part), "bytes", |r| spoil(&mut r.bricks[0]));
@@ -394,10 +395,15 @@ fn directories() {
 /// A payload whose checksum is right is refused when copied.
 #[track_caller]
 fn payload_refused(payload: Payload, found: &str, spoil: impl FnOnce(&mut [u8])) {
-    let (_folder, path, scene) = written();
-    let mut image = Image::read(&path);
-    image.edit_payload(payload, spoil);
-    fs::write(&path, &image.bytes).unwrap();
+    let (_folder, path, mut scene) = written();
+    if let Payload::Attributes(_) = payload {
+        spoil(scene.payloads.get_mut(&payload).unwrap());
+        scene.write(&path);
+    } else {
+        let mut image = Image::read(&path);
+        image.edit_payload(payload, spoil);
+        fs::write(&path, &image.bytes).unwrap();
+    }
     let file = SceneFile::open(&path).unwrap();
     for (other, expected) in &scene.payloads {
         let mut out = vec![0; expected.len()];
@@ -480,15 +486,36 @@ fn attributes_and_texels() {
     payload_refused(Payload::Attributes(1), "rotation 3", |b| put(b, wide.surfaces, surface(3, 0)));
     payload_refused(Payload::Attributes(0), "index 81 of a vertex", |b| put(b, near.indices + 2 * 80, [81, 0]));
     payload_refused(Payload::Attributes(1), "index 15 of a vertex", |b| put(b, wide.indices, [15, 0, 0, 0]));
-    for (payload, at) in [
-        (Payload::Attributes(0), near.indices - 1),
-        (Payload::Attributes(0), near.bytes - 1),
-        (Payload::Attributes(1), wide.bytes - 1),
-        (Payload::Texture(0), 44),
-        (Payload::Texture(0), 47),
-    ] {
-        payload_refused(payload, &format!("0x01 at its byte {at}"), |b| put(b, at, [1]));
+    payload_refused(Payload::Attributes(1), "index 4294967295 of a vertex", |b| put(b, wide.indices + 56, [255; 4]));
+    for at in [44, 47] {
+        payload_refused(Payload::Texture(0), &format!("0x01 at its byte {at}"), |b| put(b, at, [1]));
     }
+}
+
+/// Attributes that cannot be decoded, in a file whose checksums are right.
+#[test]
+fn encoded_attributes() {
+    let (_folder, path, scene) = written();
+    let whole = fs::read(&path).unwrap();
+    let payload = Payload::Attributes(0);
+    let refused = |spoil: &dyn Fn(&mut [u8]), found: &str| {
+        let mut image = Image { bytes: whole.clone() };
+        image.edit_payload(payload, |bytes| {
+            // There is padding to spoil.
+            assert!(u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize + 4 < bytes.len());
+            spoil(bytes);
+        });
+        fs::write(&path, &image.bytes).unwrap();
+        let file = SceneFile::open(&path).unwrap();
+        let error = file.copy(payload, &mut vec![0; scene.payloads[&payload].len()]).unwrap_err();
+        assert!(matches!(error, Error::Invalid { .. }) && error.to_string().contains(found), "{error}");
+        assert_eq!(common::problems(&path), format!("{error}\n"));
+        file.copy_stored(payload, &mut vec![0; file.span(payload).bytes as usize]).unwrap();
+    };
+    refused(&|bytes| bytes[..4].fill(255), "a block of 4294967295 bytes");
+    refused(&|bytes| bytes[0] ^= 16, "packed bytes");
+    refused(&|bytes| *bytes.last_mut().unwrap() = 1, "0x01 after the block");
+    refused(&|bytes| bytes[4] = 0, "an LZ4 block");
 }
 
 /// Contents that no index depends on: copied, but found by verifying.

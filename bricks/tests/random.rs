@@ -18,8 +18,8 @@ fn read_all(path: &Path) -> (bool, usize) {
     for access in [Access::Map, Access::Read] {
         let Ok(file) = SceneFile::open_with(path, access) else { continue };
         opened = true;
-        for (payload, span) in file.resident().payloads() {
-            let mut out = vec![0; span.bytes as usize];
+        for (payload, _) in file.resident().payloads() {
+            let mut out = vec![0; file.loaded_bytes(payload) as usize];
             if file.copy(payload, &mut out).is_ok() {
                 copied += 1;
                 traverse(file.resident(), payload, &out);

@@ -191,8 +191,7 @@ fn a_kept_file_is_continued_after_its_checkpoint() {
     let (folder, whole, scene) = written();
     let path = folder.path().join("again.bricks");
     let partial = folder.path().join(".again.bricks.partial");
-    let payloads: Vec<_> =
-        scene.resident.payloads().map(|(payload, span)| (scene.payloads[&payload].clone(), span)).collect();
+    let payloads: Vec<_> = scene.resident.payloads().map(|(payload, span)| (scene.stored(payload), span)).collect();
     let mut writer = Writer::reserve(&path).unwrap().start().unwrap();
     let mut spans = Vec::new();
     let (mut position, half) = (0, payloads.len() / 2);

@@ -177,6 +177,7 @@ const T_INFINITE: f32 = 3.4028234e38;
 const INSTANCE_IDENTITY: u32 = 1u;
 const BRICK_WIDE: u32 = 1u;
 const BRICK_INDEX32: u32 = 2u;
+const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex without one
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
 const STATE_BATCH: u32 = 4u;       // geometry arrived with the current batch

@@ -4,12 +4,12 @@ use super::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
 use super::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result};
-use bricks::{BRICK_WIDE, Manifest, Payload, SceneFile};
+use bricks::{AttributeLayout, BRICK_WIDE, Manifest, Payload, SceneFile};
 use serde::Serialize;
 use std::fmt::Write;
 
 /// Raised when a field of the JSON changes its meaning.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// Runs `info`.
 ///
@@ -75,11 +75,14 @@ struct Info<'a> {
     largest_brick_triangles: u32,
     tallest_brick_levels: u32,
     geometry_bytes: u64,
+    /// As they lie in the file.
     attribute_bytes: u64,
+    /// As they are loaded.
+    loaded_attribute_bytes: u64,
     /// Occupancy maps that are read on demand.
     proxy_bytes: u64,
     texture_bytes: u64,
-    /// Geometry and attributes of the two largest bricks: what a cache must hold at least.
+    /// Geometry and attributes of the two largest bricks, as loaded: what a cache must hold at least.
     two_largest_bricks_bytes: u64,
     /// Step of the world's lattice, world units.
     lattice_step: f64,
@@ -116,7 +119,7 @@ impl<'a> Info<'a> {
         let bytes = |wanted: fn(&Payload) -> bool| -> u64 {
             r.payloads().filter(|(payload, _)| wanted(payload)).map(|(_, span)| span.bytes).sum()
         };
-        let mut largest: Vec<u64> = r.bricks.iter().map(|b| b.geometry.bytes + b.attributes.bytes).collect();
+        let mut largest: Vec<u64> = r.bricks.iter().map(|b| b.geometry.bytes + AttributeLayout::of(b).bytes).collect();
         largest.sort_unstable_by(|a, b| b.cmp(a));
         // The world object always exists.
         let world = r.objects.first();
@@ -145,6 +148,7 @@ impl<'a> Info<'a> {
             tallest_brick_levels: r.bricks.iter().map(|b| b.height).max().unwrap_or(0),
             geometry_bytes: bytes(|p| matches!(p, Payload::Geometry(_))),
             attribute_bytes: bytes(|p| matches!(p, Payload::Attributes(_))),
+            loaded_attribute_bytes: r.bricks.iter().map(|b| AttributeLayout::of(b).bytes).sum(),
             proxy_bytes: bytes(|p| matches!(p, Payload::Proxies(_))),
             texture_bytes: bytes(|p| matches!(p, Payload::Texture(_))),
             two_largest_bricks_bytes: largest.iter().take(2).sum(),
@@ -223,13 +227,15 @@ impl<'a> Info<'a> {
             row("", line);
         }
         let payloads = [
-            ("geometry", self.geometry_bytes),
-            ("attributes", self.attribute_bytes),
-            ("proxies", self.proxy_bytes),
-            ("textures", self.texture_bytes),
+            ("geometry", human_bytes(self.geometry_bytes)),
+            (
+                "attributes",
+                format!("{} ({} loaded)", human_bytes(self.attribute_bytes), human_bytes(self.loaded_attribute_bytes)),
+            ),
+            ("proxies", human_bytes(self.proxy_bytes)),
+            ("textures", human_bytes(self.texture_bytes)),
         ];
-        let payloads = payloads.map(|(name, bytes)| format!("{name} {}", human_bytes(bytes)));
-        row("payloads", payloads.join(", "));
+        row("payloads", payloads.map(|(name, bytes)| format!("{name} {bytes}")).join(", "));
         for line in self.sections.human() {
             row("sections", line);
         }

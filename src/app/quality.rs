@@ -27,12 +27,8 @@ pub struct Sections {
     pub ids: u64,
     /// Indices of vertices.
     pub indices: u64,
-    /// Vertices of attributes: normal, texture coordinates, colour.
-    pub attribute_vertices: u64,
-    /// Surface words of triangles: material and rotation.
-    pub surfaces: u64,
-    /// Indices of attribute vertices.
-    pub attribute_indices: u64,
+    /// What shading reads, textures apart, as it is encoded.
+    pub attributes: u64,
     /// Occupancy maps that are read on demand.
     pub proxies: u64,
     /// Texels.
@@ -51,14 +47,12 @@ impl Sections {
         let resident = scene.resident();
         let mut sizes = Self { header: PAGE_BYTES, directory: DIRECTORY_BYTES, ..Self::default() };
         for brick in &resident.bricks {
-            let (geometry, attributes) = (GeometryLayout::of(brick), AttributeLayout::of(brick));
+            let geometry = GeometryLayout::of(brick);
             sizes.nodes += geometry.vertices;
             sizes.vertices += geometry.ids - geometry.vertices;
             sizes.ids += geometry.indices - geometry.ids;
             sizes.indices += geometry.bytes - geometry.indices;
-            sizes.attribute_vertices += attributes.surfaces;
-            sizes.surfaces += attributes.indices - attributes.surfaces;
-            sizes.attribute_indices += attributes.bytes - attributes.indices;
+            sizes.attributes += brick.attributes.bytes;
             sizes.proxies += brick.proxies.bytes;
         }
         sizes.textures = resident.textures.iter().map(|texture| texture.texels.bytes).sum();
@@ -76,14 +70,9 @@ impl Sections {
         self.nodes + self.vertices + self.ids + self.indices
     }
 
-    /// Bytes of what shading reads, textures apart.
-    pub fn attributes(&self) -> u64 {
-        self.attribute_vertices + self.surfaces + self.attribute_indices
-    }
-
     fn sum(&self) -> u64 {
         let resident = self.directory + self.resident.values().sum::<u64>();
-        self.header + self.geometry() + self.attributes() + self.proxies + self.textures + resident + self.padding
+        self.header + self.geometry() + self.attributes + self.proxies + self.textures + resident + self.padding
     }
 
     /// Rows for people.
@@ -95,16 +84,14 @@ impl Sections {
         };
         let geometry =
             [("nodes", self.nodes), ("vertices", self.vertices), ("ids", self.ids), ("indices", self.indices)];
-        let attributes = [
-            ("attributes: vertices", self.attribute_vertices),
-            ("surfaces", self.surfaces),
-            ("indices", self.attribute_indices),
+        let others = [
+            ("attributes", self.attributes),
             ("proxies", self.proxies),
             ("textures", self.textures),
             ("padding", self.padding),
         ];
         let resident: Vec<(&str, u64)> = self.resident.iter().map(|(name, bytes)| (*name, *bytes)).collect();
-        [format!("geometry: {}", list(&geometry)), list(&attributes), format!("resident: {}", list(&resident))]
+        [format!("geometry: {}", list(&geometry)), list(&others), format!("resident: {}", list(&resident))]
     }
 }
 
@@ -121,8 +108,10 @@ pub struct PerTriangle {
     pub ids: f64,
     /// Vertices.
     pub vertices: f64,
-    /// What shading reads, textures apart.
+    /// What shading reads, textures apart, as it is encoded in the file.
     pub attributes: f64,
+    /// What shading reads, textures apart, as it lies in the cache of the device.
+    pub loaded_attributes: f64,
     /// Proxies: occupancy maps read on demand and resident ones.
     pub proxies: f64,
     /// The file without its textures.
@@ -148,7 +137,8 @@ impl PerTriangle {
             indices: share(sizes.indices),
             ids: share(sizes.ids),
             vertices: share(sizes.vertices),
-            attributes: share(sizes.attributes()),
+            attributes: share(sizes.attributes),
+            loaded_attributes: share(resident.bricks.iter().map(|brick| AttributeLayout::of(brick).bytes).sum()),
             proxies: share(sizes.proxies + size_of_val(resident.occupancy.as_slice()) as u64),
             file_without_textures: share(file_bytes - sizes.textures),
             file: share(file_bytes),
@@ -183,7 +173,7 @@ pub struct Bin {
     pub to_triangles: u32,
     /// Bricks.
     pub bricks: u64,
-    /// Bytes of their geometry and attributes.
+    /// Bytes of their geometry and attributes in the file.
     pub bytes: u64,
 }
 
@@ -471,7 +461,7 @@ mod tests {
             resident.payloads().filter(|(payload, _)| wanted(payload)).map(|(_, span)| span.bytes).sum()
         };
         assert_eq!(sizes.geometry(), spans(|payload| matches!(payload, Payload::Geometry(_))));
-        assert_eq!(sizes.attributes(), spans(|payload| matches!(payload, Payload::Attributes(_))));
+        assert_eq!(sizes.attributes, spans(|payload| matches!(payload, Payload::Attributes(_))));
         let payloads = resident.payloads().count() as u64;
         // Less than a page after each payload, less than 64 bytes after the directory and each section.
         assert!(sizes.padding < payloads * PAGE_BYTES + 10 * 64, "{sizes:?}");
@@ -490,7 +480,7 @@ mod tests {
 
         let bins = histogram(&resident.bricks);
         assert_eq!(bins.iter().map(|bin| bin.bricks).sum::<u64>(), resident.bricks.len() as u64);
-        assert_eq!(bins.iter().map(|bin| bin.bytes).sum::<u64>(), sizes.geometry() + sizes.attributes());
+        assert_eq!(bins.iter().map(|bin| bin.bytes).sum::<u64>(), sizes.geometry() + sizes.attributes);
         for brick in &resident.bricks {
             let n = brick.triangle_count;
             assert!(bins.iter().any(|bin| (bin.from_triangles..=bin.to_triangles).contains(&n)), "{n} {bins:?}");

@@ -187,7 +187,7 @@ fn check(scene: &SceneFile, rebuilt: &SceneFile, payload: Payload) -> Result<()>
 fn replace(scene: &SceneFile, rebuilt: &SceneFile, payload: Payload, file: &mut File) -> Result<u64> {
     let span = scene.span(payload);
     let mut bytes = vec![0; span.bytes.next_multiple_of(PAGE_BYTES) as usize];
-    rebuilt.copy(payload, &mut bytes[..span.bytes as usize])?;
+    rebuilt.copy_stored(payload, &mut bytes[..span.bytes as usize])?;
     let written = file.seek(SeekFrom::Start(span.offset)).and_then(|_| file.write_all(&bytes));
     written.with_context(|| format!("{}: cannot write {payload}; repair it again", scene.path().display()))?;
     Ok(span.bytes)

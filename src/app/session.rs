@@ -34,12 +34,12 @@ pub fn open_scene(path: &Path) -> Result<Arc<SceneFile>> {
     Ok(Arc::new(SceneFile::open(path)?))
 }
 
-/// Bytes of every brick's payloads.
+/// Bytes of every brick's payloads as they are loaded.
 pub fn brick_bytes(scene: &SceneFile) -> Vec<BrickBytes> {
     let record = |b: &bricks::Brick| BrickBytes {
         bvh: u64::from(b.node_count) * size_of::<bricks::Node>() as u64,
         geometry: b.geometry.bytes,
-        attributes: b.attributes.bytes,
+        attributes: bricks::AttributeLayout::of(b).bytes,
     };
     scene.resident().bricks.iter().map(record).collect()
 }

@@ -371,11 +371,7 @@ impl Executor for GpuExecutor {
     }
 
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
-        let resident = self.scene.resident();
-        let bytes = |item: Item| match item.kind {
-            crate::stream::Kind::Geometry => resident.bricks[item.brick as usize].geometry.bytes,
-            crate::stream::Kind::Attributes => resident.bricks[item.brick as usize].attributes.bytes,
-        };
+        let bytes = |item: Item| self.scene.loaded_bytes(item.into());
         self.buffers.cache.load(&self.gpu, &mut self.workers, loads, bytes)
     }
 

@@ -4,7 +4,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-pub use bricks::{BRICK_INDEX32, BRICK_WIDE, INSTANCE_IDENTITY, NONE};
+pub use bricks::{BRICK_INDEX32, BRICK_WIDE, INSTANCE_IDENTITY, NO_NORMAL, NONE};
 
 pub const PARAM_ANY_HIT: u32 = 1;
 pub const PARAM_NEEDED: u32 = 2;

@@ -94,7 +94,7 @@ fn object(file: &SceneFile, index: u32) -> Result<TruthObject, DecodeError> {
 
 /// Words of a payload, checked by the file as they are copied.
 fn words(file: &SceneFile, payload: Payload) -> Result<Vec<u32>, DecodeError> {
-    let mut words = vec![0u32; file.span(payload).bytes as usize / 4];
+    let mut words = vec![0u32; file.loaded_bytes(payload) as usize / 4];
     file.copy(payload, bytemuck::cast_slice_mut(&mut words))?;
     Ok(words)
 }

@@ -13,11 +13,11 @@ pub trait PayloadSource: Send + Sync + 'static {
     /// Number of bricks.
     fn brick_count(&self) -> u32;
 
-    /// Length of a payload in bytes, a multiple of 16, from the always-resident part: touches no payload. The brick is
-    /// below [`Self::brick_count`].
+    /// Length of a payload as it is loaded in bytes, a multiple of 16, from the always-resident part: touches no payload.
+    /// The brick is below [`Self::brick_count`]. The source may hold fewer bytes, from which it decodes the payload.
     fn bytes(&self, item: Item) -> u64;
 
-    /// Copies a payload into `out`, [`Self::bytes`] long, and verifies *the copy*: after `Ok` it can be indexed freely.
+    /// Loads a payload into `out`, [`Self::bytes`] long, and verifies *the copy*: after `Ok` it can be indexed freely.
     /// After an error the contents of `out` are unspecified.
     ///
     /// # Errors
@@ -48,7 +48,7 @@ impl PayloadSource for SceneFile {
     }
 
     fn bytes(&self, item: Item) -> u64 {
-        self.span(item.into()).bytes
+        self.loaded_bytes(item.into())
     }
 
     fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError> {

@@ -7,8 +7,8 @@
 //! {"frame":0,"pass":"primary","requests":["g0","g1","a1"],"batches":[1]}
 //! ```
 //!
-//! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick; `g1` is the
-//! geometry of brick 1, `a1` its attributes. A request is one use of an item by a pass, resident or not. `batches` are the
+//! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick, as loaded; `g1`
+//! is the geometry of brick 1, `a1` its attributes. A request is one use of an item by a pass, resident or not. `batches` are the
 //! positions in `requests` at which a batch of loads began: what a batch loads is not evicted before the next one begins.
 //! The order of requests was chosen knowing what was resident (resident bricks come first), so a replay shows what another
 //! cache makes of these requests, not of the same frames.

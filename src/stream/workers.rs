@@ -84,7 +84,7 @@ pub struct Loaded<D> {
 pub struct WorkersStats {
     /// Payloads loaded from the source.
     pub read: u64,
-    /// Bytes of those.
+    /// Bytes of those as loaded, attributes decoded.
     pub read_bytes: u64,
     /// Payloads loaded from the host cache.
     pub cached: u64,

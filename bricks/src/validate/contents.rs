@@ -8,7 +8,7 @@ use crate::payload::Payload;
 use crate::records::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NEAR_STEPS, NODE_WIDTH, Node, WIDE_HIGH_STEPS};
 use crate::resident::Resident;
 
-/// Checks the contents of a payload that [`super::payload`] found right. For geometry: quantisation grids of nodes are
+/// Checks the contents of a payload, as it is loaded, that [`super::payload`] found right. For geometry: quantisation grids of nodes are
 /// finite, every triangle is in exactly one leaf, the brick is as high as it says, vertices lie on the lattice within the
 /// brick's bounds and, if `map` is given, in occupied cells, every triangle starts with its smallest vertex.
 ///

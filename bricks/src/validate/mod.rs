@@ -2,7 +2,7 @@
 //!
 //! * [`resident`]: the resident part by itself. Every index, range, count and length in it is right, both top-level trees
 //!   are trees over exactly the leaves, nothing is infinite or not a number.
-//! * [`payload`]: the bytes of one payload against the resident part: every index in it, and that the nodes of a brick
+//! * [`payload`]: the bytes of one payload, as it is loaded, against the resident part: every index in it, and that the nodes of a brick
 //!   are a tree no higher than the brick says.
 //! * [`spans`]: payloads fill the file up to the directory and do not overlap.
 //! * [`contents`]: what is slower to check and cannot make an index wrong: vertices on the lattice within their bounds
@@ -97,6 +97,11 @@ fn brick(index: u32, brick: &Brick) -> Result<(), Flaw> {
     rule(brick.flags & BRICK_INDEX32 != 0 || vertices <= 1 << 16, part, || {
         (format!("{vertices} vertices with 16-bit indices"), "at most 65536")
     })?;
+    // Then the length of attributes as loaded is bounded by that of geometry, which is in the file.
+    let corners = u64::from(brick.triangle_count) * 3;
+    rule(u64::from(brick.attribute_vertex_count) <= corners, part, || {
+        (format!("{} attribute vertices", brick.attribute_vertex_count), format!("at most {corners}, the corners"))
+    })?;
     let reach = if brick.flags & BRICK_WIDE != 0 { WIDE_STEPS } else { NEAR_STEPS };
     for axis in 0..3 {
         let (origin, min, max) = (brick.origin[axis], brick.min[axis], brick.max[axis]);
@@ -110,7 +115,7 @@ fn brick(index: u32, brick: &Brick) -> Result<(), Flaw> {
         })?;
     }
     length(Payload::Geometry(index), brick.geometry, GeometryLayout::of(brick).bytes)?;
-    length(Payload::Attributes(index), brick.attributes, AttributeLayout::of(brick).bytes)?;
+    encoded(Payload::Attributes(index), brick.attributes, AttributeLayout::of(brick).bytes)?;
     let means = brick.mean_albedo.iter().chain(&brick.mean_emission);
     rule(means.clone().all(|mean| mean.is_finite() && *mean >= 0.0), part, || {
         (format!("means {:?}", means.collect::<Vec<_>>()), "finite colours, not negative")
@@ -125,6 +130,15 @@ fn length(payload: Payload, span: Span, bytes: u64) -> Result<(), Flaw> {
     rule(span.bytes == bytes && bytes <= MAX_PAYLOAD_BYTES, Part::Payload(payload), || {
         let expected = format!("{bytes} bytes as its counts say, at most {MAX_PAYLOAD_BYTES}");
         (format!("{} bytes", span.bytes), expected)
+    })
+}
+
+/// Checks the length of a payload that is stored encoded and has `bytes` when loaded.
+fn encoded(payload: Payload, span: Span, bytes: u64) -> Result<(), Flaw> {
+    let valid = span.bytes > 0 && span.bytes.is_multiple_of(16) && span.bytes.max(bytes) <= MAX_PAYLOAD_BYTES;
+    rule(valid, Part::Payload(payload), || {
+        let expected = format!("a multiple of 16 from 16 to {MAX_PAYLOAD_BYTES} bytes, stored and loaded");
+        (format!("{} bytes, {bytes} when loaded", span.bytes), expected)
     })
 }
 

@@ -11,14 +11,14 @@ use crate::records::{AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_WIDE
 use crate::records::{SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use crate::resident::Resident;
 
-/// Checks the bytes of a payload against the resident part, which satisfies [`super::resident`]: every index that
+/// Checks the bytes of a payload, as it is loaded, against the resident part, which satisfies [`super::resident`]: every index that
 /// traversal or shading follows lies in its array, nodes form a tree no higher than the brick says with children after
 /// their parents, node 0 is the brick's root, padding is zero; of an occupancy map that all levels agree. `bytes` needs no alignment.
 pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(), Flaw> {
     let part = Part::Payload(payload);
-    let span = resident.span(payload);
-    rule(span.is_some_and(|span| span.bytes == bytes.len() as u64), part, || {
-        (format!("{} bytes", bytes.len()), span.map_or("no such payload".to_owned(), |span| span.bytes.to_string()))
+    let length = resident.loaded_bytes(payload);
+    rule(length == Some(bytes.len() as u64), part, || {
+        (format!("{} bytes", bytes.len()), length.map_or("no such payload".to_owned(), |length| length.to_string()))
     })?;
     match payload {
         Payload::Geometry(index) => {

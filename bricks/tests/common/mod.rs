@@ -12,7 +12,7 @@ use xxhash_rust::xxh3::xxh3_64;
 /// Positions of a triangle in lattice steps of its object.
 pub type Triangle = [[i64; 3]; 3];
 
-/// A scene and the bytes of its payloads.
+/// A scene and the bytes of its payloads as they are loaded.
 pub struct Scene {
     pub resident: Resident,
     pub payloads: BTreeMap<Payload, Vec<u8>>,
@@ -378,10 +378,19 @@ pub fn empty() -> Scene {
 }
 
 impl Scene {
+    /// The bytes of a payload as they are stored.
+    pub fn stored(&self, payload: Payload) -> Vec<u8> {
+        let bytes = &self.payloads[&payload];
+        match payload {
+            Payload::Attributes(brick) => attributes::encode(&self.resident.bricks[brick as usize], bytes),
+            _ => bytes.clone(),
+        }
+    }
+
     /// Writes the payloads and sets their spans.
     pub fn write_payloads(&mut self, writer: &mut Writer) {
-        for (payload, bytes) in &self.payloads {
-            let span = writer.write(bytes).unwrap();
+        for payload in self.payloads.keys() {
+            let span = writer.write(&self.stored(*payload)).unwrap();
             match *payload {
                 Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry = span,
                 Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes = span,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bricks::{Payload, SceneFile};
 
-use crate::stream::{Destination, HostCache, Item, PayloadSource, StreamError, Workers};
+use crate::stream::{Destination, HostCache, Item, Kind, PayloadSource, StreamError, Workers};
 
 /// The golden file of the format's own tests.
 const SCENE: &[u8] = include_bytes!("../../../bricks/tests/golden/version-2.bricks");
@@ -30,7 +30,7 @@ fn items(scene: &SceneFile) -> Vec<Item> {
 }
 
 #[test]
-fn payloads_arrive_as_they_lie_in_the_file() {
+fn payloads_arrive_as_the_file_gives_them() {
     let (_folder, scene) = open(SCENE);
     let items = items(&scene);
     assert!(!items.is_empty());
@@ -38,12 +38,17 @@ fn payloads_arrive_as_they_lie_in_the_file() {
     for _ in 0..2 {
         let loaded = workers.load(items.iter().map(|&item| (item, Sink::default())).collect()).unwrap();
         for (item, sink) in loaded {
-            let span = scene.span(Payload::from(item));
-            assert_eq!(sink.0, &SCENE[span.offset as usize..(span.offset + span.bytes) as usize], "{item}");
-            assert_eq!(
-                scene.sizes()[item.brick as usize],
-                (scene.span(Payload::Geometry(item.brick)).bytes, scene.span(Payload::Attributes(item.brick)).bytes,)
-            );
+            let payload = Payload::from(item);
+            let mut expected = vec![0; scene.loaded_bytes(payload) as usize];
+            SceneFile::copy(&scene, payload, &mut expected).unwrap();
+            assert_eq!(sink.0, expected, "{item}");
+            let span = scene.span(payload);
+            let stored = &SCENE[span.offset as usize..(span.offset + span.bytes) as usize];
+            // Geometry as it lies in the file, attributes decoded.
+            assert_eq!(sink.0 == stored, item.kind == Kind::Geometry, "{item}");
+            let [geometry, attributes] = [Payload::Geometry(item.brick), Payload::Attributes(item.brick)];
+            let sizes = (scene.loaded_bytes(geometry), scene.loaded_bytes(attributes));
+            assert_eq!(scene.sizes()[item.brick as usize], sizes);
         }
     }
     assert_eq!(workers.stats().read, items.len() as u64);

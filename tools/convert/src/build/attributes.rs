@@ -1,8 +1,8 @@
 //! What shading reads of a vertex and of a triangle: normals, texture coordinates, colours, mean colours.
 
 use super::intern::{Key, mix};
-use super::objects::{Baking, Placed};
-use bricks::{AttributeVertex, Material, NONE};
+use super::objects::Placed;
+use bricks::{AttributeVertex, Material, NO_NORMAL, NONE};
 
 /// An attribute vertex as 128 bits, for interning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,9 +28,10 @@ impl VertexBits {
     }
 }
 
-/// The attributes of a vertex of a placed part with the given octahedral normal.
-pub(super) fn vertex(placed: &Placed, vertex: u32, normal: u32) -> VertexBits {
+/// The attributes of a vertex of a placed part.
+pub(super) fn vertex(placed: &Placed, vertex: u32) -> VertexBits {
     let primitive = placed.primitive;
+    let normal = source_normal(placed, vertex).unwrap_or(NO_NORMAL);
     let uv = primitive.uvs.as_ref().map_or([0.0; 2], |uvs| uvs[vertex as usize]);
     // Adding zero turns -0 into 0, so that equal coordinates have equal bits.
     let [u, v] = uv.map(|x| if x.is_finite() { (x + 0.0).to_bits() } else { 0 });
@@ -39,7 +40,7 @@ pub(super) fn vertex(placed: &Placed, vertex: u32, normal: u32) -> VertexBits {
 }
 
 /// The octahedral normal of a vertex in object space; `None` if the source has none that is usable.
-pub(super) fn source_normal(placed: &Placed, vertex: u32) -> Option<u32> {
+fn source_normal(placed: &Placed, vertex: u32) -> Option<u32> {
     let normal = placed.primitive.normals.as_ref()?[vertex as usize].map(f64::from);
     let normal = match &placed.part.baking {
         None => normal,
@@ -49,13 +50,6 @@ pub(super) fn source_normal(placed: &Placed, vertex: u32) -> Option<u32> {
         }
     };
     octahedral(normal)
-}
-
-/// The octahedral normal of a triangle from its lattice vertices in source order, on the side from which the *source* sees
-/// them counter-clockwise; the area must not be zero.
-pub(super) fn face_normal(corners: &[[i64; 3]; 3], baking: Option<&Baking>) -> u32 {
-    let sign = if baking.is_some_and(|baking| baking.mirrored) { -1.0 } else { 1.0 };
-    octahedral(cross(corners).map(|x| x * sign)).unwrap_or(0)
 }
 
 /// Twice the area vector of a lattice triangle, in squared steps, rounded from the exact integers.
@@ -138,6 +132,7 @@ mod tests {
                 let r = (1.0 - z * z).max(0.0).sqrt();
                 let v = [r * phi.cos(), r * phi.sin(), z];
                 let d = decode(octahedral(v).unwrap());
+                assert_ne!(octahedral(v), Some(NO_NORMAL));
                 worst = worst.max((0..3).map(|k| (d[k] - v[k]).abs()).fold(0.0, f64::max));
             }
         }
@@ -158,15 +153,6 @@ mod tests {
         assert!(is_degenerate(&line));
         assert!(!is_degenerate(&[line[0], [0, 0, 1], line[2]]), "one step off a line 2^44 long");
         assert!(is_degenerate(&[[5, 5, 5], [5, 5, 5], [7, 8, 9]]));
-    }
-
-    #[test]
-    fn face_normals_keep_the_source_side() {
-        let corners = [[0, 0, 0], [5, 0, 0], [0, 5, 0]];
-        assert_eq!(decode(face_normal(&corners, None)), [0.0, 0.0, 1.0]);
-        let matrix = super::super::matrix::Affine([1.0; 12]);
-        let baking = Baking { matrix, normals: [0.0; 9], mirrored: true };
-        assert_eq!(decode(face_normal(&corners, Some(&baking))), [0.0, 0.0, -1.0]);
     }
 
     #[test]

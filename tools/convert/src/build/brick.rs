@@ -39,7 +39,7 @@ pub(super) struct EncodedBrick {
     pub record: Brick,
     /// The geometry payload.
     pub geometry: Vec<u8>,
-    /// The attribute payload.
+    /// The attribute payload, encoded.
     pub attributes: Vec<u8>,
     /// The occupancy and the proxies payload, if wanted.
     pub proxies: Option<(Occupancy, Vec<u8>)>,
@@ -213,6 +213,7 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
         let map = voxelise(step_log2, &grid, contents.triangles.iter().map(corners));
         (map.record(&grid), map.pack())
     });
+    let attributes = bricks::attributes::encode(&record, &attributes);
     EncodedBrick { record, geometry, attributes, proxies }
 }
 

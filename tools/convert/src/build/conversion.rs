@@ -169,7 +169,8 @@ impl Conversion<'_> {
         let settings = BuildSettings { resume: false, scratch: None, ..self.settings.clone() };
         let mut hash = Hash(Xxh3::new());
         // Hashing does not fail.
-        let _ = write!(hash, "{} {budget:?} {settings:?} {:?}", env!("CARGO_PKG_VERSION"), self.outline);
+        let version = (env!("CARGO_PKG_VERSION"), bricks::layout::VERSION);
+        let _ = write!(hash, "{version:?} {budget:?} {settings:?} {:?}", self.outline);
         hash.0.digest()
     }
 

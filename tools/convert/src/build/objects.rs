@@ -16,8 +16,6 @@ pub(super) struct Baking {
     pub matrix: Affine,
     /// What maps normals.
     pub normals: [f64; 9],
-    /// Whether the winding of the geometry is reversed by the matrix.
-    pub mirrored: bool,
 }
 
 /// A part of a mesh within an object. Its triangles have consecutive slots (numbers within the object's input) and ids.
@@ -195,11 +193,8 @@ pub(super) fn plan<'a>(scene: &'a Outline, settings: &BuildSettings) -> Result<P
             instances.push(InstancePlan { object, base, matrix, placement });
             continue;
         }
-        let baking = (placement.world_from_mesh != IDENTITY).then(|| Baking {
-            matrix,
-            normals: matrix.normal_matrix(),
-            mirrored: matrix.determinant() < 0.0,
-        });
+        let baking =
+            (placement.world_from_mesh != IDENTITY).then(|| Baking { matrix, normals: matrix.normal_matrix() });
         objects[0].push(placement.mesh, mesh, baking, base);
     }
     Ok(Plan { objects, instances, triangle_ids, provenance })

@@ -1,6 +1,6 @@
 //! A triangle on the lattice of its object, with all that a brick stores of it.
 
-use super::attributes::{self, VertexBits};
+use super::attributes;
 use super::lattice::Lattice;
 use super::objects::Placed;
 use bytemuck::{Pod, Zeroable};
@@ -17,7 +17,7 @@ pub(super) struct Triangle {
     pub material: u32,
     /// Corners, in steps of the object's lattice.
     pub corners: [[i64; 3]; 3],
-    /// Attribute vertices, see [`VertexBits`].
+    /// Attribute vertices, see [`attributes::VertexBits`].
     pub attributes: [[u32; 4]; 3],
 }
 
@@ -29,14 +29,7 @@ impl Triangle {
         if attributes::is_degenerate(&corners) {
             return None;
         }
-        let mut flat = None;
-        let attributes = source.map(|vertex| {
-            let normal = attributes::source_normal(placed, vertex).unwrap_or_else(|| {
-                *flat.get_or_insert_with(|| attributes::face_normal(&corners, placed.part.baking.as_ref()))
-            });
-            let VertexBits(bits) = attributes::vertex(placed, vertex, normal);
-            bits
-        });
+        let attributes = source.map(|vertex| attributes::vertex(placed, vertex).0);
         Some(Self {
             brick,
             id: placed.part.first_id + triangle,

@@ -42,7 +42,7 @@ pub fn decode(path: &Path) -> Decoded {
     let resident = file.resident().clone();
     let bricks = (0u32..).zip(&resident.bricks).map(|(index, record)| {
         let read = |payload| {
-            let mut bytes = vec![0; file.span(payload).bytes as usize];
+            let mut bytes = vec![0; file.loaded_bytes(payload) as usize];
             file.copy(payload, &mut bytes).unwrap();
             bytes
         };

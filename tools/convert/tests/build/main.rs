@@ -8,4 +8,5 @@ mod invariance;
 mod placement;
 mod proxies;
 mod scenes;
+mod sizes;
 mod structure;

@@ -207,13 +207,12 @@ fn positions_and_attributes_are_those_of_the_source() {
 
 #[test]
 fn large_bricks_have_wide_indices() {
-    let scene = decode(&built(&plain(vec![sheet(200, 10.0)]), &settings(100_000)).path());
+    let scene = decode(&built(&plain(vec![sheet(260, 10.0)]), &settings(200_000)).path());
     assert_eq!(scene.bricks.len(), 1);
-    // 80,000 flat normals of 80,000 triangles, of three vertices each.
-    assert!(scene.bricks[0].record.attribute_vertex_count > 65_536);
+    assert_eq!(scene.bricks[0].record.vertex_count, 261 * 261);
     assert!(scene.bricks[0].record.flags & BRICK_INDEX32 != 0);
     check(&scene);
-    assert_eq!(scene.triangles(0).len(), 80_000);
+    assert_eq!(scene.triangles(0).len(), 135_200);
 }
 
 #[test]
