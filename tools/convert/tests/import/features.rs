@@ -1,7 +1,9 @@
 //! What is read, feature by feature.
 
 use crate::writer::*;
-use brickwalk_convert::source::{IDENTITY, Primitive, SourceScene};
+use brickwalk_convert::import::{ImportSettings, import};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{IDENTITY, PART_TRIANGLES, Primitive, Source, SourceScene};
 use serde_json::{Value, json};
 
 /// The only primitive of the only mesh.
@@ -532,4 +534,21 @@ fn an_empty_scene_is_a_scene() {
     let scene = import_bytes("test.gltf", br#"{"asset": {"version": "2.0"}}"#).unwrap();
     assert!(scene.meshes.is_empty() && scene.placements.is_empty() && scene.warnings.is_empty());
     assert_eq!(scene.sources.len(), 1);
+}
+
+/// A primitive of two parts: messages count its vertices as the file does.
+#[test]
+fn vertices_are_numbered_as_in_the_file() {
+    let triangles = PART_TRIANGLES as usize + 10;
+    let mut file = Writer::new();
+    let positions = file.floats("VEC3", &vec![0.5; 9 * triangles]);
+    let mesh = file.mesh(json!({"attributes": {"POSITION": positions}}));
+    file.node(json!({"mesh": mesh}));
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), "test.glb", &file.glb());
+    let opened = import(&[path.as_path().into()], &ImportSettings::default(), &Progress::hidden()).unwrap();
+    let name = Some(path.to_string_lossy().into_owned());
+    assert_eq!(opened.outline().meshes[0].parts.len(), 2);
+    assert_eq!(opened.origin(0, 0, 7), (name.clone(), 7));
+    assert_eq!(opened.origin(0, 1, 7), (name, 3 * u64::from(PART_TRIANGLES) + 7));
 }
