@@ -67,7 +67,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let index = global.y * params.width + global.x;
-    let surface = primary_surfaces[index];
+    let surface = seen_surfaces[index];
     if surface.leaf == NONE || gbuffer[index].state != 0u {
         return;
     }
@@ -96,7 +96,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             corner = vec3<u32>(x >> 16u, y & 0xffffu, y >> 16u);
         }
     }
-    let hit = primary_hits[index];
+    let hit = seen_hits[index];
     let weights = vec3<f32>(1.0 - hit.u - hit.v, hit.u, hit.v);
     var normal = vec3<f32>(0.0);
     var uvs: array<vec2<f32>, 3>;
@@ -123,7 +123,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let e1 = uvs[1] - uvs[0];
         let e2 = uvs[2] - uvs[0];
         let uv_area = abs(e1.x * e2.y - e1.y * e2.x) * f32(t.width) * f32(t.height);
-        let ray = primary_rays[index];
+        let ray = seen_rays[index];
         let distance = hit.t * length(ray.direction);
         let cosine = max(abs(dot(ray.direction, surface.normal)) / length(ray.direction), 0.05);
         let footprint = distance * params.step_y.w;

@@ -1,18 +1,9 @@
-// Lambertian shading of the primary hits by the sun, where its shadow ray went free, and by a sky of two colours.
+// What the hits of the shaded set show by themselves: the sky on a miss, else their emission, and, unless passes of their own bring
+// it, the light of the sun and of the sky on a Lambertian surface. The first shading of a sample counts it.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
-
-const SHADE_SHADOWS: u32 = 4u;  // bit of params.flags: the pass's hits are shadow rays
-
-fn sky(d: vec3<f32>) -> vec3<f32> {
-    let up = normalize(d).y;
-    let horizon = mix(params.sky_color.rgb, vec3<f32>(dot(params.sky_color.rgb, vec3<f32>(0.2126, 0.7152, 0.0722))), 0.65) * 1.3;
-    if up < 0.0 {
-        return mix(horizon, params.ground_color.rgb, clamp(-up * 8.0, 0.0, 1.0));
-    }
-    return mix(horizon, params.sky_color.rgb, sqrt(up));
-}
+#include "shared/light.wgsl"
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -21,23 +12,24 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let index = global.y * params.width + global.x;
-    let surface = primary_surfaces[index];
-    var color: vec3<f32>;
-    if surface.leaf == NONE {
-        color = sky(primary_rays[index].direction);
-    } else {
-        let g = gbuffer[index];
-        let lit = !((params.flags & SHADE_SHADOWS) != 0u && (hits[index].id != NONE || rays[index].t_max < rays[index].t_min));
-        let cosine = max(dot(g.normal, params.sun.xyz), 0.0);
-        let sun = select(vec3<f32>(0.0), params.sun_color.rgb * cosine, lit);
-        // Irradiance of a sky over a ground, each of one radiance: a cosine-weighted hemisphere sees the share of both.
-        let ambient = mix(params.ground_color.rgb, params.sky_color.rgb, 0.5 + 0.5 * g.normal.y);
-        color = g.albedo * (sun + ambient) + g.emission;
+    if (params.flags & PARAM_BOUNCE) == 0u {
+        radiance[index].w += 1.0;
     }
-    let bits = bitcast<vec3<u32>>(color) & vec3<u32>(0x7f800000u);
-    if any(bits == vec3<u32>(0x7f800000u)) {
-        atomicAdd(&counters[COUNTER_NON_FINITE], 1u);
-        color = vec3<f32>(0.0);
+    let ray = seen_rays[index];
+    if !(ray.t_min <= ray.t_max) {
+        return;
     }
-    radiance[index] += vec4<f32>(color, 1.0);
+    if seen_surfaces[index].leaf == NONE {
+        add_light(index, sky(ray.direction));
+        return;
+    }
+    let g = gbuffer[index];
+    var light = vec3<f32>(0.0);
+    if (params.flags & PARAM_SUN) != 0u {
+        light += sunlight(g.normal);
+    }
+    if (params.flags & PARAM_SKY) != 0u {
+        light += ambient(g.normal);
+    }
+    add_light(index, surface_share() * (g.albedo * light + g.emission));
 }

@@ -14,7 +14,7 @@ use brickwalk::gpu::rays::Extent;
 use brickwalk::gpu::scene::Frame;
 use brickwalk::reference::{Tally, Truth, TruthRay, Verdict, judge, judge_any};
 use brickwalk::scene::path::{CameraPath, path_from_bounds};
-use brickwalk::schedule::Pass;
+use brickwalk::schedule::{Lamp, Pass};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
@@ -90,8 +90,8 @@ fn check_walk(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, si
         add(&mut spoiled, met.iter().map(|(ray, _)| judge(truth, ray, None)).collect());
         let nearer = |hit: &Hit| found(hit).map(|(id, t)| (id, t / 2.0));
         add(&mut spoiled, met.iter().map(|(ray, hit)| judge(truth, ray, nearer(hit))).collect());
-        let rays = renderer.executor.read_rays(Pass::Shadow).expect("rays");
-        let occluders = renderer.executor.read_hits(Pass::Shadow).expect("hits");
+        let rays = renderer.executor.read_rays(Pass::Shadow(Lamp::Sun)).expect("rays");
+        let occluders = renderer.executor.read_hits(Pass::Shadow(Lamp::Sun)).expect("hits");
         // A shadow ray leaves the primary hit of its pixel and does not meet that triangle again.
         let traced: Vec<(TruthRay, bool)> = (rays.iter().zip(&hits).zip(&occluders))
             .filter(|((ray, _), _)| ray.t_min <= ray.t_max)

@@ -26,6 +26,15 @@ struct Params {
     sky_color: vec4<f32>,
     ground_color: vec4<f32>,
     jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
+    lamp_corner: vec4<f32>,  // the rectangular light in the frame: a corner,
+    lamp_u: vec4<f32>,       // and its two edges; it shines to the side of cross(u, v)
+    lamp_v: vec4<f32>,
+    lamp_color: vec4<f32>,   // its radiance
+    around: vec4<f32>,    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
+    share: f32,           // of the light that the pass's direction stands for
+    surface_share: f32,   // of its own light that a primary hit shows, the rest being mirrored
+    length: f32,          // of the pass's rays where that is limited, device units
+    stream: u32,          // which random numbers the pass takes
     pair_count: u32,      // pairs to be queried
     padding0: u32,
     padding1: u32,
@@ -33,7 +42,11 @@ struct Params {
 }
 
 const PARAM_ANY_HIT: u32 = 1u;
-const PARAM_NEEDED: u32 = 2u;   // queries ask what a pass needed, from its final hits, whatever was resident
+const PARAM_NEEDED: u32 = 2u;     // queries ask what a pass needed, from its final hits, whatever was resident
+const PARAM_SUN: u32 = 4u;        // shade: with the sun, unshadowed
+const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
+const PARAM_BOUNCE: u32 = 16u;    // the hits that are shaded are those of set 1
+const PARAM_RECTANGLE: u32 = 32u; // the pass's lamp is the rectangular light
 
 struct Ray {
     origin: vec3<f32>,    // in the frame, device units

@@ -2,12 +2,13 @@
 //! receive only what they can use; what is wrong ends as usage with exit status 2.
 
 use super::inputs::{FromArgs, InputArgs};
-use super::sizes::{CacheSize, Direction, ImageSize, non_negative, positive_count, positive_count32, size_bytes};
+use super::light_args::{EffectArgs, LightArgs};
+use super::named::{named_values, unknown};
+use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
 use brickwalk_scenes::Kind;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
-use std::str::FromStr;
 
 /// Said at the end of every help text.
 const UNITS: &str = "Sizes are bytes and take K, M, G (powers of 1024); counts take K, M (powers of 1000).\n\
@@ -294,9 +295,9 @@ pub struct WalkArgs {
     /// Vertical field of view in degrees, 1e-6 to 179.99 [default: the path's]
     #[arg(long, value_name = "DEG", value_parser = fov)]
     pub fov: Option<f64>,
-    /// What to trace, separated by commas: primary, shadow; shadow includes primary
-    #[arg(long, value_name = "LIST", default_value = "primary,shadow")]
-    pub effects: Effects,
+    /// What is traced.
+    #[command(flatten)]
+    pub effects: EffectArgs,
     /// How secondary rays are answered: exact
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
@@ -324,23 +325,6 @@ pub struct WalkArgs {
     /// Environment image; comes with a later version.
     #[arg(long, hide = true, value_parser = not_built)]
     pub environment: Option<String>,
-}
-
-/// Options of the light.
-#[derive(Clone, Copy, Debug, Args)]
-pub struct LightArgs {
-    /// Direction towards the sun, world space, any length
-    #[arg(long, value_name = "X,Y,Z", default_value = "0.4,0.8,0.45", allow_hyphen_values = true)]
-    pub sun: Direction,
-    /// Angular diameter of the sun in degrees, 0 (hard shadows) to 90
-    #[arg(long, value_name = "DEG", default_value = "0.53", value_parser = sun_angle)]
-    pub sun_angle: f64,
-    /// Irradiance of the sun on a surface that faces it; a white surface then reflects 1/pi of it
-    #[arg(long, value_name = "X", default_value = "2.4", value_parser = non_negative)]
-    pub sun_intensity: f64,
-    /// Radiance of the sky, the same in all directions; unshadowed
-    #[arg(long, value_name = "X", default_value = "0.35", value_parser = non_negative)]
-    pub sky_intensity: f64,
 }
 
 /// Options of `trace`.
@@ -422,44 +406,6 @@ pub struct CompareArgs {
     pub json: bool,
 }
 
-/// Declares an enum of named values some of which this version only knows by name.
-macro_rules! named_values {
-    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* } later $later:expr) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum $name { $($(#[$vdoc])* $variant,)* }
-
-        impl $name {
-            const NAMES: &[&str] = &[$($text),*];
-
-            /// The value's name on the command line.
-            pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $text,)* }
-            }
-        }
-
-        impl FromStr for $name {
-            type Err = String;
-
-            fn from_str(text: &str) -> Result<Self, String> {
-                match text {
-                    $($text => Ok(Self::$variant),)*
-                    other => Err(unknown(other, Self::NAMES, $later)),
-                }
-            }
-        }
-    };
-}
-
-fn unknown(text: &str, known: &[&str], later: &[&str]) -> String {
-    let known = known.join(", ");
-    if later.contains(&text) {
-        format!("{text} is not in this version; it has: {known}")
-    } else {
-        format!("there is no '{text}'; known: {known}")
-    }
-}
-
 named_values! {
     /// How the bricks to intersect are found.
     Schedule {
@@ -480,44 +426,6 @@ named_values! {
     } later &["roma", "df", "dvf", "displacement", "auto"]
 }
 
-named_values! {
-    /// A pass.
-    Effect {
-        /// Rays of the camera.
-        Primary = "primary",
-        /// Rays towards the sun.
-        Shadow = "shadow",
-    } later &["ao", "diffuse", "environment"]
-}
-
-/// The passes of a frame; primary rays are always among them, as every other pass starts where they end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Effects {
-    /// Rays towards the sun.
-    pub shadow: bool,
-}
-
-impl FromStr for Effects {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut effects = Self { shadow: false };
-        for name in text.split(',') {
-            match name.trim().parse::<Effect>()? {
-                Effect::Primary => {}
-                Effect::Shadow => effects.shadow = true,
-            }
-        }
-        Ok(effects)
-    }
-}
-
-impl std::fmt::Display for Effects {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(if self.shadow { "primary,shadow" } else { "primary" })
-    }
-}
-
 /// Accepts the values of a list.
 fn one_of(text: &str, known: &[&str]) -> Result<String, String> {
     if known.contains(&text) { Ok(text.into()) } else { Err(unknown(text, known, &[])) }
@@ -529,7 +437,7 @@ fn not_built(_: &str) -> Result<String, String> {
 }
 
 /// Parses a whole number or count and checks its range.
-fn ranged(text: &str, least: u64, most: u64) -> Result<u32, String> {
+pub(super) fn ranged(text: &str, least: u64, most: u64) -> Result<u32, String> {
     let n = super::sizes::count(text)?;
     match u32::try_from(n) {
         Ok(n32) if (least..=most).contains(&n) => Ok(n32),
@@ -569,10 +477,6 @@ fn tile(text: &str) -> Result<u32, String> {
 fn fov(text: &str) -> Result<f64, String> {
     let degrees: f64 = text.parse().map_err(|_| "it must be a number of degrees".to_string())?;
     check_fov_y_degrees(degrees).map(|()| degrees).map_err(|e| e.to_string())
-}
-
-fn sun_angle(text: &str) -> Result<f64, String> {
-    non_negative(text).ok().filter(|deg| *deg <= 90.0).ok_or_else(|| "it must be from 0 to 90 degrees".into())
 }
 
 #[cfg(test)]

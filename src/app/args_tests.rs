@@ -23,7 +23,7 @@ fn defaults_of_walk_are_the_documented_ones() {
     let w = walk("").unwrap();
     assert_eq!(w.frames, 30);
     assert_eq!(w.size, ImageSize { width: 1280, height: 720 });
-    assert_eq!(w.effects, Effects { shadow: true });
+    assert_eq!(w.effects.effects.to_string(), "primary,shadow");
     assert_eq!((w.spp, w.seed, w.stream.prefetch), (1, 0, 0));
     assert_eq!(w.stream.cache, CacheSize::Percent(25.0));
     assert_eq!(w.stream.host_cache, 1 << 30);
@@ -52,7 +52,7 @@ fn options_arrive() {
     assert_eq!(w.stream.cache, CacheSize::Bytes(12 << 20));
     assert_eq!(w.stream.host_cache, 2 << 30);
     assert_eq!(w.stream.schedule, Schedule::Plain);
-    assert_eq!(w.effects.to_string(), "primary");
+    assert_eq!(w.effects.effects.to_string(), "primary");
     assert!(w.aov && w.json && w.light.sun.0[0] < 0.0);
     assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
     assert_eq!(w.stream.adapter.as_deref(), Some("llvm"));
@@ -75,8 +75,6 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--host-cache 1.5G", "whole number"),
         ("--schedule demand", "not in this version"),
         ("--schedule fastest", "known: chc, plain, auto"),
-        ("--effects primary,ao", "ao is not in this version"),
-        ("--effects diffuse", "not in this version"),
         ("--effects environment", "not in this version"),
         ("--effects glitter", "no 'glitter'"),
         ("--effects=", "known: primary, shadow"),

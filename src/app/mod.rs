@@ -8,6 +8,8 @@ pub mod demo;
 pub mod info;
 mod inputs;
 pub mod interrupt;
+pub mod light_args;
+mod named;
 pub mod output;
 pub mod quality;
 pub mod repair;

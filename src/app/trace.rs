@@ -3,12 +3,12 @@
 use super::args::TraceArgs;
 use super::output::npy::{self, Hit, Ray};
 use super::session::{Session, open_scene, write_requests};
-use crate::gpu::executor::View;
+use crate::gpu::executor::{Directions, View};
 use crate::gpu::layout::{self, NONE, Params, T_INFINITE};
 use crate::gpu::rays::Extent;
 use crate::gpu::scene::Frame;
 use crate::render::Schedule;
-use crate::schedule::{Pass, PassStats, Step, attributes, chc, plain};
+use crate::schedule::{Lamp, Pass, PassStats, Step, attributes, chc, plain};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
@@ -139,10 +139,10 @@ fn trace_chunk(
     any: bool,
     stats: &mut PassStats,
 ) -> Result<Vec<(layout::Hit, [f32; 2])>> {
-    let pass = if any { Pass::Shadow } else { Pass::Primary };
+    let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
     let executor = &mut session.executor;
     let cache = &mut session.cache;
-    executor.begin_frame(&View { frame: *frame, params: Params::default() });
+    executor.begin_frame(&View { frame: *frame, params: Params::default(), directions: Directions::default() });
     let device: Vec<layout::Ray> = rays.iter().map(|r| r.ray).collect();
     executor.set_rays(pass, &device);
     cache.begin_pass("trace", 0);
@@ -155,7 +155,7 @@ fn trace_chunk(
     if any {
         return Ok(hits.into_iter().take(rays.len()).map(|h| (h, [0.0; 2])).collect());
     }
-    attributes::resolve(executor, cache, stats)?;
+    attributes::resolve(executor, cache, pass, stats)?;
     let gbuffer = executor.read_gbuffer()?;
     Ok(hits.into_iter().zip(gbuffer).take(rays.len()).map(|(h, g)| (h, g.weights)).collect())
 }

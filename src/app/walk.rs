@@ -81,22 +81,27 @@ pub fn run(args: &WalkArgs) -> Result<()> {
 
 /// The renderer that the options of a walk ask for.
 pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
-    let Session { scene, executor, cache, schedule } = session;
+    let Session { scene, mut executor, cache, schedule } = session;
+    let effects = args.effects.effects();
+    if effects.has_bounces() {
+        executor.allow_bounces();
+    }
     let settings = RenderSettings {
         schedule,
-        shadows: args.effects.shadow,
+        effects,
         samples: args.spp,
         // Both halves of the seed count.
         seed: (args.seed ^ (args.seed >> 32)) as u32,
         measure_needed: args.measure_needed,
         aov: args.aov,
     };
-    let light = Light::new(
+    let mut light = Light::new(
         DVec3::from_array(args.light.sun.0),
         args.light.sun_angle,
         args.light.sun_intensity as f32,
         args.light.sky_intensity as f32,
     );
+    light.rectangle = args.light.rectangle();
     let fronts = (args.stream.fronts == "on").then(Fronts::default);
     let size = (args.size.width, args.size.height);
     Renderer { scene, executor, cache, settings, light, size, tile: args.stream.tile, fronts }

@@ -1,7 +1,53 @@
 //! Which dispatches of which kernels a step consists of.
 
 use super::layout::{self, Params};
-use crate::schedule::{Pass, Step};
+use crate::math::sampling::{cosine_hemisphere, halton};
+use crate::schedule::{Lamp, Pass, Step};
+
+/// The directions of the passes that start at hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Directions {
+    /// Occlusion rays a pixel and sample.
+    pub occlusion: u32,
+    /// Their length, device units.
+    pub occlusion_length: f32,
+    /// Diffuse rays a pixel and sample.
+    pub diffuse: u32,
+    /// Greatest random turn about the normal, radians.
+    pub turn: f32,
+}
+
+impl Directions {
+    /// The parameters of `pass`.
+    fn params(&self, pass: Pass, params: &Params) -> Params {
+        // Every kind of pass takes random numbers of its own. Those of a sun alone depend on the sample only.
+        let (stream, direction) = match pass {
+            Pass::Primary | Pass::Mirror | Pass::Shadow(Lamp::Sun) => (0, None),
+            Pass::Shadow(Lamp::Rectangle) => (1, None),
+            Pass::BounceShadow(Lamp::Sun) => (2, None),
+            Pass::BounceShadow(Lamp::Rectangle) => (3, None),
+            Pass::Occlusion(index) => (4, Some((index, self.occlusion))),
+            Pass::Diffuse(index) => (5, Some((index, self.diffuse))),
+        };
+        let rectangle = matches!(pass, Pass::Shadow(Lamp::Rectangle) | Pass::BounceShadow(Lamp::Rectangle));
+        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+        let mut params = Params {
+            flags: flag(pass.is_any_hit(), layout::PARAM_ANY_HIT)
+                | flag(rectangle, layout::PARAM_RECTANGLE)
+                | flag(pass.set() == 2, layout::PARAM_BOUNCE),
+            stream: params.sample.wrapping_add(stream << 24),
+            length: self.occlusion_length,
+            ..*params
+        };
+        if let Some((index, count)) = direction {
+            // The first point of the sequence is a corner of the square.
+            let [x, y, z] = cosine_hemisphere([halton(index + 1, 0), halton(index + 1, 1)]);
+            params.around = [x, y, z, self.turn];
+            params.share = 1.0 / count.max(1) as f32;
+        }
+        params
+    }
+}
 
 /// One dispatch of a kernel.
 pub struct Dispatch {
@@ -13,7 +59,7 @@ pub struct Dispatch {
     pub groups: [u32; 2],
     /// Whether group 2 is the cache.
     pub cache: bool,
-    /// Whether group 3 is what shading needs, not the tiles.
+    /// Whether group 3 is what shading the set before the pass's needs, not the tiles.
     pub shading: bool,
     /// Phase of the schedule that its time counts for, from 0.
     pub phase: Option<usize>,
@@ -28,10 +74,9 @@ fn across(count: u32) -> [u32; 2] {
     [x, count.div_ceil(x)]
 }
 
-/// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells the dispatches of a pass apart.
-pub fn dispatches(pass: Pass, step: Step, params: &Params) -> Vec<Dispatch> {
-    let any_hit = if pass == Pass::Shadow { layout::PARAM_ANY_HIT } else { 0 };
-    let params = Params { flags: any_hit, ..*params };
+/// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells passes and their dispatches apart.
+pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directions) -> Vec<Dispatch> {
+    let params = directions.params(pass, params);
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
     let kernel = |kernel, params, groups, phase| {
@@ -59,7 +104,15 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params) -> Vec<Dispatch> {
     let not_done = layout::STATE_GEOMETRY | layout::STATE_DONE;
     match step {
         Step::Generate if pass == Pass::Primary => vec![kernel("generate_primary", params, per_ray, None)],
-        Step::Generate => vec![shading("generate_shadow", params, false)],
+        Step::Generate => {
+            let kernel = match pass {
+                Pass::Occlusion(_) => "generate_occlusion",
+                Pass::Diffuse(_) => "generate_diffuse",
+                Pass::Mirror => "generate_mirror",
+                Pass::Primary | Pass::Shadow(_) | Pass::BounceShadow(_) => "generate_shadow",
+            };
+            vec![shading(kernel, params, false)]
+        }
         Step::StartHits => vec![kernel("start_hits", params, per_ray, None)],
         Step::CountRays => vec![bounds(None)],
         Step::Lists => vec![
@@ -75,15 +128,18 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params) -> Vec<Dispatch> {
         Step::QueryPairs => vec![kernel("query_pairs", params, across(params.pair_count), Some(1))],
         Step::QueryNeeded => {
             // Of every leaf, exactly.
-            let flags = any_hit | layout::PARAM_NEEDED;
+            let flags = params.flags | layout::PARAM_NEEDED;
             query(Params { select_mask: 0, select_want: 0, threshold: 0, flags, ..params }, None)
         }
         Step::ClearAttributes => vec![shading("clear_gbuffer", params, false)],
         Step::QueryHits => vec![kernel("hit_demand", params, per_ray, None)],
         Step::Resolve => vec![shading("resolve", params, true)],
-        Step::Shade { shadows } => {
-            let flags = if shadows { layout::SHADE_SHADOWS } else { 0 };
-            vec![shading("shade", Params { flags, ..params }, false)]
+        Step::Shade(light) => {
+            let sun = if light.sun { layout::PARAM_SUN } else { 0 };
+            let sky = if light.sky { layout::PARAM_SKY } else { 0 };
+            vec![shading("shade", Params { flags: params.flags | sun | sky, ..params }, false)]
         }
+        Step::AddLight => vec![shading("add_light", params, false)],
+        Step::AddOcclusion => vec![shading("add_occlusion", params, false)],
     }
 }

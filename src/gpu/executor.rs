@@ -2,6 +2,8 @@
 
 use super::device::Gpu;
 use super::dispatch::{Dispatch, dispatches};
+
+pub use super::dispatch::Directions;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
 use super::layout::{self, Params};
@@ -27,8 +29,10 @@ const LIST_ENTRIES_PER_TILE: u32 = 64;
 pub struct View {
     /// Reference point.
     pub frame: Frame,
-    /// Fields of [`Params`] that the view sets: camera, sun, sky, sample, seed, jitter.
+    /// Fields of [`Params`] that the view sets: camera, lights, sample, seed, jitter.
     pub params: Params,
+    /// Directions of the passes that start at hits.
+    pub directions: Directions,
 }
 
 /// Renders one scene on one device.
@@ -43,6 +47,7 @@ pub struct GpuExecutor {
     readback: Readback,
     timing: Timing,
     view: Params,
+    directions: Directions,
     threshold: u32,
     pair_count: u32,
 }
@@ -108,8 +113,8 @@ impl GpuExecutor {
             scene: SceneBuffers::new(&gpu, scene.resident()),
             cache: CachePages::new(&gpu, page_sizes),
             texels: Texels::new(&gpu, &scene)?,
-            passes: [RayBuffers::new(&gpu, extent.rays()), RayBuffers::new(&gpu, extent.rays())],
-            pixels: PixelBuffers::new(&gpu, extent.rays()),
+            sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
+            pixels: PixelBuffers::new(&gpu, extent.rays(), 0),
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),
             demand: storage(&gpu, "demand", bricks, size_of::<layout::Demand>()),
             counters: storage(&gpu, "counters", layout::COUNTERS, 4),
@@ -123,7 +128,7 @@ impl GpuExecutor {
         let readback = Readback::new(&gpu, (bricks * size_of::<layout::Demand>() + layout::COUNTERS * 4) as u64);
         let timing = Timing::new(&gpu, MOST_DISPATCHES as u32);
         let groups = Groups::new(&gpu, &kernels, &buffers);
-        let (view, threshold) = (Params::default(), setup.threshold);
+        let (view, directions, threshold) = (Params::default(), Directions::default(), setup.threshold);
         Ok(Self {
             gpu,
             scene,
@@ -135,9 +140,19 @@ impl GpuExecutor {
             readback,
             timing,
             view,
+            directions,
             threshold,
             pair_count: 0,
         })
+    }
+
+    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`] and [`Pass::BounceShadow`], 160 bytes a pixel; without it
+    /// they must not be run.
+    pub fn allow_bounces(&mut self) {
+        let rays = self.extent.rays();
+        self.buffers.sets[2] = RayBuffers::new(&self.gpu, rays);
+        self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, rays);
+        self.rebind();
     }
 
     /// The device.
@@ -164,6 +179,7 @@ impl GpuExecutor {
     pub fn begin_frame(&mut self, view: &View) {
         self.buffers.scene.rebase(&self.gpu, self.scene.resident(), view.frame);
         self.view = view.params;
+        self.directions = view.directions;
     }
 
     /// Writes rays from outside into `pass`; fewer than the extent holds leave the rest untraced.
@@ -171,7 +187,7 @@ impl GpuExecutor {
         let untraced = layout::Ray { t_min: 1.0, t_max: 0.0, direction: [1.0, 0.0, 0.0], ..Default::default() };
         let mut all = rays.to_vec();
         all.resize(self.extent.rays(), untraced);
-        self.gpu.queue.write_buffer(&self.buffers.passes[pass as usize].rays, 0, bytemuck::cast_slice(&all));
+        self.gpu.queue.write_buffer(&self.buffers.sets[pass.set()].rays, 0, bytemuck::cast_slice(&all));
     }
 
     /// Reads the rays of a pass back, row by row.
@@ -179,7 +195,7 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.read(|s| &s.buffers.passes[pass as usize].rays)
+        self.read(|s| &s.buffers.sets[pass.set()].rays)
     }
 
     /// Reads the hits of a pass back.
@@ -187,7 +203,7 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.read(|s| &s.buffers.passes[pass as usize].hits)
+        self.read(|s| &s.buffers.sets[pass.set()].hits)
     }
 
     /// Reads the surfaces of a pass back.
@@ -195,15 +211,15 @@ impl GpuExecutor {
     /// # Errors
     /// The device's.
     pub fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.read(|s| &s.buffers.passes[pass as usize].surfaces)
+        self.read(|s| &s.buffers.sets[pass.set()].surfaces)
     }
 
-    /// Reads the G-buffer back.
+    /// Reads the G-buffer of the primary hits back.
     ///
     /// # Errors
     /// The device's.
     pub fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read(|s| &s.buffers.pixels.gbuffer)
+        self.read(|s| &s.buffers.pixels.gbuffers[0])
     }
 
     /// Reads the radiance summed over samples back; w counts them.
@@ -268,7 +284,8 @@ impl GpuExecutor {
     fn submit(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         self.write_slots(bricks);
         let params = self.params();
-        let dispatches: Vec<Dispatch> = steps.iter().flat_map(|&step| dispatches(pass, step, &params)).collect();
+        let dispatches: Vec<Dispatch> =
+            steps.iter().flat_map(|&step| dispatches(pass, step, &params, &self.directions)).collect();
         let stride = params_stride(&self.gpu);
         let mut params = vec![0u8; stride as usize * dispatches.len()];
         for (i, dispatch) in dispatches.iter().enumerate() {
@@ -287,9 +304,10 @@ impl GpuExecutor {
             });
             compute.set_pipeline(self.kernels.pipeline(dispatch.kernel));
             compute.set_bind_group(0, &self.groups.scene, &[]);
-            compute.set_bind_group(1, &self.groups.rays[pass as usize], &[(i as u64 * stride) as u32]);
+            compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
             compute.set_bind_group(2, if dispatch.cache { &self.groups.cache } else { &self.groups.empty }, &[]);
-            compute.set_bind_group(3, if dispatch.shading { &self.groups.shading } else { &self.groups.tiles }, &[]);
+            let shading = &self.groups.shading[pass.set().saturating_sub(1)];
+            compute.set_bind_group(3, if dispatch.shading { shading } else { &self.groups.tiles }, &[]);
             let [x, y] = dispatch.groups;
             compute.dispatch_workgroups(x, y, 1);
         }

@@ -7,7 +7,6 @@ use super::pages::CachePages;
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
-use crate::schedule::Pass;
 
 /// What kernels read and write.
 pub struct Buffers {
@@ -17,8 +16,8 @@ pub struct Buffers {
     pub cache: CachePages,
     /// Textures and materials.
     pub texels: Texels,
-    /// Rays and hits, by [`Pass`].
-    pub passes: [RayBuffers; 2],
+    /// Rays and hits, by their set ([`crate::schedule::Pass::set`]).
+    pub sets: [RayBuffers; 3],
     /// What shading keeps per pixel.
     pub pixels: PixelBuffers,
     /// Tiles and their lists.
@@ -35,16 +34,16 @@ pub struct Buffers {
 pub struct Groups {
     /// 0: the scene.
     pub scene: wgpu::BindGroup,
-    /// 1: parameters and rays, by [`Pass`].
-    pub rays: [wgpu::BindGroup; 2],
+    /// 1: parameters and rays, by their set.
+    pub rays: [wgpu::BindGroup; 3],
     /// 2: the cache.
     pub cache: wgpu::BindGroup,
     /// 2 of kernels that do not read the cache.
     pub empty: wgpu::BindGroup,
     /// 3 of kernels that work on tiles.
     pub tiles: wgpu::BindGroup,
-    /// 3 of kernels that shade.
-    pub shading: wgpu::BindGroup,
+    /// 3 of kernels that shade the hits of sets 0 and 1.
+    pub shading: [wgpu::BindGroup; 2],
 }
 
 impl Groups {
@@ -53,7 +52,7 @@ impl Groups {
         let group = |label, layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries })
         };
-        let Buffers { scene, cache, texels, passes, pixels, tiles, demand, counters, params } = buffers;
+        let Buffers { scene, cache, texels, sets, pixels, tiles, demand, counters, params } = buffers;
         let params = wgpu::BindGroupEntry {
             binding: 0,
             resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -62,9 +61,9 @@ impl Groups {
                 size: std::num::NonZeroU64::new(size_of::<Params>() as u64),
             }),
         };
-        let rays = |pass: &RayBuffers| {
+        let rays = |set: &RayBuffers| {
             let mut entries = vec![params.clone()];
-            entries.extend(numbered([&pass.rays, &pass.hits, &pass.surfaces, demand, counters], 1));
+            entries.extend(numbered([&set.rays, &set.hits, &set.surfaces, demand, counters], 1));
             group("rays", &kernels.rays, &entries)
         };
         let tile_buffers = [
@@ -76,27 +75,24 @@ impl Groups {
             &tiles.pairs,
             &tiles.pair_rays,
         ];
-        let primary = &passes[Pass::Primary as usize];
-        let fixed = [
-            &texels.materials,
-            &texels.textures,
-            &pixels.gbuffer,
-            &pixels.radiance,
-            &primary.rays,
-            &primary.hits,
-            &primary.surfaces,
-        ];
-        let mut shading = numbered(fixed, 0);
-        shading.extend(numbered(filled(&texels.pages, kernels.pages.texels), TEXEL_BINDING));
+        let shading = |set: usize| {
+            let RayBuffers { rays, hits, surfaces } = &sets[set];
+            let (gbuffer, radiance) = (&pixels.gbuffers[set], &pixels.radiance);
+            let fixed =
+                [&texels.materials, &texels.textures, gbuffer, radiance, rays, hits, surfaces, &pixels.throughput];
+            let mut entries = numbered(fixed, 0);
+            entries.extend(numbered(filled(&texels.pages, kernels.pages.texels), TEXEL_BINDING));
+            group("shading", &kernels.shading, &entries)
+        };
         // Each page of the cache as vectors and as words.
         let cache = filled(cache.pages(), kernels.pages.cache).flat_map(|page| [page, page]);
         Self {
             scene: group("scene", &kernels.scene, &numbered(scene.buffers(), 0)),
-            rays: [rays(&passes[0]), rays(&passes[1])],
+            rays: [rays(&sets[0]), rays(&sets[1]), rays(&sets[2])],
             cache: group("cache", &kernels.cache, &numbered(cache, 0)),
             empty: group("none", &kernels.none, &[]),
             tiles: group("tiles", &kernels.tiles, &numbered(tile_buffers, 0)),
-            shading: group("shading", &kernels.shading, &shading),
+            shading: [shading(0), shading(1)],
         }
     }
 }

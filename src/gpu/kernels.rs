@@ -59,11 +59,16 @@ type Specialisation = (&'static str, &'static str, Groups, &'static [(&'static s
 const SPECIALISATIONS: &[Specialisation] = &[
     ("generate_primary", "generate_primary", Groups::Tiles, &[]),
     ("generate_shadow", "generate_shadow", Groups::Shading, &[]),
+    ("generate_around", "generate_occlusion", Groups::Shading, &[("LIMITED", 1.0)]),
+    ("generate_around", "generate_diffuse", Groups::Shading, &[("LIMITED", 0.0)]),
+    ("generate_mirror", "generate_mirror", Groups::Shading, &[]),
     ("start_hits", "start_hits", Groups::Tiles, &[]),
     ("clear_gbuffer", "clear_gbuffer", Groups::Shading, &[]),
     ("hit_demand", "hit_demand", Groups::Tiles, &[]),
     ("resolve", "resolve", Groups::CacheShading, &[]),
     ("shade", "shade", Groups::Shading, &[]),
+    ("add_light", "add_light", Groups::Shading, &[]),
+    ("add_occlusion", "add_occlusion", Groups::Shading, &[]),
     ("tile_bounds", "tile_bounds", Groups::Tiles, &[]),
     ("tile_walk", "tile_walk_count", Groups::Tiles, &[("WRITE", 0.0)]),
     ("tile_walk", "tile_walk_write", Groups::Tiles, &[("WRITE", 1.0)]),
@@ -97,7 +102,7 @@ impl Kernels {
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write]);
         let cache = layout(device, "cache", &vec![Read; 2 * pages.cache]);
         let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write]);
-        let shading = shading_layout(device, &[Read, Read, Write, Write, Write, Write, Write], pages.texels);
+        let shading = shading_layout(device, &[Read, Read, Write, Write, Write, Write, Write, Write], pages.texels);
         let none = layout(device, "none", &[]);
         let mut pipelines = HashMap::new();
         let mut layouts = HashMap::new();

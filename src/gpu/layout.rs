@@ -8,8 +8,10 @@ pub use bricks::{BRICK_INDEX32, BRICK_WIDE, INSTANCE_IDENTITY, NO_NORMAL, NONE};
 
 pub const PARAM_ANY_HIT: u32 = 1;
 pub const PARAM_NEEDED: u32 = 2;
-/// Bit of [`Params::flags`] for the kernel `shade`: the pass's hits are shadow rays.
-pub const SHADE_SHADOWS: u32 = 4;
+pub const PARAM_SUN: u32 = 4;
+pub const PARAM_SKY: u32 = 8;
+pub const PARAM_BOUNCE: u32 = 16;
+pub const PARAM_RECTANGLE: u32 = 32;
 pub const STATE_GEOMETRY: u32 = 1;
 pub const STATE_DONE: u32 = 2;
 pub const STATE_BATCH: u32 = 4;
@@ -47,6 +49,8 @@ mirror! {
         sample: u32, seed: u32, instance_pad: f32, sun_radius: f32,
         origin: [f32; 4], base: [f32; 4], step_x: [f32; 4], step_y: [f32; 4],
         sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
+        lamp_corner: [f32; 4], lamp_u: [f32; 4], lamp_v: [f32; 4], lamp_color: [f32; 4], around: [f32; 4],
+        share: f32, surface_share: f32, length: f32, stream: u32,
         pair_count: u32, padding0: u32, padding1: u32, padding2: u32,
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

@@ -1,4 +1,4 @@
-//! Buffers of a pass: rays and hits of both passes, tiles and their lists, the G-buffer.
+//! Buffers of a frame: rays and hits of all sets, tiles and their lists, what shading keeps.
 
 use super::device::Gpu;
 use super::layout;
@@ -37,7 +37,7 @@ impl Extent {
     }
 }
 
-/// Rays, hits and surfaces of one pass.
+/// Rays, hits and surfaces of one set.
 pub struct RayBuffers {
     /// [`layout::Ray`]s.
     pub rays: wgpu::Buffer,
@@ -69,10 +69,12 @@ pub struct TileBuffers {
 
 /// What shading keeps per pixel.
 pub struct PixelBuffers {
-    /// [`layout::GBuffer`].
-    pub gbuffer: wgpu::Buffer,
+    /// [`layout::GBuffer`] of the hits of sets 0 and 1.
+    pub gbuffers: [wgpu::Buffer; 2],
     /// Radiance summed over samples.
     pub radiance: wgpu::Buffer,
+    /// Share of the light that the rays of set 1 bring.
+    pub throughput: wgpu::Buffer,
 }
 
 /// A storage buffer of `count` elements that can be written from and copied to the host.
@@ -115,11 +117,13 @@ impl TileBuffers {
 }
 
 impl PixelBuffers {
-    /// For `rays` pixels.
-    pub fn new(gpu: &Gpu, rays: usize) -> Self {
+    /// For `rays` pixels, of which `bounces` have rays in set 1 whose hits are shaded.
+    pub fn new(gpu: &Gpu, rays: usize, bounces: usize) -> Self {
+        let gbuffer = |count| storage(gpu, "gbuffer", count, size_of::<layout::GBuffer>());
         Self {
-            gbuffer: storage(gpu, "gbuffer", rays, size_of::<layout::GBuffer>()),
+            gbuffers: [gbuffer(rays), gbuffer(bounces)],
             radiance: storage(gpu, "radiance", rays, 16),
+            throughput: storage(gpu, "throughput", bounces, 16),
         }
     }
 }

@@ -1,16 +1,16 @@
 //! The frame loop.
 
-use super::{Light, camera_view};
+use super::pass_record::FrameRecords;
+use super::{Effects, Light, camera_view};
 use crate::gpu::executor::GpuExecutor;
 use crate::gpu::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{Executor, ExecutorError, Pass, PassStats, Step, attributes, chc, plain};
+use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Shading, Step, attributes, chc, plain};
 use crate::stats::Record;
 use bricks::SceneFile;
 use std::sync::Arc;
-use std::time::Instant;
 use thiserror::Error;
 
 /// Which schedule traces a pass.
@@ -27,8 +27,8 @@ pub enum Schedule {
 pub struct RenderSettings {
     /// The schedule of every pass.
     pub schedule: Schedule,
-    /// Whether sun shadows are traced.
-    pub shadows: bool,
+    /// What is traced beside camera rays.
+    pub effects: Effects,
     /// Samples a pixel.
     pub samples: u32,
     /// Seed of all random numbers.
@@ -98,31 +98,28 @@ impl Renderer {
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
         let mut output = FrameOutput::default();
-        let mut primary = PassRecord::new(frame, "primary");
-        let mut shadow = PassRecord::new(frame, "shadow");
+        let mut records = FrameRecords::new(frame);
+        let effects = self.settings.effects;
         for sample in 0..self.settings.samples {
             let seed = self.settings.seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9));
-            let view = camera_view(self.scene.resident(), camera, &self.light, self.size, sample, seed);
+            let view = camera_view(self.scene.resident(), camera, &self.light, &effects, self.size, sample, seed);
             self.executor.begin_frame(&view);
-            primary.measure(self, |r, stats| {
+            records.pass(self, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, stats)?;
-                attributes::resolve(&mut r.executor, &mut r.cache, stats)
+                attributes::resolve(&mut r.executor, &mut r.cache, Pass::Primary, stats)?;
+                let sky = effects.occlusion.is_none() && effects.diffuse.is_none();
+                r.shade(Pass::Shadow(Lamp::Sun), Shading { sun: !effects.shadow, sky }, stats)
             })?;
-            if self.settings.shadows {
-                shadow.measure(self, |r, stats| {
-                    r.trace(frame, Pass::Shadow, stats)?;
-                    let steps = [Step::QueryHits, Step::Shade { shadows: true }];
-                    let report = r.executor.run(Pass::Shadow, &steps, &r.cache.states)?;
-                    stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.0));
-                    stats.add(report);
-                    Ok(())
-                })?;
-            } else {
-                primary.measure_more(self, |r, stats| {
-                    let report = r.executor.run(Pass::Shadow, &[Step::Shade { shadows: false }], &r.cache.states)?;
-                    stats.add(report);
-                    Ok(())
-                })?;
+            self.light(&mut records, "primary", "shadow", Pass::Shadow)?;
+            let directions = |count: u32| sample * count..(sample + 1) * count;
+            for index in directions(effects.occlusion.map_or(0, |occlusion| occlusion.rays)) {
+                records.pass(self, "ao", |r, stats| r.trace_and_add(frame, Pass::Occlusion(index), stats))?;
+            }
+            for index in directions(effects.diffuse.unwrap_or(0)) {
+                self.bounce(&mut records, "diffuse", "diffuse-shadow", Pass::Diffuse(index))?;
+            }
+            if effects.mirror {
+                self.bounce(&mut records, "mirror", "mirror-shadow", Pass::Mirror)?;
             }
             if sample == 0 && self.settings.aov {
                 self.read_aovs(view.frame.unit, &mut output.pixels)?;
@@ -130,11 +127,68 @@ impl Renderer {
         }
         let radiance = self.executor.read_radiance()?;
         output.pixels.radiance = radiance.iter().map(|c| [c[0] / c[3], c[1] / c[3], c[2] / c[3]]).collect();
-        output.records.push(primary.finish(self));
-        if self.settings.shadows {
-            output.records.push(shadow.finish(self));
-        }
+        output.records = records.finish(self);
         Ok(output)
+    }
+
+    /// Traces rays from primary hits whose own hits are shaded, and lights those: `name` and `shadow` are the effects that it
+    /// counts for.
+    fn bounce(
+        &mut self,
+        records: &mut FrameRecords,
+        name: &'static str,
+        shadow: &'static str,
+        pass: Pass,
+    ) -> Result<(), ExecutorError> {
+        let (frame, effects) = (records.frame(), self.settings.effects);
+        records.pass(self, name, |r, stats| {
+            r.trace(frame, pass, stats)?;
+            attributes::resolve(&mut r.executor, &mut r.cache, pass, stats)?;
+            let sky = pass == Pass::Mirror;
+            r.shade(Pass::BounceShadow(Lamp::Sun), Shading { sun: !effects.shadow, sky }, stats)
+        })?;
+        self.light(records, name, shadow, Pass::BounceShadow)
+    }
+
+    /// Lights the hits that the passes `of_lamp` start from by all lamps, with shadows if they are on. The sun without shadows
+    /// has been added before.
+    fn light(
+        &mut self,
+        records: &mut FrameRecords,
+        name: &'static str,
+        shadow: &'static str,
+        of_lamp: impl Fn(Lamp) -> Pass,
+    ) -> Result<(), ExecutorError> {
+        let frame = records.frame();
+        let lamps = [Some(Lamp::Sun), self.light.rectangle.map(|_| Lamp::Rectangle)];
+        for lamp in lamps.into_iter().flatten() {
+            let pass = of_lamp(lamp);
+            if self.settings.effects.shadow {
+                records.pass(self, shadow, |r, stats| r.trace_and_add(frame, pass, stats))?;
+            } else if lamp == Lamp::Rectangle {
+                records.more(self, name, |r, stats| {
+                    stats.add(r.executor.run(pass, &[Step::Generate, Step::AddLight], &r.cache.states)?);
+                    Ok(())
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Traces any-hit rays, notes the bricks that were hit, and adds the light that comes through.
+    fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
+        self.trace(frame, pass, stats)?;
+        let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
+        let report = self.executor.run(pass, &[Step::QueryHits, add], &self.cache.states)?;
+        stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.0));
+        stats.add(report);
+        Ok(())
+    }
+
+    /// Shades the hits of the set before that of `pass`.
+    fn shade(&mut self, pass: Pass, light: Shading, stats: &mut PassStats) -> Result<(), ExecutorError> {
+        stats.add(self.executor.run(pass, &[Step::Shade(light)], &self.cache.states)?);
+        Ok(())
     }
 
     /// Traces the generated rays of a pass by the schedule in force.
@@ -173,50 +227,4 @@ fn depth(ray: &Ray, hit: &Hit, unit: f64) -> f32 {
     }
     let length = ray.direction.iter().map(|&d| f64::from(d) * f64::from(d)).sum::<f64>().sqrt();
     (f64::from(hit.t) * length * unit) as f32
-}
-
-/// Collects the statistics of one effect of a frame over its samples.
-struct PassRecord {
-    frame: u32,
-    name: &'static str,
-    stats: PassStats,
-    resident_start: Option<u64>,
-    resident_end: u64,
-}
-
-impl PassRecord {
-    fn new(frame: u32, name: &'static str) -> Self {
-        Self { frame, name, stats: PassStats::default(), resident_start: None, resident_end: 0 }
-    }
-
-    fn measure(
-        &mut self,
-        renderer: &mut Renderer,
-        work: impl FnOnce(&mut Renderer, &mut PassStats) -> Result<(), ExecutorError>,
-    ) -> Result<(), ExecutorError> {
-        self.resident_start.get_or_insert(renderer.cache.residency.resident().count() as u64);
-        renderer.cache.begin_pass(self.name, self.frame);
-        self.measure_more(renderer, work)
-    }
-
-    fn measure_more(
-        &mut self,
-        renderer: &mut Renderer,
-        work: impl FnOnce(&mut Renderer, &mut PassStats) -> Result<(), ExecutorError>,
-    ) -> Result<(), ExecutorError> {
-        let start = Instant::now();
-        work(renderer, &mut self.stats)?;
-        self.stats.ms += start.elapsed().as_secs_f64() * 1e3;
-        self.resident_end = renderer.cache.residency.resident().count() as u64;
-        Ok(())
-    }
-
-    fn finish(self, renderer: &Renderer) -> Record {
-        let mut record = Record::of(self.frame, self.name, &self.stats);
-        record.cache_bytes = renderer.cache.residency.budget_bytes();
-        record.cache_used_bytes = renderer.cache.residency.used_bytes();
-        record.bricks_resident_start = self.resident_start.unwrap_or(0);
-        record.bricks_resident_end = self.resident_end;
-        record
-    }
 }

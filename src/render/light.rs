@@ -1,8 +1,19 @@
-//! Sun and sky.
+//! Sun, sky and the rectangular light.
 
 use glam::DVec3;
 
-/// A sun disc and a sky of one colour over a ground of another.
+/// A parallelogram that shines evenly to one side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RectangleLight {
+    /// A corner, world units.
+    pub corner: DVec3,
+    /// The edges that start there, world units. It shines to the side of `edges[0]` x `edges[1]`.
+    pub edges: [DVec3; 2],
+    /// Its radiance, linear.
+    pub radiance: [f32; 3],
+}
+
+/// A sun disc and a sky of one colour over a ground of another, and perhaps a rectangular light, which is not seen itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// Unit vector toward the sun, world space.
@@ -15,6 +26,8 @@ pub struct Light {
     pub sky_color: [f32; 3],
     /// Radiance of the ground, linear.
     pub ground_color: [f32; 3],
+    /// The rectangular light.
+    pub rectangle: Option<RectangleLight>,
 }
 
 impl Light {
@@ -27,6 +40,7 @@ impl Light {
             sun_color: scaled([0.60, 0.56, 0.48], sun_intensity),
             sky_color: scaled([1.15, 1.55, 2.20], sky_intensity),
             ground_color: scaled([0.75, 0.69, 0.60], sky_intensity),
+            rectangle: None,
         }
     }
 }

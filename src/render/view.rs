@@ -1,7 +1,8 @@
 //! What the device gets to know of a camera and the lights.
 
-use super::Light;
-use crate::gpu::executor::View;
+use super::effects::SURFACE_SHARE;
+use super::{Effects, Light};
+use crate::gpu::executor::{Directions, View};
 use crate::gpu::layout::Params;
 use crate::gpu::scene::Frame;
 use crate::math::sampling::halton;
@@ -23,6 +24,7 @@ pub fn camera_view(
     resident: &Resident,
     camera: &Camera,
     light: &Light,
+    effects: &Effects,
     (width, height): (u32, u32),
     sample: u32,
     seed: u32,
@@ -34,6 +36,11 @@ pub fn camera_view(
     let color = |c: [f32; 3]| [c[0], c[1], c[2], 0.0];
     let origin = frame.point(camera.position);
     let centre = basis.direction(f64::from(width) / 2.0, f64::from(height) / 2.0);
+    let length = |d: DVec3| vec4(d / frame.unit, 0.0);
+    let [lamp_corner, lamp_u, lamp_v, lamp_color] = light.rectangle.map_or([[0.0; 4]; 4], |lamp| {
+        let [x, y, z] = frame.point(lamp.corner);
+        [[x, y, z, 0.0], length(lamp.edges[0]), length(lamp.edges[1]), color(lamp.radiance)]
+    });
     let params = Params {
         origin: [origin[0], origin[1], origin[2], 0.0],
         base: vec4(basis.b, 0.0),
@@ -45,9 +52,20 @@ pub fn camera_view(
         sky_color: color(light.sky_color),
         ground_color: color(light.ground_color),
         jitter: [jx, jy, 0.0, 0.0],
+        lamp_corner,
+        lamp_u,
+        lamp_v,
+        lamp_color,
+        surface_share: if effects.mirror { SURFACE_SHARE } else { 1.0 },
         sample,
         seed,
         ..Params::default()
     };
-    View { frame, params }
+    let directions = Directions {
+        occlusion: effects.occlusion.map_or(0, |occlusion| occlusion.rays),
+        occlusion_length: effects.occlusion.map_or(0.0, |occlusion| (occlusion.length / frame.unit) as f32),
+        diffuse: effects.diffuse.unwrap_or(0),
+        turn: effects.turn_degrees.to_radians(),
+    };
+    View { frame, params, directions }
 }

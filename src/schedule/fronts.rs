@@ -11,14 +11,20 @@ use super::pair_tree::{Front, PairTree};
 use super::{Executor, ExecutorError, Pass, PassStats, Step};
 use crate::stream::Item;
 use bricks::{Resident, TopNode2};
+use std::collections::BTreeMap;
 
 /// Visible pairs are queried again every so many frames (CHC+RT §5.1, n).
 const REQUERY_FRAMES: u32 = 3;
 
-/// The fronts of both passes, kept from frame to frame.
+/// Most bytes of all fronts together. Those not used for longest are given up first; they grow anew from the root.
+pub const FRONT_BYTES: usize = 256 << 20;
+
+/// The fronts of all passes, kept from frame to frame: one a direction, one for all shadow rays of a set of hits.
 #[derive(Clone, Debug, Default)]
 pub struct Fronts {
-    trees: [Option<PairTree>; 2],
+    /// By [`Pass::visibility_state`], with the number of the pass that used them last.
+    trees: BTreeMap<Pass, (PairTree, u64)>,
+    passes: u64,
 }
 
 /// What stays the same over a pass.
@@ -50,11 +56,14 @@ impl Fronts {
     ) -> Result<(), ExecutorError> {
         let (width, height, tile) = setup.extent;
         let top = &setup.resident.top2;
-        let slot = &mut self.trees[setup.pass as usize];
-        if !slot.as_ref().is_some_and(|t| t.fits(width, height, tile)) {
-            *slot = None;
+        let state = setup.pass.visibility_state();
+        self.passes += 1;
+        self.bound(FRONT_BYTES);
+        let (tree, used) = self.trees.entry(state).or_insert_with(|| (PairTree::new(width, height, tile), 0));
+        *used = self.passes;
+        if !tree.fits(width, height, tile) {
+            *tree = PairTree::new(width, height, tile);
         }
-        let tree = slot.get_or_insert_with(|| PairTree::new(width, height, tile));
         let resident_before = cache.resident_geometry();
 
         // Phase 1: what was visible, of what is resident.
@@ -113,6 +122,17 @@ impl Fronts {
         self.finish(executor, cache, setup, &resident_before, stats)
     }
 
+    /// Gives up fronts, those not used for longest first, until they take at most `bytes`.
+    fn bound(&mut self, bytes: usize) {
+        let mut all: usize = self.trees.values().map(|(tree, _)| tree.bytes()).sum();
+        while all > bytes {
+            let Some(oldest) = self.trees.iter().min_by_key(|(_, (_, used))| *used).map(|(&state, _)| state) else {
+                return;
+            };
+            all -= self.trees.remove(&oldest).map_or(0, |(tree, _)| tree.bytes());
+        }
+    }
+
     /// Lazy queries of the visible front against final hits, pull-up, and the statistics of the fronts.
     fn finish(
         &mut self,
@@ -122,7 +142,7 @@ impl Fronts {
         resident_before: &[bool],
         stats: &mut PassStats,
     ) -> Result<(), ExecutorError> {
-        let Some(tree) = &mut self.trees[setup.pass as usize] else { return Ok(()) };
+        let Some((tree, _)) = self.trees.get_mut(&setup.pass.visibility_state()) else { return Ok(()) };
         let due: Vec<u32> = tree
             .leaves()
             .into_iter()

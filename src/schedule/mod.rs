@@ -19,4 +19,4 @@ mod states;
 mod types;
 
 pub use states::BrickStates;
-pub use types::{Executor, ExecutorError, Load, PairQuery, Pass, PassStats, Report, Step};
+pub use types::{Executor, ExecutorError, Lamp, Load, PairQuery, Pass, PassStats, Report, Shading, Step};

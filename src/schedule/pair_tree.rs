@@ -67,6 +67,11 @@ impl PairTree {
         Self { pairs: vec![root], free: [Vec::new(), Vec::new()], tiles_x, tiles_y, tile, width, height }
     }
 
+    /// Bytes it takes.
+    pub fn bytes(&self) -> usize {
+        self.pairs.capacity() * size_of::<Pair>() + self.free.iter().map(|free| 4 * free.capacity()).sum::<usize>()
+    }
+
     /// A pair.
     pub fn pair(&self, index: u32) -> &Pair {
         &self.pairs[index as usize]

@@ -4,19 +4,64 @@ use super::BrickStates;
 use crate::stream::{Item, Slot};
 use thiserror::Error;
 
-/// The rays that a step works on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// What shadow rays lead to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Lamp {
+    /// A point of the sun's disc.
+    Sun,
+    /// A point of the rectangular light.
+    Rectangle,
+}
+
+/// The rays that a step works on. One pass has one ray a pixel at most.
+///
+/// Rays lie in *sets*: set 0 are camera rays, set 1 what starts at their hits, set 2 what starts at the hits of set 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Pass {
     /// Camera rays, or rays given from outside: closest hit.
     Primary,
-    /// Rays from primary hits to the sun, or rays given from outside: any hit.
-    Shadow,
+    /// Rays from primary hits to a lamp, or rays given from outside: any hit.
+    Shadow(Lamp),
+    /// Rays of limited length from primary hits, in the direction of this number around the normal: any hit.
+    Occlusion(u32),
+    /// Rays from primary hits in the direction of this number around the normal: closest hit.
+    Diffuse(u32),
+    /// Mirrored camera rays from primary hits: closest hit.
+    Mirror,
+    /// Rays from the hits of set 1 to a lamp: any hit.
+    BounceShadow(Lamp),
+}
+
+impl Pass {
+    /// Number of the set that the rays lie in.
+    pub fn set(self) -> usize {
+        match self {
+            Pass::Primary => 0,
+            Pass::Shadow(_) | Pass::Occlusion(_) | Pass::Diffuse(_) | Pass::Mirror => 1,
+            Pass::BounceShadow(_) => 2,
+        }
+    }
+
+    /// Whether any hit ends a ray.
+    pub fn is_any_hit(self) -> bool {
+        matches!(self, Pass::Shadow(_) | Pass::Occlusion(_) | Pass::BounceShadow(_))
+    }
+
+    /// The pass whose visibility from the frame before stands for this one's: each direction has one of its own, shadow rays
+    /// share one (CHC+RT §5.4).
+    pub fn visibility_state(self) -> Pass {
+        match self {
+            Pass::Shadow(_) => Pass::Shadow(Lamp::Sun),
+            Pass::BounceShadow(_) => Pass::BounceShadow(Lamp::Sun),
+            own => own,
+        }
+    }
 }
 
 /// A kernel, or a few that belong together, run over all rays or tiles of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Fill the pass's rays from the camera, or from the primary hits.
+    /// Fill the pass's rays from the camera, or from the hits of the set before.
     Generate,
     /// Start the hits of rays given from outside.
     StartHits,
@@ -38,15 +83,25 @@ pub enum Step {
     QueryNeeded,
     /// Ask which bricks hold a final hit of the pass.
     QueryHits,
-    /// Empty the G-buffer.
+    /// Empty the G-buffer of the set before the pass's.
     ClearAttributes,
-    /// Read the attributes that are resident.
+    /// Read the attributes of the hits of the set before, where they are resident.
     Resolve,
-    /// Shade the primary hits; with the shadow rays of the pass when `shadows`.
-    Shade {
-        /// Whether the shadow pass has been traced.
-        shadows: bool,
-    },
+    /// Add what the hits of the set before show by themselves, and the sky where they missed.
+    Shade(Shading),
+    /// Add the light of the pass's lamp where its shadow ray went free.
+    AddLight,
+    /// Add the share of the sky's light that the pass's direction stands for, where its ray went free.
+    AddOcclusion,
+}
+
+/// Light that [`Step::Shade`] adds to hits beside their emission.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Shading {
+    /// The sun's, unshadowed.
+    pub sun: bool,
+    /// The sky's, unshadowed.
+    pub sky: bool,
 }
 
 /// A query pair: a rectangle of rays and a node of the binary top-level tree.

@@ -7,12 +7,12 @@
 use super::rays::{RAYS, rays};
 use super::twin::{Twin, closest};
 use super::{Check, no_results, scene};
-use crate::gpu::executor::{GpuExecutor, Setup, View};
+use crate::gpu::executor::{Directions, GpuExecutor, Setup, View};
 use crate::gpu::layout::{Hit, NONE, Params, Ray, Surface};
 use crate::gpu::rays::Extent;
 use crate::gpu::scene::Frame;
 use crate::schedule::cache::{BrickBytes, Cache};
-use crate::schedule::{ExecutorError, Pass, PassStats, Step, chc, plain};
+use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, chc, plain};
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, Workers};
 use bricks::SceneFile;
 use glam::DVec3;
@@ -76,7 +76,7 @@ fn trace(
     let setup = Setup { extent: EXTENT, threshold: 0, count: false };
     let (gpu, kernels) = (executor.gpu().clone(), executor.kernels().clone());
     let mut executor = GpuExecutor::with_kernels(gpu, kernels, scene, workers, &page_sizes, setup)?;
-    executor.begin_frame(&View { frame, params: Params::default() });
+    executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let mut run = |name, pass, list: bool| -> Result<Traced, ExecutorError> {
         executor.set_rays(pass, rays);
         cache.begin_pass("probe", 0);
@@ -88,8 +88,8 @@ fn trace(
     Ok([
         run("intersect_list (closest hit)", Pass::Primary, true)?,
         run("intersect_all (closest hit)", Pass::Primary, false)?,
-        run("intersect_list (any hit)", Pass::Shadow, true)?,
-        run("intersect_all (any hit)", Pass::Shadow, false)?,
+        run("intersect_list (any hit)", Pass::Shadow(Lamp::Sun), true)?,
+        run("intersect_all (any hit)", Pass::Shadow(Lamp::Sun), false)?,
     ])
 }
 

@@ -1,0 +1,20 @@
+// Adds the share of the sky's light that the pass's direction stands for, where its ray went free.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/shading.wgsl"
+#include "shared/light.wgsl"
+
+// One thread a pixel.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let ray = rays[index];
+    if !(ray.t_min <= ray.t_max) || hits[index].id != NONE {
+        return;
+    }
+    let g = gbuffer[index];
+    add_light(index, surface_share() * params.share * g.albedo * ambient(g.normal));
+}
