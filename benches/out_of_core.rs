@@ -41,7 +41,7 @@ fn main() {
         common::brickwalk("scene city", &[Path::new("-o"), &scene], &words);
     }
     let mut text = String::new();
-    let head = summary(&walk(&options, &scene, "near", "--cache 20% --measure-needed", "cold"));
+    let head = summary(&walk(&options, &scene, "near", "--cache 20% --measure-needed --schedule chc", "cold"));
     let _ = writeln!(text, "# City of {} triangles, {}, {} frames\n", options.triangles, options.size, options.frames);
     let _ = writeln!(
         text,

@@ -1,5 +1,5 @@
 // Intersects each ray with the whole scene, all of it resident: the baseline. One flat loop over the wide top-level tree
-// and, through copies of the bricks' roots in its leaves, the bricks.
+// and, through copies of the bricks' roots in its leaves, the bricks. With SELECT it passes by what is not in the wanted state.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/cache.wgsl"
@@ -8,6 +8,8 @@
 #include "shared/leaf.wgsl"
 #include "shared/brick.wgsl"
 #include "shared/walk_brick.wgsl"
+
+override SELECT: bool = false;
 
 // A group of the top level: the node, and its entered children, inner ones and leaves alike, by priority in the high byte,
 // so that bricks are met near to far.
@@ -39,6 +41,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let any_hit = (params.flags & PARAM_ANY_HIT) != 0u;
     let before = hits[index];
+    if SELECT && ((any_hit && before.id != NONE) || ((params.flags & PARAM_PENDING) != 0u && surfaces[index].pending == 0u)) {
+        return;
+    }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
     var r: BrickRay;
@@ -83,6 +88,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
         } else {
             let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
+            if SELECT && (slots[leaves[leaf].brick].state & params.select_mask) != params.select_want {
+                group = vec2<u32>(0u);
+                continue;
+            }
             floor = depth;
             in_brick = true;
             enter_leaf(&r, world, leaf);

@@ -44,6 +44,11 @@ fn frames_are_byte_identical_whatever_the_cache_and_schedule() {
         "--schedule chc --cache 100% --fronts on".to_string(),
         "--schedule chc --cache 20% --fronts on --tile 16".to_string(),
         format!("--schedule chc --cache {least} --fronts on --host-cache 0"),
+        "--schedule demand --cache 100%".to_string(),
+        "--schedule demand --cache 5% --evict lru".to_string(),
+        format!("--schedule demand --cache {least}"),
+        "--schedule auto --cache 20%".to_string(),
+        "--schedule auto --cache 100%".to_string(),
     ];
     for (i, options) in variants.iter().enumerate() {
         assert!(run(&format!("variant{i}"), options) == truth, "{options}: frames differ from plain");
@@ -54,19 +59,51 @@ fn frames_are_byte_identical_whatever_the_cache_and_schedule() {
 }
 
 #[test]
+fn effects_do_not_depend_on_the_cache() {
+    let folder = folder();
+    let scene = city(folder.path(), "60K", "1K");
+    let effects = "--effects shadow,ao,diffuse,mirror --ao-rays 2 --ao-length 4 --diffuse-rays 2 \
+                   --rect-light -2,6,-2,4,0,0,0,0,4 --rotation full";
+    let view = near(&scene).replace("--frames 3", "--frames 2");
+    let run = |name: &str, options: &str| {
+        let output = folder.path().join(name);
+        walk(&scene, &output, &format!("{view} {effects} {options}"));
+        frames(&output)
+    };
+    let truth = run("plain", "--schedule plain --cache 100%");
+    assert_eq!(truth.len(), 4, "two frames, PNG and EXR");
+    let least = least_cache(&scene, &folder.path().join("refused"));
+    let variants = [
+        "--schedule chc --cache 20% --tile 16".to_string(),
+        format!("--schedule chc --cache {least} --evict lru"),
+        "--schedule chc --cache 20% --fronts on".to_string(),
+        format!("--schedule demand --cache {least}"),
+        "--schedule demand --cache 100%".to_string(),
+        "--schedule auto --cache 20%".to_string(),
+    ];
+    for (i, options) in variants.iter().enumerate() {
+        assert!(run(&format!("variant{i}"), options) == truth, "{options}: frames differ from plain");
+    }
+    // Negative control: other directions give other pictures.
+    assert!(run("other", "--cache 20% --ao-length 3") != truth, "the length of occlusion rays must show");
+}
+
+#[test]
 fn ten_runs_are_one() {
     let folder = folder();
     let scene = city(folder.path(), "30K", "1K");
     let options = format!("{} --cache 20% --frames 1", near(&scene).replace("--frames 3", ""));
-    let mut first = None;
-    for run in 0..10 {
-        let output = folder.path().join(format!("run{run}"));
-        walk(&scene, &output, &options);
-        let counters = counters(&output);
-        let these = (frames(&output), counters);
-        match &first {
-            None => first = Some(these),
-            Some(first) => assert!(*first == these, "run {run} differs from run 0"),
+    for (schedule, runs) in [("chc", 10), ("demand", 3)] {
+        let mut first = None;
+        for run in 0..runs {
+            let output = folder.path().join(format!("run{run}"));
+            walk(&scene, &output, &format!("{options} --schedule {schedule}"));
+            let counters = counters(&output);
+            let these = (frames(&output), counters);
+            match &first {
+                None => first = Some(these),
+                Some(first) => assert!(*first == these, "{schedule}: run {run} differs from run 0"),
+            }
         }
     }
 }

@@ -118,7 +118,7 @@ fn an_empty_scene_renders_background() {
     common::succeed(["convert", text(&input), "-o", text(&scene)]);
     common::succeed(["verify", text(&scene)]);
     common::succeed(["info", text(&scene)]);
-    for schedule in ["chc", "plain"] {
+    for schedule in ["chc", "demand", "plain", "auto"] {
         let out = folder.path().join(schedule);
         walk(&scene, &out, &format!("--frames 1 --size 32x16 --schedule {schedule}"));
         let image = image::open(out.join("frames/0000.png")).expect("a frame").to_rgb8();

@@ -13,6 +13,7 @@ use brickwalk::gpu::layout::{Hit, NONE, Ray, T_INFINITE};
 use brickwalk::gpu::rays::Extent;
 use brickwalk::gpu::scene::Frame;
 use brickwalk::reference::{Tally, Truth, TruthRay, Verdict, judge, judge_any};
+use brickwalk::render::Effects;
 use brickwalk::scene::path::{CameraPath, path_from_bounds};
 use brickwalk::schedule::{Lamp, Pass};
 use brickwalk_convert::build::{BuildSettings, build};
@@ -108,6 +109,57 @@ fn check_walk(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, si
     assert!(spoiled.mismatches * 2 > spoiled.total(), "the judge must notice wrong hits: {spoiled}");
 }
 
+/// Frames along a path with one effect after the other: every ray of the last direction, and of the shadows at what it hits.
+fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
+    let file = open_scene(scene).expect("the scene");
+    let truth = Truth::load(&file).expect("truth");
+    let light = "--rect-light 0,60,0,9,0,0,0,0,9 --rotation full --ao-rays 2 --diffuse-rays 2 --ao-length 5";
+    let words = format!("brickwalk walk s -o o {OPTIONS} {size} {light} --effects shadow,ao,diffuse,mirror");
+    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
+    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let session = Session::open(file.clone(), scene, &args.stream, extent).expect("a session");
+    let mut renderer = renderer(session, &args);
+    let all = renderer.settings.effects;
+    let none = Effects { shadow: false, occlusion: None, diffuse: None, mirror: false, ..all };
+    let cases = [
+        ("ao", Effects { occlusion: all.occlusion, ..none }, Pass::Occlusion(1)),
+        ("diffuse", Effects { diffuse: all.diffuse, shadow: true, ..none }, Pass::Diffuse(1)),
+        ("mirror", Effects { mirror: true, shadow: true, ..none }, Pass::Mirror),
+        ("rectangular light", Effects { shadow: true, ..none }, Pass::Shadow(Lamp::Rectangle)),
+    ];
+    for (effect, effects, pass) in cases {
+        renderer.settings.effects = effects;
+        let (mut tally, mut spoiled) = (Tally::default(), Tally::default());
+        for k in 0..args.frames {
+            let camera = path.frame(k, args.frames);
+            renderer.frame(k, &camera).expect("a frame");
+            let frame = Frame::near(file.resident(), camera.position);
+            let mut passes = vec![(Pass::Primary, pass)];
+            if effects.has_bounces() {
+                passes.push((pass, Pass::BounceShadow(Lamp::Rectangle)));
+            }
+            for (from, pass) in passes {
+                let starts = renderer.executor.read_hits(from).expect("hits");
+                let rays = renderer.executor.read_rays(pass).expect("rays");
+                let hits = renderer.executor.read_hits(pass).expect("hits");
+                let asked: Vec<(TruthRay, &Hit)> = (rays.iter().zip(&starts).zip(&hits))
+                    .filter(|((ray, _), _)| ray.t_min <= ray.t_max)
+                    .map(|((ray, from), hit)| (truth_ray(&frame, ray).excluding(from.id), hit))
+                    .collect();
+                let judged = |ray: &TruthRay, hit: Option<(u32, f64)>| {
+                    if pass.is_any_hit() { judge_any(&truth, ray, hit.is_some()) } else { judge(&truth, ray, hit) }
+                };
+                add(&mut tally, asked.par_iter().map(|(ray, hit)| judged(ray, found(hit))).collect());
+                // Control: what was hit is lost, and what was free is met.
+                let opposite = |hit: &Hit| if hit.id == NONE { Some((0, 1.0)) } else { None };
+                add(&mut spoiled, asked.iter().take(64).map(|(ray, hit)| judged(ray, opposite(hit))).collect());
+            }
+        }
+        report(&format!("{name}, {effect}"), &tally, 500, tally.total() as usize);
+        assert!(spoiled.mismatches * 2 > spoiled.total(), "the judge must notice wrong hits: {spoiled}");
+    }
+}
+
 /// Rays between random points of the scene's bounds, half of them aimed at points of triangles: inside, on edges, at vertices.
 fn check_trace(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, rays: usize) {
     let Command::Trace(args) =
@@ -189,6 +241,9 @@ fn rotated_overlapping_instances_are_exact() {
     let scene = made(folder.path(), rotated_instances(5), 256);
     assert!(open_scene(&scene).expect("the scene").resident().instances.len() > 8, "they stay instances");
     check("instances", &scene, "128x96", None, 8000);
+    let file = open_scene(&scene).expect("the scene");
+    let manifest = &file.resident().manifest;
+    check_effects("instances", &scene, "64x48", &path_from_bounds(manifest.min, manifest.max));
 }
 
 #[test]
@@ -196,6 +251,7 @@ fn a_city_of_500k_triangles_is_exact() {
     let folder = common::folder();
     let scene = common::city(folder.path(), "500K", "4K");
     let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
+    check_effects("city", &scene, "72x48", &path);
     check("city", &scene, "144x96", Some(path), 4000);
 }
 

@@ -230,10 +230,11 @@ pub struct StreamArgs {
     #[arg(long, value_name = "SIZE", default_value = "1G",
         value_parser = |s: &str| if s == "0" { Ok(0) } else { size_bytes(s) })]
     pub host_cache: u64,
-    /// How bricks to intersect are found: chc (tiles against the top level, loading what rays need), plain (everything
-    /// resident, one traversal per ray; the cache must hold the scene), auto (stands for chc in this
-    /// version)
-    #[arg(long, value_name = "NAME", default_value = "chc")]
+    /// How bricks to intersect are found: chc (tiles against the top level, loading what rays need), demand (one traversal per
+    /// ray over what is resident, loading what rays ask for), plain (everything resident, one traversal per ray; the cache
+    /// must hold the scene), auto (the cheapest of these by measurement, for each effect; chc with --fronts on or a
+    /// --query-threshold). Pictures are the same
+    #[arg(long, value_name = "NAME", default_value = "auto")]
     pub schedule: Schedule,
     /// Width and height of a screen tile in pixels, a power of two from 8 to 512
     #[arg(long, value_name = "PIXELS", default_value = "64", value_parser = tile)]
@@ -411,11 +412,13 @@ named_values! {
     Schedule {
         /// Tiles against the top level; loads what rays need.
         Chc = "chc",
+        /// One traversal per ray over what is resident; loads what rays ask for.
+        Demand = "demand",
         /// Everything resident, one traversal per ray.
         Plain = "plain",
         /// The cheaper one.
         Auto = "auto",
-    } later &["demand"]
+    } later &[]
 }
 
 named_values! {

@@ -104,7 +104,11 @@ impl Session {
                  {budget} bytes, or use --schedule chc"
             ),
             ScheduleArg::Plain => Schedule::Plain,
-            ScheduleArg::Chc | ScheduleArg::Auto => Schedule::Chc,
+            ScheduleArg::Chc => Schedule::Chc,
+            ScheduleArg::Demand => Schedule::Demand,
+            // Fronts and thresholds belong to chc; with a threshold the schedule shows in the picture.
+            ScheduleArg::Auto if args.fronts == "on" || args.query_threshold > 0 => Schedule::Chc,
+            ScheduleArg::Auto => Schedule::Auto,
         };
         let policy = if args.evict == "lru" { Policy::Lru } else { Policy::RoundRobin };
         let residency = Residency::new(&sizes, budget, page_bytes, policy).map_err(|error| match error {

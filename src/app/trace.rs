@@ -8,7 +8,7 @@ use crate::gpu::layout::{self, NONE, Params, T_INFINITE};
 use crate::gpu::rays::Extent;
 use crate::gpu::scene::Frame;
 use crate::render::Schedule;
-use crate::schedule::{Lamp, Pass, PassStats, Step, attributes, chc, plain};
+use crate::schedule::{Lamp, Pass, PassStats, Step, attributes, chc, demand, plain};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
@@ -147,6 +147,8 @@ fn trace_chunk(
     executor.set_rays(pass, &device);
     cache.begin_pass("trace", 0);
     let trace = match session.schedule {
+        // Rays that are given have nothing in common that tiles could use.
+        Schedule::Demand | Schedule::Auto => demand::trace,
         Schedule::Chc => chc::trace,
         Schedule::Plain => plain::trace,
     };

@@ -8,6 +8,7 @@ use crate::gpu::rays::Extent;
 use crate::render::{FrameOutput, Light, RenderSettings, Renderer};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
 use crate::stats::Record;
 use crate::stream::{BrickBox, Item, Prefetcher};
@@ -104,7 +105,7 @@ pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
     light.rectangle = args.light.rectangle();
     let fronts = (args.stream.fronts == "on").then(Fronts::default);
     let size = (args.size.width, args.size.height);
-    Renderer { scene, executor, cache, settings, light, size, tile: args.stream.tile, fronts }
+    Renderer { scene, executor, cache, settings, light, size, tile: args.stream.tile, fronts, auto: Auto::default() }
 }
 
 /// What watches the camera for `--prefetch`; `None` when that is off.

@@ -79,8 +79,8 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
     let params = directions.params(pass, params);
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
-    let kernel = |kernel, params, groups, phase| {
-        let cache = kernel == "intersect_list" || kernel == "intersect_all";
+    let kernel = |kernel: &'static str, params, groups, phase| {
+        let cache = kernel.starts_with("intersect");
         Dispatch { kernel, params, groups, cache, shading: false, phase }
     };
     let shading =
@@ -124,6 +124,19 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         Step::IntersectResident => intersect(not_done, resident, 0),
         Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, 2),
         Step::IntersectAll => vec![kernel("intersect_all", params, per_ray, Some(0))],
+        Step::IntersectAllResident => {
+            let params = Params { select_mask: not_done, select_want: resident, ..params };
+            vec![kernel("intersect_selected", params, per_ray, Some(0))]
+        }
+        Step::IntersectAllBatch => {
+            let (mask, flags) = (layout::STATE_BATCH, params.flags | layout::PARAM_PENDING);
+            let params = Params { select_mask: mask, select_want: mask, flags, ..params };
+            vec![kernel("intersect_selected", params, per_ray, Some(2))]
+        }
+        Step::QueryAll => {
+            let params = Params { select_mask: not_done, select_want: 0, ..params };
+            vec![kernel("query_all", params, per_ray, Some(1))]
+        }
         Step::QueryMissing => query(Params { select_mask: not_done, select_want: 0, ..params }, Some(1)),
         Step::QueryPairs => vec![kernel("query_pairs", params, across(params.pair_count), Some(1))],
         Step::QueryNeeded => {

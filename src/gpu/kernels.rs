@@ -79,13 +79,16 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("query_pairs", "query_pairs", Groups::Tiles, &[]),
     ("query_reduce", "query_reduce", Groups::Tiles, &[]),
     ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 0.0)]),
-    ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0)]),
+    ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 0.0)]),
+    ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0)]),
+    ("query_all", "query_all", Groups::Tiles, &[]),
 ];
 
 /// Specialisations that count nodes and triangles, made only when counting is asked for.
 const COUNTING: &[Specialisation] = &[
     ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 1.0)]),
-    ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 1.0)]),
+    ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 0.0)]),
+    ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0)]),
 ];
 
 impl Kernels {

@@ -12,6 +12,7 @@ pub const PARAM_SUN: u32 = 4;
 pub const PARAM_SKY: u32 = 8;
 pub const PARAM_BOUNCE: u32 = 16;
 pub const PARAM_RECTANGLE: u32 = 32;
+pub const PARAM_PENDING: u32 = 64;
 pub const STATE_GEOMETRY: u32 = 1;
 pub const STATE_DONE: u32 = 2;
 pub const STATE_BATCH: u32 = 4;
@@ -56,7 +57,7 @@ mirror! {
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
     struct Hit { t: f32, id: u32, u: f32, v: f32 }
     struct Surface {
-        point: [f32; 3], leaf: u32, normal: [f32; 3], triangle: u32, area: f32, source: u32, padding1: u32, padding2: u32,
+        point: [f32; 3], leaf: u32, normal: [f32; 3], triangle: u32, area: f32, source: u32, pending: u32, padding: u32,
     }
     struct TileBounds {
         origin_min: [f32; 3], t_min: f32, origin_max: [f32; 3], t_max: f32,

@@ -5,12 +5,14 @@ use super::{Effects, Light, camera_view};
 use crate::gpu::executor::GpuExecutor;
 use crate::gpu::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
+use crate::schedule::auto::{Auto, Fixed};
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Shading, Step, attributes, chc, plain};
+use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Shading, Step, attributes, chc, demand, plain};
 use crate::stats::Record;
 use bricks::SceneFile;
 use std::sync::Arc;
+use std::time::Instant;
 use thiserror::Error;
 
 /// Which schedule traces a pass.
@@ -18,8 +20,12 @@ use thiserror::Error;
 pub enum Schedule {
     /// Tile lists, queries, loads nearest first.
     Chc,
+    /// Every ray from the root over what is resident, then asking for what is missing.
+    Demand,
     /// Everything resident, every ray from the root.
     Plain,
+    /// The cheapest of these, pass by pass.
+    Auto,
 }
 
 /// How frames are rendered.
@@ -89,6 +95,8 @@ pub struct Renderer {
     pub tile: u32,
     /// The temporal fronts, when they are on.
     pub fronts: Option<Fronts>,
+    /// What [`Schedule::Auto`] has measured.
+    pub auto: Auto,
 }
 
 impl Renderer {
@@ -193,16 +201,41 @@ impl Renderer {
 
     /// Traces the generated rays of a pass by the schedule in force.
     fn trace(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
+        let fixed = match self.settings.schedule {
+            Schedule::Chc => Fixed::Chc,
+            Schedule::Demand => Fixed::Demand,
+            Schedule::Plain => Fixed::Plain,
+            Schedule::Auto => {
+                let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
+                let (start, ms_stream, rays) = (Instant::now(), stats.ms_stream, stats.report.rays);
+                self.trace_by(chosen, frame, pass, stats)?;
+                let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - ms_stream);
+                self.auto.note(pass, ms, stats.report.rays - rays);
+                return Ok(());
+            }
+        };
+        self.trace_by(fixed, frame, pass, stats)
+    }
+
+    fn trace_by(
+        &mut self,
+        schedule: Fixed,
+        frame: u32,
+        pass: Pass,
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
         let needed = self.settings.measure_needed;
         let first = [Step::Generate];
-        match (self.settings.schedule, &mut self.fronts) {
-            (Schedule::Plain, _) => plain::trace(&mut self.executor, &mut self.cache, pass, &first, needed, stats),
-            (Schedule::Chc, None) => chc::trace(&mut self.executor, &mut self.cache, pass, &first, needed, stats),
-            (Schedule::Chc, Some(fronts)) => {
+        let (executor, cache) = (&mut self.executor, &mut self.cache);
+        match (schedule, &mut self.fronts) {
+            (Fixed::Plain, _) => plain::trace(executor, cache, pass, &first, needed, stats),
+            (Fixed::Demand, _) => demand::trace(executor, cache, pass, &first, needed, stats),
+            (Fixed::Chc, None) => chc::trace(executor, cache, pass, &first, needed, stats),
+            (Fixed::Chc, Some(fronts)) => {
                 let resident = self.scene.resident();
                 let extent = (self.size.0, self.size.1, self.tile);
                 let setup = FrontPass { resident, extent, frame, pass, measure_needed: needed };
-                fronts.trace(&mut self.executor, &mut self.cache, &setup, &first, stats)
+                fronts.trace(executor, cache, &setup, &first, stats)
             }
         }
     }

@@ -31,15 +31,18 @@ pub fn trace(
         cache.touch(Item::geometry(brick));
     }
     stats.bricks_intersected.extend(resident);
-    load_and_intersect(executor, cache, pass, report, stats)?;
+    load_and_intersect(executor, cache, pass, &BATCH_STEPS, report, stats)?;
     if needed {
         measure_needed(executor, cache, pass, &[], &resident_before, stats)?;
     }
     Ok(())
 }
 
-/// Loads what the queries in `report` want, nearest first, a few at a time, each batch intersected and the rest asked for
-/// again, until nothing is wanted.
+/// Intersects a batch and asks again, by tiles' lists.
+pub const BATCH_STEPS: [Step; 2] = [Step::IntersectBatch, Step::QueryMissing];
+
+/// Loads what the queries in `report` want, nearest first, a few at a time; each batch is intersected and the rest asked for
+/// again by `steps`, until nothing is wanted.
 ///
 /// # Errors
 /// What the executor says.
@@ -47,6 +50,7 @@ pub fn load_and_intersect(
     executor: &mut dyn Executor,
     cache: &mut Cache,
     pass: Pass,
+    steps: &[Step],
     mut report: Report,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
@@ -60,7 +64,7 @@ pub fn load_and_intersect(
         let batch: Vec<u32> = items[..count].iter().map(|item| item.brick).collect();
         cache.states.set_batch(&batch);
         stats.bricks_intersected.extend(&batch);
-        report = executor.run(pass, &[Step::IntersectBatch, Step::QueryMissing], &cache.states)?;
+        report = executor.run(pass, steps, &cache.states)?;
     }
 }
 

@@ -6,7 +6,7 @@
 //! is only ever left out by a query against present hits, so the final hits are exact.
 
 use super::cache::Cache;
-use super::chc::{load_and_intersect, measure_needed};
+use super::chc::{BATCH_STEPS, load_and_intersect, measure_needed};
 use super::pair_tree::{Front, PairTree};
 use super::{Executor, ExecutorError, Pass, PassStats, Step};
 use crate::stream::Item;
@@ -117,7 +117,7 @@ impl Fronts {
         if !waiting.is_empty() {
             executor.set_lists(&lists(tree, top, &waiting))?;
             let report = executor.run(setup.pass, &[Step::QueryMissing], &cache.states)?;
-            load_and_intersect(executor, cache, setup.pass, report, stats)?;
+            load_and_intersect(executor, cache, setup.pass, &BATCH_STEPS, report, stats)?;
         }
         self.finish(executor, cache, setup, &resident_before, stats)
     }

@@ -10,8 +10,10 @@
 //! final hits are those of brute force whatever the cache holds.
 
 pub mod attributes;
+pub mod auto;
 pub mod cache;
 pub mod chc;
+pub mod demand;
 pub mod fronts;
 mod pair_tree;
 pub mod plain;

@@ -75,6 +75,12 @@ pub enum Step {
     IntersectBatch,
     /// Intersect everything, all of it resident, from the root.
     IntersectAll,
+    /// Intersect what is resident and not done, from the root: phase 1.
+    IntersectAllResident,
+    /// Intersect the rays that asked for a brick with the batch just loaded, from the root: phase 3.
+    IntersectAllBatch,
+    /// Ask ray by ray, from the root, which missing bricks are still wanted: phase 2.
+    QueryAll,
     /// Ask ray by ray which missing bricks are still wanted: phase 2.
     QueryMissing,
     /// Ask how many rays see each of the pairs set by [`Executor::set_pairs`]: phase 2 of the fronts.

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct Record {
     /// Frame, from 0.
     pub frame: u32,
-    /// `primary` or `shadow`.
+    /// The effect: `primary`, `shadow`, `ao`, `diffuse`, `diffuse-shadow`, `mirror`, `mirror-shadow`.
     pub pass: &'static str,
     /// Rays traced.
     pub rays: u64,

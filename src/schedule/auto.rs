@@ -1,0 +1,165 @@
+//! The schedule `auto`: of the fixed schedules the one that costs least, by measurement, for every kind of pass apart.
+//!
+//! Each candidate is tried in turn, and the cheapest stays; every so often one of the others has another try, because views
+//! change. All schedules find the same hits, so clocks may decide: they change times and counters, never pictures.
+
+use super::Pass;
+use std::collections::BTreeMap;
+
+/// Passes between two tries of a schedule that costs as much as the cheapest; of one that costs k times as much, k times as many.
+const RETRY_PASSES: f64 = 24.0;
+/// Weight of the newest measurement of a schedule's cost.
+const NEWEST: f64 = 0.5;
+
+/// A schedule that `auto` chooses from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fixed {
+    /// [`super::chc`].
+    Chc,
+    /// [`super::demand`].
+    Demand,
+    /// [`super::plain`].
+    Plain,
+}
+
+/// All of them.
+const ALL: [Fixed; 3] = [Fixed::Chc, Fixed::Demand, Fixed::Plain];
+
+/// What is known of the costs of one kind of pass.
+#[derive(Clone, Debug, Default)]
+struct Costs {
+    /// Milliseconds a ray, loading apart; `None` before the first try.
+    of: [Option<f64>; 3],
+    /// Passes so far.
+    passes: u32,
+    /// Passes since a schedule that is not the cheapest was tried.
+    since_try: u32,
+    /// The schedule of the pass before.
+    last: Option<Fixed>,
+}
+
+/// Chooses a schedule for every pass.
+#[derive(Clone, Debug, Default)]
+pub struct Auto {
+    kinds: BTreeMap<u32, Costs>,
+    /// How often a pass had another schedule than the one of its kind before.
+    pub switches: u64,
+}
+
+impl Auto {
+    /// The schedule for the next pass like `pass`. `is_resident`: everything is resident, so that `plain` may be chosen; `demand`
+    /// is then the same as it.
+    pub fn choose(&mut self, pass: Pass, is_resident: bool) -> Fixed {
+        let costs = self.kinds.entry(kind(pass)).or_default();
+        let candidates = if is_resident { [Fixed::Chc, Fixed::Plain] } else { [Fixed::Chc, Fixed::Demand] };
+        // The first pass starts with nothing resident: its cost says nothing, and is not noted.
+        let chosen = if costs.passes == 0 {
+            Fixed::Chc
+        } else if let Some(&untried) = candidates.iter().find(|&&fixed| costs.of[fixed as usize].is_none()) {
+            untried
+        } else {
+            let cost = |fixed: Fixed| costs.of[fixed as usize].unwrap_or(f64::INFINITY);
+            let [a, b] = candidates;
+            let (best, other) = if cost(a) <= cost(b) { (a, b) } else { (b, a) };
+            costs.since_try += 1;
+            if f64::from(costs.since_try) * cost(best) >= RETRY_PASSES * cost(other) {
+                costs.since_try = 0;
+                other
+            } else {
+                best
+            }
+        };
+        self.switches += u64::from(costs.last.is_some_and(|last| last != chosen));
+        costs.last = Some(chosen);
+        costs.passes += 1;
+        chosen
+    }
+
+    /// Notes what a pass of the schedule just chosen for it cost: `ms` without loading, for `rays` rays.
+    pub fn note(&mut self, pass: Pass, ms: f64, rays: u64) {
+        let Some(costs) = self.kinds.get_mut(&kind(pass)) else { return };
+        let Some(last) = costs.last.filter(|_| costs.passes > 1 && rays > 0) else { return };
+        let cost = ms / rays as f64;
+        let known = &mut costs.of[last as usize];
+        *known = Some(known.map_or(cost, |known| known + NEWEST * (cost - known)));
+    }
+
+    /// How many kinds of passes had each schedule last, by name.
+    pub fn in_force(&self) -> [(&'static str, usize); 3] {
+        ALL.map(|fixed| (fixed.name(), self.kinds.values().filter(|costs| costs.last == Some(fixed)).count()))
+    }
+}
+
+impl Fixed {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Fixed::Chc => "chc",
+            Fixed::Demand => "demand",
+            Fixed::Plain => "plain",
+        }
+    }
+}
+
+/// Passes that are alike: all directions of an effect, all lamps.
+fn kind(pass: Pass) -> u32 {
+    match pass {
+        Pass::Primary => 0,
+        Pass::Shadow(_) => 1,
+        Pass::Occlusion(_) => 2,
+        Pass::Diffuse(_) => 3,
+        Pass::Mirror => 4,
+        Pass::BounceShadow(_) => 5,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs `passes` passes whose true costs are given and returns the cost of all over that of the best schedule.
+    fn run(auto: &mut Auto, passes: u32, is_resident: bool, cost: impl Fn(Fixed, u32) -> f64) -> f64 {
+        let (mut sum, mut best) = (0.0, 0.0);
+        for i in 0..passes {
+            let chosen = auto.choose(Pass::Primary, is_resident);
+            auto.note(Pass::Primary, 1000.0 * cost(chosen, i), 1000);
+            sum += cost(chosen, i);
+            best += ALL.into_iter().map(|fixed| cost(fixed, i)).fold(f64::INFINITY, f64::min);
+        }
+        sum / best
+    }
+
+    #[test]
+    fn the_cheapest_is_found_and_stays() {
+        for [chc, demand] in [[1.0, 1.5], [1.5, 1.0], [1.0, 1.0]] {
+            let mut auto = Auto::default();
+            let cost = |fixed, _| if fixed == Fixed::Chc { chc } else { demand };
+            let over = run(&mut auto, 100, false, cost);
+            assert!(over < 1.1, "{over} times the best");
+            assert!(auto.switches <= 12);
+        }
+    }
+
+    #[test]
+    fn a_change_of_view_is_noticed() {
+        let mut auto = Auto::default();
+        let cost = |fixed, i| if (fixed == Fixed::Chc) == (i < 100) { 1.0 } else { 1.5 };
+        run(&mut auto, 100, false, cost);
+        let late = run(&mut auto, 100, false, |fixed, i| cost(fixed, i + 100));
+        assert!(late < 1.25, "{late} times the best after the change");
+        let held = (0..50).filter(|_| auto.choose(Pass::Primary, false) == Fixed::Demand).count();
+        assert!(held > 40, "{held} of 50");
+    }
+
+    #[test]
+    fn plain_needs_everything_resident() {
+        let mut auto = Auto::default();
+        assert!((0..100).all(|_| {
+            let chosen = auto.choose(Pass::Mirror, false);
+            auto.note(Pass::Mirror, 1.0, 1);
+            chosen != Fixed::Plain
+        }));
+        run(&mut auto, 20, true, |fixed, _| if fixed == Fixed::Plain { 1.0 } else { 2.0 });
+        assert_eq!(auto.choose(Pass::Primary, true), Fixed::Plain);
+    }
+}
