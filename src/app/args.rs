@@ -41,7 +41,7 @@ pub enum Command {
     /// Rebuild the damaged bricks and textures of a .bricks file from what it was converted from
     Repair(RepairArgs),
     /// Render a camera path to images, records and a report, without a window
-    Walk(WalkArgs),
+    Walk(Box<WalkArgs>),
     /// Find the closest hits of given rays
     Trace(TraceArgs),
     /// Replay a trace of brick requests against other cache sizes and policies

@@ -1,3 +1,4 @@
+use super::super::sizes::Direction;
 use super::*;
 use clap::CommandFactory;
 use clap::error::ErrorKind;
@@ -8,7 +9,7 @@ fn parse(line: &str) -> Result<Command, clap::Error> {
 
 fn walk(options: &str) -> Result<WalkArgs, clap::Error> {
     parse(&format!("walk s.bricks -o out {options}")).map(|command| match command {
-        Command::Walk(args) => args,
+        Command::Walk(args) => *args,
         other => panic!("{other:?}"),
     })
 }
