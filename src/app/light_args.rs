@@ -149,8 +149,7 @@ fn turn(text: &str) -> Result<f32, String> {
 }
 
 fn sun_angle(text: &str) -> Result<f64, String> {
-    let degrees = text.parse().map_err(|_| "it must be a number of degrees")?;
-    if (0.0..=90.0).contains(&degrees) { Ok(degrees) } else { Err("it must be from 0 to 90".into()) }
+    non_negative(text).ok().filter(|deg| *deg <= 90.0).ok_or_else(|| "it must be from 0 to 90 degrees".into())
 }
 
 /// A corner and two edges that span an area.
