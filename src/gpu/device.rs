@@ -78,8 +78,8 @@ fn adapters(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
 }
 
-/// Storage buffers a kernel needs besides cache and texel pages.
-const FIXED_STORAGE_BUFFERS: u32 = 19;
+/// Storage buffers a kernel needs besides cache and texel pages: 7 of the scene, 5 of the rays, 8 of the shading.
+const FIXED_STORAGE_BUFFERS: u32 = 20;
 
 impl Gpu {
     /// Opens the adapter whose name contains `wanted` (any case), or by itself a discrete GPU, else an integrated one,
@@ -113,12 +113,12 @@ impl Gpu {
         let info = adapter.get_info();
         let limits = adapter.limits();
         let storage = limits.max_storage_buffers_per_shader_stage;
-        if storage < FIXED_STORAGE_BUFFERS + 3 {
+        if storage < FIXED_STORAGE_BUFFERS + 2 {
             return Err(DeviceError::Limit {
                 adapter: info.name,
                 what: "storage buffers a kernel",
                 found: storage.into(),
-                needed: (FIXED_STORAGE_BUFFERS + 3).into(),
+                needed: (FIXED_STORAGE_BUFFERS + 2).into(),
             });
         }
         let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
@@ -147,9 +147,9 @@ impl Gpu {
         binding.min(self.limits.max_buffer_size).min(1 << 30) / 256 * 256
     }
 
-    /// Most pages of cache (each bound twice) beside `texel_pages` pages of texels.
+    /// Most pages of cache beside `texel_pages` pages of texels.
     pub fn max_cache_pages(&self, texel_pages: usize) -> usize {
         let left = self.limits.max_storage_buffers_per_shader_stage as usize - FIXED_STORAGE_BUFFERS as usize;
-        (left.saturating_sub(texel_pages) / 2).min(64)
+        left.saturating_sub(texel_pages).min(64)
     }
 }

@@ -84,8 +84,7 @@ impl Groups {
             entries.extend(numbered(filled(&texels.pages, kernels.pages.texels), TEXEL_BINDING));
             group("shading", &kernels.shading, &entries)
         };
-        // Each page of the cache as vectors and as words.
-        let cache = filled(cache.pages(), kernels.pages.cache).flat_map(|page| [page, page]);
+        let cache = filled(cache.pages(), kernels.pages.cache);
         Self {
             scene: group("scene", &kernels.scene, &numbered(scene.buffers(), 0)),
             rays: [rays(&sets[0]), rays(&sets[1]), rays(&sets[2])],

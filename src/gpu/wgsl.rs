@@ -8,7 +8,7 @@ use std::fmt::Write;
 /// Numbers of pages that the generated accessors serve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pages {
-    /// Pages of the brick cache; each is bound twice, as vectors and as words.
+    /// Pages of the brick cache.
     pub cache: usize,
     /// Pages of texels.
     pub texels: usize,
@@ -50,16 +50,14 @@ fn append(
     Some(())
 }
 
-/// Accessors of the brick cache: group 2, binding 2k as vectors and 2k + 1 as words of page k.
+/// Accessors of the brick cache: group 2, binding k is page k. A word is a component of a vector, so that a page is bound once.
 fn cache_accessors(pages: usize) -> String {
     let mut s = String::new();
     for k in 0..pages {
-        let (v, w) = (2 * k, 2 * k + 1);
-        let _ = writeln!(s, "@group(2) @binding({v}) var<storage, read> cache_vectors_{k}: array<vec4<u32>>;");
-        let _ = writeln!(s, "@group(2) @binding({w}) var<storage, read> cache_words_{k}: array<u32>;");
+        let _ = writeln!(s, "@group(2) @binding({k}) var<storage, read> cache_{k}: array<vec4<u32>>;");
     }
-    accessor(&mut s, "cache_vec4", "vec4<u32>", "cache_vectors", pages);
-    accessor(&mut s, "cache_word", "u32", "cache_words", pages);
+    accessor(&mut s, "cache_vec4", "vec4<u32>", "cache", "[index]", pages);
+    accessor(&mut s, "cache_word", "u32", "cache", "[index >> 2u][index & 3u]", pages);
     s
 }
 
@@ -69,14 +67,14 @@ fn texel_accessors(pages: usize) -> String {
     for k in 0..pages {
         let _ = writeln!(s, "@group(3) @binding({}) var<storage, read> texels_{k}: array<u32>;", 8 + k);
     }
-    accessor(&mut s, "texel_word", "u32", "texels", pages);
+    accessor(&mut s, "texel_word", "u32", "texels", "[index]", pages);
     s
 }
 
-fn accessor(s: &mut String, name: &str, kind: &str, array: &str, pages: usize) {
+fn accessor(s: &mut String, name: &str, kind: &str, array: &str, element: &str, pages: usize) {
     let _ = writeln!(s, "fn {name}(page: u32, index: u32) -> {kind} {{");
     for k in 1..pages {
-        let _ = writeln!(s, "    if page == {k}u {{ return {array}_{k}[index]; }}");
+        let _ = writeln!(s, "    if page == {k}u {{ return {array}_{k}{element}; }}");
     }
-    let _ = writeln!(s, "    return {array}_0[index];\n}}");
+    let _ = writeln!(s, "    return {array}_0{element};\n}}");
 }
