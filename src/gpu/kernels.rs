@@ -176,3 +176,23 @@ fn shading_layout(device: &wgpu::Device, fixed: &[Bound], texel_pages: usize) ->
     entries.extend((0..texel_pages as u32).map(|k| entry(TEXEL_BINDING + k, Bound::Read)));
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("shading"), entries: &entries })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::panic::AssertUnwindSafe;
+
+    /// The device checks the limit when pipelines are made, and panics where no one asked for its errors.
+    #[test]
+    fn as_many_pages_as_are_promised_can_be_bound() {
+        let gpu = Gpu::open(None).unwrap();
+        let texels = 1;
+        let cache = gpu.max_cache_pages(texels);
+        assert!(cache > 1, "{cache} pages");
+        Kernels::new(&gpu, Pages { cache, texels }, false);
+        let one_more = Pages { cache: cache + 1, texels };
+        let is_at_the_limit = cache < 64;
+        let refused = std::panic::catch_unwind(AssertUnwindSafe(|| Kernels::new(&gpu, one_more, false))).is_err();
+        assert_eq!(refused, is_at_the_limit, "one page more than {cache}");
+    }
+}
