@@ -1,4 +1,5 @@
-// Intersects each ray with the selected leaves of its tile, near leaf first, in one flat loop.
+// Intersects each ray with a run of the selected leaves of its tile, in their order, in one flat loop. With LEAF_CACHE the groups
+// of triangles that a ray finds are postponed, and tested two at a time, or before it enters another leaf.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -9,6 +10,10 @@
 #include "shared/brick.wgsl"
 #include "shared/walk_brick.wgsl"
 
+override LEAF_CACHE: bool = false;
+
+var<private> leaf_groups_postponed: u32;
+
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
@@ -17,7 +22,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let tile = (global.y / params.tile) * params.tiles_x + global.x / params.tile;
     let entry = tile_lists[tile];
-    if entry.selected == 0u {
+    var next = entry.first + min(params.run_first, entry.selected);
+    let end = min(entry.first + entry.selected, next + params.run_count);
+    if next == end {
         return;
     }
     let index = global.y * params.width + global.x;
@@ -36,14 +43,20 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var stack: array<vec2<u32>, STACK_SIZE>;
     var depth = 0u;
     var group = vec2<u32>(0u);
-    var next = entry.first;
-    let end = entry.first + entry.selected;
+    var postponed = vec2<u32>(0u);
     loop {
         if !has_children(group) {
             if depth > 0u {
                 depth -= 1u;
                 group = stack[depth];
             } else {
+                if LEAF_CACHE && postponed.y != 0u {
+                    test_triangles(&r, &best, postponed, any_hit);
+                    postponed = vec2<u32>(0u);
+                    if any_hit && best.leaf != NONE {
+                        break;
+                    }
+                }
                 if next == end {
                     break;
                 }
@@ -63,10 +76,28 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             stack[depth] = nearest.rest;
             depth += 1u;
         }
-        group = visit_node(&r, &best, child_index(group, nearest.slot), any_hit);
+        if LEAF_CACHE {
+            let opened = open_node(&r, best.t, child_index(group, nearest.slot));
+            group = opened.children;
+            if opened.triangles.y != 0u {
+                if postponed.y == 0u {
+                    postponed = opened.triangles;
+                    leaf_groups_postponed += 1u;
+                } else {
+                    test_triangles(&r, &best, postponed, any_hit);
+                    test_triangles(&r, &best, opened.triangles, any_hit);
+                    postponed = vec2<u32>(0u);
+                }
+            }
+        } else {
+            group = visit_node(&r, &best, child_index(group, nearest.slot), any_hit);
+        }
         if any_hit && best.leaf != NONE {
             break;
         }
+    }
+    if LEAF_CACHE && leaf_groups_postponed > 0u {
+        atomicAdd(&counters[COUNTER_LEAF_GROUPS], leaf_groups_postponed);
     }
     finish_walk(&r, world, best, index);
 }

@@ -14,15 +14,26 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let entry = tile_lists[tile];
     var selected = 0u;
+    var departures = 0u;  // from the order of the leaves' numbers
+    var last = 0u;
     for (var i = entry.first; i < entry.first + entry.count; i++) {
-        let state = slots[leaves[list[i]].brick].state;
+        let leaf = list[i];
+        let state = slots[leaves[leaf].brick].state;
         if (state & params.select_mask) == params.select_want {
             selection[entry.first + selected] = i;
             selected += 1u;
+            departures += u32(leaf < last);
+            last = leaf;
         }
     }
     tile_lists[tile].selected = selected;
     if INTERSECT && selected > 0u {
         atomicAdd(&counters[COUNTER_PAIRS_INTERSECTED], selected);
+        atomicAdd(&counters[COUNTER_FRONT_TO_BACK], departures);
+        atomicMax(&counters[COUNTER_MOST_SELECTED], selected);
+        if selected > 1u && params.run_count > 1u {
+            atomicAdd(&counters[COUNTER_TILE_BATCHES], 1u);
+            atomicAdd(&counters[COUNTER_TILE_BATCH_LEAVES], selected);
+        }
     }
 }

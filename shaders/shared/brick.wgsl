@@ -101,5 +101,5 @@ fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>,
         let sign = bitcast<vec3<u32>>(select(normal, -world_direction, normal == vec3<f32>(0.0))) >> vec3<u32>(31u);
         point = offset_origin(SurfacePoint(p, error, normal, sign.x | (sign.y << 1u) | (sign.z << 2u), area));
     }
-    surfaces[ray] = Surface(point, best.leaf, normal, best.triangle, area, best.source, 0u, 0u);
+    surfaces[ray] = Surface(point, best.leaf, normal, best.triangle, area, best.source, surfaces[ray].pending, 0u);
 }

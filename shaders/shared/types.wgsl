@@ -36,8 +36,8 @@ struct Params {
     length: f32,          // of the pass's rays where that is limited, device units
     stream: u32,          // which random numbers the pass takes
     pair_count: u32,      // pairs to be queried
-    padding0: u32,
-    padding1: u32,
+    run_first: u32,       // of a tile's selected leaves, the first that intersect_list takes
+    run_count: u32,       // and how many it takes at most
     padding2: u32,
 }
 
@@ -208,3 +208,8 @@ const COUNTER_RAYS: u32 = 8u;
 const COUNTER_NODES: u32 = 9u;
 const COUNTER_TRIANGLES: u32 = 10u;
 const COUNTER_HITS: u32 = 11u;
+const COUNTER_MOST_SELECTED: u32 = 12u;
+const COUNTER_FRONT_TO_BACK: u32 = 13u;
+const COUNTER_TILE_BATCHES: u32 = 14u;
+const COUNTER_TILE_BATCH_LEAVES: u32 = 15u;
+const COUNTER_LEAF_GROUPS: u32 = 16u;

@@ -10,27 +10,44 @@ const STACK_SIZE: u32 = 52u;   // MAX_BRICK_HEIGHT + MAX_TOP_HEIGHT and the entr
 var<private> nodes_visited: u32;
 var<private> triangles_tested: u32;
 
-// Visits node `index` of the brick: tests the triangles that the ray may meet and returns the group of the inner children
-// that it enters. With `any_hit` the first triangle accepted ends the visit.
-fn visit_node(r: ptr<function, BrickRay>, best: ptr<function, Best>, index: u32, any_hit: bool) -> vec2<u32> {
+// What a ray meets of a node: the group of the inner children that it enters, and triangles: the first of the node's, and bits from
+// there on.
+struct OpenedNode {
+    children: vec2<u32>,
+    triangles: vec2<u32>,
+}
+
+fn open_node(r: ptr<function, BrickRay>, t_max: f32, index: u32) -> OpenedNode {
     let at = (*r).nodes + 5u * index;
     let page = (*r).page;
     let n1 = cache_vec4(page, at + 1u);
     let n0 = cache_vec4(page, at);
     let entered = node_hits((*r).ray, n0, cache_vec4(page, at + 2u), cache_vec4(page, at + 3u), cache_vec4(page, at + 4u),
-                            (*r).offset_high, (*r).offset_low, 0.0, (*best).t).mask;
+                            (*r).offset_high, (*r).offset_low, 0.0, t_max).mask;
     let mask = traversal_mask(entered, n1, (*r).ray.flip);
-    var triangles = mask & 0x00ffffffu;
     nodes_visited += 1u;
+    return OpenedNode(vec2<u32>(n1.x, (mask & 0xff000000u) | (n0.w >> 24u)), vec2<u32>(n1.y, mask & 0x00ffffffu));
+}
+
+// Tests a group of triangles. With `any_hit` the first one accepted ends it.
+fn test_triangles(r: ptr<function, BrickRay>, best: ptr<function, Best>, group: vec2<u32>, any_hit: bool) {
+    var triangles = group.y;
     triangles_tested += countOneBits(triangles);
     while triangles != 0u {
         let bit = firstTrailingBit(triangles);
         triangles &= triangles - 1u;
-        if test_triangle(r, best, n1.y + bit) && any_hit {
+        if test_triangle(r, best, group.x + bit) && any_hit {
             break;
         }
     }
-    return vec2<u32>(n1.x, (mask & 0xff000000u) | (n0.w >> 24u));
+}
+
+// Visits node `index` of the brick: tests the triangles that the ray may meet and returns the group of the inner children
+// that it enters.
+fn visit_node(r: ptr<function, BrickRay>, best: ptr<function, Best>, index: u32, any_hit: bool) -> vec2<u32> {
+    let opened = open_node(r, (*best).t, index);
+    test_triangles(r, best, opened.triangles, any_hit);
+    return opened.children;
 }
 
 // Whether a group holds children to be visited.

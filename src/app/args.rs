@@ -4,6 +4,7 @@
 use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
+use super::optimisation_args::OptimisationArgs;
 use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
 use brickwalk_scenes::Kind;
@@ -323,6 +324,9 @@ pub struct WalkArgs {
     /// Streaming.
     #[command(flatten)]
     pub stream: StreamArgs,
+    /// Optimisations.
+    #[command(flatten)]
+    pub optimisations: OptimisationArgs,
     /// Environment image; comes with a later version.
     #[arg(long, hide = true, value_parser = not_built)]
     pub environment: Option<String>,

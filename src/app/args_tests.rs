@@ -212,3 +212,36 @@ fn version_is_printed() {
     let version = parse("--version").unwrap_err();
     assert_eq!((version.kind(), version.exit_code()), (ErrorKind::DisplayVersion, 0));
 }
+
+#[test]
+fn optimisations_are_switched_by_name() {
+    let w = walk("--without requery,nearest-first --with leaf-cache").unwrap();
+    let on = w.optimisations.optimisations();
+    assert!(!on.requery && !on.nearest_first && on.leaf_cache && on.by_tile && on.resident_first);
+    assert_eq!(super::super::optimisation_args::names(&w.optimisations.without), ["nearest-first", "requery"]);
+    assert_eq!(walk("").unwrap().optimisations.optimisations(), crate::schedule::Optimisations::default());
+    let error = walk("--without haste").unwrap_err().to_string();
+    assert!(error.contains("known: nearest-first, requery"), "{error}");
+}
+
+#[test]
+fn optimisations_without_meaning_are_refused_with_what_they_belong_to() {
+    let check = |options: &str| {
+        let w = walk(options).unwrap();
+        w.optimisations.check(&w.stream).map_err(|error| error.to_string())
+    };
+    for (options, part) in [
+        ("--schedule plain --without requery", "chc, demand or auto"),
+        ("--schedule demand --without by-tile", "chc or auto"),
+        ("--schedule demand --with leaf-cache", "chc or auto"),
+        ("--with requery --without requery", "both"),
+    ] {
+        let error = check(options).unwrap_err();
+        assert!(error.contains(part), "{options}: {error}");
+    }
+    for options in
+        ["--schedule demand --without requery", "--schedule chc --without by-tile", "--without front-to-back"]
+    {
+        check(options).unwrap();
+    }
+}

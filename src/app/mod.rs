@@ -10,6 +10,7 @@ mod inputs;
 pub mod interrupt;
 pub mod light_args;
 mod named;
+pub mod optimisation_args;
 pub mod output;
 pub mod quality;
 pub mod repair;
@@ -68,7 +69,10 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Repair(args) => repair::run(args),
-        Command::Walk(args) => walk::run(args),
+        Command::Walk(args) => {
+            args.optimisations.check(&args.stream)?;
+            walk::run(args)
+        }
         Command::Trace(args) => {
             args.check()?;
             trace::run(args)

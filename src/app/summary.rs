@@ -1,6 +1,7 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
 use super::args::WalkArgs;
+use super::optimisation_args::names;
 use crate::render::{Renderer, Schedule};
 use crate::stats::Record;
 use serde_json::{Map, Value, json};
@@ -52,6 +53,8 @@ pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], fra
                 Schedule::Auto => "auto",
             },
             "fronts": args.stream.fronts,
+            "without": names(&args.optimisations.without),
+            "with": names(&args.optimisations.with),
             "query_threshold": args.stream.query_threshold,
             "tile": args.stream.tile,
             "evict": renderer.cache.residency.policy().name(),

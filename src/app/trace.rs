@@ -8,7 +8,7 @@ use crate::gpu::layout::{self, NONE, Params, T_INFINITE};
 use crate::gpu::rays::Extent;
 use crate::gpu::scene::Frame;
 use crate::render::Schedule;
-use crate::schedule::{Lamp, Pass, PassStats, Step, attributes, chc, demand, plain};
+use crate::schedule::{Lamp, Pass, PassStats, Step, Tracing, attributes, chc, demand, plain};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
@@ -152,7 +152,7 @@ fn trace_chunk(
         Schedule::Chc => chc::trace,
         Schedule::Plain => plain::trace,
     };
-    trace(executor, cache, pass, &[Step::StartHits], false, stats)?;
+    trace(executor, cache, pass, &[Step::StartHits], &Tracing::default(), stats)?;
     let hits = executor.read_hits(pass)?;
     if any {
         return Ok(hits.into_iter().take(rays.len()).map(|h| (h, [0.0; 2])).collect());

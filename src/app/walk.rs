@@ -8,6 +8,7 @@ use crate::gpu::rays::Extent;
 use crate::render::{FrameOutput, Light, RenderSettings, Renderer};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
 use crate::stats::Record;
@@ -93,7 +94,7 @@ pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
         samples: args.spp,
         // Both halves of the seed count.
         seed: (args.seed ^ (args.seed >> 32)) as u32,
-        measure_needed: args.measure_needed,
+        tracing: Tracing { measure_needed: args.measure_needed, optimisations: args.optimisations.optimisations() },
         aov: args.aov,
     };
     let mut light = Light::new(

@@ -74,9 +74,10 @@ fn across(count: u32) -> [u32; 2] {
     [x, count.div_ceil(x)]
 }
 
-/// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells passes and their dispatches apart.
-pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directions) -> Vec<Dispatch> {
-    let params = directions.params(pass, params);
+/// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells passes and their dispatches apart;
+/// with `leaf_cache` lists are intersected by the kernel that has one.
+pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directions, leaf_cache: bool) -> Vec<Dispatch> {
+    let params = Params { run_count: u32::MAX >> 1, ..directions.params(pass, params) };
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
     let kernel = |kernel: &'static str, params, groups, phase| {
@@ -85,12 +86,17 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
     };
     let shading =
         |kernel, params, cache| Dispatch { kernel, params, groups: per_ray, cache, shading: true, phase: None };
+    let list = |params, phase| {
+        let name = if leaf_cache { "intersect_list_cached" } else { "intersect_list" };
+        kernel(name, params, per_ray, Some(phase))
+    };
     let intersect = |mask, want, phase| {
         let params = Params { select_mask: mask, select_want: want, ..params };
-        vec![
-            kernel("tile_select_intersect", params, per_tile, Some(phase)),
-            kernel("intersect_list", params, per_ray, Some(phase)),
-        ]
+        vec![kernel("tile_select_intersect", params, per_tile, Some(phase)), list(params, phase)]
+    };
+    let select_single = |mask, want, phase| {
+        let params = Params { select_mask: mask, select_want: want, run_count: 1, ..params };
+        vec![kernel("tile_select_intersect", params, per_tile, Some(phase))]
     };
     let query = |params: Params, phase| {
         vec![
@@ -123,6 +129,13 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         ],
         Step::IntersectResident => intersect(not_done, resident, 0),
         Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, 2),
+        Step::SelectResident => select_single(not_done, resident, 0),
+        Step::SelectBatch => select_single(layout::STATE_BATCH, layout::STATE_BATCH, 2),
+        Step::IntersectOne { leaf, is_batch } => {
+            vec![list(Params { run_first: leaf, run_count: 1, ..params }, if is_batch { 2 } else { 0 })]
+        }
+        Step::SortByNumber => vec![kernel("tile_sort_number", params, per_tile, Some(1))],
+        Step::SortNodesNear => vec![kernel("tile_sort_near", params, per_tile, Some(1))],
         Step::IntersectAll => vec![kernel("intersect_all", params, per_ray, Some(0))],
         Step::IntersectAllResident => {
             let params = Params { select_mask: not_done, select_want: resident, ..params };
@@ -133,11 +146,13 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
             let params = Params { select_mask: mask, select_want: mask, flags, ..params };
             vec![kernel("intersect_selected", params, per_ray, Some(2))]
         }
-        Step::QueryAll => {
-            let params = Params { select_mask: not_done, select_want: 0, ..params };
+        Step::QueryAll | Step::QueryAllUndone => {
+            let mask = if step == Step::QueryAll { not_done } else { layout::STATE_DONE };
+            let params = Params { select_mask: mask, select_want: 0, ..params };
             vec![kernel("query_all", params, per_ray, Some(1))]
         }
         Step::QueryMissing => query(Params { select_mask: not_done, select_want: 0, ..params }, Some(1)),
+        Step::QueryUndone => query(Params { select_mask: layout::STATE_DONE, select_want: 0, ..params }, Some(1)),
         Step::QueryPairs => vec![kernel("query_pairs", params, across(params.pair_count), Some(1))],
         Step::QueryNeeded => {
             // Of every leaf, exactly.

@@ -50,6 +50,7 @@ pub struct GpuExecutor {
     directions: Directions,
     threshold: u32,
     pair_count: u32,
+    leaf_cache: bool,
 }
 
 /// How an executor is set up.
@@ -143,6 +144,7 @@ impl GpuExecutor {
             directions,
             threshold,
             pair_count: 0,
+            leaf_cache: false,
         })
     }
 
@@ -153,6 +155,11 @@ impl GpuExecutor {
         self.buffers.sets[2] = RayBuffers::new(&self.gpu, rays);
         self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, rays);
         self.rebind();
+    }
+
+    /// Whether lists are intersected by the kernel that postpones groups of triangles.
+    pub fn set_leaf_cache(&mut self, on: bool) {
+        self.leaf_cache = on;
     }
 
     /// The device.
@@ -285,7 +292,7 @@ impl GpuExecutor {
         self.write_slots(bricks);
         let params = self.params();
         let dispatches: Vec<Dispatch> =
-            steps.iter().flat_map(|&step| dispatches(pass, step, &params, &self.directions)).collect();
+            steps.iter().flat_map(|&step| dispatches(pass, step, &params, &self.directions, self.leaf_cache)).collect();
         let stride = params_stride(&self.gpu);
         let mut params = vec![0u8; stride as usize * dispatches.len()];
         for (i, dispatch) in dispatches.iter().enumerate() {
@@ -422,6 +429,11 @@ fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, Ex
         pairs_visible: count(layout::COUNTER_PAIRS_VISIBLE),
         pairs_invisible: count(layout::COUNTER_PAIRS_INVISIBLE),
         pairs_intersected: count(layout::COUNTER_PAIRS_INTERSECTED),
+        most_selected: counters[layout::COUNTER_MOST_SELECTED as usize],
+        pairs_front_to_back: count(layout::COUNTER_FRONT_TO_BACK),
+        tile_batches: count(layout::COUNTER_TILE_BATCHES),
+        tile_batch_leaves: count(layout::COUNTER_TILE_BATCH_LEAVES),
+        leaf_groups_postponed: count(layout::COUNTER_LEAF_GROUPS),
         rays: count(layout::COUNTER_RAYS),
         nodes: count(layout::COUNTER_NODES),
         triangles: count(layout::COUNTER_TRIANGLES),

@@ -75,10 +75,13 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("tile_scan", "tile_scan", Groups::Tiles, &[]),
     ("tile_select", "tile_select", Groups::Tiles, &[("INTERSECT", 0.0)]),
     ("tile_select", "tile_select_intersect", Groups::Tiles, &[("INTERSECT", 1.0)]),
+    ("tile_sort", "tile_sort_number", Groups::Tiles, &[("NEAR", 0.0)]),
+    ("tile_sort", "tile_sort_near", Groups::Tiles, &[("NEAR", 1.0)]),
     ("query", "query", Groups::Tiles, &[]),
     ("query_pairs", "query_pairs", Groups::Tiles, &[]),
     ("query_reduce", "query_reduce", Groups::Tiles, &[]),
-    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 0.0)]),
+    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 0.0), ("LEAF_CACHE", 0.0)]),
+    ("intersect_list", "intersect_list_cached", Groups::CacheTiles, &[("COUNT", 0.0), ("LEAF_CACHE", 1.0)]),
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0)]),
     ("query_all", "query_all", Groups::Tiles, &[]),
@@ -86,7 +89,8 @@ const SPECIALISATIONS: &[Specialisation] = &[
 
 /// Specialisations that count nodes and triangles, made only when counting is asked for.
 const COUNTING: &[Specialisation] = &[
-    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 1.0)]),
+    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 1.0), ("LEAF_CACHE", 0.0)]),
+    ("intersect_list", "intersect_list_cached", Groups::CacheTiles, &[("COUNT", 1.0), ("LEAF_CACHE", 1.0)]),
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0)]),
 ];

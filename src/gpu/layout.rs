@@ -29,8 +29,13 @@ pub const COUNTER_RAYS: u32 = 8;
 pub const COUNTER_NODES: u32 = 9;
 pub const COUNTER_TRIANGLES: u32 = 10;
 pub const COUNTER_HITS: u32 = 11;
+pub const COUNTER_MOST_SELECTED: u32 = 12;
+pub const COUNTER_FRONT_TO_BACK: u32 = 13;
+pub const COUNTER_TILE_BATCHES: u32 = 14;
+pub const COUNTER_TILE_BATCH_LEAVES: u32 = 15;
+pub const COUNTER_LEAF_GROUPS: u32 = 16;
 /// Number of counters.
-pub const COUNTERS: usize = 16;
+pub const COUNTERS: usize = 24;
 /// What an unbounded ray has for t_max on the device: the greatest f32 but one.
 pub const T_INFINITE: f32 = 3.402_823_4e38;
 
@@ -52,7 +57,7 @@ mirror! {
         sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
         lamp_corner: [f32; 4], lamp_u: [f32; 4], lamp_v: [f32; 4], lamp_color: [f32; 4], around: [f32; 4],
         share: f32, surface_share: f32, length: f32, stream: u32,
-        pair_count: u32, padding0: u32, padding1: u32, padding2: u32,
+        pair_count: u32, run_first: u32, run_count: u32, padding2: u32,
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
     struct Hit { t: f32, id: u32, u: f32, v: f32 }

@@ -8,7 +8,9 @@ use crate::scene::Camera;
 use crate::schedule::auto::{Auto, Fixed};
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Shading, Step, attributes, chc, demand, plain};
+use crate::schedule::{
+    Executor, ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain,
+};
 use crate::stats::Record;
 use bricks::SceneFile;
 use std::sync::Arc;
@@ -39,8 +41,8 @@ pub struct RenderSettings {
     pub samples: u32,
     /// Seed of all random numbers.
     pub seed: u32,
-    /// Ask which bricks every pass needed.
-    pub measure_needed: bool,
+    /// Ask which bricks every pass needed; which optimisations are on.
+    pub tracing: Tracing,
     /// Read depth, normals, ids and albedo back.
     pub aov: bool,
 }
@@ -105,6 +107,7 @@ impl Renderer {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
+        self.executor.set_leaf_cache(self.settings.tracing.optimisations.leaf_cache);
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
         let effects = self.settings.effects;
@@ -224,17 +227,17 @@ impl Renderer {
         pass: Pass,
         stats: &mut PassStats,
     ) -> Result<(), ExecutorError> {
-        let needed = self.settings.measure_needed;
+        let tracing = &self.settings.tracing;
         let first = [Step::Generate];
         let (executor, cache) = (&mut self.executor, &mut self.cache);
         match (schedule, &mut self.fronts) {
-            (Fixed::Plain, _) => plain::trace(executor, cache, pass, &first, needed, stats),
-            (Fixed::Demand, _) => demand::trace(executor, cache, pass, &first, needed, stats),
-            (Fixed::Chc, None) => chc::trace(executor, cache, pass, &first, needed, stats),
+            (Fixed::Plain, _) => plain::trace(executor, cache, pass, &first, tracing, stats),
+            (Fixed::Demand, _) => demand::trace(executor, cache, pass, &first, tracing, stats),
+            (Fixed::Chc, None) => chc::trace(executor, cache, pass, &first, tracing, stats),
             (Fixed::Chc, Some(fronts)) => {
                 let resident = self.scene.resident();
                 let extent = (self.size.0, self.size.1, self.tile);
-                let setup = FrontPass { resident, extent, frame, pass, measure_needed: needed };
+                let setup = FrontPass { resident, extent, frame, pass, tracing };
                 fronts.trace(executor, cache, &setup, &first, stats)
             }
         }

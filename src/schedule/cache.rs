@@ -60,8 +60,21 @@ impl Cache {
         }
     }
 
+    /// Marks what is resident as done, its intersection being under way, and notes its use. `ahead`: some bricks are missing, which
+    /// are asked for only now.
+    pub fn finish_resident(&mut self, ahead: bool, stats: &mut PassStats) {
+        let resident = self.states.finish_resident();
+        for &brick in &resident {
+            self.touch(Item::geometry(brick));
+        }
+        if ahead {
+            stats.bricks_resident_first += resident.len() as u64;
+        }
+        stats.bricks_intersected.extend(resident);
+    }
+
     /// Loads as many of `items` as fit without evicting each other, at least one and at most `most`; returns how many,
-    /// from the front.
+    /// from the front. Those that are resident stay, and count among them.
     ///
     /// # Errors
     /// What the executor says; nothing of the batch is resident then.
@@ -78,15 +91,22 @@ impl Cache {
         if let Some(trace) = &mut self.trace {
             trace.begin_batch();
         }
-        let mut loads = Vec::new();
+        let (mut taken, mut loads) = (0, Vec::new());
         for &item in items.iter().take(most) {
+            let is_resident = self.residency.slot(item).is_some();
             let Ok(placed) = self.residency.insert(item) else { break };
+            taken += 1;
             self.residency.pin(item);
             self.states.place(item, &placed);
             if let Some(trace) = &mut self.trace {
                 trace.request(item);
             }
-            loads.push(Load { item, slot: placed.slot });
+            if !is_resident {
+                loads.push(Load { item, slot: placed.slot });
+            }
+        }
+        if loads.is_empty() {
+            return Ok(taken);
         }
         if let Err(error) = executor.load(&loads) {
             for load in &loads {
@@ -111,6 +131,6 @@ impl Cache {
         stats.evicted += change.evicted;
         stats.batches += 1;
         stats.ms_stream += start.elapsed().as_secs_f64() * 1e3;
-        Ok(loads.len())
+        Ok(taken)
     }
 }

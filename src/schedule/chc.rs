@@ -2,12 +2,11 @@
 //! batch.
 
 use super::cache::{BATCH_BRICKS, Cache};
-use super::{Executor, ExecutorError, Pass, PassStats, Report, Step};
+use super::optimisations::{Optimisations, run};
+use super::{Executor, ExecutorError, Pass, PassStats, Report, Step, Tracing};
 use crate::stream::Item;
 
 /// Traces the rays of `pass`, after the steps in `first` have made them.
-///
-/// With `needed` one more query asks, from the final hits, which bricks the pass needed.
 ///
 /// # Errors
 /// What the executor says.
@@ -16,55 +15,92 @@ pub fn trace(
     cache: &mut Cache,
     pass: Pass,
     first: &[Step],
-    needed: bool,
+    tracing: &Tracing,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
+    let optimisations = &tracing.optimisations;
+    let some_missing = !cache.states.all_geometry_resident();
+    let resident_first = optimisations.resident_first || !some_missing;
     let mut steps = first.to_vec();
-    steps.extend([Step::Lists, Step::IntersectResident]);
-    if !cache.states.all_geometry_resident() {
-        steps.push(Step::QueryMissing);
+    steps.push(Step::Lists);
+    if !optimisations.front_to_back {
+        steps.push(Step::SortByNumber);
     }
-    let report = executor.run(pass, &steps, &cache.states)?;
-    let resident = cache.states.finish_resident();
-    for &brick in &resident {
-        cache.touch(Item::geometry(brick));
+    if resident_first {
+        steps.push(Step::IntersectResident);
     }
-    stats.bricks_intersected.extend(resident);
-    load_and_intersect(executor, cache, pass, &BATCH_STEPS, report, stats)?;
-    if needed {
+    if some_missing {
+        steps.push(if resident_first { Step::QueryMissing } else { Step::QueryUndone });
+    }
+    let report = run(executor, pass, &steps, &cache.states, optimisations, stats)?;
+    if resident_first {
+        cache.finish_resident(some_missing, stats);
+    }
+    let batches = Batches::of_lists(pass, optimisations);
+    batches.load_and_intersect(executor, cache, report, stats)?;
+    if tracing.measure_needed {
         measure_needed(executor, cache, pass, &[], &resident_before, stats)?;
     }
     Ok(())
 }
 
-/// Intersects a batch and asks again, by tiles' lists.
-pub const BATCH_STEPS: [Step; 2] = [Step::IntersectBatch, Step::QueryMissing];
+/// How the bricks that queries want are taken, in batches.
+pub struct Batches<'a> {
+    /// Rays.
+    pub pass: Pass,
+    /// Intersects a batch.
+    pub intersect: Step,
+    /// Asks for what is still wanted.
+    pub query: Step,
+    /// The optimisations that are on.
+    pub optimisations: &'a Optimisations,
+}
 
-/// Loads what the queries in `report` want, nearest first, a few at a time; each batch is intersected and the rest asked for
-/// again by `steps`, until nothing is wanted.
-///
-/// # Errors
-/// What the executor says.
-pub fn load_and_intersect(
-    executor: &mut dyn Executor,
-    cache: &mut Cache,
-    pass: Pass,
-    steps: &[Step],
-    mut report: Report,
-    stats: &mut PassStats,
-) -> Result<(), ExecutorError> {
-    loop {
-        let items = nearest_first(&report.demand);
-        stats.add(report);
-        if items.is_empty() {
-            return Ok(());
+impl<'a> Batches<'a> {
+    /// By the tiles' lists.
+    pub fn of_lists(pass: Pass, optimisations: &'a Optimisations) -> Self {
+        let query = if optimisations.resident_first { Step::QueryMissing } else { Step::QueryUndone };
+        Self { pass, intersect: Step::IntersectBatch, query, optimisations }
+    }
+
+    /// Loads what the queries in `report` want, nearest first, a few at a time; each batch is intersected and the rest asked
+    /// for again, until nothing is wanted. Without the re-query what was wanted at first is loaded whole: hits only move
+    /// nearer, so no ray wants anything else later.
+    ///
+    /// # Errors
+    /// What the executor says.
+    pub fn load_and_intersect(
+        &self,
+        executor: &mut dyn Executor,
+        cache: &mut Cache,
+        mut report: Report,
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
+        let on = self.optimisations;
+        let mut wanted = in_order(&report.demand, on.nearest_first);
+        stats.add(std::mem::take(&mut report));
+        while !wanted.is_empty() {
+            let count = cache.load(executor, &wanted, BATCH_BRICKS, stats)?;
+            let rest = wanted.split_off(count);
+            let batch: Vec<u32> = wanted.iter().map(|item| item.brick).collect();
+            if let Some(lowest) = rest.iter().map(|item| item.brick).min() {
+                stats.bricks_nearest_first += batch.iter().filter(|&&brick| brick > lowest).count() as u64;
+            }
+            cache.states.set_batch(&batch);
+            stats.bricks_intersected.extend(&batch);
+            if on.requery {
+                report = run(executor, self.pass, &[self.intersect, self.query], &cache.states, on, stats)?;
+                let still = |item: &&Item| report.demand.binary_search_by_key(&item.brick, |d| d.0).is_ok();
+                stats.bricks_no_longer_wanted += (rest.len() - rest.iter().filter(still).count()) as u64;
+                wanted = in_order(&report.demand, on.nearest_first);
+            } else {
+                report = run(executor, self.pass, &[self.intersect], &cache.states, on, stats)?;
+                wanted = rest;
+            }
+            stats.add(std::mem::take(&mut report));
         }
-        let count = cache.load(executor, &items, BATCH_BRICKS, stats)?;
-        let batch: Vec<u32> = items[..count].iter().map(|item| item.brick).collect();
-        cache.states.set_batch(&batch);
-        stats.bricks_intersected.extend(&batch);
-        report = executor.run(pass, steps, &cache.states)?;
+        Ok(())
     }
 }
 
@@ -95,10 +131,12 @@ pub fn measure_needed(
     Ok(())
 }
 
-/// The wanted bricks' geometry, nearest entry first, then by number.
-fn nearest_first(demand: &[(u32, u32, f32)]) -> Vec<Item> {
+/// The wanted bricks' geometry by number; or nearest entry first, then by number.
+fn in_order(demand: &[(u32, u32, f32)], nearest_first: bool) -> Vec<Item> {
     let mut wanted = demand.to_vec();
-    wanted.sort_by(|a, b| a.2.total_cmp(&b.2).then(a.0.cmp(&b.0)));
+    if nearest_first {
+        wanted.sort_by(|a, b| a.2.total_cmp(&b.2).then(a.0.cmp(&b.0)));
+    }
     wanted.iter().map(|d| Item::geometry(d.0)).collect()
 }
 
@@ -108,7 +146,9 @@ mod tests {
 
     #[test]
     fn demand_is_served_nearest_first_then_by_number() {
-        let items = nearest_first(&[(4, 1, 2.0), (7, 9, 0.5), (2, 1, 2.0)]);
-        assert_eq!(items.iter().map(|i| i.brick).collect::<Vec<_>>(), [7, 2, 4]);
+        let demand = [(2, 1, 2.0), (4, 1, 2.0), (7, 9, 0.5)];
+        let bricks = |nearest_first| in_order(&demand, nearest_first).iter().map(|i| i.brick).collect::<Vec<_>>();
+        assert_eq!(bricks(true), [7, 2, 4]);
+        assert_eq!(bricks(false), [2, 4, 7]);
     }
 }

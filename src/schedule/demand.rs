@@ -6,9 +6,8 @@
 //! no brick that is missing, as hits only move nearer, so batches leave it out.
 
 use super::cache::Cache;
-use super::chc::{load_and_intersect, measure_needed};
-use super::{Executor, ExecutorError, Pass, PassStats, Step};
-use crate::stream::Item;
+use super::chc::{Batches, measure_needed};
+use super::{Executor, ExecutorError, Pass, PassStats, Step, Tracing};
 
 /// Traces the rays of `pass`, after the steps in `first` have made them.
 ///
@@ -19,25 +18,27 @@ pub fn trace(
     cache: &mut Cache,
     pass: Pass,
     first: &[Step],
-    needed: bool,
+    tracing: &Tracing,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
+    let optimisations = &tracing.optimisations;
+    let some_missing = !cache.states.all_geometry_resident();
+    let query = if optimisations.resident_first { Step::QueryAll } else { Step::QueryAllUndone };
     let mut steps = first.to_vec();
     steps.push(Step::CountRays);
-    if cache.states.all_geometry_resident() {
-        steps.push(Step::IntersectAll);
-    } else {
-        steps.extend([Step::IntersectAllResident, Step::QueryAll]);
+    match (some_missing, optimisations.resident_first) {
+        (false, _) => steps.push(Step::IntersectAll),
+        (true, true) => steps.extend([Step::IntersectAllResident, query]),
+        (true, false) => steps.push(query),
     }
     let report = executor.run(pass, &steps, &cache.states)?;
-    let resident = cache.states.finish_resident();
-    for &brick in &resident {
-        cache.touch(Item::geometry(brick));
+    if !some_missing || optimisations.resident_first {
+        cache.finish_resident(some_missing, stats);
     }
-    stats.bricks_intersected.extend(resident);
-    load_and_intersect(executor, cache, pass, &[Step::IntersectAllBatch, Step::QueryAll], report, stats)?;
-    if needed {
+    let batches = Batches { pass, intersect: Step::IntersectAllBatch, query, optimisations };
+    batches.load_and_intersect(executor, cache, report, stats)?;
+    if tracing.measure_needed {
         measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;
     }
     Ok(())

@@ -6,11 +6,12 @@
 //! is only ever left out by a query against present hits, so the final hits are exact.
 
 use super::cache::Cache;
-use super::chc::{BATCH_STEPS, load_and_intersect, measure_needed};
+use super::chc::{Batches, measure_needed};
+use super::optimisations::run;
 use super::pair_tree::{Front, PairTree};
-use super::{Executor, ExecutorError, Pass, PassStats, Step};
+use super::{Executor, ExecutorError, Pass, PassStats, Step, Tracing};
 use crate::stream::Item;
-use bricks::{Resident, TopNode2};
+use bricks::Resident;
 use std::collections::BTreeMap;
 
 /// Visible pairs are queried again every so many frames (CHC+RT §5.1, n).
@@ -37,8 +38,8 @@ pub struct FrontPass<'a> {
     pub frame: u32,
     /// Which rays.
     pub pass: Pass,
-    /// Ask which bricks the pass needed.
-    pub measure_needed: bool,
+    /// Measurements and optimisations.
+    pub tracing: &'a Tracing,
 }
 
 impl Fronts {
@@ -64,60 +65,61 @@ impl Fronts {
         if !tree.fits(width, height, tile) {
             *tree = PairTree::new(width, height, tile);
         }
+        let tracing = setup.tracing;
         let resident_before = cache.resident_geometry();
+        let ahead = tracing.optimisations.resident_first && !cache.states.all_geometry_resident();
+        let mut found = Found { setup, steps: Vec::new(), waiting: Vec::new(), used: Vec::new() };
 
-        // Phase 1: what was visible, of what is resident.
+        // Phase 1: what was visible. Rays are counted by the step that bounds the tiles.
         let leaves = tree.leaves();
         let (visible, invisible): (Vec<u32>, Vec<u32>) =
             leaves.into_iter().partition(|&i| matches!(tree.pair(i).front, Front::Visible { .. }));
-        let mut waiting = Vec::new();
-        set_lists(executor, cache, tree, setup.resident, &visible, &mut waiting, stats)?;
-        // Rays are counted by the step that bounds the tiles; its lists are replaced by the fronts'.
-        let mut steps = first.to_vec();
-        steps.extend([Step::CountRays, Step::IntersectResident]);
+        found.steps.extend(first);
+        found.steps.push(Step::CountRays);
+        found.intersect(executor, cache, tree, &visible, stats)?;
 
         // Phases 2 and 3: query the invisible front; split what became visible until a front is reached again.
         let mut queue = if top.is_empty() { Vec::new() } else { invisible };
         loop {
             let queries: Vec<_> = queue.iter().map(|&i| tree.query(i)).collect();
             executor.set_pairs(&queries)?;
-            steps.push(Step::QueryPairs);
-            let report = executor.run(setup.pass, &steps, &cache.states)?;
+            found.steps.push(Step::QueryPairs);
+            let report = found.run(executor, cache, stats)?;
             let seen = report.pair_rays.clone();
             stats.add(report);
             stats.report.pairs_tested += queue.len() as u64;
-            let mut next = Vec::new();
-            let mut found = Vec::new();
+            let (mut next, mut terminal) = (Vec::new(), Vec::new());
             for (&index, _) in queue.iter().zip(&seen).filter(|(_, rays)| **rays > 0) {
                 if tree.is_terminal(index, top) {
                     // Spread over the frames to come, so that not all fall due at once.
                     let requery = setup.frame + 1 + index % REQUERY_FRAMES;
                     tree.set_front(index, Front::Visible { requery });
-                    found.push(index);
+                    terminal.push(index);
                 } else {
                     next.extend(tree.split(index, top));
                 }
             }
             stats.report.pairs_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
-            if next.is_empty() && found.is_empty() {
+            if next.is_empty() && terminal.is_empty() {
                 break;
             }
-            set_lists(executor, cache, tree, setup.resident, &found, &mut waiting, stats)?;
-            steps = vec![Step::IntersectResident];
+            found.intersect(executor, cache, tree, &terminal, stats)?;
             queue = next;
         }
-        let mut used = stats.bricks_intersected.clone();
-        used.sort_unstable();
-        used.dedup();
-        for brick in used {
+        found.used.sort_unstable();
+        found.used.dedup();
+        for &brick in &found.used {
             cache.touch(Item::geometry(brick));
         }
+        if ahead {
+            stats.bricks_resident_first += found.used.len() as u64;
+        }
+        stats.bricks_intersected.append(&mut found.used);
 
         // What is visible and missing: ask again, load, intersect.
+        let waiting = std::mem::take(&mut found.waiting);
         if !waiting.is_empty() {
-            executor.set_lists(&lists(tree, top, &waiting))?;
-            let report = executor.run(setup.pass, &[Step::QueryMissing], &cache.states)?;
-            load_and_intersect(executor, cache, setup.pass, &BATCH_STEPS, report, stats)?;
+            found.load(executor, cache, tree, &waiting, stats)?;
         }
         self.finish(executor, cache, setup, &resident_before, stats)
     }
@@ -164,47 +166,104 @@ impl Fronts {
         let visible = fronts.iter().filter(|&&i| matches!(tree.pair(i).front, Front::Visible { .. })).count();
         stats.pairs_visible = visible as u64;
         stats.pairs_invisible = (fronts.len() - visible) as u64;
-        if setup.measure_needed {
+        if setup.tracing.measure_needed {
             measure_needed(executor, cache, setup.pass, &[Step::Lists], resident_before, stats)?;
         }
         Ok(())
     }
 }
 
-/// Lists the pairs whose brick is resident, and adds the others to `waiting`.
-fn set_lists(
-    executor: &mut dyn Executor,
-    cache: &Cache,
-    tree: &PairTree,
-    resident: &Resident,
-    pairs: &[u32],
-    waiting: &mut Vec<u32>,
-    stats: &mut PassStats,
-) -> Result<(), ExecutorError> {
-    let mut present = Vec::new();
-    for &index in pairs {
-        let brick = brick_of(tree, resident, index);
-        if cache.states.geometry(brick as usize).is_some() {
-            present.push(index);
-            stats.bricks_intersected.push(brick);
-        } else {
-            waiting.push(index);
-        }
+/// Visible pairs on their way to be intersected.
+struct Found<'a> {
+    setup: &'a FrontPass<'a>,
+    /// Steps of the next submission.
+    steps: Vec<Step>,
+    /// Pairs whose brick is missing.
+    waiting: Vec<u32>,
+    /// Bricks that were resident and intersected.
+    used: Vec<u32>,
+}
+
+impl Found<'_> {
+    /// Submits the steps so far.
+    fn run(
+        &mut self,
+        executor: &mut dyn Executor,
+        cache: &Cache,
+        stats: &mut PassStats,
+    ) -> Result<super::Report, ExecutorError> {
+        let steps = std::mem::take(&mut self.steps);
+        run(executor, self.setup.pass, &steps, &cache.states, &self.setup.tracing.optimisations, stats)
     }
-    executor.set_lists(&lists(tree, &resident.top2, &present))
+
+    /// Has the next submission intersect the pairs whose brick is resident, and lets the others wait. Without
+    /// [`super::Optimisations::resident_first`] all are intersected now, as they are wanted.
+    fn intersect(
+        &mut self,
+        executor: &mut dyn Executor,
+        cache: &mut Cache,
+        tree: &PairTree,
+        pairs: &[u32],
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
+        if !self.setup.tracing.optimisations.resident_first && !cache.states.all_geometry_resident() {
+            return self.load(executor, cache, tree, pairs, stats);
+        }
+        let mut present = Vec::new();
+        for &index in pairs {
+            let brick = brick_of(tree, self.setup.resident, index);
+            if cache.states.geometry(brick as usize).is_some() {
+                present.push(index);
+                self.used.push(brick);
+            } else {
+                self.waiting.push(index);
+            }
+        }
+        self.set_lists(executor, tree, &present)?;
+        self.steps.push(Step::IntersectResident);
+        Ok(())
+    }
+
+    /// Asks which of the pairs are still wanted, loads and intersects them.
+    fn load(
+        &mut self,
+        executor: &mut dyn Executor,
+        cache: &mut Cache,
+        tree: &PairTree,
+        pairs: &[u32],
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
+        if pairs.is_empty() {
+            return Ok(());
+        }
+        // Other pairs than before may name the same bricks.
+        cache.states.begin_pass();
+        self.set_lists(executor, tree, pairs)?;
+        let batches = Batches::of_lists(self.setup.pass, &self.setup.tracing.optimisations);
+        self.steps.push(batches.query);
+        let report = self.run(executor, cache, stats)?;
+        batches.load_and_intersect(executor, cache, report, stats)
+    }
+
+    /// Lists leaves of the pairs by tile.
+    fn set_lists(&mut self, executor: &mut dyn Executor, tree: &PairTree, pairs: &[u32]) -> Result<(), ExecutorError> {
+        let near = self.setup.tracing.optimisations.front_to_back;
+        let mut lists = vec![Vec::new(); tree.tiles()];
+        for &index in pairs {
+            let pair = tree.pair(index);
+            let leaf = self.setup.resident.top2[pair.node as usize].left;
+            lists[tree.tile_index(pair.square)].push(if near { pair.node } else { leaf });
+        }
+        lists.iter_mut().for_each(|list| list.sort_unstable());
+        executor.set_lists(&lists)?;
+        if near {
+            self.steps.push(Step::SortNodesNear);
+        }
+        Ok(())
+    }
 }
 
 fn brick_of(tree: &PairTree, resident: &Resident, index: u32) -> u32 {
     let leaf = resident.top2[tree.pair(index).node as usize].left;
     resident.leaves[leaf as usize].brick
-}
-
-/// One list a tile: leaves in the order of the pairs.
-fn lists(tree: &PairTree, top: &[TopNode2], pairs: &[u32]) -> Vec<Vec<u32>> {
-    let mut lists = vec![Vec::new(); tree.tiles()];
-    for &index in pairs {
-        let pair = tree.pair(index);
-        lists[tree.tile_index(pair.square)].push(top[pair.node as usize].left);
-    }
-    lists
 }

@@ -15,10 +15,12 @@ pub mod cache;
 pub mod chc;
 pub mod demand;
 pub mod fronts;
+pub mod optimisations;
 mod pair_tree;
 pub mod plain;
 mod states;
 mod types;
 
+pub use optimisations::{Optimisation, Optimisations, PartOf};
 pub use states::BrickStates;
-pub use types::{Executor, ExecutorError, Lamp, Load, PairQuery, Pass, PassStats, Report, Shading, Step};
+pub use types::{Executor, ExecutorError, Lamp, Load, PairQuery, Pass, PassStats, Report, Shading, Step, Tracing};

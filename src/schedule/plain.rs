@@ -2,7 +2,7 @@
 
 use super::cache::Cache;
 use super::chc::measure_needed;
-use super::{Executor, ExecutorError, Pass, PassStats, Step};
+use super::{Executor, ExecutorError, Pass, PassStats, Step, Tracing};
 use crate::stream::Item;
 
 /// Loads every brick's geometry that is missing.
@@ -35,7 +35,7 @@ pub fn trace(
     cache: &mut Cache,
     pass: Pass,
     first: &[Step],
-    needed: bool,
+    tracing: &Tracing,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
@@ -45,7 +45,7 @@ pub fn trace(
     let report = executor.run(pass, &steps, &cache.states)?;
     stats.bricks_intersected.extend(cache.states.finish_resident());
     stats.add(report);
-    if needed {
+    if tracing.measure_needed {
         measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;
     }
     Ok(())

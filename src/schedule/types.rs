@@ -1,6 +1,6 @@
 //! What a schedule and an executor say to each other.
 
-use super::BrickStates;
+use super::{BrickStates, Optimisations};
 use crate::stream::{Item, Slot};
 use thiserror::Error;
 
@@ -73,6 +73,21 @@ pub enum Step {
     IntersectResident,
     /// Intersect the listed leaves of the batch just loaded: phase 3.
     IntersectBatch,
+    /// Select the listed leaves that [`Step::IntersectResident`] would intersect; the report says how many a tile has at most.
+    SelectResident,
+    /// Select the listed leaves that [`Step::IntersectBatch`] would intersect; the report says how many a tile has at most.
+    SelectBatch,
+    /// Intersect one of the leaves that were selected in each tile.
+    IntersectOne {
+        /// Its place among them, from 0.
+        leaf: u32,
+        /// Whether the batch was selected: phase 3, else 1.
+        is_batch: bool,
+    },
+    /// Put the lists in the order of the leaves' numbers.
+    SortByNumber,
+    /// Make lists of leaf nodes of the binary top-level tree lists of their leaves, near first.
+    SortNodesNear,
     /// Intersect everything, all of it resident, from the root.
     IntersectAll,
     /// Intersect what is resident and not done, from the root: phase 1.
@@ -83,6 +98,10 @@ pub enum Step {
     QueryAll,
     /// Ask ray by ray which missing bricks are still wanted: phase 2.
     QueryMissing,
+    /// As [`Step::QueryAll`], of all bricks that are not done, resident or not.
+    QueryAllUndone,
+    /// As [`Step::QueryMissing`], of all bricks that are not done, resident or not.
+    QueryUndone,
     /// Ask how many rays see each of the pairs set by [`Executor::set_pairs`]: phase 2 of the fronts.
     QueryPairs,
     /// Ask ray by ray which bricks the pass needed, from its final hits.
@@ -149,6 +168,16 @@ pub struct Report {
     pub pairs_invisible: u64,
     /// Pairs (tile, leaf) intersected.
     pub pairs_intersected: u64,
+    /// Most leaves that a tile selected to be intersected.
+    pub most_selected: u32,
+    /// Pairs (tile, leaf) intersected after one of the tile with a greater number.
+    pub pairs_front_to_back: u64,
+    /// Tiles, summed over dispatches, of which a dispatch intersected two leaves or more.
+    pub tile_batches: u64,
+    /// Leaves that these intersected.
+    pub tile_batch_leaves: u64,
+    /// Groups of triangles that rays postponed.
+    pub leaf_groups_postponed: u64,
     /// Rays traced; counted by [`Step::Lists`] and [`Step::CountRays`].
     pub rays: u64,
     /// Nodes visited, when the executor counts.
@@ -204,6 +233,15 @@ pub trait Executor {
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError>;
 }
 
+/// How a schedule traces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tracing {
+    /// One more query asks, from the final hits, which bricks the pass needed.
+    pub measure_needed: bool,
+    /// The optimisations that are on.
+    pub optimisations: Optimisations,
+}
+
 /// Statistics of one pass.
 #[derive(Clone, Debug, Default)]
 pub struct PassStats {
@@ -225,6 +263,12 @@ pub struct PassStats {
     pub pairs_invisible: u64,
     /// Pairs whose invisible children were collapsed.
     pub pulled_up: u64,
+    /// Bricks of batches that were taken before a wanted one with a lower number.
+    pub bricks_nearest_first: u64,
+    /// Bricks that a query wanted, and a fresh one after a batch no longer did.
+    pub bricks_no_longer_wanted: u64,
+    /// Resident bricks intersected before missing ones were asked for, where any were missing.
+    pub bricks_resident_first: u64,
     /// Bytes of needed geometry, where it was asked.
     pub bytes_needed: u64,
     /// Bytes of needed geometry that was not resident when the pass began, where it was asked.
@@ -255,6 +299,10 @@ impl PassStats {
         sum.pairs_visible += r.pairs_visible;
         sum.pairs_invisible += r.pairs_invisible;
         sum.pairs_intersected += r.pairs_intersected;
+        sum.pairs_front_to_back += r.pairs_front_to_back;
+        sum.tile_batches += r.tile_batches;
+        sum.tile_batch_leaves += r.tile_batch_leaves;
+        sum.leaf_groups_postponed += r.leaf_groups_postponed;
         sum.rays += r.rays;
         sum.nodes += r.nodes;
         sum.triangles += r.triangles;

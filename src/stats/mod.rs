@@ -42,6 +42,20 @@ pub struct Record {
     pub pulled_up: u64,
     /// Pairs (tile, leaf) intersected.
     pub pairs_intersected: u64,
+    /// With front-to-back: pairs (tile, leaf) intersected after one of the tile with a greater number.
+    pub pairs_front_to_back: u64,
+    /// With by-tile: tiles, summed over dispatches, of which a dispatch intersected two leaves or more.
+    pub tile_batches: u64,
+    /// Leaves that these intersected.
+    pub tile_batch_leaves: u64,
+    /// With leaf-cache: groups of triangles that rays postponed.
+    pub leaf_groups_postponed: u64,
+    /// With nearest-first: bricks of batches that were taken before a wanted one with a lower number.
+    pub bricks_nearest_first: u64,
+    /// With requery: bricks that a query wanted, and a fresh one after a batch no longer did.
+    pub bricks_no_longer_wanted: u64,
+    /// With resident-first: resident bricks intersected before missing ones were asked for, where any were missing.
+    pub bricks_resident_first: u64,
     /// Submissions that the host waited for.
     pub round_trips: u64,
     /// Distinct bricks that the pass needed, where that is known, else that were intersected.
@@ -110,6 +124,13 @@ impl Record {
             multi_queries: 0,
             multi_queries_failed: 0,
             pairs_intersected: r.pairs_intersected,
+            pairs_front_to_back: r.pairs_front_to_back,
+            tile_batches: r.tile_batches,
+            tile_batch_leaves: r.tile_batch_leaves,
+            leaf_groups_postponed: r.leaf_groups_postponed,
+            bricks_nearest_first: stats.bricks_nearest_first,
+            bricks_no_longer_wanted: stats.bricks_no_longer_wanted,
+            bricks_resident_first: stats.bricks_resident_first,
             round_trips: r.round_trips.into(),
             bricks_needed: distinct(needed),
             bricks_hit: stats.bricks_hit.as_deref().map_or(0, distinct),

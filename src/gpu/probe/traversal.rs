@@ -12,7 +12,7 @@ use crate::gpu::layout::{Hit, NONE, Params, Ray, Surface};
 use crate::gpu::rays::Extent;
 use crate::gpu::scene::Frame;
 use crate::schedule::cache::{BrickBytes, Cache};
-use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, chc, plain};
+use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, Tracing, chc, plain};
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, Workers};
 use bricks::SceneFile;
 use glam::DVec3;
@@ -81,7 +81,7 @@ fn trace(
         executor.set_rays(pass, rays);
         cache.begin_pass("probe", 0);
         let schedule = if list { chc::trace } else { plain::trace };
-        schedule(&mut executor, &mut cache, pass, &[Step::StartHits], false, &mut PassStats::default())?;
+        schedule(&mut executor, &mut cache, pass, &[Step::StartHits], &Tracing::default(), &mut PassStats::default())?;
         Ok(Traced { name, hits: executor.read_hits(pass)?, surfaces: executor.read_surfaces(pass)? })
     };
     // The first finds nothing resident and goes by batches, the others find everything.

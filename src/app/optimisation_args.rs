@@ -1,0 +1,69 @@
+//! Options that switch single optimisations.
+
+use super::Usage;
+use super::args::{Schedule, StreamArgs};
+use super::named::unknown;
+use crate::schedule::{Optimisation, Optimisations, PartOf};
+use clap::Args;
+
+/// Options that switch optimisations.
+#[derive(Clone, Debug, Args)]
+pub struct OptimisationArgs {
+    /// Optimisations to switch off, separated by commas, to measure what each is worth; pictures are the same.
+    /// Of loading (schedules chc and demand): nearest-first (off: bricks are loaded in the order of their numbers), requery
+    /// (off: what the first query wanted is loaded whole, without a fresh query between batches), resident-first (off: bricks
+    /// on the device are not intersected before missing ones are asked for, all wanted bricks are taken nearest first).
+    /// Of lists (chc): front-to-back (off: a tile's leaves are intersected by number), by-tile (off: a dispatch intersects one
+    /// leaf a tile, not all), leaf-cache (see --with)
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optimisation)]
+    pub without: Vec<Optimisation>,
+    /// Optimisations to switch on that are off because measurements show no gain, separated by commas: leaf-cache (chc: a ray
+    /// postpones up to two groups of triangles and tests them together)
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optimisation)]
+    pub with: Vec<Optimisation>,
+}
+
+impl OptimisationArgs {
+    /// The optimisations that are on.
+    pub fn optimisations(&self) -> Optimisations {
+        let mut on = Optimisations::default();
+        self.with.iter().for_each(|&which| on.set(which, true));
+        self.without.iter().for_each(|&which| on.set(which, false));
+        on
+    }
+
+    /// Refuses names that mean nothing with the schedule in `stream`, and those both switched on and off.
+    ///
+    /// # Errors
+    /// Which name, and what it belongs to.
+    pub fn check(&self, stream: &StreamArgs) -> Result<(), Usage> {
+        let chc = matches!(stream.schedule, Schedule::Chc | Schedule::Auto);
+        let given = |option, list: &[Optimisation]| list.iter().map(|&which| (option, which)).collect::<Vec<_>>();
+        for (option, which) in [given("--without", &self.without), given("--with", &self.with)].concat() {
+            let (has_meaning, belongs) = match which.part_of() {
+                PartOf::Loading => (stream.schedule != Schedule::Plain, "--schedule chc, demand or auto"),
+                PartOf::Lists => (chc, "--schedule chc or auto"),
+            };
+            if !has_meaning {
+                return Err(Usage(format!("{option} {}: it belongs to {belongs}", which.name())));
+            }
+            if self.with.contains(&which) && self.without.contains(&which) {
+                return Err(Usage(format!("{} is given to both --with and --without", which.name())));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Names of a list, in one order, each once.
+pub fn names(list: &[Optimisation]) -> Vec<&'static str> {
+    let mut list = list.to_vec();
+    list.sort_unstable();
+    list.dedup();
+    list.into_iter().map(Optimisation::name).collect()
+}
+
+fn optimisation(text: &str) -> Result<Optimisation, String> {
+    let found = Optimisation::ALL.iter().find(|which| which.name() == text);
+    found.copied().ok_or_else(|| unknown(text, Optimisation::NAMES, &[]))
+}

@@ -1,0 +1,141 @@
+//! The optimisations of CHC+RT, each of which can be switched off, or on, by itself. They change what is asked, loaded and
+//! intersected when, never a hit.
+
+use super::{BrickStates, Executor, ExecutorError, Pass, PassStats, Report, Step};
+
+/// What an optimisation is a part of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PartOf {
+    /// Loading missing bricks: the schedules `chc` and `demand`.
+    Loading,
+    /// Lists of leaves per tile: the schedule `chc`.
+    Lists,
+}
+
+macro_rules! optimisations {
+    ($($(#[$doc:meta])* $variant:ident, $field:ident = $name:literal, $part:ident, $default:literal;)*) => {
+        /// One of the optimisations.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Optimisation { $($(#[$doc])* $variant,)* }
+
+        /// Which optimisations are on.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub struct Optimisations { $($(#[$doc])* pub $field: bool,)* }
+
+        impl Default for Optimisations {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl Optimisation {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+            /// Their names on the command line, in the same order.
+            pub const NAMES: &[&str] = &[$($name,)*];
+
+            /// What it is a part of.
+            pub fn part_of(self) -> PartOf {
+                match self { $(Self::$variant => PartOf::$part,)* }
+            }
+        }
+
+        impl Optimisations {
+            /// Switches one.
+            pub fn set(&mut self, which: Optimisation, on: bool) {
+                match which { $(Optimisation::$variant => self.$field = on,)* }
+            }
+
+            /// Whether one is on.
+            pub fn get(&self, which: Optimisation) -> bool {
+                match which { $(Optimisation::$variant => self.$field,)* }
+            }
+        }
+    };
+}
+
+optimisations! {
+    /// Wanted bricks are taken nearest entry first; else in the order of their numbers (design of the load order).
+    NearestFirst, nearest_first = "nearest-first", Loading, true;
+    /// Between two batches of loads everything not loaded yet is asked for again; else what the first query wanted is loaded
+    /// whole.
+    Requery, requery = "requery", Loading, true;
+    /// What is resident is intersected before missing bricks are asked for (CHC+RT §5.4); else all wanted bricks are taken in one
+    /// order, resident ones without a load.
+    ResidentFirst, resident_first = "resident-first", Loading, true;
+    /// The leaves of a tile are intersected near to far (CHC+RT §5.2); else by number.
+    FrontToBack, front_to_back = "front-to-back", Lists, true;
+    /// A dispatch intersects all selected leaves of a tile (CHC+RT §5.2, which stops at 24); else one leaf a tile.
+    ByTile, by_tile = "by-tile", Lists, true;
+    /// Up to two groups of triangles that a ray found are postponed and tested together (CHC+RT §5.2); else each is tested where
+    /// it is found.
+    LeafCache, leaf_cache = "leaf-cache", Lists, false;
+}
+
+impl Optimisation {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+}
+
+/// Most dispatches with one leaf a tile that go into a submission.
+const MOST_SINGLE_LEAVES: usize = 24;
+
+/// Runs `steps`. Without [`Optimisations::by_tile`] each intersection of selected leaves becomes dispatches of one leaf a tile,
+/// and one round trip more, which says how many. What came back before the last submission is added to `stats`.
+///
+/// # Errors
+/// What the executor says.
+pub fn run(
+    executor: &mut dyn Executor,
+    pass: Pass,
+    steps: &[Step],
+    bricks: &BrickStates,
+    optimisations: &Optimisations,
+    stats: &mut PassStats,
+) -> Result<Report, ExecutorError> {
+    if optimisations.by_tile {
+        return executor.run(pass, steps, bricks);
+    }
+    let mut rest = Vec::new();
+    for &step in steps {
+        let is_batch = match step {
+            Step::IntersectResident => false,
+            Step::IntersectBatch => true,
+            other => {
+                rest.push(other);
+                continue;
+            }
+        };
+        rest.push(if is_batch { Step::SelectBatch } else { Step::SelectResident });
+        let report = executor.run(pass, &rest, bricks)?;
+        let most = report.most_selected;
+        stats.add(report);
+        rest = (0..most).map(|leaf| Step::IntersectOne { leaf, is_batch }).collect();
+        while rest.len() > MOST_SINGLE_LEAVES {
+            let later = rest.split_off(MOST_SINGLE_LEAVES);
+            stats.add(executor.run(pass, &rest, bricks)?);
+            rest = later;
+        }
+    }
+    if rest.is_empty() { Ok(Report::default()) } else { executor.run(pass, &rest, bricks) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_the_variants() {
+        for (i, &which) in Optimisation::ALL.iter().enumerate() {
+            assert_eq!(which as usize, i);
+            let mut some = Optimisations::default();
+            let on = some.get(which);
+            some.set(which, !on);
+            assert_eq!(some.get(which), !on, "{}", which.name());
+            some.set(which, on);
+            assert_eq!(some, Optimisations::default());
+        }
+    }
+}
