@@ -14,11 +14,11 @@ pub struct OptimisationArgs {
     /// (off: what the first query wanted is loaded whole, without a fresh query between batches), resident-first (off: bricks
     /// on the device are not intersected before missing ones are asked for, all wanted bricks are taken nearest first).
     /// Of lists (chc): front-to-back (off: a tile's leaves are intersected by number), by-tile (off: a dispatch intersects one
-    /// leaf a tile, not all), leaf-cache (see --with)
+    /// leaf a tile, not all), leaf-cache (see --with) [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optimisation)]
     pub without: Vec<Optimisation>,
     /// Optimisations to switch on that are off because measurements show no gain, separated by commas: leaf-cache (chc: a ray
-    /// postpones up to two groups of triangles and tests them together)
+    /// postpones up to two groups of triangles and tests them together) [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optimisation)]
     pub with: Vec<Optimisation>,
 }
