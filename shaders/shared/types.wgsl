@@ -48,6 +48,7 @@ const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
 const PARAM_BOUNCE: u32 = 16u;    // the hits that are shaded are those of set 1
 const PARAM_RECTANGLE: u32 = 32u; // the pass's lamp is the rectangular light
 const PARAM_PENDING: u32 = 64u;   // only rays that asked for a brick are traced
+const PARAM_TIGHTER: u32 = 128u;  // pairs are queried by the boxes of the node's children
 
 struct Ray {
     origin: vec3<f32>,    // in the frame, device units
@@ -137,15 +138,15 @@ struct Slot {             // where a brick lies in the cache, and its part in th
     padding2: u32,
 }
 
-struct Pair {             // a query pair: a rectangle of rays and a node of the binary top-level tree
+struct Pair {             // query pairs: a rectangle of rays and nodes of the binary top-level tree
     x0: u32,
     y0: u32,
     x1: u32,              // exclusive
     y1: u32,
-    node: u32,
+    first: u32,           // of its nodes in `pair_nodes`
+    count: u32,           // of its nodes, 1 to MOST_NODES
     padding0: u32,
     padding1: u32,
-    padding2: u32,
 }
 
 struct Demand {           // what rays still ask of a brick
@@ -213,3 +214,4 @@ const COUNTER_FRONT_TO_BACK: u32 = 13u;
 const COUNTER_TILE_BATCHES: u32 = 14u;
 const COUNTER_TILE_BATCH_LEAVES: u32 = 15u;
 const COUNTER_LEAF_GROUPS: u32 = 16u;
+const COUNTER_TIGHTENED: u32 = 17u;

@@ -14,7 +14,10 @@ pub struct OptimisationArgs {
     /// (off: what the first query wanted is loaded whole, without a fresh query between batches), resident-first (off: bricks
     /// on the device are not intersected before missing ones are asked for, all wanted bricks are taken nearest first).
     /// Of lists (chc): front-to-back (off: a tile's leaves are intersected by number), by-tile (off: a dispatch intersects one
-    /// leaf a tile, not all), leaf-cache (see --with) [default: none]
+    /// leaf a tile, not all), leaf-cache (see --with). Of --fronts on: multi-queries (off: every invisible pair
+    /// is asked for by itself), tighter-bounds (off: a node is asked for by its own box, not its children's), lazy-requery (off:
+    /// visible pairs are asked for again in every frame, not every third), pull-up (off: pairs stay split where all is
+    /// invisible) [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optimisation)]
     pub without: Vec<Optimisation>,
     /// Optimisations to switch on that are off because measurements show no gain, separated by commas: leaf-cache (chc: a ray
@@ -43,6 +46,7 @@ impl OptimisationArgs {
             let (has_meaning, belongs) = match which.part_of() {
                 PartOf::Loading => (stream.schedule != Schedule::Plain, "--schedule chc, demand or auto"),
                 PartOf::Lists => (chc, "--schedule chc or auto"),
+                PartOf::Fronts => (chc && stream.fronts == "on", "--fronts on (schedule chc)"),
             };
             if !has_meaning {
                 return Err(Usage(format!("{option} {}: it belongs to {belongs}", which.name())));

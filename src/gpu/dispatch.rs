@@ -153,7 +153,10 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         }
         Step::QueryMissing => query(Params { select_mask: not_done, select_want: 0, ..params }, Some(1)),
         Step::QueryUndone => query(Params { select_mask: layout::STATE_DONE, select_want: 0, ..params }, Some(1)),
-        Step::QueryPairs => vec![kernel("query_pairs", params, across(params.pair_count), Some(1))],
+        Step::QueryPairs { tighter } => {
+            let flags = params.flags | if tighter { layout::PARAM_TIGHTER } else { 0 };
+            vec![kernel("query_pairs", Params { flags, ..params }, across(params.pair_count), Some(1))]
+        }
         Step::QueryNeeded => {
             // Of every leaf, exactly.
             let flags = params.flags | layout::PARAM_NEEDED;

@@ -50,6 +50,7 @@ pub struct GpuExecutor {
     directions: Directions,
     threshold: u32,
     pair_count: u32,
+    pair_nodes: u32,
     leaf_cache: bool,
 }
 
@@ -144,6 +145,7 @@ impl GpuExecutor {
             directions,
             threshold,
             pair_count: 0,
+            pair_nodes: 0,
             leaf_cache: false,
         })
     }
@@ -326,9 +328,9 @@ impl GpuExecutor {
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
         let demand: Vec<layout::Demand> = bytemuck::pod_collect_to_vec(&demand[..bricks.len() * 8]);
         let mut report = read_report(&counters, &demand)?;
-        if steps.contains(&Step::QueryPairs) && self.pair_count > 0 {
+        if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
             let rays: Vec<u32> = self.read(|s| &s.buffers.tiles.pair_rays)?;
-            report.pair_rays = rays[..self.pair_count as usize].to_vec();
+            report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
         }
         let times = self.timing.read(&self.gpu, dispatches.len())?;
         for (dispatch, ms) in dispatches.iter().zip(times) {
@@ -372,26 +374,25 @@ impl Executor for GpuExecutor {
         Ok(())
     }
 
-    fn set_pairs(&mut self, pairs: &[PairQuery]) -> Result<(), ExecutorError> {
-        let records: Vec<layout::Pair> = pairs
-            .iter()
-            .map(|p| layout::Pair {
-                x0: p.x[0],
-                y0: p.y[0],
-                x1: p.x[1],
-                y1: p.y[1],
-                node: p.node,
-                ..Default::default()
-            })
-            .collect();
-        if (self.buffers.tiles.pair_rays.size() / 4) < records.len() as u64 {
-            let room = records.len().next_power_of_two();
-            self.buffers.tiles.pairs = storage(&self.gpu, "pairs", room, size_of::<layout::Pair>());
-            self.buffers.tiles.pair_rays = storage(&self.gpu, "pair rays", room, 4);
+    fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError> {
+        let mut first = 0;
+        let mut records = Vec::with_capacity(queries.len());
+        for PairQuery { x: [x0, x1], y: [y0, y1], nodes: count } in queries.iter().copied() {
+            records.push(layout::Pair { x0, y0, x1, y1, first, count, ..Default::default() });
+            first += count;
+        }
+        let tiles = &mut self.buffers.tiles;
+        // No query is without a node.
+        if (tiles.pair_nodes.size() / 4) < nodes.len() as u64 {
+            let room = nodes.len().next_power_of_two();
+            tiles.pairs = storage(&self.gpu, "pairs", room, size_of::<layout::Pair>());
+            tiles.pair_rays = storage(&self.gpu, "pair rays", room, 4);
+            tiles.pair_nodes = storage(&self.gpu, "pair nodes", room, 4);
             self.rebind();
         }
         self.gpu.queue.write_buffer(&self.buffers.tiles.pairs, 0, bytemuck::cast_slice(&records));
-        self.pair_count = records.len() as u32;
+        self.gpu.queue.write_buffer(&self.buffers.tiles.pair_nodes, 0, bytemuck::cast_slice(nodes));
+        (self.pair_count, self.pair_nodes) = (records.len() as u32, nodes.len() as u32);
         Ok(())
     }
 
@@ -440,6 +441,7 @@ fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, Ex
         non_finite: count(layout::COUNTER_NON_FINITE),
         ms_phases: [0.0; 3],
         pair_rays: Vec::new(),
+        queries_tightened: count(layout::COUNTER_TIGHTENED),
     })
 }
 

@@ -74,6 +74,7 @@ impl Groups {
             &tiles.pair_demand,
             &tiles.pairs,
             &tiles.pair_rays,
+            &tiles.pair_nodes,
         ];
         let shading = |set: usize| {
             let RayBuffers { rays, hits, surfaces } = &sets[set];

@@ -108,7 +108,7 @@ impl Kernels {
         let scene = layout(device, "scene", &[Read; 7]);
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write]);
         let cache = layout(device, "cache", &vec![Read; pages.cache]);
-        let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write]);
+        let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write, Read]);
         let shading = shading_layout(device, &[Read, Read, Write, Write, Write, Write, Write, Write], pages.texels);
         let none = layout(device, "none", &[]);
         let mut pipelines = HashMap::new();

@@ -13,6 +13,7 @@ pub const PARAM_SKY: u32 = 8;
 pub const PARAM_BOUNCE: u32 = 16;
 pub const PARAM_RECTANGLE: u32 = 32;
 pub const PARAM_PENDING: u32 = 64;
+pub const PARAM_TIGHTER: u32 = 128;
 pub const STATE_GEOMETRY: u32 = 1;
 pub const STATE_DONE: u32 = 2;
 pub const STATE_BATCH: u32 = 4;
@@ -34,6 +35,7 @@ pub const COUNTER_FRONT_TO_BACK: u32 = 13;
 pub const COUNTER_TILE_BATCHES: u32 = 14;
 pub const COUNTER_TILE_BATCH_LEAVES: u32 = 15;
 pub const COUNTER_LEAF_GROUPS: u32 = 16;
+pub const COUNTER_TIGHTENED: u32 = 17;
 /// Number of counters.
 pub const COUNTERS: usize = 24;
 /// What an unbounded ray has for t_max on the device: the greatest f32 but one.
@@ -83,7 +85,7 @@ mirror! {
         geometry_page: u32, geometry_offset: u32, attributes_page: u32, attributes_offset: u32,
         state: u32, padding0: u32, padding1: u32, padding2: u32,
     }
-    struct Pair { x0: u32, y0: u32, x1: u32, y1: u32, node: u32, padding0: u32, padding1: u32, padding2: u32 }
+    struct Pair { x0: u32, y0: u32, x1: u32, y1: u32, first: u32, count: u32, padding0: u32, padding1: u32 }
     struct Demand { rays: u32, nearest: u32 }
     struct Material {
         base_color: [f32; 4], emission: [f32; 3], metallic: f32,

@@ -61,8 +61,10 @@ pub struct TileBuffers {
     pub pair_demand: wgpu::Buffer,
     /// [`layout::Pair`]s to be queried.
     pub pairs: wgpu::Buffer,
-    /// Rays that see each pair.
+    /// Rays that see each node of the pairs.
     pub pair_rays: wgpu::Buffer,
+    /// Nodes of the pairs.
+    pub pair_nodes: wgpu::Buffer,
     /// Entries the lists hold.
     pub capacity: u32,
 }
@@ -111,6 +113,7 @@ impl TileBuffers {
             pair_demand: storage(gpu, "pair demand", entries, size_of::<layout::Demand>()),
             pairs: storage(gpu, "pairs", 1, size_of::<layout::Pair>()),
             pair_rays: storage(gpu, "pair rays", 1, 4),
+            pair_nodes: storage(gpu, "pair nodes", 1, 4),
             capacity: capacity.max(1),
         }
     }

@@ -7,9 +7,10 @@
 
 use super::cache::Cache;
 use super::chc::{Batches, measure_needed};
+use super::multi_query::batches;
 use super::optimisations::run;
-use super::pair_tree::{Front, PairTree};
-use super::{Executor, ExecutorError, Pass, PassStats, Step, Tracing};
+use super::pair_tree::{Front, PairTree, Square};
+use super::{Executor, ExecutorError, PairQuery, Pass, PassStats, Step, Tracing};
 use crate::stream::Item;
 use bricks::Resident;
 use std::collections::BTreeMap;
@@ -80,23 +81,20 @@ impl Fronts {
 
         // Phases 2 and 3: query the invisible front; split what became visible until a front is reached again.
         let mut queue = if top.is_empty() { Vec::new() } else { invisible };
+        let mut is_front = true;
         loop {
-            let queries: Vec<_> = queue.iter().map(|&i| tree.query(i)).collect();
-            executor.set_pairs(&queries)?;
-            found.steps.push(Step::QueryPairs);
-            let report = found.run(executor, cache, stats)?;
-            let seen = report.pair_rays.clone();
-            stats.add(report);
-            stats.report.pairs_tested += queue.len() as u64;
+            let seen = found.query(executor, cache, tree, &mut queue, is_front, stats)?;
+            is_front = false;
             let (mut next, mut terminal) = (Vec::new(), Vec::new());
             for (&index, _) in queue.iter().zip(&seen).filter(|(_, rays)| **rays > 0) {
                 if tree.is_terminal(index, top) {
                     // Spread over the frames to come, so that not all fall due at once.
-                    let requery = setup.frame + 1 + index % REQUERY_FRAMES;
+                    let later = 1 + index % REQUERY_FRAMES;
+                    let requery = if tracing.optimisations.lazy_requery { setup.frame + later } else { setup.frame };
                     tree.set_front(index, Front::Visible { requery });
                     terminal.push(index);
                 } else {
-                    next.extend(tree.split(index, top));
+                    next.extend(tree.split(index, top, setup.frame));
                 }
             }
             stats.report.pairs_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
@@ -124,6 +122,19 @@ impl Fronts {
         self.finish(executor, cache, setup, &resident_before, stats)
     }
 
+    /// A visibility state, a ray (column, row) and a leaf of the top level that are not together in exactly one leaf pair of the
+    /// state's fronts; `None` if all fronts partition rays x leaves, as they must. For tests: takes time and memory in
+    /// proportion to both.
+    pub fn partition_defect(&self, resident: &Resident) -> Option<(Pass, [u32; 3])> {
+        let defect = |tree: &PairTree| tree.partition_defect(&resident.top2, resident.leaves.len());
+        self.trees.iter().find_map(|(&state, (tree, _))| defect(tree).map(|at| (state, at)))
+    }
+
+    /// How many visibility states have fronts.
+    pub fn states(&self) -> usize {
+        self.trees.len()
+    }
+
     /// Gives up fronts, those not used for longest first, until they take at most `bytes`.
     fn bound(&mut self, bytes: usize) {
         let mut all: usize = self.trees.values().map(|(tree, _)| tree.bytes()).sum();
@@ -145,23 +156,27 @@ impl Fronts {
         stats: &mut PassStats,
     ) -> Result<(), ExecutorError> {
         let Some((tree, _)) = self.trees.get_mut(&setup.pass.visibility_state()) else { return Ok(()) };
-        let due: Vec<u32> = tree
-            .leaves()
-            .into_iter()
-            .filter(|&i| matches!(tree.pair(i).front, Front::Visible { requery } if requery <= setup.frame))
-            .collect();
-        if !due.is_empty() {
-            let queries: Vec<_> = due.iter().map(|&i| tree.query(i)).collect();
-            executor.set_pairs(&queries)?;
-            let report = executor.run(setup.pass, &[Step::QueryPairs], &cache.states)?;
-            for (&index, &rays) in due.iter().zip(&report.pair_rays) {
-                let requery = setup.frame + REQUERY_FRAMES;
-                tree.set_front(index, if rays > 0 { Front::Visible { requery } } else { Front::Invisible });
+        let on = &setup.tracing.optimisations;
+        let (mut due, mut deferred) = (Vec::new(), 0);
+        for index in tree.leaves() {
+            match tree.pair(index).front {
+                Front::Visible { requery } if requery <= setup.frame || !on.lazy_requery => due.push(index),
+                Front::Visible { .. } => deferred += 1,
+                Front::Invisible { .. } | Front::Inner => {}
             }
-            stats.report.pairs_tested += due.len() as u64;
-            stats.add(report);
         }
-        stats.pulled_up += tree.pull_up();
+        stats.requeries_deferred += deferred;
+        if !due.is_empty() {
+            let mut found = Found { setup, steps: Vec::new(), waiting: Vec::new(), used: Vec::new() };
+            let seen = found.query(executor, cache, tree, &mut due, false, stats)?;
+            for (&index, &rays) in due.iter().zip(&seen) {
+                let visible = Front::Visible { requery: setup.frame + REQUERY_FRAMES };
+                tree.set_front(index, if rays > 0 { visible } else { Front::Invisible { since: setup.frame } });
+            }
+        }
+        if on.pull_up {
+            stats.pulled_up += tree.pull_up();
+        }
         let fronts = tree.leaves();
         let visible = fronts.iter().filter(|&&i| matches!(tree.pair(i).front, Front::Visible { .. })).count();
         stats.pairs_visible = visible as u64;
@@ -194,6 +209,41 @@ impl Found<'_> {
     ) -> Result<super::Report, ExecutorError> {
         let steps = std::mem::take(&mut self.steps);
         run(executor, self.setup.pass, &steps, &cache.states, &self.setup.tracing.optimisations, stats)
+    }
+
+    /// Asks how many rays see each of `pairs`, after the steps so far. Pairs of `is_front`, the invisible ones of the frame before,
+    /// are asked for by multi-queries where that is on, and are put in the order of these.
+    fn query(
+        &mut self,
+        executor: &mut dyn Executor,
+        cache: &Cache,
+        tree: &PairTree,
+        pairs: &mut [u32],
+        is_front: bool,
+        stats: &mut PassStats,
+    ) -> Result<Vec<u32>, ExecutorError> {
+        let on = &self.setup.tracing.optimisations;
+        let queries = if is_front && on.multi_queries {
+            multi_queries(tree, pairs, self.setup.frame)
+        } else {
+            pairs.iter().map(|&index| tree.query(index)).collect()
+        };
+        let nodes: Vec<u32> = pairs.iter().map(|&index| tree.pair(index).node).collect();
+        executor.set_pairs(&queries, &nodes)?;
+        self.steps.push(Step::QueryPairs { tighter: on.tighter_bounds });
+        let mut report = self.run(executor, cache, stats)?;
+        let seen = std::mem::take(&mut report.pair_rays);
+        stats.add(report);
+        let mut first = 0;
+        for query in &queries {
+            let nodes = query.nodes as usize;
+            let failed = nodes > 1 && seen[first..first + nodes].iter().any(|&rays| rays > 0);
+            stats.report.pairs_tested += 1 + if failed { nodes as u64 } else { 0 };
+            stats.multi_queries += u64::from(nodes > 1);
+            stats.multi_queries_failed += u64::from(failed);
+            first += nodes;
+        }
+        Ok(seen)
     }
 
     /// Has the next submission intersect the pairs whose brick is resident, and lets the others wait. Without
@@ -261,6 +311,26 @@ impl Found<'_> {
         }
         Ok(())
     }
+}
+
+/// Sorts invisible pairs by tile, the longest invisible first, and makes queries of them, in that order.
+fn multi_queries(tree: &PairTree, pairs: &mut [u32], frame: u32) -> Vec<PairQuery> {
+    let since = |index: u32| match tree.pair(index).front {
+        Front::Invisible { since } => since,
+        Front::Visible { .. } | Front::Inner => frame,
+    };
+    let square = |index: u32| {
+        let Square { x, y, log2 } = tree.pair(index).square;
+        (log2, y, x)
+    };
+    pairs.sort_by_key(|&index| (square(index), since(index), index));
+    let mut queries = Vec::new();
+    for tile in pairs.chunk_by(|&a, &b| square(a) == square(b)) {
+        let frames: Vec<u32> = tile.iter().map(|&index| frame.saturating_sub(since(index))).collect();
+        let query = tree.query(tile[0]);
+        queries.extend(batches(&frames).into_iter().map(|size| PairQuery { nodes: size as u32, ..query }));
+    }
+    queries
 }
 
 fn brick_of(tree: &PairTree, resident: &Resident, index: u32) -> u32 {

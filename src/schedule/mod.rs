@@ -15,6 +15,7 @@ pub mod cache;
 pub mod chc;
 pub mod demand;
 pub mod fronts;
+mod multi_query;
 pub mod optimisations;
 mod pair_tree;
 pub mod plain;

@@ -10,6 +10,8 @@ pub enum PartOf {
     Loading,
     /// Lists of leaves per tile: the schedule `chc`.
     Lists,
+    /// The temporal fronts of `chc`.
+    Fronts,
 }
 
 macro_rules! optimisations {
@@ -67,6 +69,14 @@ optimisations! {
     FrontToBack, front_to_back = "front-to-back", Lists, true;
     /// A dispatch intersects all selected leaves of a tile (CHC+RT §5.2, which stops at 24); else one leaf a tile.
     ByTile, by_tile = "by-tile", Lists, true;
+    /// Invisible pairs of a tile that will probably stay so are asked for together (CHC+RT §5.1); else each by itself.
+    MultiQueries, multi_queries = "multi-queries", Fronts, true;
+    /// A node is asked for by the boxes of its children (CHC+RT §5.1); else by its own.
+    TighterBounds, tighter_bounds = "tighter-bounds", Fronts, true;
+    /// Visible pairs are asked for again every third frame (CHC+RT §5.1); else in every frame.
+    LazyRequery, lazy_requery = "lazy-requery", Fronts, true;
+    /// Pairs whose children are all invisible become leaves, one level a frame (CHC+RT §5.1); else what was split stays so.
+    PullUp, pull_up = "pull-up", Fronts, true;
     /// Up to two groups of triangles that a ray found are postponed and tested together (CHC+RT §5.2); else each is tested where
     /// it is found.
     LeafCache, leaf_cache = "leaf-cache", Lists, false;

@@ -29,7 +29,10 @@ pub enum Front {
         requery: u32,
     },
     /// No ray of the tile reaches the node before its hit.
-    Invisible,
+    Invisible {
+        /// Frame in which it was found so.
+        since: u32,
+    },
 }
 
 /// A pair of the hierarchy.
@@ -63,7 +66,12 @@ impl PairTree {
     pub fn new(width: u32, height: u32, tile: u32) -> Self {
         let (tiles_x, tiles_y) = (width.div_ceil(tile), height.div_ceil(tile));
         let log2 = tiles_x.max(tiles_y).next_power_of_two().trailing_zeros();
-        let root = Pair { square: Square { x: 0, y: 0, log2 }, node: 0, front: Front::Invisible, children: (0, 0) };
+        let root = Pair {
+            square: Square { x: 0, y: 0, log2 },
+            node: 0,
+            front: Front::Invisible { since: 0 },
+            children: (0, 0),
+        };
         Self { pairs: vec![root], free: [Vec::new(), Vec::new()], tiles_x, tiles_y, tile, width, height }
     }
 
@@ -108,10 +116,10 @@ impl PairTree {
 
     /// The rectangle of rays of a pair; empty where its square lies beyond the picture.
     pub fn query(&self, index: u32) -> PairQuery {
-        let Pair { square, node, .. } = *self.pair(index);
+        let Pair { square, .. } = *self.pair(index);
         let edge = self.tile << square.log2;
         let span = |first: u32, most: u32| [(first * self.tile).min(most), (first * self.tile + edge).min(most)];
-        PairQuery { x: span(square.x, self.width), y: span(square.y, self.height), node }
+        PairQuery { x: span(square.x, self.width), y: span(square.y, self.height), nodes: 1 }
     }
 
     /// Whether a pair is one tile and one leaf, and cannot be split (CHC+RT §4.4; spec: tile and node both terminal).
@@ -121,9 +129,9 @@ impl PairTree {
     }
 
     /// Splits a pair that is not terminal: in object space if the node's share of the root's area is larger than t_q times
-    /// the tile's share of the screen, else in screen space; where one is terminal, the other. Children start invisible.
-    /// Squares beyond the picture are left out.
-    pub fn split(&mut self, index: u32, top: &[TopNode2]) -> Vec<u32> {
+    /// the tile's share of the screen, else in screen space; where one is terminal, the other. Children start invisible, since
+    /// `frame`. Squares beyond the picture are left out.
+    pub fn split(&mut self, index: u32, top: &[TopNode2], frame: u32) -> Vec<u32> {
         let Pair { square, node, .. } = *self.pair(index);
         let n = &top[node as usize];
         let share_node = area(n) / area(&top[0]).max(f64::MIN_POSITIVE);
@@ -152,7 +160,8 @@ impl PairTree {
             first
         });
         for (i, (square, node)) in children.into_iter().enumerate() {
-            self.pairs[first as usize + i] = Pair { square, node, front: Front::Invisible, children: (0, 0) };
+            self.pairs[first as usize + i] =
+                Pair { square, node, front: Front::Invisible { since: frame }, children: (0, 0) };
         }
         let pair = &mut self.pairs[index as usize];
         pair.front = Front::Inner;
@@ -160,7 +169,8 @@ impl PairTree {
         (first..first + count).collect()
     }
 
-    /// Collapses pairs whose children are all invisible leaves, one level (CHC+RT §5.1). Returns how many.
+    /// Collapses pairs whose children are all invisible leaves, one level (CHC+RT §5.1); they have been invisible for as long as
+    /// the youngest child. Returns how many.
     pub fn pull_up(&mut self) -> u64 {
         let mut pulled = 0;
         let mut stack = vec![0u32];
@@ -170,10 +180,15 @@ impl PairTree {
                 continue;
             }
             let children = first..first + count;
-            if children.clone().all(|c| self.pair(c).front == Front::Invisible) {
+            let since = |c| match self.pair(c).front {
+                Front::Invisible { since } => Some(since),
+                _ => None,
+            };
+            let youngest = children.clone().map(since).try_fold(0, |youngest, since| Some(since?.max(youngest)));
+            if let Some(since) = youngest {
                 self.free[usize::from(count > 2)].push(first);
                 let pair = &mut self.pairs[index as usize];
-                pair.front = Front::Invisible;
+                pair.front = Front::Invisible { since };
                 pair.children = (0, 0);
                 pulled += 1;
             } else {
@@ -181,6 +196,30 @@ impl PairTree {
             }
         }
         pulled
+    }
+
+    /// A ray (column, row) and a leaf of the top level, of `leaf_count`, that are not together in exactly one leaf pair; `None` if
+    /// the leaf pairs partition rays x leaves, as they must (numerical case 31). Takes time and memory in proportion to both.
+    pub fn partition_defect(&self, top: &[TopNode2], leaf_count: usize) -> Option<[u32; 3]> {
+        let mut seen = vec![0u8; self.width as usize * self.height as usize * leaf_count];
+        for index in self.leaves() {
+            let PairQuery { x, y, .. } = self.query(index);
+            let mut nodes = vec![self.pair(index).node];
+            while let Some(node) = nodes.pop() {
+                let node = &top[node as usize];
+                if node.right != NONE {
+                    nodes.extend([node.left, node.right]);
+                    continue;
+                }
+                for ray in (y[0]..y[1]).flat_map(|y| (x[0]..x[1]).map(move |x| y * self.width + x)) {
+                    let times = &mut seen[ray as usize * leaf_count + node.left as usize];
+                    *times = times.saturating_add(1);
+                }
+            }
+        }
+        let at = seen.iter().position(|&times| times != 1)?;
+        let ray = (at / leaf_count) as u32;
+        Some([ray % self.width, ray / self.width, (at % leaf_count) as u32])
     }
 
     /// Whether the picture's size and tiles are these.
@@ -216,26 +255,8 @@ mod tests {
         ]
     }
 
-    /// Every (ray, leaf) in exactly one leaf pair: numerical case 31, exhaustively.
-    fn assert_partition(tree: &PairTree, top: &[TopNode2], width: u32, height: u32) {
-        let mut seen = vec![0u32; (width * height) as usize * 4];
-        for index in tree.leaves() {
-            let q = tree.query(index);
-            let mut nodes = vec![q.node];
-            while let Some(n) = nodes.pop() {
-                let n = &top[n as usize];
-                if n.right != NONE {
-                    nodes.extend([n.left, n.right]);
-                    continue;
-                }
-                for y in q.y[0]..q.y[1] {
-                    for x in q.x[0]..q.x[1] {
-                        seen[((y * width + x) * 4 + n.left) as usize] += 1;
-                    }
-                }
-            }
-        }
-        assert!(seen.iter().all(|&n| n == 1), "each (ray, leaf) in exactly one leaf pair");
+    fn assert_partition(tree: &PairTree, top: &[TopNode2]) {
+        assert_eq!(tree.partition_defect(top, 4), None, "each (ray, leaf) in exactly one leaf pair");
     }
 
     #[test]
@@ -243,7 +264,7 @@ mod tests {
         let top = top();
         let (width, height) = (37, 21);
         let mut tree = PairTree::new(width, height, 8);
-        assert_partition(&tree, &top, width, height);
+        assert_partition(&tree, &top);
         let mut random = 12345u32;
         let mut next = move || {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -253,14 +274,17 @@ mod tests {
             let leaves = tree.leaves();
             let index = leaves[next() as usize % leaves.len()];
             if tree.is_terminal(index, &top) {
-                tree.set_front(index, if next() % 2 == 0 { Front::Visible { requery: 0 } } else { Front::Invisible });
+                tree.set_front(
+                    index,
+                    if next() % 2 == 0 { Front::Visible { requery: 0 } } else { Front::Invisible { since: 0 } },
+                );
             } else {
-                tree.split(index, &top);
+                tree.split(index, &top, 0);
             }
             if next() % 8 == 0 {
                 tree.pull_up();
             }
-            assert_partition(&tree, &top, width, height);
+            assert_partition(&tree, &top);
         }
     }
 
@@ -269,17 +293,17 @@ mod tests {
     fn a_lost_child_is_noticed() {
         let top = top();
         let mut tree = PairTree::new(16, 16, 8);
-        let children = tree.split(0, &top);
+        let children = tree.split(0, &top, 0);
         tree.pairs[children[0] as usize].node = 3;
-        assert_partition(&tree, &top, 16, 16);
+        assert_partition(&tree, &top);
     }
 
     #[test]
     fn everything_invisible_collapses_one_level_at_a_time() {
         let top = top();
         let mut tree = PairTree::new(16, 16, 8);
-        let children = tree.split(0, &top);
-        tree.split(children[0], &top);
+        let children = tree.split(0, &top, 0);
+        tree.split(children[0], &top, 0);
         assert_eq!(tree.pull_up(), 1);
         assert_eq!(tree.pull_up(), 1);
         assert_eq!(tree.leaves(), [0]);

@@ -102,8 +102,11 @@ pub enum Step {
     QueryAllUndone,
     /// As [`Step::QueryMissing`], of all bricks that are not done, resident or not.
     QueryUndone,
-    /// Ask how many rays see each of the pairs set by [`Executor::set_pairs`]: phase 2 of the fronts.
-    QueryPairs,
+    /// Ask how many rays see each node of the queries set by [`Executor::set_pairs`]: phase 2 of the fronts.
+    QueryPairs {
+        /// By the boxes of the node's children instead of its own.
+        tighter: bool,
+    },
     /// Ask ray by ray which bricks the pass needed, from its final hits.
     QueryNeeded,
     /// Ask which bricks hold a final hit of the pass.
@@ -129,15 +132,20 @@ pub struct Shading {
     pub sky: bool,
 }
 
-/// A query pair: a rectangle of rays and a node of the binary top-level tree.
+/// A query over pairs of one rectangle of rays: each with a node of the binary top-level tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PairQuery {
     /// First column, and the one after the last.
     pub x: [u32; 2],
     /// First row, and the one after the last.
     pub y: [u32; 2],
-    /// The node.
-    pub node: u32,
+    /// How many nodes, 1 to [`PairQuery::MOST_NODES`].
+    pub nodes: u32,
+}
+
+impl PairQuery {
+    /// Most nodes of a query.
+    pub const MOST_NODES: usize = 16;
 }
 
 /// One payload to be copied into the cache.
@@ -186,8 +194,10 @@ pub struct Report {
     pub triangles: u64,
     /// Pixels whose radiance was not finite.
     pub non_finite: u64,
-    /// Rays that see each pair, after [`Step::QueryPairs`].
+    /// Rays that see each node, after [`Step::QueryPairs`].
     pub pair_rays: Vec<u32>,
+    /// Nodes that no ray sees although one enters the node's own box.
+    pub queries_tightened: u64,
     /// Device time of phases 1, 2 and 3 in milliseconds; zero where the device has no timestamps.
     pub ms_phases: [f64; 3],
 }
@@ -220,11 +230,12 @@ pub trait Executor {
     /// Lists beyond what the device holds.
     fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError>;
 
-    /// Sets the pairs that the next [`Step::QueryPairs`] queries.
+    /// Sets the queries of the next [`Step::QueryPairs`], and the nodes of all of them, one query's after the other's. A query
+    /// of several nodes asks for all at once, and where a ray sees any, for each.
     ///
     /// # Errors
-    /// More pairs than the device holds.
-    fn set_pairs(&mut self, pairs: &[PairQuery]) -> Result<(), ExecutorError>;
+    /// More than the device holds.
+    fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError>;
 
     /// Runs `steps` in order over the rays of `pass` against bricks in the given states, waits, and reports.
     ///
@@ -261,6 +272,12 @@ pub struct PassStats {
     pub pairs_visible: u64,
     /// Pairs (tile, node) of the invisible front at the end.
     pub pairs_invisible: u64,
+    /// Queries over several pairs at once.
+    pub multi_queries: u64,
+    /// Of these, those that a ray saw, so that each pair was asked for by itself.
+    pub multi_queries_failed: u64,
+    /// Visible pairs whose next query was left to a later frame.
+    pub requeries_deferred: u64,
     /// Pairs whose invisible children were collapsed.
     pub pulled_up: u64,
     /// Bricks of batches that were taken before a wanted one with a lower number.
@@ -303,6 +320,7 @@ impl PassStats {
         sum.tile_batches += r.tile_batches;
         sum.tile_batch_leaves += r.tile_batch_leaves;
         sum.leaf_groups_postponed += r.leaf_groups_postponed;
+        sum.queries_tightened += r.queries_tightened;
         sum.rays += r.rays;
         sum.nodes += r.nodes;
         sum.triangles += r.triangles;

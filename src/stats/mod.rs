@@ -30,15 +30,19 @@ pub struct Record {
     pub queries_visible: u64,
     /// Pairs that the interval test culled.
     pub queries_interval_culled: u64,
-    /// Queries over several nodes at once.
+    /// With multi-queries: queries over several pairs of a tile at once.
     pub multi_queries: u64,
     /// Of these, those that had to be repeated node by node.
     pub multi_queries_failed: u64,
+    /// With tighter-bounds: nodes that a query found invisible although a ray of the tile enters their own box.
+    pub queries_tightened: u64,
+    /// With lazy-requery: visible pairs whose next query was left to a later frame.
+    pub requeries_deferred: u64,
     /// Visible pairs (tile, leaf) at the end.
     pub pairs_visible: u64,
     /// Invisible pairs at the end.
     pub pairs_invisible: u64,
-    /// Pairs whose children were collapsed.
+    /// With pull-up: pairs whose children were collapsed.
     pub pulled_up: u64,
     /// Pairs (tile, leaf) intersected.
     pub pairs_intersected: u64,
@@ -121,8 +125,10 @@ impl Record {
             pairs_visible: stats.pairs_visible,
             pairs_invisible: stats.pairs_invisible,
             pulled_up: stats.pulled_up,
-            multi_queries: 0,
-            multi_queries_failed: 0,
+            multi_queries: stats.multi_queries,
+            multi_queries_failed: stats.multi_queries_failed,
+            queries_tightened: r.queries_tightened,
+            requeries_deferred: stats.requeries_deferred,
             pairs_intersected: r.pairs_intersected,
             pairs_front_to_back: r.pairs_front_to_back,
             tile_batches: r.tile_batches,
