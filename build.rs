@@ -14,7 +14,10 @@ fn main() {
     println!("cargo::rerun-if-changed=src/gpu/wgsl.rs");
     println!("cargo::rustc-env=BRICKWALK_COMMIT={}", commit());
     let shaders = Path::new("shaders");
-    let read = |name: &str| fs::read_to_string(shaders.join(name)).ok();
+    let read = |name: &str| match name {
+        "shared/binary.wgsl" => Some(wgsl::binary_accessors(2, 64)),
+        _ => fs::read_to_string(shaders.join(name)).ok(),
+    };
     let mut names: Vec<String> = fs::read_dir(shaders)
         .expect("the folder shaders/")
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
@@ -83,6 +86,7 @@ fn layout_checks(module: &naga::Module) -> String {
         "TileBounds",
         "TileList",
         "TopNode2",
+        "BinaryNode",
         "Leaf",
         "Instance",
         "Brick",
@@ -111,7 +115,7 @@ fn layout_checks(module: &naga::Module) -> String {
     }
     for (_, constant) in module.constants.iter() {
         let Some(name) = constant.name.as_deref() else { continue };
-        let prefixes = ["PARAM_", "STATE_", "COUNTER_", "INSTANCE_", "BRICK_", "NONE"];
+        let prefixes = ["PARAM_", "STATE_", "COUNTER_", "INSTANCE_", "BRICK_", "BINARY_", "NONE"];
         if prefixes.iter().any(|p| name.starts_with(p))
             && let naga::Expression::Literal(naga::Literal::U32(value)) = module.global_expressions[constant.init]
         {

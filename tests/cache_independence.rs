@@ -49,6 +49,7 @@ fn frames_are_byte_identical_whatever_the_cache_and_schedule() {
         format!("--schedule demand --cache {least}"),
         "--schedule auto --cache 20%".to_string(),
         "--schedule auto --cache 100%".to_string(),
+        "--schedule plain-bvh2 --cache 100%".to_string(),
     ];
     for (i, options) in variants.iter().enumerate() {
         assert!(run(&format!("variant{i}"), options) == truth, "{options}: frames differ from plain");
@@ -80,6 +81,7 @@ fn effects_do_not_depend_on_the_cache() {
         format!("--schedule demand --cache {least}"),
         "--schedule demand --cache 100%".to_string(),
         "--schedule auto --cache 20%".to_string(),
+        "--schedule plain-bvh2 --cache 100%".to_string(),
     ];
     for (i, options) in variants.iter().enumerate() {
         assert!(run(&format!("variant{i}"), options) == truth, "{options}: frames differ from plain");

@@ -100,6 +100,14 @@ struct TopNode2 {
     right: u32,           // NONE: `left` is a leaf
 }
 
+struct BinaryNode {       // of a brick's binary tree, relative to the brick's origin
+    min: vec3<f32>,
+    what: u32,            // inner: index of its first child within the brick's nodes, the other follows; leaf: BINARY_LEAF
+                          // with the number of its triangles, 0 to 3, in bits 29 and 30, and the first in the bits below
+    max: vec3<f32>,
+    padding: u32,
+}
+
 struct Leaf {
     offset_high: vec3<f32>, // brick origin - reference point, in the object's device units: high part
     instance: u32,
@@ -193,6 +201,7 @@ const INSTANCE_IDENTITY: u32 = 1u;
 const BRICK_WIDE: u32 = 1u;
 const BRICK_INDEX32: u32 = 2u;
 const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex without one
+const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
 const STATE_BATCH: u32 = 4u;       // geometry arrived with the current batch

@@ -234,7 +234,8 @@ pub struct StreamArgs {
     /// How bricks to intersect are found: chc (tiles against the top level, loading what rays need), demand (one traversal per
     /// ray over what is resident, loading what rays ask for), plain (everything resident, one traversal per ray; the cache
     /// must hold the scene), auto (the cheapest of these by measurement, for each effect; chc with --fronts on or a
-    /// --query-threshold). Pictures are the same
+    /// --query-threshold). For measurements: plain-bvh2 (as plain, over binary trees made at the start, which take memory
+    /// beside the cache: the kind of baseline of the CHC+RT paper). Pictures are the same
     #[arg(long, value_name = "NAME", default_value = "auto")]
     pub schedule: Schedule,
     /// Width and height of a screen tile in pixels, a power of two from 8 to 512
@@ -420,6 +421,8 @@ named_values! {
         Demand = "demand",
         /// Everything resident, one traversal per ray.
         Plain = "plain",
+        /// The same over binary trees.
+        PlainBvh2 = "plain-bvh2",
         /// The cheaper one.
         Auto = "auto",
     } later &[]

@@ -74,7 +74,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--cache 101%", "100 %"),
         ("--cache 99999999999G", "64 bits"),
         ("--host-cache 1.5G", "whole number"),
-        ("--schedule fastest", "known: chc, demand, plain, auto"),
+        ("--schedule fastest", "known: chc, demand, plain, plain-bvh2, auto"),
         ("--effects environment", "not in this version"),
         ("--effects glitter", "no 'glitter'"),
         ("--effects=", "known: primary, shadow"),

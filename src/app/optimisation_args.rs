@@ -44,7 +44,10 @@ impl OptimisationArgs {
         let given = |option, list: &[Optimisation]| list.iter().map(|&which| (option, which)).collect::<Vec<_>>();
         for (option, which) in [given("--without", &self.without), given("--with", &self.with)].concat() {
             let (has_meaning, belongs) = match which.part_of() {
-                PartOf::Loading => (stream.schedule != Schedule::Plain, "--schedule chc, demand or auto"),
+                PartOf::Loading => (
+                    !matches!(stream.schedule, Schedule::Plain | Schedule::PlainBvh2),
+                    "--schedule chc, demand or auto",
+                ),
                 PartOf::Lists => (chc, "--schedule chc or auto"),
                 PartOf::Fronts => (chc && stream.fronts == "on", "--fronts on (schedule chc)"),
             };

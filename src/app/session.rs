@@ -99,11 +99,13 @@ impl Session {
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
         let budget = cache_budget(args.cache, &sizes, page_bytes);
         let schedule = match args.schedule {
-            ScheduleArg::Plain if budget < for_all => bail!(
-                "{name}: --schedule plain keeps everything resident: give --cache 100% ({for_all} bytes) rather than \
-                 {budget} bytes, or use --schedule chc"
+            ScheduleArg::Plain | ScheduleArg::PlainBvh2 if budget < for_all => bail!(
+                "{name}: --schedule {} keeps everything resident: give --cache 100% ({for_all} bytes) rather than \
+                 {budget} bytes, or use --schedule chc",
+                args.schedule.name()
             ),
             ScheduleArg::Plain => Schedule::Plain,
+            ScheduleArg::PlainBvh2 => Schedule::PlainBinary,
             ScheduleArg::Chc => Schedule::Chc,
             ScheduleArg::Demand => Schedule::Demand,
             // Fronts and thresholds belong to chc; with a threshold the schedule shows in the picture.
@@ -126,9 +128,12 @@ impl Session {
         let threshold = (f64::from(args.query_threshold) * f64::from(extent.tile).powi(2) / 40_000.0) as u32;
         let setup = Setup { extent, threshold, count: false };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
-        let executor =
+        let mut executor =
             GpuExecutor::new(gpu, scene.clone(), workers, &page_sizes, setup).with_context(|| format!("{name}"))?;
         require(executor.gpu(), &probe::compare_pipelines(&executor))?;
+        if schedule == Schedule::PlainBinary {
+            executor.make_binary().with_context(|| format!("{name}"))?;
+        }
         Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule })
     }
 }

@@ -50,6 +50,7 @@ pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], fra
                 Schedule::Chc => "chc",
                 Schedule::Demand => "demand",
                 Schedule::Plain => "plain",
+                Schedule::PlainBinary => "plain-bvh2",
                 Schedule::Auto => "auto",
             },
             "fronts": args.stream.fronts,

@@ -151,6 +151,7 @@ fn trace_chunk(
         Schedule::Demand | Schedule::Auto => demand::trace,
         Schedule::Chc => chc::trace,
         Schedule::Plain => plain::trace,
+        Schedule::PlainBinary => plain::trace_binary,
     };
     trace(executor, cache, pass, &[Step::StartHits], &Tracing::default(), stats)?;
     let hits = executor.read_hits(pass)?;

@@ -1,5 +1,6 @@
 //! Which dispatches of which kernels a step consists of.
 
+use super::binary;
 use super::layout::{self, Params};
 use crate::math::sampling::{cosine_hemisphere, halton};
 use crate::schedule::{Lamp, Pass, Step};
@@ -137,6 +138,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         Step::SortByNumber => vec![kernel("tile_sort_number", params, per_tile, Some(1))],
         Step::SortNodesNear => vec![kernel("tile_sort_near", params, per_tile, Some(1))],
         Step::IntersectAll => vec![kernel("intersect_all", params, per_ray, Some(0))],
+        Step::IntersectBinary => vec![kernel(binary::KERNEL, params, per_ray, Some(0))],
         Step::IntersectAllResident => {
             let params = Params { select_mask: not_done, select_want: resident, ..params };
             vec![kernel("intersect_selected", params, per_ray, Some(0))]

@@ -1,5 +1,6 @@
 //! The wgpu executor: turns steps into dispatches, one submission and one readback a round trip.
 
+use super::binary::{self, BinaryTrees};
 use super::device::Gpu;
 use super::dispatch::{Dispatch, dispatches};
 
@@ -43,6 +44,7 @@ pub struct GpuExecutor {
     kernels: Arc<Kernels>,
     buffers: Buffers,
     groups: Groups,
+    binary: Option<BinaryTrees>,
     extent: Extent,
     readback: Readback,
     timing: Timing,
@@ -138,6 +140,7 @@ impl GpuExecutor {
             kernels,
             buffers,
             groups,
+            binary: None,
             extent,
             readback,
             timing,
@@ -162,6 +165,15 @@ impl GpuExecutor {
     /// Whether lists are intersected by the kernel that postpones groups of triangles.
     pub fn set_leaf_cache(&mut self, on: bool) {
         self.leaf_cache = on;
+    }
+
+    /// Makes what [`Step::IntersectBinary`] needs; without it that step must not be run.
+    ///
+    /// # Errors
+    /// A brick that cannot be read; more nodes than the device holds, with how much is needed.
+    pub fn make_binary(&mut self) -> Result<(), ExecutorError> {
+        self.binary = Some(BinaryTrees::new(&self.gpu, &self.scene, &self.kernels)?);
+        Ok(())
     }
 
     /// The device.
@@ -311,12 +323,14 @@ impl GpuExecutor {
                 label: Some(dispatch.kernel),
                 timestamp_writes: self.timing.writes(i as u32),
             });
-            compute.set_pipeline(self.kernels.pipeline(dispatch.kernel));
+            let binary = self.binary.as_ref().filter(|_| dispatch.kernel == binary::KERNEL);
+            compute.set_pipeline(binary.map_or_else(|| self.kernels.pipeline(dispatch.kernel), |b| &b.pipeline));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
             compute.set_bind_group(2, if dispatch.cache { &self.groups.cache } else { &self.groups.empty }, &[]);
             let shading = &self.groups.shading[pass.set().saturating_sub(1)];
-            compute.set_bind_group(3, if dispatch.shading { shading } else { &self.groups.tiles }, &[]);
+            let third = if dispatch.shading { shading } else { &self.groups.tiles };
+            compute.set_bind_group(3, binary.map_or(third, |b| &b.group), &[]);
             let [x, y] = dispatch.groups;
             compute.dispatch_workgroups(x, y, 1);
         }

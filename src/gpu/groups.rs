@@ -103,7 +103,10 @@ fn filled(pages: &[wgpu::Buffer], count: usize) -> impl Iterator<Item = &wgpu::B
 }
 
 /// Whole buffers as entries from binding `first` on.
-fn numbered<'a>(buffers: impl IntoIterator<Item = &'a wgpu::Buffer>, first: u32) -> Vec<wgpu::BindGroupEntry<'a>> {
+pub(super) fn numbered<'a>(
+    buffers: impl IntoIterator<Item = &'a wgpu::Buffer>,
+    first: u32,
+) -> Vec<wgpu::BindGroupEntry<'a>> {
     let entry = |(binding, buffer): (u32, &'a wgpu::Buffer)| wgpu::BindGroupEntry {
         binding,
         resource: buffer.as_entire_binding(),

@@ -8,7 +8,13 @@ include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 /// The text of kernel `name` with everything it includes.
 pub fn source(name: &str, pages: Pages) -> String {
-    let file = |name: &str| FILES.iter().find(|f| f.0 == name).map(|f| f.1.to_string());
+    source_with(name, pages, &|_| None)
+}
+
+/// [`source`] with the files that `generated` gives in place of the shipped ones.
+pub(super) fn source_with(name: &str, pages: Pages, generated: &dyn Fn(&str) -> Option<String>) -> String {
+    let shipped = |name: &str| FILES.iter().find(|f| f.0 == name).map(|f| f.1.to_string());
+    let file = |name: &str| generated(name).or_else(|| shipped(name));
     // The build has assembled every kernel from the same table.
     wgsl::assemble(&format!("{name}.wgsl"), pages, &file).unwrap_or_default()
 }
@@ -170,6 +176,11 @@ fn entry(binding: u32, bound: Bound) -> wgpu::BindGroupLayoutEntry {
 fn layout(device: &wgpu::Device, label: &str, bindings: &[Bound]) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = bindings.iter().enumerate().map(|(i, &b)| entry(i as u32, b)).collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
+
+/// The layout of a group of `count` storage buffers that are read.
+pub(super) fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
+    layout(device, label, &vec![Bound::Read; count])
 }
 
 /// First binding of the texels in the shading group.

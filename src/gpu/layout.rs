@@ -36,6 +36,7 @@ pub const COUNTER_TILE_BATCHES: u32 = 14;
 pub const COUNTER_TILE_BATCH_LEAVES: u32 = 15;
 pub const COUNTER_LEAF_GROUPS: u32 = 16;
 pub const COUNTER_TIGHTENED: u32 = 17;
+pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Number of counters.
 pub const COUNTERS: usize = 24;
 /// What an unbounded ray has for t_max on the device: the greatest f32 but one.
@@ -72,6 +73,7 @@ mirror! {
     }
     struct TileList { first: u32, count: u32, selected: u32, padding: u32 }
     struct TopNode2 { min: [f32; 3], left: u32, max: [f32; 3], right: u32 }
+    struct BinaryNode { min: [f32; 3], what: u32, max: [f32; 3], padding: u32 }
     struct Leaf { offset_high: [f32; 3], instance: u32, offset_low: [f32; 3], brick: u32 }
     struct Instance {
         object_from_world: [[f32; 4]; 3], world_from_object: [[f32; 4]; 3],

@@ -1,5 +1,6 @@
 //! The wgpu executor: device, layouts, kernels, cache pages, timing.
 
+pub mod binary;
 pub mod device;
 pub mod dispatch;
 pub mod executor;

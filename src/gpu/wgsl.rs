@@ -71,6 +71,18 @@ fn texel_accessors(pages: usize) -> String {
     s
 }
 
+/// What kernels over binary trees include as `shared/binary.wgsl`: group 3, the root of each brick and, from binding 1, the
+/// nodes in so many pages; and how many entries a traversal's stack has.
+pub fn binary_accessors(pages: usize, stack: u32) -> String {
+    let mut s = format!("const BINARY_STACK: u32 = {stack}u;\n");
+    s.push_str("@group(3) @binding(0) var<storage, read> binary_roots: array<vec2<u32>>;\n");
+    for k in 0..pages {
+        let _ = writeln!(s, "@group(3) @binding({}) var<storage, read> binary_{k}: array<BinaryNode>;", 1 + k);
+    }
+    accessor(&mut s, "binary_node", "BinaryNode", "binary", "[index]", pages);
+    s
+}
+
 fn accessor(s: &mut String, name: &str, kind: &str, array: &str, element: &str, pages: usize) {
     let _ = writeln!(s, "fn {name}(page: u32, index: u32) -> {kind} {{");
     for k in 1..pages {

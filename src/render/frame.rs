@@ -26,7 +26,9 @@ pub enum Schedule {
     Demand,
     /// Everything resident, every ray from the root.
     Plain,
-    /// The cheapest of these, pass by pass.
+    /// Everything resident, every ray from the root, over binary trees; the executor has been made ready for it.
+    PlainBinary,
+    /// The cheapest of the first three, pass by pass.
     Auto,
 }
 
@@ -208,6 +210,11 @@ impl Renderer {
             Schedule::Chc => Fixed::Chc,
             Schedule::Demand => Fixed::Demand,
             Schedule::Plain => Fixed::Plain,
+            Schedule::PlainBinary => {
+                let tracing = &self.settings.tracing;
+                let first = [Step::Generate];
+                return plain::trace_binary(&mut self.executor, &mut self.cache, pass, &first, tracing, stats);
+            }
             Schedule::Auto => {
                 let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
                 let (start, ms_stream, rays) = (Instant::now(), stats.ms_stream, stats.report.rays);

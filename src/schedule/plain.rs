@@ -1,4 +1,4 @@
-//! The schedule `plain`: everything resident, every ray from the root. The baseline.
+//! The schedules `plain` and `plain-bvh2`: everything resident, every ray from the root. The baselines.
 
 use super::cache::Cache;
 use super::chc::measure_needed;
@@ -38,10 +38,37 @@ pub fn trace(
     tracing: &Tracing,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
+    trace_by(Step::IntersectAll, executor, cache, pass, first, tracing, stats)
+}
+
+/// [`trace`] by binary trees, which the executor has been made ready for.
+///
+/// # Errors
+/// What the executor says.
+pub fn trace_binary(
+    executor: &mut dyn Executor,
+    cache: &mut Cache,
+    pass: Pass,
+    first: &[Step],
+    tracing: &Tracing,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
+    trace_by(Step::IntersectBinary, executor, cache, pass, first, tracing, stats)
+}
+
+fn trace_by(
+    intersect: Step,
+    executor: &mut dyn Executor,
+    cache: &mut Cache,
+    pass: Pass,
+    first: &[Step],
+    tracing: &Tracing,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
     make_all_resident(executor, cache, stats)?;
     let mut steps = first.to_vec();
-    steps.extend([Step::CountRays, Step::IntersectAll]);
+    steps.extend([Step::CountRays, intersect]);
     let report = executor.run(pass, &steps, &cache.states)?;
     stats.bricks_intersected.extend(cache.states.finish_resident());
     stats.add(report);

@@ -90,6 +90,8 @@ pub enum Step {
     SortNodesNear,
     /// Intersect everything, all of it resident, from the root.
     IntersectAll,
+    /// The same by binary trees.
+    IntersectBinary,
     /// Intersect what is resident and not done, from the root: phase 1.
     IntersectAllResident,
     /// Intersect the rays that asked for a brick with the batch just loaded, from the root: phase 3.
