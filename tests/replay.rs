@@ -123,6 +123,7 @@ fn a_replay_reproduces_the_walk() {
     let mut loads = Vec::new();
     for (i, options) in [
         "--cache 10% --evict round-robin".to_owned(),
+        "--cache 10% --evict second-chance".to_owned(),
         "--cache 10% --evict lru".to_owned(),
         // As small as it may be: batches do not fit and are cut short.
         format!("--cache {least} --evict round-robin"),
@@ -147,12 +148,12 @@ fn a_replay_reproduces_the_walk() {
         assert_eq!(row["evicted"], total(&out, "bricks_evicted"), "{options}");
         assert_eq!(row["loaded_bytes"], bytes, "{options}");
         loads.push(row["loads"].as_u64().expect("a count"));
-        // Per size: round robin, LRU, Bélády, which knows the future.
-        for three in rows.chunks(3) {
-            let loads: Vec<u64> = three.iter().map(|row| row["loads"].as_u64().expect("a count")).collect();
-            assert!(loads[2] <= loads[0] && loads[2] <= loads[1], "{options}: {three:?}");
-            assert!(loads[2] >= replayed["distinct"].as_u64().expect("a count"));
-            for row in three {
+        // Per size: round robin, second chances, LRU, Bélády, which knows the future.
+        for four in rows.chunks(4) {
+            let loads: Vec<u64> = four.iter().map(|row| row["loads"].as_u64().expect("a count")).collect();
+            assert!(loads.iter().all(|&others| loads[3] <= others), "{options}: {four:?}");
+            assert!(loads[3] >= replayed["distinct"].as_u64().expect("a count"));
+            for row in four {
                 let n = |field: &str| row[field].as_u64().expect("a count");
                 assert_eq!(n("hits") + n("loads"), replayed["requests"].as_u64().expect("a count"));
                 assert!(n("cache_bytes") >= least);
@@ -160,18 +161,35 @@ fn a_replay_reproduces_the_walk() {
         }
     }
     // Controls: the walks differ, so the numbers cannot agree by accident; a small cache has something to choose.
-    assert!(loads[0] != loads[2] && loads[2] > loads[4], "{loads:?}");
-    let [ring, belady] = [0, 2].map(|i| {
-        let rows = replayed(&folder.path().join("trace2.jsonl"), &["--cache", "100%"]);
+    assert!(loads[0] != loads[3] && loads[3] > loads[5], "{loads:?}");
+    let [ring, belady] = [0, 3].map(|i| {
+        let rows = replayed(&folder.path().join("trace3.jsonl"), &["--cache", "100%"]);
         rows["results"][i]["loads"].as_u64().expect("a count")
     });
     assert!(belady < ring, "{belady} {ring}");
+
+    // A page: three plots with a curve a policy, a table, nothing from elsewhere; the sizes are denser.
+    let (trace, page) = (folder.path().join("trace0.jsonl"), folder.path().join("replay.html"));
+    let rows = replayed(&trace, &["--plot", page.to_str().expect("UTF-8")]);
+    let sizes = rows["results"].as_array().expect("rows").len() / 4;
+    assert!(sizes > 15, "{sizes}");
+    let text = std::fs::read_to_string(&page).expect("a page");
+    assert_eq!(
+        (text.matches("<figure").count(), text.matches("class=\"key\"").count()),
+        (3, 3 * 4),
+        "a curve a policy"
+    );
+    assert_eq!(text.matches("<th scope=\"row\">").count(), sizes);
+    assert!(text.ends_with("</html>") && !text.contains("src=") && !text.contains("href="), "one offline page");
+    let missing = folder.path().join("none/replay.html");
+    let words = ["replay", trace.to_str().expect("UTF-8"), "--plot", missing.to_str().expect("UTF-8")];
+    assert!(refused(&words).contains("none/replay.html"));
 
     // Sizes asked for: too small ones are named and skipped.
     let trace = folder.path().join("trace0.jsonl");
     let rows = replayed(&trace, &["--cache", "16", "30%,40%"]);
     assert_eq!(rows["skipped_cache_bytes"], serde_json::json!([16]));
-    assert_eq!(rows["results"].as_array().expect("rows").len(), 9, "recorded, 30 %, 40 %");
+    assert_eq!(rows["results"].as_array().expect("rows").len(), 12, "recorded, 30 %, 40 %");
     let text = succeed(["replay", trace.to_str().expect("UTF-8"), "--cache", "16"]);
     assert!(text.contains("as recorded") && text.contains(&format!("Skipped, below the two largest bricks ({least}")));
 }
@@ -200,7 +218,7 @@ fn a_trace_that_is_not_whole_is_refused() {
 
     let good = std::fs::read(whole).expect("a trace");
     let last_line = good[..good.len() - 1].iter().rposition(|&byte| byte == b'\n').expect("two lines") + 1;
-    let huge = br#"{"format":2,"policy":"lru","budget_bytes":18446744073709551600,"page_bytes":16,"passes":0,"sizes":[[18446744073709551600,16]]}"#;
+    let huge = br#"{"format":3,"policy":"lru","budget_bytes":18446744073709551600,"page_bytes":16,"passes":0,"sizes":[[18446744073709551600,16]]}"#;
     let file = folder.path().join("bad.jsonl");
     let name = file.to_str().expect("UTF-8");
     for bad in [

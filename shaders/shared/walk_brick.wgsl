@@ -17,6 +17,15 @@ struct OpenedNode {
     triangles: vec2<u32>,
 }
 
+// Notes that a ray enters a child box of the brick's root: what a resident brick's demand says (the host knows which are).
+// Most rays find it noted, and only read.
+fn note_use(leaf: u32) {
+    let brick = leaves[leaf].brick;
+    if atomicLoad(&demand[brick].rays) == 0u {
+        atomicStore(&demand[brick].rays, 1u);
+    }
+}
+
 fn open_node(r: ptr<function, BrickRay>, t_max: f32, index: u32) -> OpenedNode {
     let at = (*r).nodes + 5u * index;
     let page = (*r).page;
@@ -26,6 +35,9 @@ fn open_node(r: ptr<function, BrickRay>, t_max: f32, index: u32) -> OpenedNode {
                             (*r).offset_high, (*r).offset_low, 0.0, t_max).mask;
     let mask = traversal_mask(entered, n1, (*r).ray.flip);
     nodes_visited += 1u;
+    if index == 0u && mask != 0u {
+        note_use((*r).leaf);
+    }
     return OpenedNode(vec2<u32>(n1.x, (mask & 0xff000000u) | (n0.w >> 24u)), vec2<u32>(n1.y, mask & 0x00ffffffu));
 }
 

@@ -7,6 +7,7 @@ use super::named::{named_values, unknown};
 use super::optimisation_args::OptimisationArgs;
 use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
+use crate::stream::Policy;
 use brickwalk_scenes::Kind;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -244,9 +245,10 @@ pub struct StreamArgs {
     /// Threads that read bricks and check them [default: one per core, at most 4]
     #[arg(long, value_name = "N", alias = "hash-threads", value_parser = threads)]
     pub workers: Option<u32>,
-    /// Which brick makes room for another: round-robin, lru (the one not used for longest)
+    /// Which brick makes room for another: round-robin (the next one in the cache), second-chance (the next one that was not
+    /// used since its turn came last), lru (the one not used for longest)
     #[arg(long, value_name = "NAME", default_value = "round-robin",
-        value_parser = |s: &str| one_of(s, &["round-robin", "lru"]))]
+        value_parser = |s: &str| one_of(s, &Policy::ALL.map(Policy::name)))]
     pub evict: String,
     /// Keep query pairs of tiles and nodes from frame to frame (walk, with schedule chc): on, off
     #[arg(long, value_name = "on|off", default_value = "off", value_parser = |s: &str| one_of(s, &["on", "off"]))]
@@ -389,9 +391,13 @@ pub struct ReplayArgs {
     /// The trace that walk or trace wrote with --requests-out
     #[arg(value_name = "F")]
     pub requests: PathBuf,
-    /// Caches beside the recorded one: sizes, or shares P% of all bricks [default: 5% 10% 20% 50% 100%]
+    /// Caches beside the recorded one: sizes, or shares P% of all bricks [default: 5% 10% 20% 50% 100%; with --plot 26
+    /// shares from 2% to 100%]
     #[arg(long, value_name = "SIZE|P%", num_args = 1.., value_delimiter = ',')]
     pub cache: Vec<CacheSize>,
+    /// Write a page with plots against the size of the cache, and a table; one file that opens offline
+    #[arg(long, value_name = "FILE.html")]
+    pub plot: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

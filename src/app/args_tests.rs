@@ -92,7 +92,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--fov nan", "179.99"),
         ("--fronts yes", "known: on, off"),
         ("--query-threshold 40001", "0 to 40000"),
-        ("--evict fifo", "known: round-robin, lru"),
+        ("--evict fifo", "known: round-robin, second-chance, lru"),
         ("--prefetch 65537", "0 to 65536"),
         ("--environment f.hdr", "not in this version"),
         ("--nonsense", "--nonsense"),

@@ -16,6 +16,12 @@ const FORMAT: u32 = 1;
 /// Shares of all bricks, percent, that are replayed without `--cache`.
 const LADDER: [f64; 5] = [5.0, 10.0, 20.0, 50.0, 100.0];
 
+/// The shares with a plot.
+const DENSE: [f64; 26] = [
+    2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 18.0, 20.0, 22.0, 25.0, 28.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0,
+    60.0, 65.0, 70.0, 80.0, 90.0, 100.0,
+];
+
 /// A cache size and what every policy made of the trace in it.
 struct Rung {
     budget_bytes: u64,
@@ -32,9 +38,20 @@ pub fn run(args: &ReplayArgs) -> Result<()> {
     let file = File::open(&args.requests).with_context(|| format!("{name}: cannot be opened"))?;
     ensure!(!file.metadata()?.is_dir(), "{name}: it is a folder; give the file that --requests-out wrote");
     let trace = Trace::read(BufReader::new(file)).with_context(|| name.clone())?;
-    let (rungs, skipped) = climb(&trace, &args.cache).with_context(|| name.clone())?;
+    let ladder = if args.plot.is_some() { &DENSE[..] } else { &LADDER };
+    let asked = if args.cache.is_empty() {
+        ladder.iter().map(|&percent| CacheSize::Percent(percent)).collect()
+    } else {
+        args.cache.clone()
+    };
+    let (rungs, skipped) = climb(&trace, &asked).with_context(|| name.clone())?;
+    let json = as_json(&trace, &rungs, &skipped);
+    if let Some(page) = &args.plot {
+        let short = args.requests.file_name().map_or(name.clone(), |file| file.to_string_lossy().into_owned());
+        brickwalk_report::write_replay(page, &short, &json)?;
+    }
     if args.json {
-        return super::print_json(&as_json(&trace, &rungs, &skipped));
+        return super::print_json(&json);
     }
     super::print(&format!("{name}: {}", as_text(&trace, &rungs, &skipped)))
 }
@@ -46,8 +63,6 @@ fn all_bytes(trace: &Trace) -> u64 {
 
 /// Replays in the recorded cache and in those asked for, each size once, ascending; and the sizes too small for the scene.
 fn climb(trace: &Trace, asked: &[CacheSize]) -> Result<(Vec<Rung>, Vec<u64>), TraceError> {
-    let ladder = LADDER.map(CacheSize::Percent);
-    let asked = if asked.is_empty() { &ladder[..] } else { asked };
     // As the cache rounds it.
     let recorded = trace.budget_bytes - trace.budget_bytes % 16;
     let given = asked.iter().map(|&size| cache_budget(size, &trace.sizes, trace.page_bytes) / 16 * 16);

@@ -112,7 +112,7 @@ impl Session {
             ScheduleArg::Auto if args.fronts == "on" || args.query_threshold > 0 => Schedule::Chc,
             ScheduleArg::Auto => Schedule::Auto,
         };
-        let policy = if args.evict == "lru" { Policy::Lru } else { Policy::RoundRobin };
+        let policy: Policy = args.evict.parse().map_err(|error: String| anyhow!(error).context("--evict"))?;
         let residency = Residency::new(&sizes, budget, page_bytes, policy).map_err(|error| match error {
             ResidencyError::CacheTooSmall { needed, given } => anyhow!(
                 "{name}: a cache of {given} bytes is too small: the two largest bricks need {needed} bytes; give \

@@ -342,6 +342,13 @@ impl GpuExecutor {
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
         let demand: Vec<layout::Demand> = bytemuck::pod_collect_to_vec(&demand[..bricks.len() * 8]);
         let mut report = read_report(&counters, &demand)?;
+        if steps.iter().any(|step| step.is_intersection()) {
+            // Queries in the same submission ask for missing bricks, or for what is not done beside a batch, which is; of the
+            // others rays have noted the use.
+            let undone = steps.iter().any(|step| matches!(step, Step::QueryUndone | Step::QueryAllUndone));
+            let is_used = |brick: usize| bricks.geometry(brick).is_some() && (!undone || bricks.done(brick));
+            report.used = report.demand.extract_if(.., |d| is_used(d.0 as usize)).map(|d| d.0).collect();
+        }
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
             let rays: Vec<u32> = self.read(|s| &s.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
@@ -438,6 +445,7 @@ fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, Ex
     Ok(Report {
         round_trips: 1,
         demand: wanted.map(|(brick, d)| (brick as u32, d.rays, f32::from_bits(d.nearest))).collect(),
+        used: Vec::new(),
         list_entries: counters[layout::COUNTER_LIST_ENTRIES as usize],
         pairs_tested: count(layout::COUNTER_PAIRS_TESTED),
         pairs_culled: count(layout::COUNTER_PAIRS_CULLED),

@@ -60,17 +60,22 @@ impl Cache {
         }
     }
 
-    /// Marks what is resident as done, its intersection being under way, and notes its use. `ahead`: some bricks are missing, which
-    /// are asked for only now.
-    pub fn finish_resident(&mut self, ahead: bool, stats: &mut PassStats) {
-        let resident = self.states.finish_resident();
-        for &brick in &resident {
+    /// Marks what is resident as done, its intersection being under way, and notes the use of the bricks that rays entered.
+    /// `ahead`: some bricks are missing, which are asked for only now.
+    pub fn finish_resident(&mut self, used: &[u32], ahead: bool, stats: &mut PassStats) {
+        self.states.finish_resident();
+        self.touch_geometry(used, ahead, stats);
+    }
+
+    /// Notes the use of resident bricks that rays entered.
+    pub fn touch_geometry(&mut self, used: &[u32], ahead: bool, stats: &mut PassStats) {
+        for &brick in used {
             self.touch(Item::geometry(brick));
         }
         if ahead {
-            stats.bricks_resident_first += resident.len() as u64;
+            stats.bricks_resident_first += used.len() as u64;
         }
-        stats.bricks_intersected.extend(resident);
+        stats.bricks_intersected.extend(used);
     }
 
     /// Loads as many of `items` as fit without evicting each other, at least one and at most `most`; returns how many,

@@ -35,7 +35,7 @@ pub fn trace(
     }
     let report = run(executor, pass, &steps, &cache.states, optimisations, stats)?;
     if resident_first {
-        cache.finish_resident(some_missing, stats);
+        cache.finish_resident(&report.used, some_missing, stats);
     }
     let batches = Batches::of_lists(pass, optimisations);
     batches.load_and_intersect(executor, cache, report, stats)?;

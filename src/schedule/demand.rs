@@ -34,7 +34,7 @@ pub fn trace(
     }
     let report = executor.run(pass, &steps, &cache.states)?;
     if !some_missing || optimisations.resident_first {
-        cache.finish_resident(some_missing, stats);
+        cache.finish_resident(&report.used, some_missing, stats);
     }
     let batches = Batches { pass, intersect: Step::IntersectAllBatch, query, optimisations };
     batches.load_and_intersect(executor, cache, report, stats)?;

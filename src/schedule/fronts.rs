@@ -11,7 +11,6 @@ use super::multi_query::batches;
 use super::optimisations::run;
 use super::pair_tree::{Front, PairTree, Square};
 use super::{Executor, ExecutorError, PairQuery, Pass, PassStats, Step, Tracing};
-use crate::stream::Item;
 use bricks::Resident;
 use std::collections::BTreeMap;
 
@@ -106,13 +105,7 @@ impl Fronts {
         }
         found.used.sort_unstable();
         found.used.dedup();
-        for &brick in &found.used {
-            cache.touch(Item::geometry(brick));
-        }
-        if ahead {
-            stats.bricks_resident_first += found.used.len() as u64;
-        }
-        stats.bricks_intersected.append(&mut found.used);
+        cache.touch_geometry(&found.used, ahead, stats);
 
         // What is visible and missing: ask again, load, intersect.
         let waiting = std::mem::take(&mut found.waiting);
@@ -195,7 +188,7 @@ struct Found<'a> {
     steps: Vec<Step>,
     /// Pairs whose brick is missing.
     waiting: Vec<u32>,
-    /// Bricks that were resident and intersected.
+    /// Bricks that were resident and that rays entered.
     used: Vec<u32>,
 }
 
@@ -232,6 +225,7 @@ impl Found<'_> {
         executor.set_pairs(&queries, &nodes)?;
         self.steps.push(Step::QueryPairs { tighter: on.tighter_bounds });
         let mut report = self.run(executor, cache, stats)?;
+        self.used.extend(&report.used);
         let seen = std::mem::take(&mut report.pair_rays);
         stats.add(report);
         let mut first = 0;
@@ -264,7 +258,6 @@ impl Found<'_> {
             let brick = brick_of(tree, self.setup.resident, index);
             if cache.states.geometry(brick as usize).is_some() {
                 present.push(index);
-                self.used.push(brick);
             } else {
                 self.waiting.push(index);
             }

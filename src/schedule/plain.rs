@@ -70,7 +70,7 @@ fn trace_by(
     let mut steps = first.to_vec();
     steps.extend([Step::CountRays, intersect]);
     let report = executor.run(pass, &steps, &cache.states)?;
-    stats.bricks_intersected.extend(cache.states.finish_resident());
+    cache.finish_resident(&report.used, false, stats);
     stats.add(report);
     if tracing.measure_needed {
         measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;

@@ -58,16 +58,11 @@ impl BrickStates {
         self.batch.fill(false);
     }
 
-    /// Marks what is resident as done, and returns it.
-    pub(super) fn finish_resident(&mut self) -> Vec<u32> {
-        let mut finished = Vec::new();
-        for brick in 0..self.done.len() {
-            if self.geometry[brick].is_some() && !self.done[brick] {
-                self.done[brick] = true;
-                finished.push(brick as u32);
-            }
+    /// Marks what is resident as done.
+    pub(super) fn finish_resident(&mut self) {
+        for (done, slot) in self.done.iter_mut().zip(&self.geometry) {
+            *done |= slot.is_some();
         }
-        finished
     }
 
     /// Marks `bricks` as the batch, done when its step has run.

@@ -125,6 +125,20 @@ pub enum Step {
     AddOcclusion,
 }
 
+impl Step {
+    /// Whether rays meet bricks in it.
+    pub fn is_intersection(self) -> bool {
+        matches!(
+            self,
+            Step::IntersectResident
+                | Step::IntersectBatch
+                | Step::IntersectAll
+                | Step::IntersectAllResident
+                | Step::IntersectAllBatch
+        )
+    }
+}
+
 /// Light that [`Step::Shade`] adds to hits beside their emission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Shading {
@@ -166,6 +180,9 @@ pub struct Report {
     pub round_trips: u32,
     /// Bricks still wanted: brick, rays, entry distance of the nearest; ascending by brick.
     pub demand: Vec<(u32, u32, f32)>,
+    /// Resident bricks that a step of intersection entered: some ray met a child box of their root before its hit at that
+    /// time. Ascending.
+    pub used: Vec<u32>,
     /// Entries that the tiles' lists hold, or would hold.
     pub list_entries: u32,
     /// Pairs (tile, node) put to the interval test.

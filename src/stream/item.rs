@@ -101,18 +101,21 @@ pub enum Policy {
     /// Write at the next position, wrap, evict what is overlapped (the paper's cache).
     #[default]
     RoundRobin,
+    /// Round robin that passes over once what was used, and stays in place where a cycle of requests does not fit.
+    SecondChance,
     /// Evict what was not used for longest.
     Lru,
 }
 
 impl Policy {
     /// Every policy, in the order of the command line's help.
-    pub const ALL: [Self; 2] = [Self::RoundRobin, Self::Lru];
+    pub const ALL: [Self; 3] = [Self::RoundRobin, Self::SecondChance, Self::Lru];
 
     /// The name used on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::RoundRobin => "round-robin",
+            Self::SecondChance => "second-chance",
             Self::Lru => "lru",
         }
     }
@@ -132,6 +135,6 @@ impl FromStr for Policy {
         Self::ALL
             .into_iter()
             .find(|policy| policy.name() == text)
-            .ok_or_else(|| format!("{text:?} is not a policy: expected round-robin or lru"))
+            .ok_or_else(|| format!("{text:?} is not a policy: expected round-robin, second-chance or lru"))
     }
 }

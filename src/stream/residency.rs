@@ -212,7 +212,8 @@ impl Residency {
         let space = Space::new(page_bytes, budget);
         let count = bytes.len();
         let placement = match policy {
-            Policy::RoundRobin => Placement::RoundRobin(Ring::default()),
+            Policy::SecondChance => Placement::RoundRobin(Ring::with_chances(count)),
+            Policy::RoundRobin => Placement::RoundRobin(Ring::plain()),
             Policy::Lru => Placement::Lru(Lru::new(count, &space)),
         };
         Ok(Self {
@@ -277,7 +278,8 @@ impl Residency {
 
     /// The policy.
     pub fn policy(&self) -> Policy {
-        match self.placement {
+        match &self.placement {
+            Placement::RoundRobin(ring) if ring.has_chances() => Policy::SecondChance,
             Placement::RoundRobin(_) => Policy::RoundRobin,
             Placement::Lru(_) => Policy::Lru,
         }
@@ -323,12 +325,15 @@ impl Residency {
         self.space.extents().map(|extent| (extent.item, self.space.slot(extent.start)))
     }
 
-    /// Notes a use of `item`: under LRU it becomes the most recently used, if it is resident.
+    /// Notes a use of `item`, if it is resident: under LRU it becomes the most recently used, with second chances it is
+    /// marked.
     pub fn touch(&mut self, item: Item) {
-        if let Placement::Lru(lru) = &mut self.placement
-            && self.place[item.index()] != NOWHERE
-        {
-            lru.recency.touch(item);
+        if self.place[item.index()] == NOWHERE {
+            return;
+        }
+        match &mut self.placement {
+            Placement::RoundRobin(ring) => ring.touch(item),
+            Placement::Lru(lru) => lru.recency.touch(item),
         }
     }
 
@@ -382,8 +387,11 @@ impl Residency {
         };
         let start = start.ok_or(NoRoom { item, bytes })?;
         let evicted: Vec<Item> = self.space.overlapping(start, start + bytes).map(|extent| extent.item).collect();
+        if let Placement::RoundRobin(ring) = &mut self.placement {
+            ring.write(&self.space, item, start, bytes);
+        }
         for &old in &evicted {
-            self.release(old);
+            self.release(old, true);
             let old_bytes = self.bytes(old);
             let counters = self.counters.kind_mut(old.kind);
             counters.evicted += 1;
@@ -392,9 +400,8 @@ impl Residency {
         self.space.occupy(start, bytes, item);
         self.place[item.index()] = start;
         self.used_bytes += bytes;
-        match &mut self.placement {
-            Placement::RoundRobin(ring) => ring.advance_to(start + bytes),
-            Placement::Lru(lru) => lru.recency.touch(item),
+        if let Placement::Lru(lru) = &mut self.placement {
+            lru.recency.touch(item);
         }
         let (pass, times) = &mut self.inserted[item.index()];
         if *pass != self.pass {
@@ -414,7 +421,7 @@ impl Residency {
         if self.bytes(item) == 0 || self.place[item.index()] == NOWHERE {
             return false;
         }
-        self.release(item);
+        self.release(item, false);
         let bytes = self.bytes(item);
         let (pass, times) = &mut self.inserted[item.index()];
         let counters = self.counters.kind_mut(item.kind);
@@ -427,8 +434,8 @@ impl Residency {
         true
     }
 
-    /// Frees the room of a resident item and whatever was noted of it, but for the counters.
-    fn release(&mut self, item: Item) {
+    /// Frees the room of a resident item and whatever was noted of it, but for the counters. `is_overwritten`: for another.
+    fn release(&mut self, item: Item, is_overwritten: bool) {
         let (start, bytes) = (self.place[item.index()], self.bytes(item));
         self.space.free(start);
         self.place[item.index()] = NOWHERE;
@@ -436,8 +443,9 @@ impl Residency {
         if std::mem::take(&mut self.is_pinned[item.index()]) {
             self.pinned.retain(|&pinned| pinned != item);
         }
-        if let Placement::Lru(lru) = &mut self.placement {
-            lru.freed(&self.space, item, start, start + bytes);
+        match &mut self.placement {
+            Placement::RoundRobin(ring) => ring.freed(item, is_overwritten),
+            Placement::Lru(lru) => lru.freed(&self.space, item, start, start + bytes),
         }
     }
 
@@ -484,6 +492,9 @@ impl Residency {
             Placement::RoundRobin(ring) => {
                 let head = ring.head();
                 check(head <= self.space.total() && head % ALIGN == 0, &|| format!("the head is at {head}"))?;
+                for item in (0..self.place.len()).filter_map(Item::from_index).filter(|&item| ring.is_marked(item)) {
+                    check(self.place[item.index()] != NOWHERE, &|| format!("{item} is marked and not resident"))?;
+                }
             }
             Placement::Lru(lru) => {
                 let mut listed = 0;

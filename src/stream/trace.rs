@@ -3,27 +3,30 @@
 //! The file's first line describes the cache, every other line one pass:
 //!
 //! ```text
-//! {"format":2,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"passes":1,"sizes":[[1024,512],[2048,512]]}
+//! {"format":3,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"passes":1,"sizes":[[1024,512],[2048,512]]}
 //! {"frame":0,"pass":"primary","requests":["g0","g1","a1"],"batches":[1]}
 //! ```
 //!
 //! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick, as loaded; `g1`
-//! is the geometry of brick 1, `a1` its attributes. A request is one use of an item by a pass, resident or not. `batches` are the
-//! positions in `requests` at which a batch of loads began: what a batch loads is not evicted before the next one begins.
-//! The order of requests was chosen knowing what was resident (resident bricks come first), so a replay shows what another
-//! cache makes of these requests, not of the same frames.
+//! is the geometry of brick 1, `a1` its attributes. A request is one use of an item by a pass: of a resident one that rays met,
+//! or a load. `batches` are the positions in `requests` at which a batch of loads began: what a batch loads is not evicted
+//! before the next one begins.
+//!
+//! A pass meets what is resident before it loads, first geometry, then attributes; so does a replay, whatever the order of the
+//! lines. Which missing bricks a pass asks for depends a little on what was resident, as hits hide what lies behind: a
+//! replay shows what another cache makes of these requests, which are nearly those of the same frames.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufWriter, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::item::{Item, Policy};
+use super::item::{Item, Kind, Policy};
 use super::residency::{Residency, ResidencyError};
 
 /// The format number of a trace.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// Why a trace cannot be written, read or replayed.
 #[derive(Debug, thiserror::Error)]
@@ -235,14 +238,15 @@ fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
 pub enum Replay {
     /// A [`Residency`] with this policy, pages and all.
     Cache(Policy),
-    /// Bélády's rule: evict what is used again last. Sizes differ, so this is the greedy bound: the optimum when all items
-    /// have one size, else an estimate that an optimal choice may beat. Counts bytes alone: no pages, no fragmentation.
+    /// Bélády's rule: evict what the pass furthest ahead uses. Sizes differ, so this is the greedy bound: the optimum when all
+    /// items have one size, else an estimate that an optimal choice may beat. Counts bytes alone: no pages, no fragmentation.
     Belady,
 }
 
 impl Replay {
     /// Everything to compare.
-    pub const ALL: [Self; 3] = [Self::Cache(Policy::RoundRobin), Self::Cache(Policy::Lru), Self::Belady];
+    pub const ALL: [Self; 4] =
+        [Self::Cache(Policy::RoundRobin), Self::Cache(Policy::SecondChance), Self::Cache(Policy::Lru), Self::Belady];
 
     /// The name in reports.
     pub const fn name(self) -> &'static str {
@@ -306,42 +310,68 @@ pub fn replay(
     if let Some(item) = trace.requests().find(|item| item.brick as usize >= sizes.len()) {
         return Err(TraceError::NoSuchBrick { item, bricks: sizes.len() });
     }
-    let requests: Vec<Item> = trace.requests().filter(|&item| cache.bytes(item) > 0).collect();
-    let mut result = ReplayResult { requests: requests.len() as u64, ..ReplayResult::default() };
-    for item in requests.iter().collect::<BTreeSet<_>>() {
+    let stages = stages(trace, |item| cache.bytes(item));
+    let mut result = ReplayResult::default();
+    result.requests = stages.iter().map(|stage| stage.requests.len() as u64).sum();
+    let requests = stages.iter().flat_map(|stage| &stage.requests);
+    for item in requests.map(|&(_, item)| item).collect::<BTreeSet<_>>() {
         result.distinct += 1;
-        result.distinct_bytes += cache.bytes(*item);
+        result.distinct_bytes += cache.bytes(item);
     }
     match against {
         Replay::Cache(_) => {
-            for pass in &trace.passes {
-                result.hits += replay_pass(&mut cache, pass);
+            for stage in &stages {
+                result.hits += replay_stage(&mut cache, stage);
             }
             let counters = cache.counters().total();
             (result.loads, result.loaded_bytes) = (counters.loaded, counters.loaded_bytes);
             result.evicted = counters.evicted;
         }
-        Replay::Belady => belady(&requests, sizes.len(), cache.budget_bytes(), |item| cache.bytes(item), &mut result),
+        Replay::Belady => belady(&stages, cache.budget_bytes(), |item| cache.bytes(item), &mut result),
     }
     Ok(result)
 }
 
-/// One pass against a cache; returns the hits.
-fn replay_pass(cache: &mut Residency, pass: &PassRequests) -> u64 {
-    cache.begin_pass();
-    cache.unpin_all();
-    let mut hits = 0;
-    let mut batches = pass.batches.iter().peekable();
+/// The requests of one kind of one pass: what is resident of them is met first, then the rest is loaded.
+struct Stage<'a> {
+    pass: &'a PassRequests,
+    /// Whether the pass begins with it.
+    is_first: bool,
+    /// Positions in the pass's requests, and items.
+    requests: Vec<(usize, Item)>,
+}
+
+/// The stages of all passes, without items of zero bytes.
+fn stages(trace: &Trace, bytes: impl Fn(Item) -> u64) -> Vec<Stage<'_>> {
+    let of_kind = |pass: &PassRequests, kind: Kind| -> Vec<(usize, Item)> {
+        let requests = pass.requests.iter().copied().enumerate();
+        requests.filter(|&(_, item)| item.kind == kind && bytes(item) > 0).collect()
+    };
+    let both = trace.passes.iter().flat_map(|pass| [(pass, Kind::Geometry), (pass, Kind::Attributes)]);
+    both.map(|(pass, kind)| Stage { pass, is_first: kind == Kind::Geometry, requests: of_kind(pass, kind) }).collect()
+}
+
+/// One stage against a cache; returns the hits.
+fn replay_stage(cache: &mut Residency, stage: &Stage) -> u64 {
+    if stage.is_first {
+        cache.begin_pass();
+        cache.unpin_all();
+    }
+    let (present, missing): (Vec<_>, Vec<_>) =
+        stage.requests.iter().copied().partition(|&(_, item)| cache.slot(item).is_some());
+    for &(_, item) in &present {
+        cache.touch(item);
+    }
+    let mut hits = present.len() as u64;
+    let mut batches = stage.pass.batches.iter().peekable();
     let mut in_batch = false;
-    for (position, &item) in pass.requests.iter().enumerate() {
+    for (position, item) in missing {
         while batches.next_if(|&&begin| begin <= position).is_some() {
             cache.unpin_all();
             in_batch = true;
         }
-        if cache.bytes(item) == 0 {
-            continue;
-        }
         if cache.slot(item).is_some() {
+            // Asked for twice.
             hits += 1;
             cache.touch(item);
             continue;
@@ -360,29 +390,40 @@ fn replay_pass(cache: &mut Residency, pass: &PassRequests) -> u64 {
 }
 
 /// Bélády's rule, greedily, into `result`. Every item fits into the budget alone.
-fn belady(requests: &[Item], bricks: usize, budget: u64, bytes: impl Fn(Item) -> u64, result: &mut ReplayResult) {
+fn belady(stages: &[Stage], budget: u64, bytes: impl Fn(Item) -> u64, result: &mut ReplayResult) {
     const NEVER: usize = usize::MAX;
-    let mut next_use = vec![NEVER; requests.len()];
-    let mut seen = vec![NEVER; bricks * 2];
-    for (now, item) in requests.iter().enumerate().rev() {
-        next_use[now] = std::mem::replace(&mut seen[item.index()], now);
+    // Per stage and request: the next stage that asks for the same.
+    let mut seen: BTreeMap<Item, usize> = BTreeMap::new();
+    let mut next_use: Vec<Vec<usize>> = Vec::with_capacity(stages.len());
+    for (now, stage) in stages.iter().enumerate().rev() {
+        let next = |(_, item): &(usize, Item)| seen.get(item).copied().unwrap_or(NEVER);
+        next_use.push(stage.requests.iter().map(next).collect());
+        seen.extend(stage.requests.iter().map(|&(_, item)| (item, now)));
     }
+    next_use.reverse();
     // (next use, item) of everything resident; the last is evicted first.
-    let mut resident: BTreeSet<(usize, Item)> = BTreeSet::new();
+    let mut order: BTreeSet<(usize, Item)> = BTreeSet::new();
+    let mut resident: BTreeMap<Item, usize> = BTreeMap::new();
     let mut used = 0;
-    for (now, &item) in requests.iter().enumerate() {
-        if resident.remove(&(now, item)) {
-            result.hits += 1;
-        } else {
-            result.loads += 1;
-            result.loaded_bytes += bytes(item);
-            used += bytes(item);
-            while used > budget {
-                let Some((_, old)) = resident.pop_last() else { break };
-                used -= bytes(old);
-                result.evicted += 1;
+    for (stage, next_use) in stages.iter().zip(&next_use) {
+        let requests = stage.requests.iter().map(|&(_, item)| item).zip(next_use.iter().copied());
+        let (present, missing): (Vec<_>, Vec<_>) = requests.partition(|(item, _)| resident.contains_key(item));
+        for (item, next) in present.into_iter().chain(missing) {
+            if let Some(old) = resident.insert(item, next) {
+                result.hits += 1;
+                order.remove(&(old, item));
+            } else {
+                result.loads += 1;
+                result.loaded_bytes += bytes(item);
+                used += bytes(item);
+                while used > budget {
+                    let Some((_, old)) = order.pop_last() else { break };
+                    resident.remove(&old);
+                    used -= bytes(old);
+                    result.evicted += 1;
+                }
             }
+            order.insert((next, item));
         }
-        resident.insert((next_use[now], item));
     }
 }

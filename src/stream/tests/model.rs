@@ -1,6 +1,7 @@
 //! A naive model of the cache: one cell for every 16 bytes, every search by trying every address.
 
 use crate::stream::{Item, Policy};
+use std::collections::HashMap;
 
 /// A model that behaves as the documentation of `Residency` says, or is broken in one way.
 #[derive(Clone, Debug)]
@@ -13,6 +14,14 @@ pub struct Model {
     /// Resident items, least recently used first.
     recency: Vec<Item>,
     pinned: Vec<Item>,
+    /// Round robin: what gets a second chance.
+    marked: Vec<Item>,
+    /// Round robin: bytes written when an item was overwritten last.
+    lost: HashMap<Item, u64>,
+    written: u64,
+    /// Round robin: 16 when writes that bring something back prevail.
+    excess: u64,
+    brought_back: u64,
     broken: Broken,
 }
 
@@ -29,6 +38,10 @@ pub enum Broken {
     HeadStays,
     /// Does not note uses.
     ForgetsUses,
+    /// Passes over marked items again and again.
+    KeepsMarks,
+    /// Moves the head whatever it brings back.
+    NeverStays,
 }
 
 /// Bytes of an item.
@@ -47,6 +60,11 @@ impl Model {
             head: 0,
             recency: Vec::new(),
             pinned: Vec::new(),
+            marked: Vec::new(),
+            lost: HashMap::new(),
+            written: 0,
+            excess: 0,
+            brought_back: 0,
             broken,
         }
     }
@@ -59,6 +77,7 @@ impl Model {
         if self.broken != Broken::ForgetsUses && self.recency.contains(&item) {
             self.recency.retain(|&other| other != item);
             self.recency.push(item);
+            self.marked.push(item);
         }
     }
 
@@ -78,6 +97,7 @@ impl Model {
         self.cells.iter_mut().filter(|cell| **cell == Some(item)).for_each(|cell| *cell = None);
         self.recency.retain(|&other| other != item);
         self.pinned.retain(|&other| other != item);
+        self.marked.retain(|&other| other != item);
     }
 
     /// Whether `count` cells from `start` are in one page and all `usable`.
@@ -86,6 +106,40 @@ impl Model {
         end <= self.cells.len()
             && (self.broken == Broken::IgnoresPages || start / self.page_cells == (end - 1) / self.page_cells)
             && self.cells[start..end].iter().all(|&cell| usable(cell))
+    }
+
+    /// The first range at or after the head, then from the start, without an item that is `kept`.
+    fn from_head(&self, count: usize, kept: impl Fn(Item) -> bool) -> Option<usize> {
+        let mut starts = (self.head..self.cells.len()).chain(0..self.head);
+        starts.find(|&start| self.fits(start, count, |cell| !cell.is_some_and(&kept)))
+    }
+
+    /// Round robin with second chances: takes marks for a write of `item` at `start` and says where the head is after it.
+    fn head_after(&mut self, item: Item, start: usize, count: usize) -> usize {
+        let all = self.cells.len();
+        let marked = |item: Item| self.marked.contains(&item);
+        let mut head = start + count;
+        let brings_back = self.lost.get(&item).is_some_and(|&lost| self.written - lost < all as u64 * 16);
+        self.excess = if brings_back { 16.min(self.excess + 1) } else { self.excess.saturating_sub(1) };
+        if brings_back && self.excess == 16 {
+            self.brought_back += 1;
+            if self.brought_back % 8 != 0 && self.broken != Broken::NeverStays {
+                head = start;
+            }
+        }
+        self.written += count as u64 * 16;
+        let spared = self.cells[start..start + count].iter().flatten().all(|&item| !marked(item));
+        let passed: Vec<Item> = if !spared {
+            self.marked.clone()
+        } else if start >= self.head {
+            self.cells[self.head..start].iter().flatten().copied().collect()
+        } else {
+            self.cells[self.head..].iter().chain(&self.cells[..start]).flatten().copied().collect()
+        };
+        if self.broken != Broken::KeepsMarks {
+            self.marked.retain(|item| !passed.contains(item));
+        }
+        head
     }
 
     /// Address and evicted items in the order of addresses; `None` without room.
@@ -98,9 +152,10 @@ impl Model {
         let all = self.cells.len();
         let pinned = |item: Item| self.broken != Broken::IgnoresPins && self.pinned.contains(&item);
         let start = match self.policy {
-            Policy::RoundRobin => (self.head..all)
-                .chain(0..self.head)
-                .find(|&start| self.fits(start, count, |cell| !cell.is_some_and(pinned))),
+            Policy::RoundRobin => self.from_head(count, pinned),
+            Policy::SecondChance => self
+                .from_head(count, |item| pinned(item) || self.marked.contains(&item))
+                .or_else(|| self.from_head(count, pinned)),
             Policy::Lru => {
                 let mut given_up: Vec<Item> = Vec::new();
                 let mut candidates = self.recency.iter().copied().filter(|&item| !pinned(item));
@@ -116,14 +171,19 @@ impl Model {
                 }
             }
         }?;
+        let head = match self.policy {
+            Policy::SecondChance => self.head_after(item, start, count),
+            _ => start + count,
+        };
         let mut evicted: Vec<Item> = self.cells[start..start + count].iter().filter_map(|&cell| cell).collect();
         evicted.dedup();
         for &old in &evicted {
             self.withdraw(old);
+            self.lost.insert(old, self.written);
         }
         self.cells[start..start + count].fill(Some(item));
         if self.broken != Broken::HeadStays {
-            self.head = start + count;
+            self.head = head;
         }
         self.recency.push(item);
         Some((start as u64 * 16, evicted))

@@ -3,10 +3,13 @@
 use super::model::Random;
 use crate::stream::{Counters, Item, Policy, Replay, ReplayResult, Residency, Trace, TraceError, replay};
 
+/// Passes that ask for one brick each.
 fn trace_of(bricks: &[u32], sizes: Vec<(u64, u64)>) -> Trace {
     let mut trace = Trace::new(sizes, 1 << 20, 1 << 20, Policy::RoundRobin);
-    trace.begin_pass(0, "primary");
-    bricks.iter().for_each(|&brick| trace.request(Item::geometry(brick)));
+    for &brick in bricks {
+        trace.begin_pass(0, "primary");
+        trace.request(Item::geometry(brick));
+    }
     trace
 }
 
@@ -26,7 +29,7 @@ fn lines_round_trip() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
         lines[0],
-        r#"{"format":2,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"passes":2,"sizes":[[1024,512],[2048,0]]}"#
+        r#"{"format":3,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"passes":2,"sizes":[[1024,512],[2048,0]]}"#
     );
     assert_eq!(lines[1], r#"{"frame":0,"pass":"primary","requests":["g1","a0"],"batches":[1]}"#);
     assert_eq!(lines.len(), 3);
@@ -42,12 +45,12 @@ fn lines_round_trip() {
 
 #[test]
 fn a_wrong_line_is_named() {
-    let good = r#"{"format":2,"policy":"lru","budget_bytes":64,"page_bytes":64,"passes":1,"sizes":[[16,16]]}"#;
+    let good = r#"{"format":3,"policy":"lru","budget_bytes":64,"page_bytes":64,"passes":1,"sizes":[[16,16]]}"#;
     let pass = r#"{"frame":0,"pass":"a","requests":["g0"],"batches":[0]}"#;
     let cases = [
         ("".to_owned(), 1),
         ("{}".to_owned(), 1),
-        (good.replace("\"format\":2", "\"format\":1"), 1),
+        (good.replace("\"format\":3", "\"format\":2"), 1),
         (good.replace("lru", "fifo"), 1),
         (format!("{good}\n{pass}\n{{\"frame\":1"), 3),
         (format!("{good}\n{}", pass.replace("g0", "h0")), 2),
@@ -77,7 +80,7 @@ fn a_cycle_longer_than_the_cache() {
     let cycle: Vec<u32> = (0..400).map(|request| request % 4).collect();
     let trace = trace_of(&cycle, sizes.clone());
     let results = Replay::ALL.map(|against| replay(&trace, &sizes, 48, 48, against).unwrap());
-    let [ring, lru, belady] = results;
+    let [round_robin, _, lru, belady] = results;
     let none = ReplayResult {
         requests: 400,
         loads: 400,
@@ -88,8 +91,8 @@ fn a_cycle_longer_than_the_cache() {
         distinct_bytes: 64,
         ..ReplayResult::default()
     };
-    assert_eq!((ring, lru), (none, none));
-    assert_eq!((ring.reloads(), belady.evicted), (396, belady.loads - 3));
+    assert_eq!((round_robin, lru), (none, none));
+    assert_eq!((round_robin.reloads(), belady.evicted), (396, belady.loads - 3));
     // After the first three loads one of three requests misses.
     assert_eq!(belady.loads, 3 + 397_u64.div_ceil(3));
     assert_eq!(belady.hits + belady.loads, 400);
@@ -97,6 +100,32 @@ fn a_cycle_longer_than_the_cache() {
     // With room for all, every cache loads each once.
     for against in Replay::ALL {
         assert_eq!(replay(&trace, &sizes, 64, 64, against).unwrap().loads, 4);
+    }
+    // In one pass what is resident comes first, so that every cache loads but one brick a round.
+    let mut rounds = Trace::new(sizes.clone(), 48, 48, Policy::RoundRobin);
+    for _ in 0..100 {
+        rounds.begin_pass(0, "primary");
+        (0..4).for_each(|brick| rounds.request(Item::geometry(brick)));
+    }
+    for against in Replay::ALL {
+        assert_eq!(replay(&rounds, &sizes, 48, 48, against).unwrap().loads, 4 + 99, "{against:?}");
+    }
+}
+
+#[test]
+fn second_chances_keep_most_of_a_cycle_that_does_not_fit() {
+    // Room for 100 bricks, forty rounds through a few more. Bélády hits (100 - 1) of (n - 1) requests in the long run; second
+    // chances lose what its head still moves, every eighth write that brings something back: measured 2 to 6 points.
+    for (n, below) in [(101, 0.02), (105, 0.02), (110, 0.03), (125, 0.045), (150, 0.07)] {
+        let sizes = vec![(16, 0); n as usize];
+        let cycle: Vec<u32> = (0..40 * n).map(|request| request % n).collect();
+        let trace = trace_of(&cycle, sizes.clone());
+        let results = Replay::ALL.map(|against| replay(&trace, &sizes, 1600, 1600, against).unwrap().hit_rate());
+        let [round_robin, second_chance, lru, belady] = results;
+        println!("{n}: {results:?}");
+        assert!(belady - second_chance < below, "{n}: {second_chance} is far from {belady}");
+        // Controls: round robin and LRU hit nothing.
+        assert_eq!((round_robin, lru), (0.0, 0.0));
     }
 }
 
@@ -124,7 +153,7 @@ fn belady_is_the_optimum_for_one_size() {
         let trace = trace_of(&requests, sizes.clone());
         let best = fewest_loads(&requests, 0, 3) as u64;
         let results = Replay::ALL.map(|against| replay(&trace, &sizes, 48, 48, against).unwrap());
-        assert_eq!(results[2].loads, best, "seed {seed}: {requests:?}");
+        assert_eq!(results[3].loads, best, "seed {seed}: {requests:?}");
         assert!(results.iter().all(|result| result.loads >= best && result.loads >= result.distinct));
         worse += u32::from(results[0].loads > best) + u32::from(results[1].loads > best);
     }
@@ -143,26 +172,30 @@ fn walk(seed: u64, policy: Policy) -> (Trace, Counters) {
         cache.begin_pass();
         cache.unpin_all();
         trace.begin_pass(frame, "primary");
-        let wanted: Vec<Item> = (0..20).filter_map(|_| Item::from_index(random.below(60) as usize)).collect();
-        let (resident, missing): (Vec<Item>, Vec<Item>) = wanted.iter().partition(|&&item| cache.slot(item).is_some());
-        for item in resident {
-            cache.touch(item);
-            trace.request(item);
-        }
-        let mut rest: Vec<Item> = missing.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
-        while !rest.is_empty() {
-            cache.unpin_all();
-            trace.begin_batch();
-            let loaded = rest.iter().take(8).take_while(|&&item| {
-                let placed = cache.insert(item).is_ok();
-                if placed {
-                    cache.pin(item);
-                    trace.request(item);
-                }
-                placed
-            });
-            let loaded = loaded.count();
-            rest.drain(..loaded);
+        for make in [Item::geometry, Item::attributes] {
+            let wanted: Vec<Item> = (0..10).map(|_| make(random.below(30) as u32)).collect();
+            let (resident, missing): (Vec<Item>, Vec<Item>) =
+                wanted.iter().partition(|&&item| cache.slot(item).is_some());
+            for item in resident {
+                cache.touch(item);
+                trace.request(item);
+            }
+            let mut rest: Vec<Item> =
+                missing.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
+            while !rest.is_empty() {
+                cache.unpin_all();
+                trace.begin_batch();
+                let loaded = rest.iter().take(8).take_while(|&&item| {
+                    let placed = cache.insert(item).is_ok();
+                    if placed {
+                        cache.pin(item);
+                        trace.request(item);
+                    }
+                    placed
+                });
+                let loaded = loaded.count();
+                rest.drain(..loaded);
+            }
         }
     }
     (trace, cache.counters())
@@ -205,7 +238,8 @@ fn replay_checks_what_it_is_given() {
         assert!(matches!(replay(&trace, &[(16, 0); 3], 16, 64, against), Err(TraceError::Cache(_))));
     }
     // Items without bytes do not count.
-    let mut trace = trace_of(&[], vec![(16, 0)]);
+    let mut trace = Trace::new(vec![(16, 0)], 64, 64, Policy::RoundRobin);
+    trace.begin_pass(0, "primary");
     trace.request(Item::attributes(0));
     trace.request(Item::geometry(0));
     for against in Replay::ALL {

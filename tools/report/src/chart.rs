@@ -1,4 +1,4 @@
-//! One plot over the frames, drawn as SVG.
+//! One plot over the frames of a walk, or over sizes of a cache, drawn as SVG.
 //!
 //! The picture is scaled by its viewBox, so its text has to stay legible at the width of a phone: the box is narrow,
 //! and legend, title and reading aid are HTML beside it. Colours are written as plain SVG attributes, which the rules of
@@ -103,6 +103,17 @@ pub enum Unit {
     Count,
     /// Bytes.
     Bytes,
+    /// Hundredths.
+    Percent,
+}
+
+/// What a plot runs over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Across {
+    /// Frames from 0; the first starts with an empty cache.
+    Frames,
+    /// Sizes of a cache, in percent of all bricks.
+    Shares,
 }
 
 impl Unit {
@@ -112,6 +123,7 @@ impl Unit {
             Self::Milliseconds => ("ms", 1.0),
             Self::MegaRays => ("Mrays/s", 1.0),
             Self::Bytes => format::byte_unit(max),
+            Self::Percent => ("%", 1.0),
             Self::Count if max >= 1e9 => ("thousand millions", 1e9),
             Self::Count if max >= 2e6 => ("millions", 1e6),
             Self::Count if max >= 2e4 => ("thousands", 1e3),
@@ -125,6 +137,7 @@ impl Unit {
             Self::Milliseconds => format!("{} ms", format::number(value)),
             Self::MegaRays => format!("{} Mrays/s", format::number(value)),
             Self::Bytes => format::bytes(value),
+            Self::Percent => format!("{} %", format::number(value)),
             Self::Count if value.fract() == 0.0 => format::count(value),
             Self::Count => format::number(value),
         }
@@ -136,7 +149,7 @@ impl Unit {
 pub struct Series {
     /// What the legend says.
     pub name: String,
-    /// (frame, value) by ascending frame.
+    /// (frame or share, value), ascending.
     pub points: Vec<(f64, f64)>,
     /// How it is drawn.
     pub shape: Shape,
@@ -147,13 +160,15 @@ pub struct Series {
 /// A bar: frame, low end, high end.
 type Bar = (f64, f64, f64);
 
-/// A plot over the frames. Each series has a point at least, and some point is above zero.
+/// A plot. Each series has a point at least, and some point is above zero.
 #[derive(Clone, Debug)]
 pub struct Chart {
     /// What is plotted.
     pub title: String,
     /// What the values count.
     pub unit: Unit,
+    /// What they run over.
+    pub across: Across,
     /// The series in drawing order; stacked ones from the bottom.
     pub series: Vec<Series>,
 }
@@ -220,8 +235,8 @@ impl Chart {
         let extent = self.extent();
         let group = ((extent.to - extent.from) as u64).div_ceil(DRAWN_FRAMES).max(1);
         let mut chart = self.clone();
-        if group == 1 {
-            return (chart, group);
+        if group == 1 || self.across == Across::Shares {
+            return (chart, 1);
         }
         for series in chart.series.iter_mut().filter(|s| s.shape != Shape::Limit) {
             // Sums and counts by the group's middle frame.
@@ -248,7 +263,7 @@ impl Chart {
     pub fn draw(&self) -> Result<Drawing, ReportError> {
         let (chart, group) = self.grouped();
         let extent = chart.extent();
-        let cut = extent.first_is_beyond();
+        let cut = self.across == Across::Frames && extent.first_is_beyond();
         let max = if cut { extent.rest } else { extent.first.max(extent.rest) };
         let (unit, size) = self.unit.scale(max);
         let ticks = ticks(max / size, 4);
@@ -296,7 +311,10 @@ impl Chart {
             .axis_style(AXIS.rgb().stroke_width(FINE))
             .label_style(label.clone())
             .axis_desc_style(label)
-            .x_desc("frame")
+            .x_desc(match self.across {
+                Across::Frames => "frame",
+                Across::Shares => "cache, % of all bricks",
+            })
             .set_all_tick_mark_size(4 * FINE)
             .x_label_formatter(&|frame| format::count(*frame))
             .y_label_formatter(&|value| tick_label(*value))
@@ -429,7 +447,7 @@ mod tests {
 
     fn chart(points: Vec<(f64, f64)>, shape: Shape) -> Chart {
         let series = vec![Series { name: "one".into(), points, shape, ink: BLUE }];
-        Chart { title: "a title".into(), unit: Unit::Milliseconds, series }
+        Chart { title: "a title".into(), unit: Unit::Milliseconds, across: Across::Frames, series }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Turns the records of a walk into one offline HTML page.
+//! Turns the records of a walk, or the results of a replay, into one offline HTML page.
 //!
 //! The input is the folder that `brickwalk walk` writes: `records.jsonl` (one object per frame and pass),
 //! `summary.json` and `frames/*.png`. The output is `report.html` beside them: one file without scripts or references to anything
@@ -13,13 +13,14 @@ mod format;
 mod frames;
 mod page;
 mod plots;
+mod replay;
 mod tables;
 mod walk;
 
 pub use error::ReportError;
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes `dir/report.html` from `dir/records.jsonl`, `dir/summary.json` and `dir/frames/*.png`.
 ///
@@ -33,12 +34,23 @@ pub fn write(dir: &Path) -> Result<(), ReportError> {
     let walk = walk::Walk::read(dir)?;
     let gallery = frames::Gallery::read(dir, &walk)?;
     let html = page::render(&walk, &gallery)?;
-    publish(dir, html.as_bytes())
+    publish(dir.join("report.html"), html.as_bytes())
+}
+
+/// Writes the page of a replay, `path`, from what `brickwalk replay --json` prints: plots of loads, bytes and hits against
+/// the size of the cache, a curve a policy, and a table. `name` is that of the trace.
+///
+/// The page appears complete or not at all, and an older file is replaced.
+///
+/// # Errors
+/// [`ReportError`]: a plot cannot be drawn, or the page cannot be written.
+pub fn write_replay(path: &Path, name: &str, replay: &serde_json::Value) -> Result<(), ReportError> {
+    publish(path.to_owned(), replay::render(name, replay)?.as_bytes())
 }
 
 /// Writes the page under a temporary name in its folder, then renames it.
-fn publish(dir: &Path, html: &[u8]) -> Result<(), ReportError> {
-    let path = dir.join("report.html");
+fn publish(path: PathBuf, html: &[u8]) -> Result<(), ReportError> {
+    let dir = path.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let failed = |source| ReportError::Write { path: path.clone(), source };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".report-").suffix(".tmp");

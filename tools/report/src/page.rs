@@ -19,6 +19,23 @@ const SHOWN_APART: [&str; 7] =
 /// A plot cannot be drawn.
 pub fn render(walk: &Walk, gallery: &Gallery) -> Result<String, ReportError> {
     let scene = walk.text("scene/file").unwrap_or_else(|| "unnamed scene".into());
+    let head = html! {
+        p.kicker { "brickwalk · walk" }
+        h1 { (scene) }
+        (verdict(walk))
+        (facts(walk))
+    };
+    let main = html! {
+        (medians(walk))
+        section { h2 { "Frames" } (frames(walk, gallery)) }
+        (all_plots(walk)?)
+        (all_tables(walk))
+    };
+    Ok(whole(&format!("Walk through {scene}"), &head, &main))
+}
+
+/// A page from its parts.
+pub fn whole(title: &str, head: &Markup, main: &Markup) -> String {
     let dark = chart::colour_rules();
     let page = html! {
         (DOCTYPE)
@@ -27,26 +44,13 @@ pub fn render(walk: &Walk, gallery: &Gallery) -> Result<String, ReportError> {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { "Walk through " (scene) }
+                title { (title) }
                 style { (PreEscaped(STYLE)) "@media (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
             }
-            body {
-                header {
-                    p.kicker { "brickwalk · walk" }
-                    h1 { (scene) }
-                    (verdict(walk))
-                    (facts(walk))
-                }
-                main {
-                    (medians(walk))
-                    section { h2 { "Frames" } (frames(walk, gallery)) }
-                    (all_plots(walk)?)
-                    (all_tables(walk))
-                }
-            }
+            body { header { (head) } main { (main) } }
         }
     };
-    Ok(page.into_string())
+    page.into_string()
 }
 
 /// How many frames there are, and whether all of their pixels can be trusted.
@@ -224,33 +228,47 @@ fn undrawn(plot: &Plot) -> String {
 
 fn plot(plot: &Plot) -> Result<Option<Markup>, ReportError> {
     let Some(chart) = &plot.chart else { return Ok(None) };
-    let drawing = chart.draw()?;
     let undrawn = undrawn(plot);
-    Ok(Some(html! {
+    let left_out = (!undrawn.is_empty()).then(|| format!("Left out: {undrawn}."));
+    let median = |values| Statistics::of(values).map(|s| chart.unit.show(s.median));
+    Ok(Some(drawn(chart, plot.title, plot.reading, left_out.as_deref(), median)?))
+}
+
+/// A chart with its title, its legend, in which `value` stands beside each name, and how to read it.
+pub fn drawn(
+    chart: &chart::Chart,
+    title: &str,
+    reading: &str,
+    note: Option<&str>,
+    value: impl Fn(Vec<f64>) -> Option<String>,
+) -> Result<Markup, ReportError> {
+    let drawing = chart.draw()?;
+    Ok(html! {
         figure.plot {
             figcaption {
-                h3 { (plot.title) @if !drawing.unit.is_empty() { span.unit { ", " (drawing.unit) } } }
+                h3 { (title) @if !drawing.unit.is_empty() { span.unit { ", " (drawing.unit) } } }
                 ul.legend {
                     @for series in &chart.series {
-                        @let values = series.points.iter().map(|p| p.1).collect();
                         li {
                             svg.key viewBox="0 0 16 10" aria-hidden="true" {
                                 (key(series.shape, &series.ink.light_hex()))
                             }
                             (series.name) " "
-                            @if let Some(s) = Statistics::of(values) { span.value { (chart.unit.show(s.median)) } }
+                            @if let Some(value) = value(series.points.iter().map(|p| p.1).collect()) {
+                                span.value { (value) }
+                            }
                         }
                     }
                 }
             }
             svg viewBox=(Drawing::view_box()) role="img" aria-label=(chart.title) { (PreEscaped(drawing.svg)) }
             div {
-                p.reading { (plot.reading) }
+                p.reading { (reading) }
                 @if !drawing.notes.is_empty() { p.note { (drawing.notes) } }
-                @if !undrawn.is_empty() { p.note { "Left out: " (undrawn) "." } }
+                @if let Some(note) = note { p.note { (note) } }
             }
         }
-    }))
+    })
 }
 
 /// A legend's sample of a series.

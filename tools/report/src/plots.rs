@@ -1,6 +1,6 @@
 //! Which plots a report has, and how each is read.
 
-use crate::chart::{BLACK, BLUE, Chart, GREEN, GREY, INKS, Ink, ORANGE, PURPLE, RED, Series, Shape, Unit};
+use crate::chart::{Across, BLACK, BLUE, Chart, GREEN, GREY, INKS, Ink, ORANGE, PURPLE, RED, Series, Shape, Unit};
 use crate::walk::{Pass, Walk};
 
 /// A plot, or the reason why there is none.
@@ -158,7 +158,7 @@ fn of_lines(plot: &PassPlot, pass: &Pass) -> Plot {
     }
     let drawn = !series.is_empty() && (measured || !plot.of_needs);
     let title = format!("{}, {}", plot.title, pass.name);
-    let chart = drawn.then_some(Chart { title, unit: plot.unit, series });
+    let chart = drawn.then_some(Chart { title, unit: plot.unit, across: Across::Frames, series });
     Plot { title: plot.title, reading: plot.reading, chart, zero, missing }
 }
 
@@ -214,7 +214,7 @@ fn of_field(walk: &Walk, title: &'static str, reading: &'static str, unit: Unit,
             ink: INKS[k % INKS.len()],
         })
         .collect();
-    let chart = (!series.is_empty()).then(|| Chart { title: title.into(), unit, series });
+    let chart = (!series.is_empty()).then(|| Chart { title: title.into(), unit, across: Across::Frames, series });
     let undrawn = |has: bool| {
         let passes = walk.passes.iter().filter(move |p| !p.has_nonzero(field) && p.series(field).is_empty() != has);
         passes.map(|pass| pass.name.clone()).collect()
