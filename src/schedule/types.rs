@@ -281,7 +281,7 @@ pub struct PassStats {
     pub ms_stream: f64,
     /// Wall time of the pass, milliseconds.
     pub ms: f64,
-    /// Distinct bricks whose geometry was intersected.
+    /// Bricks that rays entered: a child box of their root before the hit at that time.
     pub bricks_intersected: Vec<u32>,
     /// Distinct bricks that the pass needed (definitions.md), where it was asked.
     pub bricks_needed: Option<Vec<u32>>,

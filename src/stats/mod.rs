@@ -62,7 +62,7 @@ pub struct Record {
     pub bricks_resident_first: u64,
     /// Submissions that the host waited for.
     pub round_trips: u64,
-    /// Distinct bricks that the pass needed, where that is known, else that were intersected.
+    /// Distinct bricks that the pass needed, where that is known, else that rays entered.
     pub bricks_needed: u64,
     /// Distinct bricks that hold a final hit.
     pub bricks_hit: u64,

@@ -6,8 +6,8 @@
 //!
 //! **What we changed.** The cache is made of pages, each no larger than one storage binding, and what a batch is about to
 //! use can be pinned so that a wrap in mid-batch never overwrites it. Geometry (what traversal reads) and attributes (what
-//! shading of hits reads) are cached apart. LRU is offered beside round robin, and a recorded trace of requests can be
-//! replayed against both and against Bélády's greedy bound.
+//! shading of hits reads) are cached apart. Round robin with second chances and LRU are offered beside round robin, and a
+//! recorded trace of requests can be replayed against all and against Bélády's greedy bound.
 //!
 //! **Practice.** [`Residency`] is a pure state machine that says where a payload goes and what it overwrites.
 //! [`Workers`] are the only threads that touch the scene file: they take a payload from the [`HostCache`] or copy and

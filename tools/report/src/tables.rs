@@ -31,7 +31,7 @@ const MEANINGS: [(&str, &str); 37] = [
     ("pulled_up", "pairs whose children were merged"),
     ("pairs_intersected", "pairs (tile, leaf) intersected"),
     ("round_trips", "submissions that the host waited for"),
-    ("bricks_needed", "distinct bricks that the rays needed, where known, else intersected"),
+    ("bricks_needed", "distinct bricks that the rays needed, where known, else entered"),
     ("bricks_hit", "distinct bricks that hold a final hit"),
     ("bricks_loaded", "payloads loaded"),
     ("bricks_reloaded", "payloads loaded twice or more in one pass"),
