@@ -80,6 +80,15 @@ fn prefetching_changes_nothing_but_the_host_cache() {
     let count = |summary: &Value, field: &str| summary["prefetch"][field].as_u64().expect("a count");
     assert!(count(&with, "used") > 0, "{}", with["prefetch"]);
     assert_eq!(count(&with, "used") + count(&with, "wasted"), count(&with, "prefetched"));
+    // Frame by frame: what loads found is all accounted for; what arrived after the last pass is in no record.
+    let of = |name: &str, field: &str| total(&folder.path().join(name), field);
+    assert_eq!(of("with", "prefetched_used_bytes"), count(&with, "used_bytes"));
+    let arrived = of("with", "prefetched_bytes");
+    assert!(arrived >= of("with", "prefetched_used_bytes") + of("with", "prefetched_wasted_bytes"));
+    assert!(arrived <= count(&with, "prefetched_bytes"), "{arrived}, {}", with["prefetch"]);
+    for field in ["prefetched_bytes", "prefetched_used_bytes", "prefetched_wasted_bytes"] {
+        assert_eq!(of("without", field), 0, "{field}");
+    }
     let misses = |summary: &Value| summary["host_cache"]["misses"].as_u64().expect("a count");
     // A load is either read from the file or found in the host cache, brought there by prefetching or by a load.
     assert_eq!(misses(&with) + count(&with, "used"), misses(&without));

@@ -395,7 +395,7 @@ pub struct ReplayArgs {
     /// shares from 2% to 100%]
     #[arg(long, value_name = "SIZE|P%", num_args = 1.., value_delimiter = ',')]
     pub cache: Vec<CacheSize>,
-    /// Write a page with plots against the size of the cache, and a table; one file that opens offline
+    /// Write a page with plots against the size of the cache, and a table; one file that opens offline [default: none]
     #[arg(long, value_name = "FILE.html")]
     pub plot: Option<PathBuf>,
     /// Print JSON

@@ -12,7 +12,7 @@ use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
 use crate::stats::Record;
-use crate::stream::{BrickBox, Item, Prefetcher};
+use crate::stream::{BrickBox, HostCacheStats, Item, Prefetcher};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
@@ -106,7 +106,18 @@ pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
     light.rectangle = args.light.rectangle();
     let fronts = (args.stream.fronts == "on").then(Fronts::default);
     let size = (args.size.width, args.size.height);
-    Renderer { scene, executor, cache, settings, light, size, tile: args.stream.tile, fronts, auto: Auto::default() }
+    Renderer {
+        scene,
+        executor,
+        cache,
+        settings,
+        light,
+        size,
+        tile: args.stream.tile,
+        fronts,
+        auto: Auto::default(),
+        host_seen: HostCacheStats::default(),
+    }
 }
 
 /// What watches the camera for `--prefetch`; `None` when that is off.

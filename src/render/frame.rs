@@ -12,6 +12,7 @@ use crate::schedule::{
     Executor, ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain,
 };
 use crate::stats::Record;
+use crate::stream::HostCacheStats;
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -101,6 +102,8 @@ pub struct Renderer {
     pub fronts: Option<Fronts>,
     /// What [`Schedule::Auto`] has measured.
     pub auto: Auto,
+    /// The host cache's statistics at the end of the pass before.
+    pub host_seen: HostCacheStats,
 }
 
 impl Renderer {

@@ -28,13 +28,17 @@ pub struct Cache {
     pub bytes: Vec<BrickBytes>,
     /// Requests in order, when they are recorded.
     pub trace: Option<Trace>,
+    /// The frame, from 1, and per item the frame that loaded it last.
+    frame: u32,
+    loaded_in: Vec<u32>,
 }
 
 impl Cache {
     /// An empty cache over bricks of the given sizes.
     pub fn new(residency: Residency, bytes: Vec<BrickBytes>, trace: Option<Trace>) -> Self {
         let states = BrickStates::new(bytes.len());
-        Self { residency, states, bytes, trace }
+        let loaded_in = vec![0; 2 * bytes.len()];
+        Self { residency, states, bytes, trace, frame: 0, loaded_in }
     }
 
     /// Starts a pass: nothing is done, nothing is pinned.
@@ -42,6 +46,7 @@ impl Cache {
         self.residency.begin_pass();
         self.residency.unpin_all();
         self.states.begin_pass();
+        self.frame = frame + 1;
         if let Some(trace) = &mut self.trace {
             trace.begin_pass(frame, name);
         }
@@ -128,6 +133,10 @@ impl Cache {
                     stats.bytes_geometry += bytes.geometry - bytes.bvh;
                 }
                 Kind::Attributes => stats.bytes_attributes += bytes.attributes,
+            }
+            if std::mem::replace(&mut self.loaded_in[load.item.index()], self.frame) == self.frame {
+                stats.reloaded_frame += 1;
+                stats.bytes_reloaded_frame += self.residency.bytes(load.item);
             }
         }
         let change = self.residency.counters().since(&before).total();

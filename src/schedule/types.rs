@@ -313,8 +313,14 @@ pub struct PassStats {
     pub loaded: u64,
     /// Payloads loaded twice or more in this pass.
     pub reloaded: u64,
+    /// Payloads loaded that had been loaded in the same frame before.
+    pub reloaded_frame: u64,
+    /// Bytes of those.
+    pub bytes_reloaded_frame: u64,
     /// Payloads evicted.
     pub evicted: u64,
+    /// Most fillings of the cache that one of the passes took ([`crate::stream::Residency::fillings`]).
+    pub cache_passes: u64,
     /// Bytes of nodes loaded.
     pub bytes_bvh: u64,
     /// Bytes of triangles loaded.

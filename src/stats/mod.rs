@@ -70,11 +70,18 @@ pub struct Record {
     pub bricks_loaded: u64,
     /// Payloads loaded twice or more in this pass.
     pub bricks_reloaded: u64,
+    /// Payloads loaded that had been loaded in the same frame before, by whatever pass.
+    pub bricks_reloaded_frame: u64,
+    /// Bytes of those.
+    pub bytes_reloaded_frame: u64,
     /// Payloads evicted.
     pub bricks_evicted: u64,
-    /// Payloads resident at the start.
+    /// Fillings of the cache that a pass took, the most of those of the effect (a direction, a lamp, a sample is a pass each): a
+    /// filling ends when a load evicts what the same filling loaded or used. 1 where all that each pass used fitted at once.
+    pub cache_passes: u64,
+    /// Payloads resident when the effect's first pass began.
     pub bricks_resident_start: u64,
-    /// Payloads resident at the end.
+    /// Payloads resident at its end, but for what passes of other effects loaded and evicted between its own.
     pub bricks_resident_end: u64,
     /// Batches of loads.
     pub load_batches: u64,
@@ -98,6 +105,12 @@ pub struct Record {
     pub cache_bytes: u64,
     /// Of it, bytes in use at the end.
     pub cache_used_bytes: u64,
+    /// Bytes that workers brought into the host cache ahead of need, from the end of the pass before this effect's passes on.
+    pub prefetched_bytes: u64,
+    /// Bytes brought ahead of need that the effect's loads found in the host cache.
+    pub prefetched_used_bytes: u64,
+    /// Bytes brought ahead of need that the host cache put out before anything asked for them.
+    pub prefetched_wasted_bytes: u64,
     /// Pixels that are not final.
     pub unresolved_pixels: u64,
     /// Pixels whose radiance was not finite.
@@ -142,7 +155,10 @@ impl Record {
             bricks_hit: stats.bricks_hit.as_deref().map_or(0, distinct),
             bricks_loaded: stats.loaded,
             bricks_reloaded: stats.reloaded,
+            bricks_reloaded_frame: stats.reloaded_frame,
+            bytes_reloaded_frame: stats.bytes_reloaded_frame,
             bricks_evicted: stats.evicted,
+            cache_passes: stats.cache_passes,
             load_batches: stats.batches,
             bytes_needed: stats.bytes_needed,
             bytes_needed_missing: stats.bytes_needed_missing,

@@ -34,6 +34,8 @@ pub struct HostCacheStats {
     pub prefetched_used: u64,
     /// Bytes of those.
     pub prefetched_used_bytes: u64,
+    /// Bytes of payloads brought ahead of need that were put out before a look-up found them.
+    pub prefetched_wasted_bytes: u64,
 }
 
 /// A payload, or the room reserved for one.
@@ -167,6 +169,8 @@ impl HostCache {
             for (old, entry) in &mut victims {
                 *entry = inner.entries.pop(old);
             }
+            let in_vain = victims.iter().filter_map(|(_, entry)| entry.as_ref()).filter(|entry| entry.ahead);
+            inner.stats.prefetched_wasted_bytes += in_vain.map(|entry| entry.bytes).sum::<u64>();
             inner.stats.entries -= victims.len() as u64;
             inner.stats.evicted += victims.len() as u64;
             inner.stats.used_bytes = used + bytes;

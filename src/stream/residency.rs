@@ -169,6 +169,11 @@ pub struct Residency {
     /// Per item: the pass that inserted it last, and how often that pass did.
     inserted: Vec<(u32, u32)>,
     pass: u32,
+    /// Per item: the filling that used it last.
+    used_in: Vec<u64>,
+    filling: u64,
+    /// The filling that the pass began with.
+    first_filling: u64,
     pub(super) used_bytes: u64,
     pub(super) counters: Counters,
 }
@@ -225,6 +230,9 @@ impl Residency {
             pinned: Vec::new(),
             inserted: vec![(0, 0); count],
             pass: 0,
+            used_in: vec![0; count],
+            filling: 1,
+            first_filling: 1,
             used_bytes: 0,
             counters: Counters::default(),
         })
@@ -307,6 +315,15 @@ impl Residency {
             self.pass = 0;
         }
         self.pass += 1;
+        self.filling += 1;
+        self.first_filling = self.filling;
+    }
+
+    /// How many fillings of the cache the pass has taken so far. A filling ends, and the next begins, when an insertion evicts
+    /// what the same filling inserted or touched: 1 where all that a pass uses fits at once. What the fillings of a pass use has
+    /// at most as many bytes as so many caches.
+    pub fn fillings(&self) -> u64 {
+        self.filling - self.first_filling + 1
     }
 
     /// Where `item` lies, if it is resident. Does not count as a use.
@@ -331,6 +348,7 @@ impl Residency {
         if self.place[item.index()] == NOWHERE {
             return;
         }
+        self.used_in[item.index()] = self.filling;
         match &mut self.placement {
             Placement::RoundRobin(ring) => ring.touch(item),
             Placement::Lru(lru) => lru.recency.touch(item),
@@ -390,6 +408,8 @@ impl Residency {
         if let Placement::RoundRobin(ring) = &mut self.placement {
             ring.write(&self.space, item, start, bytes);
         }
+        self.filling += u64::from(evicted.iter().any(|old| self.used_in[old.index()] == self.filling));
+        self.used_in[item.index()] = self.filling;
         for &old in &evicted {
             self.release(old, true);
             let old_bytes = self.bytes(old);

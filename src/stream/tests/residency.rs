@@ -401,3 +401,45 @@ fn items_and_policies_round_trip_as_text() {
     }
     assert!("fifo".parse::<Policy>().is_err());
 }
+
+#[test]
+fn fillings_are_counted_within_a_pass() {
+    for policy in Policy::ALL {
+        // Room for four; a pass that uses ten.
+        let mut cache = Residency::new(&[(32, 0); 10], 128, 128, policy).unwrap();
+        cache.begin_pass();
+        assert_eq!(cache.fillings(), 1);
+        (0..10).for_each(|brick| drop(cache.insert(Item::geometry(brick)).unwrap()));
+        assert_eq!(cache.fillings(), 3, "{policy}: four, four, two");
+        // What earlier passes left is no part of this one's fillings.
+        cache.begin_pass();
+        (0..2).for_each(|brick| drop(cache.insert(Item::geometry(brick)).unwrap()));
+        assert_eq!(cache.fillings(), 1, "{policy}");
+        // A use counts like a load: three used, then two loaded into room for one.
+        cache.begin_pass();
+        let used: Vec<Item> = cache.resident().map(|one| one.0).collect();
+        used.iter().for_each(|&item| cache.touch(item));
+        let missing = (0..10).map(Item::geometry).find(|&item| cache.slot(item).is_none()).unwrap();
+        cache.insert(missing).unwrap();
+        assert_eq!(cache.fillings(), 2, "{policy}");
+        // Never more bytes used in a pass than so many caches hold, whatever comes.
+        for seed in 0..50 {
+            let mut random = Random(seed);
+            let (sizes, budget, page) = random_cache(&mut random);
+            let mut cache = Residency::new(&sizes, budget, page, policy).unwrap();
+            for _ in 0..4 {
+                cache.begin_pass();
+                let mut used = std::collections::BTreeSet::new();
+                for _ in 0..40 {
+                    let item = Item::from_index(random.below(sizes.len() as u64 * 2) as usize).unwrap();
+                    cache.insert(item).unwrap();
+                    used.insert(item);
+                }
+                let bytes: u64 = used.iter().map(|&item| bytes(&sizes, item)).sum();
+                assert!(bytes <= cache.fillings() * cache.budget_bytes(), "seed {seed}, {policy}");
+                // Each filling but the last has evicted something.
+                assert!(cache.fillings() <= 1 + cache.counters().total().evicted, "seed {seed}, {policy}");
+            }
+        }
+    }
+}

@@ -13,7 +13,7 @@ const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 const NONE: &str = "–";
 
 /// What a field of the records means, with its unit. Fields that are not listed are shown without.
-const MEANINGS: [(&str, &str); 37] = [
+const MEANINGS: [(&str, &str); 43] = [
     ("rays", "rays traced"),
     ("ms", "wall time from submission to fence, ms"),
     ("ms_phase1", "device time of phase 1: what was known and resident, ms"),
@@ -35,6 +35,12 @@ const MEANINGS: [(&str, &str); 37] = [
     ("bricks_hit", "distinct bricks that hold a final hit"),
     ("bricks_loaded", "payloads loaded"),
     ("bricks_reloaded", "payloads loaded twice or more in one pass"),
+    ("bricks_reloaded_frame", "payloads loaded that had been loaded in the same frame before"),
+    ("bytes_reloaded_frame", "bytes of those"),
+    ("cache_passes", "most fillings of the cache that one pass took; 1 where all it used fitted"),
+    ("prefetched_bytes", "bytes brought into the host cache ahead of need"),
+    ("prefetched_used_bytes", "bytes brought ahead of need that loads found there"),
+    ("prefetched_wasted_bytes", "bytes brought ahead of need and put out before they were asked for"),
     ("bricks_evicted", "payloads evicted"),
     ("bricks_resident_start", "payloads resident at the start"),
     ("bricks_resident_end", "payloads resident at the end"),
@@ -54,7 +60,8 @@ const MEANINGS: [(&str, &str); 37] = [
 ];
 
 /// Fields that tell a state, not an amount: their sum over the frames means nothing.
-const STATES: [&str; 4] = ["bricks_resident_start", "bricks_resident_end", "cache_bytes", "cache_used_bytes"];
+const STATES: [&str; 5] =
+    ["bricks_resident_start", "bricks_resident_end", "cache_bytes", "cache_used_bytes", "cache_passes"];
 
 fn meaning(field: &str) -> &'static str {
     MEANINGS.iter().find(|(name, _)| *name == field).map_or("", |(_, text)| text)
