@@ -117,6 +117,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         if !walk.in_brick {
             let leaf = at & ~BINARY_LEAF;
             let brick = leaves[leaf].brick;
+            note_use(leaf);
             enter_leaf(&r, world, leaf);
             enter_brick(&r, brick);
             root = binary_roots[brick];

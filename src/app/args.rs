@@ -318,6 +318,11 @@ pub struct WalkArgs {
     /// Ask after every pass which bricks it needed (bricks_needed in the records); takes a traversal more a pass
     #[arg(long)]
     pub measure_needed: bool,
+    /// Render every frame exactly as well, in a second session with a cache of its own, and record how far each effect is from it
+    /// (error_mean, error_worst_tile, error_pixels): what --query-threshold costs. Takes twice the time and device memory; the
+    /// walk's times and counters leave it out
+    #[arg(long)]
+    pub measure_error: bool,
     /// Print the records on standard output too, one JSON object a line
     #[arg(long)]
     pub json: bool,

@@ -79,6 +79,7 @@ pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], fra
         "texture_bytes_resident": renderer.executor.texture_bytes(),
         "host_cache": streaming.0,
         "prefetch": streaming.1,
+        "error": args.measure_error.then(|| errors(records)),
         "memory": memory(),
         "passes": passes(records),
         "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
@@ -107,6 +108,25 @@ fn streaming(renderer: &mut Renderer) -> (Value, Value) {
         "dropped": stats.prefetch_dropped,
     });
     (cache, prefetch)
+}
+
+/// The errors of the effects that `--measure-error` measured: means over the frames, and the greatest.
+fn errors(records: &[Record]) -> Value {
+    let mut effects: Map<String, Value> = Map::new();
+    for name in records.iter().map(|r| r.pass) {
+        let rows: Vec<&Record> = records.iter().filter(|r| r.pass == name).collect();
+        let most = |of: fn(&Record) -> f64| rows.iter().map(|r| of(r)).fold(0.0, f64::max);
+        effects.entry(name).or_insert_with(|| {
+            json!({
+                "mean": rows.iter().map(|r| r.error_mean).sum::<f64>() / rows.len() as f64,
+                "mean_most": most(|r| r.error_mean),
+                "worst_tile_most": most(|r| r.error_worst_tile),
+                "pixels_mean": rows.iter().map(|r| r.error_pixels).sum::<u64>() as f64 / rows.len() as f64,
+                "pixels_most": rows.iter().map(|r| r.error_pixels).max(),
+            })
+        });
+    }
+    Value::Object(effects)
 }
 
 /// What rendering left out because the scene does not need it, and why.

@@ -5,7 +5,7 @@ use super::output::{atomic, exr, png};
 use super::session::{Session, open_scene, write_requests};
 use super::summary;
 use crate::gpu::rays::Extent;
-use crate::render::{FrameOutput, Light, RenderSettings, Renderer};
+use crate::render::{Captures, FrameOutput, Light, RenderSettings, Renderer};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
@@ -14,9 +14,11 @@ use crate::schedule::fronts::Fronts;
 use crate::stats::Record;
 use crate::stream::{BrickBox, HostCacheStats, Item, Prefetcher};
 use anyhow::{Context, Result, bail};
+use bricks::SceneFile;
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 /// Runs the command.
@@ -34,7 +36,8 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         path = path.with_fov_y_degrees(fov)?;
     }
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(scene, &args.scene, &args.stream, extent)?;
+    let session = Session::open(scene.clone(), &args.scene, &args.stream, extent)?;
+    let mut reference = if args.measure_error { Some(reference(scene, args, extent)?) } else { None };
     let frames_folder = args.output.join("frames");
     atomic::create_folder(&frames_folder)?;
     for stale in ["summary.json", "report.html"] {
@@ -42,6 +45,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         let _ = std::fs::remove_file(args.output.join(stale));
     }
     let mut renderer = renderer(session, args);
+    renderer.captures = args.measure_error.then(Captures::default);
     let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
     let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
     let progress = Progress::new();
@@ -54,7 +58,11 @@ pub fn run(args: &WalkArgs) -> Result<()> {
             break;
         }
         let camera = path.frame(frame, args.frames);
-        let output = renderer.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
+        let mut output = renderer.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
+        if let Some(reference) = &mut reference {
+            reference.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
+            note_errors(&mut output.records, &renderer, reference);
+        }
         if let Some(prefetcher) = prefetcher.as_mut().filter(|_| frame + 1 < args.frames) {
             look_ahead(&mut renderer, prefetcher, &camera);
         }
@@ -116,7 +124,34 @@ pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
         tile: args.stream.tile,
         fronts,
         auto: Auto::default(),
+        captures: None,
         host_seen: HostCacheStats::default(),
+    }
+}
+
+/// A renderer of the same frames, exactly, with a cache and a device session of its own.
+fn reference(scene: Arc<SceneFile>, args: &WalkArgs, extent: Extent) -> Result<Renderer> {
+    let mut args = args.clone();
+    args.stream.query_threshold = 0;
+    args.stream.prefetch = 0;
+    args.stream.requests_out = None;
+    args.measure_needed = false;
+    args.aov = false;
+    let session = Session::open(scene, &args.scene, &args.stream, extent)?;
+    let mut reference = renderer(session, &args);
+    reference.captures = Some(Captures::default());
+    Ok(reference)
+}
+
+/// Enters how far the effects of the frame just rendered are from the `reference`'s.
+fn note_errors(records: &mut [Record], renderer: &Renderer, reference: &Renderer) {
+    let (Some(captures), Some(exact)) = (&renderer.captures, &reference.captures) else { return };
+    for record in records {
+        let samples = renderer.settings.samples;
+        let error = captures.error(exact, record.pass, renderer.size.0, renderer.tile, samples);
+        record.error_mean = error.mean;
+        record.error_worst_tile = error.worst_tile;
+        record.error_pixels = error.pixels;
     }
 }
 

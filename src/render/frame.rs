@@ -1,7 +1,7 @@
 //! The frame loop.
 
 use super::pass_record::FrameRecords;
-use super::{Effects, Light, camera_view};
+use super::{Captures, Effects, Light, camera_view};
 use crate::gpu::executor::GpuExecutor;
 use crate::gpu::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -102,6 +102,8 @@ pub struct Renderer {
     pub fronts: Option<Fronts>,
     /// What [`Schedule::Auto`] has measured.
     pub auto: Auto,
+    /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
+    pub captures: Option<Captures>,
     /// The host cache's statistics at the end of the pass before.
     pub host_seen: HostCacheStats,
 }
@@ -113,6 +115,9 @@ impl Renderer {
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
         self.executor.set_leaf_cache(self.settings.tracing.optimisations.leaf_cache);
+        if let Some(captures) = &mut self.captures {
+            captures.clear();
+        }
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
         let effects = self.settings.effects;

@@ -109,6 +109,7 @@ pub fn run(
         return executor.run(pass, steps, bricks);
     }
     let mut rest = Vec::new();
+    let mut used = Vec::new();
     for &step in steps {
         let is_batch = match step {
             Step::IntersectResident => false,
@@ -121,15 +122,22 @@ pub fn run(
         rest.push(if is_batch { Step::SelectBatch } else { Step::SelectResident });
         let report = executor.run(pass, &rest, bricks)?;
         let most = report.most_selected;
+        used.extend(&report.used);
         stats.add(report);
         rest = (0..most).map(|leaf| Step::IntersectOne { leaf, is_batch }).collect();
         while rest.len() > MOST_SINGLE_LEAVES {
             let later = rest.split_off(MOST_SINGLE_LEAVES);
-            stats.add(executor.run(pass, &rest, bricks)?);
+            let report = executor.run(pass, &rest, bricks)?;
+            used.extend(&report.used);
+            stats.add(report);
             rest = later;
         }
     }
-    if rest.is_empty() { Ok(Report::default()) } else { executor.run(pass, &rest, bricks) }
+    let mut report = if rest.is_empty() { Report::default() } else { executor.run(pass, &rest, bricks)? };
+    report.used.append(&mut used);
+    report.used.sort_unstable();
+    report.used.dedup();
+    Ok(report)
 }
 
 #[cfg(test)]

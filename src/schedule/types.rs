@@ -132,7 +132,9 @@ impl Step {
             self,
             Step::IntersectResident
                 | Step::IntersectBatch
+                | Step::IntersectOne { .. }
                 | Step::IntersectAll
+                | Step::IntersectBinary
                 | Step::IntersectAllResident
                 | Step::IntersectAllBatch
         )

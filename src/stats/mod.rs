@@ -111,6 +111,14 @@ pub struct Record {
     pub prefetched_used_bytes: u64,
     /// Bytes brought ahead of need that the host cache put out before anything asked for them.
     pub prefetched_wasted_bytes: u64,
+    /// With `--measure-error`: mean absolute difference of the effect's part of the picture from the exact one, over pixels and
+    /// channels, linear radiance.
+    pub error_mean: f64,
+    /// The same over the tile where it is largest.
+    pub error_worst_tile: f64,
+    /// Pixels of which a ray of the effect hit something else than in the exact rendering: another triangle, for shadows and
+    /// occlusion something rather than nothing or the other way round.
+    pub error_pixels: u64,
     /// Pixels that are not final.
     pub unresolved_pixels: u64,
     /// Pixels whose radiance was not finite.

@@ -311,8 +311,8 @@ pub fn replay(
         return Err(TraceError::NoSuchBrick { item, bricks: sizes.len() });
     }
     let stages = stages(trace, |item| cache.bytes(item));
-    let mut result = ReplayResult::default();
-    result.requests = stages.iter().map(|stage| stage.requests.len() as u64).sum();
+    let requests = stages.iter().map(|stage| stage.requests.len() as u64).sum();
+    let mut result = ReplayResult { requests, ..ReplayResult::default() };
     let requests = stages.iter().flat_map(|stage| &stage.requests);
     for item in requests.map(|&(_, item)| item).collect::<BTreeSet<_>>() {
         result.distinct += 1;

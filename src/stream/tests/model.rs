@@ -109,7 +109,7 @@ impl Model {
     }
 
     /// The first range at or after the head, then from the start, without an item that is `kept`.
-    fn from_head(&self, count: usize, kept: impl Fn(Item) -> bool) -> Option<usize> {
+    fn first_from_head(&self, count: usize, kept: impl Fn(Item) -> bool) -> Option<usize> {
         let mut starts = (self.head..self.cells.len()).chain(0..self.head);
         starts.find(|&start| self.fits(start, count, |cell| !cell.is_some_and(&kept)))
     }
@@ -123,7 +123,7 @@ impl Model {
         self.excess = if brings_back { 16.min(self.excess + 1) } else { self.excess.saturating_sub(1) };
         if brings_back && self.excess == 16 {
             self.brought_back += 1;
-            if self.brought_back % 8 != 0 && self.broken != Broken::NeverStays {
+            if !self.brought_back.is_multiple_of(8) && self.broken != Broken::NeverStays {
                 head = start;
             }
         }
@@ -152,10 +152,10 @@ impl Model {
         let all = self.cells.len();
         let pinned = |item: Item| self.broken != Broken::IgnoresPins && self.pinned.contains(&item);
         let start = match self.policy {
-            Policy::RoundRobin => self.from_head(count, pinned),
+            Policy::RoundRobin => self.first_from_head(count, pinned),
             Policy::SecondChance => self
-                .from_head(count, |item| pinned(item) || self.marked.contains(&item))
-                .or_else(|| self.from_head(count, pinned)),
+                .first_from_head(count, |item| pinned(item) || self.marked.contains(&item))
+                .or_else(|| self.first_from_head(count, pinned)),
             Policy::Lru => {
                 let mut given_up: Vec<Item> = Vec::new();
                 let mut candidates = self.recency.iter().copied().filter(|&item| !pinned(item));

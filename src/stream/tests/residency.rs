@@ -29,7 +29,8 @@ fn run_schedule(seed: u64, policy: Policy, broken: Broken, steps: usize) -> Resu
         let items = sizes.len() as u64 * 2;
         // Every other schedule goes round through everything, with a step aside now and then.
         let index =
-            if seed % 2 == 0 && random.below(8) > 0 { step as u64 % items } else { random.below(items) } as usize;
+            if seed.is_multiple_of(2) && random.below(8) > 0 { step as u64 % items } else { random.below(items) }
+                as usize;
         let item = Item::from_index(index).unwrap();
         let empty = bytes(&sizes, item) == 0;
         match random.below(20) {

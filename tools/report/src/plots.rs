@@ -49,7 +49,7 @@ struct PassPlot {
     of_needs: bool,
 }
 
-const PASS_PLOTS: [PassPlot; 6] = [
+const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Time per phase",
         of_needs: false,
@@ -117,6 +117,14 @@ const PASS_PLOTS: [PassPlot; 6] = [
             line("missing", &["bytes_needed_missing"], BLACK),
             line("moved", &["bytes_bvh", "bytes_geometry"], BLUE),
         ],
+    },
+    PassPlot {
+        title: "Error",
+        of_needs: false,
+        reading: "Mean absolute difference of the effect's part of the picture from the exact one, linear radiance: over all \
+                  pixels, and over the tile where it is largest. Measured with --measure-error.",
+        unit: Unit::Count,
+        lines: &[line("all pixels", &["error_mean"], BLUE), line("worst tile", &["error_worst_tile"], RED)],
     },
     PassPlot {
         title: "Bricks",

@@ -13,7 +13,7 @@ const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 const NONE: &str = "–";
 
 /// What a field of the records means, with its unit. Fields that are not listed are shown without.
-const MEANINGS: [(&str, &str); 43] = [
+const MEANINGS: [(&str, &str); 46] = [
     ("rays", "rays traced"),
     ("ms", "wall time from submission to fence, ms"),
     ("ms_phase1", "device time of phase 1: what was known and resident, ms"),
@@ -55,6 +55,9 @@ const MEANINGS: [(&str, &str); 43] = [
     ("triangles_tested", "triangles tested, where counted"),
     ("cache_bytes", "the cache's budget, bytes"),
     ("cache_used_bytes", "bytes of the cache in use at the end"),
+    ("error_mean", "mean absolute error of the effect's picture, linear radiance, where measured"),
+    ("error_worst_tile", "the same over the worst tile"),
+    ("error_pixels", "pixels of which a ray hit something else than in the exact rendering, where measured"),
     ("unresolved_pixels", "pixels that are not final"),
     ("non_finite", "pixels whose radiance was not finite"),
 ];
