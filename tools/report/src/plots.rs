@@ -49,6 +49,9 @@ struct PassPlot {
     of_needs: bool,
 }
 
+/// The plot that most walks do not ask for, and that is not missed where there is no error.
+const ERROR: &str = "Error";
+
 const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Time per phase",
@@ -119,7 +122,7 @@ const PASS_PLOTS: [PassPlot; 7] = [
         ],
     },
     PassPlot {
-        title: "Error",
+        title: ERROR,
         of_needs: false,
         reading: "Mean absolute difference of the effect's part of the picture from the exact one, linear radiance: over all \
                   pixels, and over the tile where it is largest. Measured with --measure-error.",
@@ -144,7 +147,8 @@ const PASS_PLOTS: [PassPlot; 7] = [
 
 /// The plots of one pass.
 pub fn of_pass(pass: &Pass) -> Vec<Plot> {
-    PASS_PLOTS.iter().map(|plot| of_lines(plot, pass)).collect()
+    let plots = PASS_PLOTS.iter().map(|plot| of_lines(plot, pass));
+    plots.filter(|plot| plot.title != ERROR || plot.chart.is_some()).collect()
 }
 
 fn of_lines(plot: &PassPlot, pass: &Pass) -> Plot {
