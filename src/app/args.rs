@@ -1,6 +1,7 @@
 //! The command line: every subcommand, every option with its unit and default. Values are validated here, so that commands
 //! receive only what they can use; what is wrong ends as usage with exit status 2.
 
+use super::bench::args::BenchArgs;
 use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
@@ -13,7 +14,7 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Said at the end of every help text.
-const UNITS: &str = "Sizes are bytes and take K, M, G (powers of 1024); counts take K, M (powers of 1000).\n\
+pub(super) const UNITS: &str = "Sizes are bytes and take K, M, G (powers of 1024); counts take K, M (powers of 1000).\n\
      Exit status: 0 done, 1 the input is bad (one line says what and what to do), 2 wrong usage.";
 
 /// Walks by ray tracing through scenes that do not fit in GPU memory.
@@ -50,6 +51,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Measure how far an image is from a reference: RMSE, relMSE, bias, FLIP
     Compare(CompareArgs),
+    /// Measure: the experiments of the CHC+RT paper, repeated
+    Bench(BenchArgs),
 }
 
 /// Options of `demo`.
@@ -172,6 +175,9 @@ pub struct SceneArgs {
     /// so with what grows on it
     #[arg(long)]
     pub instanced: bool,
+    /// Place the whole scene so many times, in a square; meshes of 1000 triangles and more are stored once
+    #[arg(long, value_name = "N", default_value = "1", value_parser = copies, conflicts_with = "instanced")]
+    pub copies: u32,
     /// How to cut and round.
     #[command(flatten)]
     pub build: BuildArgs,
@@ -470,6 +476,10 @@ fn frames(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1_000_000)
 }
 
+fn copies(text: &str) -> Result<u32, String> {
+    ranged(text, 1, 1024)
+}
+
 fn samples(text: &str) -> Result<u32, String> {
     ranged(text, 1, 65_536)
 }
@@ -490,7 +500,7 @@ fn brick_triangles(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1 << 20)
 }
 
-fn tile(text: &str) -> Result<u32, String> {
+pub(super) fn tile(text: &str) -> Result<u32, String> {
     let wrong = || "a tile is a power of two from 8 to 512 pixels".to_string();
     ranged(text, 8, 512).ok().filter(|n| n.is_power_of_two()).ok_or_else(wrong)
 }

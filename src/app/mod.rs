@@ -2,6 +2,7 @@
 //! on standard error), 2 wrong usage.
 
 pub mod args;
+pub mod bench;
 pub mod compare;
 pub mod convert;
 pub mod demo;
@@ -79,6 +80,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         }
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Bench(args) => bench::run(args),
     }
 }
 

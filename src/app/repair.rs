@@ -138,7 +138,9 @@ fn source(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Progr
 fn generated(manifest: &Manifest) -> Option<Settings> {
     let [source] = &manifest.sources[..] else { return None };
     let settings = Settings::of_source(&source.name).filter(|_| source.bytes == 0)?;
-    Some(Settings { instanced: settings.kind == Kind::City && manifest.has_instances, ..settings })
+    // Copies are instances themselves.
+    let instanced = settings.kind == Kind::City && settings.copies == 1 && manifest.has_instances;
+    Some(Settings { instanced, ..settings })
 }
 
 /// Refuses inputs that are not those of the conversion. Their names do not matter.
@@ -226,7 +228,7 @@ mod tests {
             ..Manifest::default()
         };
         let settings = generated(&manifest("city seed=7 triangles=12000", 0, true)).unwrap();
-        assert_eq!(settings, Settings { kind: Kind::City, triangles: 12_000, seed: 7, instanced: true });
+        assert_eq!(settings, Settings { kind: Kind::City, triangles: 12_000, seed: 7, instanced: true, copies: 1 });
         assert!(!generated(&manifest("terrain seed=7 triangles=12000", 0, true)).unwrap().instanced);
         assert_eq!(generated(&manifest("city seed=7 triangles=12000", 5, true)), None);
         assert_eq!(generated(&manifest("city.gltf", 0, true)), None);

@@ -16,7 +16,13 @@ use std::time::Instant;
 /// A count of triangles that the kind cannot have, or a file cannot be written.
 pub fn run(args: &SceneArgs) -> Result<()> {
     let start = Instant::now();
-    let settings = Settings { kind: args.kind, triangles: args.triangles, seed: args.seed, instanced: args.instanced };
+    let settings = Settings {
+        kind: args.kind,
+        triangles: args.triangles,
+        seed: args.seed,
+        instanced: args.instanced,
+        copies: args.copies,
+    };
     let progress = interrupt::job();
     refuse_folder(&args.output)?;
     let gltf = GltfForm::of(&args.output);

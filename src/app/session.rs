@@ -64,6 +64,11 @@ pub fn write_requests(args: &StreamArgs, cache: &Cache) -> Result<()> {
     Ok(())
 }
 
+/// The rays of a tile with edges of `tile` rays that `--query-threshold` comes to: it counts those of a tile of 200 x 200.
+pub fn scaled_threshold(threshold: u32, tile: u32) -> u32 {
+    (f64::from(threshold) * f64::from(tile).powi(2) / 40_000.0) as u32
+}
+
 /// Refuses a device with a failed check.
 fn require(gpu: &Gpu, checks: &[probe::Check]) -> Result<()> {
     let failures = probe::failures(checks);
@@ -124,8 +129,7 @@ impl Session {
         let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
         let host = HostCache::new(args.host_cache);
         let workers = Workers::new(scene.clone(), host, args.worker_count(), args.prefetch as usize)?;
-        // The threshold counts pixels of a tile of 200 x 200.
-        let threshold = (f64::from(args.query_threshold) * f64::from(extent.tile).powi(2) / 40_000.0) as u32;
+        let threshold = scaled_threshold(args.query_threshold, extent.tile);
         let setup = Setup { extent, threshold, count: false };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let mut executor =

@@ -5,7 +5,7 @@ use super::output::{atomic, exr, png};
 use super::session::{Session, open_scene, write_requests};
 use super::summary;
 use crate::gpu::rays::Extent;
-use crate::render::{Captures, FrameOutput, Light, RenderSettings, Renderer};
+use crate::render::{Captures, FrameOutput, Light, RenderSettings, Renderer, Schedule};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
@@ -92,19 +92,10 @@ pub fn run(args: &WalkArgs) -> Result<()> {
 /// The renderer that the options of a walk ask for.
 pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
     let Session { scene, mut executor, cache, schedule } = session;
-    let effects = args.effects.effects();
-    if effects.has_bounces() {
+    if args.effects.effects().has_bounces() {
         executor.allow_bounces();
     }
-    let settings = RenderSettings {
-        schedule,
-        effects,
-        samples: args.spp,
-        // Both halves of the seed count.
-        seed: (args.seed ^ (args.seed >> 32)) as u32,
-        tracing: Tracing { measure_needed: args.measure_needed, optimisations: args.optimisations.optimisations() },
-        aov: args.aov,
-    };
+    let settings = settings(args, schedule);
     let mut light = Light::new(
         DVec3::from_array(args.light.sun.0),
         args.light.sun_angle,
@@ -152,6 +143,19 @@ fn note_errors(records: &mut [Record], renderer: &Renderer, reference: &Renderer
         record.error_mean = error.mean;
         record.error_worst_tile = error.worst_tile;
         record.error_pixels = error.pixels;
+    }
+}
+
+/// How frames are rendered by the options of a walk.
+pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
+    RenderSettings {
+        schedule,
+        effects: args.effects.effects(),
+        samples: args.spp,
+        // Both halves of the seed count.
+        seed: (args.seed ^ (args.seed >> 32)) as u32,
+        tracing: Tracing { measure_needed: args.measure_needed, optimisations: args.optimisations.optimisations() },
+        aov: args.aov,
     }
 }
 

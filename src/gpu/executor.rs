@@ -167,6 +167,11 @@ impl GpuExecutor {
         self.leaf_cache = on;
     }
 
+    /// Changes [`Setup::threshold`].
+    pub fn set_threshold(&mut self, threshold: u32) {
+        self.threshold = threshold;
+    }
+
     /// Makes what [`Step::IntersectBinary`] needs; without it that step must not be run.
     ///
     /// # Errors

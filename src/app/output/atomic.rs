@@ -76,6 +76,21 @@ impl JsonLines {
         Ok(Self { file, name })
     }
 
+    /// Goes on with a file whose first `length` bytes are whole lines; what follows them is cut off.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn append(path: &Path, length: u64) -> Result<Self> {
+        let name = path.display().to_string();
+        let open = || {
+            let file = File::options().append(true).open(path)?;
+            file.set_len(length)?;
+            Ok::<_, std::io::Error>(file)
+        };
+        let file = open().with_context(|| format!("{name}: cannot append to this file; check its permissions"))?;
+        Ok(Self { file, name })
+    }
+
     /// Appends one object as one line with one write, so that the line is whole when the process ends between two. Returns the
     /// line, newline included.
     ///

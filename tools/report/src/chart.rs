@@ -51,6 +51,9 @@ const GRID: Ink = Ink { light: [0xe2, 0xe6, 0xea], dark: [0x2d, 0x34, 0x3c] };
 /// Ink of the axes' labels.
 const LABEL: Ink = Ink { light: [0x4a, 0x53, 0x5e], dark: [0xb0, 0xba, 0xc6] };
 
+/// [`LABEL`] as it is written.
+pub const LABEL_HEX: &str = "#4A535E";
+
 impl Ink {
     fn rgb(self) -> RGBColor {
         RGBColor(self.light[0], self.light[1], self.light[2])
@@ -114,6 +117,8 @@ pub enum Across {
     Frames,
     /// Sizes of a cache, in percent of all bricks.
     Shares,
+    /// What the name says, from 0.
+    Named(&'static str),
 }
 
 impl Unit {
@@ -185,6 +190,9 @@ pub struct Drawing {
 }
 
 impl Drawing {
+    /// Width of the drawing in the units of its text.
+    pub const WIDTH: u32 = WIDTH;
+
     /// The `viewBox` of the drawing.
     pub fn view_box() -> String {
         format!("0 0 {} {}", WIDTH * FINE, HEIGHT * FINE)
@@ -314,6 +322,7 @@ impl Chart {
             .x_desc(match self.across {
                 Across::Frames => "frame",
                 Across::Shares => "cache, % of all bricks",
+                Across::Named(name) => name,
             })
             .set_all_tick_mark_size(4 * FINE)
             .x_label_formatter(&|frame| format::count(*frame))

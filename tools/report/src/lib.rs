@@ -14,10 +14,13 @@ mod frames;
 mod page;
 mod plots;
 mod replay;
+mod sheet;
 mod tables;
 mod walk;
 
+pub use chart::Unit;
 pub use error::ReportError;
+pub use sheet::{Graph, GraphShape, Line, Section, Sheet, Table, Value, write_sheet};
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

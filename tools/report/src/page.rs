@@ -272,7 +272,7 @@ pub fn drawn(
 }
 
 /// A legend's sample of a series.
-fn key(shape: Shape, colour: &str) -> Markup {
+pub fn key(shape: Shape, colour: &str) -> Markup {
     html! {
         @match shape {
             Shape::Stacked => { rect x="2" y="0" width="12" height="10" fill=(colour) {} }

@@ -110,6 +110,10 @@ impl Recipe for City {
         let target = DVec3::new(middle.x, (0.02 * (high.x - low.x)).min(0.3 * high.y), middle.z);
         path::around(target, &self.bounds, 33.0f64.to_radians(), 0.5)
     }
+
+    fn bounds(&self) -> &[[DVec3; 2]] {
+        &self.bounds
+    }
 }
 
 /// Triangles of the surroundings of `blocks` blocks.

@@ -6,6 +6,7 @@
 mod block;
 mod building;
 mod city;
+mod copies;
 mod facade;
 mod furniture;
 mod gltf;
@@ -107,11 +108,13 @@ pub struct Settings {
     /// City: trees and vehicles as instances of shared meshes instead of copies within the blocks. The triangles are the
     /// same. The other kinds always store once what they have many of.
     pub instanced: bool,
+    /// How often the whole is placed, at least once; [`Self::triangles`] are those of one copy.
+    pub copies: u32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { kind: Kind::City, triangles: 1_000_000, seed: 0, instanced: false }
+        Self { kind: Kind::City, triangles: 1_000_000, seed: 0, instanced: false, copies: 1 }
     }
 }
 
@@ -120,9 +123,11 @@ impl Settings {
     /// is not part of the name. `None` if no generated scene is called so.
     pub fn of_source(name: &str) -> Option<Self> {
         let (kind, rest) = name.split_once(" seed=")?;
-        let (seed, triangles) = rest.split_once(" triangles=")?;
-        let (kind, seed, triangles) = (kind.parse().ok()?, seed.parse().ok()?, triangles.parse().ok()?);
-        Some(Self { kind, triangles, seed, instanced: false })
+        let (seed, rest) = rest.split_once(" triangles=")?;
+        let (triangles, copies) = rest.split_once(" copies=").unwrap_or((rest, "1"));
+        let (kind, seed) = (kind.parse().ok()?, seed.parse().ok()?);
+        let (triangles, copies) = (triangles.parse().ok()?, copies.parse().ok()?);
+        Some(Self { kind, triangles, seed, instanced: false, copies })
     }
 }
 
@@ -191,7 +196,7 @@ pub fn generate(settings: &Settings, progress: &Progress) -> Result<Scene, Error
         Kind::Stadium => stadium::generate(settings, progress),
     };
     progress.finish();
-    Ok(scene)
+    Ok(scene.copied(settings.copies))
 }
 
 /// The source entry of a generated scene: no bytes, and the xxh3-64 of none.

@@ -24,6 +24,9 @@ pub trait Recipe: Send + Sync {
 
     /// The path that has the whole scene in view.
     fn far(&self) -> CameraPath;
+
+    /// Boxes around all that is worth seeing.
+    fn bounds(&self) -> &[[DVec3; 2]];
 }
 
 /// A mesh that is made while its parts are read.
@@ -35,8 +38,10 @@ type Made = Arc<OnceLock<Vec<Primitive>>>;
 /// The meshes read last are kept, one for each thread of the pool in which the scene was generated, as the parts of a mesh
 /// are made together.
 pub struct Scene {
-    outline: Outline,
-    recipe: Box<dyn Recipe>,
+    pub(crate) outline: Outline,
+    pub(crate) recipe: Box<dyn Recipe>,
+    /// Where the copies of the whole are; none where there is only one.
+    pub(crate) copies: Vec<DVec3>,
     recent: Mutex<LruCache<usize, Made>>,
 }
 
@@ -44,7 +49,7 @@ impl Scene {
     /// A scene of `recipe`, whose meshes have the parts that `outline` says.
     pub(crate) fn new(outline: Outline, recipe: Box<dyn Recipe>) -> Self {
         let kept = NonZeroUsize::MIN.saturating_add(rayon::current_num_threads());
-        Self { outline, recipe, recent: Mutex::new(LruCache::new(kept)) }
+        Self { outline, recipe, copies: Vec::new(), recent: Mutex::new(LruCache::new(kept)) }
     }
 
     /// The path of `frames` frames (at least one) through the midst of the scene; a longer one begins with a shorter one,
@@ -55,7 +60,7 @@ impl Scene {
 
     /// The path that has the whole scene in view.
     pub fn far_path(&self) -> CameraPath {
-        self.recipe.far()
+        if self.copies.is_empty() { self.recipe.far() } else { self.far_of_copies() }
     }
 
     /// Triangles, every use of a mesh counted.
@@ -139,7 +144,10 @@ pub struct Draft {
 impl Draft {
     /// Nothing yet, of `materials`.
     pub fn new(materials: Vec<bricks::Material>, settings: &Settings) -> Self {
-        let name = format!("{} seed={} triangles={}", settings.kind, settings.seed, settings.triangles);
+        let mut name = format!("{} seed={} triangles={}", settings.kind, settings.seed, settings.triangles);
+        if settings.copies > 1 {
+            name += &format!(" copies={}", settings.copies);
+        }
         let sources = vec![crate::source_of(name)];
         Self { outline: Outline { materials, sources, ..Outline::default() } }
     }

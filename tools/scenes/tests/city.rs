@@ -9,7 +9,7 @@ use common::{clearance, position, same_mesh, triangles};
 use glam::DVec3;
 
 fn lazy(triangles: u64, seed: u64, instanced: bool) -> Scene {
-    let settings = Settings { kind: Kind::City, triangles, seed, instanced };
+    let settings = Settings { kind: Kind::City, triangles, seed, instanced, ..Settings::default() };
     generate(&settings, &Progress::hidden()).expect("a count in range")
 }
 

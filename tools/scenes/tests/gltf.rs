@@ -8,7 +8,8 @@ use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
 
 fn scene(kind: Kind, triangles: u64, seed: u64, instanced: bool) -> Scene {
-    generate(&Settings { kind, triangles, seed, instanced }, &Progress::hidden()).expect("a count in range")
+    generate(&Settings { kind, triangles, seed, instanced, ..Settings::default() }, &Progress::hidden())
+        .expect("a count in range")
 }
 
 fn written(scene: &Scene, file: &Path) -> impl Source + use<> {

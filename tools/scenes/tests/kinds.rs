@@ -9,7 +9,7 @@ use common::{clearance, position, same_mesh, triangles};
 use glam::DVec3;
 
 fn scene(kind: Kind, triangles: u64, seed: u64) -> Scene {
-    let settings = Settings { kind, triangles, seed, instanced: false };
+    let settings = Settings { kind, triangles, seed, ..Settings::default() };
     generate(&settings, &Progress::hidden()).expect("a count in range")
 }
 
@@ -32,6 +32,29 @@ fn counts_are_as_asked() {
             );
         }
     }
+}
+
+#[test]
+fn copies_lie_apart_and_share_their_meshes() {
+    let one = scene(Kind::Pipes, 20_000, 3);
+    let settings = Settings { kind: Kind::Pipes, triangles: 20_000, seed: 3, copies: 5, ..Settings::default() };
+    let five = generate(&settings, &Progress::hidden()).expect("a count in range");
+    let (single, placed) = (&one.outline().placements, &five.outline().placements);
+    assert_eq!(five.outline().meshes, one.outline().meshes);
+    assert_eq!((placed.len(), five.placed_triangles()), (5 * single.len(), 5 * one.placed_triangles()));
+    assert_eq!(five.near_path(30), one.near_path(30), "the first copy is where the one is");
+    let shift = |copy: usize| [3, 7, 11].map(|k| placed[copy * single.len()].world_from_mesh[k]);
+    for a in 0..5 {
+        for b in 0..a {
+            let apart = DVec3::from_array(shift(a)) - DVec3::from_array(shift(b));
+            assert!(apart.length() > 10.0 && apart.y == 0.0, "copies {a} and {b}: {apart}");
+        }
+    }
+    // Farther away, to see them all.
+    let height = |scene: &Scene| scene.far_path().keyframes[0].position[1];
+    assert!(height(&five) > height(&one));
+    let name = &five.outline().sources[0].name;
+    assert_eq!(Settings::of_source(name), Some(settings), "{name}");
 }
 
 #[test]

@@ -170,6 +170,10 @@ impl Recipe for Plant {
         let middle = 0.5 * (low + high);
         path::around(DVec3::new(middle.x, 0.25 * high.y, middle.z), &self.bounds, 26.0f64.to_radians(), 0.7)
     }
+
+    fn bounds(&self) -> &[[DVec3; 2]] {
+        &self.bounds
+    }
 }
 
 /// See [`crate::generate`]. Builds every bay once, to count.

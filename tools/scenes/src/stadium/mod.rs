@@ -57,6 +57,10 @@ impl Recipe for Stadium {
         let [_, high] = self.bounds.iter().copied().fold(EMPTY, union);
         path::around(DVec3::new(0.0, 0.2 * high.y, 0.0), &self.bounds, 38.0f64.to_radians(), 0.5)
     }
+
+    fn bounds(&self) -> &[[DVec3; 2]] {
+        &self.bounds
+    }
 }
 
 /// See [`crate::generate`]. Builds the bowl once, to count.

@@ -128,6 +128,10 @@ impl Recipe for Terrain {
         let [_, high] = self.bounds.iter().copied().fold(EMPTY, union);
         path::around(DVec3::new(0.0, 0.3 * high.y, 0.0), &self.bounds, 27.0f64.to_radians(), 0.4)
     }
+
+    fn bounds(&self) -> &[[DVec3; 2]] {
+        &self.bounds
+    }
 }
 
 /// Chebyshev distance from the origin, in quads rounded up, within which a thing is on the land.

@@ -1,0 +1,162 @@
+//! `bench chc` as a user runs it, on tiny scenes: its files agree with each other and with what was measured, and a run that was
+//! bounded is gone on with.
+
+mod common;
+
+use common::{brickwalk, folder, succeed};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+const TINY: &str = "--triangles 10K,12K,10K --size 64x36 --frames 3 --rays 1 --skip 1";
+
+fn words<'a>(output: &'a Path, options: &'a str) -> Vec<&'a std::ffi::OsStr> {
+    let first = ["bench".as_ref(), "chc".as_ref(), "-o".as_ref(), output.as_os_str()];
+    let rest = TINY.split_whitespace().chain(options.split_whitespace()).map(std::ffi::OsStr::new);
+    first.into_iter().chain(rest).collect()
+}
+
+fn json(folder: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(folder.join("chc.json")).expect("chc.json")).expect("JSON")
+}
+
+fn cases(folder: &Path) -> Vec<(String, u64)> {
+    let text = std::fs::read_to_string(folder.join("cells.jsonl")).expect("cells");
+    let cells = text.lines().skip(1).map(|line| serde_json::from_str::<Value>(line).expect("a whole line"));
+    cells.map(|cell| (cell["case"].as_str().unwrap().into(), cell["repetition"].as_u64().unwrap())).collect()
+}
+
+fn table<'a>(json: &'a Value, name: &str) -> &'a Value {
+    json["tables"].as_array().unwrap().iter().find(|table| table["name"] == name).expect("the table")
+}
+
+/// Column `name` of the row that begins with `start`.
+fn entry(table: &Value, start: &[&str], name: &str) -> Value {
+    let column = table["columns"].as_array().unwrap().iter().position(|column| column == name).expect("the column");
+    let rows = table["rows"].as_array().unwrap();
+    let row = rows.iter().find(|row| start.iter().enumerate().all(|(i, text)| row[i] == *text)).expect("the row");
+    row[column].clone()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+#[test]
+fn files_agree_and_a_bounded_run_is_gone_on_with() {
+    let folder = folder();
+    let output = folder.path().join("out");
+    let options = "--repeat 1 --stages table2,targets";
+    // Nothing fits into no time; the files are there all the same.
+    succeed(words(&output, &format!("{options} --minutes 0")));
+    assert_eq!(cases(&output), []);
+    assert_eq!(json(&output)["walks"], 0);
+    succeed(words(&output, "--repeat 1 --stages targets"));
+    let before = cases(&output);
+    assert_eq!(before.len(), 6, "two scenes, with all optimisations and without each of two");
+    // A process that was killed in the middle of a line.
+    let file = output.join("cells.jsonl");
+    let whole = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, format!("{whole}{{\"case\": \"tab")).unwrap();
+    let printed = succeed(words(&output, &format!("{options} --resume")));
+    let after = cases(&output);
+    assert_eq!(after[..6], before[..], "what was measured is kept");
+    let distinct: BTreeSet<_> = after.iter().collect();
+    assert_eq!((after.len(), distinct.len()), (30, 30), "two scenes, two paths, six schedules");
+    succeed(words(&output, options));
+    assert_eq!(cases(&output), after, "nothing is measured twice");
+    assert!(printed.contains("rule not met"), "{printed}");
+    agree(&output);
+}
+
+/// JSON, CSV, Markdown and HTML hold the same numbers, which follow from the cells, beside the paper's.
+fn agree(output: &Path) {
+    let json = json(output);
+    let table2 = table(&json, "table2");
+    let csv = std::fs::read_to_string(output.join("table2.csv")).unwrap();
+    let rows = table2["rows"].as_array().unwrap();
+    assert_eq!(csv.lines().count(), rows.len() + 1);
+    for (line, row) in csv.lines().skip(1).zip(rows) {
+        for (text, value) in line.split(',').zip(row.as_array().unwrap()) {
+            match value {
+                Value::Null => assert_eq!(text, ""),
+                Value::String(words) => assert_eq!(text, words),
+                other => assert_eq!(text.parse::<f64>().unwrap(), number(other)),
+            }
+        }
+    }
+    let html = std::fs::read_to_string(output.join("report.html")).unwrap();
+    let markdown = std::fs::read_to_string(output.join("chc.md")).unwrap();
+    assert!(html.contains("Figure 7") && html.contains("Figure 8") && html.contains("<svg"));
+    assert!(!html.contains("<script") && !html.contains("http://") && !html.contains("https://"));
+
+    let start = ["city", "near", "primary", "chc"];
+    let ratio = number(&entry(table2, &start, "over plain-bvh2, wall"));
+    let cells = json["cells"].as_array().unwrap();
+    let ms = |schedule: &str| {
+        let path = format!("table2/city/100%/tile 64/near/primary,ao,diffuse/{schedule}/threshold 0/turn 36");
+        let cell = cells.iter().find(|cell| cell["case"] == *path).expect("the cell");
+        let frames = cell["passes"]["primary"]["ms"].as_array().unwrap();
+        let late: Vec<f64> = frames[1..].iter().map(|ms| ms.as_f64().unwrap()).collect();
+        late.iter().sum::<f64>() / late.len() as f64
+    };
+    let expected = ms("plain-bvh2") / ms("chc");
+    // Both are the same quotient of sums of two numbers.
+    assert!((ratio - expected).abs() < 1e-12 * expected, "{ratio} against {expected}");
+    // Control: the other baseline has another time.
+    assert!(ratio != ms("plain") / ms("chc"));
+    let shown = if ratio >= 9.995 { format!("{ratio:.1}×") } else { format!("{ratio:.2}×") };
+    assert!(ratio < 0.9995 || (html.contains(&shown) && markdown.contains(&shown)), "{shown}");
+
+    // CHC+RT, table 2: speed-up of primary, AO and diffuse rays, near and far.
+    for (scene, view, expected) in [
+        ("city", "near", [1.61, 1.22, 1.28]),
+        ("city", "far", [1.12, 0.97, 0.89]),
+        ("pipes", "near", [5.46, 4.46, 5.92]),
+        ("pipes", "far", [5.50, 3.82, 3.23]),
+    ] {
+        for (effect, expected) in ["primary", "ao", "diffuse"].into_iter().zip(expected) {
+            assert_eq!(number(&entry(table2, &[scene, view, effect, "chc"], "paper")), expected);
+            assert_eq!(entry(table2, &[scene, view, effect, "plain"], "paper"), Value::Null);
+        }
+    }
+    let targets = table(&json, "targets");
+    let cold = number(&entry(targets, &["city", "chc"], "cold: moved ÷ needed"));
+    assert!((0.99..10.0).contains(&cold), "{cold} times what was needed");
+}
+
+#[test]
+fn what_cannot_be_measured_is_refused() {
+    let folder = folder();
+    let output = folder.path().join("out");
+    let outcome = |words: Vec<&std::ffi::OsStr>| {
+        let found = brickwalk(words);
+        (found.status.code(), String::from_utf8_lossy(&found.stderr).into_owned())
+    };
+    let refused = |options: &str| outcome(words(&output, options));
+    for (options, part) in [
+        ("--stages table9", "table2"),
+        ("--triangles 1M", "three counts"),
+        ("--frames 0", "1 to 300"),
+        ("--frames 4 --skip 4", "above 4"),
+        ("--minutes soon", "minutes"),
+    ] {
+        let start = ["bench".as_ref(), "chc".as_ref(), "-o".as_ref(), output.as_os_str()];
+        let (code, message) = outcome(start.into_iter().chain(options.split(' ').map(std::ffi::OsStr::new)).collect());
+        assert!(code == Some(2) && message.contains(part), "{options}: {message}");
+    }
+    assert!(!output.exists(), "wrong usage writes nothing");
+    let (code, message) = refused("--resume");
+    assert!(code == Some(1) && message.contains("cells.jsonl"), "{message}");
+    let (code, message) = refused("--minutes 0 --sponza missing.bricks --stages table2");
+    assert_eq!(code, Some(0), "nothing is opened without time: {message}");
+    let (code, message) = refused("--minutes 0 --repeat 3");
+    assert!(code == Some(1) && message.contains("repetitions"), "{message}");
+    std::fs::write(output.join("cells.jsonl"), "nothing\n").unwrap();
+    let (code, message) = refused("--minutes 0");
+    assert!(code == Some(1) && message.contains("line 1"), "{message}");
+    std::fs::remove_dir_all(&output).unwrap();
+    std::fs::write(&output, "a file").unwrap();
+    let (code, message) = refused("");
+    assert!(code == Some(1) && message.contains("out"), "{message}");
+}
