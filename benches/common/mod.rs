@@ -1,4 +1,5 @@
 //! Walks of processes of their own, and what they wrote.
+#![allow(dead_code)]
 
 use serde_json::Value;
 use std::path::Path;
