@@ -4,14 +4,14 @@
 //!
 //! Options (after `--`): `--triangles COUNT` (500K), `--brick-triangles COUNT` (4K), `--size WxH` (320x180), `--frames N` (12),
 //! `--effects LIST` (shadow,ao; one ray of ao and diffuse a pixel), `--repeat N` (5), `--tile PIXELS` (32), `--cache P%` (20%),
-//! `--record DIR`. Walks are interleaved; times are medians over repetitions, the first 5 frames left out. Counters are those of
-//! one walk, all frames.
+//! `--record DIR`. Walks are interleaved; of every frame the least time of all repetitions counts, so that what else the machine does
+//! shows least, and the first 5 frames are left out. Counters are those of one walk, all frames.
 
 mod common;
 
 use brickwalk::app::output::atomic;
 use clap::Parser;
-use common::{bytes_moved, median, number, records, summary};
+use common::{bytes_moved, number, records, summary};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -80,12 +80,15 @@ const GROUPS: &[(&str, &[&str])] = &[
 const EFFECTS: &[(&str, &[&str])] =
     &[("primary", &["primary"]), ("shadow", &["shadow"]), ("ao", &["ao"]), ("diffuse", &["diffuse", "diffuse-shadow"])];
 
+/// Frames whose times do not count.
+const FIRST_FRAMES: usize = 5;
+
 /// A variant, and what was measured of it.
 struct Variant {
     words: String,
     /// Of one walk: rows of each effect.
     rows: Vec<Vec<Value>>,
-    /// Milliseconds a frame of each effect, by repetition.
+    /// Milliseconds of each effect by frame, the least of all repetitions.
     ms: Vec<Vec<f64>>,
 }
 
@@ -103,7 +106,8 @@ fn main() {
     let mut groups: Vec<Vec<Variant>> = Vec::new();
     for (schedule, switches) in GROUPS {
         let words = std::iter::once(schedule.to_string()).chain(switches.iter().map(|s| format!("{schedule} {s}")));
-        let fresh = |words| Variant { words, rows: Vec::new(), ms: vec![Vec::new(); EFFECTS.len()] };
+        let fresh =
+            |words| Variant { words, rows: Vec::new(), ms: vec![vec![f64::INFINITY; options.frames]; EFFECTS.len()] };
         groups.push(words.map(fresh).collect());
     }
     for _ in 0..options.repeat {
@@ -127,8 +131,10 @@ fn measure(options: &Options, scene: &Path, output: &Path, variant: &mut Variant
     common::walk(scene, &scene.with_extension("near.json"), output, &words);
     variant.rows = EFFECTS.iter().map(|(_, passes)| passes.iter().flat_map(|p| records(output, p)).collect()).collect();
     for (ms, rows) in variant.ms.iter_mut().zip(&variant.rows) {
-        let late = rows.iter().filter(|r| number(r, "frame") >= 5.0);
-        ms.push(late.map(|r| number(r, "ms")).sum::<f64>() / (options.frames - 5) as f64);
+        for (frame, least) in ms.iter_mut().enumerate() {
+            let of_frame = rows.iter().filter(|r| number(r, "frame") == frame as f64);
+            *least = least.min(of_frame.map(|r| number(r, "ms")).sum());
+        }
     }
 }
 
@@ -197,9 +203,11 @@ impl Variant {
         (0..EFFECTS.len()).filter(|&effect| !self.rows[effect].is_empty())
     }
 
-    /// Medians of each effect's time, and of their sum.
+    /// Milliseconds a frame of each effect, and of all.
     fn times(&self) -> Vec<f64> {
-        let sums = (0..self.ms[0].len()).map(|i| self.ms.iter().map(|effect| effect[i]).sum()).collect();
-        self.shown().map(|effect| self.ms[effect].clone()).chain([sums]).map(median).collect()
+        let late = |ms: &[f64]| ms.iter().skip(FIRST_FRAMES).sum::<f64>() / (ms.len() - FIRST_FRAMES) as f64;
+        let mut times: Vec<f64> = self.shown().map(|effect| late(&self.ms[effect])).collect();
+        times.push(times.iter().sum());
+        times
     }
 }
