@@ -85,6 +85,7 @@ fn layout_checks(module: &naga::Module) -> String {
         "Surface",
         "TileBounds",
         "TileList",
+        "Entry",
         "TopNode2",
         "BinaryNode",
         "Leaf",

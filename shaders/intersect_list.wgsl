@@ -60,8 +60,12 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                 if next == end {
                     break;
                 }
-                let leaf = list[selection[next]];
+                let listed = list[selection[next]];
                 next += 1u;
+                if listed.near > best.t {
+                    continue;
+                }
+                let leaf = listed.leaf;
                 enter_leaf(&r, world, leaf);
                 enter_brick(&r, leaves[leaf].brick);
                 group = root_group(r.ray.flip);

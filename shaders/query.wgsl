@@ -34,12 +34,16 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var r: BrickRay;
     for (var next = entry.first; next < entry.first + entry.selected; next++) {
         let position = selection[next];
-        let leaf = list[position];
+        let listed = list[position];
+        let leaf = listed.leaf;
         if occluded {
             if surfaces[index].leaf == leaf {
                 atomicAdd(&pair_demand[position].rays, 1u);
                 atomicMin(&pair_demand[position].nearest, 0u);
             }
+            continue;
+        }
+        if listed.near > hit.t {
             continue;
         }
         enter_leaf(&r, world, leaf);

@@ -21,20 +21,23 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if WRITE && entry.count == 0u {
         return;
     }
-    var stack: array<u32, WALK_STACK>;
+    var stack: array<Entry, WALK_STACK>; // nodes here, with what the list notes of leaves
     var depth = 0u;
     var node = 0u;
+    var near = 0.0;
     var found = 0u;
     var tested = 0u;
     var culled = 0u;
     if params.top_count > 0u {
         tested = 1u;
-        if tile_meets_box(bounds, top2[0].min, top2[0].max, params.instance_pad).hit {
+        let root = tile_meets_box(bounds, top2[0].min, top2[0].max, params.instance_pad);
+        near = root.near;
+        if root.hit {
             loop {
                 let n = top2[node];
                 if n.right == NONE {
                     if WRITE {
-                        list[entry.first + found] = n.left;
+                        list[entry.first + found] = Entry(n.left, near);
                         pair_demand_clear(entry.first + found);
                     }
                     found += 1u;
@@ -50,13 +53,15 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                             atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
                             break;
                         }
-                        stack[depth] = select(n.right, n.left, swap);
+                        stack[depth] = Entry(select(n.right, n.left, swap), select(r.near, l.near, swap));
                         depth += 1u;
                         node = select(n.left, n.right, swap);
+                        near = select(l.near, r.near, swap);
                         continue;
                     }
                     if l.hit || r.hit {
                         node = select(n.right, n.left, l.hit);
+                        near = select(r.near, l.near, l.hit);
                         continue;
                     }
                 }
@@ -64,7 +69,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                     break;
                 }
                 depth -= 1u;
-                node = stack[depth];
+                node = stack[depth].leaf;
+                near = stack[depth].near;
             }
         } else {
             culled = 1u;

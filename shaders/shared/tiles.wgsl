@@ -2,7 +2,7 @@
 
 @group(3) @binding(0) var<storage, read_write> tile_bounds: array<TileBounds>;
 @group(3) @binding(1) var<storage, read_write> tile_lists: array<TileList>;
-@group(3) @binding(2) var<storage, read_write> list: array<u32>;                // leaves per tile, near first
+@group(3) @binding(2) var<storage, read_write> list: array<Entry>;              // leaves per tile, near first
 @group(3) @binding(3) var<storage, read_write> selection: array<u32>;           // positions in `list`, per tile
 @group(3) @binding(4) var<storage, read_write> pair_demand: array<PairDemand>;  // per position in `list`
 @group(3) @binding(5) var<storage, read> pairs: array<Pair>;                    // queries of pairs

@@ -93,6 +93,11 @@ struct TileList {         // where a tile's entries lie in the lists
     padding: u32,
 }
 
+struct Entry {            // of a tile's list
+    leaf: u32,
+    near: f32,            // no ray of the tile enters the leaf's box before this distance
+}
+
 struct TopNode2 {
     min: vec3<f32>,
     left: u32,

@@ -383,7 +383,7 @@ impl GpuExecutor {
 
 impl Executor for GpuExecutor {
     fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
-        let entries: Vec<u32> = lists.iter().flatten().copied().collect();
+        let entries: Vec<layout::Entry> = lists.iter().flatten().map(|&leaf| layout::Entry { leaf, near: 0.0 }).collect();
         if entries.len() > self.buffers.tiles.capacity as usize {
             self.grow_lists(u32::try_from(entries.len()).unwrap_or(u32::MAX))?;
         }

@@ -72,6 +72,7 @@ mirror! {
         direction_min: [f32; 3], rays: u32, direction_max: [f32; 3], padding: u32,
     }
     struct TileList { first: u32, count: u32, selected: u32, padding: u32 }
+    struct Entry { leaf: u32, near: f32 }
     struct TopNode2 { min: [f32; 3], left: u32, max: [f32; 3], right: u32 }
     struct BinaryNode { min: [f32; 3], what: u32, max: [f32; 3], padding: u32 }
     struct Leaf { offset_high: [f32; 3], instance: u32, offset_low: [f32; 3], brick: u32 }

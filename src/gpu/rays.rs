@@ -53,7 +53,7 @@ pub struct TileBuffers {
     pub bounds: wgpu::Buffer,
     /// [`layout::TileList`]s.
     pub lists: wgpu::Buffer,
-    /// Leaves.
+    /// [`layout::Entry`]s.
     pub list: wgpu::Buffer,
     /// Positions in the list.
     pub selection: wgpu::Buffer,
@@ -108,7 +108,7 @@ impl TileBuffers {
         Self {
             bounds: storage(gpu, "tile bounds", tiles, size_of::<layout::TileBounds>()),
             lists: storage(gpu, "tile lists", tiles, size_of::<layout::TileList>()),
-            list: storage(gpu, "list", entries, 4),
+            list: storage(gpu, "list", entries, size_of::<layout::Entry>()),
             selection: storage(gpu, "selection", entries, 4),
             pair_demand: storage(gpu, "pair demand", entries, size_of::<layout::Demand>()),
             pairs: storage(gpu, "pairs", 1, size_of::<layout::Pair>()),
