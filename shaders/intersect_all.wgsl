@@ -1,7 +1,8 @@
-// Intersects each ray with the whole scene, all of it resident: the baseline. One flat loop over the wide top-level tree
+// Intersects each ray with the whole scene, all of it resident: the baseline, or with OF_TILES the rays of the tiles that have no list. One flat loop over the wide top-level tree
 // and, through copies of the bricks' roots in its leaves, the bricks. With SELECT it passes by what is not in the wanted state.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
+#include "shared/tiles.wgsl"
 #include "shared/cache.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/node.wgsl"
@@ -10,6 +11,7 @@
 #include "shared/walk_brick.wgsl"
 
 override SELECT: bool = false;
+override OF_TILES: bool = false;
 
 // A group of the top level: the node, and its entered children, inner ones and leaves alike, by priority in the high byte,
 // so that bricks are met near to far.
@@ -32,6 +34,9 @@ fn top_group(ray: FramedRay, node: u32, t_max: f32) -> vec2<u32> {
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    if OF_TILES && tile_lists[(global.y / params.tile) * params.tiles_x + global.x / params.tile].from_root == 0u {
         return;
     }
     let index = global.y * params.width + global.x;

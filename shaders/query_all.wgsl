@@ -1,10 +1,13 @@
 // Ray-by-ray queries of the whole top level: each ray asks for the bricks in the wanted state of whose root it enters a child box at
-// or before its present hit, and notes whether it asked for any.
+// or before its present hit, and notes whether it asked for any. With OF_TILES only the rays of the tiles that have no list ask.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
+#include "shared/tiles.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/node.wgsl"
 #include "shared/leaf.wgsl"
+
+override OF_TILES: bool = false;
 
 const TOP_STACK_SIZE: u32 = 192u;  // MAX_TOP_HEIGHT levels of which each leaves at most 7 siblings, and the root
 
@@ -31,6 +34,9 @@ fn entered(ray: FramedRay, n0: vec4<u32>, n1: vec4<u32>, n2: vec4<u32>, n3: vec4
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    if OF_TILES && tile_lists[(global.y / params.tile) * params.tiles_x + global.x / params.tile].from_root == 0u {
         return;
     }
     let index = global.y * params.width + global.x;

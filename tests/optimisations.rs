@@ -143,6 +143,7 @@ fn counter(which: Optimisation) -> fn(&Record) -> u64 {
         Optimisation::NearestFirst => |r| r.bricks_nearest_first,
         Optimisation::Requery => |r| r.bricks_no_longer_wanted,
         Optimisation::ResidentFirst => |r| r.bricks_resident_first,
+        Optimisation::RootWalk => |r| r.tiles_from_root,
         Optimisation::FrontToBack => |r| r.pairs_front_to_back,
         Optimisation::ByTile => |r| r.tile_batches,
         Optimisation::MultiQueries => |r| r.multi_queries,

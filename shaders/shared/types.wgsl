@@ -38,7 +38,7 @@ struct Params {
     pair_count: u32,      // pairs to be queried
     run_first: u32,       // of a tile's selected leaves, the first that intersect_list takes
     run_count: u32,       // and how many it takes at most
-    padding2: u32,
+    list_most: u32,       // leaves of the longest list that is kept
 }
 
 const PARAM_ANY_HIT: u32 = 1u;
@@ -90,7 +90,7 @@ struct TileList {         // where a tile's entries lie in the lists
     first: u32,
     count: u32,
     selected: u32,        // entries of the selection, from `first` on
-    padding: u32,
+    from_root: u32,       // 1: the list was too long, the tile's rays walk from the root
 }
 
 struct Entry {            // of a tile's list
@@ -229,3 +229,4 @@ const COUNTER_TILE_BATCHES: u32 = 14u;
 const COUNTER_TILE_BATCH_LEAVES: u32 = 15u;
 const COUNTER_LEAF_GROUPS: u32 = 16u;
 const COUNTER_TIGHTENED: u32 = 17u;
+const COUNTER_TILES_FROM_ROOT: u32 = 18u;

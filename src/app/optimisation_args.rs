@@ -14,7 +14,8 @@ pub struct OptimisationArgs {
     /// (off: what the first query wanted is loaded whole, without a fresh query between batches), resident-first (off: bricks
     /// on the device are not intersected before missing ones are asked for, all wanted bricks are taken nearest first).
     /// Of lists (chc): front-to-back (off: a tile's leaves are intersected by number), by-tile (off: a dispatch intersects one
-    /// leaf a tile, not all), leaf-cache (see --with). Of --fronts on: multi-queries (off: every invisible pair
+    /// leaf a tile, not all), root-walk (off: a tile has a list however long; on, the rays of tiles with long lists walk from the
+    /// root), leaf-cache (see --with). Of --fronts on: multi-queries (off: every invisible pair
     /// is asked for by itself), tighter-bounds (off: a node is asked for by its own box, not its children's), lazy-requery (off:
     /// visible pairs are asked for again in every frame, not every third), pull-up (off: pairs stay split where all is
     /// invisible) [default: none]

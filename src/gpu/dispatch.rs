@@ -66,6 +66,10 @@ pub struct Dispatch {
     pub phase: Option<usize>,
 }
 
+/// Leaves of the longest list that its tile's rays are intersected with; longer ones cost more than the walk of the top level that
+/// they save (ARCHITECTURE.md, "What a list costs").
+const LIST_MOST: u32 = 12;
+
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
 
@@ -93,7 +97,11 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
     };
     let intersect = |mask, want, phase| {
         let params = Params { select_mask: mask, select_want: want, ..params };
-        vec![kernel("tile_select_intersect", params, per_tile, Some(phase)), list(params, phase)]
+        vec![
+            kernel("tile_select_intersect", params, per_tile, Some(phase)),
+            list(params, phase),
+            kernel("intersect_from_root", params, per_ray, Some(phase)),
+        ]
     };
     let select_single = |mask, want, phase| {
         let params = Params { select_mask: mask, select_want: want, run_count: 1, ..params };
@@ -104,6 +112,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
             kernel("tile_select", params, per_tile, phase),
             kernel("query", params, per_ray, phase),
             kernel("query_reduce", params, per_tile, phase),
+            kernel("query_from_root", params, per_ray, phase),
         ]
     };
     let bounds = |phase| kernel("tile_bounds", params, across(params.tiles), phase);
@@ -122,12 +131,17 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         }
         Step::StartHits => vec![kernel("start_hits", params, per_ray, None)],
         Step::CountRays => vec![bounds(None)],
-        Step::Lists => vec![
-            bounds(Some(1)),
-            kernel("tile_walk_count", params, per_tile, Some(1)),
-            kernel("tile_scan", params, [1, 1], Some(1)),
-            kernel("tile_walk_write", params, per_tile, Some(1)),
-        ],
+        Step::Lists | Step::ShortLists => {
+            // A ray that walks by itself cannot tell how many of its tile see a leaf.
+            let is_short = step == Step::ShortLists && params.threshold == 0;
+            let params = Params { list_most: if is_short { LIST_MOST } else { u32::MAX }, ..params };
+            vec![
+                bounds(Some(1)),
+                kernel("tile_walk_count", params, per_tile, Some(1)),
+                kernel("tile_scan", params, [1, 1], Some(1)),
+                kernel("tile_walk_write", params, per_tile, Some(1)),
+            ]
+        }
         Step::IntersectResident => intersect(not_done, resident, 0),
         Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, 2),
         Step::SelectResident => select_single(not_done, resident, 0),

@@ -383,7 +383,8 @@ impl GpuExecutor {
 
 impl Executor for GpuExecutor {
     fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
-        let entries: Vec<layout::Entry> = lists.iter().flatten().map(|&leaf| layout::Entry { leaf, near: 0.0 }).collect();
+        let entries: Vec<layout::Entry> =
+            lists.iter().flatten().map(|&leaf| layout::Entry { leaf, near: 0.0 }).collect();
         if entries.len() > self.buffers.tiles.capacity as usize {
             self.grow_lists(u32::try_from(entries.len()).unwrap_or(u32::MAX))?;
         }
@@ -458,6 +459,7 @@ fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, Ex
         pairs_invisible: count(layout::COUNTER_PAIRS_INVISIBLE),
         pairs_intersected: count(layout::COUNTER_PAIRS_INTERSECTED),
         most_selected: counters[layout::COUNTER_MOST_SELECTED as usize],
+        tiles_from_root: count(layout::COUNTER_TILES_FROM_ROOT),
         pairs_front_to_back: count(layout::COUNTER_FRONT_TO_BACK),
         tile_batches: count(layout::COUNTER_TILE_BATCHES),
         tile_batch_leaves: count(layout::COUNTER_TILE_BATCH_LEAVES),

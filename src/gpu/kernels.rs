@@ -90,7 +90,9 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("intersect_list", "intersect_list_cached", Groups::CacheTiles, &[("COUNT", 0.0), ("LEAF_CACHE", 1.0)]),
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0)]),
+    ("intersect_all", "intersect_from_root", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0), ("OF_TILES", 1.0)]),
     ("query_all", "query_all", Groups::Tiles, &[]),
+    ("query_all", "query_from_root", Groups::Tiles, &[("OF_TILES", 1.0)]),
 ];
 
 /// Specialisations that count nodes and triangles, made only when counting is asked for.
@@ -99,6 +101,7 @@ const COUNTING: &[Specialisation] = &[
     ("intersect_list", "intersect_list_cached", Groups::CacheTiles, &[("COUNT", 1.0), ("LEAF_CACHE", 1.0)]),
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0)]),
+    ("intersect_all", "intersect_from_root", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0), ("OF_TILES", 1.0)]),
 ];
 
 impl Kernels {

@@ -36,6 +36,7 @@ pub const COUNTER_TILE_BATCHES: u32 = 14;
 pub const COUNTER_TILE_BATCH_LEAVES: u32 = 15;
 pub const COUNTER_LEAF_GROUPS: u32 = 16;
 pub const COUNTER_TIGHTENED: u32 = 17;
+pub const COUNTER_TILES_FROM_ROOT: u32 = 18;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Number of counters.
 pub const COUNTERS: usize = 24;
@@ -60,7 +61,7 @@ mirror! {
         sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
         lamp_corner: [f32; 4], lamp_u: [f32; 4], lamp_v: [f32; 4], lamp_color: [f32; 4], around: [f32; 4],
         share: f32, surface_share: f32, length: f32, stream: u32,
-        pair_count: u32, run_first: u32, run_count: u32, padding2: u32,
+        pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
     struct Hit { t: f32, id: u32, u: f32, v: f32 }
@@ -71,7 +72,7 @@ mirror! {
         origin_min: [f32; 3], t_min: f32, origin_max: [f32; 3], t_max: f32,
         direction_min: [f32; 3], rays: u32, direction_max: [f32; 3], padding: u32,
     }
-    struct TileList { first: u32, count: u32, selected: u32, padding: u32 }
+    struct TileList { first: u32, count: u32, selected: u32, from_root: u32 }
     struct Entry { leaf: u32, near: f32 }
     struct TopNode2 { min: [f32; 3], left: u32, max: [f32; 3], right: u32 }
     struct BinaryNode { min: [f32; 3], what: u32, max: [f32; 3], padding: u32 }

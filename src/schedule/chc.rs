@@ -23,7 +23,8 @@ pub fn trace(
     let some_missing = !cache.states.all_geometry_resident();
     let resident_first = optimisations.resident_first || !some_missing;
     let mut steps = first.to_vec();
-    steps.push(Step::Lists);
+    let is_short = optimisations.root_walk && optimisations.by_tile && optimisations.front_to_back;
+    steps.push(if is_short { Step::ShortLists } else { Step::Lists });
     if !optimisations.front_to_back {
         steps.push(Step::SortByNumber);
     }
@@ -40,7 +41,7 @@ pub fn trace(
     let batches = Batches::of_lists(pass, optimisations);
     batches.load_and_intersect(executor, cache, report, stats)?;
     if tracing.measure_needed {
-        measure_needed(executor, cache, pass, &[], &resident_before, stats)?;
+        measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;
     }
     Ok(())
 }

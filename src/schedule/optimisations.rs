@@ -69,6 +69,9 @@ optimisations! {
     FrontToBack, front_to_back = "front-to-back", Lists, true;
     /// A dispatch intersects all selected leaves of a tile (CHC+RT §5.2, which stops at 24); else one leaf a tile.
     ByTile, by_tile = "by-tile", Lists, true;
+    /// The rays of a tile whose list is long walk from the root instead, each by itself; else by the list whatever its length. In
+    /// force with `by-tile` and `front-to-back`.
+    RootWalk, root_walk = "root-walk", Lists, true;
     /// Invisible pairs of a tile that will probably stay so are asked for together (CHC+RT §5.1); else each by itself.
     MultiQueries, multi_queries = "multi-queries", Fronts, true;
     /// A node is asked for by the boxes of its children (CHC+RT §5.1); else by its own.

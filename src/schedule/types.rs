@@ -69,6 +69,9 @@ pub enum Step {
     CountRays,
     /// Bounds of the tiles, their walk of the top level, their lists of leaves.
     Lists,
+    /// As [`Step::Lists`], without those lists that cost more than they save: the rays of their tiles walk from the root in the steps
+    /// that follow. With a threshold all lists are kept.
+    ShortLists,
     /// Intersect the listed leaves whose geometry is resident and not done: phase 1.
     IntersectResident,
     /// Intersect the listed leaves of the batch just loaded: phase 3.
@@ -199,6 +202,8 @@ pub struct Report {
     pub pairs_intersected: u64,
     /// Most leaves that a tile selected to be intersected.
     pub most_selected: u32,
+    /// Tiles whose list was too long to be kept.
+    pub tiles_from_root: u64,
     /// Pairs (tile, leaf) intersected after one of the tile with a greater number.
     pub pairs_front_to_back: u64,
     /// Tiles, summed over dispatches, of which a dispatch intersected two leaves or more.
@@ -207,7 +212,7 @@ pub struct Report {
     pub tile_batch_leaves: u64,
     /// Groups of triangles that rays postponed.
     pub leaf_groups_postponed: u64,
-    /// Rays traced; counted by [`Step::Lists`] and [`Step::CountRays`].
+    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`] and [`Step::CountRays`].
     pub rays: u64,
     /// Nodes visited, when the executor counts.
     pub nodes: u64,
@@ -343,6 +348,7 @@ impl PassStats {
         sum.pairs_visible += r.pairs_visible;
         sum.pairs_invisible += r.pairs_invisible;
         sum.pairs_intersected += r.pairs_intersected;
+        sum.tiles_from_root += r.tiles_from_root;
         sum.pairs_front_to_back += r.pairs_front_to_back;
         sum.tile_batches += r.tile_batches;
         sum.tile_batch_leaves += r.tile_batch_leaves;

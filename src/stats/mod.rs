@@ -46,6 +46,8 @@ pub struct Record {
     pub pulled_up: u64,
     /// Pairs (tile, leaf) intersected.
     pub pairs_intersected: u64,
+    /// With root-walk: tiles, summed over passes, whose rays walked from the root because their list was long.
+    pub tiles_from_root: u64,
     /// With front-to-back: pairs (tile, leaf) intersected after one of the tile with a greater number.
     pub pairs_front_to_back: u64,
     /// With by-tile: tiles, summed over dispatches, of which a dispatch intersected two leaves or more.
@@ -151,6 +153,7 @@ impl Record {
             queries_tightened: r.queries_tightened,
             requeries_deferred: stats.requeries_deferred,
             pairs_intersected: r.pairs_intersected,
+            tiles_from_root: r.tiles_from_root,
             pairs_front_to_back: r.pairs_front_to_back,
             tile_batches: r.tile_batches,
             tile_batch_leaves: r.tile_batch_leaves,
