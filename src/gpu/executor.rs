@@ -375,7 +375,7 @@ impl GpuExecutor {
             return Err(ExecutorError::Device(text));
         }
         let capacity = entries.saturating_add(entries / 4).min(most);
-        self.buffers.tiles = TileBuffers::new(&self.gpu, self.extent, capacity);
+        self.buffers.tiles.make_room(&self.gpu, capacity);
         self.rebind();
         Ok(())
     }

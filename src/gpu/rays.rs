@@ -104,18 +104,30 @@ impl TileBuffers {
     /// For the tiles of `extent` and lists of `capacity` entries in all.
     pub fn new(gpu: &Gpu, extent: Extent, capacity: u32) -> Self {
         let tiles = extent.tiles() as usize;
-        let entries = capacity as usize;
+        let [list, selection, pair_demand] = Self::entries(gpu, capacity);
         Self {
             bounds: storage(gpu, "tile bounds", tiles, size_of::<layout::TileBounds>()),
             lists: storage(gpu, "tile lists", tiles, size_of::<layout::TileList>()),
-            list: storage(gpu, "list", entries, size_of::<layout::Entry>()),
-            selection: storage(gpu, "selection", entries, 4),
-            pair_demand: storage(gpu, "pair demand", entries, size_of::<layout::Demand>()),
+            list,
+            selection,
+            pair_demand,
             pairs: storage(gpu, "pairs", 1, size_of::<layout::Pair>()),
             pair_rays: storage(gpu, "pair rays", 1, 4),
             pair_nodes: storage(gpu, "pair nodes", 1, 4),
             capacity: capacity.max(1),
         }
+    }
+
+    /// Makes room for `capacity` entries. What the lists hold is lost, what is known of the tiles is not.
+    pub fn make_room(&mut self, gpu: &Gpu, capacity: u32) {
+        [self.list, self.selection, self.pair_demand] = Self::entries(gpu, capacity);
+        self.capacity = capacity.max(1);
+    }
+
+    /// List, selection and demand of `capacity` entries.
+    fn entries(gpu: &Gpu, capacity: u32) -> [wgpu::Buffer; 3] {
+        let of = |label, stride| storage(gpu, label, capacity as usize, stride);
+        [of("list", size_of::<layout::Entry>()), of("selection", 4), of("pair demand", size_of::<layout::Demand>())]
     }
 }
 
