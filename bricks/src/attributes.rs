@@ -130,7 +130,7 @@ pub fn decode(brick: &Brick, stored: &[u8], scratch: &mut Vec<u8>, loaded: &mut 
 fn decode_surfaces(materials: &[u8], rotations: &[u8], surfaces: &mut [u8]) -> Result<(), UnpackError> {
     let (surfaces, padding) = surfaces.split_at_mut(materials.len());
     padding.fill(0);
-    let mut all = 0;
+    let (mut all, mut unused) = (0, 0);
     for ((surfaces, materials), &rotations) in surfaces.chunks_mut(16).zip(materials.chunks(16)).zip(rotations) {
         let mut rotations = u32::from(rotations);
         for (surface, material) in surfaces.as_chunks_mut::<4>().0.iter_mut().zip(materials.as_chunks::<4>().0) {
@@ -140,9 +140,9 @@ fn decode_surfaces(materials: &[u8], rotations: &[u8], surfaces: &mut [u8]) -> R
             rotations >>= 2;
         }
         // Of the last byte fewer than four may be in use.
-        all |= rotations << SURFACE_ROTATION_SHIFT;
+        unused |= rotations;
     }
-    if all & !SURFACE_MATERIAL != 0 {
+    if all & !SURFACE_MATERIAL != 0 || unused != 0 {
         let (found, expected) = ("set bits beside those of materials and rotations", "zeros there");
         return Err(UnpackError { found: found.to_owned(), expected: expected.to_owned() });
     }
@@ -283,6 +283,15 @@ mod tests {
         assert!(decoded(&brick, &columns(SURFACE_MATERIAL, 0x3f)).is_ok());
         for stored in [columns(1 << 30, 0), columns(1 << 31, 0), columns(0, 0x40), columns(0, 0x80)] {
             assert!(decoded(&brick, &stored).unwrap_err().found.contains("set bits"));
+        }
+        // The last byte of rotations, all the ways to leave bits of it without use.
+        for triangles in 1..5 {
+            let brick = self::brick(triangles, 1, false);
+            for bit in 0..8 {
+                let mut columns = vec![0; Columns::of(&brick).bytes()];
+                columns[16 + 4 * triangles as usize] = 1 << bit;
+                assert_eq!(decoded(&brick, &pack(&columns)).is_ok(), bit < 2 * triangles, "bit {bit} of {triangles}");
+            }
         }
     }
 
