@@ -51,6 +51,8 @@ fn files_agree_and_a_bounded_run_is_gone_on_with() {
     succeed(words(&output, &format!("{options} --minutes 0")));
     assert_eq!(cases(&output), []);
     assert_eq!(json(&output)["walks"], 0);
+    succeed(words(&output, "--repeat 1 --stages targets --only pipes"));
+    assert!(cases(&output).len() == 3 && cases(&output).iter().all(|(name, _)| name.contains("pipes")));
     succeed(words(&output, "--repeat 1 --stages targets"));
     let before = cases(&output);
     assert_eq!(before.len(), 6, "two scenes, with all optimisations and without each of two");
@@ -140,6 +142,7 @@ fn what_cannot_be_measured_is_refused() {
         ("--frames 0", "1 to 300"),
         ("--frames 4 --skip 4", "above 4"),
         ("--minutes soon", "minutes"),
+        ("--only nothing", "no case"),
     ] {
         let start = ["bench".as_ref(), "chc".as_ref(), "-o".as_ref(), output.as_os_str()];
         let (code, message) = outcome(start.into_iter().chain(options.split(' ').map(std::ffi::OsStr::new)).collect());

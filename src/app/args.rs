@@ -271,6 +271,9 @@ pub struct StreamArgs {
     /// Write the trace of brick requests to this file, for replay against other caches [default: none]
     #[arg(long, value_name = "F")]
     pub requests_out: Option<PathBuf>,
+    /// Count the nodes that rays visit and the triangles that they test (nodes_visited, triangles_tested), which takes time
+    #[arg(long)]
+    pub count: bool,
     /// Use the graphics adapter whose name contains NAME, upper and lower case alike [default: a GPU, else software]
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,

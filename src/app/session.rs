@@ -130,7 +130,7 @@ impl Session {
         let host = HostCache::new(args.host_cache);
         let workers = Workers::new(scene.clone(), host, args.worker_count(), args.prefetch as usize)?;
         let threshold = scaled_threshold(args.query_threshold, extent.tile);
-        let setup = Setup { extent, threshold, count: false };
+        let setup = Setup { extent, threshold, count: args.count };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let mut executor =
             GpuExecutor::new(gpu, scene.clone(), workers, &page_sizes, setup).with_context(|| format!("{name}"))?;

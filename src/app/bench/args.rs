@@ -48,6 +48,10 @@ pub struct ChcArgs {
     /// large city all resident) [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub stages: Vec<Stage>,
+    /// Measure only cases whose names contain every word of TEXT; repeated: those of any TEXT. Names are such as
+    /// "table2/city/100%/tile 64/near/primary,ao,diffuse/chc+fronts/threshold 0/turn 36"; cells.jsonl holds them
+    #[arg(long, value_name = "TEXT")]
+    pub only: Vec<String>,
     /// Begin no walk after so many minutes; the results hold what is measured until then [default: no limit]
     #[arg(long, value_name = "N", value_parser = minutes)]
     pub minutes: Option<f64>,
@@ -142,6 +146,11 @@ impl ChcArgs {
     pub fn stages(&self) -> Vec<Stage> {
         let wanted = |stage: &Stage| self.stages.is_empty() || self.stages.contains(stage);
         Stage::ALL.into_iter().filter(wanted).collect()
+    }
+
+    /// Whether a case of this name is wanted.
+    pub fn wants(&self, name: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|text| text.split_whitespace().all(|word| name.contains(word)))
     }
 }
 

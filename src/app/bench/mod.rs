@@ -42,13 +42,21 @@ pub fn run(args: &BenchArgs) -> Result<()> {
 
 fn chc(args: &ChcArgs, settings: &Settings) -> Result<()> {
     let start = Instant::now();
+    let scope = |stages| Scope { stages, sponza: args.sponza.is_some(), tile: settings.tile, repeat: settings.repeat };
+    let mut wanted = plan::groups(&scope(args.stages()));
+    for group in &mut wanted {
+        group.cases.retain(|case| args.wants(&case.to_string()));
+    }
+    wanted.retain(|group| !group.cases.is_empty());
+    if wanted.is_empty() {
+        return Err(super::Usage(format!("--only {}: no case of these stages has such a name", args.only.join(", "))).into());
+    }
     atomic::create_folder(&args.output)?;
     let header = header(args, settings)?;
     let mut cells = Cells::open(&args.output, header, args.resume)?;
-    let scope = |stages| Scope { stages, sponza: args.sponza.is_some(), tile: settings.tile, repeat: settings.repeat };
     let deadline = args.minutes.map(|minutes| start + Duration::from_secs_f64(60.0 * minutes));
     let mut run = Run { args, settings, cells: &mut cells, notes: Vec::new(), deadline };
-    let ended = run.measure(&plan::groups(&scope(args.stages())))?;
+    let ended = run.measure(&wanted)?;
     let notes = std::mem::take(&mut run.notes);
     // What earlier runs measured of other stages is shown, too.
     let all = plan::groups(&scope(plan::Stage::ALL.to_vec()));
