@@ -1,5 +1,7 @@
-// Intersects each ray with the whole scene, all of it resident: the baseline, or with OF_TILES the rays of the tiles that have no list. One flat loop over the wide top-level tree
-// and, through copies of the bricks' roots in its leaves, the bricks. With SELECT it passes by what is not in the wanted state.
+// Intersects each ray with the whole scene, all of it resident: the baseline, or with OF_TILES the rays of the tiles that have no
+// list. One loop over the wide top-level tree and, through copies of the bricks' roots in its leaves, the bricks; nodes are visited
+// until one has triangles, so that the rays of a subgroup test theirs together. With SELECT it passes by what is not in the wanted
+// state.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -59,49 +61,61 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var in_brick = false;
     var group = top_group(world, 0u, best.t);
     loop {
-        if !has_children(group) {
-            if in_brick && depth == floor {
-                in_brick = false;
-                r.ray.flip = world.flip;
+        var triangles = vec2<u32>(0u);
+        loop {
+            if !has_children(group) {
+                if in_brick && depth == floor {
+                    in_brick = false;
+                    r.ray.flip = world.flip;
+                }
+                if depth == 0u {
+                    break;
+                }
+                depth -= 1u;
+                group = stack[depth];
             }
-            if depth == 0u {
-                break;
+            let nearest = nearest_child(group, r.ray.flip);
+            if has_children(nearest.rest) {
+                if depth == STACK_SIZE {
+                    atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
+                    break;
+                }
+                stack[depth] = nearest.rest;
+                depth += 1u;
             }
-            depth -= 1u;
-            group = stack[depth];
-        }
-        let nearest = nearest_child(group, r.ray.flip);
-        if has_children(nearest.rest) {
-            if depth == STACK_SIZE {
-                atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
-                break;
-            }
-            stack[depth] = nearest.rest;
-            depth += 1u;
-        }
-        let slot = nearest.slot;
-        if in_brick {
-            group = visit_node(&r, &best, child_index(group, slot), any_hit);
-            if any_hit && best.leaf != NONE {
-                break;
-            }
-            continue;
-        }
-        let inner = top8[5u * group.x].w >> 24u;
-        let n1 = top8[5u * group.x + 1u];
-        if (inner & (1u << slot)) != 0u {
-            group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
-        } else {
-            let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
-            if SELECT && (slots[leaves[leaf].brick].state & params.select_mask) != params.select_want {
-                group = vec2<u32>(0u);
+            let slot = nearest.slot;
+            if in_brick {
+                let opened = open_node(&r, best.t, child_index(group, slot));
+                group = opened.children;
+                triangles = opened.triangles;
+                if triangles.y != 0u {
+                    break;
+                }
                 continue;
             }
-            floor = depth;
-            in_brick = true;
-            enter_leaf(&r, world, leaf);
-            enter_brick(&r, leaves[leaf].brick);
-            group = root_group(r.ray.flip);
+            let inner = top8[5u * group.x].w >> 24u;
+            let n1 = top8[5u * group.x + 1u];
+            if (inner & (1u << slot)) != 0u {
+                group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
+            } else {
+                let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
+                if SELECT && (slots[leaves[leaf].brick].state & params.select_mask) != params.select_want {
+                    group = vec2<u32>(0u);
+                    continue;
+                }
+                floor = depth;
+                in_brick = true;
+                enter_leaf(&r, world, leaf);
+                enter_brick(&r, leaves[leaf].brick);
+                group = root_group(r.ray.flip);
+            }
+        }
+        if triangles.y == 0u {
+            break;
+        }
+        test_triangles(&r, &best, triangles, any_hit);
+        if any_hit && best.leaf != NONE {
+            break;
         }
     }
     finish_walk(&r, world, best, index);

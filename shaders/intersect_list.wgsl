@@ -1,5 +1,6 @@
-// Intersects each ray with a run of the selected leaves of its tile, in their order, in one flat loop. With LEAF_CACHE the groups
-// of triangles that a ray finds are postponed, and tested two at a time, or before it enters another leaf.
+// Intersects each ray with a run of the selected leaves of its tile, in their order. Nodes are visited until one has triangles, so
+// that the rays of a subgroup test theirs together. With LEAF_CACHE two such groups are gathered, as long as the ray does not enter
+// another leaf.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -43,59 +44,57 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var stack: array<vec2<u32>, STACK_SIZE>;
     var depth = 0u;
     var group = vec2<u32>(0u);
-    var postponed = vec2<u32>(0u);
     loop {
-        if !has_children(group) {
-            if depth > 0u {
-                depth -= 1u;
-                group = stack[depth];
-            } else {
-                if LEAF_CACHE && postponed.y != 0u {
-                    test_triangles(&r, &best, postponed, any_hit);
-                    postponed = vec2<u32>(0u);
-                    if any_hit && best.leaf != NONE {
+        var postponed = vec2<u32>(0u);
+        var triangles = vec2<u32>(0u);
+        loop {
+            if !has_children(group) {
+                if depth > 0u {
+                    depth -= 1u;
+                    group = stack[depth];
+                } else {
+                    if next == end || (LEAF_CACHE && postponed.y != 0u) {
                         break;
                     }
+                    let listed = list[selection[next]];
+                    next += 1u;
+                    if listed.near > best.t {
+                        continue;
+                    }
+                    let leaf = listed.leaf;
+                    enter_leaf(&r, world, leaf);
+                    enter_brick(&r, leaves[leaf].brick);
+                    group = root_group(r.ray.flip);
                 }
-                if next == end {
+            }
+            let nearest = nearest_child(group, r.ray.flip);
+            if has_children(nearest.rest) {
+                if depth == STACK_SIZE {
+                    atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
                     break;
                 }
-                let listed = list[selection[next]];
-                next += 1u;
-                if listed.near > best.t {
-                    continue;
-                }
-                let leaf = listed.leaf;
-                enter_leaf(&r, world, leaf);
-                enter_brick(&r, leaves[leaf].brick);
-                group = root_group(r.ray.flip);
+                stack[depth] = nearest.rest;
+                depth += 1u;
             }
-        }
-        let nearest = nearest_child(group, r.ray.flip);
-        if has_children(nearest.rest) {
-            if depth == STACK_SIZE {
-                atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
-                break;
-            }
-            stack[depth] = nearest.rest;
-            depth += 1u;
-        }
-        if LEAF_CACHE {
             let opened = open_node(&r, best.t, child_index(group, nearest.slot));
             group = opened.children;
-            if opened.triangles.y != 0u {
-                if postponed.y == 0u {
-                    postponed = opened.triangles;
-                    leaf_groups_postponed += 1u;
-                } else {
-                    test_triangles(&r, &best, postponed, any_hit);
-                    test_triangles(&r, &best, opened.triangles, any_hit);
-                    postponed = vec2<u32>(0u);
+            triangles = opened.triangles;
+            if triangles.y != 0u {
+                if !LEAF_CACHE || postponed.y != 0u {
+                    break;
                 }
+                postponed = triangles;
+                triangles = vec2<u32>(0u);
+                leaf_groups_postponed += 1u;
             }
-        } else {
-            group = visit_node(&r, &best, child_index(group, nearest.slot), any_hit);
         }
+        if (postponed.y | triangles.y) == 0u {
+            break;
+        }
+        if LEAF_CACHE {
+            test_triangles(&r, &best, postponed, any_hit);
+        }
+        test_triangles(&r, &best, triangles, any_hit);
         if any_hit && best.leaf != NONE {
             break;
         }

@@ -1,4 +1,4 @@
-// Traversal of one brick, the inner part of every intersection kernel's one flat loop.
+// Traversal of one brick, the inner part of every intersection kernel's loop.
 //
 // A group is a node's entered inner children, still to be visited: the base of its children, and a word of priorities in
 // the high byte (the highest is nearest) and the mask of inner slots in the low byte.
@@ -52,14 +52,6 @@ fn test_triangles(r: ptr<function, BrickRay>, best: ptr<function, Best>, group: 
             break;
         }
     }
-}
-
-// Visits node `index` of the brick: tests the triangles that the ray may meet and returns the group of the inner children
-// that it enters.
-fn visit_node(r: ptr<function, BrickRay>, best: ptr<function, Best>, index: u32, any_hit: bool) -> vec2<u32> {
-    let opened = open_node(r, (*best).t, index);
-    test_triangles(r, best, opened.triangles, any_hit);
-    return opened.children;
 }
 
 // Whether a group holds children to be visited.

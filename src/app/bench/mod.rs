@@ -49,7 +49,9 @@ fn chc(args: &ChcArgs, settings: &Settings) -> Result<()> {
     }
     wanted.retain(|group| !group.cases.is_empty());
     if wanted.is_empty() {
-        return Err(super::Usage(format!("--only {}: no case of these stages has such a name", args.only.join(", "))).into());
+        return Err(
+            super::Usage(format!("--only {}: no case of these stages has such a name", args.only.join(", "))).into()
+        );
     }
     atomic::create_folder(&args.output)?;
     let header = header(args, settings)?;
