@@ -34,14 +34,20 @@ fn top_group(ray: FramedRay, node: u32, t_max: f32) -> vec2<u32> {
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) global: vec3<u32>) {
-    if global.x >= params.width || global.y >= params.height {
+fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let number = workgroup.x + workgroup.y * workgroups.x;
+    var work: Work;
+    if OF_TILES {
+        work = work_of(WORK_ROOTED, number);
+    } else {
+        work = work_of_all(number);
+    }
+    let x = work.ray.x + local.x;
+    let y = work.ray.y + local.y;
+    if work.tile == NONE || x >= params.width || y >= params.height {
         return;
     }
-    if OF_TILES && tile_lists[(global.y / params.tile) * params.tiles_x + global.x / params.tile].from_root == 0u {
-        return;
-    }
-    let index = global.y * params.width + global.x;
+    let index = y * params.width + x;
     let ray = rays[index];
     if !(ray.t_min <= ray.t_max) || params.top_count == 0u {
         return;

@@ -3,6 +3,7 @@
 // triangles. One stack serves the binary top level and the trees of the bricks at its leaves.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
+#include "shared/blocks.wgsl"
 #include "shared/cache.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/node.wgsl"
@@ -59,11 +60,14 @@ fn pop(walk: ptr<function, Walk>) -> u32 {
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) global: vec3<u32>) {
-    if global.x >= params.width || global.y >= params.height {
+fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let work = work_of_all(workgroup.x + workgroup.y * workgroups.x);
+    let x = work.ray.x + local.x;
+    let y = work.ray.y + local.y;
+    if work.tile == NONE || x >= params.width || y >= params.height {
         return;
     }
-    let index = global.y * params.width + global.x;
+    let index = y * params.width + x;
     let ray = rays[index];
     if !(ray.t_min <= ray.t_max) || params.top_count == 0u {
         return;

@@ -10,16 +10,15 @@
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) global: vec3<u32>) {
-    if global.x >= params.width || global.y >= params.height {
+fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let work = work_of(WORK_CHOSEN, workgroup.x + workgroup.y * workgroups.x);
+    let x = work.ray.x + local.x;
+    let y = work.ray.y + local.y;
+    if work.tile == NONE || x >= params.width || y >= params.height {
         return;
     }
-    let tile = (global.y / params.tile) * params.tiles_x + global.x / params.tile;
-    let entry = tile_lists[tile];
-    if entry.selected == 0u {
-        return;
-    }
-    let index = global.y * params.width + global.x;
+    let entry = tile_lists[work.tile];
+    let index = y * params.width + x;
     let ray = rays[index];
     if !(ray.t_min <= ray.t_max) {
         return;

@@ -6,6 +6,7 @@
 #include "shared/tiles.wgsl"
 
 var<workgroup> sums: array<u32, 256>;
+var<workgroup> roots_of: array<u32, 256>;
 
 fn kept(count: u32) -> u32 {
     return select(count, 0u, count > params.list_most);
@@ -18,32 +19,44 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     let first = min(lane * run, params.tiles);
     let last = min(first + run, params.tiles);
     var sum = 0u;
+    var from_root = 0u;
     for (var i = first; i < last; i++) {
-        sum += kept(tile_lists[i].count);
+        let count = tile_lists[i].count;
+        sum += kept(count);
+        from_root += u32(count > kept(count));
     }
     sums[lane] = sum;
+    roots_of[lane] = from_root;
     workgroupBarrier();
     var before = 0u;
     var total = 0u;
+    var place = 0u;
+    var rooted = 0u;
     for (var i = 0u; i < 256u; i++) {
         if i < lane {
             before += sums[i];
+            place += roots_of[i];
         }
         total += sums[i];
+        rooted += roots_of[i];
     }
-    var from_root = 0u;
     let fits = total <= params.list_capacity;
     for (var i = first; i < last; i++) {
         let all = tile_lists[i].count;
         let count = kept(all);
-        tile_lists[i] = TileList(before, select(0u, count, fits), 0u, u32(fits && all > count));
-        from_root += u32(all > count);
+        tile_lists[i].first = before;
+        tile_lists[i].count = select(0u, count, fits);
+        tile_lists[i].selected = 0u;
+        tile_lists[i].from_root = u32(fits && all > count);
         before += count;
-    }
-    if from_root > 0u {
-        atomicAdd(&counters[COUNTER_TILES_FROM_ROOT], from_root);
+        if all > count {
+            tile_lists[place].rooted = i;
+            place += 1u;
+        }
     }
     if lane == 0u {
         atomicStore(&counters[COUNTER_LIST_ENTRIES], total);
+        atomicAdd(&counters[COUNTER_TILES_FROM_ROOT], rooted);
+        set_work(WORK_ROOTED, select(0u, rooted, fits));
     }
 }

@@ -27,6 +27,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
     }
     tile_lists[tile].selected = selected;
+    if selected > 0u {
+        // In any order: tiles do not depend on each other.
+        tile_lists[atomicAdd(&counters[COUNTER_TILES_CHOSEN], 1u)].chosen = tile;
+    }
     if INTERSECT && selected > 0u {
         atomicAdd(&counters[COUNTER_PAIRS_INTERSECTED], selected);
         atomicAdd(&counters[COUNTER_FRONT_TO_BACK], departures);

@@ -77,7 +77,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
     }
     if !WRITE {
-        tile_lists[tile] = TileList(0u, found, 0u, 0u);
+        tile_lists[tile].count = found;
         atomicAdd(&counters[COUNTER_PAIRS_TESTED], tested);
         atomicAdd(&counters[COUNTER_PAIRS_CULLED], culled);
     }

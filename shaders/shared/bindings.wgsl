@@ -13,7 +13,7 @@
 @group(1) @binding(2) var<storage, read_write> hits: array<Hit>;
 @group(1) @binding(3) var<storage, read_write> surfaces: array<Surface>;
 @group(1) @binding(4) var<storage, read_write> demand: array<BrickDemand>;      // per brick
-@group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>, 24>;
+@group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>, 32>;
 
 struct BrickDemand {
     rays: atomic<u32>,

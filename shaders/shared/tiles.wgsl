@@ -1,4 +1,5 @@
 // Bindings of group 3 for the kernels that work on tiles: their bounds and their lists of leaves.
+#include "shared/blocks.wgsl"
 
 @group(3) @binding(0) var<storage, read_write> tile_bounds: array<TileBounds>;
 @group(3) @binding(1) var<storage, read_write> tile_lists: array<TileList>;
@@ -12,4 +13,25 @@
 struct PairDemand {
     rays: atomic<u32>,
     nearest: atomic<u32>,
+}
+
+const MOST_WORKGROUPS: u32 = 65535u; // in one dimension
+
+// What a workgroup has to do of the work that begins at counter `work`: over chosen tiles alone.
+fn work_of(work: u32, workgroup: u32) -> Work {
+    if workgroup >= atomicLoad(&counters[work + 3u]) {
+        return Work(NONE, vec2<u32>(0u));
+    }
+    let place = workgroup / blocks_of_tile();
+    return block_of_tile(select(tile_lists[place].rooted, tile_lists[place].chosen, work == WORK_CHOSEN), workgroup);
+}
+
+// Sets the workgroups of the work that begins at counter `work`: over so many tiles.
+fn set_work(work: u32, tiles_with_work: u32) {
+    let workgroups = tiles_with_work * blocks_of_tile();
+    let x = min(workgroups, MOST_WORKGROUPS);
+    atomicStore(&counters[work], x);
+    atomicStore(&counters[work + 1u], (workgroups + max(x, 1u) - 1u) / max(x, 1u));
+    atomicStore(&counters[work + 2u], 1u);
+    atomicStore(&counters[work + 3u], workgroups);
 }

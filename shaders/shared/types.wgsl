@@ -91,6 +91,8 @@ struct TileList {         // where a tile's entries lie in the lists
     count: u32,
     selected: u32,        // entries of the selection, from `first` on
     from_root: u32,       // 1: the list was too long, the tile's rays walk from the root
+    chosen: u32,          // of place i, not of tile i: the i-th tile that has a selection,
+    rooted: u32,          // and the i-th whose rays walk from the root
 }
 
 struct Entry {            // of a tile's list
@@ -230,3 +232,6 @@ const COUNTER_TILE_BATCH_LEAVES: u32 = 15u;
 const COUNTER_LEAF_GROUPS: u32 = 16u;
 const COUNTER_TIGHTENED: u32 = 17u;
 const COUNTER_TILES_FROM_ROOT: u32 = 18u;
+const COUNTER_TILES_CHOSEN: u32 = 19u;
+const WORK_CHOSEN: u32 = 24u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
+const WORK_ROOTED: u32 = 28u;      // the same over tiles whose rays walk from the root

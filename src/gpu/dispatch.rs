@@ -50,14 +50,25 @@ impl Directions {
     }
 }
 
+/// The workgroups of a dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Workgroups {
+    /// So many in x and y.
+    Fixed([u32; 2]),
+    /// Of the tiles that have just been chosen; the device knows how many.
+    Chosen,
+    /// Of the tiles whose rays walk from the root; the device knows how many.
+    Rooted,
+}
+
 /// One dispatch of a kernel.
 pub struct Dispatch {
     /// The kernel's pipeline.
     pub kernel: &'static str,
     /// Its parameters.
     pub params: Params,
-    /// Workgroups in x and y.
-    pub groups: [u32; 2],
+    /// Its workgroups.
+    pub groups: Workgroups,
     /// Whether group 2 is the cache.
     pub cache: bool,
     /// Whether group 3 is what shading the set before the pass's needs, not the tiles.
@@ -66,9 +77,11 @@ pub struct Dispatch {
     pub phase: Option<usize>,
 }
 
-/// Leaves of the longest list that its tile's rays are intersected with; longer ones cost more than the walk of the top level that
-/// they save (ARCHITECTURE.md, "What a list costs").
-const LIST_MOST: u32 = 12;
+/// Leaves of the longest list that a tile's rays are intersected with; longer ones cost more than the walk of the top level that
+/// they save (ARCHITECTURE.md, "What a list costs"). Camera rays of a tile agree on what is near and stop there, others do not.
+fn list_most(pass: Pass) -> u32 {
+    if pass == Pass::Primary { 128 } else { 12 }
+}
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -80,39 +93,53 @@ fn across(count: u32) -> [u32; 2] {
 }
 
 /// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells passes and their dispatches apart;
-/// with `leaf_cache` lists are intersected by the kernel that has one.
-pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directions, leaf_cache: bool) -> Vec<Dispatch> {
+/// with `leaf_cache` lists are intersected by the kernel that has one; with `everything` resident no kernel looks for what is.
+pub fn dispatches(
+    pass: Pass,
+    step: Step,
+    params: &Params,
+    directions: &Directions,
+    leaf_cache: bool,
+    everything: bool,
+) -> Vec<Dispatch> {
     let params = Params { run_count: u32::MAX >> 1, ..directions.params(pass, params) };
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
-    let kernel = |kernel: &'static str, params, groups, phase| {
+    let by_tile = across(params.tiles * (params.tile / 8) * (params.tile / 8));
+    let dispatch = |kernel: &'static str, params, groups, phase| {
         let cache = kernel.starts_with("intersect");
         Dispatch { kernel, params, groups, cache, shading: false, phase }
     };
-    let shading =
-        |kernel, params, cache| Dispatch { kernel, params, groups: per_ray, cache, shading: true, phase: None };
+    let kernel = |kernel, params, groups, phase| dispatch(kernel, params, Workgroups::Fixed(groups), phase);
+    let shading = |kernel, params, cache| {
+        let groups = Workgroups::Fixed(per_ray);
+        Dispatch { kernel, params, groups, cache, shading: true, phase: None }
+    };
     let list = |params, phase| {
         let name = if leaf_cache { "intersect_list_cached" } else { "intersect_list" };
-        kernel(name, params, per_ray, Some(phase))
+        dispatch(name, params, Workgroups::Chosen, Some(phase))
     };
-    let intersect = |mask, want, phase| {
+    let choose = |params, phase| kernel("tile_choose", params, [1, 1], phase);
+    let intersect = |mask, want, from_root, phase| {
         let params = Params { select_mask: mask, select_want: want, ..params };
         vec![
             kernel("tile_select_intersect", params, per_tile, Some(phase)),
+            choose(params, Some(phase)),
             list(params, phase),
-            kernel("intersect_from_root", params, per_ray, Some(phase)),
+            dispatch(from_root, params, Workgroups::Rooted, Some(phase)),
         ]
     };
     let select_single = |mask, want, phase| {
         let params = Params { select_mask: mask, select_want: want, run_count: 1, ..params };
-        vec![kernel("tile_select_intersect", params, per_tile, Some(phase))]
+        vec![kernel("tile_select_intersect", params, per_tile, Some(phase)), choose(params, Some(phase))]
     };
     let query = |params: Params, phase| {
         vec![
             kernel("tile_select", params, per_tile, phase),
-            kernel("query", params, per_ray, phase),
+            choose(params, phase),
+            dispatch("query", params, Workgroups::Chosen, phase),
             kernel("query_reduce", params, per_tile, phase),
-            kernel("query_from_root", params, per_ray, phase),
+            dispatch("query_from_root", params, Workgroups::Rooted, phase),
         ]
     };
     let bounds = |phase| kernel("tile_bounds", params, across(params.tiles), phase);
@@ -134,7 +161,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         Step::Lists | Step::ShortLists => {
             // A ray that walks by itself cannot tell how many of its tile see a leaf.
             let is_short = step == Step::ShortLists && params.threshold == 0;
-            let params = Params { list_most: if is_short { LIST_MOST } else { u32::MAX }, ..params };
+            let params = Params { list_most: if is_short { list_most(pass) } else { u32::MAX }, ..params };
             vec![
                 bounds(Some(1)),
                 kernel("tile_walk_count", params, per_tile, Some(1)),
@@ -142,8 +169,11 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
                 kernel("tile_walk_write", params, per_tile, Some(1)),
             ]
         }
-        Step::IntersectResident => intersect(not_done, resident, 0),
-        Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, 2),
+        Step::IntersectResident => {
+            let from_root = if everything { "intersect_from_root_all" } else { "intersect_from_root" };
+            intersect(not_done, resident, from_root, 0)
+        }
+        Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, "intersect_from_root", 2),
         Step::SelectResident => select_single(not_done, resident, 0),
         Step::SelectBatch => select_single(layout::STATE_BATCH, layout::STATE_BATCH, 2),
         Step::IntersectOne { leaf, is_batch } => {
@@ -151,21 +181,21 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         }
         Step::SortByNumber => vec![kernel("tile_sort_number", params, per_tile, Some(1))],
         Step::SortNodesNear => vec![kernel("tile_sort_near", params, per_tile, Some(1))],
-        Step::IntersectAll => vec![kernel("intersect_all", params, per_ray, Some(0))],
-        Step::IntersectBinary => vec![kernel(binary::KERNEL, params, per_ray, Some(0))],
+        Step::IntersectAll => vec![kernel("intersect_all", params, by_tile, Some(0))],
+        Step::IntersectBinary => vec![kernel(binary::KERNEL, params, by_tile, Some(0))],
         Step::IntersectAllResident => {
             let params = Params { select_mask: not_done, select_want: resident, ..params };
-            vec![kernel("intersect_selected", params, per_ray, Some(0))]
+            vec![kernel(if everything { "intersect_all" } else { "intersect_selected" }, params, by_tile, Some(0))]
         }
         Step::IntersectAllBatch => {
             let (mask, flags) = (layout::STATE_BATCH, params.flags | layout::PARAM_PENDING);
             let params = Params { select_mask: mask, select_want: mask, flags, ..params };
-            vec![kernel("intersect_selected", params, per_ray, Some(2))]
+            vec![kernel("intersect_selected", params, by_tile, Some(2))]
         }
         Step::QueryAll | Step::QueryAllUndone => {
             let mask = if step == Step::QueryAll { not_done } else { layout::STATE_DONE };
             let params = Params { select_mask: mask, select_want: 0, ..params };
-            vec![kernel("query_all", params, per_ray, Some(1))]
+            vec![kernel("query_all", params, by_tile, Some(1))]
         }
         Step::QueryMissing => query(Params { select_mask: not_done, select_want: 0, ..params }, Some(1)),
         Step::QueryUndone => query(Params { select_mask: layout::STATE_DONE, select_want: 0, ..params }, Some(1)),

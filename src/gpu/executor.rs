@@ -2,7 +2,7 @@
 
 use super::binary::{self, BinaryTrees};
 use super::device::Gpu;
-use super::dispatch::{Dispatch, dispatches};
+use super::dispatch::{Dispatch, Workgroups, dispatches};
 
 pub use super::dispatch::Directions;
 use super::groups::{Buffers, Groups};
@@ -22,6 +22,8 @@ use std::sync::Arc;
 
 /// Most dispatches of one submission.
 const MOST_DISPATCHES: usize = 32;
+/// Bytes of the numbers of workgroups in x, y and z.
+const INDIRECT_BYTES: u64 = 12;
 /// Entries per tile that the lists start with.
 const LIST_ENTRIES_PER_TILE: u32 = 64;
 
@@ -121,7 +123,13 @@ impl GpuExecutor {
             pixels: PixelBuffers::new(&gpu, extent.rays(), 0),
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),
             demand: storage(&gpu, "demand", bricks, size_of::<layout::Demand>()),
-            counters: storage(&gpu, "counters", layout::COUNTERS, 4),
+            counters: storage(&gpu, "counters", layout::COUNTERS_AND_WORK, 4),
+            indirect: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("indirect"),
+                size: INDIRECT_BYTES,
+                usage: wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
             params: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("params"),
                 size: (MOST_DISPATCHES as u64) * params_stride(&gpu),
@@ -129,7 +137,8 @@ impl GpuExecutor {
                 mapped_at_creation: false,
             }),
         };
-        let readback = Readback::new(&gpu, (bricks * size_of::<layout::Demand>() + layout::COUNTERS * 4) as u64);
+        let readback =
+            Readback::new(&gpu, (bricks * size_of::<layout::Demand>() + layout::COUNTERS_AND_WORK * 4) as u64);
         let timing = Timing::new(&gpu, MOST_DISPATCHES as u32);
         let groups = Groups::new(&gpu, &kernels, &buffers);
         let (view, directions, threshold) = (Params::default(), Directions::default(), setup.threshold);
@@ -310,8 +319,9 @@ impl GpuExecutor {
     fn submit(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         self.write_slots(bricks);
         let params = self.params();
-        let dispatches: Vec<Dispatch> =
-            steps.iter().flat_map(|&step| dispatches(pass, step, &params, &self.directions, self.leaf_cache)).collect();
+        let everything = bricks.all_geometry_resident();
+        let of_step = |&step| dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything);
+        let dispatches: Vec<Dispatch> = steps.iter().flat_map(of_step).collect();
         let stride = params_stride(&self.gpu);
         let mut params = vec![0u8; stride as usize * dispatches.len()];
         for (i, dispatch) in dispatches.iter().enumerate() {
@@ -320,10 +330,19 @@ impl GpuExecutor {
         }
         self.gpu.queue.write_buffer(&self.buffers.params, 0, &params);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        encoder.clear_buffer(&self.buffers.counters, 0, None);
+        encoder.clear_buffer(&self.buffers.counters, 0, Some(layout::COUNTERS as u64 * 4));
         let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX }; bricks.len()];
         self.gpu.queue.write_buffer(&self.buffers.demand, 0, bytemuck::cast_slice(&unasked));
         for (i, dispatch) in dispatches.iter().enumerate() {
+            let work = match dispatch.groups {
+                Workgroups::Fixed(_) => None,
+                Workgroups::Chosen => Some(layout::WORK_CHOSEN),
+                Workgroups::Rooted => Some(layout::WORK_ROOTED),
+            };
+            if let Some(work) = work {
+                let (from, to) = (&self.buffers.counters, &self.buffers.indirect);
+                encoder.copy_buffer_to_buffer(from, u64::from(work) * 4, to, 0, INDIRECT_BYTES);
+            }
             let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some(dispatch.kernel),
                 timestamp_writes: self.timing.writes(i as u32),
@@ -336,14 +355,18 @@ impl GpuExecutor {
             let shading = &self.groups.shading[pass.set().saturating_sub(1)];
             let third = if dispatch.shading { shading } else { &self.groups.tiles };
             compute.set_bind_group(3, binary.map_or(third, |b| &b.group), &[]);
-            let [x, y] = dispatch.groups;
-            compute.dispatch_workgroups(x, y, 1);
+            match dispatch.groups {
+                Workgroups::Fixed([x, y]) => compute.dispatch_workgroups(x, y, 1),
+                Workgroups::Chosen | Workgroups::Rooted => {
+                    compute.dispatch_workgroups_indirect(&self.buffers.indirect, 0);
+                }
+            }
         }
         self.timing.resolve(&mut encoder, dispatches.len() as u32);
         self.readback.copy(&mut encoder, &[&self.buffers.counters, &self.buffers.demand]);
         self.gpu.queue.submit([encoder.finish()]);
         let bytes = self.readback.wait(&self.gpu)?;
-        let (counters, demand) = bytes.split_at(layout::COUNTERS * 4);
+        let (counters, demand) = bytes.split_at(layout::COUNTERS_AND_WORK * 4);
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
         let demand: Vec<layout::Demand> = bytemuck::pod_collect_to_vec(&demand[..bricks.len() * 8]);
         let mut report = read_report(&counters, &demand)?;
@@ -398,6 +421,8 @@ impl Executor for GpuExecutor {
         self.gpu.queue.write_buffer(&self.buffers.tiles.lists, 0, bytemuck::cast_slice(&records));
         self.gpu.queue.write_buffer(&self.buffers.tiles.list, 0, bytemuck::cast_slice(&entries));
         self.gpu.queue.write_buffer(&self.buffers.tiles.pair_demand, 0, bytemuck::cast_slice(&unasked));
+        // All tiles have lists.
+        self.gpu.queue.write_buffer(&self.buffers.counters, u64::from(layout::WORK_ROOTED) * 4, &[0; 16]);
         Ok(())
     }
 

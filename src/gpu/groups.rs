@@ -24,8 +24,10 @@ pub struct Buffers {
     pub tiles: TileBuffers,
     /// [`super::layout::Demand`] of every brick.
     pub demand: wgpu::Buffer,
-    /// Counters.
+    /// Counters, and the work of indirect dispatches.
     pub counters: wgpu::Buffer,
+    /// What an indirect dispatch takes, copied from behind the counters.
+    pub indirect: wgpu::Buffer,
     /// [`Params`] of every dispatch of a submission.
     pub params: wgpu::Buffer,
 }
@@ -52,7 +54,7 @@ impl Groups {
         let group = |label, layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries })
         };
-        let Buffers { scene, cache, texels, sets, pixels, tiles, demand, counters, params } = buffers;
+        let Buffers { scene, cache, texels, sets, pixels, tiles, demand, counters, params, .. } = buffers;
         let params = wgpu::BindGroupEntry {
             binding: 0,
             resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {

@@ -81,6 +81,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("tile_scan", "tile_scan", Groups::Tiles, &[]),
     ("tile_select", "tile_select", Groups::Tiles, &[("INTERSECT", 0.0)]),
     ("tile_select", "tile_select_intersect", Groups::Tiles, &[("INTERSECT", 1.0)]),
+    ("tile_choose", "tile_choose", Groups::Tiles, &[]),
     ("tile_sort", "tile_sort_number", Groups::Tiles, &[("NEAR", 0.0)]),
     ("tile_sort", "tile_sort_near", Groups::Tiles, &[("NEAR", 1.0)]),
     ("query", "query", Groups::Tiles, &[]),
@@ -91,6 +92,12 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0)]),
     ("intersect_all", "intersect_from_root", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0), ("OF_TILES", 1.0)]),
+    (
+        "intersect_all",
+        "intersect_from_root_all",
+        Groups::CacheTiles,
+        &[("COUNT", 0.0), ("SELECT", 0.0), ("OF_TILES", 1.0)],
+    ),
     ("query_all", "query_all", Groups::Tiles, &[]),
     ("query_all", "query_from_root", Groups::Tiles, &[("OF_TILES", 1.0)]),
 ];
@@ -102,6 +109,12 @@ const COUNTING: &[Specialisation] = &[
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0)]),
     ("intersect_all", "intersect_from_root", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0), ("OF_TILES", 1.0)]),
+    (
+        "intersect_all",
+        "intersect_from_root_all",
+        Groups::CacheTiles,
+        &[("COUNT", 1.0), ("SELECT", 0.0), ("OF_TILES", 1.0)],
+    ),
 ];
 
 impl Kernels {

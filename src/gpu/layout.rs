@@ -37,9 +37,14 @@ pub const COUNTER_TILE_BATCH_LEAVES: u32 = 15;
 pub const COUNTER_LEAF_GROUPS: u32 = 16;
 pub const COUNTER_TIGHTENED: u32 = 17;
 pub const COUNTER_TILES_FROM_ROOT: u32 = 18;
+pub const COUNTER_TILES_CHOSEN: u32 = 19;
+pub const WORK_CHOSEN: u32 = 24;
+pub const WORK_ROOTED: u32 = 28;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Number of counters.
 pub const COUNTERS: usize = 24;
+/// Counters and, behind them, what indirect dispatches take: from [`WORK_CHOSEN`] and [`WORK_ROOTED`] on, four words each.
+pub const COUNTERS_AND_WORK: usize = 32;
 /// What an unbounded ray has for t_max on the device: the greatest f32 but one.
 pub const T_INFINITE: f32 = 3.402_823_4e38;
 
@@ -72,7 +77,7 @@ mirror! {
         origin_min: [f32; 3], t_min: f32, origin_max: [f32; 3], t_max: f32,
         direction_min: [f32; 3], rays: u32, direction_max: [f32; 3], padding: u32,
     }
-    struct TileList { first: u32, count: u32, selected: u32, from_root: u32 }
+    struct TileList { first: u32, count: u32, selected: u32, from_root: u32, chosen: u32, rooted: u32 }
     struct Entry { leaf: u32, near: f32 }
     struct TopNode2 { min: [f32; 3], left: u32, max: [f32; 3], right: u32 }
     struct BinaryNode { min: [f32; 3], what: u32, max: [f32; 3], padding: u32 }
