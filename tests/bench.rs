@@ -52,19 +52,19 @@ fn files_agree_and_a_bounded_run_is_gone_on_with() {
     assert_eq!(cases(&output), []);
     assert_eq!(json(&output)["walks"], 0);
     succeed(words(&output, "--repeat 1 --stages targets --only pipes"));
-    assert!(cases(&output).len() == 3 && cases(&output).iter().all(|(name, _)| name.contains("pipes")));
+    assert!(cases(&output).len() == 6 && cases(&output).iter().all(|(name, _)| name.contains("pipes")));
     succeed(words(&output, "--repeat 1 --stages targets"));
     let before = cases(&output);
-    assert_eq!(before.len(), 6, "two scenes, with all optimisations and without each of two");
+    assert_eq!(before.len(), 12, "two scenes, three effects, camera rays also without each of two optimisations and both");
     // A process that was killed in the middle of a line.
     let file = output.join("cells.jsonl");
     let whole = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, format!("{whole}{{\"case\": \"tab")).unwrap();
     let printed = succeed(words(&output, &format!("{options} --resume")));
     let after = cases(&output);
-    assert_eq!(after[..6], before[..], "what was measured is kept");
+    assert_eq!(after[..12], before[..], "what was measured is kept");
     let distinct: BTreeSet<_> = after.iter().collect();
-    assert_eq!((after.len(), distinct.len()), (30, 30), "two scenes, two paths, six schedules");
+    assert_eq!((after.len(), distinct.len()), (36, 36), "two scenes, two paths, six schedules");
     succeed(words(&output, options));
     assert_eq!(cases(&output), after, "nothing is measured twice");
     assert!(printed.contains("rule not met"), "{printed}");
@@ -123,7 +123,7 @@ fn agree(output: &Path) {
         }
     }
     let targets = table(&json, "targets");
-    let cold = number(&entry(targets, &["city", "chc"], "cold: moved ÷ needed"));
+    let cold = number(&entry(targets, &["city", "primary", "chc"], "cold: moved ÷ needed"));
     assert!((0.99..10.0).contains(&cold), "{cold} times what was needed");
 }
 

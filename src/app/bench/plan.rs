@@ -175,8 +175,8 @@ pub const AUTO: Variant = Variant::of("auto");
 pub const IN_CORE: [Variant; 6] = [PLAIN, PLAIN_BVH2, CHC, FRONTS, DEMAND, AUTO];
 /// What is compared out of core.
 pub const OUT_OF_CORE: [Variant; 4] = [CHC, FRONTS, DEMAND, AUTO];
-/// Optimisations of loading that are left out in turn.
-pub const WITHOUT: [&str; 2] = ["requery", "nearest-first"];
+/// Optimisations of loading that are left out, each and both.
+pub const WITHOUT: [&str; 3] = ["requery", "nearest-first", "requery,nearest-first"];
 
 impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -351,9 +351,11 @@ fn of_stage(stage: Stage, scope: &Scope) -> Vec<Group> {
             let variants = WITHOUT.map(|without| Variant { without, ..needed });
             let variants = [&[needed][..], &variants].concat();
             for scene in [SceneId::City, SceneId::Pipes] {
-                let group = group(scene, TARGET_CACHE, View::Near, PRIMARY, &variants);
-                // Counts are the same in every walk.
-                groups.push(Group { repetitions: 1, ..group });
+                // Apart: rays of one effect would load what those of another need. Counts are the same in every walk.
+                groups.extend(APART.map(|effects| {
+                    let variants = if effects == PRIMARY { &variants[..] } else { &variants[..1] };
+                    Group { repetitions: 1, ..group(scene, TARGET_CACHE, View::Near, effects, variants) }
+                }));
             }
         }
         Stage::Scale => groups.push(group(SceneId::CityLarge, 100, View::Near, ALL_EFFECTS, &[PLAIN, CHC, FRONTS])),

@@ -235,7 +235,7 @@ fn targets(cases: &[Case], measured: &Measured) -> Table {
             "BVH and triangles moved ÷ needed, near, cache {TARGET_CACHE} %: of the first frame, which begins with an empty cache, \
              and of the others, of what was not resident. 1 is the least."
         ),
-        &["scene", "schedule", "cold: MB moved", "cold: moved ÷ needed", "steady: MB moved", "steady: moved ÷ missing"],
+        &["scene", "rays", "schedule", "cold: MB moved", "cold: moved ÷ needed", "steady: MB moved", "steady: moved ÷ missing"],
     );
     for (case, effect) in rows(cases, Stage::Targets, measured) {
         let sums = |field| measured.first_and_rest(case, effect, field).unwrap_or_default();
@@ -244,6 +244,7 @@ fn targets(cases: &[Case], measured: &Measured) -> Table {
         let over = |moved: f64, needed: f64| Value::ratio((needed > 0.0).then(|| moved / needed));
         table.rows.push(vec![
             case.scene.name().into(),
+            effect.name().into(),
             case.variant.to_string().into(),
             Value::Number(cold * MEGA),
             over(cold, missing.0),
