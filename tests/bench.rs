@@ -55,7 +55,11 @@ fn files_agree_and_a_bounded_run_is_gone_on_with() {
     assert!(cases(&output).len() == 6 && cases(&output).iter().all(|(name, _)| name.contains("pipes")));
     succeed(words(&output, "--repeat 1 --stages targets"));
     let before = cases(&output);
-    assert_eq!(before.len(), 12, "two scenes, three effects, camera rays also without each of two optimisations and both");
+    assert_eq!(
+        before.len(),
+        12,
+        "two scenes, three effects, camera rays also without each of two optimisations and both"
+    );
     // A process that was killed in the middle of a line.
     let file = output.join("cells.jsonl");
     let whole = std::fs::read_to_string(&file).unwrap();

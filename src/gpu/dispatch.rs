@@ -161,7 +161,8 @@ pub fn dispatches(
         Step::Lists | Step::ShortLists => {
             // A ray that walks by itself cannot tell how many of its tile see a leaf.
             let is_short = step == Step::ShortLists && params.threshold == 0;
-            let params = Params { list_most: if is_short { list_most(pass) } else { u32::MAX }, ..params };
+            let most = if is_short { params.list_most.min(list_most(pass)) } else { u32::MAX };
+            let params = Params { list_most: most, ..params };
             vec![
                 bounds(Some(1)),
                 kernel("tile_walk_count", params, per_tile, Some(1)),

@@ -56,6 +56,7 @@ pub struct GpuExecutor {
     pair_count: u32,
     pair_nodes: u32,
     leaf_cache: bool,
+    list_most: u32,
 }
 
 /// How an executor is set up.
@@ -159,6 +160,7 @@ impl GpuExecutor {
             pair_count: 0,
             pair_nodes: 0,
             leaf_cache: false,
+            list_most: u32::MAX,
         })
     }
 
@@ -174,6 +176,11 @@ impl GpuExecutor {
     /// Whether lists are intersected by the kernel that postpones groups of triangles.
     pub fn set_leaf_cache(&mut self, on: bool) {
         self.leaf_cache = on;
+    }
+
+    /// Bounds the lists of [`Step::ShortLists`] to so many leaves, for every pass; with 0 all rays walk from the root.
+    pub fn set_list_most(&mut self, leaves: u32) {
+        self.list_most = leaves;
     }
 
     /// Changes [`Setup::threshold`].
@@ -286,6 +293,7 @@ impl GpuExecutor {
             tiles: extent.tiles(),
             list_capacity: self.buffers.tiles.capacity,
             threshold: self.threshold,
+            list_most: self.list_most,
             pair_count: self.pair_count,
             top_count: self.scene.resident().top2.len() as u32,
             instance_pad: self.buffers.scene.instance_pad,

@@ -235,7 +235,15 @@ fn targets(cases: &[Case], measured: &Measured) -> Table {
             "BVH and triangles moved ÷ needed, near, cache {TARGET_CACHE} %: of the first frame, which begins with an empty cache, \
              and of the others, of what was not resident. 1 is the least."
         ),
-        &["scene", "rays", "schedule", "cold: MB moved", "cold: moved ÷ needed", "steady: MB moved", "steady: moved ÷ missing"],
+        &[
+            "scene",
+            "rays",
+            "schedule",
+            "cold: MB moved",
+            "cold: moved ÷ needed",
+            "steady: MB moved",
+            "steady: moved ÷ missing",
+        ],
     );
     for (case, effect) in rows(cases, Stage::Targets, measured) {
         let sums = |field| measured.first_and_rest(case, effect, field).unwrap_or_default();

@@ -53,7 +53,7 @@ fn sound_pipelines_agree() {
         let checks = compare_pipelines(&executor);
         println!("{pages} pages: {:?}", start.elapsed());
         assert_eq!(failures(&checks), Vec::<String>::new());
-        assert!(checks.len() == 8 && checks.iter().all(|check| check.cases > 500), "{checks:?}");
+        assert!(checks.len() == 23 && checks.iter().all(|check| check.cases > 500), "{checks:?}");
     }
 }
 
@@ -95,6 +95,16 @@ fn a_pipeline_that_differs_is_named() {
             "barrier3(barrier3(high + (*r).offset_high) + barrier3(low + (*r).offset_low))",
             "barrier3(high + (*r).offset_high)",
             vec![format!("{list}{closest}brute force"), format!("{list}{any}brute force")],
+        ),
+        // The first rays of tiles without lists.
+        (
+            all,
+            "work = work_of(WORK_ROOTED, number);",
+            "work = work_of(WORK_ROOTED, number + 1u);",
+            ["intersect_from_root", "intersect_from_root_all"]
+                .iter()
+                .flat_map(|name| [format!("{name}{closest}brute force"), format!("{name}{any}{all}")])
+                .collect(),
         ),
         // The same hits, but rays that start elsewhere: brute force does not tell.
         (

@@ -12,8 +12,8 @@ use crate::gpu::layout::{Hit, NONE, Params, Ray, Surface};
 use crate::gpu::rays::Extent;
 use crate::gpu::scene::Frame;
 use crate::schedule::cache::{BrickBytes, Cache};
-use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, Tracing, chc, plain};
-use crate::stream::{HostCache, PayloadSource, Policy, Residency, Workers};
+use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Step, Tracing, chc, demand, plain};
+use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use glam::DVec3;
 use std::sync::Arc;
@@ -40,27 +40,76 @@ fn compare(executor: &GpuExecutor) -> Result<Vec<Check>, Box<dyn std::error::Err
     let frame = Frame::near(scene.resident(), DVec3::ZERO);
     let twin = Twin::new(&scene, &frame)?;
     let rays = rays(&twin, frame.unit);
-    let [list, all, any_list, any_all] = trace(executor, scene, frame, &rays)?;
+    let [closest, any] = trace(executor, scene, frame, &rays)?;
     let met: Vec<Vec<Hit>> = rays.iter().map(|ray| twin.hits(ray)).collect();
-    Ok(vec![
-        closest_against_twin(&all, &rays, &met),
-        closest_against_twin(&list, &rays, &met),
-        any_against_twin(&any_all, &rays, &met),
-        any_against_twin(&any_list, &rays, &met),
-        alike(&list, &all, &rays),
-        occluded_alike(&any_list, &any_all, &rays),
-        occluded_alike(&any_all, &all, &rays),
-        occluded_alike(&any_list, &list, &rays),
-    ])
+    let mut checks: Vec<Check> = closest.iter().map(|one| closest_against_twin(one, &rays, &met)).collect();
+    checks.extend(any.iter().map(|one| any_against_twin(one, &rays, &met)));
+    // The first of them are `intersect_all`'s.
+    checks.extend(closest[1..].iter().map(|one| alike(one, &closest[0], &rays)));
+    checks.extend(any[1..].iter().map(|one| occluded_alike(one, &any[0], &rays)));
+    checks.extend(any.iter().zip(&closest).map(|(any, closest)| occluded_alike(any, closest, &rays)));
+    Ok(checks)
 }
 
-/// Traces `rays` through `scene` by `intersect_list` and `intersect_all`, for closest hits, then for any.
+/// How a pipeline is made to trace.
+struct Way {
+    closest: &'static str,
+    any: &'static str,
+    schedule: Schedule,
+    /// Leaves of the longest list.
+    list_most: u32,
+    /// Whether nothing is resident at first, so that rays go by batches.
+    is_cold: bool,
+}
+
+type Schedule = fn(&mut dyn Executor, &mut Cache, Pass, &[Step], &Tracing, &mut PassStats) -> Result<(), ExecutorError>;
+
+/// Every pipeline that intersects. The first makes everything resident for the second.
+const WAYS: [Way; 5] = [
+    Way {
+        closest: "intersect_all (closest hit)",
+        any: "intersect_all (any hit)",
+        schedule: plain::trace,
+        list_most: 0,
+        is_cold: false,
+    },
+    Way {
+        closest: "intersect_from_root_all (closest hit)",
+        any: "intersect_from_root_all (any hit)",
+        schedule: chc::trace,
+        list_most: 0,
+        is_cold: false,
+    },
+    Way {
+        closest: "intersect_list (closest hit)",
+        any: "intersect_list (any hit)",
+        schedule: chc::trace,
+        list_most: u32::MAX,
+        is_cold: true,
+    },
+    Way {
+        closest: "intersect_from_root (closest hit)",
+        any: "intersect_from_root (any hit)",
+        schedule: chc::trace,
+        list_most: 0,
+        is_cold: true,
+    },
+    Way {
+        closest: "intersect_selected (closest hit)",
+        any: "intersect_selected (any hit)",
+        schedule: demand::trace,
+        list_most: 0,
+        is_cold: true,
+    },
+];
+
+/// Traces `rays` through `scene` in every way, for closest hits and for any.
 fn trace(
     executor: &GpuExecutor,
     scene: Arc<SceneFile>,
     frame: Frame,
     rays: &[Ray],
-) -> Result<[Traced; 4], Box<dyn std::error::Error>> {
+) -> Result<[Vec<Traced>; 2], Box<dyn std::error::Error>> {
     let sizes = scene.sizes();
     let largest = sizes.iter().map(|s| s.0.max(s.1)).max().unwrap_or(0).max(16);
     // Pages as small as their number allows, so that bricks lie in as many of them as the pipelines know.
@@ -68,29 +117,35 @@ fn trace(
     let most = executor.kernels().pages.cache as u64;
     let page_bytes = (1..).map(|k| k * largest).find(|&bytes| pages(bytes) <= most).unwrap_or(largest);
     let budget = Residency::budget_for_all(&sizes, page_bytes);
-    let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin)?;
-    let page_sizes: Vec<u64> = residency.page_sizes().collect();
     let weigh = |&(geometry, attributes): &(u64, u64)| BrickBytes { bvh: 0, geometry, attributes };
-    let mut cache = Cache::new(residency, sizes.iter().map(weigh).collect(), None);
+    let empty = || -> Result<Cache, ResidencyError> {
+        let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin)?;
+        Ok(Cache::new(residency, sizes.iter().map(weigh).collect(), None))
+    };
+    let mut cache = empty()?;
+    let page_sizes: Vec<u64> = cache.residency.page_sizes().collect();
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1, 0)?;
     let setup = Setup { extent: EXTENT, threshold: 0, count: false };
     let (gpu, kernels) = (executor.gpu().clone(), executor.kernels().clone());
     let mut executor = GpuExecutor::with_kernels(gpu, kernels, scene, workers, &page_sizes, setup)?;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
-    let mut run = |name, pass, list: bool| -> Result<Traced, ExecutorError> {
-        executor.set_rays(pass, rays);
-        cache.begin_pass("probe", 0);
-        let schedule = if list { chc::trace } else { plain::trace };
-        schedule(&mut executor, &mut cache, pass, &[Step::StartHits], &Tracing::default(), &mut PassStats::default())?;
-        Ok(Traced { name, hits: executor.read_hits(pass)?, surfaces: executor.read_surfaces(pass)? })
-    };
-    // The first finds nothing resident and goes by batches, the others find everything.
-    Ok([
-        run("intersect_list (closest hit)", Pass::Primary, true)?,
-        run("intersect_all (closest hit)", Pass::Primary, false)?,
-        run("intersect_list (any hit)", Pass::Shadow(Lamp::Sun), true)?,
-        run("intersect_all (any hit)", Pass::Shadow(Lamp::Sun), false)?,
-    ])
+    let mut found = [Vec::new(), Vec::new()];
+    for (pass, found) in [Pass::Primary, Pass::Shadow(Lamp::Sun)].into_iter().zip(&mut found) {
+        for way in WAYS {
+            if way.is_cold {
+                cache = empty()?;
+            }
+            executor.set_list_most(way.list_most);
+            executor.set_rays(pass, rays);
+            cache.begin_pass("probe", 0);
+            let tracing = Tracing::default();
+            (way.schedule)(&mut executor, &mut cache, pass, &[Step::StartHits], &tracing, &mut PassStats::default())?;
+            let name = if pass == Pass::Primary { way.closest } else { way.any };
+            let (hits, surfaces) = (executor.read_hits(pass)?, executor.read_surfaces(pass)?);
+            found.push(Traced { name, hits, surfaces });
+        }
+    }
+    Ok(found)
 }
 
 const TWIN: &str = "brute force";
