@@ -1,5 +1,6 @@
 // Ray-by-ray queries of the whole top level: each ray asks for the bricks in the wanted state of whose root it enters a child box at
-// or before its present hit, and notes whether it asked for any. With OF_TILES only the rays of the tiles that have no list ask.
+// or before its present hit, and notes whether it asked for any. With OF_TILES only the rays of the tiles that have no list ask; with
+// a threshold they count in their tile's table, and query_reduce decides.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -28,6 +29,21 @@ fn entered(ray: FramedRay, n0: vec4<u32>, n1: vec4<u32>, n2: vec4<u32>, n3: vec4
         }
     }
     return e;
+}
+
+// Position of a leaf in the tile's table; NONE where no ray counts. A leaf that the tile's walk has missed counts for itself.
+fn position_of(tile: u32, leaf: u32) -> u32 {
+    if !OF_TILES || params.threshold == 0u {
+        return NONE;
+    }
+    let entry = tile_lists[tile];
+    var place = table_place(leaf, entry.count);
+    var listed = list[entry.first + place].leaf;
+    while listed != leaf && listed != NONE {
+        place = (place + 1u) & (entry.count - 1u);
+        listed = list[entry.first + place].leaf;
+    }
+    return select(entry.first + place, NONE, listed == NONE);
 }
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
@@ -88,14 +104,23 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             let e = entered(r.ray, roots[root], roots[root + 1u], roots[root + 2u], roots[root + 3u], roots[root + 4u],
                             r.offset_high, r.offset_low, 0.0, hit.t);
             if e.mask != 0u {
-                atomicAdd(&demand[brick].rays, 1u);
-                atomicMin(&demand[brick].nearest, bitcast<u32>(max(e.near, 0.0)));
+                let nearest = bitcast<u32>(max(e.near, 0.0));
+                let position = position_of(work.tile, leaf);
+                if position != NONE {
+                    atomicAdd(&pair_demand[position].rays, 1u);
+                    atomicMin(&pair_demand[position].nearest, nearest);
+                } else {
+                    atomicAdd(&demand[brick].rays, 1u);
+                    atomicMin(&demand[brick].nearest, nearest);
+                }
                 asks += 1u;
             }
         }
     }
     if asks > 0u {
         surfaces[index].pending = 1u;
-        atomicAdd(&counters[COUNTER_PAIRS_VISIBLE], asks);
+        if !OF_TILES || params.threshold == 0u {
+            atomicAdd(&counters[COUNTER_PAIRS_VISIBLE], asks);
+        }
     }
 }

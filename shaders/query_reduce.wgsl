@@ -1,4 +1,4 @@
-// Sums the selected pairs' queries into the demand of their bricks, and clears them for the next query.
+// Sums the queries of the selected pairs, and those in tables, into the demand of their bricks, and clears them for the next query.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -11,20 +11,32 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let entry = tile_lists[tile];
+    let is_table = entry.from_root != 0u;
+    let pairs_asked = select(entry.selected, entry.count, is_table);
+    var asked = 0u;
     var visible = 0u;
-    for (var i = entry.first; i < entry.first + entry.selected; i++) {
-        let position = selection[i];
+    for (var i = entry.first; i < entry.first + pairs_asked; i++) {
+        var position = i;
+        if !is_table {
+            position = selection[i];
+        }
+        let leaf = list[position].leaf;
+        if leaf == NONE {
+            continue;
+        }
         let count = atomicExchange(&pair_demand[position].rays, 0u);
         let nearest = atomicExchange(&pair_demand[position].nearest, 0xffffffffu);
+        // Of a table only what rays have asked for counts as a query.
+        asked += u32(!is_table || count > 0u);
         if count > params.threshold {
-            let brick = leaves[list[position].leaf].brick;
+            let brick = leaves[leaf].brick;
             atomicAdd(&demand[brick].rays, count);
             atomicMin(&demand[brick].nearest, nearest);
             visible += 1u;
         }
     }
-    if entry.selected > 0u {
+    if asked > 0u {
         atomicAdd(&counters[COUNTER_PAIRS_VISIBLE], visible);
-        atomicAdd(&counters[COUNTER_PAIRS_INVISIBLE], entry.selected - visible);
+        atomicAdd(&counters[COUNTER_PAIRS_INVISIBLE], asked - visible);
     }
 }

@@ -1,6 +1,6 @@
-// Places the tiles' lists one after the other. Lists of more than list_most leaves are dropped: the rays of those tiles walk the
-// whole top level, each by itself. If they do not fit, all are emptied and the total says how many entries
-// the lists need: the pass is then repeated with larger ones.
+// Places the tiles' lists one after the other. The rays of tiles with lists of more than list_most leaves walk the whole top level,
+// each by itself: such lists are dropped, or, where a threshold asks how many rays see a leaf, get the place of a table. If they
+// do not fit, all are emptied and the total says how many entries they need: the pass is then repeated with larger ones.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -9,7 +9,10 @@ var<workgroup> sums: array<u32, 256>;
 var<workgroup> roots_of: array<u32, 256>;
 
 fn kept(count: u32) -> u32 {
-    return select(count, 0u, count > params.list_most);
+    if count <= params.list_most {
+        return count;
+    }
+    return select(table_entries(count), 0u, params.threshold == 0u);
 }
 
 // One workgroup: each thread sums a run of tiles, then all shift by the sum of the runs before.
@@ -23,7 +26,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     for (var i = first; i < last; i++) {
         let count = tile_lists[i].count;
         sum += kept(count);
-        from_root += u32(count > kept(count));
+        from_root += u32(count > params.list_most);
     }
     sums[lane] = sum;
     roots_of[lane] = from_root;
@@ -47,9 +50,9 @@ fn main(@builtin(local_invocation_index) lane: u32) {
         tile_lists[i].first = before;
         tile_lists[i].count = select(0u, count, fits);
         tile_lists[i].selected = 0u;
-        tile_lists[i].from_root = u32(fits && all > count);
+        tile_lists[i].from_root = u32(fits && all > params.list_most);
         before += count;
-        if all > count {
+        if all > params.list_most {
             tile_lists[place].rooted = i;
             place += 1u;
         }

@@ -16,7 +16,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var selected = 0u;
     var departures = 0u;  // from the order of the leaves' numbers
     var last = 0u;
-    for (var i = entry.first; i < entry.first + entry.count; i++) {
+    let end = select(entry.first + entry.count, entry.first, entry.from_root != 0u);
+    for (var i = entry.first; i < end; i++) {
         let leaf = list[i].leaf;
         let state = slots[leaves[leaf].brick].state;
         if (state & params.select_mask) == params.select_want {

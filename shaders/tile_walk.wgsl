@@ -25,6 +25,12 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var depth = 0u;
     var node = 0u;
     var near = 0.0;
+    if WRITE && entry.from_root != 0u {
+        for (var i = 0u; i < entry.count; i++) {
+            list[entry.first + i] = Entry(NONE, 0.0);
+            pair_demand_clear(entry.first + i);
+        }
+    }
     var found = 0u;
     var tested = 0u;
     var culled = 0u;
@@ -36,7 +42,13 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             loop {
                 let n = top2[node];
                 if n.right == NONE {
-                    if WRITE {
+                    if WRITE && entry.from_root != 0u {
+                        var place = table_place(n.left, entry.count);
+                        while list[entry.first + place].leaf != NONE {
+                            place = (place + 1u) & (entry.count - 1u);
+                        }
+                        list[entry.first + place].leaf = n.left;
+                    } else if WRITE {
                         list[entry.first + found] = Entry(n.left, near);
                         pair_demand_clear(entry.first + found);
                     }

@@ -15,6 +15,16 @@ struct PairDemand {
     nearest: atomic<u32>,
 }
 
+// The list of a tile whose rays walk from the root is a table of leaves, at most half full, in which a ray finds those that it sees.
+fn table_entries(leaves: u32) -> u32 {
+    return 2u << (firstLeadingBit(leaves) + 1u);
+}
+
+// Where to look for a leaf first; then behind it, and from the start again.
+fn table_place(leaf: u32, entries: u32) -> u32 {
+    return (leaf * 0x9e3779b1u) >> (32u - firstLeadingBit(entries));
+}
+
 const MOST_WORKGROUPS: u32 = 65535u; // in one dimension
 
 // What a workgroup has to do of the work that begins at counter `work`: over chosen tiles alone.

@@ -138,8 +138,8 @@ pub fn dispatches(
             kernel("tile_select", params, per_tile, phase),
             choose(params, phase),
             dispatch("query", params, Workgroups::Chosen, phase),
-            kernel("query_reduce", params, per_tile, phase),
             dispatch("query_from_root", params, Workgroups::Rooted, phase),
+            kernel("query_reduce", params, per_tile, phase),
         ]
     };
     let bounds = |phase| kernel("tile_bounds", params, across(params.tiles), phase);
@@ -159,8 +159,7 @@ pub fn dispatches(
         Step::StartHits => vec![kernel("start_hits", params, per_ray, None)],
         Step::CountRays => vec![bounds(None)],
         Step::Lists | Step::ShortLists => {
-            // A ray that walks by itself cannot tell how many of its tile see a leaf.
-            let is_short = step == Step::ShortLists && params.threshold == 0;
+            let is_short = step == Step::ShortLists;
             let most = if is_short { params.list_most.min(list_most(pass)) } else { u32::MAX };
             let params = Params { list_most: most, ..params };
             vec![
