@@ -1,6 +1,6 @@
 // Places the tiles' lists one after the other. The rays of tiles with lists of more than list_most leaves walk the whole top level,
-// each by itself: such lists are dropped, or, where a threshold asks how many rays see a leaf, get the place of a table. If they
-// do not fit, all are emptied and the total says how many entries they need: the pass is then repeated with larger ones.
+// each by itself: such lists are dropped, or, where a threshold asks how many rays see a leaf, get the place of a table. If the
+// entries do not fit, all lists are emptied and the total says how many entries they need: the pass is then repeated with larger ones.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -15,6 +15,11 @@ fn kept(count: u32) -> u32 {
     return select(table_entries(count), 0u, params.threshold == 0u);
 }
 
+// The sum, or the greatest number: so many entries fit nowhere.
+fn plus(a: u32, b: u32) -> u32 {
+    return select(a + b, 0xffffffffu, b > 0xffffffffu - a);
+}
+
 // One workgroup: each thread sums a run of tiles, then all shift by the sum of the runs before.
 @compute @workgroup_size(256)
 fn main(@builtin(local_invocation_index) lane: u32) {
@@ -25,7 +30,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     var from_root = 0u;
     for (var i = first; i < last; i++) {
         let count = tile_lists[i].count;
-        sum += kept(count);
+        sum = plus(sum, kept(count));
         from_root += u32(count > params.list_most);
     }
     sums[lane] = sum;
@@ -40,7 +45,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
             before += sums[i];
             place += roots_of[i];
         }
-        total += sums[i];
+        total = plus(total, sums[i]);
         rooted += roots_of[i];
     }
     let fits = total <= params.list_capacity;

@@ -38,7 +38,7 @@ struct Params {
     pair_count: u32,      // pairs to be queried
     run_first: u32,       // of a tile's selected leaves, the first that intersect_list takes
     run_count: u32,       // and how many it takes at most
-    list_most: u32,       // leaves of the longest list that is kept
+    list_most: u32,       // leaves of the longest list that rays are intersected with
 }
 
 const PARAM_ANY_HIT: u32 = 1u;

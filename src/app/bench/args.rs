@@ -50,6 +50,7 @@ pub struct ChcArgs {
     pub stages: Vec<Stage>,
     /// Measure only cases whose names contain every word of TEXT; repeated: those of any TEXT. Names are such as
     /// "table2/city/100%/tile 64/near/primary,ao,diffuse/chc+fronts/threshold 0/turn 36"; cells.jsonl holds them
+    /// [default: all]
     #[arg(long, value_name = "TEXT")]
     pub only: Vec<String>,
     /// Begin no walk after so many minutes; the results hold what is measured until then [default: no limit]
