@@ -35,19 +35,11 @@ fn top_group(ray: FramedRay, node: u32, t_max: f32) -> vec2<u32> {
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let number = workgroup.x + workgroup.y * workgroups.x;
-    var work: Work;
-    if OF_TILES {
-        work = work_of(WORK_ROOTED, number);
-    } else {
-        work = work_of_all(number);
-    }
-    let x = work.ray.x + local.x;
-    let y = work.ray.y + local.y;
-    if work.tile == NONE || x >= params.width || y >= params.height {
+    let work = rooted_or_all(OF_TILES, workgroup.x + workgroup.y * workgroups.x);
+    let index = ray_of(work, local);
+    if index == NONE {
         return;
     }
-    let index = y * params.width + x;
     let ray = rays[index];
     if !(ray.t_min <= ray.t_max) || params.top_count == 0u {
         return;

@@ -62,12 +62,10 @@ fn pop(walk: ptr<function, Walk>) -> u32 {
 @compute @workgroup_size(8, 8)
 fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     let work = work_of_all(workgroup.x + workgroup.y * workgroups.x);
-    let x = work.ray.x + local.x;
-    let y = work.ray.y + local.y;
-    if work.tile == NONE || x >= params.width || y >= params.height {
+    let index = ray_of(work, local);
+    if index == NONE {
         return;
     }
-    let index = y * params.width + x;
     let ray = rays[index];
     if !(ray.t_min <= ray.t_max) || params.top_count == 0u {
         return;

@@ -17,6 +17,12 @@ fn block_of_tile(tile: u32, workgroup: u32) -> Work {
     return Work(tile, first + 8u * vec2<u32>(block % edge, block / edge));
 }
 
+// Index of the ray of thread `local`; NONE without work and beyond the picture.
+fn ray_of(work: Work, local: vec3<u32>) -> u32 {
+    let ray = work.ray + local.xy;
+    return select(ray.y * params.width + ray.x, NONE, work.tile == NONE || ray.x >= params.width || ray.y >= params.height);
+}
+
 // What a workgroup has to do of the work over all tiles.
 fn work_of_all(workgroup: u32) -> Work {
     let tile = workgroup / blocks_of_tile();

@@ -36,6 +36,14 @@ fn work_of(work: u32, workgroup: u32) -> Work {
     return block_of_tile(select(tile_lists[place].rooted, tile_lists[place].chosen, work == WORK_CHOSEN), workgroup);
 }
 
+// The same over the tiles whose rays walk from the root, or over all tiles.
+fn rooted_or_all(rooted: bool, workgroup: u32) -> Work {
+    if rooted {
+        return work_of(WORK_ROOTED, workgroup);
+    }
+    return work_of_all(workgroup);
+}
+
 // Sets the workgroups of the work that begins at counter `work`: over so many tiles.
 fn set_work(work: u32, tiles_with_work: u32) {
     let workgroups = tiles_with_work * blocks_of_tile();

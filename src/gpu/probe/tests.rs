@@ -99,8 +99,8 @@ fn a_pipeline_that_differs_is_named() {
         // The first rays of tiles without lists.
         (
             all,
-            "work = work_of(WORK_ROOTED, number);",
-            "work = work_of(WORK_ROOTED, number + 1u);",
+            "return work_of(WORK_ROOTED, workgroup);",
+            "return work_of(WORK_ROOTED, workgroup + 1u);",
             ["intersect_from_root", "intersect_from_root_all"]
                 .iter()
                 .flat_map(|name| [format!("{name}{closest}brute force"), format!("{name}{any}{all}")])
