@@ -29,6 +29,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var r: BrickRay;
+    var first = NONE;
+    var first_near = T_INFINITE;
     for (var next = entry.first; next < entry.first + entry.selected; next++) {
         let position = selection[next];
         let listed = list[position];
@@ -44,7 +46,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             continue;
         }
         enter_leaf(&r, world, leaf);
-        let at = 5u * leaves[leaf].brick;
+        let brick = leaves[leaf].brick;
+        let at = 5u * brick;
         let n1 = roots[at + 1u];
         let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, hit.t);
         var near = T_INFINITE;
@@ -59,6 +62,13 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
         if any {
             atomicAdd(&pair_demand[position].rays, 1u);
             atomicMin(&pair_demand[position].nearest, bitcast<u32>(max(near, 0.0)));
+            if first == NONE || near < first_near {
+                first = brick;
+                first_near = near;
+            }
         }
+    }
+    if first != NONE {
+        atomicAdd(&demand[first].next, 1u);
     }
 }

@@ -67,6 +67,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     stack[0] = 0u;
     var depth = 1u;
     var asks = 0u;
+    var first = NONE;
+    var first_near = T_INFINITE;
     while depth > 0u {
         depth -= 1u;
         let at = 5u * stack[depth];
@@ -106,11 +108,16 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
                     atomicMin(&demand[brick].nearest, nearest);
                 }
                 asks += 1u;
+                if first == NONE || e.near < first_near {
+                    first = brick;
+                    first_near = e.near;
+                }
             }
         }
     }
     if asks > 0u {
         surfaces[index].pending = 1u;
+        atomicAdd(&demand[first].next, 1u);
         if !OF_TILES || params.threshold == 0u {
             atomicAdd(&counters[COUNTER_PAIRS_VISIBLE], asks);
         }

@@ -16,8 +16,8 @@ use brickwalk::render::{Renderer, camera_view};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::auto::Fixed;
 use brickwalk::schedule::{
-    BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, PassStats, Report, Step, Tracing, attributes, chc,
-    demand,
+    BrickStates, Executor, ExecutorError, Load, Optimisations, PairQuery, Pass, PassStats, Report, Step, Tracing,
+    attributes, chc, demand,
 };
 use brickwalk::stats::Record;
 use brickwalk::stream::{Item, Kind, Slot};
@@ -296,4 +296,41 @@ fn records_are_what_a_spy_counts() {
         assert!(memory.lies.len() > 2, "something is resident");
     }
     assert_eq!(noticed.len(), 17, "{noticed:?}");
+}
+
+#[test]
+fn closest_hits_load_what_is_needed_and_nothing_else() {
+    let folder = common::folder();
+    let scene = common::city(folder.path(), "40K", "512");
+    let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
+    let mut in_vain = BTreeMap::new();
+    for (schedule, nearest_first) in
+        [(Fixed::Chc, true), (Fixed::Demand, true), (Fixed::Chc, false), (Fixed::Demand, false)]
+    {
+        let mut renderer = open(&scene, "--cache 100%");
+        for number in 0..3 {
+            let effects = renderer.settings.effects;
+            let camera = path.frame(4 * number, 9);
+            let resident = renderer.scene.resident();
+            let view = camera_view(resident, &camera, &renderer.light, &effects, renderer.size, 0, number);
+            renderer.executor.begin_frame(&view);
+            renderer.cache.begin_pass("primary", number);
+            let optimisations = Optimisations { nearest_first, ..Optimisations::default() };
+            let tracing = Tracing { measure_needed: true, optimisations, ..Tracing::default() };
+            let mut stats = PassStats::default();
+            let inner = &mut renderer.executor;
+            let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
+            let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
+            let cache = &mut renderer.cache;
+            trace(&mut spy, cache, Pass::Primary, &[Step::Generate], &tracing, &mut stats).expect("a pass");
+            let needed: BTreeSet<u32> = stats.bricks_needed.into_iter().flatten().collect();
+            let loaded = spy.batches.iter().flatten().map(|load| load.item.brick);
+            let vain = loaded.filter(|brick| !needed.contains(brick)).count();
+            *in_vain.entry((schedule == Fixed::Chc, nearest_first)).or_insert(0) += vain;
+            assert!(number > 0 || !spy.batches.is_empty(), "something is loaded");
+        }
+    }
+    assert_eq!((in_vain[&(true, true)], in_vain[&(false, true)]), (0, 0), "{in_vain:?}");
+    // Control: in another order some are.
+    assert!(in_vain[&(true, false)] > 0 && in_vain[&(false, false)] > 0, "{in_vain:?}");
 }

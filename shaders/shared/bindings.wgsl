@@ -12,13 +12,8 @@
 @group(1) @binding(1) var<storage, read_write> rays: array<Ray>;
 @group(1) @binding(2) var<storage, read_write> hits: array<Hit>;
 @group(1) @binding(3) var<storage, read_write> surfaces: array<Surface>;
-@group(1) @binding(4) var<storage, read_write> demand: array<BrickDemand>;      // per brick
+@group(1) @binding(4) var<storage, read_write> demand: array<Demand>;           // per brick
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>, 32>;
-
-struct BrickDemand {
-    rays: atomic<u32>,
-    nearest: atomic<u32>,
-}
 
 fn zero_bits() -> u32 {
     return params.zero;

@@ -10,11 +10,6 @@
 @group(3) @binding(6) var<storage, read_write> pair_rays: array<u32>;           // rays that see each of their nodes
 @group(3) @binding(7) var<storage, read> pair_nodes: array<u32>;                // their nodes
 
-struct PairDemand {
-    rays: atomic<u32>,
-    nearest: atomic<u32>,
-}
-
 // The list of a tile whose rays walk from the root is a table of leaves, at most half full, in which a ray finds those that it sees.
 fn table_entries(leaves: u32) -> u32 {
     return 2u << (firstLeadingBit(leaves) + 1u);

@@ -165,8 +165,14 @@ struct Pair {             // query pairs: a rectangle of rays and nodes of the b
 }
 
 struct Demand {           // what rays still ask of a brick
-    rays: u32,
-    nearest: u32,         // bits of the least entry distance, a non-negative f32
+    rays: atomic<u32>,
+    nearest: atomic<u32>, // bits of the least entry distance, a non-negative f32
+    next: atomic<u32>,    // rays that enter it before any other that they ask for
+}
+
+struct PairDemand {       // what the rays of a tile still ask of a leaf
+    rays: atomic<u32>,
+    nearest: atomic<u32>, // as above
 }
 
 struct Material {

@@ -15,7 +15,7 @@ use super::scene::{Frame, SceneBuffers};
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::schedule::{BrickStates, Demand, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, Workers};
 use bricks::SceneFile;
 use std::sync::Arc;
@@ -339,7 +339,7 @@ impl GpuExecutor {
         self.gpu.queue.write_buffer(&self.buffers.params, 0, &params);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         encoder.clear_buffer(&self.buffers.counters, 0, Some(layout::COUNTERS as u64 * 4));
-        let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX }; bricks.len()];
+        let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX, next: 0 }; bricks.len()];
         self.gpu.queue.write_buffer(&self.buffers.demand, 0, bytemuck::cast_slice(&unasked));
         for (i, dispatch) in dispatches.iter().enumerate() {
             let work = match dispatch.groups {
@@ -376,14 +376,15 @@ impl GpuExecutor {
         let bytes = self.readback.wait(&self.gpu)?;
         let (counters, demand) = bytes.split_at(layout::COUNTERS_AND_WORK * 4);
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
-        let demand: Vec<layout::Demand> = bytemuck::pod_collect_to_vec(&demand[..bricks.len() * 8]);
+        let demand: Vec<layout::Demand> =
+            bytemuck::pod_collect_to_vec(&demand[..bricks.len() * size_of::<layout::Demand>()]);
         let mut report = read_report(&counters, &demand)?;
         if steps.iter().any(|step| step.is_intersection()) {
             // Queries in the same submission ask for missing bricks, or for what is not done beside a batch, which is; of the
             // others rays have noted the use.
             let undone = steps.iter().any(|step| matches!(step, Step::QueryUndone | Step::QueryAllUndone));
             let is_used = |brick: usize| bricks.geometry(brick).is_some() && (!undone || bricks.done(brick));
-            report.used = report.demand.extract_if(.., |d| is_used(d.0 as usize)).map(|d| d.0).collect();
+            report.used = report.demand.extract_if(.., |d| is_used(d.brick as usize)).map(|d| d.brick).collect();
         }
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
             let rays: Vec<u32> = self.read(|s| &s.buffers.tiles.pair_rays)?;
@@ -400,7 +401,7 @@ impl GpuExecutor {
 
     /// Grows the lists to at least `entries`.
     fn grow_lists(&mut self, entries: u32) -> Result<(), ExecutorError> {
-        let most = (self.gpu.limits.max_storage_buffer_binding_size / size_of::<layout::Demand>() as u64) as u32;
+        let most = (self.gpu.limits.max_storage_buffer_binding_size / size_of::<layout::PairDemand>() as u64) as u32;
         if entries > most {
             let text = format!("cannot hold tile lists of {entries} entries; use a larger --tile");
             return Err(ExecutorError::Device(text));
@@ -425,7 +426,7 @@ impl Executor for GpuExecutor {
             records.push(layout::TileList { first, count: list.len() as u32, ..Default::default() });
             first += list.len() as u32;
         }
-        let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX }; entries.len()];
+        let unasked = vec![layout::PairDemand { rays: 0, nearest: u32::MAX }; entries.len()];
         self.gpu.queue.write_buffer(&self.buffers.tiles.lists, 0, bytemuck::cast_slice(&records));
         self.gpu.queue.write_buffer(&self.buffers.tiles.list, 0, bytemuck::cast_slice(&entries));
         self.gpu.queue.write_buffer(&self.buffers.tiles.pair_demand, 0, bytemuck::cast_slice(&unasked));
@@ -483,7 +484,14 @@ fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, Ex
     let wanted = demand.iter().enumerate().filter(|(_, d)| d.rays > 0);
     Ok(Report {
         round_trips: 1,
-        demand: wanted.map(|(brick, d)| (brick as u32, d.rays, f32::from_bits(d.nearest))).collect(),
+        demand: wanted
+            .map(|(brick, d)| Demand {
+                brick: brick as u32,
+                rays: d.rays,
+                nearest: f32::from_bits(d.nearest),
+                next: d.next,
+            })
+            .collect(),
         used: Vec::new(),
         list_entries: counters[layout::COUNTER_LIST_ENTRIES as usize],
         pairs_tested: count(layout::COUNTER_PAIRS_TESTED),

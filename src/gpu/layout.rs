@@ -95,7 +95,8 @@ mirror! {
         state: u32, padding0: u32, padding1: u32, padding2: u32,
     }
     struct Pair { x0: u32, y0: u32, x1: u32, y1: u32, first: u32, count: u32, padding0: u32, padding1: u32 }
-    struct Demand { rays: u32, nearest: u32 }
+    struct Demand { rays: u32, nearest: u32, next: u32 }
+    struct PairDemand { rays: u32, nearest: u32 }
     struct Material {
         base_color: [f32; 4], emission: [f32; 3], metallic: f32,
         roughness: f32, alpha_cutoff: f32, flags: u32, base_color_texture: u32, padding: [u32; 4],

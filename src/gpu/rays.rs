@@ -127,7 +127,7 @@ impl TileBuffers {
     /// List, selection and demand of `capacity` entries.
     fn entries(gpu: &Gpu, capacity: u32) -> [wgpu::Buffer; 3] {
         let of = |label, stride| storage(gpu, label, capacity as usize, stride);
-        [of("list", size_of::<layout::Entry>()), of("selection", 4), of("pair demand", size_of::<layout::Demand>())]
+        [of("list", size_of::<layout::Entry>()), of("selection", 4), of("pair demand", size_of::<layout::PairDemand>())]
     }
 }
 

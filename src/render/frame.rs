@@ -201,7 +201,7 @@ impl Renderer {
         self.trace(frame, pass, stats)?;
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
         let report = self.executor.run(pass, &[Step::QueryHits, add], &self.cache.states)?;
-        stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.0));
+        stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
         stats.add(report);
         Ok(())
     }

@@ -3,7 +3,7 @@
 
 use super::cache::{BATCH_BRICKS, Cache};
 use super::optimisations::{Optimisations, run};
-use super::{Executor, ExecutorError, Pass, PassStats, Report, Step, Tracing};
+use super::{Demand, Executor, ExecutorError, Pass, PassStats, Report, Step, Tracing};
 use crate::stream::Item;
 
 /// Traces the rays of `pass`, after the steps in `first` have made them.
@@ -65,9 +65,10 @@ impl<'a> Batches<'a> {
         Self { pass, intersect: Step::IntersectBatch, query, optimisations }
     }
 
-    /// Loads what the queries in `report` want, nearest first, a few at a time; each batch is intersected and the rest asked
-    /// for again, until nothing is wanted. Without the re-query what was wanted at first is loaded whole: hits only move
-    /// nearer, so no ray wants anything else later.
+    /// Loads what the queries in `report` want, nearest first, a few at a time and only bricks that some ray enters before any
+    /// other that it wants: what lies behind them may turn out to be hidden. Each batch is intersected and the rest asked for
+    /// again, until nothing is wanted. Without the re-query what was wanted at first is loaded whole: hits only move nearer,
+    /// so no ray wants anything else later.
     ///
     /// # Errors
     /// What the executor says.
@@ -79,10 +80,11 @@ impl<'a> Batches<'a> {
         stats: &mut PassStats,
     ) -> Result<(), ExecutorError> {
         let on = self.optimisations;
-        let mut wanted = in_order(&report.demand, on.nearest_first);
+        let (mut wanted, mut certain) = in_order(&report.demand, on.nearest_first);
         stats.add(std::mem::take(&mut report));
         while !wanted.is_empty() {
-            let count = cache.load(executor, &wanted, BATCH_BRICKS, stats)?;
+            let most = if on.requery { certain.min(BATCH_BRICKS) } else { BATCH_BRICKS };
+            let count = cache.load(executor, &wanted, most, stats)?;
             let rest = wanted.split_off(count);
             let batch: Vec<u32> = wanted.iter().map(|item| item.brick).collect();
             if let Some(lowest) = rest.iter().map(|item| item.brick).min() {
@@ -92,9 +94,9 @@ impl<'a> Batches<'a> {
             stats.bricks_intersected.extend(&batch);
             if on.requery {
                 report = run(executor, self.pass, &[self.intersect, self.query], &cache.states, on, stats)?;
-                let still = |item: &&Item| report.demand.binary_search_by_key(&item.brick, |d| d.0).is_ok();
+                let still = |item: &&Item| report.demand.binary_search_by_key(&item.brick, |d| d.brick).is_ok();
                 stats.bricks_no_longer_wanted += (rest.len() - rest.iter().filter(still).count()) as u64;
-                wanted = in_order(&report.demand, on.nearest_first);
+                (wanted, certain) = in_order(&report.demand, on.nearest_first);
             } else {
                 report = run(executor, self.pass, &[self.intersect], &cache.states, on, stats)?;
                 wanted = rest;
@@ -121,7 +123,7 @@ pub fn measure_needed(
     let mut steps = first.to_vec();
     steps.push(Step::QueryNeeded);
     let report = executor.run(pass, &steps, &cache.states)?;
-    for &(brick, ..) in &report.demand {
+    for &Demand { brick, .. } in &report.demand {
         let bytes = cache.bytes[brick as usize].geometry;
         stats.bytes_needed += bytes;
         if !resident_before[brick as usize] {
@@ -132,24 +134,49 @@ pub fn measure_needed(
     Ok(())
 }
 
-/// The wanted bricks' geometry by number; or nearest entry first, then by number.
-fn in_order(demand: &[(u32, u32, f32)], nearest_first: bool) -> Vec<Item> {
+/// The wanted bricks' geometry by number; or nearest entry first, then by number, those ahead that some ray enters next. Also
+/// how many of them, from the front, are not hidden by others: where a threshold keeps every brick back that a ray enters next,
+/// all.
+fn in_order(demand: &[Demand], nearest_first: bool) -> (Vec<Item>, usize) {
     let mut wanted = demand.to_vec();
+    let mut certain = wanted.len();
     if nearest_first {
-        wanted.sort_by(|a, b| a.2.total_cmp(&b.2).then(a.0.cmp(&b.0)));
+        let hidden = |d: &Demand| d.next == 0;
+        wanted.sort_by(|a, b| {
+            hidden(a).cmp(&hidden(b)).then(a.nearest.total_cmp(&b.nearest)).then(a.brick.cmp(&b.brick))
+        });
+        certain = wanted.iter().position(hidden).filter(|&count| count > 0).unwrap_or(certain);
     }
-    wanted.iter().map(|d| Item::geometry(d.0)).collect()
+    (wanted.iter().map(|d| Item::geometry(d.brick)).collect(), certain)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn bricks(demand: &[(u32, f32, u32)], nearest_first: bool) -> (Vec<u32>, usize) {
+        let demand: Vec<Demand> =
+            demand.iter().map(|&(brick, nearest, next)| Demand { brick, rays: 9, nearest, next }).collect();
+        let (items, certain) = in_order(&demand, nearest_first);
+        (items.iter().map(|i| i.brick).collect(), certain)
+    }
+
     #[test]
     fn demand_is_served_nearest_first_then_by_number() {
-        let demand = [(2, 1, 2.0), (4, 1, 2.0), (7, 9, 0.5)];
-        let bricks = |nearest_first| in_order(&demand, nearest_first).iter().map(|i| i.brick).collect::<Vec<_>>();
-        assert_eq!(bricks(true), [7, 2, 4]);
-        assert_eq!(bricks(false), [2, 4, 7]);
+        let demand = [(2, 2.0, 1), (4, 2.0, 1), (7, 0.5, 9)];
+        assert_eq!(bricks(&demand, true), (vec![7, 2, 4], 3));
+        assert_eq!(bricks(&demand, false), (vec![2, 4, 7], 3));
+    }
+
+    #[test]
+    fn what_no_ray_enters_next_waits() {
+        let demand = [(2, 2.0, 1), (4, 0.5, 0), (7, 0.7, 9)];
+        assert_eq!(bricks(&demand, true), (vec![7, 2, 4], 2));
+        assert_eq!(bricks(&demand, false), (vec![2, 4, 7], 3));
+    }
+
+    #[test]
+    fn where_no_brick_is_entered_next_none_waits() {
+        assert_eq!(bricks(&[(2, 2.0, 0), (4, 0.5, 0)], true), (vec![4, 2], 2));
     }
 }

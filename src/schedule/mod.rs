@@ -24,4 +24,6 @@ mod types;
 
 pub use optimisations::{Optimisation, Optimisations, PartOf};
 pub use states::BrickStates;
-pub use types::{Executor, ExecutorError, Lamp, Load, PairQuery, Pass, PassStats, Report, Shading, Step, Tracing};
+pub use types::{
+    Demand, Executor, ExecutorError, Lamp, Load, PairQuery, Pass, PassStats, Report, Shading, Step, Tracing,
+};

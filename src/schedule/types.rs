@@ -178,13 +178,27 @@ pub struct Load {
     pub slot: Slot,
 }
 
+/// What rays still ask of a brick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demand {
+    /// Its number.
+    pub brick: u32,
+    /// Rays that enter a child box of its root at or before their hit.
+    pub rays: u32,
+    /// Distance at which the first of them enters, in device units.
+    pub nearest: f32,
+    /// Rays that enter it before any other that they ask for. Where there are some, the brick is needed: no closest hit of
+    /// theirs lies before it.
+    pub next: u32,
+}
+
 /// What came back from one round trip.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Round trips it took: 2 when the lists had to grow, else 1.
     pub round_trips: u32,
-    /// Bricks still wanted: brick, rays, entry distance of the nearest; ascending by brick.
-    pub demand: Vec<(u32, u32, f32)>,
+    /// Bricks still wanted, ascending.
+    pub demand: Vec<Demand>,
     /// Resident bricks that a step of intersection entered: some ray met a child box of their root before its hit at that
     /// time. Ascending.
     pub used: Vec<u32>,
