@@ -316,7 +316,7 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
             renderer.executor.begin_frame(&view);
             renderer.cache.begin_pass("primary", number);
             let optimisations = Optimisations { nearest_first, ..Optimisations::default() };
-            let tracing = Tracing { measure_needed: true, optimisations, ..Tracing::default() };
+            let tracing = Tracing { measure_needed: true, optimisations };
             let mut stats = PassStats::default();
             let inner = &mut renderer.executor;
             let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };

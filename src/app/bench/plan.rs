@@ -269,8 +269,10 @@ pub fn paper_cache(scene: SceneId) -> u32 {
 /// Sizes of tiles of figure 5, pixels.
 pub const TILES: [u32; 5] = [16, 32, 64, 128, 256];
 
-/// Share of the bricks that the cache of the targets holds, percent.
-pub const TARGET_CACHE: u32 = 20;
+/// Share of the bricks that the cache holds where bytes moved are measured against bytes needed, percent.
+pub fn target_cache(scene: SceneId) -> u32 {
+    if scene == SceneId::CityLarge { 25 } else { 20 }
+}
 
 const PRIMARY: &[Effect] = &[Effect::Primary];
 const ALL_EFFECTS: &[Effect] = &[Effect::Primary, Effect::Ao, Effect::Diffuse];
@@ -354,9 +356,11 @@ fn of_stage(stage: Stage, scope: &Scope) -> Vec<Group> {
                 // Apart: rays of one effect would load what those of another need. Counts are the same in every walk.
                 groups.extend(APART.map(|effects| {
                     let variants = if effects == PRIMARY { &variants[..] } else { &variants[..1] };
-                    Group { repetitions: 1, ..group(scene, TARGET_CACHE, View::Near, effects, variants) }
+                    Group { repetitions: 1, ..group(scene, target_cache(scene), View::Near, effects, variants) }
                 }));
             }
+            let scene = SceneId::CityLarge;
+            groups.push(group(scene, target_cache(scene), View::Near, PRIMARY, &[needed]));
         }
         Stage::Scale => groups.push(group(SceneId::CityLarge, 100, View::Near, ALL_EFFECTS, &[PLAIN, CHC, FRONTS])),
     }
