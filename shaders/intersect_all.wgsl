@@ -46,7 +46,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     }
     let any_hit = (params.flags & PARAM_ANY_HIT) != 0u;
     let before = hits[index];
-    if SELECT && ((any_hit && before.id != NONE) || ((params.flags & PARAM_PENDING) != 0u && surfaces[index].pending == 0u)) {
+    if SELECT && ((any_hit && before.id != NONE) || surfaces[index].pending == 0u) {
         return;
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);

@@ -54,6 +54,9 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     if index == NONE {
         return;
     }
+    if surfaces[index].pending == 0u {
+        return;
+    }
     let ray = rays[index];
     let hit = hits[index];
     let occluded = (params.flags & PARAM_ANY_HIT) != 0u && hit.id != NONE;

@@ -22,5 +22,5 @@ fn zero_bits() -> u32 {
 // Starts a ray's hit: nothing found within its range; triangle `source`, from which it starts, is not met (NONE: of none).
 fn start_hit(ray: u32, t_max: f32, source: u32) {
     hits[ray] = Hit(t_max, NONE, 0.0, 0.0);
-    surfaces[ray] = Surface(vec3<f32>(0.0), NONE, vec3<f32>(0.0), 0u, 0.0, source, 0u, 0u);
+    surfaces[ray] = Surface(vec3<f32>(0.0), NONE, vec3<f32>(0.0), 0u, 0.0, source, 1u, 0u);
 }

@@ -47,7 +47,6 @@ const PARAM_SUN: u32 = 4u;        // shade: with the sun, unshadowed
 const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
 const PARAM_BOUNCE: u32 = 16u;    // the hits that are shaded are those of set 1
 const PARAM_RECTANGLE: u32 = 32u; // the pass's lamp is the rectangular light
-const PARAM_PENDING: u32 = 64u;   // only rays that asked for a brick are traced
 const PARAM_TIGHTER: u32 = 128u;  // pairs are queried by the boxes of the node's children
 
 struct Ray {
@@ -71,7 +70,7 @@ struct Surface {
     triangle: u32,        // triangle within the brick
     area: f32,            // twice the triangle's area in the world, device units
     source: u32,          // id of the triangle that the ray starts from, which it does not meet; NONE: of none
-    pending: u32,         // 1: the ray asked for a brick that was missing
+    pending: u32,         // 0: the ray has asked from the root, for nothing: it wants nothing else in its pass
     padding: u32,
 }
 

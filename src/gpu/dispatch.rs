@@ -188,8 +188,7 @@ pub fn dispatches(
             vec![kernel(if everything { "intersect_all" } else { "intersect_selected" }, params, by_tile, Some(0))]
         }
         Step::IntersectAllBatch => {
-            let (mask, flags) = (layout::STATE_BATCH, params.flags | layout::PARAM_PENDING);
-            let params = Params { select_mask: mask, select_want: mask, flags, ..params };
+            let params = Params { select_mask: layout::STATE_BATCH, select_want: layout::STATE_BATCH, ..params };
             vec![kernel("intersect_selected", params, by_tile, Some(2))]
         }
         Step::QueryAll | Step::QueryAllUndone => {

@@ -12,7 +12,6 @@ pub const PARAM_SUN: u32 = 4;
 pub const PARAM_SKY: u32 = 8;
 pub const PARAM_BOUNCE: u32 = 16;
 pub const PARAM_RECTANGLE: u32 = 32;
-pub const PARAM_PENDING: u32 = 64;
 pub const PARAM_TIGHTER: u32 = 128;
 pub const STATE_GEOMETRY: u32 = 1;
 pub const STATE_DONE: u32 = 2;

@@ -4,8 +4,11 @@ use super::{BrickStates, Executor, ExecutorError, Load, PassStats};
 use crate::stream::{Item, Kind, Residency, Trace};
 use std::time::Instant;
 
-/// Most bricks loaded between two queries (design.md: a fresh query per 8 loads costs at most 10 % more bytes).
+/// Most bricks loaded between two queries where some of them may turn out to be hidden by others.
 pub const BATCH_BRICKS: usize = 8;
+
+/// Most bytes loaded at once: they take as much memory on their way to the device.
+const BATCH_BYTES: u64 = 64 << 20;
 
 /// Bytes of one brick's payloads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,8 +86,8 @@ impl Cache {
         stats.bricks_intersected.extend(used);
     }
 
-    /// Loads as many of `items` as fit without evicting each other, at least one and at most `most`; returns how many,
-    /// from the front. Those that are resident stay, and count among them.
+    /// Loads as many of `items` as fit without evicting each other, at least one and at most `most` and 64 MiB; returns how
+    /// many, from the front. Those that are resident stay, and count among them.
     ///
     /// # Errors
     /// What the executor says; nothing of the batch is resident then.
@@ -101,9 +104,13 @@ impl Cache {
         if let Some(trace) = &mut self.trace {
             trace.begin_batch();
         }
-        let (mut taken, mut loads) = (0, Vec::new());
+        let (mut taken, mut loads, mut bytes) = (0, Vec::new(), 0);
         for &item in items.iter().take(most) {
             let is_resident = self.residency.slot(item).is_some();
+            bytes += if is_resident { 0 } else { self.residency.bytes(item) };
+            if bytes > BATCH_BYTES && taken > 0 {
+                break;
+            }
             let Ok(placed) = self.residency.insert(item) else { break };
             taken += 1;
             self.residency.pin(item);

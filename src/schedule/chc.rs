@@ -81,11 +81,10 @@ impl<'a> Batches<'a> {
         stats: &mut PassStats,
     ) -> Result<(), ExecutorError> {
         let on = self.optimisations;
-        let (mut wanted, mut certain) = in_order(&report.demand, on.nearest_first);
+        let (mut wanted, mut most) = in_order(&report.demand, on.nearest_first);
         stats.add(std::mem::take(&mut report));
         while !wanted.is_empty() {
-            let most = if on.requery { certain.min(BATCH_BRICKS) } else { BATCH_BRICKS };
-            let count = cache.load(executor, &wanted, most, stats)?;
+            let count = cache.load(executor, &wanted, if on.requery { most } else { BATCH_BRICKS }, stats)?;
             let rest = wanted.split_off(count);
             let batch: Vec<u32> = wanted.iter().map(|item| item.brick).collect();
             if let Some(lowest) = rest.iter().map(|item| item.brick).min() {
@@ -97,7 +96,7 @@ impl<'a> Batches<'a> {
                 report = run(executor, self.pass, &[self.intersect, self.query], &cache.states, on, stats)?;
                 let still = |item: &&Item| report.demand.binary_search_by_key(&item.brick, |d| d.brick).is_ok();
                 stats.bricks_no_longer_wanted += (rest.len() - rest.iter().filter(still).count()) as u64;
-                (wanted, certain) = in_order(&report.demand, on.nearest_first);
+                (wanted, most) = in_order(&report.demand, on.nearest_first);
             } else {
                 report = run(executor, self.pass, &[self.intersect], &cache.states, on, stats)?;
                 wanted = rest;
@@ -138,19 +137,22 @@ pub fn measure_needed(
 }
 
 /// The wanted bricks' geometry by number; or nearest entry first, then by number, those ahead that some ray enters next. Also
-/// how many of them, from the front, are not hidden by others: where a threshold keeps every brick back that a ray enters next,
-/// all.
+/// how many of them to load before the next query: only what some ray enters next, unless a threshold keeps back what rays
+/// enter next of every brick.
 fn in_order(demand: &[Demand], nearest_first: bool) -> (Vec<Item>, usize) {
     let mut wanted = demand.to_vec();
-    let mut certain = wanted.len();
+    let mut most = BATCH_BRICKS;
     if nearest_first {
         let hidden = |d: &Demand| d.next == 0;
         wanted.sort_by(|a, b| {
             hidden(a).cmp(&hidden(b)).then(a.nearest.total_cmp(&b.nearest)).then(a.brick.cmp(&b.brick))
         });
-        certain = wanted.iter().position(hidden).filter(|&count| count > 0).unwrap_or(certain);
+        let needed = wanted.iter().filter(|d| !hidden(d)).count();
+        if needed > 0 {
+            most = needed;
+        }
     }
-    (wanted.iter().map(|d| Item::geometry(d.brick)).collect(), certain)
+    (wanted.iter().map(|d| Item::geometry(d.brick)).collect(), most)
 }
 
 #[cfg(test)]
@@ -160,26 +162,32 @@ mod tests {
     fn bricks(demand: &[(u32, f32, u32)], nearest_first: bool) -> (Vec<u32>, usize) {
         let demand: Vec<Demand> =
             demand.iter().map(|&(brick, nearest, next)| Demand { brick, rays: 9, nearest, next }).collect();
-        let (items, certain) = in_order(&demand, nearest_first);
-        (items.iter().map(|i| i.brick).collect(), certain)
+        let (items, most) = in_order(&demand, nearest_first);
+        (items.iter().map(|i| i.brick).collect(), most)
     }
 
     #[test]
     fn demand_is_served_nearest_first_then_by_number() {
         let demand = [(2, 2.0, 1), (4, 2.0, 1), (7, 0.5, 9)];
         assert_eq!(bricks(&demand, true), (vec![7, 2, 4], 3));
-        assert_eq!(bricks(&demand, false), (vec![2, 4, 7], 3));
+        assert_eq!(bricks(&demand, false), (vec![2, 4, 7], BATCH_BRICKS));
     }
 
     #[test]
     fn what_no_ray_enters_next_waits() {
         let demand = [(2, 2.0, 1), (4, 0.5, 0), (7, 0.7, 9)];
         assert_eq!(bricks(&demand, true), (vec![7, 2, 4], 2));
-        assert_eq!(bricks(&demand, false), (vec![2, 4, 7], 3));
+        assert_eq!(bricks(&demand, false), (vec![2, 4, 7], BATCH_BRICKS));
     }
 
     #[test]
-    fn where_no_brick_is_entered_next_none_waits() {
-        assert_eq!(bricks(&[(2, 2.0, 0), (4, 0.5, 0)], true), (vec![4, 2], 2));
+    fn where_no_brick_is_entered_next_the_nearest_are_taken() {
+        assert_eq!(bricks(&[(2, 2.0, 0), (4, 0.5, 0)], true), (vec![4, 2], BATCH_BRICKS));
+    }
+
+    #[test]
+    fn all_that_is_needed_is_loaded() {
+        let demand: Vec<_> = (0..100).map(|brick| (brick, 1.0, 1)).collect();
+        assert_eq!(bricks(&demand, true).1, 100);
     }
 }

@@ -172,8 +172,8 @@ impl Fronts {
         }
         let fronts = tree.leaves();
         let visible = fronts.iter().filter(|&&i| matches!(tree.pair(i).front, Front::Visible { .. })).count();
-        stats.pairs_visible = visible as u64;
-        stats.pairs_invisible = (fronts.len() - visible) as u64;
+        stats.pairs_visible += visible as u64;
+        stats.pairs_invisible += (fronts.len() - visible) as u64;
         if setup.tracing.measure_needed {
             measure_needed(executor, cache, setup.pass, &[Step::Lists], resident_before, stats)?;
         }

@@ -308,9 +308,9 @@ pub struct PassStats {
     pub bricks_needed: Option<Vec<u32>>,
     /// Distinct bricks that hold a final hit, where it was asked.
     pub bricks_hit: Option<Vec<u32>>,
-    /// Pairs (tile, leaf) of the visible front at the end.
+    /// Pairs (tile, leaf) of the visible fronts at the end, summed over directions and samples.
     pub pairs_visible: u64,
-    /// Pairs (tile, node) of the invisible front at the end.
+    /// Pairs (tile, node) of the invisible fronts at the end, summed likewise.
     pub pairs_invisible: u64,
     /// Queries over several pairs at once.
     pub multi_queries: u64,

@@ -141,7 +141,9 @@ fn trace(
             let tracing = Tracing::default();
             (way.schedule)(&mut executor, &mut cache, pass, &[Step::StartHits], &tracing, &mut PassStats::default())?;
             let name = if pass == Pass::Primary { way.closest } else { way.any };
-            let (hits, surfaces) = (executor.read_hits(pass)?, executor.read_surfaces(pass)?);
+            let (hits, mut surfaces) = (executor.read_hits(pass)?, executor.read_surfaces(pass)?);
+            // What a ray still asks for is no part of its hit.
+            surfaces.iter_mut().for_each(|surface| surface.pending = 0);
             found.push(Traced { name, hits, surfaces });
         }
     }
