@@ -66,9 +66,9 @@ impl<'a> Batches<'a> {
         Self { pass, intersect: Step::IntersectBatch, query, optimisations }
     }
 
-    /// Loads what the queries in `report` want, nearest first, a few at a time and only bricks that some ray enters before any
-    /// other that it wants: what lies behind them may turn out to be hidden. Each batch is intersected and the rest asked for
-    /// again, until nothing is wanted. Without the re-query what was wanted at first is loaded whole: hits only move nearer,
+    /// Loads of what the queries in `report` want, nearest first, those bricks that some ray enters before any other that it
+    /// wants: what lies behind them may turn out to be hidden. Each batch is intersected and the rest asked for again, until
+    /// nothing is wanted. Without the re-query what was wanted at first is loaded whole: hits only move nearer,
     /// so no ray wants anything else later.
     ///
     /// # Errors
