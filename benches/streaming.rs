@@ -5,8 +5,8 @@
 use brickwalk::app::args::{Cli, Command};
 use brickwalk::app::session::{Session, brick_bytes, open_scene};
 use brickwalk::gpu::device::Gpu;
-use brickwalk::gpu::rays::Extent;
-use brickwalk::schedule::{Executor, Load};
+use brickwalk::kernel::Extent;
+use brickwalk::schedule::Load;
 use brickwalk::stream::{Item, Slot};
 use clap::Parser;
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
@@ -68,7 +68,7 @@ fn streaming(c: &mut Criterion) {
         };
         let extent = Extent { width: 64, height: 64, tile: 64 };
         let mut session = Session::open(file.clone(), &path, &args.stream, extent).expect("a session");
-        let upload = session.executor.gpu().upload.name();
+        let upload = session.executor.device().upload;
         let loads = place(&session, &bricks);
         group.bench_function(BenchmarkId::new(format!("brickwalk from the {name}"), upload), |b| {
             b.iter(|| {

@@ -1,9 +1,11 @@
 //! brickwalk walks by ray tracing through scenes that do not fit in GPU memory.
 //!
-//! See `ARCHITECTURE.md` for the house: math → scene → stream → schedule → gpu → render → app.
+//! See `ARCHITECTURE.md` for the house: math → scene → stream → schedule → kernel → cpu, gpu → render → app.
 
 pub mod app;
+pub mod cpu;
 pub mod gpu;
+pub mod kernel;
 pub mod math;
 pub mod metrics;
 pub mod reference;

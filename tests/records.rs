@@ -8,9 +8,9 @@ use bricks::{AttributeLayout, GeometryLayout, INSTANCE_IDENTITY, Node, Payload, 
 use brickwalk::app::args::{Cli, Command};
 use brickwalk::app::session::{Session, open_scene};
 use brickwalk::app::walk::renderer;
-use brickwalk::gpu::layout::{NONE, Ray, T_INFINITE};
-use brickwalk::gpu::rays::Extent;
-use brickwalk::gpu::scene::Frame;
+use brickwalk::kernel::Extent;
+use brickwalk::kernel::frame::Frame;
+use brickwalk::kernel::layout::{NONE, Ray, T_INFINITE};
 use brickwalk::reference::{Truth, TruthRay, Verdict, judge};
 use brickwalk::render::{Renderer, camera_view};
 use brickwalk::scene::path::CameraPath;
@@ -249,7 +249,7 @@ fn records_are_what_a_spy_counts() {
                 let cache = &mut renderer.cache;
                 let resident_start = cache.residency.resident().count() as u64;
                 cache.begin_pass("primary", number);
-                let inner = &mut renderer.executor;
+                let inner = &mut *renderer.executor;
                 let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
                 let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
                 trace(&mut spy, cache, Pass::Primary, &[Step::Generate], &tracing, &mut stats).expect("a pass");
@@ -318,7 +318,7 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
             let optimisations = Optimisations { nearest_first, ..Optimisations::default() };
             let tracing = Tracing { measure_needed: true, optimisations };
             let mut stats = PassStats::default();
-            let inner = &mut renderer.executor;
+            let inner = &mut *renderer.executor;
             let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
             let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
             let cache = &mut renderer.cache;

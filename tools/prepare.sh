@@ -1,4 +1,4 @@
-# Sourced by the scripts beside it: makes sure that cargo, a C++ compiler and linker, and a Vulkan driver are there. On
+# Sourced by the scripts beside it: makes sure that cargo, a C++ compiler and linker, and for tests a Vulkan driver are there. On
 # Debian and its relatives it installs what is missing with apt-get; elsewhere it says what to install.
 # shellcheck shell=bash
 
@@ -60,6 +60,7 @@ install_packages() {
         fail "apt-get install $* failed; install them, then run this again"
 }
 
+# With the argument `vulkan`, a driver too.
 prepare() {
     if ! have cargo && [ -r "${HOME:-/root}/.cargo/env" ]; then
         # shellcheck source=/dev/null
@@ -72,7 +73,7 @@ prepare() {
         missing+=(g++)
     fi
     # The graphics systems of other platforms need no package.
-    if [ "$(uname -s)" = Linux ]; then
+    if [ "${1:-}" = vulkan ] && [ "$(uname -s)" = Linux ]; then
         have_vulkan_loader || missing+=(libvulkan1)
         have_vulkan_driver || missing+=(mesa-vulkan-drivers)
     fi

@@ -5,5 +5,5 @@ set -euo pipefail
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 . "$root/tools/prepare.sh"
 
-prepare
+prepare vulkan
 exec cargo test --release --workspace --manifest-path "$root/Cargo.toml" "$@"

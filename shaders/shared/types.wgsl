@@ -1,4 +1,4 @@
-// Structures shared by all kernels. Each mirrors a #[repr(C)] struct of src/gpu/layout.rs; the build compares the two.
+// Structures shared by all kernels. Each mirrors a #[repr(C)] struct of src/kernel/layout.rs; the build compares the two.
 
 struct Params {
     zero: u32,            // 0; what barrier() ors in, unknown to the compiler

@@ -2,6 +2,7 @@
 //! receive only what they can use; what is wrong ends as usage with exit status 2.
 
 use super::bench::args::BenchArgs;
+use super::device::Adapter;
 use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
@@ -53,6 +54,17 @@ pub enum Command {
     Compare(CompareArgs),
     /// Measure: the experiments of the CHC+RT paper, repeated
     Bench(BenchArgs),
+    /// List what can render, and what is chosen
+    Adapters(AdaptersArgs),
+}
+
+/// Options of `adapters`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct AdaptersArgs {
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Options of `demo`.
@@ -77,9 +89,10 @@ pub struct DemoArgs {
     /// Seed of the city and of random sampling
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Use the graphics adapter whose name contains NAME, upper and lower case alike
-    #[arg(long, value_name = "NAME")]
-    pub adapter: Option<String>,
+    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics adapter whose
+    /// name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
+    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
+    pub adapter: Adapter,
 }
 
 /// Options of `convert`.
@@ -274,9 +287,10 @@ pub struct StreamArgs {
     /// Count the nodes that rays visit and the triangles that they test (nodes_visited, triangles_tested), which takes time
     #[arg(long)]
     pub count: bool,
-    /// Use the graphics adapter whose name contains NAME, upper and lower case alike [default: a GPU, else software]
-    #[arg(long, value_name = "NAME")]
-    pub adapter: Option<String>,
+    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics adapter whose
+    /// name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
+    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
+    pub adapter: Adapter,
 }
 
 impl StreamArgs {

@@ -56,7 +56,7 @@ fn options_arrive() {
     assert_eq!(w.effects.effects.to_string(), "primary");
     assert!(w.aov && w.json && w.light.sun.0[0] < 0.0);
     assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
-    assert_eq!(w.stream.adapter.as_deref(), Some("llvm"));
+    assert_eq!(w.stream.adapter, Adapter::Named("llvm".into()));
     assert_eq!((w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()), ("on", 20, "lru"));
     assert!(w.measure_needed && w.stream.prefetch == 16 && w.stream.requests_out == Some("f.jsonl".into()));
     assert_eq!(walk("--hash-threads 3").unwrap().stream.worker_count(), 3);
@@ -181,8 +181,10 @@ fn help_explains_units_and_defaults() {
     let cli = Cli::command();
     let mut names: Vec<_> = cli.get_subcommands().map(|c| c.get_name().to_string()).collect();
     names.sort();
-    let commands =
-        ["bench", "compare", "convert", "demo", "info", "repair", "replay", "scene", "trace", "verify", "walk"];
+    let commands = [
+        "adapters", "bench", "compare", "convert", "demo", "info", "repair", "replay", "scene", "trace", "verify",
+        "walk",
+    ];
     assert_eq!(names, commands);
     for name in commands {
         let name = if name == "bench" { "bench chc" } else { name };

@@ -25,9 +25,7 @@ pub fn run(args: &DemoArgs) -> Result<()> {
     walk.extend(["--path".into(), path.into()]);
     let (frames, size, cache) = (args.frames.to_string(), args.size.to_string(), args.cache.to_string());
     walk.extend(["--frames", &frames, "--size", &size, "--cache", &cache, "--seed", &seed].map(OsString::from));
-    if let Some(adapter) = &args.adapter {
-        walk.extend(["--adapter", adapter].map(OsString::from));
-    }
+    walk.extend(["--adapter", &args.adapter.to_string()].map(OsString::from));
     step("walk through it, out of core", &walk)?;
     let report = args.output.join("report.html");
     super::print(&format!("Done. Frames: {}\nReport: {}\n", args.output.join("frames").display(), report.display()))

@@ -1,11 +1,13 @@
 //! The command: parses, dispatches, and turns whatever happens into an exit status: 0 done, 1 the input is bad (one line
 //! on standard error), 2 wrong usage.
 
+pub mod adapters;
 pub mod args;
 pub mod bench;
 pub mod compare;
 pub mod convert;
 pub mod demo;
+pub mod device;
 pub mod info;
 mod inputs;
 pub mod interrupt;
@@ -81,6 +83,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Adapters(args) => adapters::run(args),
     }
 }
 

@@ -1,14 +1,12 @@
 //! Everything a walk or a trace works with, opened from the command line's options.
 
 use super::args::{Schedule as ScheduleArg, StreamArgs};
+use super::device::Device;
 use super::sizes::{CacheSize, option_bytes};
-use crate::gpu::device::Gpu;
-use crate::gpu::executor::{GpuExecutor, Setup};
-use crate::gpu::probe;
-use crate::gpu::rays::Extent;
+use crate::kernel::{Extent, FrameExecutor, Setup};
 use crate::render::Schedule;
 use crate::schedule::cache::{BrickBytes, Cache};
-use crate::stream::{HostCache, Policy, Residency, ResidencyError, Trace, Workers};
+use crate::stream::{HostCache, Policy, Residency, ResidencyError, Trace};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
 use std::path::Path;
@@ -19,7 +17,7 @@ pub struct Session {
     /// The scene.
     pub scene: Arc<SceneFile>,
     /// The executor.
-    pub executor: GpuExecutor,
+    pub executor: Box<dyn FrameExecutor>,
     /// The cache.
     pub cache: Cache,
     /// The schedule in force.
@@ -69,19 +67,6 @@ pub fn scaled_threshold(threshold: u32, tile: u32) -> u32 {
     (f64::from(threshold) * f64::from(tile).powi(2) / 40_000.0) as u32
 }
 
-/// Refuses a device with a failed check.
-fn require(gpu: &Gpu, checks: &[probe::Check]) -> Result<()> {
-    let failures = probe::failures(checks);
-    if failures.is_empty() {
-        return Ok(());
-    }
-    bail!(
-        "{} does not compute as exact rendering needs: {}; choose another with --adapter",
-        gpu.info.name,
-        failures.join(", ")
-    );
-}
-
 impl Session {
     /// Opens device, cache and workers for `scene`.
     ///
@@ -96,11 +81,10 @@ impl Session {
                 bail!("{}: --requests-out needs a file in a folder that exists", file.display());
             }
         }
-        let gpu = Gpu::open(args.adapter.as_deref())?;
-        require(&gpu, &probe::run(&gpu.device, &gpu.queue).checks)?;
+        let device = Device::open(&args.adapter)?;
         let bytes = brick_bytes(&scene);
         let sizes: Vec<(u64, u64)> = bytes.iter().map(|b| (b.geometry, b.attributes)).collect();
-        let page_bytes = gpu.page_bytes();
+        let page_bytes = device.page_bytes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
         let budget = cache_budget(args.cache, &sizes, page_bytes);
         let schedule = match args.schedule {
@@ -127,14 +111,13 @@ impl Session {
             other => anyhow!(other).context(format!("{name}: --cache")),
         })?;
         let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
-        let host = HostCache::new(args.host_cache);
-        let workers = Workers::new(scene.clone(), host, args.worker_count(), args.prefetch as usize)?;
         let threshold = scaled_threshold(args.query_threshold, extent.tile);
         let setup = Setup { extent, threshold, count: args.count };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
+        let host = HostCache::new(args.host_cache);
+        let threads = (args.worker_count(), args.prefetch as usize);
         let mut executor =
-            GpuExecutor::new(gpu, scene.clone(), workers, &page_sizes, setup).with_context(|| format!("{name}"))?;
-        require(executor.gpu(), &probe::compare_pipelines(&executor))?;
+            device.executor(scene.clone(), host, threads, &page_sizes, setup).with_context(|| format!("{name}"))?;
         if schedule == Schedule::PlainBinary {
             executor.make_binary().with_context(|| format!("{name}"))?;
         }

@@ -12,7 +12,6 @@ const FORMAT: u32 = 1;
 /// The summary of a walk of `frames` finished frames.
 pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], frames: u32) -> Value {
     let streaming = streaming(renderer);
-    let gpu = renderer.executor.gpu();
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let brick_bytes: u64 = renderer.cache.bytes.iter().map(|b| b.geometry + b.attributes).sum();
@@ -20,14 +19,7 @@ pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], fra
         "format": FORMAT,
         "version": env!("CARGO_PKG_VERSION"),
         "commit": env!("BRICKWALK_COMMIT"),
-        "adapter": {
-            "name": gpu.info.name,
-            "driver": gpu.info.driver,
-            "driver_info": gpu.info.driver_info,
-            "backend": gpu.info.backend.to_string(),
-            "upload": gpu.upload.name(),
-            "timestamps": gpu.timestamps,
-        },
+        "adapter": renderer.executor.device(),
         "scene": {
             "file": args.scene.file_name().map(|n| n.to_string_lossy()),
             "file_bytes": renderer.scene.file_bytes(),

@@ -3,10 +3,10 @@
 use super::args::TraceArgs;
 use super::output::npy::{self, Hit, Ray};
 use super::session::{Session, open_scene, write_requests};
-use crate::gpu::executor::{Directions, View};
-use crate::gpu::layout::{self, NONE, Params, T_INFINITE};
-use crate::gpu::rays::Extent;
-use crate::gpu::scene::Frame;
+use crate::kernel::Extent;
+use crate::kernel::frame::Frame;
+use crate::kernel::layout::{self, NONE, Params, T_INFINITE};
+use crate::kernel::{Directions, View};
 use crate::render::Schedule;
 use crate::schedule::{Lamp, Pass, PassStats, Step, Tracing, attributes, chc, demand, plain};
 use anyhow::{Context, Result, bail};
@@ -140,7 +140,7 @@ fn trace_chunk(
     stats: &mut PassStats,
 ) -> Result<Vec<(layout::Hit, [f32; 2])>> {
     let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
-    let executor = &mut session.executor;
+    let executor = &mut *session.executor;
     let cache = &mut session.cache;
     executor.begin_frame(&View { frame: *frame, params: Params::default(), directions: Directions::default() });
     let device: Vec<layout::Ray> = rays.iter().map(|r| r.ray).collect();

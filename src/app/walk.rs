@@ -4,7 +4,7 @@ use super::args::WalkArgs;
 use super::output::{atomic, exr, png};
 use super::session::{Session, open_scene, write_requests};
 use super::summary;
-use crate::gpu::rays::Extent;
+use crate::kernel::Extent;
 use crate::render::{Captures, FrameOutput, Light, RenderSettings, Renderer, Schedule};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};

@@ -1,22 +1,18 @@
 //! Binary trees of all bricks on the device, for the baseline `plain-bvh2`: nodes in pages of their own, beside the cache.
 
-pub mod tree;
-
 use super::device::Gpu;
 use super::groups::numbered;
 use super::kernels::{self, Kernels};
-use super::layout::BinaryNode;
 use super::pages::device_error;
 use super::rays::storage;
 use super::wgsl;
+use crate::kernel::binary_tree::{Tree, top_height, tree_of};
+use crate::kernel::dispatch::INTERSECT_BINARY;
+use crate::kernel::layout::BinaryNode;
 use crate::schedule::ExecutorError;
-use crate::stream::{Item, StreamError};
-use bricks::{Payload, Resident, SceneFile};
+use bricks::SceneFile;
 use rayon::prelude::*;
-use tree::{Tree, binary_tree};
 
-/// The kernel that traverses them.
-pub const KERNEL: &str = "intersect_binary";
 /// Bricks whose trees are made at a time, a thread.
 const AT_A_TIME: usize = 8;
 /// Bytes that are copied to the device at a time.
@@ -65,30 +61,6 @@ impl BinaryTrees {
         let descriptor = wgpu::BindGroupDescriptor { label: Some("binary"), layout: &layout, entries: &entries };
         Ok(Self { group: gpu.device.create_bind_group(&descriptor), pipeline, bytes })
     }
-}
-
-fn tree_of(scene: &SceneFile, brick: usize) -> Result<Tree, ExecutorError> {
-    let item = Item::geometry(brick as u32);
-    let payload = Payload::from(item);
-    let mut geometry = vec![0u32; scene.loaded_bytes(payload) as usize / 4];
-    scene
-        .copy(payload, bytemuck::cast_slice_mut(&mut geometry))
-        .map_err(|reason| StreamError::Payload { item, reason: Box::new(reason) })?;
-    Ok(binary_tree(&scene.resident().bricks[brick], &geometry))
-}
-
-/// Levels of inner nodes of the binary top level.
-fn top_height(resident: &Resident) -> u32 {
-    let mut levels = vec![0; resident.top2.len()];
-    // Children follow their parent.
-    for (i, node) in resident.top2.iter().enumerate() {
-        if node.right != bricks::TOP_LEAF {
-            for child in [node.left, node.right] {
-                levels[child as usize] = levels[i] + 1;
-            }
-        }
-    }
-    levels.into_iter().max().unwrap_or(0)
 }
 
 /// Pages of nodes, filled one after the other; no brick's nodes lie in two.
@@ -175,17 +147,17 @@ fn pipeline(gpu: &Gpu, kernels: &Kernels, pages: usize, stack: u32) -> (wgpu::Bi
     let device = &gpu.device;
     let group = kernels::read_layout(device, "binary", 1 + pages);
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(KERNEL),
+        label: Some(INTERSECT_BINARY),
         bind_group_layouts: &[Some(&kernels.scene), Some(&kernels.rays), Some(&kernels.cache), Some(&group)],
         immediate_size: 0,
     });
-    let source = kernels::source_with(KERNEL, kernels.pages, &binary);
+    let source = kernels::source_with(INTERSECT_BINARY, kernels.pages, &binary);
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(KERNEL),
+        label: Some(INTERSECT_BINARY),
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(KERNEL),
+        label: Some(INTERSECT_BINARY),
         layout: Some(&layout),
         module: &module,
         entry_point: Some("main"),

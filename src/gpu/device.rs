@@ -1,12 +1,13 @@
 //! The adapter, its limits, and the device made from it.
 
+use crate::kernel::DeviceInfo;
 use thiserror::Error;
 
 /// Why there is no device to work with.
 #[derive(Debug, Error)]
 pub enum DeviceError {
     /// No adapter, or none of the given name.
-    #[error("no Vulkan, Metal or DirectX 12 adapter{}; install a driver (on Debian without a GPU: apt-get install libvulkan1 mesa-vulkan-drivers); found: {found}", .wanted.as_ref().map(|w| format!(" whose name contains {w:?}")).unwrap_or_default())]
+    #[error("no Vulkan, Metal or DirectX 12 adapter{}; found: {found}; choose one of them, or install a driver (software Vulkan on Debian: apt-get install libvulkan1 mesa-vulkan-drivers), or render on the processor with --adapter cpu", .wanted.as_ref().map(|w| format!(" whose name contains {w:?}")).unwrap_or_default())]
     NoAdapter {
         /// The name asked for.
         wanted: Option<String>,
@@ -81,6 +82,109 @@ fn adapters(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
 /// Storage buffers a kernel needs besides cache and texel pages: 7 of the scene, 5 of the rays, 8 of the shading.
 const FIXED_STORAGE_BUFFERS: u32 = 20;
 
+/// An adapter that there is.
+pub struct Candidate {
+    adapter: Option<wgpu::Adapter>,
+    /// Name, driver, backend.
+    pub info: wgpu::AdapterInfo,
+    /// What it allows.
+    pub limits: wgpu::Limits,
+    /// What it lacks without which nothing works.
+    pub flaw: Option<String>,
+}
+
+impl Candidate {
+    fn new(adapter: wgpu::Adapter) -> Self {
+        let (info, limits) = (adapter.get_info(), adapter.limits());
+        let flaw = check_limits(&info, &limits).err().map(|error| error.to_string());
+        Self { adapter: Some(adapter), info, limits, flaw }
+    }
+
+    /// Whether it is more than a program on the processor.
+    pub fn is_hardware(&self) -> bool {
+        use wgpu::DeviceType::{DiscreteGpu, IntegratedGpu, VirtualGpu};
+        matches!(self.info.device_type, DiscreteGpu | IntegratedGpu | VirtualGpu)
+    }
+
+    /// The lower, the better.
+    pub fn rank(&self) -> u32 {
+        rank(&self.info)
+    }
+
+    /// What it is, in words.
+    pub fn kind(&self) -> &'static str {
+        match self.info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::VirtualGpu => "virtual GPU",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "other",
+        }
+    }
+
+    /// Largest number of bytes of one page of the cache or of the texels.
+    pub fn page_bytes(&self) -> u64 {
+        page_bytes(&self.limits)
+    }
+
+    /// One that cannot be opened, sound or not.
+    #[cfg(test)]
+    pub fn for_tests(device_type: wgpu::DeviceType, is_sound: bool) -> Self {
+        let info = wgpu::AdapterInfo::new(device_type, wgpu::Backend::Vulkan);
+        let flaw = (!is_sound).then(|| "it is a test".into());
+        Self { adapter: None, info, limits: wgpu::Limits::default(), flaw }
+    }
+
+    /// Opens it.
+    ///
+    /// # Errors
+    /// It gives no device, or lacks something.
+    pub fn open(&self) -> Result<Gpu, DeviceError> {
+        let adapter = self
+            .adapter
+            .as_ref()
+            .ok_or_else(|| DeviceError::NoAdapter { wanted: Some(self.info.name.clone()), found: "none".into() })?;
+        Gpu::from_adapter(adapter)
+    }
+}
+
+/// The adapters of Vulkan, Metal and DirectX 12. OpenGL is a fallback that must be asked for by name.
+pub fn candidates() -> Vec<Candidate> {
+    adapters(wgpu::Backends::PRIMARY).into_iter().map(Candidate::new).collect()
+}
+
+/// The lower, the better.
+fn rank(info: &wgpu::AdapterInfo) -> u32 {
+    match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Cpu => 3,
+        wgpu::DeviceType::Other => 4,
+    }
+}
+
+/// Refuses what lacks something without which nothing works.
+fn check_limits(info: &wgpu::AdapterInfo, limits: &wgpu::Limits) -> Result<(), DeviceError> {
+    let found = limits.max_storage_buffers_per_shader_stage;
+    if found < FIXED_STORAGE_BUFFERS + 2 {
+        return Err(DeviceError::Limit {
+            adapter: info.name.clone(),
+            what: "storage buffers a kernel",
+            found: found.into(),
+            needed: (FIXED_STORAGE_BUFFERS + 2).into(),
+        });
+    }
+    Ok(())
+}
+
+/// Largest number of bytes of one page of the cache or of the texels.
+fn page_bytes(limits: &wgpu::Limits) -> u64 {
+    let binding = limits.max_storage_buffer_binding_size;
+    // Offsets within a page are u32 words, and 1 GiB keeps an allocation within what drivers give in one piece.
+    binding.min(limits.max_buffer_size).min(1 << 30) / 256 * 256
+}
+
 impl Gpu {
     /// Opens the adapter whose name contains `wanted` (any case), or by itself a discrete GPU, else an integrated one,
     /// else whatever there is. `BRICKWALK_UPLOAD=staged` forces the staging buffer where pages could be mapped.
@@ -95,14 +199,7 @@ impl Gpu {
             let wanted = wanted.to_lowercase();
             adapters.retain(|a| a.get_info().name.to_lowercase().contains(&wanted));
         }
-        let rank = |a: &wgpu::Adapter| match a.get_info().device_type {
-            wgpu::DeviceType::DiscreteGpu => 0,
-            wgpu::DeviceType::IntegratedGpu => 1,
-            wgpu::DeviceType::VirtualGpu => 2,
-            wgpu::DeviceType::Cpu => 3,
-            wgpu::DeviceType::Other => 4,
-        };
-        let Some(adapter) = adapters.into_iter().min_by_key(rank) else {
+        let Some(adapter) = adapters.into_iter().min_by_key(|a| rank(&a.get_info())) else {
             let found = if found.is_empty() { "none".to_string() } else { found };
             return Err(DeviceError::NoAdapter { wanted: wanted.map(str::to_string), found });
         };
@@ -112,15 +209,7 @@ impl Gpu {
     fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, DeviceError> {
         let info = adapter.get_info();
         let limits = adapter.limits();
-        let storage = limits.max_storage_buffers_per_shader_stage;
-        if storage < FIXED_STORAGE_BUFFERS + 2 {
-            return Err(DeviceError::Limit {
-                adapter: info.name,
-                what: "storage buffers a kernel",
-                found: storage.into(),
-                needed: (FIXED_STORAGE_BUFFERS + 2).into(),
-            });
-        }
+        check_limits(&info, &limits)?;
         let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
         let features = adapter.features() & wanted;
         let descriptor = wgpu::DeviceDescriptor {
@@ -140,11 +229,21 @@ impl Gpu {
         Ok(Self { device, queue, info, limits, timestamps, upload })
     }
 
+    /// What summaries say of it.
+    pub fn device_info(&self) -> DeviceInfo {
+        DeviceInfo {
+            name: self.info.name.clone(),
+            driver: self.info.driver.clone(),
+            driver_info: self.info.driver_info.clone(),
+            backend: self.info.backend.to_string(),
+            upload: self.upload.name(),
+            timestamps: self.timestamps,
+        }
+    }
+
     /// Largest number of bytes of one page of the cache or of the texels.
     pub fn page_bytes(&self) -> u64 {
-        let binding = self.limits.max_storage_buffer_binding_size;
-        // Offsets within a page are u32 words, and 1 GiB keeps an allocation within what drivers give in one piece.
-        binding.min(self.limits.max_buffer_size).min(1 << 30) / 256 * 256
+        page_bytes(&self.limits)
     }
 
     /// Most pages of cache beside `texel_pages` pages of texels.

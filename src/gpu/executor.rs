@@ -1,22 +1,21 @@
 //! The wgpu executor: turns steps into dispatches, one submission and one readback a round trip.
 
-use super::binary::{self, BinaryTrees};
+use super::binary::BinaryTrees;
 use super::device::Gpu;
-use super::dispatch::{Dispatch, Workgroups, dispatches};
-
-pub use super::dispatch::Directions;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
-use super::layout::{self, Params};
 use super::pages::{CachePages, MappedRange};
-use super::rays::{Extent, PixelBuffers, RayBuffers, TileBuffers, storage};
+use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
 use super::readback::Readback;
-use super::scene::{Frame, SceneBuffers};
+use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::schedule::{BrickStates, Demand, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::stream::{Item, Workers};
+use crate::kernel::dispatch::{Dispatch, INTERSECT_BINARY, Workgroups, dispatches};
+use crate::kernel::layout::{self, Params};
+use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, View, padded, report};
+use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::stream::{Item, WorkerPool, Workers};
 use bricks::SceneFile;
 use std::sync::Arc;
 
@@ -27,16 +26,9 @@ const INDIRECT_BYTES: u64 = 12;
 /// Entries per tile that the lists start with.
 const LIST_ENTRIES_PER_TILE: u32 = 64;
 
-/// What a frame needs to know besides the scene.
-#[derive(Clone, Copy, Debug)]
-pub struct View {
-    /// Reference point.
-    pub frame: Frame,
-    /// Fields of [`Params`] that the view sets: camera, lights, sample, seed, jitter.
-    pub params: Params,
-    /// Directions of the passes that start at hits.
-    pub directions: Directions,
-}
+/// Bounds, lists, entries and selection of all tiles.
+#[cfg(test)]
+pub(crate) type TilesRead = (Vec<layout::TileBounds>, Vec<layout::TileList>, Vec<layout::Entry>, Vec<u32>);
 
 /// Renders one scene on one device.
 pub struct GpuExecutor {
@@ -57,17 +49,6 @@ pub struct GpuExecutor {
     pair_nodes: u32,
     leaf_cache: bool,
     list_most: u32,
-}
-
-/// How an executor is set up.
-#[derive(Clone, Copy, Debug)]
-pub struct Setup {
-    /// Picture and tiles.
-    pub extent: Extent,
-    /// A (tile, leaf) query with at most so many rays is not visible; 0 is exact.
-    pub threshold: u32,
-    /// Count nodes and triangles visited (slower).
-    pub count: bool,
 }
 
 impl GpuExecutor {
@@ -109,7 +90,7 @@ impl GpuExecutor {
         page_sizes: &[u64],
         setup: Setup,
     ) -> Result<Self, ExecutorError> {
-        let most = Extent::most_rays(&gpu);
+        let most = most_rays(&gpu);
         let extent = setup.extent;
         if extent.rays() as u64 > most {
             let text = format!("{:?} holds pictures of at most {most} pixels; ask for a smaller --size", gpu.info.name);
@@ -164,39 +145,6 @@ impl GpuExecutor {
         })
     }
 
-    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`] and [`Pass::BounceShadow`], 160 bytes a pixel; without it
-    /// they must not be run.
-    pub fn allow_bounces(&mut self) {
-        let rays = self.extent.rays();
-        self.buffers.sets[2] = RayBuffers::new(&self.gpu, rays);
-        self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, rays);
-        self.rebind();
-    }
-
-    /// Whether lists are intersected by the kernel that postpones groups of triangles.
-    pub fn set_leaf_cache(&mut self, on: bool) {
-        self.leaf_cache = on;
-    }
-
-    /// Bounds the lists of [`Step::ShortLists`] to so many leaves, for every pass; with 0 all rays walk from the root.
-    pub fn set_list_most(&mut self, leaves: u32) {
-        self.list_most = leaves;
-    }
-
-    /// Changes [`Setup::threshold`].
-    pub fn set_threshold(&mut self, threshold: u32) {
-        self.threshold = threshold;
-    }
-
-    /// Makes what [`Step::IntersectBinary`] needs; without it that step must not be run.
-    ///
-    /// # Errors
-    /// A brick that cannot be read; more nodes than the device holds, with how much is needed.
-    pub fn make_binary(&mut self) -> Result<(), ExecutorError> {
-        self.binary = Some(BinaryTrees::new(&self.gpu, &self.scene, &self.kernels)?);
-        Ok(())
-    }
-
     /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
@@ -207,69 +155,15 @@ impl GpuExecutor {
         &self.kernels
     }
 
-    /// Bytes of textures on the device.
-    pub fn texture_bytes(&self) -> u64 {
-        self.buffers.texels.bytes
-    }
-
-    /// The workers that read payloads.
-    pub fn workers(&mut self) -> &mut Workers<MappedRange> {
-        &mut self.workers
-    }
-
-    /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
-    pub fn begin_frame(&mut self, view: &View) {
-        self.buffers.scene.rebase(&self.gpu, self.scene.resident(), view.frame);
-        self.view = view.params;
-        self.directions = view.directions;
-    }
-
-    /// Writes rays from outside into `pass`; fewer than the extent holds leave the rest untraced.
-    pub fn set_rays(&mut self, pass: Pass, rays: &[layout::Ray]) {
-        let untraced = layout::Ray { t_min: 1.0, t_max: 0.0, direction: [1.0, 0.0, 0.0], ..Default::default() };
-        let mut all = rays.to_vec();
-        all.resize(self.extent.rays(), untraced);
-        self.gpu.queue.write_buffer(&self.buffers.sets[pass.set()].rays, 0, bytemuck::cast_slice(&all));
-    }
-
-    /// Reads the rays of a pass back, row by row.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.read(|s| &s.buffers.sets[pass.set()].rays)
-    }
-
-    /// Reads the hits of a pass back.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.read(|s| &s.buffers.sets[pass.set()].hits)
-    }
-
-    /// Reads the surfaces of a pass back.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.read(|s| &s.buffers.sets[pass.set()].surfaces)
-    }
-
-    /// Reads the G-buffer of the primary hits back.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read(|s| &s.buffers.pixels.gbuffers[0])
-    }
-
-    /// Reads the radiance summed over samples back; w counts them.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.read(|s| &s.buffers.pixels.radiance)
+    /// Reads the tiles back, for tests: bounds, lists, entries, selection.
+    #[cfg(test)]
+    pub(crate) fn read_tiles(&mut self) -> Result<TilesRead, ExecutorError> {
+        Ok((
+            self.read(|s| &s.buffers.tiles.bounds)?,
+            self.read(|s| &s.buffers.tiles.lists)?,
+            self.read(|s| &s.buffers.tiles.list)?,
+            self.read(|s| &s.buffers.tiles.selection)?,
+        ))
     }
 
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
@@ -301,31 +195,9 @@ impl GpuExecutor {
         }
     }
 
-    fn write_slots(&self, bricks: &BrickStates) {
-        let slots: Vec<layout::Slot> = (0..bricks.len())
-            .map(|brick| {
-                let geometry = bricks.geometry(brick);
-                let attributes = bricks.attributes(brick);
-                let bit = |set: bool, bit: u32| if set { bit } else { 0 };
-                layout::Slot {
-                    geometry_page: geometry.map_or(0, |s| s.page),
-                    geometry_offset: geometry.map_or(0, |s| s.offset / 16),
-                    attributes_page: attributes.map_or(0, |s| s.page),
-                    attributes_offset: attributes.map_or(0, |s| s.offset / 16),
-                    state: bit(geometry.is_some(), layout::STATE_GEOMETRY)
-                        | bit(bricks.done(brick), layout::STATE_DONE)
-                        | bit(bricks.batch(brick), layout::STATE_BATCH)
-                        | bit(attributes.is_some(), layout::STATE_ATTRIBUTES),
-                    ..Default::default()
-                }
-            })
-            .collect();
-        self.gpu.queue.write_buffer(&self.buffers.scene.slots, 0, bytemuck::cast_slice(&slots));
-    }
-
     /// One submission: all steps, then counters and demand read back.
     fn submit(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
-        self.write_slots(bricks);
+        self.gpu.queue.write_buffer(&self.buffers.scene.slots, 0, bytemuck::cast_slice(&report::slots(bricks)));
         let params = self.params();
         let everything = bricks.all_geometry_resident();
         let of_step = |&step| dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything);
@@ -355,7 +227,7 @@ impl GpuExecutor {
                 label: Some(dispatch.kernel),
                 timestamp_writes: self.timing.writes(i as u32),
             });
-            let binary = self.binary.as_ref().filter(|_| dispatch.kernel == binary::KERNEL);
+            let binary = self.binary.as_ref().filter(|_| dispatch.kernel == INTERSECT_BINARY);
             compute.set_pipeline(binary.map_or_else(|| self.kernels.pipeline(dispatch.kernel), |b| &b.pipeline));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
@@ -378,14 +250,8 @@ impl GpuExecutor {
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
         let demand: Vec<layout::Demand> =
             bytemuck::pod_collect_to_vec(&demand[..bricks.len() * size_of::<layout::Demand>()]);
-        let mut report = read_report(&counters, &demand)?;
-        if steps.iter().any(|step| step.is_intersection()) {
-            // Queries in the same submission ask for missing bricks, or for what is not done beside a batch, which is; of the
-            // others rays have noted the use.
-            let undone = steps.iter().any(|step| matches!(step, Step::QueryUndone | Step::QueryAllUndone));
-            let is_used = |brick: usize| bricks.geometry(brick).is_some() && (!undone || bricks.done(brick));
-            report.used = report.demand.extract_if(.., |d| is_used(d.brick as usize)).map(|d| d.brick).collect();
-        }
+        let mut report = report::of_counters(&counters, &demand)?;
+        report::take_used(&mut report, steps, bricks);
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
             let rays: Vec<u32> = self.read(|s| &s.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
@@ -410,6 +276,79 @@ impl GpuExecutor {
         self.buffers.tiles.make_room(&self.gpu, capacity);
         self.rebind();
         Ok(())
+    }
+}
+
+impl FrameExecutor for GpuExecutor {
+    fn device(&self) -> DeviceInfo {
+        self.gpu.device_info()
+    }
+
+    fn page_bytes(&self) -> u64 {
+        self.gpu.page_bytes()
+    }
+
+    fn allow_bounces(&mut self) {
+        let rays = self.extent.rays();
+        self.buffers.sets[2] = RayBuffers::new(&self.gpu, rays);
+        self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, rays);
+        self.rebind();
+    }
+
+    fn set_leaf_cache(&mut self, on: bool) {
+        self.leaf_cache = on;
+    }
+
+    fn set_list_most(&mut self, leaves: u32) {
+        self.list_most = leaves;
+    }
+
+    fn set_threshold(&mut self, threshold: u32) {
+        self.threshold = threshold;
+    }
+
+    fn make_binary(&mut self) -> Result<(), ExecutorError> {
+        self.binary = Some(BinaryTrees::new(&self.gpu, &self.scene, &self.kernels)?);
+        Ok(())
+    }
+
+    fn texture_bytes(&self) -> u64 {
+        self.buffers.texels.bytes
+    }
+
+    fn workers(&self) -> &dyn WorkerPool {
+        &self.workers
+    }
+
+    fn begin_frame(&mut self, view: &View) {
+        self.buffers.scene.rebase(&self.gpu, self.scene.resident(), view.frame);
+        self.view = view.params;
+        self.directions = view.directions;
+    }
+
+    fn set_rays(&mut self, pass: Pass, rays: &[layout::Ray]) {
+        let all = padded(rays, self.extent.rays());
+        self.gpu.queue.write_buffer(&self.buffers.sets[pass.set()].rays, 0, bytemuck::cast_slice(&all));
+    }
+
+    fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
+        self.read(|s| &s.buffers.sets[pass.set()].rays)
+    }
+
+    fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
+        self.read(|s| &s.buffers.sets[pass.set()].hits)
+    }
+
+    fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
+        self.read(|s| &s.buffers.sets[pass.set()].surfaces)
+    }
+
+    fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
+        self.read(|s| &s.buffers.pixels.gbuffers[0])
+    }
+
+    fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
+        self.read(|s| &s.buffers.pixels.radiance)
     }
 }
 
@@ -474,45 +413,6 @@ impl Executor for GpuExecutor {
         report.round_trips += round_trips;
         Ok(report)
     }
-}
-
-fn read_report(counters: &[u32], demand: &[layout::Demand]) -> Result<Report, ExecutorError> {
-    let count = |i: u32| u64::from(counters[i as usize]);
-    if counters[layout::COUNTER_STACK_OVERFLOW as usize] > 0 {
-        return Err(ExecutorError::StackOverflow(counters[layout::COUNTER_STACK_OVERFLOW as usize]));
-    }
-    let wanted = demand.iter().enumerate().filter(|(_, d)| d.rays > 0);
-    Ok(Report {
-        round_trips: 1,
-        demand: wanted
-            .map(|(brick, d)| Demand {
-                brick: brick as u32,
-                rays: d.rays,
-                nearest: f32::from_bits(d.nearest),
-                next: d.next,
-            })
-            .collect(),
-        used: Vec::new(),
-        list_entries: counters[layout::COUNTER_LIST_ENTRIES as usize],
-        pairs_tested: count(layout::COUNTER_PAIRS_TESTED),
-        pairs_culled: count(layout::COUNTER_PAIRS_CULLED),
-        pairs_visible: count(layout::COUNTER_PAIRS_VISIBLE),
-        pairs_invisible: count(layout::COUNTER_PAIRS_INVISIBLE),
-        pairs_intersected: count(layout::COUNTER_PAIRS_INTERSECTED),
-        most_selected: counters[layout::COUNTER_MOST_SELECTED as usize],
-        tiles_from_root: count(layout::COUNTER_TILES_FROM_ROOT),
-        pairs_front_to_back: count(layout::COUNTER_FRONT_TO_BACK),
-        tile_batches: count(layout::COUNTER_TILE_BATCHES),
-        tile_batch_leaves: count(layout::COUNTER_TILE_BATCH_LEAVES),
-        leaf_groups_postponed: count(layout::COUNTER_LEAF_GROUPS),
-        rays: count(layout::COUNTER_RAYS),
-        nodes: count(layout::COUNTER_NODES),
-        triangles: count(layout::COUNTER_TRIANGLES),
-        non_finite: count(layout::COUNTER_NON_FINITE),
-        ms_phases: [0.0; 3],
-        pair_rays: Vec::new(),
-        queries_tightened: count(layout::COUNTER_TIGHTENED),
-    })
 }
 
 /// Bytes from one set of parameters to the next: the device's alignment for dynamic offsets.

@@ -2,11 +2,11 @@
 
 use super::device::Gpu;
 use super::kernels::{Kernels, TEXEL_BINDING};
-use super::layout::Params;
 use super::pages::CachePages;
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
+use crate::kernel::layout::Params;
 
 /// What kernels read and write.
 pub struct Buffers {
@@ -22,7 +22,7 @@ pub struct Buffers {
     pub pixels: PixelBuffers,
     /// Tiles and their lists.
     pub tiles: TileBuffers,
-    /// [`super::layout::Demand`] of every brick.
+    /// [`crate::kernel::layout::Demand`] of every brick.
     pub demand: wgpu::Buffer,
     /// Counters, and the work of indirect dispatches.
     pub counters: wgpu::Buffer,

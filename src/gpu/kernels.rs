@@ -102,6 +102,12 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("query_all", "query_from_root", Groups::Tiles, &[("OF_TILES", 1.0)]),
 ];
 
+/// The names of all specialisations.
+#[cfg(test)]
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    SPECIALISATIONS.iter().map(|specialisation| specialisation.1)
+}
+
 /// Specialisations that count nodes and triangles, made only when counting is asked for.
 const COUNTING: &[Specialisation] = &[
     ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 1.0), ("LEAF_CACHE", 0.0)]),

@@ -1,12 +1,10 @@
-//! The wgpu executor: device, layouts, kernels, cache pages, timing.
+//! The wgpu executor: device, kernels, cache pages, timing.
 
 pub mod binary;
 pub mod device;
-pub mod dispatch;
 pub mod executor;
 pub mod groups;
 pub mod kernels;
-pub mod layout;
 pub mod pages;
 pub mod probe;
 pub mod rays;
@@ -15,9 +13,3 @@ pub mod scene;
 pub mod texels;
 pub mod timing;
 pub mod wgsl;
-
-#[rustfmt::skip]
-mod layout_checks {
-    use super::layout;
-    include!(concat!(env!("OUT_DIR"), "/layout_checks.rs"));
-}

@@ -66,7 +66,7 @@ pub fn failures(checks: &[Check]) -> Vec<String> {
 
 /// The scene that the traversal pipelines are compared with: several bricks, one of them wide; sheets in one plane, some
 /// twice; slivers; turned and mirrored instances. `scene_tests.rs` says how it is made.
-pub(super) fn scene() -> Result<SceneFile, bricks::Error> {
+pub(crate) fn scene() -> Result<SceneFile, bricks::Error> {
     SceneFile::from_bytes("the probe's scene", include_bytes!("probe/scene.bricks"))
 }
 

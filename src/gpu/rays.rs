@@ -1,40 +1,12 @@
 //! Buffers of a frame: rays and hits of all sets, tiles and their lists, what shading keeps.
 
 use super::device::Gpu;
-use super::layout;
+use crate::kernel::{Extent, layout};
 
-/// Size of the picture, or of the block of rays, in rays, and the tiles over it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Extent {
-    /// Rays per row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Edge of a tile in rays.
-    pub tile: u32,
-}
-
-impl Extent {
-    /// Number of rays.
-    pub fn rays(&self) -> usize {
-        self.width as usize * self.height as usize
-    }
-
-    /// Tiles per row.
-    pub fn tiles_x(&self) -> u32 {
-        self.width.div_ceil(self.tile)
-    }
-
-    /// Number of tiles.
-    pub fn tiles(&self) -> u32 {
-        self.tiles_x() * self.height.div_ceil(self.tile)
-    }
-
-    /// Most rays that buffers on this device hold.
-    pub fn most_rays(gpu: &Gpu) -> u64 {
-        let bytes = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
-        bytes / size_of::<layout::GBuffer>().max(size_of::<layout::Surface>()) as u64
-    }
+/// Most rays that buffers on this device hold.
+pub fn most_rays(gpu: &Gpu) -> u64 {
+    let bytes = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
+    bytes / size_of::<layout::GBuffer>().max(size_of::<layout::Surface>()) as u64
 }
 
 /// Rays, hits and surfaces of one set.

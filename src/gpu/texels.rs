@@ -1,9 +1,9 @@
 //! Base colour textures on the device: all mip levels as words in pages, each a binding.
 
 use super::device::Gpu;
-use super::layout;
 use super::pages::device_error;
 use super::rays::storage;
+use crate::kernel::layout;
 use crate::schedule::ExecutorError;
 use bricks::{Payload, SceneFile};
 

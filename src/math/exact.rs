@@ -36,6 +36,18 @@ pub fn barrier3(x: [f32; 3]) -> [f32; 3] {
     x
 }
 
+/// The greater one, as one machine instruction; of numbers, never of NaN.
+#[inline(always)]
+pub fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The lesser one, as one machine instruction; of numbers, never of NaN.
+#[inline(always)]
+pub fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
 /// f32 of sign, significand in 2^23..=2^24 and biased exponent; beyond the normal range `under` or the greatest finite value.
 fn compose(sign: u32, significand: u32, exponent: i32, under: u32) -> f32 {
     let e = exponent + (significand >> 24) as i32;
@@ -62,7 +74,21 @@ fn root_step((q, r): (u32, u32), step: u32) -> (u32, u32) {
 
 /// a / b, correctly rounded. b must not be 0; denormals count as 0; a quotient too small becomes 0, one too large the
 /// greatest finite value.
+#[inline]
 pub fn divide(a: f32, b: f32) -> f32 {
+    // Inside the range of normal numbers Rust's division is correctly rounded, too.
+    let quotient = a / b;
+    if is_inside(a) && is_inside(b) && is_inside(quotient) { quotient } else { divide_by_integers(a, b) }
+}
+
+/// Whether x is far enough from the ends of the normal range that rounding beyond them has no part in it.
+#[inline(always)]
+fn is_inside(x: f32) -> bool {
+    (2..=253).contains(&((x.to_bits() >> 23) & 255))
+}
+
+/// [`divide`] as the kernel carries it out.
+fn divide_by_integers(a: f32, b: f32) -> f32 {
     let (x, y) = (a.to_bits(), b.to_bits());
     let sign = (x ^ y) & SIGN;
     let (ex, ey) = ((x >> 23) & 255, (y >> 23) & 255);
@@ -85,7 +111,14 @@ pub fn divide(a: f32, b: f32) -> f32 {
 }
 
 /// Square root of x >= 0, correctly rounded; denormals count as 0.
+#[inline]
 pub fn square_root(x: f32) -> f32 {
+    // Rust's root is correctly rounded, too.
+    if is_inside(x) { x.sqrt() } else { square_root_by_integers(x) }
+}
+
+/// [`square_root`] as the kernel carries it out.
+fn square_root_by_integers(x: f32) -> f32 {
     let bits = x.to_bits();
     let e = (bits >> 23) as i32 - 127;
     if e <= -127 {
@@ -117,7 +150,27 @@ fn shift_down_sticky(x: u64, n: u32) -> u64 {
 /// a*b - c*d, correctly rounded, in integers. Zero only when the products are equal; a difference too small for f32
 /// becomes the least normal number of its sign, so that the sign is always right; one too large the greatest finite value.
 /// A denormal factor counts as 0.
+#[inline]
 pub fn diffprod(a: f32, b: f32, c: f32, d: f32) -> f32 {
+    // In f64 the products are exact. Their difference is rounded to odd (Boldo, Melquiond 2008), so that rounding it once more
+    // gives what rounding it once would.
+    let (p, q) = (f64::from(a) * f64::from(b), f64::from(c) * f64::from(d));
+    let sum = p - q;
+    let back = sum - p;
+    let error = (p - (sum - back)) - (q + back);
+    let odd = if error == 0.0 || sum.to_bits() & 1 == 1 {
+        sum
+    } else if error > 0.0 {
+        sum.next_up()
+    } else {
+        sum.next_down()
+    };
+    let difference = odd as f32;
+    if [a, b, c, d, difference].into_iter().all(is_inside) { difference } else { diffprod_by_integers(a, b, c, d) }
+}
+
+/// [`diffprod`] as the kernel carries it out.
+fn diffprod_by_integers(a: f32, b: f32, c: f32, d: f32) -> f32 {
     let (ua, ub, uc, ud) = (a.to_bits(), b.to_bits(), c.to_bits(), d.to_bits());
     let mut p = significand_product(ua, ub);
     let mut q = significand_product(uc, ud);
@@ -224,11 +277,13 @@ pub struct TriangleHit {
     pub det: f32,
 }
 
+#[inline(always)]
 fn is_tiny(x: f32) -> bool {
     x.to_bits() & !SIGN < TINY_EDGE
 }
 
 /// A vertex relative to the ray's origin, sheared along the ray: (x, y) on the plane across axis kz, z along kz.
+#[inline(always)]
 pub fn shear(f: &RayFrame, v: [f32; 3]) -> [f32; 3] {
     let p = [v[f.kx as usize], v[f.ky as usize], v[f.kz as usize]];
     [barrier(p[0] - barrier(f.sx * p[2])), barrier(p[1] - barrier(f.sy * p[2])), p[2]]
@@ -236,6 +291,7 @@ pub fn shear(f: &RayFrame, v: [f32; 3]) -> [f32; 3] {
 
 /// Closest-hit candidate of the ray (0, d), f = ray_frame(d), with a triangle whose vertices are relative to the ray's
 /// origin. Closed on its edges, two-sided, t >= t_min >= 0. Accept it when t < best.t, or t == best.t and its id is lower.
+#[inline(always)]
 pub fn intersect_triangle(f: &RayFrame, a: [f32; 3], b: [f32; 3], c: [f32; 3], t_min: f32) -> TriangleHit {
     let miss = TriangleHit::default();
     let (sa, sb, sc) = (shear(f, a), shear(f, b), shear(f, c));
@@ -248,7 +304,7 @@ pub fn intersect_triangle(f: &RayFrame, a: [f32; 3], b: [f32; 3], c: [f32; 3], t
         v = diffprod(sa[0], sc[1], sa[1], sc[0]);
         w = diffprod(sb[0], sa[1], sb[1], sa[0]);
     }
-    if u.min(v.min(w)) < 0.0 && u.max(v.max(w)) > 0.0 {
+    if least(u, least(v, w)) < 0.0 && most(u, most(v, w)) > 0.0 {
         return miss;
     }
     let det = barrier(barrier(u + v) + w);
@@ -261,29 +317,31 @@ pub fn intersect_triangle(f: &RayFrame, a: [f32; 3], b: [f32; 3], c: [f32; 3], t
         return miss;
     }
     // The slab of the padded triangle: with t inside it, no box that holds the triangle is pruned before t.
-    let low = zip(a, zip(b, c, f32::min), f32::min);
-    let high = zip(a, zip(b, c, f32::max), f32::max);
-    let m = greatest(zip(low, high, |l, h| l.abs().max(h.abs())));
+    let low = zip(a, zip(b, c, least), least);
+    let high = zip(a, zip(b, c, most), most);
+    let m = greatest(zip(low, high, |l, h| most(l.abs(), h.abs())));
     let e = barrier(CLAMP_ULPS * m);
     let t0 = zip(low, f.inv, |l, i| barrier(barrier(l - e) * i));
     let t1 = zip(high, f.inv, |h, i| barrier(barrier(h + e) * i));
-    let n = greatest(zip(t0, t1, f32::min));
-    let far = zip(t0, t1, f32::max);
-    let x = far[0].min(far[1].min(far[2]));
+    let n = greatest(zip(t0, t1, least));
+    let far = zip(t0, t1, most);
+    let x = least(far[0], least(far[1], far[2]));
     if x < t_min {
         return miss;
     }
     // Without the sign of a zero, which max leaves open.
-    let clamped = t.min(x).max(n.max(t_min)).to_bits() & !SIGN;
+    let clamped = most(least(t, x), most(n, t_min)).to_bits() & !SIGN;
     TriangleHit { hit: true, t: f32::from_bits(clamped), u, v, w, det }
 }
 
+#[inline(always)]
 fn zip(a: [f32; 3], b: [f32; 3], f: impl Fn(f32, f32) -> f32) -> [f32; 3] {
     [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2])]
 }
 
+#[inline(always)]
 fn greatest(x: [f32; 3]) -> f32 {
-    x[0].max(x[1].max(x[2]))
+    most(x[0], most(x[1], x[2]))
 }
 
 /// A point on a triangle from which rays can start, in the frame of the vertices.
@@ -307,7 +365,7 @@ fn dot(x: [f32; 3], y: [f32; 3]) -> f32 {
 }
 
 /// Length of x, whose squares stay within the normal range.
-fn length_of(x: [f32; 3]) -> f32 {
+pub fn length_of(x: [f32; 3]) -> f32 {
     square_root(dot(x, x))
 }
 

@@ -1,7 +1,7 @@
 //! What every effect of a frame adds to the picture and what its rays hit, to be set beside another rendering of the frame.
 
-use crate::gpu::executor::GpuExecutor;
-use crate::gpu::layout::{Hit, NONE};
+use crate::kernel::FrameExecutor;
+use crate::kernel::layout::{Hit, NONE};
 use crate::schedule::{ExecutorError, Lamp, Pass};
 
 /// The pictures of the effects of one frame.
@@ -44,7 +44,7 @@ impl Captures {
     ///
     /// # Errors
     /// The device's.
-    pub fn note(&mut self, executor: &mut GpuExecutor, name: &'static str) -> Result<(), ExecutorError> {
+    pub fn note(&mut self, executor: &mut dyn FrameExecutor, name: &'static str) -> Result<(), ExecutorError> {
         let now = executor.read_radiance()?;
         let of_bounce = name.ends_with("-shadow");
         let pass = match name {

@@ -2,15 +2,13 @@
 
 use super::pass_record::FrameRecords;
 use super::{Captures, Effects, Light, camera_view};
-use crate::gpu::executor::GpuExecutor;
-use crate::gpu::layout::{GBuffer, Hit, NONE, Ray, Surface};
+use crate::kernel::FrameExecutor;
+use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
 use crate::schedule::auto::{Auto, Fixed};
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{
-    Executor, ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain,
-};
+use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain};
 use crate::stats::Record;
 use crate::stream::HostCacheStats;
 use bricks::SceneFile;
@@ -87,7 +85,7 @@ pub struct Renderer {
     /// The scene.
     pub scene: Arc<SceneFile>,
     /// The executor.
-    pub executor: GpuExecutor,
+    pub executor: Box<dyn FrameExecutor>,
     /// The cache.
     pub cache: Cache,
     /// Settings of all frames.
@@ -127,7 +125,7 @@ impl Renderer {
             self.executor.begin_frame(&view);
             records.pass(self, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, stats)?;
-                attributes::resolve(&mut r.executor, &mut r.cache, Pass::Primary, stats)?;
+                attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none();
                 r.shade(Pass::Shadow(Lamp::Sun), Shading { sun: !effects.shadow, sky }, stats)
             })?;
@@ -164,7 +162,7 @@ impl Renderer {
         let (frame, effects) = (records.frame(), self.settings.effects);
         records.pass(self, name, |r, stats| {
             r.trace(frame, pass, stats)?;
-            attributes::resolve(&mut r.executor, &mut r.cache, pass, stats)?;
+            attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
             let sky = pass == Pass::Mirror;
             r.shade(Pass::BounceShadow(Lamp::Sun), Shading { sun: !effects.shadow, sky }, stats)
         })?;
@@ -221,7 +219,7 @@ impl Renderer {
             Schedule::PlainBinary => {
                 let tracing = &self.settings.tracing;
                 let first = [Step::Generate];
-                return plain::trace_binary(&mut self.executor, &mut self.cache, pass, &first, tracing, stats);
+                return plain::trace_binary(&mut *self.executor, &mut self.cache, pass, &first, tracing, stats);
             }
             Schedule::Auto => {
                 let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
@@ -247,7 +245,7 @@ impl Renderer {
     ) -> Result<(), ExecutorError> {
         let tracing = &self.settings.tracing;
         let first = [Step::Generate];
-        let (executor, cache) = (&mut self.executor, &mut self.cache);
+        let (executor, cache) = (&mut *self.executor, &mut self.cache);
         match (schedule, &mut self.fronts) {
             (Fixed::Plain, _) => plain::trace(executor, cache, pass, &first, tracing, stats),
             (Fixed::Demand, _) => demand::trace(executor, cache, pass, &first, tracing, stats),

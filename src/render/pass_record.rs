@@ -75,7 +75,7 @@ impl FrameRecords {
         effect.ahead.prefetched_used_bytes += host.prefetched_used_bytes - seen.prefetched_used_bytes;
         effect.ahead.prefetched_wasted_bytes += host.prefetched_wasted_bytes - seen.prefetched_wasted_bytes;
         if let Some(captures) = &mut renderer.captures {
-            captures.note(&mut renderer.executor, name)?;
+            captures.note(&mut *renderer.executor, name)?;
         }
         Ok(())
     }

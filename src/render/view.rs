@@ -2,9 +2,9 @@
 
 use super::effects::SURFACE_SHARE;
 use super::{Effects, Light};
-use crate::gpu::executor::{Directions, View};
-use crate::gpu::layout::Params;
-use crate::gpu::scene::Frame;
+use crate::kernel::frame::Frame;
+use crate::kernel::layout::Params;
+use crate::kernel::{Directions, View};
 use crate::math::sampling::halton;
 use crate::scene::Camera;
 use bricks::Resident;

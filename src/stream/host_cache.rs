@@ -194,15 +194,21 @@ pub struct Reservation {
 impl Reservation {
     /// Puts a copy of `payload`, which must be verified and of the reserved length, into the cache. Of another length, it
     /// is not put in.
-    pub fn fill(mut self, payload: &[u8]) {
+    pub fn fill(self, payload: &[u8]) {
+        if payload.len() as u64 == self.bytes {
+            self.share(Arc::from(payload));
+        }
+    }
+
+    /// Puts `payload` itself into the cache, as [`Self::fill`] does a copy.
+    pub fn share(mut self, payload: Arc<[u8]>) {
         if payload.len() as u64 != self.bytes {
             return;
         }
-        let copy: Arc<[u8]> = Arc::from(payload);
         let mut inner = self.cache.lock();
         let Inner { entries, stats, .. } = &mut *inner;
         if let Some(entry) = entries.peek_mut(&self.item) {
-            entry.payload = Some(copy);
+            entry.payload = Some(payload);
             stats.entries += 1;
             stats.inserted += 1;
             if entry.ahead {

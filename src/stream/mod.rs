@@ -34,4 +34,4 @@ pub use prefetch::{BrickBox, Frustum, Prefetcher, nearest_in_view, predict};
 pub use residency::{Counters, KindCounters, NoRoom, Placed, Residency, ResidencyError};
 pub use source::{PayloadSource, SourceError};
 pub use trace::{PassRequests, Replay, ReplayResult, Trace, TraceError, replay};
-pub use workers::{Destination, Loaded, StreamError, Workers, WorkersStats};
+pub use workers::{Destination, Loaded, StreamError, WorkerPool, Workers, WorkersStats};

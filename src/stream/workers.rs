@@ -25,8 +25,49 @@ const QUEUED_JOBS_PER_THREAD: usize = 4;
 
 /// Where a payload goes, such as a mapped, write-only range of a staging buffer.
 pub trait Destination: Send + 'static {
+    /// Whether the destination keeps payloads as they are in host memory, shared with the host cache.
+    const SHARES: bool = false;
+
     /// Takes the verified payload. Called once, on a worker thread, and not at all when the payload cannot be had.
     fn fill(&mut self, bytes: &[u8]);
+
+    /// Takes the verified payload in memory of its own, in place of [`Self::fill`], where it lies in such.
+    fn share(&mut self, payload: Arc<[u8]>) {
+        self.fill(&payload);
+    }
+}
+
+/// What frames ask of workers beside loads, whatever their destinations.
+pub trait WorkerPool {
+    /// As [`Workers::prefetch`].
+    fn prefetch(&self, items: &[Item]) -> usize;
+
+    /// As [`Workers::cancel_prefetch`].
+    fn cancel_prefetch(&self);
+
+    /// As [`Workers::host_cache`].
+    fn host_cache(&self) -> &Arc<HostCache>;
+
+    /// As [`Workers::stats`].
+    fn stats(&self) -> WorkersStats;
+}
+
+impl<D: Destination> WorkerPool for Workers<D> {
+    fn prefetch(&self, items: &[Item]) -> usize {
+        Self::prefetch(self, items)
+    }
+
+    fn cancel_prefetch(&self) {
+        Self::cancel_prefetch(self);
+    }
+
+    fn host_cache(&self) -> &Arc<HostCache> {
+        Self::host_cache(self)
+    }
+
+    fn stats(&self) -> WorkersStats {
+        Self::stats(self)
+    }
 }
 
 /// Why something was not loaded.
@@ -365,16 +406,28 @@ fn answer<D: Destination>(shared: &Shared, job: Job<D>, buffer: &mut Vec<u8>) {
     // and the reservation gives its room back when dropped.
     let outcome = catch_unwind(AssertUnwindSafe(|| match cached {
         Some(payload) => {
-            destination.fill(&payload);
             add(&shared.tally.cached, 1);
             add(&shared.tally.cached_bytes, payload.len() as u64);
+            destination.share(payload);
             Ok(())
         }
         None => {
-            let payload = read(shared, item, bytes, buffer)?;
-            destination.fill(payload);
-            if let Some(reservation) = reservation {
-                reservation.fill(payload);
+            if D::SHARES {
+                // Zeroed in place: the payload is read into the memory in which it stays.
+                let mut payload: Arc<[u8]> = std::iter::repeat_n(0, bytes).collect();
+                if let Some(memory) = Arc::get_mut(&mut payload).filter(|memory| !memory.is_empty()) {
+                    shared.source.copy(item, memory)?;
+                }
+                if let Some(reservation) = reservation {
+                    reservation.share(payload.clone());
+                }
+                destination.share(payload);
+            } else {
+                let payload = read(shared, item, bytes, buffer)?;
+                destination.fill(payload);
+                if let Some(reservation) = reservation {
+                    reservation.fill(payload);
+                }
             }
             add(&shared.tally.read, 1);
             add(&shared.tally.read_bytes, bytes as u64);

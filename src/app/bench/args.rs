@@ -2,6 +2,7 @@
 
 use super::plan::Stage;
 use crate::app::args::{UNITS, ranged};
+use crate::app::device::Adapter;
 use crate::app::sizes::{ImageSize, positive_count};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -71,9 +72,10 @@ pub struct ChcArgs {
     /// Width and height of a screen tile in pixels, a power of two from 8 to 512 [default: 64; with --quick 16]
     #[arg(long, value_name = "PIXELS", value_parser = crate::app::args::tile)]
     pub tile: Option<u32>,
-    /// Use the graphics adapter whose name contains NAME, upper and lower case alike [default: a GPU, else software]
-    #[arg(long, value_name = "NAME")]
-    pub adapter: Option<String>,
+    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics adapter whose
+    /// name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
+    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
+    pub adapter: Adapter,
     /// Occlusion and diffuse rays a pixel [default: 20; with --quick 2].
     #[arg(long, hide = true, value_parser = repetitions)]
     pub rays: Option<u32>,

@@ -6,10 +6,11 @@ use super::paper::THRESHOLDS;
 use super::plan::{Case, PLAIN, PLAIN_BVH2, Variant};
 use super::scenes::Place;
 use crate::app::args::{Cli, Command, WalkArgs};
+use crate::app::device::Adapter;
 use crate::app::output::png;
 use crate::app::session::{Session, open_scene, scaled_threshold};
 use crate::app::walk;
-use crate::gpu::rays::Extent;
+use crate::kernel::Extent;
 use crate::render::{Renderer, Schedule};
 use crate::scene::path::CameraPath;
 use crate::schedule::auto::Auto;
@@ -55,7 +56,7 @@ pub struct Bench<'a> {
     renderer: Renderer,
     settings: &'a Settings,
     place: &'a Place,
-    adapter: Option<&'a str>,
+    adapter: &'a Adapter,
     /// Whether the binary trees could be made; else why not.
     binary: Result<(), String>,
 }
@@ -74,7 +75,7 @@ impl<'a> Bench<'a> {
         case: &Case,
         place: &'a Place,
         settings: &'a Settings,
-        adapter: Option<&'a str>,
+        adapter: &'a Adapter,
         wants_binary: bool,
     ) -> Result<Self> {
         let open = |variant: Variant| -> Result<Renderer> {
@@ -118,7 +119,7 @@ impl<'a> Bench<'a> {
         let items: Vec<Item> = items.collect();
         let mut rest = &items[..];
         while !rest.is_empty() {
-            let count = cache.load(executor, rest, AT_A_TIME, &mut PassStats::default())?;
+            let count = cache.load(&mut **executor, rest, AT_A_TIME, &mut PassStats::default())?;
             rest = &rest[count..];
         }
         Ok(())
@@ -142,7 +143,7 @@ impl<'a> Bench<'a> {
         if case.cache < 100 {
             let old = &renderer.cache;
             let sizes: Vec<(u64, u64)> = old.bytes.iter().map(|b| (b.geometry, b.attributes)).collect();
-            let page_bytes = renderer.executor.gpu().page_bytes();
+            let page_bytes = renderer.executor.page_bytes();
             let residency = Residency::new(&sizes, old.residency.budget_bytes(), page_bytes, old.residency.policy())?;
             renderer.cache = Cache::new(residency, old.bytes.clone(), None);
         }
@@ -246,7 +247,7 @@ fn of_device(error: &anyhow::Error) -> bool {
 }
 
 /// The options of the walk that a user would type.
-fn words(case: &Case, place: &Place, settings: &Settings, adapter: Option<&str>) -> Result<WalkArgs> {
+fn words(case: &Case, place: &Place, settings: &Settings, adapter: &Adapter) -> Result<WalkArgs> {
     let Variant { schedule, threshold, rotation, without, needed, fronts } = case.variant;
     let rays = settings.rays;
     let mut line = format!(
@@ -267,9 +268,7 @@ fn words(case: &Case, place: &Place, settings: &Settings, adapter: Option<&str>)
     let mut words: Vec<OsString> = ["brickwalk", "walk", "-o", "."].map(OsString::from).to_vec();
     words.push(place.scene.clone().into());
     words.extend(line.split_whitespace().map(OsString::from));
-    if let Some(adapter) = adapter {
-        words.extend(["--adapter".into(), adapter.into()]);
-    }
+    words.extend(["--adapter".into(), adapter.to_string().into()]);
     match Cli::try_parse_from(words).context("the bench's own walk")?.command {
         Command::Walk(args) => Ok(*args),
         _ => bail!("the bench's own walk is none"),

@@ -13,10 +13,11 @@ mod plots;
 mod scenes;
 mod tables;
 
+use super::device::Device;
 use super::interrupt;
 use super::output::atomic;
 use super::sizes::human_count;
-use crate::gpu::device::Gpu;
+use crate::kernel::DeviceInfo;
 use anyhow::{Result, bail};
 use args::{BenchArgs, ChcArgs, Experiments, Settings};
 use brickwalk_convert::progress::Progress;
@@ -75,7 +76,7 @@ fn chc(args: &ChcArgs, settings: &Settings) -> Result<()> {
 
 /// The settings that make measurements comparable.
 fn header(args: &ChcArgs, settings: &Settings) -> Result<Header> {
-    let info = Gpu::open(args.adapter.as_deref())?.info;
+    let DeviceInfo { name, driver, driver_info, backend, .. } = Device::open(&args.adapter)?.info();
     Ok(Header {
         format: cells::FORMAT,
         settings: json!({
@@ -89,10 +90,10 @@ fn header(args: &ChcArgs, settings: &Settings) -> Result<Header> {
             "sponza": args.sponza.as_ref().map(|file| file.file_name().map(|name| name.to_string_lossy().into_owned())),
         }),
         adapter: json!({
-            "name": info.name,
-            "driver": info.driver,
-            "driver_info": info.driver_info,
-            "backend": info.backend.to_string(),
+            "name": name,
+            "driver": driver,
+            "driver_info": driver_info,
+            "backend": backend,
         }),
         commit: env!("BRICKWALK_COMMIT").into(),
     })
@@ -135,8 +136,7 @@ impl Run<'_> {
             let folder = self.args.scenes.clone().unwrap_or_else(|| self.args.output.join("scenes"));
             let place = scenes::place(first.scene, &folder, self.settings, self.args.sponza.as_deref())?;
             let wants_binary = open.iter().any(|case| case.variant.schedule == PLAIN_BVH2.schedule);
-            let adapter = self.args.adapter.as_deref();
-            let mut bench = match Bench::open(first, &place, self.settings, adapter, wants_binary) {
+            let mut bench = match Bench::open(first, &place, self.settings, &self.args.adapter, wants_binary) {
                 Ok(bench) => bench,
                 Err(error) if error.is::<DoesNotFit>() => {
                     self.notes.push(format!("{} with a cache of {} %: {error}", first.scene.name(), first.cache));

@@ -1,6 +1,6 @@
 //! The probe's scene file is what the converter makes of the scene below. `BRICKWALK_REGENERATE_PROBE=1` writes it anew.
 
-use crate::gpu::layout::{BRICK_INDEX32, BRICK_WIDE};
+use crate::kernel::layout::{BRICK_INDEX32, BRICK_WIDE};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;

@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::gpu::device::Gpu;
-use crate::gpu::executor::{GpuExecutor, Setup};
+use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::{self, Kernels};
-use crate::gpu::rays::Extent;
-use crate::gpu::scene::Frame;
+use crate::kernel::frame::Frame;
+use crate::kernel::{Extent, Setup};
 use crate::stream::{HostCache, Workers};
 use std::sync::Arc;
 

@@ -7,10 +7,10 @@
 use super::rays::{RAYS, rays};
 use super::twin::{Twin, closest};
 use super::{Check, no_results, scene};
-use crate::gpu::executor::{Directions, GpuExecutor, Setup, View};
-use crate::gpu::layout::{Hit, NONE, Params, Ray, Surface};
-use crate::gpu::rays::Extent;
-use crate::gpu::scene::Frame;
+use crate::gpu::executor::GpuExecutor;
+use crate::kernel::frame::Frame;
+use crate::kernel::layout::{Hit, NONE, Params, Ray, Surface};
+use crate::kernel::{Directions, Extent, FrameExecutor, Setup, View};
 use crate::schedule::cache::{BrickBytes, Cache};
 use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Step, Tracing, chc, demand, plain};
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};

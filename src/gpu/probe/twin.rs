@@ -1,9 +1,12 @@
 //! The twin of the intersection kernels: every ray with every triangle of a scene, in f32, with nothing left out.
 
-use crate::gpu::layout::{self, BRICK_INDEX32, BRICK_WIDE, INSTANCE_IDENTITY, NONE};
-use crate::gpu::scene::{Frame, Placement};
+use crate::cpu::brick::BrickView;
+use crate::cpu::leaf::{BrickRay, rows_direction, rows_point};
+use crate::cpu::node::framed_ray;
+use crate::kernel::frame::{Frame, Placement};
+use crate::kernel::layout::{self, INSTANCE_IDENTITY, NONE};
 use crate::math::exact::{divide, intersect_triangle, ray_frame};
-use bricks::{GeometryLayout, Payload, SceneFile};
+use bricks::{Payload, SceneFile};
 
 /// All triangles of a scene, each of every instance, relative to the reference point of a frame.
 pub struct Twin {
@@ -16,17 +19,6 @@ struct Triangle {
     id: u32,
     /// In the frame of the instance's object.
     vertices: [[f32; 3]; 3],
-}
-
-/// Rows of a matrix with a direction, as `row_direction` of leaf.wgsl.
-fn turn(rows: &[[f32; 4]; 3], d: [f32; 3]) -> [f32; 3] {
-    rows.map(|r| (r[0] * d[0] + r[1] * d[1]) + r[2] * d[2])
-}
-
-/// Rows of a matrix with a point, as `row_point` of leaf.wgsl.
-fn place(rows: &[[f32; 4]; 3], p: [f32; 3]) -> [f32; 3] {
-    let turned = turn(rows, p);
-    [0, 1, 2].map(|k| turned[k] + rows[k][3])
 }
 
 impl Twin {
@@ -43,27 +35,16 @@ impl Twin {
             let payload = Payload::Geometry(leaf.brick);
             let mut words = vec![0u32; scene.span(payload).bytes as usize / 4];
             scene.copy(payload, bytemuck::cast_slice_mut(&mut words))?;
-            let layout = GeometryLayout::of(brick);
-            let from = |bytes: u64| &words[bytes as usize / 4..];
-            let (vertices, ids, indices) = (from(layout.vertices), from(layout.ids), from(layout.indices));
-            let halves: &[u16] = bytemuck::cast_slice(indices);
-            // As `vertex` of brick.wgsl: rounded once.
-            let vertex = |i: usize| {
-                let at = |word: usize| f32::from_bits(vertices[word]);
-                [0, 1, 2].map(|k| match brick.flags & BRICK_WIDE {
-                    0 => at(3 * i + k) + leaf.offset_high[k],
-                    _ => (at(6 * i + k) + leaf.offset_high[k]) + (at(6 * i + 3 + k) + leaf.offset_low[k]),
-                })
-            };
             let instance = leaf.instance as usize;
-            for triangle in 0..brick.triangle_count as usize {
-                let corners = [0, 1, 2].map(|k| match brick.flags & BRICK_INDEX32 {
-                    0 => usize::from(halves[3 * triangle + k]),
-                    _ => indices[3 * triangle + k] as usize,
-                });
-                let id = placement.instances[instance].base + ids[triangle];
-                triangles.push(Triangle { instance, id, vertices: corners.map(vertex) });
-            }
+            let r = BrickRay {
+                offset_high: leaf.offset_high,
+                offset_low: leaf.offset_low,
+                base: placement.instances[instance].base,
+                brick: BrickView::new(brick, bytemuck::cast_slice(&words)),
+                ..BrickRay::outside(&framed_ray([0.0; 3], [1.0, 0.0, 0.0], 0.0))
+            };
+            let triangle = |i| Triangle { instance, id: r.id(i), vertices: r.vertices(i) };
+            triangles.extend((0..brick.triangle_count).map(triangle));
         }
         Ok(Self { instances: placement.instances, triangles })
     }
@@ -72,7 +53,7 @@ impl Twin {
     pub fn world_triangles(&self) -> impl Iterator<Item = [[f32; 3]; 3]> + '_ {
         self.triangles.iter().map(|triangle| {
             let instance = &self.instances[triangle.instance];
-            triangle.vertices.map(|v| place(&instance.world_from_object, v))
+            triangle.vertices.map(|v| rows_point(&instance.world_from_object, v))
         })
     }
 
@@ -82,7 +63,7 @@ impl Twin {
             let identity = instance.flags & INSTANCE_IDENTITY != 0;
             let rows = &instance.object_from_world;
             let (o, d) = (ray.origin, ray.direction);
-            let (o, d) = if identity { (o, d) } else { (place(rows, o), turn(rows, d)) };
+            let (o, d) = if identity { (o, d) } else { (rows_point(rows, o), rows_direction(rows, d)) };
             (o, ray_frame(d))
         };
         let rays: Vec<_> = self.instances.iter().map(in_object).collect();

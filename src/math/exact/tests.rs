@@ -58,6 +58,7 @@ fn divide_is_correctly_rounded() {
     let mut approximation_wrong = 0;
     let mut check = |a: f32, b: f32| {
         wrong += u32::from(differ(divide(a, b), a / b));
+        wrong += u32::from(differ(divide_by_integers(a, b), a / b));
         // Negative control: what a kernel gets from a reciprocal.
         approximation_wrong += u32::from(differ(a * (1.0 / b), a / b));
     };
@@ -86,6 +87,30 @@ fn divide_is_correctly_rounded() {
     assert!(approximation_wrong > 100_000, "the control must show: {approximation_wrong}");
 }
 
+/// The processor's own operations give what the kernel's do, also where results leave the normal range.
+#[test]
+fn shortcuts_give_what_the_kernel_gives() {
+    let mut rng = Rng(9);
+    let (mut beyond, mut ordinary_differs, mut fused_differs) = (0, 0, 0);
+    for _ in 0..2_000_000 {
+        let (a, b) = (rng.float(-127, 127), rng.float(-127, 127));
+        if b != 0.0 {
+            assert_eq!(divide(a, b).to_bits(), divide_by_integers(a, b).to_bits(), "{a:e} {b:e}");
+            beyond += u32::from(!(a / b).is_normal());
+            ordinary_differs += u32::from(differ(a / b, divide_by_integers(a, b)));
+        }
+        assert_eq!(square_root(a.abs()).to_bits(), square_root_by_integers(a.abs()).to_bits(), "{a:e}");
+        // Products that are near each other, too.
+        let (c, d) = if a.to_bits() & 1 == 0 { (rng.float(-90, 90), rng.float(-90, 90)) } else { (a.next_up(), b) };
+        let exact = diffprod_by_integers(a, b, c, d);
+        assert_eq!(diffprod(a, b, c, d).to_bits(), exact.to_bits(), "{a:e} {b:e} {c:e} {d:e}");
+        fused_differs += u32::from(differ(a.mul_add(b, -(c * d)), exact));
+    }
+    assert!(beyond > 100_000, "{beyond}");
+    // Control: division alone would not do, nor one fused product.
+    assert!(ordinary_differs > 10_000 && fused_differs > 10_000, "{ordinary_differs} {fused_differs}");
+}
+
 #[test]
 fn divide_at_the_ends_of_the_range() {
     assert_eq!(divide(0.0, -3.0).to_bits(), SIGN);
@@ -105,10 +130,12 @@ fn square_root_is_correctly_rounded() {
         for _ in 0..4_000 {
             let x = rng.float(exponent, exponent).abs();
             assert_eq!(square_root(x).to_bits(), x.sqrt().to_bits(), "{x:e}");
+            assert_eq!(square_root_by_integers(x).to_bits(), x.sqrt().to_bits(), "{x:e}");
         }
     }
     for i in 0..=4096u32 {
         assert_eq!(square_root((i * i) as f32), i as f32);
+        assert_eq!(square_root_by_integers((i * i) as f32), i as f32);
     }
     assert_eq!(square_root(1e-40), 0.0);
 }

@@ -4,8 +4,10 @@
 //! tree over its at most eight children that has the least surface area, by dynamic programming over their subsets. Leaves
 //! stay what they are. Boxes are those of the triangles, not of the wide tree's grids.
 
-use crate::gpu::layout::{BINARY_LEAF, BinaryNode};
-use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NODE_WIDTH, Node};
+use super::layout::{BINARY_LEAF, BinaryNode};
+use crate::schedule::ExecutorError;
+use crate::stream::{Item, StreamError};
+use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NODE_WIDTH, Node, Payload, Resident, SceneFile};
 
 /// Bits below the number of a leaf's triangles.
 const COUNT_SHIFT: u32 = 29;
@@ -55,6 +57,34 @@ pub struct Tree {
     pub nodes: Vec<BinaryNode>,
     /// Levels of inner nodes: what a traversal's stack must hold at most.
     pub height: u32,
+}
+
+/// Makes the tree of brick number `brick` of `scene`.
+///
+/// # Errors
+/// A brick that cannot be read.
+pub fn tree_of(scene: &SceneFile, brick: usize) -> Result<Tree, ExecutorError> {
+    let item = Item::geometry(brick as u32);
+    let payload = Payload::from(item);
+    let mut geometry = vec![0u32; scene.loaded_bytes(payload) as usize / 4];
+    scene
+        .copy(payload, bytemuck::cast_slice_mut(&mut geometry))
+        .map_err(|reason| StreamError::Payload { item, reason: Box::new(reason) })?;
+    Ok(binary_tree(&scene.resident().bricks[brick], &geometry))
+}
+
+/// Levels of inner nodes of the binary top level.
+pub fn top_height(resident: &Resident) -> u32 {
+    let mut levels = vec![0; resident.top2.len()];
+    // Children follow their parent.
+    for (i, node) in resident.top2.iter().enumerate() {
+        if node.right != bricks::TOP_LEAF {
+            for child in [node.left, node.right] {
+                levels[child as usize] = levels[i] + 1;
+            }
+        }
+    }
+    levels.into_iter().max().unwrap_or(0)
 }
 
 /// Makes the tree of `brick` from the words of its geometry payload, which is valid.
@@ -190,5 +220,5 @@ fn above(x: f64) -> f32 {
 }
 
 #[cfg(test)]
-#[path = "tree_tests.rs"]
+#[path = "binary_tree_tests.rs"]
 mod tests;

@@ -1,6 +1,5 @@
 //! Which dispatches of which kernels a step consists of.
 
-use super::binary;
 use super::layout::{self, Params};
 use crate::math::sampling::{cosine_hemisphere, halton};
 use crate::schedule::{Lamp, Pass, Step};
@@ -82,6 +81,9 @@ pub struct Dispatch {
 fn list_most(pass: Pass) -> u32 {
     if pass == Pass::Primary { 128 } else { 12 }
 }
+
+/// The kernel that traverses binary trees.
+pub const INTERSECT_BINARY: &str = "intersect_binary";
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -182,7 +184,7 @@ pub fn dispatches(
         Step::SortByNumber => vec![kernel("tile_sort_number", params, per_tile, Some(1))],
         Step::SortNodesNear => vec![kernel("tile_sort_near", params, per_tile, Some(1))],
         Step::IntersectAll => vec![kernel("intersect_all", params, by_tile, Some(0))],
-        Step::IntersectBinary => vec![kernel(binary::KERNEL, params, by_tile, Some(0))],
+        Step::IntersectBinary => vec![kernel(INTERSECT_BINARY, params, by_tile, Some(0))],
         Step::IntersectAllResident => {
             let params = Params { select_mask: not_done, select_want: resident, ..params };
             vec![kernel(if everything { "intersect_all" } else { "intersect_selected" }, params, by_tile, Some(0))]

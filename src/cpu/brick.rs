@@ -1,0 +1,161 @@
+//! What a ray meets inside one brick: twin of `shaders/shared/brick.wgsl`.
+
+use super::leaf::{BrickRay, row_direction, rows_point};
+use super::node::UNIT;
+use super::scene::Scene;
+use super::vector::{Vec3, each, most3};
+use crate::kernel::layout::{BRICK_INDEX32, BRICK_WIDE, Hit, INSTANCE_IDENTITY, Surface};
+use crate::math::exact::{
+    SurfacePoint, TriangleHit, barrier, divide, intersect_triangle, length_of, offset_origin, surface_point,
+};
+use bricks::{Brick, GeometryLayout, Node};
+
+/// The arrays of a brick's geometry where they lie. What indices they hold has been checked when the payload was loaded; they
+/// are checked on every use all the same.
+#[derive(Clone, Copy, Default)]
+pub struct BrickView<'a> {
+    /// Nodes, the root first.
+    pub nodes: &'a [Node],
+    /// Three numbers a vertex, or six of a wide brick.
+    vertices: &'a [f32],
+    /// Mesh-local ids of the triangles.
+    ids: &'a [u32],
+    /// Three indices a triangle where they have 16 bits,
+    short: &'a [u16],
+    /// and where they have 32.
+    long: &'a [u32],
+    /// Whether vertices have two parts.
+    is_wide: bool,
+}
+
+impl<'a> BrickView<'a> {
+    /// The arrays in the verified geometry of `brick`, which is aligned for u32 and of the length that the record implies.
+    pub fn new(brick: &Brick, bytes: &'a [u8]) -> Self {
+        let layout = GeometryLayout::of(brick);
+        let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
+        let indices = part(layout.indices, layout.bytes);
+        let is_long = brick.flags & BRICK_INDEX32 != 0;
+        Self {
+            nodes: bytemuck::cast_slice(part(0, layout.vertices)),
+            vertices: bytemuck::cast_slice(part(layout.vertices, layout.ids)),
+            ids: bytemuck::cast_slice(part(layout.ids, layout.indices)),
+            short: if is_long { &[] } else { bytemuck::cast_slice(indices) },
+            long: if is_long { bytemuck::cast_slice(indices) } else { &[] },
+            is_wide: brick.flags & BRICK_WIDE != 0,
+        }
+    }
+
+    /// The vertices of a triangle, as numbers of them.
+    #[inline(always)]
+    fn triangle_indices(&self, triangle: u32) -> [u32; 3] {
+        let at = 3 * triangle as usize;
+        if self.long.is_empty() {
+            let i = &self.short[at..at + 3];
+            return [i[0].into(), i[1].into(), i[2].into()];
+        }
+        let i = &self.long[at..at + 3];
+        [i[0], i[1], i[2]]
+    }
+}
+
+/// The nearest hit so far.
+#[derive(Clone, Copy, Debug)]
+pub struct Best {
+    /// Distance.
+    pub t: f32,
+    /// Global id of the triangle.
+    pub id: u32,
+    /// Its leaf; NONE while this dispatch has found nothing.
+    pub leaf: u32,
+    /// Its number in the brick.
+    pub triangle: u32,
+    /// Its edge values, not divided.
+    pub hit: TriangleHit,
+    /// Triangle that the ray starts from.
+    pub source: u32,
+}
+
+impl BrickRay<'_> {
+    /// A vertex in the object's frame: the correctly rounded difference of its lattice position and the reference point.
+    #[inline(always)]
+    pub fn vertex(&self, index: u32) -> Vec3 {
+        if !self.brick.is_wide {
+            let at = 3 * index as usize;
+            let l = &self.brick.vertices[at..at + 3];
+            return each(|k| barrier(l[k] + self.offset_high[k]));
+        }
+        let at = 6 * index as usize;
+        let l = &self.brick.vertices[at..at + 6];
+        each(|k| barrier(barrier(l[k] + self.offset_high[k]) + barrier(l[3 + k] + self.offset_low[k])))
+    }
+
+    /// The vertices of a triangle in the object's frame.
+    #[inline(always)]
+    pub fn vertices(&self, triangle: u32) -> [Vec3; 3] {
+        let [a, b, c] = self.brick.triangle_indices(triangle);
+        [self.vertex(a), self.vertex(b), self.vertex(c)]
+    }
+
+    /// The global id of a triangle.
+    #[inline(always)]
+    pub fn id(&self, triangle: u32) -> u32 {
+        self.base.wrapping_add(self.brick.ids[triangle as usize])
+    }
+
+    /// Tests one triangle and keeps the nearer hit; at equal distance the lower global id, so that no order shows.
+    /// The triangle that the ray starts from is never met. Returns whether it is the best so far.
+    #[inline(always)]
+    pub fn test_triangle(&self, best: &mut Best, triangle: u32) -> bool {
+        let [a, b, c] = self.vertices(triangle);
+        let relative = |v: Vec3| each(|k| barrier(v[k] - self.ray.origin[k]));
+        let (a, b, c) = (relative(a), relative(b), relative(c));
+        let h = intersect_triangle(&self.ray.frame, a, b, c, self.ray.t_min);
+        if !h.hit || h.t > best.t {
+            return false;
+        }
+        let id = self.id(triangle);
+        if (h.t == best.t && id >= best.id) || id == best.source {
+            return false;
+        }
+        *best = Best { t: h.t, id, leaf: self.leaf, triangle, hit: h, source: best.source };
+        true
+    }
+
+    /// A hit that became the best in this dispatch: distance, id, barycentrics, and the point secondary rays start from.
+    pub fn write_hit(&self, scene: &Scene, best: &Best, world_direction: Vec3, hit: &mut Hit, surface: &mut Surface) {
+        let instance = &scene.instances[scene.leaves[best.leaf as usize].instance as usize];
+        let [a, b, c] = self.vertices(best.triangle);
+        let s = surface_point(a, b, c, &best.hit, self.ray.direction);
+        let det = best.hit.det;
+        *hit = Hit { t: best.t, id: best.id, u: divide(best.hit.v, det), v: divide(best.hit.w, det) };
+        let (mut point, mut normal, mut area) = (offset_origin(&s), s.n, s.area);
+        if instance.flags & INSTANCE_IDENTITY == 0 {
+            // Normals go by the inverse transpose: the columns of object_from_world.
+            let rows = &instance.object_from_world;
+            let n = each(|k| row_direction([rows[0][k], rows[1][k], rows[2][k], 0.0], s.n));
+            let stretch = length_of(n);
+            normal = n.map(|x| divide(x, stretch));
+            // Area vectors go by the cofactor matrix, det * inverse transpose.
+            area = barrier(barrier(area * stretch) * instance.volume);
+            let m = &instance.world_from_object;
+            let p = rows_point(m, point);
+            // The rounding of the transforms there and back (numerics.md, "Instances"), along the normal.
+            let reach = most3(p.map(f32::abs)).max(most3(each(|k| m[k][3].abs())));
+            let delta = 16.0 * UNIT * instance.scale * reach;
+            // A zero component moves away from where the ray points.
+            let sign = |k: usize| (if normal[k] == 0.0 { -world_direction[k] } else { normal[k] }).to_bits() >> 31;
+            let down = sign(0) | (sign(1) << 1) | (sign(2) << 2);
+            point = offset_origin(&SurfacePoint { p, delta, n: normal, down, area });
+        }
+        *surface = Surface {
+            point,
+            leaf: best.leaf,
+            normal,
+            triangle: best.triangle,
+            area,
+            source: best.source,
+            pending: surface.pending,
+            padding: 0,
+        };
+    }
+}

@@ -1,0 +1,159 @@
+//! The payloads that are resident: verified bytes in host memory, shared with the host cache, and the places that they take of the
+//! budget.
+
+use super::brick::BrickView;
+use super::resolve::AttributeView;
+use crate::schedule::{BrickStates, ExecutorError, Load};
+use crate::stream::{Destination, Item, Slot, Workers};
+use bricks::{Resident, SceneFile};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Where a worker puts a payload: memory that it may share with the host cache.
+#[derive(Default)]
+pub struct Shared(Option<Arc<[u8]>>);
+
+impl Destination for Shared {
+    const SHARES: bool = true;
+
+    fn fill(&mut self, bytes: &[u8]) {
+        self.share(Arc::from(bytes));
+    }
+
+    fn share(&mut self, payload: Arc<[u8]>) {
+        self.0 = Some(payload);
+    }
+}
+
+/// What is resident.
+pub struct BrickCache {
+    /// By [`Item::index`]; each at one of `places`.
+    held: Vec<Option<Held>>,
+    /// Bytes and owner of every place that is taken.
+    places: BTreeMap<Slot, (u64, Item)>,
+}
+
+/// A payload and the place that it takes.
+struct Held {
+    place: Slot,
+    bytes: Arc<[u8]>,
+}
+
+impl BrickCache {
+    /// Nothing of `bricks` bricks.
+    pub fn new(bricks: usize) -> Self {
+        Self { held: (0..2 * bricks).map(|_| None).collect(), places: BTreeMap::new() }
+    }
+
+    /// Has the workers bring payloads. What lay at their places is given up first, so that never more is held than the budget
+    /// says.
+    ///
+    /// # Errors
+    /// The first payload that cannot be read or verified; none of `loads` is resident then.
+    pub fn load(&mut self, scene: &SceneFile, workers: &Workers<Shared>, loads: &[Load]) -> Result<(), ExecutorError> {
+        for load in loads {
+            // What was evicted and not overwritten may come back elsewhere.
+            if let Some(held) = self.held[load.item.index()].take() {
+                self.places.remove(&held.place);
+            }
+            self.give_up(load.slot, scene.loaded_bytes(load.item.into()));
+        }
+        let requests = loads.iter().map(|load| (load.item, Shared::default())).collect();
+        let loaded = workers.load(requests)?;
+        for (load, (item, Shared(payload))) in loads.iter().zip(loaded) {
+            self.places.insert(load.slot, (scene.loaded_bytes(item.into()), item));
+            self.held[item.index()] = payload.map(|bytes| Held { place: load.slot, bytes });
+        }
+        Ok(())
+    }
+
+    /// Frees everything that lies in the `bytes` from `slot` on.
+    fn give_up(&mut self, slot: Slot, bytes: u64) {
+        let end = u64::from(slot.offset) + bytes;
+        // Places do not overlap: of those before, the last alone can reach in.
+        let before =
+            self.places.range(..slot).next_back().filter(|(at, (bytes, _))| {
+                at.page == slot.page && u64::from(at.offset) + bytes > u64::from(slot.offset)
+            });
+        let within = self.places.range(slot..).take_while(|(at, _)| at.page == slot.page && u64::from(at.offset) < end);
+        let overlapped: Vec<(Slot, Item)> =
+            before.into_iter().chain(within).map(|(&at, &(_, item))| (at, item)).collect();
+        for (at, item) in overlapped {
+            self.places.remove(&at);
+            self.held[item.index()] = None;
+        }
+    }
+
+    /// Every brick's geometry; of bricks that are not resident, nothing.
+    ///
+    /// # Errors
+    /// A brick that `bricks` says is resident and was never loaded; with `all`, a brick that is not resident.
+    pub fn geometry(
+        &self,
+        resident: &Resident,
+        bricks: &BrickStates,
+        all: bool,
+    ) -> Result<Vec<BrickView<'_>>, ExecutorError> {
+        let view = |(i, brick)| match &self.held[Item::geometry(i as u32).index()] {
+            Some(held) => Ok(BrickView::new(brick, &held.bytes)),
+            None if all || bricks.geometry(i).is_some() => Err(missing(Item::geometry(i as u32))),
+            None => Ok(BrickView::default()),
+        };
+        resident.bricks.iter().enumerate().map(view).collect()
+    }
+
+    /// Every brick's attributes; of bricks whose attributes are not resident, nothing.
+    ///
+    /// # Errors
+    /// A brick whose attributes `bricks` says are resident and were never loaded.
+    pub fn attributes(
+        &self,
+        resident: &Resident,
+        bricks: &BrickStates,
+    ) -> Result<Vec<AttributeView<'_>>, ExecutorError> {
+        let view = |(i, brick)| match &self.held[Item::attributes(i as u32).index()] {
+            Some(held) => Ok(AttributeView::new(brick, &held.bytes)),
+            None if bricks.attributes(i).is_some() => Err(missing(Item::attributes(i as u32))),
+            None => Ok(AttributeView::default()),
+        };
+        resident.bricks.iter().enumerate().map(view).collect()
+    }
+}
+
+fn missing(item: Item) -> ExecutorError {
+    ExecutorError::Device(format!("was to use {item}, which it does not hold; this is a defect"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::probe;
+    use crate::stream::HostCache;
+
+    fn at(offset: u32) -> Slot {
+        Slot { page: 0, offset }
+    }
+
+    #[test]
+    fn what_is_overwritten_is_given_up_and_nothing_else() {
+        let scene = Arc::new(probe::scene().unwrap());
+        let workers = Workers::new(scene.clone(), HostCache::new(0), 1, 0).unwrap();
+        let mut cache = BrickCache::new(scene.resident().bricks.len());
+        let mut load = |brick: u32, slot: Slot| {
+            cache.load(&scene, &workers, &[Load { item: Item::geometry(brick), slot }]).unwrap();
+            let held = |brick: u32| cache.held[Item::geometry(brick).index()].is_some();
+            assert_eq!(cache.places.len(), cache.held.iter().flatten().count(), "one place each");
+            [held(0), held(1), held(2)]
+        };
+        assert_eq!(load(0, at(0)), [true, false, false]);
+        // Comes back elsewhere, and stays when its old place is taken.
+        assert_eq!(load(0, at(1 << 20)), [true, false, false]);
+        assert_eq!(load(1, at(0)), [true, true, false]);
+        // Begins within one that lies before it.
+        assert_eq!(load(2, at(16)), [true, false, true]);
+        // Covers the beginning of one that lies behind it.
+        assert_eq!(load(1, at((1 << 20) - 16)), [false, true, true]);
+        // Another page is another place.
+        assert_eq!(load(0, Slot { page: 1, offset: 16 }), [true, true, true]);
+    }
+}

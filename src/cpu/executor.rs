@@ -1,0 +1,323 @@
+//! The CPU executor: runs the kernels that a step consists of one after the other, each over all rays or tiles in parallel.
+
+use super::cache::{BrickCache, Shared};
+use super::generate::{
+    generate_diffuse, generate_mirror, generate_occlusion, generate_primary, generate_shadow, start_hits,
+};
+use super::intersect_all::intersect_all;
+use super::intersect_binary::{BinaryTrees, intersect_binary};
+use super::intersect_list::intersect_list;
+use super::isa::Best;
+use super::query::query;
+use super::query_all::query_all;
+use super::query_pairs::query_pairs;
+use super::rays::{RaySet, Work};
+use super::resolve::{AttributeView, Texels, resolve};
+use super::scene::{Bound, Counters, Demand, Scene};
+use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
+use super::tile_bounds::tile_bounds;
+use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
+use super::tile_walk::{tile_walk_count, tile_walk_write};
+use crate::kernel::dispatch::{Dispatch, INTERSECT_BINARY, dispatches};
+use crate::kernel::layout::{self, Params};
+use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, View, padded, report};
+use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::stream::{WorkerPool, Workers};
+use bricks::SceneFile;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Bytes of a page of the cache: offsets within one are u32. Pages are numbers here, no memory.
+const PAGE_BYTES: u64 = 1 << 30;
+
+/// What kernels write.
+struct Buffers {
+    /// Rays by their set ([`Pass::set`]).
+    sets: [RaySet; 3],
+    pixels: Pixels,
+    tiles: TileLists,
+}
+
+/// Renders one scene on the processor.
+pub struct CpuExecutor {
+    file: Arc<SceneFile>,
+    workers: Workers<Shared>,
+    cache: BrickCache,
+    scene: Scene,
+    texels: Texels,
+    buffers: Buffers,
+    binary: Option<BinaryTrees>,
+    extent: Extent,
+    view: Params,
+    directions: Directions,
+    threshold: u32,
+    leaf_cache: bool,
+    list_most: u32,
+    count: bool,
+    isa: Best,
+}
+
+impl CpuExecutor {
+    /// Largest number of bytes of one page of the cache.
+    pub const PAGE_BYTES: u64 = PAGE_BYTES;
+
+    /// Sets up buffers; nothing is resident.
+    ///
+    /// # Errors
+    /// Textures that cannot be read.
+    pub fn new(file: Arc<SceneFile>, workers: Workers<Shared>, setup: Setup) -> Result<Self, ExecutorError> {
+        let Setup { extent, threshold, count } = setup;
+        let rays = extent.rays();
+        let sets = [RaySet::new(rays), RaySet::new(rays), RaySet::new(0)];
+        let tiles = TileLists::new(extent.tiles() as usize);
+        Ok(Self {
+            cache: BrickCache::new(file.resident().bricks.len()),
+            scene: Scene::new(file.resident()),
+            texels: Texels::new(&file)?,
+            buffers: Buffers { sets, pixels: Pixels::new(rays), tiles },
+            binary: None,
+            extent,
+            view: Params::default(),
+            directions: Directions::default(),
+            threshold,
+            leaf_cache: false,
+            list_most: u32::MAX,
+            count,
+            isa: Best::detect(),
+            file,
+            workers,
+        })
+    }
+
+    /// The parameters of all dispatches of a submission.
+    fn params(&self) -> Params {
+        let extent = self.extent;
+        Params {
+            zero: 0,
+            width: extent.width,
+            height: extent.height,
+            tile: extent.tile,
+            tiles_x: extent.tiles_x(),
+            tiles: extent.tiles(),
+            // Lists grow as they are placed.
+            list_capacity: u32::MAX,
+            threshold: self.threshold,
+            list_most: self.list_most,
+            pair_count: self.buffers.tiles.pairs.len() as u32,
+            top_count: self.scene.top2.len() as u32,
+            instance_pad: self.scene.instance_pad,
+            ..self.view
+        }
+    }
+
+    /// Whether lists are intersected by the kernel that postpones groups of triangles, for tests.
+    #[cfg(test)]
+    pub(super) fn leaf_cache(&self) -> bool {
+        self.leaf_cache
+    }
+
+    /// The tiles and their lists, for tests.
+    #[cfg(test)]
+    pub(super) fn tiles(&self) -> &TileLists {
+        &self.buffers.tiles
+    }
+}
+
+/// Runs one kernel by its name.
+fn run_kernel(
+    dispatch: &Dispatch,
+    pass: Pass,
+    bound: &Bound,
+    buffers: &mut Buffers,
+    attributes: &[AttributeView],
+    texels: &Texels,
+    binary: Option<&BinaryTrees>,
+) -> Result<(), ExecutorError> {
+    let Buffers { sets, pixels, tiles } = buffers;
+    // The set of the pass, and the one before it, whose hits are shaded.
+    let shaded = pass.set().saturating_sub(1);
+    let (before, from) = sets.split_at_mut(pass.set());
+    let own = &mut from[0];
+    let none = RaySet::default();
+    let seen = before.last().unwrap_or(&none);
+    match dispatch.kernel {
+        "generate_primary" => generate_primary(bound, own),
+        "generate_shadow" => generate_shadow(bound, own, seen),
+        "generate_occlusion" => generate_occlusion(bound, own, seen, &pixels.gbuffers[shaded]),
+        "generate_diffuse" => {
+            generate_diffuse(bound, own, seen, &pixels.gbuffers[shaded], &mut pixels.throughput);
+        }
+        "generate_mirror" => generate_mirror(bound, own, seen, &pixels.gbuffers[shaded], &mut pixels.throughput),
+        "start_hits" => start_hits(own),
+        "clear_gbuffer" => clear_gbuffer(bound, pixels, shaded),
+        "hit_demand" => hit_demand(bound, own),
+        "resolve" => resolve(bound, seen, &mut pixels.gbuffers[shaded], texels, attributes),
+        "shade" => shade(bound, pixels, shaded, seen),
+        "add_light" => add_light(bound, pixels, shaded, own),
+        "add_occlusion" => add_occlusion(bound, pixels, shaded, own),
+        "tile_bounds" => tile_bounds(bound, own, &mut tiles.bounds),
+        "tile_walk_count" => tile_walk_count(bound, tiles),
+        "tile_scan" => tile_scan(bound, tiles)?,
+        "tile_walk_write" => tile_walk_write(bound, tiles),
+        "tile_select" => tile_select::<false>(bound, tiles),
+        "tile_select_intersect" => tile_select::<true>(bound, tiles),
+        "tile_choose" => tile_choose(tiles),
+        "tile_sort_number" => tile_sort::<false>(bound, tiles),
+        "tile_sort_near" => tile_sort::<true>(bound, tiles),
+        "query" => query(bound, own, tiles),
+        "query_reduce" => query_reduce(bound, tiles),
+        "query_from_root" => query_all(bound, own, Work::Rooted(tiles)),
+        "query_all" => query_all(bound, own, Work::All),
+        "query_pairs" => query_pairs(bound, own, tiles),
+        "intersect_list" => intersect_list::<false>(bound, own, tiles),
+        "intersect_list_cached" => intersect_list::<true>(bound, own, tiles),
+        "intersect_from_root" => intersect_all::<true>(bound, own, Work::Rooted(tiles)),
+        "intersect_from_root_all" => intersect_all::<false>(bound, own, Work::Rooted(tiles)),
+        "intersect_selected" => intersect_all::<true>(bound, own, Work::All),
+        "intersect_all" => intersect_all::<false>(bound, own, Work::All),
+        INTERSECT_BINARY => match binary {
+            Some(trees) => intersect_binary(bound, own, trees),
+            None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
+        },
+        other => return Err(ExecutorError::Device(format!("has no kernel {other}; this is a defect"))),
+    }
+    Ok(())
+}
+
+impl Executor for CpuExecutor {
+    fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
+        self.cache.load(&self.file, &self.workers, loads)
+    }
+
+    fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
+        let tiles = &mut self.buffers.tiles;
+        tiles.make_room(lists.iter().map(|list| list.len() as u64).sum())?;
+        tiles.set(lists);
+        Ok(())
+    }
+
+    fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError> {
+        let tiles = &mut self.buffers.tiles;
+        let mut first = 0;
+        tiles.pairs.clear();
+        for PairQuery { x: [x0, x1], y: [y0, y1], nodes: count } in queries.iter().copied() {
+            tiles.pairs.push(layout::Pair { x0, y0, x1, y1, first, count, ..Default::default() });
+            first += count;
+        }
+        tiles.pair_nodes = nodes.to_vec();
+        Ok(())
+    }
+
+    fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
+        let params = self.params();
+        let resident = self.file.resident();
+        let needs_all = steps.iter().any(|step| matches!(step, Step::IntersectAll | Step::IntersectBinary));
+        let geometry = self.cache.geometry(resident, bricks, needs_all)?;
+        let attributes = match steps.contains(&Step::Resolve) {
+            true => self.cache.attributes(resident, bricks)?,
+            false => Vec::new(),
+        };
+        let slots = report::slots(bricks);
+        let demand: Vec<Demand> = (0..bricks.len()).map(|_| Demand::default()).collect();
+        let counters = Counters::default();
+        let mut ms_phases = [0.0; 3];
+        let everything = bricks.all_geometry_resident();
+        for &step in steps {
+            for dispatch in dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything) {
+                let start = Instant::now();
+                let bound = Bound {
+                    params: &dispatch.params,
+                    scene: &self.scene,
+                    bricks: &geometry,
+                    slots: &slots,
+                    demand: &demand,
+                    counters: &counters,
+                    count: self.count,
+                    isa: self.isa,
+                };
+                let binary = self.binary.as_ref();
+                run_kernel(&dispatch, pass, &bound, &mut self.buffers, &attributes, &self.texels, binary)?;
+                if let Some(phase) = dispatch.phase {
+                    ms_phases[phase] += start.elapsed().as_secs_f64() * 1e3;
+                }
+            }
+        }
+        let demand: Vec<layout::Demand> = demand.iter().map(Demand::get).collect();
+        let mut report = Report { ms_phases, ..report::of_counters(&counters.get(), &demand)? };
+        report::take_used(&mut report, steps, bricks);
+        if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) {
+            report.pair_rays = std::mem::take(&mut self.buffers.tiles.pair_rays);
+        }
+        Ok(report)
+    }
+}
+
+impl FrameExecutor for CpuExecutor {
+    fn device(&self) -> DeviceInfo {
+        super::device_info()
+    }
+
+    fn page_bytes(&self) -> u64 {
+        PAGE_BYTES
+    }
+
+    fn texture_bytes(&self) -> u64 {
+        self.texels.bytes
+    }
+
+    fn workers(&self) -> &dyn WorkerPool {
+        &self.workers
+    }
+
+    fn allow_bounces(&mut self) {
+        self.buffers.sets[2] = RaySet::new(self.extent.rays());
+        self.buffers.pixels.allow_bounces();
+    }
+
+    fn make_binary(&mut self) -> Result<(), ExecutorError> {
+        self.binary = Some(BinaryTrees::new(&self.file)?);
+        Ok(())
+    }
+
+    fn set_leaf_cache(&mut self, on: bool) {
+        self.leaf_cache = on;
+    }
+
+    fn set_list_most(&mut self, leaves: u32) {
+        self.list_most = leaves;
+    }
+
+    fn set_threshold(&mut self, threshold: u32) {
+        self.threshold = threshold;
+    }
+
+    fn begin_frame(&mut self, view: &View) {
+        self.scene.rebase(self.file.resident(), view.frame);
+        self.view = view.params;
+        self.directions = view.directions;
+    }
+
+    fn set_rays(&mut self, pass: Pass, rays: &[layout::Ray]) {
+        self.buffers.sets[pass.set()].rays = padded(rays, self.extent.rays());
+    }
+
+    fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
+        Ok(self.buffers.sets[pass.set()].rays.clone())
+    }
+
+    fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
+        Ok(self.buffers.sets[pass.set()].hits.clone())
+    }
+
+    fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
+        Ok(self.buffers.sets[pass.set()].surfaces.clone())
+    }
+
+    fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
+        Ok(self.buffers.pixels.gbuffers[0].clone())
+    }
+
+    fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
+        Ok(self.buffers.pixels.radiance.clone())
+    }
+}

@@ -1,0 +1,168 @@
+//! Rays from the camera and from hits: twins of `shaders/generate_primary.wgsl`, `generate_shadow.wgsl`, `generate_around.wgsl`,
+//! `generate_mirror.wgsl` and `start_hits.wgsl`.
+
+use super::random::{disc_point, tangent};
+use super::rays::{RaySet, start_hit};
+use super::scene::Bound;
+use super::shade::surface_share;
+use super::vector::{Vec3, cross, dot, each, normalize, xyz};
+use crate::kernel::layout::{GBuffer, NONE, PARAM_RECTANGLE, Ray, T_INFINITE};
+use crate::math::exact::barrier;
+use crate::math::sampling::random2;
+use rayon::prelude::*;
+
+/// Rays to the rectangular light end short of it by this share of the distance, so that what lies in its plane casts no shadow.
+const SHORT_OF_LIGHT: f32 = 1.0 / 65_536.0;
+
+/// Makes every ray of `own`, with the triangle that it starts from.
+fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32) + Sync) {
+    let RaySet { rays, hits, surfaces } = own;
+    let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
+    all.enumerate().with_min_len(1024).for_each(|(index, ((ray, hit), surface))| {
+        let source;
+        (*ray, source) = make(index);
+        (*hit, *surface) = start_hit(ray.t_max, source);
+    });
+}
+
+/// Starts the hits of rays that came from outside: nothing found within their range.
+pub fn start_hits(own: &mut RaySet) {
+    let RaySet { rays, hits, surfaces } = own;
+    for ((ray, hit), surface) in rays.iter().zip(hits).zip(surfaces) {
+        (*hit, *surface) = start_hit(ray.t_max, NONE);
+    }
+}
+
+fn along(base: f32, x: f32, step_x: f32, y: f32, step_y: f32) -> f32 {
+    barrier(barrier(base + barrier(x * step_x)) + barrier(y * step_y))
+}
+
+/// Camera rays: direction(x, y) = base + x * step_x + y * step_y through the jittered pixel position, not normalised.
+pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
+    let p = bound.params;
+    for_each_new(own, |index| {
+        let (column, row) = (index as u32 % p.width, index as u32 / p.width);
+        let x = barrier(column as f32 + p.jitter[0]);
+        let y = barrier(row as f32 + p.jitter[1]);
+        let direction = each(|k| along(p.base[k], x, p.step_x[k], y, p.step_y[k]));
+        (Ray { origin: xyz(p.origin), t_min: 0.0, direction, t_max: T_INFINITE }, NONE)
+    });
+}
+
+/// One ray from every hit of the shaded set to a point of the pass's lamp; from surfaces that face away, none.
+pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet) {
+    let p = bound.params;
+    let sun = xyz(p.sun);
+    for_each_new(own, |index| {
+        let surface = &seen.surfaces[index];
+        let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
+        if surface.leaf != NONE {
+            let r = random2(index as u32, p.stream, p.seed);
+            let mut faces = true;
+            let mut t_max = T_INFINITE;
+            if bound.has(PARAM_RECTANGLE) {
+                let (u, v) = (xyz(p.lamp_u), xyz(p.lamp_v));
+                let across = |k: usize| barrier(barrier(r[0] * u[k]) + barrier(r[1] * v[k]));
+                ray.direction = each(|k| barrier(barrier(p.lamp_corner[k] + across(k)) - surface.point[k]));
+                faces = dot(ray.direction, cross(u, v)) < 0.0;
+                t_max = 1.0 - SHORT_OF_LIGHT;
+            } else if p.sun_radius > 0.0 {
+                let disc = disc_point(r).map(|x| x * p.sun_radius);
+                let x = tangent(sun);
+                let y = cross(sun, x);
+                let across = |k: usize| barrier(barrier(x[k] * disc[0]) + barrier(y[k] * disc[1]));
+                ray.direction = each(|k| barrier(sun[k] + across(k)));
+            }
+            if faces && dot(surface.normal, ray.direction) > 0.0 {
+                ray.t_min = 0.0;
+                ray.t_max = t_max;
+            }
+        }
+        (ray, seen.hits[index].id)
+    });
+}
+
+/// The pass's direction around the normal, turned about it at random within limits.
+fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
+    let p = bound.params;
+    let a = p.around;
+    let angle = a[3] * random2(index as u32, p.stream, p.seed)[0];
+    let (c, s) = (angle.cos(), angle.sin());
+    let x = tangent(normal);
+    let y = cross(normal, x);
+    let turned = [c * a[0] - s * a[1], s * a[0] + c * a[1], a[2]];
+    normalize(each(|k| turned[0] * x[k] + turned[1] * y[k] + turned[2] * normal[k]))
+}
+
+/// A ray from a hit in `direction`, up to `t_max`; none where that leads below the surface.
+fn leaving(surface: &crate::kernel::layout::Surface, direction: Vec3, t_max: f32) -> Ray {
+    let above = dot(surface.normal, direction) > 0.0;
+    let (t_min, t_max) = if above { (0.0, t_max) } else { (1.0, 0.0) };
+    Ray { origin: surface.point, t_min, direction, t_max }
+}
+
+/// What stands for the ray of a pixel without a hit.
+fn none(origin: Vec3) -> Ray {
+    Ray { origin, t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 }
+}
+
+/// One ray of limited length from every primary hit in the pass's direction around the interpolated normal (CHC+RT §5.3); where
+/// that leads below the surface, none.
+pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer]) {
+    for_each_new(own, |index| {
+        let surface = &seen.surfaces[index];
+        let ray = match surface.leaf {
+            NONE => none(surface.point),
+            _ => leaving(surface, turned(bound, index, gbuffer[index].normal), bound.params.length),
+        };
+        (ray, seen.hits[index].id)
+    });
+}
+
+/// As [`generate_occlusion`], of unlimited length. The throughput is noted: what the surface reflects, by the share of the direction.
+pub fn generate_diffuse(
+    bound: &Bound,
+    own: &mut RaySet,
+    seen: &RaySet,
+    gbuffer: &[GBuffer],
+    throughput: &mut [[f32; 4]],
+) {
+    for_each_new(own, |index| {
+        let surface = &seen.surfaces[index];
+        let ray = match surface.leaf {
+            NONE => none(surface.point),
+            _ => leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE),
+        };
+        (ray, seen.hits[index].id)
+    });
+    for ((carried, ray), g) in throughput.iter_mut().zip(&own.rays).zip(gbuffer) {
+        let share = |k: usize| surface_share(bound) * bound.params.share * g.albedo[k];
+        *carried = if ray.t_min <= ray.t_max { [share(0), share(1), share(2), 0.0] } else { [0.0; 4] };
+    }
+}
+
+/// The mirrored ray of every primary hit, about the interpolated normal; where that leads below the surface, none.
+pub fn generate_mirror(
+    bound: &Bound,
+    own: &mut RaySet,
+    seen: &RaySet,
+    gbuffer: &[GBuffer],
+    throughput: &mut [[f32; 4]],
+) {
+    for_each_new(own, |index| {
+        let surface = &seen.surfaces[index];
+        let ray = match surface.leaf {
+            NONE => none(surface.point),
+            _ => {
+                let (d, n) = (normalize(seen.rays[index].direction), gbuffer[index].normal);
+                let along = 2.0 * dot(n, d);
+                leaving(surface, normalize(each(|k| d[k] - along * n[k])), T_INFINITE)
+            }
+        };
+        (ray, seen.hits[index].id)
+    });
+    for (carried, ray) in throughput.iter_mut().zip(&own.rays) {
+        let share = if ray.t_min <= ray.t_max { 1.0 - bound.params.surface_share } else { 0.0 };
+        *carried = [share, share, share, 0.0];
+    }
+}

@@ -1,0 +1,351 @@
+//! An executor that runs every step on a graphics device and on the processor and compares all that they write, for tests.
+//!
+//! Rays that start at hits are within [`Lockstep::bound`] of each other, because WGSL leaves sine, cosine, division and
+//! inverse square root some ulps; the device's are then given to both, so that everything that follows can be compared exactly:
+//! hits, surfaces, lists, what is asked and counted, bit for bit. What is read and added for shading is compared within the bound.
+
+use super::CpuExecutor;
+use crate::gpu::executor::GpuExecutor;
+use crate::kernel::dispatch::dispatches;
+use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
+use crate::kernel::{DeviceInfo, Directions, FrameExecutor, View};
+use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::stream::WorkerPool;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex};
+
+/// What was compared.
+#[derive(Default)]
+pub struct Findings {
+    /// The first differences, in words.
+    pub differences: Vec<String>,
+    /// Kernels that ran.
+    pub kernels: BTreeSet<&'static str>,
+    /// Values compared, by what they are.
+    pub compared: BTreeMap<&'static str, usize>,
+    /// The greatest difference of values that are compared within the bound, relative to numbers above 1.
+    pub greatest: f32,
+}
+
+/// A defect of the processor's side, which comparing must notice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Defect {
+    /// Rays start 2^-10 beside where they should.
+    Rays,
+    /// Other random numbers.
+    Seed,
+    /// The light is brighter by 2^-8.
+    Light,
+}
+
+/// Both executors.
+pub struct Lockstep {
+    gpu: GpuExecutor,
+    cpu: CpuExecutor,
+    bound: f32,
+    defect: Option<Defect>,
+    directions: Directions,
+    findings: Arc<Mutex<Findings>>,
+}
+
+impl Findings {
+    fn note(&mut self, text: impl FnOnce() -> String) {
+        if self.differences.len() < 8 {
+            self.differences.push(text());
+        }
+    }
+
+    /// Compares words; both zeros are one value.
+    fn words<T: bytemuck::Pod>(&mut self, what: &'static str, context: &str, gpu: &[T], cpu: &[T]) {
+        *self.compared.entry(what).or_default() += gpu.len();
+        if gpu.len() != cpu.len() {
+            self.note(|| format!("{context}: {} {what} instead of {}", cpu.len(), gpu.len()));
+        }
+        let value = |x: &u32| if *x == 1 << 31 { 0 } else { *x };
+        for (i, (g, c)) in gpu.iter().zip(cpu).enumerate() {
+            let of = |x: &T| -> Vec<u32> { bytemuck::pod_collect_to_vec(bytemuck::bytes_of(x)) };
+            let (g, c) = (of(g), of(c));
+            if !g.iter().map(value).eq(c.iter().map(value)) {
+                self.note(|| format!("{context}: {what} {i}: {c:08x?} instead of {g:08x?}"));
+                return;
+            }
+        }
+    }
+
+    /// Compares numbers within `bound`, relative to numbers above 1.
+    fn numbers(&mut self, what: &'static str, context: &str, bound: f32, gpu: &[f32], cpu: &[f32]) {
+        *self.compared.entry(what).or_default() += gpu.len();
+        for (i, (g, c)) in gpu.iter().zip(cpu).enumerate() {
+            let apart = (g - c).abs() / g.abs().max(1.0);
+            self.greatest = self.greatest.max(apart);
+            if apart.is_nan() || apart > bound {
+                self.note(|| format!("{context}: {what} {i}: {c} instead of {g}"));
+                return;
+            }
+        }
+    }
+
+    fn report(&mut self, context: &str, gpu: &Report, cpu: &Report) {
+        // The kernel of binary trees, a baseline, does not count.
+        let counts = !context.contains("IntersectBinary");
+        let counted = |count: u64| if counts { count } else { 0 };
+        let numbers = |r: &Report| {
+            [
+                r.list_entries.into(),
+                r.pairs_tested,
+                r.pairs_culled,
+                r.pairs_visible,
+                r.pairs_invisible,
+                r.pairs_intersected,
+                r.most_selected.into(),
+                r.tiles_from_root,
+                r.pairs_front_to_back,
+                r.tile_batches,
+                r.tile_batch_leaves,
+                r.leaf_groups_postponed,
+                r.rays,
+                counted(r.nodes),
+                counted(r.triangles),
+                r.non_finite,
+                r.queries_tightened,
+            ]
+        };
+        self.words("counters", context, &numbers(gpu), &numbers(cpu));
+        let demand = |r: &Report| -> Vec<[u32; 4]> {
+            r.demand.iter().map(|d| [d.brick, d.rays, d.nearest.to_bits(), d.next]).collect()
+        };
+        self.words("demands", context, &demand(gpu), &demand(cpu));
+        self.words("used bricks", context, &gpu.used, &cpu.used);
+        self.words("rays of pairs", context, &gpu.pair_rays, &cpu.pair_rays);
+    }
+}
+
+impl Lockstep {
+    /// Of both, over the same scene and with the same extent. `bound`: of differences where they are allowed.
+    pub fn new(gpu: GpuExecutor, cpu: CpuExecutor, bound: f32, findings: Arc<Mutex<Findings>>) -> Self {
+        Self { gpu, cpu, bound, defect: None, directions: Directions::default(), findings }
+    }
+
+    /// Breaks the processor's side.
+    pub fn with_defect(mut self, defect: Defect) -> Self {
+        self.defect = Some(defect);
+        self
+    }
+
+    /// Rays that have been made alike on both sides.
+    fn generate(&mut self, context: &str, pass: Pass, bricks: &BrickStates) -> Result<(), ExecutorError> {
+        self.gpu.run(pass, &[Step::Generate], bricks)?;
+        self.cpu.run(pass, &[Step::Generate], bricks)?;
+        let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);
+        let surfaces = match pass.set() {
+            0 => Vec::new(),
+            1 => self.gpu.read_surfaces(Pass::Primary)?,
+            _ => self.gpu.read_surfaces(Pass::Mirror)?,
+        };
+        let mut findings = self.findings.lock().expect("findings");
+        if pass == Pass::Primary {
+            findings.words("camera rays", context, &rays, &own);
+        }
+        // A ray that all but touches its surface may be traced on one side alone.
+        let is_grazing = |i: usize, ray: &Ray| {
+            surfaces.get(i).is_some_and(|s| {
+                let along: f32 = (0..3).map(|k| s.normal[k] * ray.direction[k]).sum();
+                let length = ray.direction.iter().map(|x| x * x).sum::<f32>().sqrt();
+                along.abs() <= 4.0 * self.bound * length
+            })
+        };
+        for (i, (g, c)) in rays.iter().zip(&own).enumerate() {
+            findings.numbers("origins", context, 0.0, &g.origin, &c.origin);
+            findings.numbers("directions", context, self.bound, &g.direction, &c.direction);
+            if !is_grazing(i, g) {
+                findings.numbers("ends of rays", context, 0.0, &[g.t_min, g.t_max], &[c.t_min, c.t_max]);
+            }
+        }
+        own = rays;
+        if self.defect == Some(Defect::Rays) {
+            own.iter_mut().for_each(|ray| ray.origin[0] += 1.0 / 1024.0);
+        }
+        drop(findings);
+        self.cpu.set_rays(pass, &own);
+        // Their hits have been started by the side that made them: started anew, with the device's ends.
+        Ok(())
+    }
+
+    fn compare(&mut self, context: &str, pass: Pass, steps: &[Step]) -> Result<(), ExecutorError> {
+        let hits = (self.gpu.read_hits(pass)?, self.cpu.read_hits(pass)?);
+        let surfaces = (self.gpu.read_surfaces(pass)?, self.cpu.read_surfaces(pass)?);
+        let rays = self.gpu.read_rays(pass)?;
+        let mut findings = self.findings.lock().expect("findings");
+        let traced = |i: &usize| rays[*i].t_min <= rays[*i].t_max;
+        let of_traced = |all: &[Hit]| -> Vec<Hit> { (0..all.len()).filter(traced).map(|i| all[i]).collect() };
+        findings.words("hits", context, &of_traced(&hits.0), &of_traced(&hits.1));
+        let of_traced = |all: &[Surface]| -> Vec<Surface> { (0..all.len()).filter(traced).map(|i| all[i]).collect() };
+        findings.words("surfaces", context, &of_traced(&surfaces.0), &of_traced(&surfaces.1));
+        let has_lists =
+            |step: &Step| matches!(step, Step::Lists | Step::ShortLists | Step::SortByNumber | Step::SortNodesNear);
+        if steps.iter().any(has_lists) {
+            let (bounds, lists, list, selection) = self.gpu.read_tiles()?;
+            let own = self.cpu.tiles();
+            findings.words("bounds of tiles", context, &bounds, &own.bounds);
+            // Which tiles have work is noted place by place there, and in any order.
+            let placed = |l: &TileList| TileList { chosen: 0, rooted: 0, ..*l };
+            findings.words("lists of tiles", context, &lists.iter().map(placed).collect::<Vec<_>>(), &own.lists);
+            let numbers = |has_work: &dyn Fn(&TileList) -> bool| -> Vec<u32> {
+                (0..).zip(&own.lists).filter(|(_, l)| has_work(l)).map(|(tile, _)| tile).collect()
+            };
+            let (with_selection, rooted) = (numbers(&|l| l.selected > 0), numbers(&|l| l.from_root != 0));
+            let mut chosen: Vec<u32> = lists[..with_selection.len()].iter().map(|l| l.chosen).collect();
+            chosen.sort_unstable();
+            findings.words("chosen tiles", context, &chosen, &with_selection);
+            assert!(with_selection.iter().all(|&tile| own.chosen[tile as usize]), "{context}: chosen tiles");
+            let places: Vec<u32> = lists[..rooted.len()].iter().map(|l| l.rooted).collect();
+            findings.words("rooted tiles", context, &places, &rooted);
+            let held: u32 = lists.iter().map(|l| l.count).sum();
+            let held = (held as usize).min(own.list.len());
+            findings.words("entries", context, &list[..held], &own.list[..held]);
+            for l in &lists {
+                let range = l.first as usize..(l.first + l.selected) as usize;
+                if own.selection.len() >= range.end {
+                    findings.words("selections", context, &selection[range.clone()], &own.selection[range]);
+                }
+            }
+        }
+        if steps.iter().any(|step| matches!(step, Step::Resolve | Step::Shade(_) | Step::AddLight | Step::AddOcclusion))
+        {
+            let radiance = (self.gpu.read_radiance()?, self.cpu.read_radiance()?);
+            let brighter = if self.defect == Some(Defect::Light) { 1.0 + 1.0 / 256.0 } else { 1.0 };
+            let own: Vec<f32> = radiance.1.iter().flatten().map(|x| x * brighter).collect();
+            findings.numbers("radiance", context, self.bound, radiance.0.as_flattened(), &own);
+            let gbuffer = (self.gpu.read_gbuffer()?, self.cpu.read_gbuffer()?);
+            let numbers = |g: &GBuffer| [&g.albedo[..], &g.normal, &g.emission, &g.weights, &g.uv].concat();
+            let whole = |g: &GBuffer| [g.state, g.material];
+            for (g, c) in gbuffer.0.iter().zip(&gbuffer.1) {
+                findings.numbers("attributes", context, self.bound, &numbers(g), &numbers(c));
+                findings.words("materials", context, &[whole(g)], &[whole(c)]);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Executor for Lockstep {
+    fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
+        self.gpu.load(loads)?;
+        self.cpu.load(loads)
+    }
+
+    fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
+        self.gpu.set_lists(lists)?;
+        self.cpu.set_lists(lists)
+    }
+
+    fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError> {
+        self.gpu.set_pairs(queries, nodes)?;
+        self.cpu.set_pairs(queries, nodes)
+    }
+
+    fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
+        let context = format!("{pass:?}, {steps:?}");
+        let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, ..Params::default() };
+        for &step in steps {
+            let everything = bricks.all_geometry_resident();
+            for leaf_cache in [false, true] {
+                let list = dispatches(pass, step, &params, &self.directions, leaf_cache, everything);
+                let ran = |name: &str| leaf_cache == self.cpu.leaf_cache() || !name.starts_with("intersect_list");
+                let names = list.iter().map(|dispatch| dispatch.kernel).filter(|name| ran(name));
+                self.findings.lock().expect("findings").kernels.extend(names);
+            }
+        }
+        let rest = match steps {
+            [Step::Generate, rest @ ..] => {
+                self.generate(&context, pass, bricks)?;
+                rest
+            }
+            all => all,
+        };
+        let gpu = self.gpu.run(pass, rest, bricks)?;
+        let cpu = self.cpu.run(pass, rest, bricks)?;
+        self.findings.lock().expect("findings").report(&context, &gpu, &cpu);
+        self.compare(&context, pass, rest)?;
+        Ok(gpu)
+    }
+}
+
+impl FrameExecutor for Lockstep {
+    fn device(&self) -> DeviceInfo {
+        self.gpu.device()
+    }
+
+    fn page_bytes(&self) -> u64 {
+        self.gpu.page_bytes()
+    }
+
+    fn texture_bytes(&self) -> u64 {
+        assert_eq!(self.gpu.texture_bytes(), self.cpu.texture_bytes());
+        self.gpu.texture_bytes()
+    }
+
+    fn workers(&self) -> &dyn WorkerPool {
+        self.gpu.workers()
+    }
+
+    fn allow_bounces(&mut self) {
+        self.gpu.allow_bounces();
+        self.cpu.allow_bounces();
+    }
+
+    fn make_binary(&mut self) -> Result<(), ExecutorError> {
+        self.gpu.make_binary()?;
+        self.cpu.make_binary()
+    }
+
+    fn set_leaf_cache(&mut self, on: bool) {
+        self.gpu.set_leaf_cache(on);
+        self.cpu.set_leaf_cache(on);
+    }
+
+    fn set_list_most(&mut self, leaves: u32) {
+        self.gpu.set_list_most(leaves);
+        self.cpu.set_list_most(leaves);
+    }
+
+    fn set_threshold(&mut self, threshold: u32) {
+        self.gpu.set_threshold(threshold);
+        self.cpu.set_threshold(threshold);
+    }
+
+    fn begin_frame(&mut self, view: &View) {
+        self.directions = view.directions;
+        self.gpu.begin_frame(view);
+        let mut view = *view;
+        if self.defect == Some(Defect::Seed) {
+            view.params.seed ^= 1;
+        }
+        self.cpu.begin_frame(&view);
+    }
+
+    fn set_rays(&mut self, pass: Pass, rays: &[Ray]) {
+        self.gpu.set_rays(pass, rays);
+        self.cpu.set_rays(pass, rays);
+    }
+
+    fn read_rays(&mut self, pass: Pass) -> Result<Vec<Ray>, ExecutorError> {
+        self.gpu.read_rays(pass)
+    }
+
+    fn read_hits(&mut self, pass: Pass) -> Result<Vec<Hit>, ExecutorError> {
+        self.gpu.read_hits(pass)
+    }
+
+    fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<Surface>, ExecutorError> {
+        self.gpu.read_surfaces(pass)
+    }
+
+    fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError> {
+        self.gpu.read_gbuffer()
+    }
+
+    fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
+        self.gpu.read_radiance()
+    }
+}

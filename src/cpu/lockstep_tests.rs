@@ -1,0 +1,261 @@
+//! Every kernel against its twin: frames of all effects, by all schedules, with caches that hold everything and next to nothing.
+
+use super::CpuExecutor;
+use super::lockstep::{Defect, Findings, Lockstep};
+use crate::gpu::device::Gpu;
+use crate::gpu::executor::GpuExecutor;
+use crate::gpu::kernels::{self, Kernels};
+use crate::gpu::probe;
+use crate::gpu::wgsl::Pages;
+use crate::kernel::dispatch::INTERSECT_BINARY;
+use crate::kernel::{Extent, FrameExecutor, Setup};
+use crate::render::{Effects, Light, Occlusion, RectangleLight, RenderSettings, Renderer, Schedule};
+use crate::scene::path::path_from_bounds;
+use crate::schedule::auto::Auto;
+use crate::schedule::cache::{BrickBytes, Cache};
+use crate::schedule::fronts::Fronts;
+use crate::schedule::{Optimisation, Tracing};
+use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
+use bricks::SceneFile;
+use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene, SourceTexture};
+use glam::DVec3;
+use std::sync::{Arc, Mutex};
+
+/// Of numbers that pass through sine, cosine and inverse square roots; the greatest difference that software Vulkan shows is a
+/// fraction of it.
+const BOUND: f32 = 1.0 / 65_536.0;
+
+const EXTENT: Extent = Extent { width: 40, height: 28, tile: 16 };
+
+/// A device and its kernels, or a note why the test is skipped.
+fn device() -> Option<(Gpu, Arc<Kernels>)> {
+    let Ok(gpu) = Gpu::open(None) else {
+        println!("skipped: no adapter");
+        return None;
+    };
+    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1 }, true));
+    Some((gpu, kernels))
+}
+
+/// Triangles in all directions with normals, colours and textures of every way to wrap; turned and mirrored copies of them.
+fn textured() -> Arc<SceneFile> {
+    let mut state = 7u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1 << 24)
+    };
+    let mut primitive = |material: u32, count: u32| {
+        let mut part = Primitive { material, ..Primitive::default() };
+        let (mut normals, mut uvs, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+        for corner in 0..3 * count {
+            let near = if corner % 3 == 0 { 0.0 } else { 1.0 };
+            let around = *part.positions.last().filter(|_| near > 0.0).unwrap_or(&[
+                8.0 * random(),
+                3.0 * random(),
+                8.0 * random(),
+            ]);
+            part.positions.push(around.map(|x: f64| x + near * (random() - 0.5)));
+            normals.push([0; 3].map(|_| random() as f32 - 0.5));
+            uvs.push([0; 2].map(|_| 5.0 * random() as f32 - 2.0));
+            colors.push([0; 4].map(|_| random() as f32));
+        }
+        part.indices = (0..3 * count).collect();
+        (part.normals, part.uvs, part.colors) = (Some(normals), Some(uvs), Some(colors));
+        part
+    };
+    let texture = |i: u32| SourceTexture {
+        name: format!("texture {i}"),
+        width: 8 << i,
+        height: 16 >> i,
+        wrap: [bricks::WRAP_REPEAT, bricks::WRAP_CLAMP, bricks::WRAP_MIRROR][i as usize] * 0x0001_0001,
+        rgba: (0..4 * (8 << i) * (16 >> i)).map(|k: u32| (k * 37 + k / 7 * 11) as u8).collect(),
+    };
+    let material = |i: u32| bricks::Material {
+        base_color: [0.9, 0.8, 0.7, 1.0],
+        emission: [0.25 * i as f32; 3],
+        base_color_texture: if i < 3 { i } else { bricks::NONE },
+        ..bytemuck::Zeroable::zeroed()
+    };
+    let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
+    let place = |mesh, world_from_mesh| Placement { name: "p".into(), mesh, source: 0, world_from_mesh };
+    let source = SourceScene {
+        meshes: vec![
+            mesh("world", (0..4).map(|i| primitive(i, 150)).collect()),
+            mesh("thing", vec![primitive(1, 200)]),
+        ],
+        placements: vec![
+            place(0, IDENTITY),
+            place(1, [0.75, 0.0, 1.0, 0.75, 0.0, 1.25, 0.0, 0.5, -1.0, 0.0, 0.75, -0.25]),
+            place(1, [-0.5, 0.0, 0.0, -1.0, 0.0, 0.8, 0.1, 0.25, 0.2, 0.0, 0.7, 1.0]),
+        ],
+        materials: (0..4).map(material).collect(),
+        textures: (0..3).map(texture).collect(),
+        sources: vec![bricks::Source { name: "t".into(), bytes: 0, hash: "2d06800538d394c2".into() }],
+        ..SourceScene::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.bricks");
+    let settings = BuildSettings { brick_triangles: 40, instance_min_triangles: 1, ..BuildSettings::default() };
+    build(source, &settings, &path, &Progress::hidden()).unwrap();
+    let scene = SceneFile::from_bytes("the textured scene", std::fs::read(&path).unwrap()).unwrap();
+    assert!(scene.resident().manifest.has_textures && scene.resident().instances.len() == 3);
+    Arc::new(scene)
+}
+
+/// One way to render.
+struct Variant {
+    schedule: Schedule,
+    everything_fits: bool,
+    fronts: bool,
+    threshold: u32,
+    /// Leaves of the longest list that is intersected.
+    list_most: u32,
+    without: &'static [Optimisation],
+    with: &'static [Optimisation],
+}
+
+const VARIANT: Variant = Variant {
+    schedule: Schedule::Chc,
+    everything_fits: false,
+    fronts: false,
+    threshold: 0,
+    list_most: u32::MAX,
+    without: &[],
+    with: &[],
+};
+
+fn effects() -> Effects {
+    Effects {
+        shadow: true,
+        occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
+        diffuse: Some(1),
+        mirror: true,
+        turn_degrees: 360.0,
+    }
+}
+
+/// Renders two frames in lockstep.
+fn render(
+    (gpu, kernels): &(Gpu, Arc<Kernels>),
+    scene: &Arc<SceneFile>,
+    variant: &Variant,
+    defect: Option<Defect>,
+    findings: &Arc<Mutex<Findings>>,
+) {
+    let sizes = scene.sizes();
+    let page_bytes = gpu.page_bytes();
+    let residency = |budget| Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin);
+    let least = match residency(16) {
+        Err(ResidencyError::CacheTooSmall { needed, .. }) => needed,
+        other => panic!("a cache of nothing must be refused: {other:?}"),
+    };
+    let budget = if variant.everything_fits { Residency::budget_for_all(&sizes, page_bytes) } else { least };
+    let residency = residency(budget).unwrap();
+    let pages: Vec<u64> = residency.page_sizes().collect();
+    let setup = Setup { extent: EXTENT, threshold: variant.threshold, count: true };
+    let host = || HostCache::new(1 << 20);
+    let on_gpu = GpuExecutor::with_kernels(
+        gpu.clone(),
+        kernels.clone(),
+        scene.clone(),
+        Workers::new(scene.clone(), host(), 1, 0).unwrap(),
+        &pages,
+        setup,
+    );
+    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1, 0).unwrap(), setup);
+    let mut executor = Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone());
+    if let Some(defect) = defect {
+        executor = executor.with_defect(defect);
+    }
+    executor.allow_bounces();
+    executor.set_list_most(variant.list_most);
+    if variant.schedule == Schedule::PlainBinary {
+        executor.make_binary().unwrap();
+    }
+    let bytes = |&(geometry, attributes): &(u64, u64)| BrickBytes { bvh: 0, geometry, attributes };
+    let mut tracing = Tracing { measure_needed: true, ..Tracing::default() };
+    variant.without.iter().for_each(|&which| tracing.optimisations.set(which, false));
+    variant.with.iter().for_each(|&which| tracing.optimisations.set(which, true));
+    let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
+    let manifest = &scene.resident().manifest;
+    let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
+    light.rectangle = Some(RectangleLight { corner: top, edges: [DVec3::X * 3.0, DVec3::Z * 3.0], radiance: [4.0; 3] });
+    let mut renderer = Renderer {
+        scene: scene.clone(),
+        executor: Box::new(executor),
+        cache: Cache::new(residency, sizes.iter().map(bytes).collect(), None),
+        settings: RenderSettings {
+            schedule: variant.schedule,
+            effects: effects(),
+            samples: 1,
+            seed: 3,
+            tracing,
+            aov: false,
+        },
+        light,
+        size: (EXTENT.width, EXTENT.height),
+        tile: EXTENT.tile,
+        fronts: variant.fronts.then(Fronts::default),
+        auto: Auto::default(),
+        captures: None,
+        host_seen: HostCacheStats::default(),
+    };
+    let path = path_from_bounds(manifest.min, manifest.max);
+    for frame in 0..2 {
+        renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
+    }
+}
+
+#[test]
+fn twins_agree_with_their_kernels() {
+    let Some(device) = device() else { return };
+    use Optimisation::*;
+    let variants = [
+        Variant { schedule: Schedule::Plain, everything_fits: true, ..VARIANT },
+        Variant { schedule: Schedule::PlainBinary, everything_fits: true, ..VARIANT },
+        Variant { everything_fits: true, ..VARIANT },
+        VARIANT,
+        // Walks from the root, of some tiles and of all; the tables that a threshold takes.
+        Variant { everything_fits: true, list_most: 0, ..VARIANT },
+        Variant { list_most: 3, ..VARIANT },
+        Variant { list_most: 3, threshold: 4, ..VARIANT },
+        Variant { list_most: 0, threshold: 2, ..VARIANT },
+        Variant { schedule: Schedule::Demand, ..VARIANT },
+        Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
+        Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
+        Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
+        Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
+        Variant { fronts: true, ..VARIANT },
+        Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
+    ];
+    let findings = Arc::new(Mutex::new(Findings::default()));
+    for scene in [Arc::new(probe::scene().unwrap()), textured()] {
+        for (i, variant) in variants.iter().enumerate() {
+            render(&device, &scene, variant, None, &findings);
+            let found = findings.lock().unwrap();
+            assert_eq!(found.differences, Vec::<String>::new(), "variant {i} of {}", scene.path().display());
+        }
+    }
+    let found = findings.lock().unwrap();
+    println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
+    let all = kernels::names().chain([INTERSECT_BINARY]);
+    let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
+    assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
+    assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
+    assert!(found.greatest > 0.0, "nothing was compared within the bound");
+}
+
+#[test]
+fn a_twin_that_differs_is_noticed() {
+    let Some(device) = device() else { return };
+    let scene = textured();
+    for (defect, what) in [(Defect::Rays, "hits"), (Defect::Seed, "directions"), (Defect::Light, "radiance")] {
+        let findings = Arc::new(Mutex::new(Findings::default()));
+        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, ..VARIANT };
+        render(&device, &scene, &variant, Some(defect), &findings);
+        let found = findings.lock().unwrap();
+        assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);
+    }
+}

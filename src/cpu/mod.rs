@@ -1,0 +1,56 @@
+//! The executor that needs no graphics device: a twin of every kernel, run by rayon over bands of rays and over tiles.
+//!
+//! A twin has the name of its kernel in `shaders/` and the same operations in the same order, in f32; what the WGSL guards with
+//! `barrier` rounds as it stands here, because Rust neither contracts nor reassociates. So both executors find the same hits, bit
+//! for bit, where rays are the same. Rays differ where they depend on functions that WGSL leaves some ulps (sine, cosine,
+//! inverse square root): those of soft shadows, occlusion, diffuse and mirrored light.
+//!
+//! Geometry and attributes of resident bricks are the verified bytes that a worker read, shared with the host cache: a brick
+//! is traversed where it lies. Slots only say what the budget holds.
+
+pub mod brick;
+pub mod cache;
+pub mod executor;
+mod generate;
+mod intersect_all;
+mod intersect_binary;
+mod intersect_list;
+mod interval;
+pub mod isa;
+pub mod leaf;
+mod light;
+pub mod node;
+mod query;
+mod query_all;
+mod query_pairs;
+mod random;
+mod rays;
+mod resolve;
+mod scene;
+mod shade;
+mod tile_bounds;
+mod tile_lists;
+mod tile_walk;
+mod vector;
+mod walk_brick;
+
+#[cfg(test)]
+mod lockstep;
+#[cfg(test)]
+mod lockstep_tests;
+
+pub use executor::CpuExecutor;
+
+use crate::kernel::DeviceInfo;
+
+/// What summaries say of the processor.
+pub fn device_info() -> DeviceInfo {
+    DeviceInfo {
+        name: "cpu".into(),
+        driver: "brickwalk".into(),
+        driver_info: format!("{} threads, {}", rayon::current_num_threads(), isa::Best::detect().name()),
+        backend: "cpu".into(),
+        upload: "in place",
+        timestamps: true,
+    }
+}

@@ -1,0 +1,103 @@
+//! What a frame needs of an executor beside steps.
+
+use super::View;
+use super::layout::{GBuffer, Hit, Ray, Surface};
+use crate::schedule::{Executor, ExecutorError, Pass};
+use crate::stream::WorkerPool;
+use serde::Serialize;
+
+/// The device that an executor runs on, as summaries name it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct DeviceInfo {
+    /// Its name.
+    pub name: String,
+    /// The driver's name.
+    pub driver: String,
+    /// The driver's version.
+    pub driver_info: String,
+    /// What it is reached through.
+    pub backend: String,
+    /// How payloads reach the cache.
+    pub upload: &'static str,
+    /// Whether phases are timed on the device.
+    pub timestamps: bool,
+}
+
+/// An executor that renders frames: takes views and rays, gives back what passes left.
+pub trait FrameExecutor: Executor {
+    /// The device.
+    fn device(&self) -> DeviceInfo;
+
+    /// Largest number of bytes of one page of the cache.
+    fn page_bytes(&self) -> u64;
+
+    /// Bytes of textures, which are resident throughout.
+    fn texture_bytes(&self) -> u64;
+
+    /// The workers that read payloads.
+    fn workers(&self) -> &dyn WorkerPool;
+
+    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`] and [`Pass::BounceShadow`], 160 bytes a pixel; without it
+    /// they must not be run.
+    fn allow_bounces(&mut self);
+
+    /// Makes what [`crate::schedule::Step::IntersectBinary`] needs; without it that step must not be run.
+    ///
+    /// # Errors
+    /// A brick that cannot be read; more nodes than the device holds, with how much is needed.
+    fn make_binary(&mut self) -> Result<(), ExecutorError>;
+
+    /// Whether lists are intersected by the kernel that postpones groups of triangles.
+    fn set_leaf_cache(&mut self, on: bool);
+
+    /// Bounds the lists of [`crate::schedule::Step::ShortLists`] to so many leaves, for every pass; with 0 all rays walk from the
+    /// root.
+    fn set_list_most(&mut self, leaves: u32);
+
+    /// Changes [`super::Setup::threshold`].
+    fn set_threshold(&mut self, threshold: u32);
+
+    /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
+    fn begin_frame(&mut self, view: &View);
+
+    /// Writes rays from outside into `pass`; fewer than the extent holds leave the rest untraced.
+    fn set_rays(&mut self, pass: Pass, rays: &[Ray]);
+
+    /// Reads the rays of a pass back, row by row.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_rays(&mut self, pass: Pass) -> Result<Vec<Ray>, ExecutorError>;
+
+    /// Reads the hits of a pass back.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_hits(&mut self, pass: Pass) -> Result<Vec<Hit>, ExecutorError>;
+
+    /// Reads the surfaces of a pass back.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<Surface>, ExecutorError>;
+
+    /// Reads the G-buffer of the primary hits back.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError>;
+
+    /// Reads the radiance summed over samples back; w counts them.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError>;
+}
+
+/// `rays`, and behind them untraced ones up to `count` in all.
+pub fn padded(rays: &[Ray], count: usize) -> Vec<Ray> {
+    let untraced = Ray { t_min: 1.0, t_max: 0.0, direction: [1.0, 0.0, 0.0], ..Default::default() };
+    let mut all = rays.to_vec();
+    all.resize(count, untraced);
+    all
+}

@@ -1,0 +1,22 @@
+//! What both executors share: the structures that kernels read and write, which kernels a step consists of, the scene relative
+//! to a frame's reference point, and what their counters say.
+//!
+//! A kernel is a WGSL file in `shaders/` and a function of the same name in [`crate::cpu`], its twin.
+
+pub mod binary_tree;
+pub mod dispatch;
+pub mod frame;
+mod frame_executor;
+pub mod layout;
+pub mod report;
+mod setup;
+
+pub use dispatch::Directions;
+pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
+pub use setup::{Extent, Setup, View};
+
+#[rustfmt::skip]
+mod layout_checks {
+    use super::layout;
+    include!(concat!(env!("OUT_DIR"), "/layout_checks.rs"));
+}

@@ -1,0 +1,55 @@
+//! What an executor is set up for, and what it is told of every frame.
+
+use super::Directions;
+use super::frame::Frame;
+use super::layout::Params;
+
+/// Size of the picture, or of the block of rays, in rays, and the tiles over it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Rays per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Edge of a tile in rays.
+    pub tile: u32,
+}
+
+impl Extent {
+    /// Number of rays.
+    pub fn rays(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Tiles per row.
+    pub fn tiles_x(&self) -> u32 {
+        self.width.div_ceil(self.tile)
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> u32 {
+        self.tiles_x() * self.height.div_ceil(self.tile)
+    }
+}
+
+/// How an executor is set up.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    /// Picture and tiles.
+    pub extent: Extent,
+    /// A (tile, leaf) query with at most so many rays is not visible; 0 is exact.
+    pub threshold: u32,
+    /// Count nodes and triangles visited (slower).
+    pub count: bool,
+}
+
+/// What a frame needs to know besides the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Reference point.
+    pub frame: Frame,
+    /// Fields of [`Params`] that the view sets: camera, lights, sample, seed, jitter.
+    pub params: Params,
+    /// Directions of the passes that start at hits.
+    pub directions: Directions,
+}
