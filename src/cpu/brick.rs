@@ -2,9 +2,10 @@
 
 use super::leaf::{BrickRay, row_direction, rows_point};
 use super::node::UNIT;
+use super::rays::Slot;
 use super::scene::Scene;
 use super::vector::{Vec3, each, most3};
-use crate::kernel::layout::{BRICK_INDEX32, BRICK_WIDE, Hit, INSTANCE_IDENTITY, Surface};
+use crate::kernel::layout::{BRICK_INDEX32, BRICK_WIDE, Hit, INSTANCE_IDENTITY, NONE, Surface};
 use crate::math::exact::{
     SurfacePoint, TriangleHit, barrier, divide, intersect_triangle, length_of, offset_origin, surface_point,
 };
@@ -55,6 +56,15 @@ impl<'a> BrickView<'a> {
         }
         let i = &self.long[at..at + 3];
         [i[0], i[1], i[2]]
+    }
+}
+
+impl Best {
+    /// What is known of a ray before a dispatch.
+    #[inline(always)]
+    pub fn before(slot: &Slot) -> Self {
+        let (before, source) = (&slot.hit, slot.surface.source);
+        Self { t: before.t, id: before.id, leaf: NONE, triangle: 0, hit: TriangleHit::default(), source }
     }
 }
 
@@ -109,15 +119,21 @@ impl BrickRay<'_> {
         let [a, b, c] = self.vertices(triangle);
         let relative = |v: Vec3| each(|k| barrier(v[k] - self.ray.origin[k]));
         let (a, b, c) = (relative(a), relative(b), relative(c));
-        let h = intersect_triangle(&self.ray.frame, a, b, c, self.ray.t_min);
-        if !h.hit || h.t > best.t {
+        let hit = intersect_triangle(&self.ray.frame, a, b, c, self.ray.t_min);
+        hit.hit && self.keep(best, triangle, hit)
+    }
+
+    /// Keeps the hit of a triangle that is met, if it is the best so far.
+    #[inline(always)]
+    pub fn keep(&self, best: &mut Best, triangle: u32, hit: TriangleHit) -> bool {
+        if hit.t > best.t {
             return false;
         }
         let id = self.id(triangle);
-        if (h.t == best.t && id >= best.id) || id == best.source {
+        if (hit.t == best.t && id >= best.id) || id == best.source {
             return false;
         }
-        *best = Best { t: h.t, id, leaf: self.leaf, triangle, hit: h, source: best.source };
+        *best = Best { t: hit.t, id, leaf: self.leaf, triangle, hit, source: best.source };
         true
     }
 

@@ -6,7 +6,8 @@ use super::brick::Best;
 use super::isa::{Isa, Lanes};
 use super::leaf::BrickRay;
 use super::node::{FramedRay, framed_ray, inner_before};
-use super::rays::{RayKernel, RaySet, Scratch, Slot, Work, run_for_each_ray};
+use super::packet_walk::{PacketGroup, PacketScratch, put, take};
+use super::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
 use super::scene::Bound;
 use super::walk_brick::{Group, STACK_SIZE, Visits, finish_walk};
 use crate::kernel::layout::{COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT};
@@ -30,7 +31,7 @@ fn top_group<I: Isa>(
 
 /// Of the rays of `work`; `SELECT`: with what is selected.
 pub fn intersect_all<const SELECT: bool>(bound: &Bound, set: &mut RaySet, work: Work) {
-    run_for_each_ray(set, bound, work, &IntersectAll::<SELECT> { bound });
+    run_for_each_packet(set, bound, work, &IntersectAll::<SELECT> { bound });
 }
 
 struct IntersectAll<'a, const SELECT: bool> {
@@ -44,20 +45,72 @@ impl<const SELECT: bool> RayKernel for IntersectAll<'_, SELECT> {
     }
 }
 
+impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
+    #[inline(always)]
+    fn takes(&self, slot: &Slot) -> bool {
+        takes::<SELECT>(self.bound, slot)
+    }
+
+    #[inline(always)]
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, _: usize) {
+        let bound = self.bound;
+        let any_hit = bound.has(PARAM_ANY_HIT);
+        let flip = packets.packet.flip;
+        let mut depth = 0;
+        // The node whose children are visited next, and who visits it.
+        let mut next = Some((0, packets.packet.all()));
+        loop {
+            if let Some((index, rays)) = next.take() {
+                let node = &bound.scene.top8[index as usize];
+                let mut group = PacketGroup { group: Group { base: index, bits: 0 }, rays: [0; 8] };
+                let (zero, pad) = ([0.0; 3], bound.params.instance_pad);
+                let mut met = packets.packet.open(isa, node, zero, zero, pad, rays, &mut group.rays);
+                packets.visits.nodes = packets.visits.nodes.wrapping_add(rays.count_ones());
+                while met != 0 {
+                    group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ flip);
+                    met &= met - 1;
+                }
+                if !put(&mut packets.top, &mut depth, group, &mut scratch.tally) {
+                    break;
+                }
+            }
+            if depth == 0 {
+                break;
+            }
+            let (group, child, rays) = take(&mut packets.top, &mut depth, flip);
+            let rays = rays & !packets.packet.done;
+            let node = &bound.scene.top8[group.base as usize];
+            let inner = u32::from(node.inner_mask);
+            if rays == 0 {
+                continue;
+            } else if inner & 1 << child != 0 {
+                next = Some((node.child_base + inner_before(inner, child), rays));
+                continue;
+            }
+            let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
+            if !SELECT || bound.is_selected(bound.brick_of(leaf)) {
+                packets.walk_leaf(isa, bound, scratch, leaf, rays, any_hit);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn takes<const SELECT: bool>(bound: &Bound, slot: &Slot) -> bool {
+    let is_found = bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
+    let is_left_out = SELECT && (is_found || slot.surface.pending == 0);
+    slot.is_traced() && bound.params.top_count != 0 && !is_left_out
+}
+
 #[inline(always)]
 fn trace<I: Isa, const SELECT: bool>(isa: I, bound: &Bound, scratch: &mut Scratch, mut slot: Slot) {
+    if !takes::<SELECT>(bound, &slot) {
+        return;
+    }
     let ray = *slot.ray;
-    if !slot.is_traced() || bound.params.top_count == 0 {
-        return;
-    }
     let any_hit = bound.has(PARAM_ANY_HIT);
-    let before = *slot.hit;
-    if SELECT && ((any_hit && before.id != NONE) || slot.surface.pending == 0) {
-        return;
-    }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let source = slot.surface.source;
-    let mut best = Best { t: before.t, id: before.id, leaf: NONE, triangle: 0, hit: Default::default(), source };
+    let mut best = Best::before(&slot);
     let mut visits = Visits::default();
     let lanes = Lanes::new(&world, [0.0; 3], [0.0; 3]);
     let mut r = BrickRay::outside(&world);

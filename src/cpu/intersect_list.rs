@@ -5,16 +5,22 @@ use super::brick::Best;
 use super::isa::Isa;
 use super::leaf::BrickRay;
 use super::node::framed_ray;
-use super::rays::{RayKernel, RaySet, Scratch, Slot, Work, run_for_each_ray};
+use super::packet_walk::PacketScratch;
+use super::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet, run_for_each_ray};
 use super::scene::Bound;
 use super::tile_lists::TileLists;
 use super::walk_brick::{Group, STACK_SIZE, Visits, finish_walk};
-use crate::kernel::layout::{COUNTER_LEAF_GROUPS, COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT};
+use crate::kernel::layout::{COUNTER_LEAF_GROUPS, COUNTER_STACK_OVERFLOW, Entry, NONE, PARAM_ANY_HIT};
 
 /// Of the rays of chosen tiles. With `LEAF_CACHE` two groups of triangles are gathered, as long as the ray does not enter another
 /// leaf.
 pub fn intersect_list<const LEAF_CACHE: bool>(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
-    run_for_each_ray(set, bound, Work::Chosen(lists), &IntersectList::<LEAF_CACHE> { bound, lists });
+    let kernel = IntersectList::<LEAF_CACHE> { bound, lists };
+    if LEAF_CACHE {
+        run_for_each_ray(set, bound, Work::Chosen(lists), &kernel);
+    } else {
+        run_for_each_packet(set, bound, Work::Chosen(lists), &kernel);
+    }
 }
 
 struct IntersectList<'a, const LEAF_CACHE: bool> {
@@ -25,36 +31,62 @@ struct IntersectList<'a, const LEAF_CACHE: bool> {
 impl<const LEAF_CACHE: bool> RayKernel for IntersectList<'_, LEAF_CACHE> {
     #[inline(always)]
     fn run<I: Isa>(&self, isa: I, scratch: &mut Scratch, slot: Slot) {
-        trace::<I, LEAF_CACHE>(isa, self.bound, scratch, slot, self.lists);
+        trace(isa, self, scratch, slot);
+    }
+}
+
+impl<const LEAF_CACHE: bool> IntersectList<'_, LEAF_CACHE> {
+    /// The run of a tile's selection: its first, and the one after the last.
+    #[inline(always)]
+    fn run_of(&self, tile: usize) -> (u32, u32) {
+        let (entry, params) = (&self.lists.lists[tile], self.bound.params);
+        let next = entry.first + params.run_first.min(entry.selected);
+        (next, (entry.first + entry.selected).min(next.saturating_add(params.run_count)))
+    }
+
+    /// An entry of the selection.
+    #[inline(always)]
+    fn listed(&self, position: u32) -> Entry {
+        self.lists.list[self.lists.selection[position as usize] as usize]
+    }
+}
+
+impl<const LEAF_CACHE: bool> PacketKernel for IntersectList<'_, LEAF_CACHE> {
+    #[inline(always)]
+    fn takes(&self, slot: &Slot) -> bool {
+        let (next, end) = self.run_of(slot.tile);
+        next != end && slot.is_traced() && !(self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE)
+    }
+
+    #[inline(always)]
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
+        let (next, end) = self.run_of(tile);
+        for position in next..end {
+            let listed = self.listed(position);
+            let rays = packets.packet.reaching(isa, listed.near) & !packets.packet.done;
+            if rays != 0 {
+                packets.walk_leaf(isa, self.bound, scratch, listed.leaf, rays, self.bound.has(PARAM_ANY_HIT));
+            }
+        }
     }
 }
 
 #[inline(always)]
 fn trace<I: Isa, const LEAF_CACHE: bool>(
     isa: I,
-    bound: &Bound,
+    kernel: &IntersectList<LEAF_CACHE>,
     scratch: &mut Scratch,
     mut slot: Slot,
-    lists: &TileLists,
 ) {
-    let entry = lists.lists[slot.tile];
-    let mut next = entry.first + bound.params.run_first.min(entry.selected);
-    let end = (entry.first + entry.selected).min(next.saturating_add(bound.params.run_count));
-    if next == end {
+    if !kernel.takes(&slot) {
         return;
     }
+    let bound = kernel.bound;
+    let (mut next, end) = kernel.run_of(slot.tile);
     let ray = *slot.ray;
-    if !slot.is_traced() {
-        return;
-    }
     let any_hit = bound.has(PARAM_ANY_HIT);
-    let before = *slot.hit;
-    if any_hit && before.id != NONE {
-        return;
-    }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let source = slot.surface.source;
-    let mut best = Best { t: before.t, id: before.id, leaf: NONE, triangle: 0, hit: Default::default(), source };
+    let mut best = Best::before(&slot);
     let mut visits = Visits::default();
     let mut r = BrickRay::outside(&world);
     let Scratch { stack, tally, .. } = scratch;
@@ -73,7 +105,7 @@ fn trace<I: Isa, const LEAF_CACHE: bool>(
                     if next == end || (LEAF_CACHE && postponed.bits != 0) {
                         break;
                     }
-                    let listed = lists.list[lists.selection[next as usize] as usize];
+                    let listed = kernel.listed(next);
                     next += 1;
                     if listed.near > best.t {
                         continue;

@@ -3,6 +3,7 @@
 
 use super::node::{FramedRay, node_hits, traversal_mask};
 use super::vector::{Vec3, xyz};
+use super::wide::{Portable, Wide};
 use bricks::Node;
 
 /// A ray and its offset from the space of nodes as vectors of four, the last of no meaning.
@@ -27,6 +28,15 @@ impl Lanes {
 
 /// What nodes are tested by. A value of the type is proof that the processor has the instructions.
 pub trait Isa: Copy + Send + Sync {
+    /// Numbers of several rays.
+    type Wide: Wide;
+
+    /// The same number in all lanes.
+    fn splat(self, x: f32) -> Self::Wide;
+
+    /// The first of `from`, a number a lane.
+    fn load(self, from: &[f32]) -> Self::Wide;
+
     /// The traversal mask of a brick's node ([`traversal_mask`]): what `ray` enters of it up to `t_max`. `lanes` are the ray's.
     fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32;
 
@@ -40,6 +50,20 @@ pub trait Isa: Copy + Send + Sync {
 pub struct Scalar;
 
 impl Isa for Scalar {
+    type Wide = Portable;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Portable {
+        Portable([x; 8])
+    }
+
+    #[inline(always)]
+    fn load(self, from: &[f32]) -> Portable {
+        let mut lanes = [0.0; 8];
+        lanes.copy_from_slice(&from[..8]);
+        Portable(lanes)
+    }
+
     #[inline(always)]
     fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
         let (high, low) = (xyz(lanes.offset_high), xyz(lanes.offset_low));
@@ -75,20 +99,58 @@ impl Avx2 {
     }
 }
 
+/// AVX-512, of x86-64, and AVX2 for single rays.
 #[cfg(target_arch = "x86_64")]
-impl Isa for Avx2 {
-    #[inline(always)]
-    fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
-        // SAFETY: a value of the type exists only where AVX2 has been detected.
-        unsafe { avx2::open(ray, lanes, node, t_max) }
-    }
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512(());
 
-    #[inline(always)]
-    fn open_top(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
-        // SAFETY: a value of the type exists only where AVX2 has been detected.
-        unsafe { avx2::open_top(ray, lanes, node, slack, t_max) }
+#[cfg(target_arch = "x86_64")]
+impl Avx512 {
+    /// If the processor has it.
+    pub fn detect() -> Option<Self> {
+        let has = std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512dq");
+        (has && Avx2::detect().is_some()).then_some(Self(()))
     }
 }
+
+#[cfg(target_arch = "x86_64")]
+macro_rules! isa_of_x86 {
+    ($name:ident, $wide:ty) => {
+        #[cfg(target_arch = "x86_64")]
+        impl Isa for $name {
+            type Wide = $wide;
+
+            #[inline(always)]
+            fn splat(self, x: f32) -> $wide {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { <$wide>::splat(x) }
+            }
+
+            #[inline(always)]
+            fn load(self, from: &[f32]) -> $wide {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { <$wide>::load(from) }
+            }
+
+            #[inline(always)]
+            fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
+                // SAFETY: a value of the type exists only where AVX2 has been detected.
+                unsafe { avx2::open(ray, lanes, node, t_max) }
+            }
+
+            #[inline(always)]
+            fn open_top(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
+                // SAFETY: a value of the type exists only where AVX2 has been detected.
+                unsafe { avx2::open_top(ray, lanes, node, slack, t_max) }
+            }
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+isa_of_x86!(Avx2, super::wide::x86::Eight);
+#[cfg(target_arch = "x86_64")]
+isa_of_x86!(Avx512, super::wide::x86::Sixteen);
 
 /// The instruction set that kernels run with.
 #[derive(Clone, Copy, Debug)]
@@ -98,16 +160,34 @@ pub enum Best {
     /// [`Avx2`].
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
+    /// [`Avx512`].
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
 }
 
 impl Best {
     /// The best that this processor has.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = Avx2::detect() {
+        if let Some(avx512) = Avx512::detect() {
+            return Self::Avx512(avx512);
+        } else if let Some(avx2) = Avx2::detect() {
             return Self::Avx2(avx2);
         }
         Self::Scalar(Scalar)
+    }
+
+    /// All that this processor has, for tests.
+    #[cfg(test)]
+    pub fn all() -> Vec<Self> {
+        let mut all = vec![Self::Scalar(Scalar)];
+        #[cfg(target_arch = "x86_64")]
+        {
+            all.extend(Avx2::detect().map(Self::Avx2));
+            all.extend(Avx512::detect().map(Self::Avx512));
+        }
+        println!("{all:?}");
+        all
     }
 
     /// Its name.
@@ -116,6 +196,8 @@ impl Best {
             Self::Scalar(_) => "scalar",
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => "AVX2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "AVX-512",
         }
     }
 }

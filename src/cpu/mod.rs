@@ -5,6 +5,9 @@
 //! for bit, where rays are the same. Rays differ where they depend on functions that WGSL leaves some ulps (sine, cosine,
 //! inverse square root): those of soft shadows, occlusion, diffuse and mirrored light.
 //!
+//! Intersection kernels take rays of one octant together (`packet.rs`): they meet children in the same order, so that each has the
+//! hits, uses and counts that it has alone.
+//!
 //! Geometry and attributes of resident bricks are the verified bytes that a worker read, shared with the host cache: a brick
 //! is traversed where it lies. Slots only say what the budget holds.
 
@@ -20,6 +23,10 @@ pub mod isa;
 pub mod leaf;
 mod light;
 pub mod node;
+mod packet;
+mod packet_surface;
+mod packet_triangle;
+mod packet_walk;
 mod query;
 mod query_all;
 mod query_pairs;
@@ -33,11 +40,14 @@ mod tile_lists;
 mod tile_walk;
 mod vector;
 mod walk_brick;
+mod wide;
 
 #[cfg(test)]
 mod lockstep;
 #[cfg(test)]
 mod lockstep_tests;
+#[cfg(test)]
+mod packet_tests;
 
 pub use executor::CpuExecutor;
 

@@ -24,10 +24,15 @@ pub struct FramedRay {
 
 /// A ray's frame, and the order in which it meets children.
 pub fn framed_ray(origin: Vec3, direction: Vec3, t_min: f32) -> FramedRay {
+    FramedRay { origin, t_min: most(t_min, 0.0), direction, flip: octant(direction), frame: ray_frame(direction) }
+}
+
+/// The octant that a direction points to: [`FramedRay::flip`].
+#[inline(always)]
+pub fn octant(direction: Vec3) -> u32 {
     let negative = direction.map(|d| d.to_bits() >> 31);
     // Slots are placed by octant: slot bit 2 is x, bit 1 y, bit 0 z, set for the upper half of the parent.
-    let flip = (negative[0] << 2) | (negative[1] << 1) | negative[2];
-    FramedRay { origin, t_min: most(t_min, 0.0), direction, flip, frame: ray_frame(direction) }
+    (negative[0] << 2) | (negative[1] << 1) | negative[2]
 }
 
 /// Which children of a node a ray enters, and where.

@@ -1,6 +1,10 @@
 //! Rays of a set and the loops over them.
 
+use super::brick::Best as Found;
 use super::isa::{Best, Isa};
+use super::node::{framed_ray, octant};
+use super::packet::RAYS;
+use super::packet_walk::PacketScratch;
 use super::scene::{Bound, Tally};
 use super::tile_lists::TileLists;
 use super::walk_brick::{STACK_SIZE, Stack};
@@ -81,45 +85,103 @@ pub struct Scratch {
     pub stack: Stack,
     /// That of a traversal over single nodes.
     pub nodes: Vec<u32>,
+    /// What packets work with, once there was one.
+    packets: Option<Box<PacketScratch>>,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self { tally: Tally::default(), stack: [Default::default(); STACK_SIZE], nodes: Vec::new() }
+        Self { tally: Tally::default(), stack: [Default::default(); STACK_SIZE], nodes: Vec::new(), packets: None }
     }
 }
 
-/// Calls `kernel` for every ray of `work`: bands of rows in parallel, in each blocks of 8 x 8 rays, so that neighbours meet the same
-/// nodes. A block lies in one tile.
-pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn(&mut Scratch, Slot) + Sync) {
+/// A rectangle of rays that lies in one tile and in one band.
+struct Block {
+    tile: usize,
+    /// First column.
+    first: usize,
+    columns: usize,
+    rows: usize,
+}
+
+impl Block {
+    /// Numbers of its rays within the band of rows of `width`: squares of 8 x 8 one after the other.
+    fn places(&self, width: usize) -> impl Iterator<Item = usize> + use<> {
+        let Self { first, columns, rows, .. } = *self;
+        let squares = (first..first + columns).step_by(BLOCK);
+        let end = first + columns;
+        squares
+            .flat_map(move |x| (0..rows).flat_map(move |row| (x..(x + BLOCK).min(end)).map(move |x| row * width + x)))
+    }
+}
+
+/// The rays of a band with what is written of them.
+struct Band<'a> {
+    rays: &'a [Ray],
+    hits: &'a mut [Hit],
+    surfaces: &'a mut [Surface],
+}
+
+impl Band<'_> {
+    #[inline(always)]
+    fn slot(&mut self, tile: usize, at: usize) -> Slot<'_> {
+        Slot { tile, ray: &self.rays[at], hit: &mut self.hits[at], surface: &mut self.surfaces[at] }
+    }
+}
+
+/// Calls `visit` for the blocks of `work`, at most `columns` wide: bands of rows in parallel.
+fn for_each_block(
+    set: &mut RaySet,
+    bound: &Bound,
+    work: Work,
+    columns: usize,
+    visit: impl Fn(&mut Scratch, &mut Band, Block) + Sync,
+) {
     let [width, edge, tiles_x] = [bound.params.width, bound.params.tile, bound.params.tiles_x].map(|x| x as usize);
+    // Tiles are powers of two of at least 8.
+    let columns = columns.min(edge);
     let band = BLOCK * width;
     let RaySet { rays, hits, surfaces } = set;
     let bands = rays.par_chunks(band).zip(hits.par_chunks_mut(band)).zip(surfaces.par_chunks_mut(band));
     bands.enumerate().for_each(|(number, ((rays, hits), surfaces))| {
         let mut scratch = Scratch::default();
-        for first in (0..width).step_by(BLOCK) {
+        let rows = rays.len() / width;
+        let mut band = Band { rays, hits, surfaces };
+        for first in (0..width).step_by(columns) {
             let tile = number * BLOCK / edge * tiles_x + first / edge;
-            if !work.includes(tile) {
-                continue;
-            }
-            for row in 0..rays.len() / width {
-                for x in first..(first + BLOCK).min(width) {
-                    let at = row * width + x;
-                    let (ray, hit, surface) = (&rays[at], &mut hits[at], &mut surfaces[at]);
-                    let slot = Slot { tile, ray, hit, surface };
-                    kernel(&mut scratch, slot);
-                }
+            if work.includes(tile) {
+                let columns = columns.min(width - first);
+                visit(&mut scratch, &mut band, Block { tile, first, columns, rows });
             }
         }
         bound.counters.add(&scratch.tally);
     });
 }
 
-/// A kernel that is compiled for every instruction set.
+/// Calls `kernel` for every ray of `work`: bands of rows in parallel, in each blocks of 8 x 8 rays, so that neighbours meet the same
+/// nodes.
+pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn(&mut Scratch, Slot) + Sync) {
+    let width = bound.params.width as usize;
+    for_each_block(set, bound, work, BLOCK, |scratch, band, block| {
+        for at in block.places(width) {
+            kernel(scratch, band.slot(block.tile, at));
+        }
+    });
+}
+
+/// A kernel that is compiled for every instruction set. Implementations are always inlined, so that all of it is.
 pub trait RayKernel: Sync {
-    /// Runs it for one ray. Implementations are always inlined, so that all of it is compiled for `isa`.
+    /// Runs it for one ray.
     fn run<I: Isa>(&self, isa: I, scratch: &mut Scratch, slot: Slot);
+}
+
+/// A kernel that rays of one octant may run together.
+pub trait PacketKernel: RayKernel {
+    /// Whether it does anything for a ray.
+    fn takes(&self, slot: &Slot) -> bool;
+
+    /// Runs it for the rays of the packet, which are of the tile; what they find stays with them.
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize);
 }
 
 /// [`for_each_ray`] with the dispatch's instruction set.
@@ -131,14 +193,111 @@ pub fn run_for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: &im
             // SAFETY: a value of the type exists only where AVX2 has been detected.
             unsafe { run_avx2(isa, kernel, scratch, slot) }
         }),
+        #[cfg(target_arch = "x86_64")]
+        Best::Avx512(isa) => for_each_ray(set, bound, work, |scratch, slot| {
+            // SAFETY: a value of the type exists only where AVX2 has been detected.
+            unsafe { run_avx2(isa, kernel, scratch, slot) }
+        }),
     }
 }
 
 /// What `kernel` is compiled for AVX2 in.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn run_avx2(isa: super::isa::Avx2, kernel: &impl RayKernel, scratch: &mut Scratch, slot: Slot) {
+fn run_avx2<I: Isa>(isa: I, kernel: &impl RayKernel, scratch: &mut Scratch, slot: Slot) {
     kernel.run(isa, scratch, slot);
+}
+
+/// Columns of the blocks whose rays are made packets of: 256 rays, of which those of an octant go together.
+const PACKET_COLUMNS: usize = 32;
+/// Fewer rays of an octant go one by one.
+const LEAST_PACKET: usize = 4;
+
+/// [`run_for_each_ray`], rays of an octant together.
+pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
+    for_each_block(set, bound, work, PACKET_COLUMNS, |scratch, band, block| match bound.isa {
+        Best::Scalar(isa) => run_block(isa, bound, kernel, scratch, band, block),
+        #[cfg(target_arch = "x86_64")]
+        Best::Avx2(isa) => {
+            // SAFETY: a value of the type exists only where AVX2 has been detected.
+            unsafe { run_block_avx2(isa, bound, kernel, scratch, band, block) }
+        }
+        #[cfg(target_arch = "x86_64")]
+        Best::Avx512(isa) => {
+            // SAFETY: a value of the type exists only where AVX-512 and AVX2 have been detected.
+            unsafe { run_block_avx512(isa, bound, kernel, scratch, band, block) }
+        }
+    });
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn run_block_avx2(
+    isa: super::isa::Avx2,
+    bound: &Bound,
+    kernel: &impl PacketKernel,
+    scratch: &mut Scratch,
+    band: &mut Band,
+    block: Block,
+) {
+    run_block(isa, bound, kernel, scratch, band, block);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512dq")]
+fn run_block_avx512(
+    isa: super::isa::Avx512,
+    bound: &Bound,
+    kernel: &impl PacketKernel,
+    scratch: &mut Scratch,
+    band: &mut Band,
+    block: Block,
+) {
+    run_block(isa, bound, kernel, scratch, band, block);
+}
+
+/// Makes packets of a block's rays and runs them.
+#[inline(always)]
+fn run_block<I: Isa>(
+    isa: I,
+    bound: &Bound,
+    kernel: &impl PacketKernel,
+    scratch: &mut Scratch,
+    band: &mut Band,
+    block: Block,
+) {
+    let mut octants = [[0u32; PACKET_COLUMNS * BLOCK]; 8];
+    let mut counts = [0; 8];
+    for at in block.places(bound.params.width as usize) {
+        let slot = band.slot(block.tile, at);
+        if kernel.takes(&slot) {
+            let octant = octant(slot.ray.direction) as usize;
+            octants[octant][counts[octant]] = at as u32;
+            counts[octant] += 1;
+        }
+    }
+    let mut packets = scratch.packets.take().unwrap_or_default();
+    for flip in 0..8 {
+        for places in octants[flip][..counts[flip]].chunks(RAYS) {
+            if places.len() < LEAST_PACKET {
+                for &at in places {
+                    kernel.run(isa, scratch, band.slot(block.tile, at as usize));
+                }
+                continue;
+            }
+            packets.packet.clear(flip as u32);
+            for &at in places {
+                let slot = band.slot(block.tile, at as usize);
+                let ray = framed_ray(slot.ray.origin, slot.ray.direction, slot.ray.t_min);
+                packets.packet.add(ray, Found::before(&slot));
+            }
+            packets.packet.seal(isa);
+            kernel.run_packet(isa, scratch, &mut packets, block.tile);
+            packets.count(bound, &mut scratch.tally);
+            packets.packet.write(isa, bound, band.hits, band.surfaces, places);
+        }
+    }
+    scratch.packets = Some(packets);
 }
 
 /// Starts a ray's hit: nothing found within its range; triangle `source`, from which it starts, is not met (NONE: of none).

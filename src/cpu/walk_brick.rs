@@ -6,7 +6,7 @@ use super::leaf::BrickRay;
 use super::node::{FramedRay, inner_before};
 use super::rays::Slot;
 use super::scene::{Bound, Tally};
-use crate::kernel::layout::{COUNTER_NODES, COUNTER_TRIANGLES, NONE};
+use crate::kernel::layout::{COUNTER_NODES, COUNTER_TRIANGLES, Hit, NONE, Surface};
 
 /// MAX_BRICK_HEIGHT + MAX_TOP_HEIGHT and the entries that a change of tree leaves.
 pub const STACK_SIZE: usize = 52;
@@ -98,17 +98,31 @@ impl BrickRay<'_> {
     }
 }
 
-/// Writes what the walk found, if it found something nearer than was known, and counts.
+/// Writes what a walk found, if it found something nearer than was known.
 #[inline(always)]
-pub fn finish_walk(bound: &Bound, world: &FramedRay, best: &Best, visits: Visits, slot: &mut Slot, tally: &mut Tally) {
+pub fn write_found(bound: &Bound, world: &FramedRay, best: &Best, hit: &mut Hit, surface: &mut Surface) {
     if best.leaf != NONE {
         let mut r = BrickRay::outside(world);
         r.enter_leaf(bound.scene, world, best.leaf);
         r.brick = bound.bricks[bound.brick_of(best.leaf)];
-        r.write_hit(bound.scene, best, world.direction, slot.hit, slot.surface);
+        r.write_hit(bound.scene, best, world.direction, hit, surface);
     }
-    if bound.count {
-        tally.add(COUNTER_NODES, visits.nodes);
-        tally.add(COUNTER_TRIANGLES, visits.triangles);
+}
+
+impl Visits {
+    /// Counts them, if they are asked for.
+    #[inline(always)]
+    pub fn count(self, bound: &Bound, tally: &mut Tally) {
+        if bound.count {
+            tally.add(COUNTER_NODES, self.nodes);
+            tally.add(COUNTER_TRIANGLES, self.triangles);
+        }
     }
+}
+
+/// Writes and counts what a walk found.
+#[inline(always)]
+pub fn finish_walk(bound: &Bound, world: &FramedRay, best: &Best, visits: Visits, slot: &mut Slot, tally: &mut Tally) {
+    write_found(bound, world, best, slot.hit, slot.surface);
+    visits.count(bound, tally);
 }

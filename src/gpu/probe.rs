@@ -70,6 +70,15 @@ pub(crate) fn scene() -> Result<SceneFile, bricks::Error> {
     SceneFile::from_bytes("the probe's scene", include_bytes!("probe/scene.bricks"))
 }
 
+/// The rays of the probe, at its scene in `frame`, for tests of others.
+#[cfg(test)]
+pub(crate) fn adverse_rays(
+    scene: &SceneFile,
+    frame: &crate::kernel::frame::Frame,
+) -> Result<Vec<crate::kernel::layout::Ray>, bricks::Error> {
+    Ok(rays::rays(&twin::Twin::new(scene, frame)?, frame.unit))
+}
+
 impl Check {
     fn new(name: &'static str, against: &'static str) -> Self {
         Self { name, against, cases: 0, different: 0, first: None }

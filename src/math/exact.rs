@@ -13,16 +13,20 @@ const LEAST_NORMAL: u32 = 0x0080_0000;
 const GREATEST_FINITE: u32 = 0x7f7f_ffff;
 /// 2^-100: below it a flushed product might show.
 const TINY_EDGE: u32 = 0x0d80_0000;
+/// The same as a number.
+pub const TINY: f32 = f32::from_bits(TINY_EDGE);
 /// 2^-60.
-const LEAST_SHEAR: f32 = f32::from_bits((127 - 60) << 23);
+pub const LEAST_SHEAR: f32 = f32::from_bits((127 - 60) << 23);
 /// 2^96.
 const GREATEST_INVERSE: f32 = f32::from_bits((127 + 96) << 23);
 /// 2^-60.
 const LEAST_COORDINATE: f32 = LEAST_SHEAR;
 /// 32 u with u = 2^-24.
-const CLAMP_ULPS: f32 = 1.0 / 524_288.0;
+pub const CLAMP_ULPS: f32 = 1.0 / 524_288.0;
+/// The greatest number below 1 / 3.
+pub const THIRD: f32 = f32::from_bits(0x3eaa_aaaa);
 /// K u with K = 32.
-const OFFSET_ULPS: f32 = 1.0 / 524_288.0;
+pub const OFFSET_ULPS: f32 = 1.0 / 524_288.0;
 
 /// The same value. On the device it hides a rounded value from the compiler; Rust never contracts or reassociates.
 #[inline(always)]
@@ -78,12 +82,13 @@ fn root_step((q, r): (u32, u32), step: u32) -> (u32, u32) {
 pub fn divide(a: f32, b: f32) -> f32 {
     // Inside the range of normal numbers Rust's division is correctly rounded, too.
     let quotient = a / b;
-    if is_inside(a) && is_inside(b) && is_inside(quotient) { quotient } else { divide_by_integers(a, b) }
+    let is_plain = is_inside(b) && (a == 0.0 || (is_inside(a) && is_inside(quotient)));
+    if is_plain { quotient } else { divide_by_integers(a, b) }
 }
 
 /// Whether x is far enough from the ends of the normal range that rounding beyond them has no part in it.
 #[inline(always)]
-fn is_inside(x: f32) -> bool {
+pub fn is_inside(x: f32) -> bool {
     (2..=253).contains(&((x.to_bits() >> 23) & 255))
 }
 
@@ -166,7 +171,15 @@ pub fn diffprod(a: f32, b: f32, c: f32, d: f32) -> f32 {
         sum.next_down()
     };
     let difference = odd as f32;
-    if [a, b, c, d, difference].into_iter().all(is_inside) { difference } else { diffprod_by_integers(a, b, c, d) }
+    let is_plain = |x: f32| x == 0.0 || is_inside(x);
+    if is_plain(a) && is_plain(b) && is_plain(c) && is_plain(d) {
+        if is_inside(difference) {
+            return difference;
+        } else if sum == 0.0 {
+            return 0.0;
+        }
+    }
+    diffprod_by_integers(a, b, c, d)
 }
 
 /// [`diffprod`] as the kernel carries it out.
@@ -413,7 +426,7 @@ pub fn surface_point(a: [f32; 3], b: [f32; 3], c: [f32; 3], hit: &TriangleHit, d
     let margin = barrier(4.0 * OFFSET_ULPS * barrier(barrier(reach[0] + reach[1]) + reach[2]));
     let area = barrier(size * scale);
     let least = [bc, ca, ab].map(|edge| divide(barrier(margin * length_of(edge)), area));
-    weights = zip(weights, least, |x, l| x.max(l.min(f32::from_bits(0x3eaa_aaaa))));
+    weights = zip(weights, least, |x, l| x.max(l.min(THIRD)));
     let total = barrier(barrier(weights[0] + weights[1]) + weights[2]);
     weights = weights.map(|x| divide(x, total));
 

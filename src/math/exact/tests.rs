@@ -104,6 +104,14 @@ fn shortcuts_give_what_the_kernel_gives() {
         let (c, d) = if a.to_bits() & 1 == 0 { (rng.float(-90, 90), rng.float(-90, 90)) } else { (a.next_up(), b) };
         let exact = diffprod_by_integers(a, b, c, d);
         assert_eq!(diffprod(a, b, c, d).to_bits(), exact.to_bits(), "{a:e} {b:e} {c:e} {d:e}");
+        // Zeros of either sign among the factors, as axis-aligned edges have them.
+        let zero = |x: f32, bit: u32| if d.to_bits() >> bit & 1 == 0 { x } else { 0.0f32.copysign(x) };
+        let (x, y, z, w) = (zero(a, 1), zero(b, 2), zero(c, 3), zero(d, 4));
+        let exactly = diffprod_by_integers(x, y, z, w);
+        assert_eq!(diffprod(x, y, z, w).to_bits(), exactly.to_bits(), "{x:e} {y:e} {z:e} {w:e}");
+        if b != 0.0 {
+            assert_eq!(divide(x, b).to_bits(), divide_by_integers(x, b).to_bits(), "{x:e} {b:e}");
+        }
         fused_differs += u32::from(differ(a.mul_add(b, -(c * d)), exact));
     }
     assert!(beyond > 100_000, "{beyond}");
