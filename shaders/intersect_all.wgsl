@@ -97,7 +97,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
                 group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
             } else {
                 let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
-                if SELECT && (slots[leaves[leaf].brick].state & params.select_mask) != params.select_want {
+                let is_selected = !SELECT || (slots[leaves[leaf].brick].state & params.select_mask) == params.select_want;
+                if !is_selected || (SELECT && OF_TILES && is_culled(work.tile, leaf)) {
                     group = vec2<u32>(0u);
                     continue;
                 }

@@ -31,21 +31,6 @@ fn entered(ray: FramedRay, n0: vec4<u32>, n1: vec4<u32>, n2: vec4<u32>, n3: vec4
     return e;
 }
 
-// Position of a leaf in the tile's table; NONE where no ray counts. A leaf that the tile's walk has missed counts for itself.
-fn position_of(tile: u32, leaf: u32) -> u32 {
-    if !OF_TILES || params.threshold == 0u {
-        return NONE;
-    }
-    let entry = tile_lists[tile];
-    var place = table_place(leaf, entry.count);
-    var listed = list[entry.first + place].leaf;
-    while listed != leaf && listed != NONE {
-        place = (place + 1u) & (entry.count - 1u);
-        listed = list[entry.first + place].leaf;
-    }
-    return select(entry.first + place, NONE, listed == NONE);
-}
-
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
@@ -102,8 +87,14 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
                             r.offset_high, r.offset_low, 0.0, hit.t);
             if e.mask != 0u {
                 let nearest = bitcast<u32>(max(e.near, 0.0));
-                let position = position_of(work.tile, leaf);
+                var position = NONE;
+                if OF_TILES && params.threshold > 0u {
+                    position = position_of(work.tile, leaf);
+                }
                 if position != NONE {
+                    if atomicLoad(&pair_demand[position].rays) == PAIR_CULLED {
+                        continue;
+                    }
                     atomicAdd(&pair_demand[position].rays, 1u);
                     atomicMin(&pair_demand[position].nearest, nearest);
                 } else {

@@ -1,4 +1,5 @@
 // Sums the queries of the selected pairs, and those in tables, into the demand of their bricks, and clears them for the next query.
+// Pairs that no more rays see than the threshold are culled for the rest of the pass: hits only move nearer, so no more will.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -24,11 +25,16 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         if leaf == NONE {
             continue;
         }
-        let count = atomicExchange(&pair_demand[position].rays, 0u);
-        let nearest = atomicExchange(&pair_demand[position].nearest, 0xffffffffu);
+        let count = atomicLoad(&pair_demand[position].rays);
         // Of a table only what rays have asked for counts as a query.
-        asked += u32(!is_table || count > 0u);
-        if count > params.threshold {
+        if is_table && (count == 0u || count == PAIR_CULLED) {
+            continue;
+        }
+        let nearest = atomicExchange(&pair_demand[position].nearest, 0xffffffffu);
+        let is_visible = count > params.threshold;
+        atomicStore(&pair_demand[position].rays, select(PAIR_CULLED, 0u, is_visible));
+        asked += 1u;
+        if is_visible {
             let brick = leaves[leaf].brick;
             atomicAdd(&demand[brick].rays, count);
             atomicMin(&demand[brick].nearest, nearest);

@@ -1,4 +1,4 @@
-// Picks from each tile's list the leaves whose brick is in the wanted state, keeping their order.
+// Picks from each tile's list the leaves whose brick is in the wanted state, but for culled pairs, keeping their order.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -20,7 +20,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     for (var i = entry.first; i < end; i++) {
         let leaf = list[i].leaf;
         let state = slots[leaves[leaf].brick].state;
-        if (state & params.select_mask) == params.select_want {
+        if (state & params.select_mask) == params.select_want && atomicLoad(&pair_demand[i].rays) != PAIR_CULLED {
             selection[entry.first + selected] = i;
             selected += 1u;
             departures += u32(leaf < last);

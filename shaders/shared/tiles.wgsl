@@ -20,6 +20,30 @@ fn table_place(leaf: u32, entries: u32) -> u32 {
     return (leaf * 0x9e3779b1u) >> (32u - firstLeadingBit(entries));
 }
 
+// Position of a leaf in the tile's table; NONE where the tile's walk has missed it, so that no ray counts there.
+fn position_of(tile: u32, leaf: u32) -> u32 {
+    let entry = tile_lists[tile];
+    var place = table_place(leaf, entry.count);
+    var listed = list[entry.first + place].leaf;
+    while listed != leaf && listed != NONE {
+        place = (place + 1u) & (entry.count - 1u);
+        listed = list[entry.first + place].leaf;
+    }
+    return select(entry.first + place, NONE, listed == NONE);
+}
+
+// Whether a leaf of a tile whose rays walk from the root is culled.
+fn is_culled(tile: u32, leaf: u32) -> bool {
+    if params.threshold == 0u {
+        return false;
+    }
+    let position = position_of(tile, leaf);
+    if position == NONE {
+        return false;
+    }
+    return atomicLoad(&pair_demand[position].rays) == PAIR_CULLED;
+}
+
 const MOST_WORKGROUPS: u32 = 65535u; // in one dimension
 
 // What a workgroup has to do of the work that begins at counter `work`: over chosen tiles alone.

@@ -170,7 +170,7 @@ struct Demand {           // what rays still ask of a brick
 }
 
 struct PairDemand {       // what the rays of a tile still ask of a leaf
-    rays: atomic<u32>,
+    rays: atomic<u32>,    // PAIR_CULLED: too few saw it, and are done with it
     nearest: atomic<u32>, // as above
 }
 
@@ -214,6 +214,7 @@ const BRICK_WIDE: u32 = 1u;
 const BRICK_INDEX32: u32 = 2u;
 const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex without one
 const BINARY_LEAF: u32 = 0x80000000u;
+const PAIR_CULLED: u32 = 0xffffffffu;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
 const STATE_BATCH: u32 = 4u;       // geometry arrived with the current batch

@@ -9,6 +9,7 @@ use super::node::{FramedRay, framed_ray, inner_before};
 use super::packet_walk::{PacketGroup, PacketScratch, put, take};
 use super::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
 use super::scene::Bound;
+use super::tile_lists::TileLists;
 use super::walk_brick::{Group, STACK_SIZE, Visits, finish_walk};
 use crate::kernel::layout::{COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT};
 
@@ -29,19 +30,29 @@ fn top_group<I: Isa>(
     Group { base: node, bits: isa.open_top(ray, lanes, n, bound.params.instance_pad, t_max) }
 }
 
-/// Of the rays of `work`; `SELECT`: with what is selected.
+/// Of the rays of `work`; `SELECT`: with what is selected, but for culled pairs.
 pub fn intersect_all<const SELECT: bool>(bound: &Bound, set: &mut RaySet, work: Work) {
-    run_for_each_packet(set, bound, work, &IntersectAll::<SELECT> { bound });
+    let tables = work.tables(bound).filter(|_| SELECT);
+    run_for_each_packet(set, bound, work, &IntersectAll::<SELECT> { bound, tables });
 }
 
 struct IntersectAll<'a, const SELECT: bool> {
     bound: &'a Bound<'a>,
+    /// Of the tiles, where a threshold may have culled some of what is selected.
+    tables: Option<&'a TileLists>,
+}
+
+impl<const SELECT: bool> IntersectAll<'_, SELECT> {
+    #[inline(always)]
+    fn is_left_out(&self, tile: usize, leaf: u32, brick: usize) -> bool {
+        SELECT && (!self.bound.is_selected(brick) || self.tables.is_some_and(|tables| tables.is_culled(tile, leaf)))
+    }
 }
 
 impl<const SELECT: bool> RayKernel for IntersectAll<'_, SELECT> {
     #[inline(always)]
     fn run<I: Isa>(&self, isa: I, scratch: &mut Scratch, slot: Slot) {
-        trace::<I, SELECT>(isa, self.bound, scratch, slot);
+        self.trace(isa, scratch, slot);
     }
 }
 
@@ -52,7 +63,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
     }
 
     #[inline(always)]
-    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, _: usize) {
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
         let bound = self.bound;
         let any_hit = bound.has(PARAM_ANY_HIT);
         let flip = packets.packet.flip;
@@ -88,7 +99,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
                 continue;
             }
             let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
-            if !SELECT || bound.is_selected(bound.brick_of(leaf)) {
+            if !self.is_left_out(tile, leaf, bound.brick_of(leaf)) {
                 packets.walk_leaf(isa, bound, scratch, leaf, rays, any_hit);
             }
         }
@@ -102,82 +113,85 @@ fn takes<const SELECT: bool>(bound: &Bound, slot: &Slot) -> bool {
     slot.is_traced() && bound.params.top_count != 0 && !is_left_out
 }
 
-#[inline(always)]
-fn trace<I: Isa, const SELECT: bool>(isa: I, bound: &Bound, scratch: &mut Scratch, mut slot: Slot) {
-    if !takes::<SELECT>(bound, &slot) {
-        return;
-    }
-    let ray = *slot.ray;
-    let any_hit = bound.has(PARAM_ANY_HIT);
-    let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let mut best = Best::before(&slot);
-    let mut visits = Visits::default();
-    let lanes = Lanes::new(&world, [0.0; 3], [0.0; 3]);
-    let mut r = BrickRay::outside(&world);
-    let Scratch { stack, tally, .. } = scratch;
-    let mut depth = 0;
-    // Stack depth at which the brick ends.
-    let mut floor = 0;
-    let mut in_brick = false;
-    let mut group = top_group(isa, bound, &mut visits, &world, &lanes, 0, best.t);
-    loop {
-        let mut triangles = Group::default();
+impl<const SELECT: bool> IntersectAll<'_, SELECT> {
+    #[inline(always)]
+    fn trace<I: Isa>(&self, isa: I, scratch: &mut Scratch, mut slot: Slot) {
+        let bound = self.bound;
+        if !takes::<SELECT>(bound, &slot) {
+            return;
+        }
+        let ray = *slot.ray;
+        let any_hit = bound.has(PARAM_ANY_HIT);
+        let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+        let mut best = Best::before(&slot);
+        let mut visits = Visits::default();
+        let lanes = Lanes::new(&world, [0.0; 3], [0.0; 3]);
+        let mut r = BrickRay::outside(&world);
+        let Scratch { stack, tally, .. } = scratch;
+        let mut depth = 0;
+        // Stack depth at which the brick ends.
+        let mut floor = 0;
+        let mut in_brick = false;
+        let mut group = top_group(isa, bound, &mut visits, &world, &lanes, 0, best.t);
         loop {
-            if !group.has_children() {
-                if in_brick && depth == floor {
-                    in_brick = false;
-                    r.ray.flip = world.flip;
+            let mut triangles = Group::default();
+            loop {
+                if !group.has_children() {
+                    if in_brick && depth == floor {
+                        in_brick = false;
+                        r.ray.flip = world.flip;
+                    }
+                    if depth == 0 {
+                        break;
+                    }
+                    depth -= 1;
+                    group = stack[depth];
                 }
-                if depth == 0 {
-                    break;
+                let (child, rest) = group.nearest_child(r.ray.flip);
+                if rest.has_children() {
+                    if depth == STACK_SIZE {
+                        tally.add(COUNTER_STACK_OVERFLOW, 1);
+                        break;
+                    }
+                    stack[depth] = rest;
+                    depth += 1;
                 }
-                depth -= 1;
-                group = stack[depth];
-            }
-            let (child, rest) = group.nearest_child(r.ray.flip);
-            if rest.has_children() {
-                if depth == STACK_SIZE {
-                    tally.add(COUNTER_STACK_OVERFLOW, 1);
-                    break;
-                }
-                stack[depth] = rest;
-                depth += 1;
-            }
-            if in_brick {
-                let opened = r.open_node(isa, bound, &mut visits, best.t, group.child_index(child));
-                group = opened.children;
-                triangles = opened.triangles;
-                if triangles.bits != 0 {
-                    break;
-                }
-                continue;
-            }
-            let node = &bound.scene.top8[group.base as usize];
-            let inner = u32::from(node.inner_mask);
-            if inner & 1 << child != 0 {
-                let next = node.child_base + inner_before(inner, child);
-                group = top_group(isa, bound, &mut visits, &world, &lanes, next, best.t);
-            } else {
-                let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
-                let brick = bound.brick_of(leaf);
-                if SELECT && !bound.is_selected(brick) {
-                    group = Group::default();
+                if in_brick {
+                    let opened = r.open_node(isa, bound, &mut visits, best.t, group.child_index(child));
+                    group = opened.children;
+                    triangles = opened.triangles;
+                    if triangles.bits != 0 {
+                        break;
+                    }
                     continue;
                 }
-                floor = depth;
-                in_brick = true;
-                r.enter_leaf(bound.scene, &world, leaf);
-                r.brick = bound.bricks[brick];
-                group = Group::root(r.ray.flip);
+                let node = &bound.scene.top8[group.base as usize];
+                let inner = u32::from(node.inner_mask);
+                if inner & 1 << child != 0 {
+                    let next = node.child_base + inner_before(inner, child);
+                    group = top_group(isa, bound, &mut visits, &world, &lanes, next, best.t);
+                } else {
+                    let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
+                    let brick = bound.brick_of(leaf);
+                    if self.is_left_out(slot.tile, leaf, brick) {
+                        group = Group::default();
+                        continue;
+                    }
+                    floor = depth;
+                    in_brick = true;
+                    r.enter_leaf(bound.scene, &world, leaf);
+                    r.brick = bound.bricks[brick];
+                    group = Group::root(r.ray.flip);
+                }
+            }
+            if triangles.bits == 0 {
+                break;
+            }
+            r.test_triangles(&mut visits, &mut best, triangles, any_hit);
+            if any_hit && best.leaf != NONE {
+                break;
             }
         }
-        if triangles.bits == 0 {
-            break;
-        }
-        r.test_triangles(&mut visits, &mut best, triangles, any_hit);
-        if any_hit && best.leaf != NONE {
-            break;
-        }
+        finish_walk(bound, &world, &best, visits, &mut slot, tally);
     }
-    finish_walk(bound, &world, &best, visits, &mut slot, tally);
 }

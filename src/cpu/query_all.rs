@@ -14,10 +14,7 @@ const TOP_STACK_SIZE: usize = 192;
 
 /// Of the rays of `work`, all or those that walk from the root.
 pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work) {
-    let tables = match work {
-        Work::Rooted(tiles) if bound.params.threshold > 0 => Some(tiles),
-        _ => None,
-    };
+    let tables = work.tables(bound);
     for_each_ray(set, bound, work, |scratch, slot| ask(bound, scratch, slot, tables));
 }
 
@@ -68,6 +65,7 @@ fn ask(bound: &Bound, scratch: &mut Scratch, slot: Slot, tables: Option<&TileLis
             if entered != 0 {
                 // A leaf that the tile's walk has missed counts for itself.
                 match tables.and_then(|tiles| Some(&tiles.pair_demand[tiles.position_of(slot.tile, leaf)?])) {
+                    Some(listed) if listed.is_culled() => continue,
                     Some(listed) => listed.add_ray(near),
                     None => bound.demand[brick].add_ray(near),
                 }

@@ -67,7 +67,15 @@ pub enum Work<'a> {
     Rooted(&'a TileLists),
 }
 
-impl Work<'_> {
+impl<'a> Work<'a> {
+    /// The tables of tiles whose rays walk from the root, where a threshold makes some.
+    pub fn tables(self, bound: &Bound) -> Option<&'a TileLists> {
+        match self {
+            Self::Rooted(tiles) if bound.params.threshold > 0 => Some(tiles),
+            _ => None,
+        }
+    }
+
     fn includes(self, tile: usize) -> bool {
         match self {
             Self::All => true,

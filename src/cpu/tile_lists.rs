@@ -86,6 +86,11 @@ impl TileLists {
         let place = place_in_table(&self.list[first..first + entry.count as usize], leaf);
         (self.list[first + place].leaf == leaf).then_some(first + place)
     }
+
+    /// Whether a leaf of a tile whose rays walk from the root is culled.
+    pub fn is_culled(&self, tile: usize, leaf: u32) -> bool {
+        self.position_of(tile, leaf).is_some_and(|position| self.pair_demand[position].is_culled())
+    }
 }
 
 /// The list of a tile whose rays walk from the root is a table of leaves, at most half full, in which a ray finds those that it
@@ -143,10 +148,10 @@ pub fn tile_scan(bound: &Bound, tiles: &mut TileLists) -> Result<(), ExecutorErr
     Ok(())
 }
 
-/// Picks from each tile's list the leaves whose brick is in the wanted state, keeping their order. `INTERSECT`: the selection is
+/// Picks from each tile's list the leaves whose brick is in the wanted state, but for culled pairs, keeping their order. `INTERSECT`: the selection is
 /// intersected next, and counted as such.
 pub fn tile_select<const INTERSECT: bool>(bound: &Bound, tiles: &mut TileLists) {
-    let TileLists { lists, list, selection, .. } = tiles;
+    let TileLists { lists, list, selection, pair_demand, .. } = tiles;
     let places = of_tiles(lists, selection);
     lists.par_iter_mut().zip(places).for_each(|(entry, selection)| {
         let mut selected = 0;
@@ -155,7 +160,7 @@ pub fn tile_select<const INTERSECT: bool>(bound: &Bound, tiles: &mut TileLists) 
         let count = if entry.from_root != 0 { 0 } else { entry.count };
         for i in entry.first..entry.first + count {
             let leaf = list[i as usize].leaf;
-            if bound.is_selected(bound.brick_of(leaf)) {
+            if bound.is_selected(bound.brick_of(leaf)) && !pair_demand[i as usize].is_culled() {
                 selection[selected as usize] = i;
                 selected += 1;
                 departures += u32::from(leaf < last);
@@ -206,6 +211,7 @@ pub fn tile_choose(tiles: &mut TileLists) {
 }
 
 /// Sums the queries of the selected pairs, and those in tables, into the demand of their bricks, and clears them for the next query.
+/// Pairs that no more rays see than the threshold are culled for the rest of the pass: hits only move nearer, so no more will.
 pub fn query_reduce(bound: &Bound, tiles: &TileLists) {
     tiles.lists.par_iter().for_each(|entry| {
         let is_table = entry.from_root != 0;
@@ -217,10 +223,19 @@ pub fn query_reduce(bound: &Bound, tiles: &TileLists) {
             if leaf == NONE {
                 continue;
             }
-            let pair = tiles.pair_demand[position].take();
+            let demand = &tiles.pair_demand[position];
+            if demand.is_culled() {
+                continue;
+            }
+            let pair = demand.take();
             // Of a table only what rays have asked for counts as a query.
-            asked += u32::from(!is_table || pair.rays > 0);
-            if pair.rays > bound.params.threshold {
+            if is_table && pair.rays == 0 {
+                continue;
+            }
+            asked += 1;
+            if pair.rays <= bound.params.threshold {
+                demand.cull();
+            } else {
                 bound.demand[bound.brick_of(leaf)].add(pair.rays, pair.nearest);
                 visible += 1;
             }

@@ -13,6 +13,7 @@ pub const PARAM_SKY: u32 = 8;
 pub const PARAM_BOUNCE: u32 = 16;
 pub const PARAM_RECTANGLE: u32 = 32;
 pub const PARAM_TIGHTER: u32 = 128;
+pub const PAIR_CULLED: u32 = u32::MAX;
 pub const STATE_GEOMETRY: u32 = 1;
 pub const STATE_DONE: u32 = 2;
 pub const STATE_BATCH: u32 = 4;
