@@ -31,6 +31,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     var r: BrickRay;
     var first = NONE;
     var first_near = T_INFINITE;
+    let up_to_next = (params.flags & PARAM_NEXT) != 0u;
+    var limit = hit.t;
     for (var next = entry.first; next < entry.first + entry.selected; next++) {
         let position = selection[next];
         let listed = list[position];
@@ -42,14 +44,14 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             }
             continue;
         }
-        if listed.near > hit.t {
+        if listed.near > limit {
             continue;
         }
         enter_leaf(&r, world, leaf);
         let brick = leaves[leaf].brick;
         let at = 5u * brick;
         let n1 = roots[at + 1u];
-        let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, hit.t);
+        let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, limit);
         var near = T_INFINITE;
         var any = false;
         for (var i = 0u; i < 8u; i++) {
@@ -65,6 +67,9 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             if first == NONE || near < first_near {
                 first = brick;
                 first_near = near;
+                if up_to_next {
+                    limit = min(limit, near);
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 // Occlusion queries of (tile, node) pairs of any size: how many rays of the tile enter the node at or before their present hit.
 // With PARAM_TIGHTER they must enter one of its children's boxes (of a leaf, of its brick's root's), which lie in its own.
-// A query of several nodes asks first whether any ray enters any of them, and only then for each node alone.
+// A query of several nodes asks first whether any ray enters any of them, and only then for each node alone. No more rays than the
+// threshold are none.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -96,17 +97,20 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
         ask(pair, lane, false);
     }
     workgroupBarrier();
-    let failed = pair.count > 1u && atomicLoad(&visible) > 0u;
+    let failed = pair.count > 1u && atomicLoad(&visible) > params.threshold;
     if failed {
         ask(pair, lane, true);
     }
     workgroupBarrier();
+    if lane == 0u && pair.count > 0u {
+        atomicAdd(&counters[COUNTER_PAIRS_TESTED], select(1u, 1u + pair.count, failed));
+    }
     if lane < pair.count {
         var seen = atomicLoad(&visible);
         if failed {
             seen = atomicLoad(&visible_each[lane]);
         }
-        pair_rays[pair.first + lane] = seen;
+        atomicStore(&pair_rays[pair.first + lane], select(0u, seen, seen > params.threshold));
         if seen == 0u && (atomicLoad(&own) & (1u << lane)) != 0u {
             atomicAdd(&counters[COUNTER_TIGHTENED], 1u);
         }

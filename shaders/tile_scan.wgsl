@@ -1,6 +1,6 @@
 // Places the tiles' lists one after the other. The rays of tiles with lists of more than list_most leaves walk the whole top level,
-// each by itself: such lists are dropped, or, where a threshold asks how many rays see a leaf, get the place of a table. If the
-// entries do not fit, all lists are emptied and the total says how many entries they need: the pass is then repeated with larger ones.
+// each by itself: such lists are dropped. If the entries do not fit, all lists are emptied and the total says how many entries they
+// need: the pass is then repeated with larger ones.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -9,10 +9,7 @@ var<workgroup> sums: array<u32, 256>;
 var<workgroup> roots_of: array<u32, 256>;
 
 fn kept(count: u32) -> u32 {
-    if count <= params.list_most {
-        return count;
-    }
-    return select(table_entries(count), 0u, params.threshold == 0u);
+    return select(count, 0u, count > params.list_most);
 }
 
 // The sum, or the greatest number: so many entries fit nowhere.

@@ -20,7 +20,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     for (var i = entry.first; i < end; i++) {
         let leaf = list[i].leaf;
         let state = slots[leaves[leaf].brick].state;
-        if (state & params.select_mask) == params.select_want && atomicLoad(&pair_demand[i].rays) != PAIR_CULLED {
+        if (state & params.select_mask) == params.select_want && !is_culled(tile, leaf) {
             selection[entry.first + selected] = i;
             selected += 1u;
             departures += u32(leaf < last);

@@ -1,5 +1,5 @@
 // Walks the binary top level for each tile, near child first, and lists the leaves its rays may meet. Run twice: first to
-// count, then, after tile_scan has placed the lists, to WRITE them.
+// count, as far as list_most and one more, then, after tile_scan has placed the lists, to WRITE them.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
@@ -25,12 +25,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var depth = 0u;
     var node = 0u;
     var near = 0.0;
-    if WRITE && entry.from_root != 0u {
-        for (var i = 0u; i < entry.count; i++) {
-            list[entry.first + i] = Entry(NONE, 0.0);
-            pair_demand_clear(entry.first + i);
-        }
-    }
     var found = 0u;
     var tested = 0u;
     var culled = 0u;
@@ -42,17 +36,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             loop {
                 let n = top2[node];
                 if n.right == NONE {
-                    if WRITE && entry.from_root != 0u {
-                        var place = table_place(n.left, entry.count);
-                        while list[entry.first + place].leaf != NONE {
-                            place = (place + 1u) & (entry.count - 1u);
-                        }
-                        list[entry.first + place].leaf = n.left;
-                    } else if WRITE {
+                    if WRITE {
                         list[entry.first + found] = Entry(n.left, near);
                         pair_demand_clear(entry.first + found);
                     }
                     found += 1u;
+                    if !WRITE && found > params.list_most {
+                        break;
+                    }
                 } else {
                     let l = tile_meets_box(bounds, top2[n.left].min, top2[n.left].max, params.instance_pad);
                     let r = tile_meets_box(bounds, top2[n.right].min, top2[n.right].max, params.instance_pad);

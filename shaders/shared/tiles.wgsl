@@ -7,41 +7,20 @@
 @group(3) @binding(3) var<storage, read_write> selection: array<u32>;           // positions in `list`, per tile
 @group(3) @binding(4) var<storage, read_write> pair_demand: array<PairDemand>;  // per position in `list`
 @group(3) @binding(5) var<storage, read> pairs: array<Pair>;                    // queries of pairs
-@group(3) @binding(6) var<storage, read_write> pair_rays: array<u32>;           // rays that see each of their nodes
+@group(3) @binding(6) var<storage, read_write> pair_rays: array<atomic<u32>>;   // rays that see each of their nodes, or each leaf from each tile
 @group(3) @binding(7) var<storage, read> pair_nodes: array<u32>;                // their nodes
 
-// The list of a tile whose rays walk from the root is a table of leaves, at most half full, in which a ray finds those that it sees.
-fn table_entries(leaves: u32) -> u32 {
-    return 2u << (firstLeadingBit(leaves) + 1u);
+// Of a tile and a leaf, the place of their count in pair_rays.
+fn place_of_pair(tile: u32, leaf: u32) -> u32 {
+    return tile * arrayLength(&leaves) + leaf;
 }
 
-// Where to look for a leaf first; then behind it, and from the start again.
-fn table_place(leaf: u32, entries: u32) -> u32 {
-    return (leaf * 0x9e3779b1u) >> (32u - firstLeadingBit(entries));
-}
-
-// Position of a leaf in the tile's table; NONE where the tile's walk has missed it, so that no ray counts there.
-fn position_of(tile: u32, leaf: u32) -> u32 {
-    let entry = tile_lists[tile];
-    var place = table_place(leaf, entry.count);
-    var listed = list[entry.first + place].leaf;
-    while listed != leaf && listed != NONE {
-        place = (place + 1u) & (entry.count - 1u);
-        listed = list[entry.first + place].leaf;
-    }
-    return select(entry.first + place, NONE, listed == NONE);
-}
-
-// Whether a leaf of a tile whose rays walk from the root is culled.
+// Whether too few rays of a tile see a leaf.
 fn is_culled(tile: u32, leaf: u32) -> bool {
-    if params.threshold == 0u {
+    if (params.flags & PARAM_CULLED) == 0u {
         return false;
     }
-    let position = position_of(tile, leaf);
-    if position == NONE {
-        return false;
-    }
-    return atomicLoad(&pair_demand[position].rays) == PAIR_CULLED;
+    return atomicLoad(&pair_rays[place_of_pair(tile, leaf)]) <= params.threshold;
 }
 
 const MOST_WORKGROUPS: u32 = 65535u; // in one dimension

@@ -48,6 +48,8 @@ const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
 const PARAM_BOUNCE: u32 = 16u;    // the hits that are shaded are those of set 1
 const PARAM_RECTANGLE: u32 = 32u; // the pass's lamp is the rectangular light
 const PARAM_TIGHTER: u32 = 128u;  // pairs are queried by the boxes of the node's children
+const PARAM_NEXT: u32 = 256u;     // a ray asks up to the first brick that it enters of those it asks for, not for all
+const PARAM_CULLED: u32 = 512u;   // pairs of a tile and a leaf that no more rays see than the threshold are left out
 
 struct Ray {
     origin: vec3<f32>,    // in the frame, device units
@@ -170,7 +172,7 @@ struct Demand {           // what rays still ask of a brick
 }
 
 struct PairDemand {       // what the rays of a tile still ask of a leaf
-    rays: atomic<u32>,    // PAIR_CULLED: too few saw it, and are done with it
+    rays: atomic<u32>,
     nearest: atomic<u32>, // as above
 }
 
@@ -214,7 +216,6 @@ const BRICK_WIDE: u32 = 1u;
 const BRICK_INDEX32: u32 = 2u;
 const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex without one
 const BINARY_LEAF: u32 = 0x80000000u;
-const PAIR_CULLED: u32 = 0xffffffffu;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
 const STATE_BATCH: u32 = 4u;       // geometry arrived with the current batch

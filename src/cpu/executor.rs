@@ -9,7 +9,7 @@ use super::intersect_binary::{BinaryTrees, intersect_binary};
 use super::intersect_list::intersect_list;
 use super::isa::Best;
 use super::query::query;
-use super::query_all::query_all;
+use super::query_all::{count_pairs, query_all};
 use super::query_pairs::query_pairs;
 use super::rays::{RaySet, Work};
 use super::resolve::{AttributeView, Texels, resolve};
@@ -18,7 +18,7 @@ use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, 
 use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
-use crate::kernel::dispatch::{Dispatch, INTERSECT_BINARY, dispatches};
+use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
 use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, View, padded, report};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
@@ -51,6 +51,7 @@ pub struct CpuExecutor {
     view: Params,
     directions: Directions,
     threshold: u32,
+    pairs_are_culled: bool,
     leaf_cache: bool,
     list_most: u32,
     count: bool,
@@ -80,6 +81,7 @@ impl CpuExecutor {
             view: Params::default(),
             directions: Directions::default(),
             threshold,
+            pairs_are_culled: false,
             leaf_cache: false,
             list_most: u32::MAX,
             count,
@@ -114,6 +116,12 @@ impl CpuExecutor {
     #[cfg(test)]
     pub(super) fn leaf_cache(&self) -> bool {
         self.leaf_cache
+    }
+
+    /// What too few rays are, for tests.
+    #[cfg(test)]
+    pub(super) fn threshold(&self) -> u32 {
+        self.threshold
     }
 
     /// The tiles and their lists, for tests.
@@ -166,15 +174,19 @@ fn run_kernel(
         "tile_sort_near" => tile_sort::<true>(bound, tiles),
         "query" => query(bound, own, tiles),
         "query_reduce" => query_reduce(bound, tiles),
-        "query_from_root" => query_all(bound, own, Work::Rooted(tiles)),
-        "query_all" => query_all(bound, own, Work::All),
+        "query_from_root" => query_all(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
+        "query_all" => query_all(bound, own, Work::All, &tiles.pair_counts),
+        COUNT_PAIRS => {
+            tiles.pair_counts.start(bound.params.tiles, bound.scene.leaves.len())?;
+            count_pairs(bound, own, &tiles.pair_counts);
+        }
         "query_pairs" => query_pairs(bound, own, tiles),
         "intersect_list" => intersect_list::<false>(bound, own, tiles),
         "intersect_list_cached" => intersect_list::<true>(bound, own, tiles),
-        "intersect_from_root" => intersect_all::<true>(bound, own, Work::Rooted(tiles)),
-        "intersect_from_root_all" => intersect_all::<false>(bound, own, Work::Rooted(tiles)),
-        "intersect_selected" => intersect_all::<true>(bound, own, Work::All),
-        "intersect_all" => intersect_all::<false>(bound, own, Work::All),
+        "intersect_from_root" => intersect_all::<true>(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
+        "intersect_from_root_all" => intersect_all::<false>(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
+        "intersect_selected" => intersect_all::<true>(bound, own, Work::All, &tiles.pair_counts),
+        "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),
             None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
@@ -223,6 +235,9 @@ impl Executor for CpuExecutor {
         let mut ms_phases = [0.0; 3];
         let everything = bricks.all_geometry_resident();
         for &step in steps {
+            self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.threshold);
+            let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
+            let params = Params { flags, ..params };
             for dispatch in dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything) {
                 let start = Instant::now();
                 let bound = Bound {

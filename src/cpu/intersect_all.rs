@@ -7,9 +7,9 @@ use super::isa::{Isa, Lanes};
 use super::leaf::BrickRay;
 use super::node::{FramedRay, framed_ray, inner_before};
 use super::packet_walk::{PacketGroup, PacketScratch, put, take};
+use super::pair_counts::PairCounts;
 use super::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
 use super::scene::Bound;
-use super::tile_lists::TileLists;
 use super::walk_brick::{Group, STACK_SIZE, Visits, finish_walk};
 use crate::kernel::layout::{COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT};
 
@@ -31,21 +31,20 @@ fn top_group<I: Isa>(
 }
 
 /// Of the rays of `work`; `SELECT`: with what is selected, but for culled pairs.
-pub fn intersect_all<const SELECT: bool>(bound: &Bound, set: &mut RaySet, work: Work) {
-    let tables = work.tables(bound).filter(|_| SELECT);
-    run_for_each_packet(set, bound, work, &IntersectAll::<SELECT> { bound, tables });
+pub fn intersect_all<const SELECT: bool>(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts) {
+    run_for_each_packet(set, bound, work, &IntersectAll::<SELECT> { bound, pairs });
 }
 
 struct IntersectAll<'a, const SELECT: bool> {
     bound: &'a Bound<'a>,
-    /// Of the tiles, where a threshold may have culled some of what is selected.
-    tables: Option<&'a TileLists>,
+    pairs: &'a PairCounts,
 }
 
 impl<const SELECT: bool> IntersectAll<'_, SELECT> {
     #[inline(always)]
-    fn is_left_out(&self, tile: usize, leaf: u32, brick: usize) -> bool {
-        SELECT && (!self.bound.is_selected(brick) || self.tables.is_some_and(|tables| tables.is_culled(tile, leaf)))
+    fn is_left_out(&self, tile: usize, leaf: u32) -> bool {
+        let Self { bound, pairs } = self;
+        SELECT && (!bound.is_selected(bound.brick_of(leaf)) || pairs.is_culled(bound, tile, leaf))
     }
 }
 
@@ -99,7 +98,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
                 continue;
             }
             let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
-            if !self.is_left_out(tile, leaf, bound.brick_of(leaf)) {
+            if !self.is_left_out(tile, leaf) {
                 packets.walk_leaf(isa, bound, scratch, leaf, rays, any_hit);
             }
         }
@@ -173,7 +172,7 @@ impl<const SELECT: bool> IntersectAll<'_, SELECT> {
                 } else {
                     let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
                     let brick = bound.brick_of(leaf);
-                    if self.is_left_out(slot.tile, leaf, brick) {
+                    if self.is_left_out(slot.tile, leaf) {
                         group = Group::default();
                         continue;
                     }

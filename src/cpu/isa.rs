@@ -1,7 +1,7 @@
 //! Instruction sets: the node test for eight children at once, where the processor has the instructions for it. All give the same
 //! bits: the same operations in the same order, none of them fused.
 
-use super::node::{FramedRay, node_hits, traversal_mask};
+use super::node::{FramedRay, by_priority, node_hits, traversal_mask};
 use super::vector::{Vec3, xyz};
 use super::wide::{Portable, Wide};
 use bricks::Node;
@@ -73,16 +73,7 @@ impl Isa for Scalar {
 
     #[inline(always)]
     fn open_top(self, ray: &FramedRay, _: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
-        let mut entered = node_hits(ray, node, [0.0; 3], [0.0; 3], slack, t_max).mask;
-        let mut bits = 0;
-        while entered != 0 {
-            let i = entered.trailing_zeros();
-            entered &= entered - 1;
-            if node.meta[i as usize] != 0 {
-                bits |= 0x8000_0000 >> (i ^ ray.flip);
-            }
-        }
-        bits
+        by_priority(node_hits(ray, node, [0.0; 3], [0.0; 3], slack, t_max).mask, node, ray.flip)
     }
 }
 

@@ -246,7 +246,8 @@ impl Executor for Lockstep {
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let context = format!("{pass:?}, {steps:?}");
-        let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, ..Params::default() };
+        let threshold = self.cpu.threshold();
+        let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, threshold, ..Params::default() };
         for &step in steps {
             let everything = bricks.all_geometry_resident();
             for leaf_cache in [false, true] {

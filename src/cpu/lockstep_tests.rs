@@ -217,7 +217,7 @@ fn twins_agree_with_their_kernels() {
         Variant { schedule: Schedule::PlainBinary, everything_fits: true, ..VARIANT },
         Variant { everything_fits: true, ..VARIANT },
         VARIANT,
-        // Walks from the root, of some tiles and of all; the tables that a threshold takes.
+        // Walks from the root, of some tiles and of all; pairs that a threshold culls.
         Variant { everything_fits: true, list_most: 0, ..VARIANT },
         Variant { list_most: 3, ..VARIANT },
         Variant { list_most: 3, threshold: 4, ..VARIANT },
@@ -228,6 +228,7 @@ fn twins_agree_with_their_kernels() {
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
         Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
         Variant { fronts: true, ..VARIANT },
+        Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
     ];
     let findings = Arc::new(Mutex::new(Findings::default()));

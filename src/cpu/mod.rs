@@ -27,6 +27,7 @@ mod packet;
 mod packet_surface;
 mod packet_triangle;
 mod packet_walk;
+mod pair_counts;
 mod query;
 mod query_all;
 mod query_pairs;

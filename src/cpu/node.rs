@@ -129,6 +129,20 @@ pub fn traversal_mask(entered: u32, node: &Node, flip: u32) -> u32 {
     bits
 }
 
+/// The entered children that exist, inner ones and leaves alike, by priority in the high byte.
+#[inline(always)]
+pub fn by_priority(mut entered: u32, node: &Node, flip: u32) -> u32 {
+    let mut bits = 0;
+    while entered != 0 {
+        let i = entered.trailing_zeros();
+        entered &= entered - 1;
+        if node.meta[i as usize] != 0 {
+            bits |= 0x8000_0000 >> (i ^ flip);
+        }
+    }
+    bits
+}
+
 /// The entered children that exist, a bit each, and where the nearest is entered.
 #[inline(always)]
 pub fn entered_children(hits: &NodeHits, node: &Node) -> (u32, f32) {

@@ -1,6 +1,7 @@
 use super::brick::BrickView;
 use super::intersect_all::intersect_all;
 use super::isa::{Best, Scalar};
+use super::pair_counts::PairCounts;
 use super::rays::{RaySet, Work, start_hit};
 use super::scene::{Bound, Counters, Demand, Scene};
 use crate::gpu::probe;
@@ -71,7 +72,7 @@ impl Stage {
             // Some start from a triangle, which they do not meet.
             (set.hits[i], set.surfaces[i]) = start_hit(ray.t_max, if i % 5 == 0 { i as u32 % 64 } else { NONE });
         }
-        intersect_all::<false>(&bound, &mut set, Work::All);
+        intersect_all::<false>(&bound, &mut set, Work::All, &PairCounts::default());
         let counted = counters.get();
         let bits = |hit: &Hit| bytemuck::cast(*hit);
         let surface = |surface: &Surface| bytemuck::cast(*surface);

@@ -8,7 +8,7 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::tile_lists::TileLists;
 use super::vector::{each, least, most, most3};
-use crate::kernel::layout::{COUNTER_TIGHTENED, NONE, PARAM_ANY_HIT, PARAM_TIGHTER, Pair};
+use crate::kernel::layout::{COUNTER_PAIRS_TESTED, COUNTER_TIGHTENED, NONE, PARAM_ANY_HIT, PARAM_TIGHTER, Pair};
 use rayon::prelude::*;
 
 /// Whether the ray enters a box of the top level in its range, padded as in `node_hits`.
@@ -100,7 +100,7 @@ pub fn query_pairs(bound: &Bound, set: &RaySet, tiles: &mut TileLists) {
         let nodes = &tiles.pair_nodes[pair.first as usize..(pair.first + pair.count) as usize];
         let mut seen = Seen::default();
         ask(bound, set, pair, nodes, false, &mut seen);
-        let failed = pair.count > 1 && seen.visible > 0;
+        let failed = pair.count > 1 && seen.visible > bound.params.threshold;
         if failed {
             ask(bound, set, pair, nodes, true, &mut seen);
         }
@@ -109,8 +109,9 @@ pub fn query_pairs(bound: &Bound, set: &RaySet, tiles: &mut TileLists) {
         let mut tally = Tally::default();
         let tightened = rays.iter().enumerate().filter(|&(k, &rays)| rays == 0 && seen.own & 1 << k != 0).count();
         tally.add(COUNTER_TIGHTENED, tightened as u32);
+        tally.add(COUNTER_PAIRS_TESTED, if failed { 1 + pair.count } else { 1 });
         bound.counters.add(&tally);
-        rays
+        rays.into_iter().map(|rays| if rays > bound.params.threshold { rays } else { 0 }).collect()
     });
-    tiles.pair_rays = answered.collect::<Vec<_>>().concat();
+    tiles.pair_rays = answered.collect::<Vec<Vec<u32>>>().concat();
 }

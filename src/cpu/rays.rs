@@ -67,15 +67,7 @@ pub enum Work<'a> {
     Rooted(&'a TileLists),
 }
 
-impl<'a> Work<'a> {
-    /// The tables of tiles whose rays walk from the root, where a threshold makes some.
-    pub fn tables(self, bound: &Bound) -> Option<&'a TileLists> {
-        match self {
-            Self::Rooted(tiles) if bound.params.threshold > 0 => Some(tiles),
-            _ => None,
-        }
-    }
-
+impl Work<'_> {
     fn includes(self, tile: usize) -> bool {
         match self {
             Self::All => true,
@@ -93,13 +85,21 @@ pub struct Scratch {
     pub stack: Stack,
     /// That of a traversal over single nodes.
     pub nodes: Vec<u32>,
+    /// The same, and where the ray enters them.
+    pub entered: Vec<(u32, f32)>,
     /// What packets work with, once there was one.
     packets: Option<Box<PacketScratch>>,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self { tally: Tally::default(), stack: [Default::default(); STACK_SIZE], nodes: Vec::new(), packets: None }
+        Self {
+            tally: Tally::default(),
+            stack: [Default::default(); STACK_SIZE],
+            nodes: Vec::new(),
+            entered: Vec::new(),
+            packets: None,
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 use super::brick::BrickView;
 use super::isa::Best;
 use crate::kernel::frame::{Frame, Placement};
-use crate::kernel::layout::{self, PAIR_CULLED, Params};
+use crate::kernel::layout::{self, Params};
 use bricks::{Node, Resident};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -87,16 +87,6 @@ impl Demand {
     pub fn take(&self) -> layout::PairDemand {
         let rays = self.rays.swap(0, Ordering::Relaxed);
         layout::PairDemand { rays, nearest: self.nearest.swap(u32::MAX, Ordering::Relaxed) }
-    }
-
-    /// Culls the pair for the rest of the pass.
-    pub fn cull(&self) {
-        self.rays.store(PAIR_CULLED, Ordering::Relaxed);
-    }
-
-    /// Whether the pair is culled.
-    pub fn is_culled(&self) -> bool {
-        self.rays.load(Ordering::Relaxed) == PAIR_CULLED
     }
 }
 

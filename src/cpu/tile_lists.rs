@@ -1,14 +1,14 @@
 //! The tiles' lists of leaves: where they lie, what is selected of them, their order, and what their queries ask of bricks. Twins of
-//! `shaders/tile_scan.wgsl`, `tile_select.wgsl`, `tile_choose.wgsl`, `tile_sort.wgsl` and `query_reduce.wgsl`; of tables,
-//! `shaders/shared/tiles.wgsl`.
+//! `shaders/tile_scan.wgsl`, `tile_select.wgsl`, `tile_choose.wgsl`, `tile_sort.wgsl` and `query_reduce.wgsl`.
 
 use super::interval::tile_meets_box;
+use super::pair_counts::PairCounts;
 use super::scene::{Bound, Demand, Tally};
 use super::vector::{dot, each, most};
 use crate::kernel::layout::{
     COUNTER_FRONT_TO_BACK, COUNTER_LIST_ENTRIES, COUNTER_MOST_SELECTED, COUNTER_PAIRS_INTERSECTED,
     COUNTER_PAIRS_INVISIBLE, COUNTER_PAIRS_VISIBLE, COUNTER_TILE_BATCH_LEAVES, COUNTER_TILE_BATCHES,
-    COUNTER_TILES_FROM_ROOT, Entry, NONE, Pair, TileBounds, TileList, TopNode2,
+    COUNTER_TILES_FROM_ROOT, Entry, Pair, TileBounds, TileList, TopNode2,
 };
 use crate::schedule::ExecutorError;
 use rayon::prelude::*;
@@ -37,6 +37,8 @@ pub struct TileLists {
     pub pair_nodes: Vec<u32>,
     /// Rays that see each of their nodes.
     pub pair_rays: Vec<u32>,
+    /// Rays that see each leaf from each tile.
+    pub pair_counts: PairCounts,
 }
 
 impl TileLists {
@@ -78,34 +80,6 @@ impl TileLists {
         }
         self.pair_demand.iter_mut().for_each(|demand| *demand = Demand::default());
     }
-
-    /// Position of a leaf in a tile's table, if it is there.
-    pub fn position_of(&self, tile: usize, leaf: u32) -> Option<usize> {
-        let entry = self.lists[tile];
-        let first = entry.first as usize;
-        let place = place_in_table(&self.list[first..first + entry.count as usize], leaf);
-        (self.list[first + place].leaf == leaf).then_some(first + place)
-    }
-
-    /// Whether a leaf of a tile whose rays walk from the root is culled.
-    pub fn is_culled(&self, tile: usize, leaf: u32) -> bool {
-        self.position_of(tile, leaf).is_some_and(|position| self.pair_demand[position].is_culled())
-    }
-}
-
-/// The list of a tile whose rays walk from the root is a table of leaves, at most half full, in which a ray finds those that it
-/// sees: its entries, a power of two.
-fn table_entries(leaves: u32) -> u64 {
-    2 << (leaves.ilog2() + 1)
-}
-
-/// Where a leaf is in a table, or belongs: it is looked for at a place of its own first, then behind it, and from the start again.
-pub fn place_in_table(table: &[Entry], leaf: u32) -> usize {
-    let mut place = (leaf.wrapping_mul(0x9e37_79b1) >> (32 - table.len().ilog2())) as usize;
-    while table[place].leaf != leaf && table[place].leaf != NONE {
-        place = (place + 1) & (table.len() - 1);
-    }
-    place
 }
 
 /// The parts of `data` that belong to the tiles, in order. Lists follow each other, empty ones apart.
@@ -120,17 +94,13 @@ pub fn of_tiles<'a, T>(lists: &[TileList], data: &'a mut [T]) -> Vec<&'a mut [T]
 }
 
 /// Places the tiles' lists one after the other. The rays of tiles with lists of more than `list_most` leaves walk the whole top level,
-/// each by itself: such lists are dropped, or, where a threshold asks how many rays see a leaf, get the place of a table.
+/// each by itself: such lists are dropped.
 ///
 /// # Errors
 /// The lists are too long to be held.
 pub fn tile_scan(bound: &Bound, tiles: &mut TileLists) -> Result<(), ExecutorError> {
     let walks_from_root = |count: u32| count > bound.params.list_most;
-    let kept = |count: u32| match walks_from_root(count) {
-        false => u64::from(count),
-        true if bound.params.threshold == 0 => 0,
-        true => table_entries(count),
-    };
+    let kept = |count: u32| if walks_from_root(count) { 0 } else { u64::from(count) };
     tiles.make_room(tiles.lists.iter().map(|list| kept(list.count)).sum())?;
     let (mut before, mut rooted) = (0, 0);
     for list in &mut tiles.lists {
@@ -151,16 +121,16 @@ pub fn tile_scan(bound: &Bound, tiles: &mut TileLists) -> Result<(), ExecutorErr
 /// Picks from each tile's list the leaves whose brick is in the wanted state, but for culled pairs, keeping their order. `INTERSECT`: the selection is
 /// intersected next, and counted as such.
 pub fn tile_select<const INTERSECT: bool>(bound: &Bound, tiles: &mut TileLists) {
-    let TileLists { lists, list, selection, pair_demand, .. } = tiles;
+    let TileLists { lists, list, selection, pair_counts, .. } = tiles;
     let places = of_tiles(lists, selection);
-    lists.par_iter_mut().zip(places).for_each(|(entry, selection)| {
+    lists.par_iter_mut().zip(places).enumerate().for_each(|(tile, (entry, selection))| {
         let mut selected = 0;
         // From the order of the leaves' numbers.
         let (mut departures, mut last) = (0, 0);
         let count = if entry.from_root != 0 { 0 } else { entry.count };
         for i in entry.first..entry.first + count {
             let leaf = list[i as usize].leaf;
-            if bound.is_selected(bound.brick_of(leaf)) && !pair_demand[i as usize].is_culled() {
+            if bound.is_selected(bound.brick_of(leaf)) && !pair_counts.is_culled(bound, tile, leaf) {
                 selection[selected as usize] = i;
                 selected += 1;
                 departures += u32::from(leaf < last);
@@ -210,42 +180,22 @@ pub fn tile_choose(tiles: &mut TileLists) {
     }
 }
 
-/// Sums the queries of the selected pairs, and those in tables, into the demand of their bricks, and clears them for the next query.
-/// Pairs that no more rays see than the threshold are culled for the rest of the pass: hits only move nearer, so no more will.
+/// Sums the queries of the selected pairs into the demand of their bricks, and clears them for the next query.
 pub fn query_reduce(bound: &Bound, tiles: &TileLists) {
-    tiles.lists.par_iter().for_each(|entry| {
-        let is_table = entry.from_root != 0;
-        let pairs_asked = if is_table { entry.count } else { entry.selected };
-        let (mut asked, mut visible) = (0, 0);
-        for i in entry.first..entry.first + pairs_asked {
-            let position = if is_table { i } else { tiles.selection[i as usize] } as usize;
-            let leaf = tiles.list[position].leaf;
-            if leaf == NONE {
-                continue;
-            }
-            let demand = &tiles.pair_demand[position];
-            if demand.is_culled() {
-                continue;
-            }
-            let pair = demand.take();
-            // Of a table only what rays have asked for counts as a query.
-            if is_table && pair.rays == 0 {
-                continue;
-            }
-            asked += 1;
-            if pair.rays <= bound.params.threshold {
-                demand.cull();
-            } else {
-                bound.demand[bound.brick_of(leaf)].add(pair.rays, pair.nearest);
+    tiles.lists.par_iter().filter(|entry| entry.selected > 0).for_each(|entry| {
+        let mut visible = 0;
+        for i in entry.first..entry.first + entry.selected {
+            let position = tiles.selection[i as usize] as usize;
+            let pair = tiles.pair_demand[position].take();
+            if pair.rays > 0 {
+                bound.demand[bound.brick_of(tiles.list[position].leaf)].add(pair.rays, pair.nearest);
                 visible += 1;
             }
         }
-        if asked > 0 {
-            let mut tally = Tally::default();
-            tally.add(COUNTER_PAIRS_VISIBLE, visible);
-            tally.add(COUNTER_PAIRS_INVISIBLE, asked - visible);
-            bound.counters.add(&tally);
-        }
+        let mut tally = Tally::default();
+        tally.add(COUNTER_PAIRS_VISIBLE, visible);
+        tally.add(COUNTER_PAIRS_INVISIBLE, entry.selected - visible);
+        bound.counters.add(&tally);
     });
 }
 

@@ -3,7 +3,7 @@
 
 use super::interval::tile_meets_box;
 use super::scene::{Bound, Tally};
-use super::tile_lists::{TileLists, centre_along, of_tiles, place_in_table};
+use super::tile_lists::{TileLists, centre_along, of_tiles};
 use crate::kernel::layout::{
     COUNTER_PAIRS_CULLED, COUNTER_PAIRS_TESTED, COUNTER_STACK_OVERFLOW, Entry, NONE, TileBounds, TileList, TopNode2,
 };
@@ -11,13 +11,16 @@ use rayon::prelude::*;
 
 const WALK_STACK: usize = 72;
 
-/// Counts the leaves of every tile.
+/// Counts the leaves of every tile, as far as `list_most` and one more.
 pub fn tile_walk_count(bound: &Bound, tiles: &mut TileLists) {
     let TileLists { bounds, lists, .. } = tiles;
     bounds.par_iter().zip(lists.par_iter_mut()).for_each(|(bounds, list)| {
         let mut tally = Tally::default();
         let mut found = 0;
-        let walked = walk(bound, bounds, &mut tally, |_| found += 1);
+        let walked = walk(bound, bounds, &mut tally, |_| {
+            found += 1;
+            found <= bound.params.list_most
+        });
         *list = TileList { count: found, ..TileList::default() };
         tally.add(COUNTER_PAIRS_TESTED, walked.tested);
         tally.add(COUNTER_PAIRS_CULLED, walked.culled);
@@ -25,29 +28,18 @@ pub fn tile_walk_count(bound: &Bound, tiles: &mut TileLists) {
     });
 }
 
-/// Writes the lists of the tiles that keep one, and the tables.
+/// Writes the lists of the tiles that keep one.
 pub fn tile_walk_write(bound: &Bound, tiles: &mut TileLists) {
     let TileLists { bounds, lists, list, pair_demand, .. } = tiles;
     pair_demand.par_iter_mut().for_each(|demand| *demand = Default::default());
     let places = of_tiles(lists, list);
-    bounds.par_iter().zip(lists.par_iter()).zip(places).filter(|(_, place)| !place.is_empty()).for_each(
-        |((bounds, list), place)| {
-            let mut tally = Tally::default();
-            if list.from_root != 0 {
-                place.fill(Entry { leaf: NONE, near: 0.0 });
-                walk(bound, bounds, &mut tally, |entry| place[place_in_table(place, entry.leaf)].leaf = entry.leaf);
-            } else {
-                let mut free = place.iter_mut();
-                walk(bound, bounds, &mut tally, |entry| {
-                    // The walk finds what it counted.
-                    if let Some(place) = free.next() {
-                        *place = entry;
-                    }
-                });
-            }
-            bound.counters.add(&tally);
-        },
-    );
+    bounds.par_iter().zip(places).filter(|(_, place)| !place.is_empty()).for_each(|(bounds, place)| {
+        let mut tally = Tally::default();
+        let mut free = place.iter_mut();
+        // The walk finds what it counted.
+        walk(bound, bounds, &mut tally, |entry| free.next().map(|place| *place = entry).is_some());
+        bound.counters.add(&tally);
+    });
 }
 
 /// How many nodes a walk tested, and how many of them it culled.
@@ -56,7 +48,8 @@ struct Walked {
     culled: u32,
 }
 
-fn walk(bound: &Bound, bounds: &TileBounds, tally: &mut Tally, mut list: impl FnMut(Entry)) -> Walked {
+/// Calls `list` for every leaf until it says that it takes no more.
+fn walk(bound: &Bound, bounds: &TileBounds, tally: &mut Tally, mut list: impl FnMut(Entry) -> bool) -> Walked {
     let top2: &[TopNode2] = &bound.scene.top2;
     let meets = |node: u32| {
         let n = &top2[node as usize];
@@ -79,7 +72,9 @@ fn walk(bound: &Bound, bounds: &TileBounds, tally: &mut Tally, mut list: impl Fn
     loop {
         let n = &top2[node as usize];
         if n.right == NONE {
-            list(Entry { leaf: n.left, near });
+            if !list(Entry { leaf: n.left, near }) {
+                break;
+            }
         } else {
             let (l, r) = (meets(n.left), meets(n.right));
             walked.tested += 2;

@@ -11,7 +11,7 @@ use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::kernel::dispatch::{Dispatch, INTERSECT_BINARY, Workgroups, dispatches};
+use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Workgroups, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
 use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, View, padded, report};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
@@ -45,6 +45,7 @@ pub struct GpuExecutor {
     view: Params,
     directions: Directions,
     threshold: u32,
+    pairs_are_culled: bool,
     pair_count: u32,
     pair_nodes: u32,
     leaf_cache: bool,
@@ -138,6 +139,7 @@ impl GpuExecutor {
             view,
             directions,
             threshold,
+            pairs_are_culled: false,
             pair_count: 0,
             pair_nodes: 0,
             leaf_cache: false,
@@ -200,8 +202,17 @@ impl GpuExecutor {
         self.gpu.queue.write_buffer(&self.buffers.scene.slots, 0, bytemuck::cast_slice(&report::slots(bricks)));
         let params = self.params();
         let everything = bricks.all_geometry_resident();
-        let of_step = |&step| dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything);
-        let dispatches: Vec<Dispatch> = steps.iter().flat_map(of_step).collect();
+        let mut list: Vec<Dispatch> = Vec::new();
+        for &step in steps {
+            self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.threshold);
+            let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
+            let params = Params { flags, ..params };
+            list.extend(dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything));
+        }
+        let dispatches = list;
+        if dispatches.iter().any(|dispatch| dispatch.kernel == COUNT_PAIRS) {
+            self.make_room_for_counts()?;
+        }
         let stride = params_stride(&self.gpu);
         let mut params = vec![0u8; stride as usize * dispatches.len()];
         for (i, dispatch) in dispatches.iter().enumerate() {
@@ -214,6 +225,9 @@ impl GpuExecutor {
         let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX, next: 0 }; bricks.len()];
         self.gpu.queue.write_buffer(&self.buffers.demand, 0, bytemuck::cast_slice(&unasked));
         for (i, dispatch) in dispatches.iter().enumerate() {
+            if dispatch.kernel == COUNT_PAIRS {
+                encoder.clear_buffer(&self.buffers.tiles.pair_rays, 0, None);
+            }
             let work = match dispatch.groups {
                 Workgroups::Fixed(_) => None,
                 Workgroups::Chosen => Some(layout::WORK_CHOSEN),
@@ -263,6 +277,20 @@ impl GpuExecutor {
             }
         }
         Ok(report)
+    }
+
+    /// Makes room for the counts of how many rays of each tile see each leaf.
+    fn make_room_for_counts(&mut self) -> Result<(), ExecutorError> {
+        let (tiles, leaves) = (self.extent.tiles(), self.scene.resident().leaves.len());
+        let pairs = u64::from(tiles) * leaves as u64;
+        if 4 * pairs > self.gpu.limits.max_storage_buffer_binding_size {
+            return Err(report::too_many_pairs(tiles, leaves));
+        }
+        if self.buffers.tiles.pair_rays.size() < 4 * pairs {
+            self.buffers.tiles.pair_rays = storage(&self.gpu, "pair rays", pairs as usize, 4);
+            self.rebind();
+        }
+        Ok(())
     }
 
     /// Grows the lists to at least `entries`.

@@ -100,6 +100,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ),
     ("query_all", "query_all", Groups::Tiles, &[]),
     ("query_all", "query_from_root", Groups::Tiles, &[("OF_TILES", 1.0)]),
+    ("query_all", "count_pairs", Groups::Tiles, &[("COUNT", 1.0)]),
 ];
 
 /// The names of all specialisations.

@@ -2,7 +2,7 @@
 
 use super::layout::{self, Params};
 use crate::math::sampling::{cosine_hemisphere, halton};
-use crate::schedule::{Lamp, Pass, Step};
+use crate::schedule::{Lamp, Pass, Query, Step};
 
 /// The directions of the passes that start at hits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,7 +32,8 @@ impl Directions {
         let rectangle = matches!(pass, Pass::Shadow(Lamp::Rectangle) | Pass::BounceShadow(Lamp::Rectangle));
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let mut params = Params {
-            flags: flag(pass.is_any_hit(), layout::PARAM_ANY_HIT)
+            flags: params.flags
+                | flag(pass.is_any_hit(), layout::PARAM_ANY_HIT)
                 | flag(rectangle, layout::PARAM_RECTANGLE)
                 | flag(pass.set() == 2, layout::PARAM_BOUNCE),
             stream: params.sample.wrapping_add(stream << 24),
@@ -80,6 +81,19 @@ pub struct Dispatch {
 /// they save (ARCHITECTURE.md, "What a list costs"). Camera rays of a tile agree on what is near and stop there, others do not.
 fn list_most(pass: Pass) -> u32 {
     if pass == Pass::Primary { 128 } else { 12 }
+}
+
+/// The kernel that counts, from zero, how many rays of each tile see each leaf.
+pub const COUNT_PAIRS: &str = "count_pairs";
+
+/// Whether pairs are culled after `step`, given whether they were before it: from [`Step::CullPairs`] on to the end of the pass. Other
+/// passes begin with one of the steps that end it.
+pub fn are_pairs_culled(step: Step, before: bool, threshold: u32) -> bool {
+    match step {
+        Step::CullPairs { .. } => threshold > 0,
+        Step::Lists | Step::ShortLists | Step::CountRays => false,
+        _ => before,
+    }
 }
 
 /// The kernel that traverses binary trees.
@@ -147,6 +161,7 @@ pub fn dispatches(
     let bounds = |phase| kernel("tile_bounds", params, across(params.tiles), phase);
     let resident = layout::STATE_GEOMETRY;
     let not_done = layout::STATE_GEOMETRY | layout::STATE_DONE;
+    let unprocessed = |undone: bool| if undone { layout::STATE_DONE } else { not_done };
     match step {
         Step::Generate if pass == Pass::Primary => vec![kernel("generate_primary", params, per_ray, None)],
         Step::Generate => {
@@ -193,21 +208,23 @@ pub fn dispatches(
             let params = Params { select_mask: layout::STATE_BATCH, select_want: layout::STATE_BATCH, ..params };
             vec![kernel("intersect_selected", params, by_tile, Some(2))]
         }
-        Step::QueryAll | Step::QueryAllUndone => {
-            let mask = if step == Step::QueryAll { not_done } else { layout::STATE_DONE };
-            let params = Params { select_mask: mask, select_want: 0, ..params };
-            vec![kernel("query_all", params, by_tile, Some(1))]
+        Step::CullPairs { .. } if params.threshold == 0 => Vec::new(),
+        Step::CullPairs { undone } => {
+            let params = Params { select_mask: unprocessed(undone), select_want: 0, ..params };
+            vec![kernel(COUNT_PAIRS, params, by_tile, Some(1))]
         }
-        Step::QueryMissing => query(Params { select_mask: not_done, select_want: 0, ..params }, Some(1)),
-        Step::QueryUndone => query(Params { select_mask: layout::STATE_DONE, select_want: 0, ..params }, Some(1)),
+        Step::Query(Query { from_root, undone, up_to_next }) => {
+            let flags = params.flags | if up_to_next { layout::PARAM_NEXT } else { 0 };
+            let params = Params { select_mask: unprocessed(undone), select_want: 0, flags, ..params };
+            if from_root { vec![kernel("query_all", params, by_tile, Some(1))] } else { query(params, Some(1)) }
+        }
         Step::QueryPairs { tighter } => {
             let flags = params.flags | if tighter { layout::PARAM_TIGHTER } else { 0 };
             vec![kernel("query_pairs", Params { flags, ..params }, across(params.pair_count), Some(1))]
         }
         Step::QueryNeeded => {
-            // Of every leaf, exactly.
             let flags = params.flags | layout::PARAM_NEEDED;
-            query(Params { select_mask: 0, select_want: 0, threshold: 0, flags, ..params }, None)
+            query(Params { select_mask: 0, select_want: 0, flags, ..params }, None)
         }
         Step::ClearAttributes => vec![shading("clear_gbuffer", params, false)],
         Step::QueryHits => vec![kernel("hit_demand", params, per_ray, None)],

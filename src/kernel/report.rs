@@ -29,7 +29,7 @@ pub fn take_used(report: &mut Report, steps: &[Step], bricks: &BrickStates) {
     if steps.iter().any(|step| step.is_intersection()) {
         // Queries in the same submission ask for missing bricks, or for what is not done beside a batch, which is; of the
         // others rays have noted the use.
-        let undone = steps.iter().any(|step| matches!(step, Step::QueryUndone | Step::QueryAllUndone));
+        let undone = steps.iter().any(|step| matches!(step, Step::Query(query) if query.undone));
         let is_used = |brick: usize| bricks.geometry(brick).is_some() && (!undone || bricks.done(brick));
         report.used = report.demand.extract_if(.., |d| is_used(d.brick as usize)).map(|d| d.brick).collect();
     }
@@ -75,4 +75,12 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
         pair_rays: Vec::new(),
         queries_tightened: count(layout::COUNTER_TIGHTENED),
     })
+}
+
+/// What is said where the rays of each tile that see each leaf cannot be counted.
+pub fn too_many_pairs(tiles: u32, leaves: usize) -> ExecutorError {
+    let text = format!(
+        "cannot count which of {leaves} leaves each of {tiles} tiles sees; use a larger --tile, or no --query-threshold"
+    );
+    ExecutorError::Device(text)
 }

@@ -3,7 +3,7 @@
 
 use super::cache::{BATCH_BRICKS, Cache};
 use super::optimisations::{Optimisations, run};
-use super::{Demand, Executor, ExecutorError, Pass, PassStats, Report, Step, Tracing};
+use super::{Demand, Executor, ExecutorError, Pass, PassStats, Query, Report, Step, Tracing};
 use crate::stream::Item;
 use std::time::Instant;
 
@@ -32,14 +32,14 @@ pub fn trace(
     if resident_first {
         steps.push(Step::IntersectResident);
     }
+    let batches = Batches::new(pass, Step::IntersectBatch, optimisations);
     if some_missing {
-        steps.push(if resident_first { Step::QueryMissing } else { Step::QueryUndone });
+        steps.extend([Step::CullPairs { undone: !resident_first }, batches.query()]);
     }
     let report = run(executor, pass, &steps, &cache.states, optimisations, stats)?;
     if resident_first {
         cache.finish_resident(&report.used, some_missing, stats);
     }
-    let batches = Batches::of_lists(pass, optimisations);
     batches.load_and_intersect(executor, cache, report, stats)?;
     if tracing.measure_needed {
         measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;
@@ -49,21 +49,27 @@ pub fn trace(
 
 /// How the bricks that queries want are taken, in batches.
 pub struct Batches<'a> {
-    /// Rays.
-    pub pass: Pass,
+    pass: Pass,
     /// Intersects a batch.
-    pub intersect: Step,
-    /// Asks for what is still wanted.
-    pub query: Step,
-    /// The optimisations that are on.
-    pub optimisations: &'a Optimisations,
+    intersect: Step,
+    on: &'a Optimisations,
 }
 
 impl<'a> Batches<'a> {
-    /// By the tiles' lists.
-    pub fn of_lists(pass: Pass, optimisations: &'a Optimisations) -> Self {
-        let query = if optimisations.resident_first { Step::QueryMissing } else { Step::QueryUndone };
-        Self { pass, intersect: Step::IntersectBatch, query, optimisations }
+    /// Of the rays of `pass`, met by the step `intersect`.
+    pub fn new(pass: Pass, intersect: Step, optimisations: &'a Optimisations) -> Self {
+        Self { pass, intersect, on: optimisations }
+    }
+
+    /// Asks for what is wanted. Where what is loaded is asked for again, and nearest first, a ray need not know what lies behind the
+    /// next that it enters.
+    pub fn query(&self) -> Step {
+        let Self { intersect, on, .. } = *self;
+        Step::Query(Query {
+            from_root: intersect == Step::IntersectAllBatch,
+            undone: !on.resident_first,
+            up_to_next: on.requery && on.nearest_first,
+        })
     }
 
     /// Loads of what the queries in `report` want, nearest first, those bricks that some ray enters before any other that it
@@ -80,7 +86,7 @@ impl<'a> Batches<'a> {
         mut report: Report,
         stats: &mut PassStats,
     ) -> Result<(), ExecutorError> {
-        let on = self.optimisations;
+        let on = self.on;
         let (mut wanted, mut most) = in_order(&report.demand, on.nearest_first);
         stats.add(std::mem::take(&mut report));
         while !wanted.is_empty() {
@@ -93,7 +99,7 @@ impl<'a> Batches<'a> {
             cache.states.set_batch(&batch);
             stats.bricks_intersected.extend(&batch);
             if on.requery {
-                report = run(executor, self.pass, &[self.intersect, self.query], &cache.states, on, stats)?;
+                report = run(executor, self.pass, &[self.intersect, self.query()], &cache.states, on, stats)?;
                 let still = |item: &&Item| report.demand.binary_search_by_key(&item.brick, |d| d.brick).is_ok();
                 stats.bricks_no_longer_wanted += (rest.len() - rest.iter().filter(still).count()) as u64;
                 (wanted, most) = in_order(&report.demand, on.nearest_first);
@@ -137,8 +143,7 @@ pub fn measure_needed(
 }
 
 /// The wanted bricks' geometry by number; or nearest entry first, then by number, those ahead that some ray enters next. Also
-/// how many of them to load before the next query: only what some ray enters next, unless a threshold keeps back what rays
-/// enter next of every brick.
+/// how many of them to load before the next query: only what some ray enters next.
 fn in_order(demand: &[Demand], nearest_first: bool) -> (Vec<Item>, usize) {
     let mut wanted = demand.to_vec();
     let mut most = BATCH_BRICKS;

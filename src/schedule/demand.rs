@@ -24,7 +24,8 @@ pub fn trace(
     let resident_before = cache.resident_geometry();
     let optimisations = &tracing.optimisations;
     let some_missing = !cache.states.all_geometry_resident();
-    let query = if optimisations.resident_first { Step::QueryAll } else { Step::QueryAllUndone };
+    let batches = Batches::new(pass, Step::IntersectAllBatch, optimisations);
+    let query = batches.query();
     let mut steps = first.to_vec();
     steps.push(Step::CountRays);
     match (some_missing, optimisations.resident_first) {
@@ -36,7 +37,6 @@ pub fn trace(
     if !some_missing || optimisations.resident_first {
         cache.finish_resident(&report.used, some_missing, stats);
     }
-    let batches = Batches { pass, intersect: Step::IntersectAllBatch, query, optimisations };
     batches.load_and_intersect(executor, cache, report, stats)?;
     if tracing.measure_needed {
         measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;

@@ -232,7 +232,6 @@ impl Found<'_> {
         for query in &queries {
             let nodes = query.nodes as usize;
             let failed = nodes > 1 && seen[first..first + nodes].iter().any(|&rays| rays > 0);
-            stats.report.pairs_tested += 1 + if failed { nodes as u64 } else { 0 };
             stats.multi_queries += u64::from(nodes > 1);
             stats.multi_queries_failed += u64::from(failed);
             first += nodes;
@@ -282,8 +281,8 @@ impl Found<'_> {
         // Other pairs than before may name the same bricks.
         cache.states.begin_pass();
         self.set_lists(executor, tree, pairs)?;
-        let batches = Batches::of_lists(self.setup.pass, &self.setup.tracing.optimisations);
-        self.steps.push(batches.query);
+        let batches = Batches::new(self.setup.pass, Step::IntersectBatch, &self.setup.tracing.optimisations);
+        self.steps.push(batches.query());
         let report = self.run(executor, cache, stats)?;
         batches.load_and_intersect(executor, cache, report, stats)
     }

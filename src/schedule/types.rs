@@ -70,7 +70,7 @@ pub enum Step {
     /// Bounds of the tiles, their walk of the top level, their lists of leaves.
     Lists,
     /// As [`Step::Lists`], without those lists that cost more than they save: the rays of their tiles walk from the root in the steps
-    /// that follow. With a threshold all lists are kept.
+    /// that follow.
     ShortLists,
     /// Intersect the listed leaves whose geometry is resident and not done: phase 1.
     IntersectResident,
@@ -99,14 +99,14 @@ pub enum Step {
     IntersectAllResident,
     /// Intersect the rays that asked for a brick with the batch just loaded, from the root: phase 3.
     IntersectAllBatch,
-    /// Ask ray by ray, from the root, which missing bricks are still wanted: phase 2.
-    QueryAll,
-    /// Ask ray by ray which missing bricks are still wanted: phase 2.
-    QueryMissing,
-    /// As [`Step::QueryAll`], of all bricks that are not done, resident or not.
-    QueryAllUndone,
-    /// As [`Step::QueryMissing`], of all bricks that are not done, resident or not.
-    QueryUndone,
+    /// With a threshold: count how many rays of each tile see each leaf, and leave pairs of a tile and a leaf that no more rays see than
+    /// the threshold out of the queries and intersections that follow in the pass. Without one nothing is done.
+    CullPairs {
+        /// Of all leaves that are not done, resident or not; else of missing ones.
+        undone: bool,
+    },
+    /// Ask ray by ray which bricks are still wanted: phase 2.
+    Query(Query),
     /// Ask how many rays see each node of the queries set by [`Executor::set_pairs`]: phase 2 of the fronts.
     QueryPairs {
         /// By the boxes of the node's children instead of its own.
@@ -126,6 +126,17 @@ pub enum Step {
     AddLight,
     /// Add the share of the sky's light that the pass's direction stands for, where its ray went free.
     AddOcclusion,
+}
+
+/// Whom rays ask, and for what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Query {
+    /// Every ray from the root; else by the lists, where the ray's tile has one.
+    pub from_root: bool,
+    /// Of all bricks that are not done, resident or not; else of missing ones.
+    pub undone: bool,
+    /// Each ray up to the first that it enters of those it asks for; else for all that it enters before its hit.
+    pub up_to_next: bool,
 }
 
 impl Step {
