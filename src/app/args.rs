@@ -273,7 +273,7 @@ pub struct StreamArgs {
     #[arg(long, value_name = "on|off", default_value = "off", value_parser = |s: &str| one_of(s, &["on", "off"]))]
     pub fronts: String,
     /// Leave a brick out of a tile where at most this many of its rays could see it, scaled to a tile of 200x200 pixels;
-    /// 0 is exact, more is faster and misses hits
+    /// 0 is exact, more loads less and misses hits
     #[arg(long, value_name = "PIXELS", default_value = "0", value_parser = query_threshold)]
     pub query_threshold: u32,
     /// Payloads (geometry or attributes of a brick) that the workers may read into the host cache while a frame renders:

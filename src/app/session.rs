@@ -9,6 +9,7 @@ use crate::schedule::cache::{BrickBytes, Cache};
 use crate::stream::{HostCache, Policy, Residency, ResidencyError, Trace};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
+use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -112,6 +113,14 @@ impl Session {
         })?;
         let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
         let threshold = scaled_threshold(args.query_threshold, extent.tile);
+        if args.query_threshold > threshold && threshold == 0 {
+            let _ = writeln!(
+                std::io::stderr(),
+                "brickwalk: warning: --query-threshold {} is less than one ray of a tile of {}: nothing is left out; use a larger --tile",
+                args.query_threshold,
+                extent.tile
+            );
+        }
         let setup = Setup { extent, threshold, count: args.count };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let host = HostCache::new(args.host_cache);
