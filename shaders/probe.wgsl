@@ -37,6 +37,8 @@ fn arithmetic(@builtin(global_invocation_id) id: vec3<u32>) {
     put(at + 6u, square_root(abs(x.x)));
     put(at + 7u, diffprod(x.x, x.y, x.z, x.w));
     put(at + 8u, x.x);
+    put(at + 9u, max(x.x, x.y));
+    put(at + 10u, min(x.x, x.y));
 }
 
 // One thread a case of 16 words: vertices a, b, c, origin and direction of a ray, t_min; 28 words of results.

@@ -7,6 +7,7 @@ use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
 use super::optimisation_args::OptimisationArgs;
+use super::selftest::args::SelftestArgs;
 use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
 use crate::stream::Policy;
@@ -56,6 +57,8 @@ pub enum Command {
     Bench(BenchArgs),
     /// List what can render, and what is chosen
     Adapters(AdaptersArgs),
+    /// Check the numerical stability of this machine's device, case by case
+    Selftest(SelftestArgs),
 }
 
 /// Options of `adapters`.

@@ -19,6 +19,7 @@ pub mod quality;
 pub mod repair;
 pub mod replay;
 pub mod scene;
+pub mod selftest;
 pub mod session;
 pub mod sizes;
 pub mod summary;
@@ -84,6 +85,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Compare(args) => compare::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Adapters(args) => adapters::run(args),
+        Command::Selftest(args) => selftest::run(args),
     }
 }
 

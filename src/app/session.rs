@@ -25,6 +25,20 @@ pub struct Session {
     pub schedule: Schedule,
 }
 
+/// What an executor is made for.
+pub struct Needs<'a> {
+    /// The scene.
+    pub scene: Arc<SceneFile>,
+    /// The host's cache.
+    pub host: Arc<HostCache>,
+    /// Threads that read payloads, and how many of them may be read ahead.
+    pub threads: (usize, usize),
+    /// Bytes of the cache's pages.
+    pub page_sizes: &'a [u64],
+    /// Picture, tiles and counting.
+    pub setup: Setup,
+}
+
 /// Opens a scene file.
 ///
 /// # Errors
@@ -74,7 +88,6 @@ impl Session {
     /// # Errors
     /// No device, a device that fails the start-up probe, a cache too small or too large.
     pub fn open(scene: Arc<SceneFile>, path: &Path, args: &StreamArgs, extent: Extent) -> Result<Self> {
-        let name = path.display();
         if let Some(file) = &args.requests_out {
             // Said before the work rather than after it.
             let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -83,9 +96,27 @@ impl Session {
             }
         }
         let device = Device::open(&args.adapter)?;
+        let page_bytes = device.page_bytes();
+        Self::open_on(scene, path, args, extent, page_bytes, |needs| {
+            device.executor(needs.scene, needs.host, needs.threads, needs.page_sizes, needs.setup)
+        })
+    }
+
+    /// As [`Session::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
+    ///
+    /// # Errors
+    /// As [`Session::open`].
+    pub fn open_on(
+        scene: Arc<SceneFile>,
+        path: &Path,
+        args: &StreamArgs,
+        extent: Extent,
+        page_bytes: u64,
+        make: impl FnOnce(Needs) -> Result<Box<dyn FrameExecutor>>,
+    ) -> Result<Self> {
+        let name = path.display();
         let bytes = brick_bytes(&scene);
         let sizes: Vec<(u64, u64)> = bytes.iter().map(|b| (b.geometry, b.attributes)).collect();
-        let page_bytes = device.page_bytes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
         let budget = cache_budget(args.cache, &sizes, page_bytes);
         let schedule = match args.schedule {
@@ -125,8 +156,8 @@ impl Session {
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let host = HostCache::new(args.host_cache);
         let threads = (args.worker_count(), args.prefetch as usize);
-        let mut executor =
-            device.executor(scene.clone(), host, threads, &page_sizes, setup).with_context(|| format!("{name}"))?;
+        let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
+        let mut executor = make(needs).with_context(|| format!("{name}"))?;
         if schedule == Schedule::PlainBinary {
             executor.make_binary().with_context(|| format!("{name}"))?;
         }

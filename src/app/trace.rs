@@ -139,12 +139,32 @@ fn trace_chunk(
     any: bool,
     stats: &mut PassStats,
 ) -> Result<Vec<(layout::Hit, [f32; 2])>> {
-    let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
-    let executor = &mut *session.executor;
-    let cache = &mut session.cache;
-    executor.begin_frame(&View { frame: *frame, params: Params::default(), directions: Directions::default() });
     let device: Vec<layout::Ray> = rays.iter().map(|r| r.ray).collect();
-    executor.set_rays(pass, &device);
+    let hits = trace_device(session, frame, &device, any, stats)?;
+    if any {
+        return Ok(hits.into_iter().map(|h| (h, [0.0; 2])).collect());
+    }
+    let (executor, cache) = (&mut *session.executor, &mut session.cache);
+    attributes::resolve(executor, cache, Pass::Primary, stats)?;
+    let gbuffer = executor.read_gbuffer()?;
+    Ok(hits.into_iter().zip(gbuffer).map(|(h, g)| (h, g.weights)).collect())
+}
+
+/// Traces rays that are in `frame`, at most as many as [`EXTENT`] has; their hits in the same order.
+///
+/// # Errors
+/// A damaged brick, or the device's.
+pub fn trace_device(
+    session: &mut Session,
+    frame: &Frame,
+    rays: &[layout::Ray],
+    any: bool,
+    stats: &mut PassStats,
+) -> Result<Vec<layout::Hit>> {
+    let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
+    let (executor, cache) = (&mut *session.executor, &mut session.cache);
+    executor.begin_frame(&View { frame: *frame, params: Params::default(), directions: Directions::default() });
+    executor.set_rays(pass, rays);
     cache.begin_pass("trace", 0);
     let trace = match session.schedule {
         // Rays that are given have nothing in common that tiles could use.
@@ -154,11 +174,7 @@ fn trace_chunk(
         Schedule::PlainBinary => plain::trace_binary,
     };
     trace(executor, cache, pass, &[Step::StartHits], &Tracing::default(), stats)?;
-    let hits = executor.read_hits(pass)?;
-    if any {
-        return Ok(hits.into_iter().take(rays.len()).map(|h| (h, [0.0; 2])).collect());
-    }
-    attributes::resolve(executor, cache, pass, stats)?;
-    let gbuffer = executor.read_gbuffer()?;
-    Ok(hits.into_iter().zip(gbuffer).take(rays.len()).map(|(h, g)| (h, g.weights)).collect())
+    let mut hits = executor.read_hits(pass)?;
+    hits.truncate(rays.len());
+    Ok(hits)
 }

@@ -181,6 +181,17 @@ impl Best {
         all
     }
 
+    /// Numbers in a vector.
+    pub fn lanes(self) -> u32 {
+        match self {
+            Self::Scalar(_) => 1,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => 8,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => 16,
+        }
+    }
+
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {

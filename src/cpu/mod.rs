@@ -54,6 +54,11 @@ pub use executor::CpuExecutor;
 
 use crate::kernel::DeviceInfo;
 
+/// Rays that are tested together at most.
+pub fn lanes() -> u32 {
+    isa::Best::detect().lanes()
+}
+
 /// What summaries say of the processor.
 pub fn device_info() -> DeviceInfo {
     DeviceInfo {

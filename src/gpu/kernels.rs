@@ -131,7 +131,7 @@ impl Kernels {
     }
 
     /// [`Self::new`] from the texts that `source` gives for the names of kernels.
-    pub(super) fn from_sources(gpu: &Gpu, pages: Pages, count: bool, source: &dyn Fn(&str) -> String) -> Self {
+    pub fn from_sources(gpu: &Gpu, pages: Pages, count: bool, source: &dyn Fn(&str) -> String) -> Self {
         use Bound::{Params, Read, Write};
         let device = &gpu.device;
         let scene = layout(device, "scene", &[Read; 7]);

@@ -34,6 +34,8 @@ pub struct ProbeReport {
     pub flushes_denormals: bool,
     /// Whether the bits of a NaN survive a load and a store as f32.
     pub keeps_nan_bits: bool,
+    /// What max and min give of a NaN and a number: "the number", "the NaN", or "either".
+    pub nan_in_max_min: &'static str,
     /// Least and greatest subgroup size, where the driver tells.
     pub subgroup_size: Option<(u32, u32)>,
     /// Wall time of the probe, milliseconds, compilation included.
@@ -120,7 +122,7 @@ pub fn run(device: &wgpu::Device, queue: &wgpu::Queue) -> ProbeReport {
 }
 
 /// The text of `shaders/probe.wgsl` with what it includes.
-fn source() -> String {
+pub fn source() -> String {
     let file = |name: &str| match name {
         "probe.wgsl" => Some(include_str!("../../shaders/probe.wgsl").to_string()),
         "shared/exact.wgsl" => Some(include_str!("../../shaders/shared/exact.wgsl").to_string()),
@@ -130,7 +132,8 @@ fn source() -> String {
     wgsl::assemble("probe.wgsl", Pages { cache: 1, texels: 1 }, &file).unwrap_or_default()
 }
 
-fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> ProbeReport {
+/// [`run`] with another text of the kernels.
+pub fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> ProbeReport {
     let start = Instant::now();
     let info = device.adapter_info();
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -145,6 +148,7 @@ fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> Probe
         contracts: false,
         flushes_denormals: false,
         keeps_nan_bits: true,
+        nan_in_max_min: "the number",
         subgroup_size: (info.subgroup_max_size > 0).then_some((info.subgroup_min_size, info.subgroup_max_size)),
         ms: 0.0,
     };
@@ -172,7 +176,10 @@ fn no_results(name: &'static str, reason: String) -> Check {
 }
 
 /// Runs one entry point over all cases; `result_words` words a case come back.
-fn dispatch<Case, const N: usize>(
+///
+/// # Errors
+/// The device returns nothing.
+pub fn dispatch<Case, const N: usize>(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     module: &wgpu::ShaderModule,
@@ -238,10 +245,14 @@ fn ordinary(x: f32) -> bool {
 fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results: &[u32]) {
     let names = ["rounding of +", "rounding of -", "rounding of *", "barrier", "divide", "square_root", "diffprod"];
     let mut checks = names.map(|name| Check::new(name, TWIN));
+    let mut nans = Vec::new();
     for (case, found) in cases.iter().zip(results.chunks_exact(ARITHMETIC_WORDS)) {
         let [a, b, c, d] = case.words.map(f32::from_bits);
         if !case.words.iter().all(|&x| ordinary(f32::from_bits(x))) {
             report.keeps_nan_bits &= !a.is_nan() || found[8] == case.words[0];
+            if a.is_nan() {
+                nans.extend([found[9], found[10]].map(|x| f32::from_bits(x).is_nan()));
+            }
             continue;
         }
         let product = a * b;
@@ -267,6 +278,11 @@ fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results:
             report.contracts |= f32::from_bits(found[4]) != 0.0;
         }
     }
+    report.nan_in_max_min = match (nans.contains(&true), nans.contains(&false)) {
+        (true, true) => "either",
+        (true, false) => "the NaN",
+        _ => "the number",
+    };
     report.checks.extend(checks);
 }
 

@@ -26,6 +26,7 @@ mod site;
 mod solid;
 mod soup;
 mod stadium;
+mod stiff;
 mod street;
 mod style;
 mod terrain;
@@ -42,8 +43,10 @@ use std::str::FromStr;
 
 pub use gltf::{GltfForm, write_gltf};
 pub use path::{CameraPath, Keyframe, LONG_FRAMES, NEAR_FRAMES, write_paths};
+pub use rng::Rng;
 pub use scene::Scene;
 pub use soup::{SoupKind, rotated_instances, soup};
+pub use stiff::{Stiff, moved, one_mesh, stiff};
 
 /// Kinds of generated scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -61,11 +61,11 @@ pub fn soup(kind: SoupKind, n: u32, seed: u64) -> SourceScene {
 }
 
 /// A point in the cube of half side `half`.
-fn inside(rng: &mut Rng, half: f64) -> DVec3 {
+pub(crate) fn inside(rng: &mut Rng, half: f64) -> DVec3 {
     DVec3::new(rng.range(-half, half), rng.range(-half, half), rng.range(-half, half))
 }
 
-fn scene(name: String, meshes: Vec<Mesh>, placements: Vec<Placement>) -> SourceScene {
+pub(crate) fn scene(name: String, meshes: Vec<Mesh>, placements: Vec<Placement>) -> SourceScene {
     SourceScene {
         meshes,
         placements,
@@ -78,7 +78,7 @@ fn scene(name: String, meshes: Vec<Mesh>, placements: Vec<Placement>) -> SourceS
 /// Sixteen overlapping instances of a bumpy sphere of 1280 triangles: turned, scaled (some unevenly), some mirrored.
 pub fn rotated_instances(seed: u64) -> SourceScene {
     let mut rng = Rng::new(seed, &[21]);
-    let mesh = Mesh { name: "bumpy sphere".into(), primitives: vec![bumpy_sphere(&mut rng)] };
+    let mesh = Mesh { name: "bumpy sphere".into(), primitives: vec![bumpy_sphere(&mut rng, 3)] };
     let placements = (0..16)
         .map(|k| {
             let turn = DQuat::from_axis_angle(rng.direction(), rng.range(0.0, std::f64::consts::TAU));
@@ -95,8 +95,8 @@ pub fn rotated_instances(seed: u64) -> SourceScene {
     scene(format!("rotated instances seed={seed}"), vec![mesh], placements)
 }
 
-/// An icosahedron divided three times, its radius between 0.8 and 1.2.
-fn bumpy_sphere(rng: &mut Rng) -> Primitive {
+/// An icosahedron divided so many times, its radius between 0.8 and 1.2: closed, around the origin.
+pub(crate) fn bumpy_sphere(rng: &mut Rng, divisions: u32) -> Primitive {
     let g = 0.5 * (1.0 + 5f64.sqrt());
     let mut points: Vec<DVec3> = [(-1.0, g), (1.0, g), (-1.0, -g), (1.0, -g)]
         .into_iter()
@@ -117,7 +117,7 @@ fn bumpy_sphere(rng: &mut Rng) -> Primitive {
             }
         }
     }
-    for _ in 0..3 {
+    for _ in 0..divisions {
         let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
         let mut middle = |a: u32, b: u32| {
             *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {

@@ -1,0 +1,70 @@
+//! Rays aimed at what is hard to hit.
+
+use crate::kernel::frame::Frame;
+use crate::kernel::layout::{Ray, T_INFINITE};
+use crate::reference::Truth;
+use brickwalk_scenes::Rng;
+use glam::DVec3;
+
+/// What a ray is aimed at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aim {
+    /// A vertex of a triangle.
+    Vertex,
+    /// A point of an edge.
+    Edge,
+    /// A point inside of a triangle.
+    Inside,
+}
+
+impl Aim {
+    /// Every kind.
+    pub const ALL: [Self; 3] = [Self::Vertex, Self::Edge, Self::Inside];
+}
+
+/// Triangles in device units relative to a frame's reference point, where lattice points are exact in f64.
+pub struct Targets(pub Vec<[DVec3; 3]>);
+
+impl Targets {
+    /// All triangles of a scene.
+    pub fn of(truth: &Truth, frame: &Frame) -> Self {
+        let relative = |p: [f64; 3]| (DVec3::from(p) - frame.origin) / frame.unit;
+        Self(truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(relative)).collect())
+    }
+
+    /// A point of a random triangle.
+    pub fn point(&self, rng: &mut Rng, aim: Aim) -> DVec3 {
+        let index = rng.int(0, self.0.len() as i64 - 1) as usize;
+        let [a, b, c] = self.0[index];
+        let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]][rng.int(0, 2) as usize];
+        match aim {
+            Aim::Vertex => a,
+            Aim::Edge => a + rng.unit() * (b - a),
+            Aim::Inside => {
+                let (s, t) = (rng.unit(), rng.unit());
+                let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+                a + s * (b - a) + t * (c - a)
+            }
+        }
+    }
+
+    /// A ray from `origin` at a random target. Where origin and vertex are lattice points with at most 24 bits between them, the ray
+    /// goes through the vertex exactly.
+    pub fn ray(&self, rng: &mut Rng, origin: DVec3, aim: Aim) -> Ray {
+        ray(origin, self.point(rng, aim))
+    }
+}
+
+/// The ray from a point through another, in device units; it begins at the point rounded to f32.
+pub fn ray(origin: DVec3, to: DVec3) -> Ray {
+    let origin = origin.as_vec3();
+    let direction = (to - origin.as_dvec3()).as_vec3();
+    let direction = if direction.abs().max_element() < 1e-9 { glam::Vec3::X } else { direction };
+    Ray { origin: origin.to_array(), t_min: 0.0, direction: direction.to_array(), t_max: T_INFINITE }
+}
+
+/// A point with coordinates on multiples of `step` within the cube of half side `half` around `middle`.
+pub fn lattice_point(rng: &mut Rng, middle: DVec3, half: f64, step: f64) -> DVec3 {
+    let offset = DVec3::new(rng.range(-half, half), rng.range(-half, half), rng.range(-half, half));
+    ((middle + offset) / step).round() * step
+}
