@@ -57,7 +57,11 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     Ok(())
 }
 
-fn check(ray: &Ray) -> Result<()> {
+/// Refuses a ray that has no direction or that is not all numbers.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check(ray: &Ray) -> Result<()> {
     if !ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite()) {
         bail!("origin and direction must be finite");
     }

@@ -166,12 +166,16 @@ impl Defect {
     }
 }
 
-/// An executor with a defect of streaming or of positions.
+/// An executor with a defect of streaming or of positions, or whose device fails.
 pub struct Faulty {
     /// The sound one.
     pub inner: Box<dyn FrameExecutor>,
     /// The defect.
-    pub defect: Defect,
+    pub defect: Option<Defect>,
+    /// The submission, from 1 on, whose results never come back.
+    pub fails_at: Option<u32>,
+    /// Submissions so far.
+    pub submissions: u32,
     /// The scene.
     pub scene: Arc<SceneFile>,
     /// The frame's reference point in device units.
@@ -181,7 +185,7 @@ pub struct Faulty {
 impl Faulty {
     /// A point of the frame, relative to the world's origin, if that is the defect.
     fn point(&self, p: [f32; 3]) -> [f32; 3] {
-        if self.defect == Defect::WorldF32 {
+        if self.defect == Some(Defect::WorldF32) {
             (DVec3::from(p.map(f64::from)) + self.reference).as_vec3().to_array()
         } else {
             p
@@ -193,7 +197,7 @@ impl Executor for Faulty {
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
         self.inner.load(loads)?;
         let bytes = |load: &Load| self.scene.loaded_bytes(load.item.into());
-        if self.defect == Defect::EarlyEviction
+        if self.defect == Some(Defect::EarlyEviction)
             && let Some(last) = loads.last()
             && let Some(first) = loads[..loads.len() - 1].iter().find(|first| bytes(first) >= bytes(last))
         {
@@ -212,7 +216,11 @@ impl Executor for Faulty {
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let mut report = self.inner.run(pass, steps, bricks)?;
-        if self.defect == Defect::LostQuery && !report.demand.is_empty() {
+        self.submissions += 1;
+        if self.fails_at == Some(self.submissions) {
+            return Err(ExecutorError::Device("was lost on purpose".into()));
+        }
+        if self.defect == Some(Defect::LostQuery) && !report.demand.is_empty() {
             report.demand.remove(0);
         }
         Ok(report)
@@ -258,7 +266,7 @@ impl FrameExecutor for Faulty {
 
     fn begin_frame(&mut self, view: &View) {
         let mut view = *view;
-        if self.defect == Defect::WorldF32 {
+        if self.defect == Some(Defect::WorldF32) {
             self.reference = view.frame.origin / view.frame.unit;
             let [x, y, z, w] = view.params.origin;
             let [x, y, z] = self.point([x, y, z]);

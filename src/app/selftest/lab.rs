@@ -41,6 +41,8 @@ pub struct Lab {
     pub rays: usize,
     /// What is planted.
     pub defect: Option<Defect>,
+    /// The submission of executors made from now on whose results never come back.
+    pub fails_at: Option<u32>,
     folder: tempfile::TempDir,
     kernels: Vec<Arc<Kernels>>,
     scenes: u32,
@@ -66,7 +68,7 @@ impl Lab {
         }
         let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
         let adapter = adapter.clone();
-        Ok(Self { device, adapter, seed, rays, defect, folder, kernels: Vec::new(), scenes: 0 })
+        Ok(Self { device, adapter, seed, rays, defect, fails_at: None, folder, kernels: Vec::new(), scenes: 0 })
     }
 
     /// A stream of random numbers for the part `key` of a case.
@@ -160,10 +162,11 @@ impl Lab {
                 Box::new(GpuExecutor::with_kernels(gpu, kernels, scene.clone(), workers, page_sizes, setup)?)
             }
         };
-        Ok(match self.defect {
-            Some(defect) => Box::new(Faulty { inner: executor, defect, scene, reference: DVec3::ZERO }),
-            None => executor,
-        })
+        let (defect, fails_at) = (self.defect, self.fails_at);
+        if defect.is_none() && fails_at.is_none() {
+            return Ok(executor);
+        }
+        Ok(Box::new(Faulty { inner: executor, defect, fails_at, submissions: 0, scene, reference: DVec3::ZERO }))
     }
 }
 

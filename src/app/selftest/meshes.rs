@@ -233,7 +233,7 @@ pub fn edges(lab: &mut Lab) -> Result<Checks> {
                 let hits = stage.trace(&frame, &rays, false)?;
                 missed += misses(&hits);
                 if first.is_none() {
-                    let judged = rays.len().min(lab.share(4000));
+                    let judged = rays.len().min(lab.share(1000));
                     first = Some(stage.judge(&truth, &frame, &rays[..judged])?.0);
                 }
                 traced += count;

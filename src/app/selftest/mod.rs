@@ -8,13 +8,18 @@
 //! [`defects`] shows that the cases can fail.
 
 pub mod args;
+mod boxes;
 pub mod case;
 pub mod defects;
 mod lab;
 mod list;
+mod maps;
 mod meshes;
 mod rays;
 mod shapes;
+mod streaming;
+mod surfaces;
+mod views;
 
 use super::device::Device;
 use crate::cpu;

@@ -154,7 +154,7 @@ fn build_and_judge(lab: &mut Lab, checks: &mut Checks, kind: Stiff, n: u32, bric
 /// Case 11: all boxes have one centre.
 pub fn equal_centroids(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    build_and_judge(lab, &mut checks, Stiff::EqualCentroids, 1000, 150, 2000.0)?;
+    build_and_judge(lab, &mut checks, Stiff::EqualCentroids, 500, 75, 2000.0)?;
     Ok(checks)
 }
 
@@ -176,7 +176,7 @@ pub fn spanning(lab: &mut Lab) -> Result<Checks> {
 /// Case 14: triangles whose sizes are a geometric series, at one corner.
 pub fn series(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    build_and_judge(lab, &mut checks, Stiff::Series, 1500, 1500, 500.0)?;
+    build_and_judge(lab, &mut checks, Stiff::Series, 1000, 1000, 500.0)?;
     Ok(checks)
 }
 
