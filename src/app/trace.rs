@@ -33,6 +33,9 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     let (hits, stats) =
         trace(&mut session, &rays, args.any, &progress).with_context(|| args.scene.display().to_string())?;
     progress.finish();
+    if let Some(row) = hits.iter().position(|hit| hit.t.is_nan() || hit.u.is_nan() || hit.v.is_nan()) {
+        bail!("the hit of row {row} is not a number: {:?}; this is a defect, see brickwalk selftest", hits[row]);
+    }
     if args.any {
         let any: Vec<bool> = hits.iter().map(|h| h.triangle != NONE).collect();
         npy::write_any(&args.output, &any)?;

@@ -84,7 +84,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     }
     let non_finite: u64 = records.iter().map(|r| r.non_finite).sum();
     if non_finite > 0 {
-        bail!("{non_finite} pixels were not finite and are black; this is a defect, see records.jsonl for the frames");
+        bail!("{non_finite} pixels were not finite; this is a defect, see records.jsonl for the frames");
     }
     Ok(())
 }

@@ -71,6 +71,15 @@ pub struct Pixels {
     pub albedo: Vec<[f32; 3]>,
 }
 
+impl Pixels {
+    /// How many pixels have a value that is no number: radiance, normals and colours are finite, depths at most infinite.
+    pub fn not_finite(&self) -> u64 {
+        let count = |values: &[[f32; 3]]| values.iter().filter(|v| !v.iter().all(|x| x.is_finite())).count();
+        let depths = self.depth.iter().filter(|d| d.is_nan() || **d == f32::NEG_INFINITY).count();
+        (count(&self.radiance) + count(&self.normal) + count(&self.albedo) + depths) as u64
+    }
+}
+
 /// A frame and its records.
 #[derive(Clone, Debug, Default)]
 pub struct FrameOutput {
@@ -147,6 +156,10 @@ impl Renderer {
         let radiance = self.executor.read_radiance()?;
         output.pixels.radiance = radiance.iter().map(|c| [c[0] / c[3], c[1] / c[3], c[2] / c[3]]).collect();
         output.records = records.finish(self);
+        // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
+        if let Some(primary) = output.records.first_mut() {
+            primary.non_finite += output.pixels.not_finite();
+        }
         Ok(output)
     }
 
@@ -279,4 +292,33 @@ fn depth(ray: &Ray, hit: &Hit, unit: f64) -> f32 {
     }
     let length = ray.direction.iter().map(|&d| f64::from(d) * f64::from(d)).sum::<f64>().sqrt();
     (f64::from(hit.t) * length * unit) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_nan_anywhere_is_counted() {
+        let sound = Pixels {
+            radiance: vec![[1.0; 3]; 2],
+            depth: vec![f32::INFINITY, 2.0],
+            normal: vec![[0.0; 3]; 2],
+            id: vec![1, 2],
+            albedo: vec![[0.5; 3]; 2],
+        };
+        assert_eq!(sound.not_finite(), 0);
+        let spoil: [fn(&mut Pixels); 5] = [
+            |p| p.radiance[1][2] = f32::NAN,
+            |p| p.radiance[0][0] = f32::INFINITY,
+            |p| p.depth[0] = f32::NAN,
+            |p| p.normal[1][0] = f32::NAN,
+            |p| p.albedo[0][1] = f32::NEG_INFINITY,
+        ];
+        for spoil in spoil {
+            let mut pixels = sound.clone();
+            spoil(&mut pixels);
+            assert_eq!(pixels.not_finite(), 1);
+        }
+    }
 }

@@ -21,8 +21,8 @@ use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernel::layout::{Ray, T_INFINITE};
 use anyhow::{Result, anyhow};
-use brickwalk_scenes::{Rng, Stiff, stiff};
 use bricks::Node;
+use brickwalk_scenes::{Rng, Stiff, stiff};
 use glam::DVec3;
 
 /// Multiples of this are the integers.
@@ -142,7 +142,11 @@ fn case(rng: &mut Rng, kind: Kind, number: usize) -> BoxCase {
     let inside = rng.int(0, 3);
     let aim: [i128; 3] = std::array::from_fn(|k| {
         let [min, max] = bounds[k];
-        if rng.int(0, 3) < inside { min + (rng.unit() * (max - min) as f64) as i128 } else { [min, max][rng.int(0, 1) as usize] }
+        if rng.int(0, 3) < inside {
+            min + (rng.unit() * (max - min) as f64) as i128
+        } else {
+            [min, max][rng.int(0, 1) as usize]
+        }
     });
     let mut origin: [i128; 3] = std::array::from_fn(|k| {
         // What f32 holds there.
@@ -177,13 +181,13 @@ fn case(rng: &mut Rng, kind: Kind, number: usize) -> BoxCase {
     for k in 0..3 {
         if case.ray.direction[k] == 0.0 && kind != Kind::Any {
             let zero = if kind == Kind::Tiny { [1e-30, 1e-38, 1e-42][number / 4 % 3] } else { 0.0 };
-            case.ray.direction[k] = if number / 2 % 2 == 0 { zero } else { -zero };
+            case.ray.direction[k] = [zero, -zero][number / 2 % 2];
         }
     }
     if case.ray.direction.iter().all(|x| x.abs() < 1e-6) {
         case.ray.direction[(flat + 2) % 3] = 1.0;
     }
-    if number % 5 == 0 {
+    if number.is_multiple_of(5) {
         case.ray.t_max = 1.0;
     } else if kind == Kind::Tiny {
         case.ray.t_max = 1_048_576.0;

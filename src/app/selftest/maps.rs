@@ -6,9 +6,9 @@ use crate::math::octahedral::{octahedral_decode, octahedral_encode};
 use crate::math::sampling::{concentric_disc, cosine_hemisphere, hammersley};
 use crate::reference::Truth;
 use anyhow::Result;
+use bricks::OCCUPANCY_LEVELS;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::one_mesh;
-use bricks::OCCUPANCY_LEVELS;
 use glam::DVec3;
 
 /// A sheet of 12 x 12 squares of side 1/8: its corner, and what one square more in either direction adds.
@@ -29,7 +29,8 @@ fn holes(lab: &mut Lab, primitive: Primitive) -> Result<(u64, u64)> {
     let (file, _, _) = lab.build(one_mesh("sheet", primitive), &settings(40, -20))?;
     let truth = Truth::load(&file)?;
     let resident = file.resident();
-    let maps: Vec<_> = (0..resident.bricks.len() as u32).map(|brick| file.occupancy(brick)).collect::<Result<_, _>>()?;
+    let maps: Vec<_> =
+        (0..resident.bricks.len() as u32).map(|brick| file.occupancy(brick)).collect::<Result<_, _>>()?;
     let is_occupied = |p: DVec3| {
         resident.occupancy.iter().zip(&maps).any(|(record, map)| {
             let side = f64::from(record.cell_log2).exp2();
@@ -163,14 +164,14 @@ pub fn hammersley_ends(_: &mut Lab) -> Result<Checks> {
             let p = hammersley(index, count);
             outside += u64::from(!p.iter().all(|x| (0.0..1.0).contains(x)));
             let [x, y, z] = cosine_hemisphere(p);
-            below += u64::from(!(z >= 0.0) || !x.is_finite() || !y.is_finite());
+            below += u64::from(z.is_nan() || z < 0.0 || !x.is_finite() || !y.is_finite());
             points += 1;
         }
     }
     let ends = [0.0, 1.0, 0.5, 1.0f32.next_down(), f32::MIN_POSITIVE];
     for (x, y) in ends.into_iter().flat_map(|x| ends.map(|y| (x, y))) {
         let [a, b, z] = cosine_hemisphere([x, y]);
-        below += u64::from(!(z >= 0.0) || !a.is_finite() || !b.is_finite());
+        below += u64::from(z.is_nan() || z < 0.0 || !a.is_finite() || !b.is_finite());
         points += 1;
     }
     checks.none("points outside of [0, 1)", outside, points);

@@ -12,7 +12,8 @@ use super::rays::{Aim, Targets, lattice_point, ray};
 use crate::kernel::layout::Ray;
 use crate::reference::Tally;
 use anyhow::Result;
-use brickwalk_scenes::{Rng, Stiff, moved, rotated_instances, stiff};
+use brickwalk_convert::source::Primitive;
+use brickwalk_scenes::{Rng, Stiff, moved, one_mesh, rotated_instances, stiff};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -98,7 +99,7 @@ pub fn cuts(lab: &mut Lab) -> Result<Checks> {
 /// Case 3: ten decades of size in one scene.
 pub fn scale_mix(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    let count = lab.share(4000);
+    let count = lab.share(1000);
     let mut stage = lab.stage(stiff(Stiff::ScaleMix, 1, lab.seed), &settings(64, -19), "--cache 50%")?;
     let truth = stage.truth()?;
     let mut rng = lab.random(&[3]);
@@ -290,7 +291,41 @@ pub fn grazing(lab: &mut Lab) -> Result<Checks> {
     let (tally, hits) = stage.judge(&truth, &frame, &rays)?;
     note(&mut checks, "grazing", &tally);
     checks.none("misses inside a closed mesh", misses(&hits), count as u64);
+    needles(lab, &mut checks)?;
     Ok(checks)
+}
+
+/// Rays in the planes of long triangles, along them: the plane says nothing of t, and the triangle's own slab must hold it.
+fn needles(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    let mut rng = lab.random(&[23, 1]);
+    let needles: Vec<[DVec3; 4]> = (0..600)
+        .map(|_| {
+            let [x, y, z] = [0; 3].map(|_| rng.range(-3.0, 3.0));
+            let along = rng.direction();
+            let across = along.any_orthonormal_vector();
+            let (p, long) = (DVec3::new(x, y, z), rng.range(0.5, 1.5));
+            [p - long * along, p + long * along, p + 0.7 * long * along + 1e-3 * across, along]
+        })
+        .collect();
+    let positions: Vec<[f64; 3]> = needles.iter().flat_map(|n| [n[0], n[1], n[2]].map(|p| p.to_array())).collect();
+    let indices = (0..positions.len() as u32).collect();
+    let source = one_mesh("needles", Primitive { positions, indices, ..Primitive::default() });
+    let mut stage = lab.stage(source, &settings(32, -20), "--cache 40% --schedule chc")?;
+    let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
+    let count = lab.share(6000);
+    let rays: Vec<Ray> = (0..count)
+        .map(|i| {
+            let [a, b, c, along] = needles[i % needles.len()];
+            let (s, t) = (rng.unit(), rng.unit() * 0.3);
+            let aim = a + s * (b - a) + t * (1.0 - s) * (c - a);
+            let origin = aim - rng.range(4.0, 20.0) * along + 1e-6 * rng.direction();
+            ray(origin / frame.unit, aim / frame.unit)
+        })
+        .collect();
+    let (tally, hits) = stage.judge(&truth, &frame, &rays)?;
+    note(checks, "along needles", &tally);
+    checks.at_least("along needles: hits", count as u64 - misses(&hits), count as u64 / 50);
+    Ok(())
 }
 
 /// Case 59: instances that are turned, mirrored and scaled unevenly.

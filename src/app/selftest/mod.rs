@@ -11,6 +11,7 @@ pub mod args;
 mod boxes;
 pub mod case;
 pub mod defects;
+mod errors;
 mod lab;
 mod list;
 mod maps;
@@ -81,6 +82,9 @@ pub struct Report {
 /// # Errors
 /// A case fails; there is no device.
 pub fn run(args: &SelftestArgs) -> Result<()> {
+    if let Some(folder) = &args.errors {
+        return errors::run(args, folder);
+    }
     let report = test(args)?;
     if args.json {
         super::print_json(&report)?;

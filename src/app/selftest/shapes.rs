@@ -117,7 +117,7 @@ fn build_and_judge(lab: &mut Lab, checks: &mut Checks, kind: Stiff, n: u32, bric
     let start = Instant::now();
     let (file, path, summary) = lab.build(stiff(kind, n, lab.seed), &settings(bricks, 0))?;
     let resident = file.resident();
-    checks.at_least(&format!("{kind}, {n}: triangles"), summary.triangles_stored, u64::from(n).min(500));
+    checks.at_least(&format!("{kind}, {n}: triangles"), summary.triangles_stored, u64::from(n).min(300));
     let highest = resident.bricks.iter().map(|brick| brick.height).max().unwrap_or(0);
     checks.at_most(&format!("{kind}: height of bricks"), highest, MAX_BRICK_HEIGHT);
     let largest = resident.bricks.iter().map(|brick| brick.triangle_count).max().unwrap_or(0);
@@ -154,7 +154,7 @@ fn build_and_judge(lab: &mut Lab, checks: &mut Checks, kind: Stiff, n: u32, bric
 /// Case 11: all boxes have one centre.
 pub fn equal_centroids(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    build_and_judge(lab, &mut checks, Stiff::EqualCentroids, 500, 75, 2000.0)?;
+    build_and_judge(lab, &mut checks, Stiff::EqualCentroids, 300, 40, 2000.0)?;
     Ok(checks)
 }
 

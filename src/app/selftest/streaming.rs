@@ -9,9 +9,9 @@ use crate::kernel::layout::Ray;
 use crate::render::{Pixels, Renderer};
 use crate::stream::{Item, PayloadSource, Policy, Residency};
 use anyhow::{Context, Result, anyhow};
+use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Payload, SceneFile};
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Stiff, one_mesh, stiff};
-use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Payload, SceneFile};
 use bytemuck::Zeroable;
 use glam::DVec3;
 use std::path::PathBuf;
@@ -95,9 +95,9 @@ pub fn late_queries(lab: &mut Lab) -> Result<Checks> {
     checks.at_least("queries left to a later frame", deferred, 1);
     for submission in [1, 3, 6] {
         lab.fails_at = Some(submission);
-        let frame = lab.renderer(&place.file, &place.path, &options).and_then(|mut renderer| {
-            renderer.frame(0, &in_city(0, [0.0; 3])).map_err(anyhow::Error::from)
-        });
+        let frame = lab
+            .renderer(&place.file, &place.path, &options)
+            .and_then(|mut renderer| renderer.frame(0, &in_city(0, [0.0; 3])).map_err(anyhow::Error::from));
         lab.fails_at = None;
         checks.refuses(&format!("lost answer of submission {submission}"), frame.map(|_| ()), &["lost"]);
     }
@@ -107,11 +107,11 @@ pub fn late_queries(lab: &mut Lab) -> Result<Checks> {
 /// Case 34: lists longer than there is room for at first are made again, and nothing is left out.
 pub fn overflow(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    let place = place(lab, 8)?;
+    let place = place(lab, 32)?;
     // One tile, whose list starts with room for 64 leaves.
-    let options = format!("{OPTIONS} --tile 128 --cache 15% --schedule chc --without root-walk");
+    let options = format!("{OPTIONS} --tile 128 --cache 25% --schedule chc --without root-walk");
     let mut renderer = lab.renderer(&place.file, &place.path, &options)?;
-    checks.at_least("leaves", place.file.resident().leaves.len(), 640);
+    checks.at_least("leaves", place.file.resident().leaves.len(), 256);
     let differ = unlike(&mut renderer, &place, 2)? + unlike(&mut renderer, &place, 0)?;
     checks.none("pixels unlike those without lists", differ, 2 * 72 * 48);
     Ok(checks)
@@ -134,7 +134,8 @@ pub fn least_cache(lab: &mut Lab) -> Result<Checks> {
     let mut rng = lab.random(&[35]);
     let (mut lost, mut of) = (0, 0);
     for policy in Policy::ALL {
-        let sizes: Vec<(u64, u64)> = (0..40).map(|_| (16 * rng.int(1, 64) as u64, 16 * rng.int(0, 16) as u64)).collect();
+        let sizes: Vec<(u64, u64)> =
+            (0..40).map(|_| (16 * rng.int(1, 64) as u64, 16 * rng.int(0, 16) as u64)).collect();
         let mut residency = Residency::new(&sizes, 3 * Residency::least_budget(&sizes), 4096, policy)?;
         for _ in 0..400 {
             residency.unpin_all();

@@ -101,9 +101,10 @@ fn thin_gap(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
         .collect();
     let hits = stage.trace(&frame, &leaving, false)?;
     let wall = |id: u32| id / 2;
-    let wrong = starts.iter().zip(&hits).filter(|((from, _), to)| {
-        from.id == NONE || to.id == NONE || wall(from.id) == wall(to.id)
-    });
+    let wrong = starts
+        .iter()
+        .zip(&hits)
+        .filter(|((from, _), to)| from.id == NONE || to.id == NONE || wall(from.id) == wall(to.id));
     checks.none("two walls 2 steps apart: rays that do not meet the other", wrong.count() as u64, count as u64);
     Ok(())
 }
@@ -113,7 +114,8 @@ fn sky_in_a_box(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let (file, path, _) = lab.build(stiff(Stiff::Cube, 4, lab.seed), &settings(64, 0))?;
     let camera = |k: u32| Camera {
         position: DVec3::new(0.1, 0.2, -0.3),
-        target: DVec3::new(0.1, 0.2, -0.3) + [DVec3::new(1.0, 1.0, 1.0), DVec3::new(-1.0, 0.9, 0.3), DVec3::NEG_Y][k as usize],
+        target: DVec3::new(0.1, 0.2, -0.3)
+            + [DVec3::new(1.0, 1.0, 1.0), DVec3::new(-1.0, 0.9, 0.3), DVec3::NEG_Y][k as usize],
         up: DVec3::Y,
         fov_y: 1.7,
     };
@@ -170,7 +172,8 @@ fn is_before(truth: &Truth, frame: &Frame, id: u32, point: [f32; 3], origin: [f3
     let Some(vertices) = truth.vertices(id) else { return false };
     let coarse = 2f64.powi(20);
     let fine = 2f64.powi(40);
-    let lattice = vertices.map(|v| ((DVec3::from(v) - frame.origin) / frame.unit * coarse).to_array().map(|x| x as i128));
+    let lattice =
+        vertices.map(|v| ((DVec3::from(v) - frame.origin) / frame.unit * coarse).to_array().map(|x| x as i128));
     let [a, b, c] = lattice;
     let minus = |p: [i128; 3], q: [i128; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
     let (ab, ac) = (minus(b, a), minus(c, a));
@@ -187,7 +190,8 @@ fn is_before(truth: &Truth, frame: &Frame, id: u32, point: [f32; 3], origin: [f3
 pub fn inside(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let count = lab.share(8000);
-    let mut stage = lab.stage(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(16, -10), "--cache 40% --schedule chc")?;
+    let mut stage =
+        lab.stage(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(16, -10), "--cache 40% --schedule chc")?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let targets = Targets::of(&truth, &frame);
     let mut rng = lab.random(&[26]);

@@ -29,7 +29,8 @@ pub fn city(seed: u64, shift: [f64; 3]) -> Result<SourceScene> {
 
 /// Eyes in the city, on its lattice.
 pub fn in_city(k: u32, shift: [f64; 3]) -> Camera {
-    let eyes = [([2.0, 1.75, 1.0], [30.0, 3.0, 8.0]), ([-3.5, 1.75, 12.0], [0.0, 2.5, -40.0]), ([40.0, 30.0, 40.0], [0.0; 3])];
+    let eyes =
+        [([2.0, 1.75, 1.0], [30.0, 3.0, 8.0]), ([-3.5, 1.75, 12.0], [0.0, 2.5, -40.0]), ([40.0, 30.0, 40.0], [0.0; 3])];
     let (position, target) = eyes[k as usize % 3];
     let shift = DVec3::from(shift);
     Camera { position: DVec3::from(position) + shift, target: DVec3::from(target) + shift, up: DVec3::Y, fov_y: 1.0 }
@@ -38,7 +39,10 @@ pub fn in_city(k: u32, shift: [f64; 3]) -> Camera {
 /// How many pixels differ in any bit.
 pub fn pixels_unlike(a: &Pixels, b: &Pixels) -> u64 {
     let bits = |p: &Pixels, i: usize| {
-        let aov = p.depth.get(i).map(|d| (d.to_bits(), p.id[i], p.normal[i].map(f32::to_bits), p.albedo[i].map(f32::to_bits)));
+        let aov = p
+            .depth
+            .get(i)
+            .map(|d| (d.to_bits(), p.id[i], p.normal[i].map(f32::to_bits), p.albedo[i].map(f32::to_bits)));
         (p.radiance[i].map(f32::to_bits), aov)
     };
     (0..a.radiance.len()).filter(|&i| bits(a, i) != bits(b, i)).count() as u64
@@ -134,7 +138,10 @@ pub fn intervals(lab: &mut Lab) -> Result<Checks> {
     checks.none("t_min above t_max: hits", found(&empty), of);
     let frame = Frame::near(stage.file.resident(), DVec3::ZERO);
     let given = |t_min: f64, t_max: f64| npy::Ray { origin: [0.0; 3], direction: [1.0, 2.0, 3.0], t_min, t_max };
-    let is_empty = |ray: &npy::Ray| !(|ray: Ray| ray.t_min <= ray.t_max)(device_ray(ray, &frame).ray);
+    let is_empty = |given: &npy::Ray| {
+        let ray = device_ray(given, &frame).ray;
+        ray.t_min > ray.t_max
+    };
     checks.holds("given: t_min above t_max is an empty interval", is_empty(&given(2.0, 1.0)));
     checks.holds("given: t_max = inf is not", !is_empty(&given(0.0, f64::INFINITY)));
     checks.refuses("given: t_max = NaN", check(&given(0.0, f64::NAN)), &["numbers"]);
@@ -145,7 +152,8 @@ pub fn intervals(lab: &mut Lab) -> Result<Checks> {
 fn deviation(camera: &Camera) -> f64 {
     let (right, up, forward) = camera.frame();
     let lengths = [right, up, forward].map(|v| (v.length() - 1.0).abs());
-    let angles = [right.dot(up).abs(), up.dot(forward).abs(), forward.dot(right).abs(), (right.cross(up) + forward).length()];
+    let angles =
+        [right.dot(up).abs(), up.dot(forward).abs(), forward.dot(right).abs(), (right.cross(up) + forward).length()];
     lengths.into_iter().chain(angles).fold(0.0, |worst, x| if x > worst || x.is_nan() { x } else { worst })
 }
 
@@ -173,16 +181,26 @@ pub fn fields_of_view(lab: &mut Lab) -> Result<Checks> {
     let (file, path, _) = lab.build(stiff(Stiff::Shell, 3, lab.seed), &settings(64, 0))?;
     let truth = Truth::load(&file)?;
     for degrees in [1e-6, 1e-3, 1.0, 90.0, 179.0, 179.99] {
-        let camera = Camera { position: DVec3::new(0.1, 0.0, 0.2), target: DVec3::X, up: DVec3::Y, fov_y: f64::to_radians(degrees) };
+        let camera = Camera {
+            position: DVec3::new(0.1, 0.0, 0.2),
+            target: DVec3::X,
+            up: DVec3::Y,
+            fov_y: f64::to_radians(degrees),
+        };
         let basis = camera.ray_basis(64, 48);
         let vectors = [basis.b, basis.dx, basis.dy].into_iter().all(|v| v.is_finite() && v != DVec3::ZERO);
         checks.holds(&format!("{degrees} degrees: rays are finite"), vectors);
-        let mut renderer = lab.renderer(&file, &path, "--size 64x48 --tile 16 --cache 40% --schedule chc --aov --effects primary")?;
+        let mut renderer =
+            lab.renderer(&file, &path, "--size 64x48 --tile 16 --cache 40% --schedule chc --aov --effects primary")?;
         let pixels = renderer.frame(0, &camera)?.pixels;
-        let (tally, missed) = judge_picture(&mut *renderer.executor, &truth, &Frame::near(file.resident(), camera.position))?;
+        let (tally, missed) =
+            judge_picture(&mut *renderer.executor, &truth, &Frame::near(file.resident(), camera.position))?;
         checks.none(&format!("{degrees} degrees: unexcused differences from truth"), tally.mismatches, tally.total());
         checks.none(&format!("{degrees} degrees: pixels that miss a closed mesh"), missed, 64 * 48);
-        checks.holds(&format!("{degrees} degrees: pixels are finite"), pixels.radiance.iter().flatten().all(|x| x.is_finite()));
+        checks.holds(
+            &format!("{degrees} degrees: pixels are finite"),
+            pixels.radiance.iter().flatten().all(|x| x.is_finite()),
+        );
     }
     Ok(checks)
 }
@@ -208,7 +226,8 @@ fn odd_sizes(lab: &mut Lab, checks: &mut Checks, sizes: &[(u32, u32)], tiles: &[
         let (mut wrong, mut missed, mut rays, mut pixels) = (0, 0, 0, 0);
         for &tile in tiles {
             for schedule in ["chc", "demand", "plain"] {
-                let options = format!("--size {w}x{h} --tile {tile} --cache 100% --schedule {schedule} --effects primary --aov");
+                let options =
+                    format!("--size {w}x{h} --tile {tile} --cache 100% --schedule {schedule} --effects primary --aov");
                 let mut renderer = lab.renderer(&file, &path, &options)?;
                 let output = renderer.frame(0, &camera)?;
                 let frame = Frame::near(file.resident(), camera.position);

@@ -68,7 +68,7 @@ fn verdict(walk: &Walk) -> Markup {
             }
             @if !walk.passes.is_empty() {
                 @if unresolved > 0.0 { li.warn { (format::count(unresolved)) " pixels are not final" } }
-                @if non_finite > 0.0 { li.warn { (format::count(non_finite)) " pixels were not finite and are black" } }
+                @if non_finite > 0.0 { li.warn { (format::count(non_finite)) " pixels were not finite" } }
                 @if unresolved == 0.0 && non_finite == 0.0 { li { "every pixel is final and finite" } }
             }
         }

@@ -180,7 +180,7 @@ fn flat_box(rng: &mut Rng, k: u32) -> Vec<[DVec3; 3]> {
     let mut grid = |most: i64| rng.int(0, most) as f64 / 64.0;
     let low = DVec3::new(grid(448) - 4.0, grid(448) - 4.0, grid(448) - 4.0);
     let mut size = DVec3::new(grid(63), grid(63), grid(63)) + 1.0 / 64.0;
-    if k % 3 != 0 {
+    if !k.is_multiple_of(3) {
         size[k as usize / 3 % 3] = 0.0;
     }
     let corner = |i: u32| low + size * DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2));
