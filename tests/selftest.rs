@@ -49,7 +49,7 @@ fn every_planted_defect_is_noticed() {
     let cases: std::collections::BTreeSet<u32> = ALL.into_iter().map(case_of).collect();
     let numbers = cases.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
     let sound = test(&args(&format!("--adapter {name} --case {numbers}"))).expect("a device");
-    assert_eq!(failed(&sound), [], "without a defect: {:#?}", sound.rows);
+    assert!(failed(&sound).is_empty(), "without a defect: {:#?}", sound.rows);
     for defect in ALL {
         let case = case_of(defect);
         let words = format!("--adapter {name} --case {case} --plant {}", defect.name());
@@ -69,7 +69,7 @@ fn defects_of_streaming_are_noticed_on_the_processor() {
         assert_eq!(failed(&report), [case_of(defect)], "{}", defect.name());
     }
     assert!(matches!(Device::open(&"cpu".parse().expect("a name")), Ok(Device::Cpu)));
-    let refused = test(&args("--adapter cpu --plant raw-t")).err().expect("it has no kernels to be changed");
+    let refused = test(&args("--adapter cpu --plant raw-t")).expect_err("it has no kernels to be changed");
     assert!(refused.to_string().contains("--adapter"), "{refused}");
 }
 
