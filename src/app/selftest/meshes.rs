@@ -160,7 +160,7 @@ pub fn scale_sweep(lab: &mut Lab) -> Result<Checks> {
 /// Case 5: slivers a hundred million times longer than wide.
 pub fn slivers(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    let count = lab.share(12_000);
+    let count = lab.share(5000);
     let mut stage = lab.stage(stiff(Stiff::Slivers, 4000, lab.seed), &settings(256, -32), "--cache 50%")?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let targets = Targets::of(&truth, &frame);

@@ -66,7 +66,7 @@ pub fn overflow(lab: &mut Lab) -> Result<Checks> {
 /// Case 10: coincident triangles; the lowest id wins, also where a ray starts on them.
 pub fn coincident(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    let (n, count) = (12, lab.share(20_000));
+    let (n, count) = (12, lab.share(8000));
     let own = 2 * n * n;
     let mut expected = None;
     let ways = [

@@ -24,10 +24,17 @@ fn surfaces(stage: &mut Stage, frame: &Frame, rays: &[Ray]) -> Result<Vec<(Hit, 
     Ok(hits.into_iter().zip(surfaces).collect())
 }
 
+/// Sine of the least angle between a leaving ray and its surface. The edges of a triangle are rounded by u of their length, which tilts
+/// its normal by some u times the triangle's aspect: less than 8 u · 100 here. A ray that is lower may lead below the surface.
+const LEAST_SINE: f64 = 1e-4;
+
 /// A ray that leaves a surface, on the normal's side.
 fn leaving(rng: &mut Rng, surface: &Surface, size: f64) -> Ray {
     let normal = Vec3::from(surface.normal).as_dvec3();
     let mut direction = rng.direction();
+    while surface.leaf != NONE && direction.dot(normal).abs() < LEAST_SINE {
+        direction = rng.direction();
+    }
     if direction.dot(normal) < 0.0 {
         direction = -direction;
     }
