@@ -57,6 +57,27 @@ impl<'a> BrickView<'a> {
         let i = &self.long[at..at + 3];
         [i[0], i[1], i[2]]
     }
+
+    /// A vertex in the object's frame, in which the brick's origin lies at the offset: the correctly rounded difference of its
+    /// lattice position and the reference point.
+    #[inline(always)]
+    fn vertex(&self, index: u32, offset_high: Vec3, offset_low: Vec3) -> Vec3 {
+        if !self.is_wide {
+            let at = 3 * index as usize;
+            let l = &self.vertices[at..at + 3];
+            return each(|k| barrier(l[k] + offset_high[k]));
+        }
+        let at = 6 * index as usize;
+        let l = &self.vertices[at..at + 6];
+        each(|k| barrier(barrier(l[k] + offset_high[k]) + barrier(l[3 + k] + offset_low[k])))
+    }
+
+    /// The vertices of a triangle in the object's frame.
+    #[inline(always)]
+    pub fn vertices(&self, triangle: u32, offset_high: Vec3, offset_low: Vec3) -> [Vec3; 3] {
+        let [a, b, c] = self.triangle_indices(triangle);
+        [a, b, c].map(|index| self.vertex(index, offset_high, offset_low))
+    }
 }
 
 impl Best {
@@ -86,24 +107,10 @@ pub struct Best {
 }
 
 impl BrickRay<'_> {
-    /// A vertex in the object's frame: the correctly rounded difference of its lattice position and the reference point.
-    #[inline(always)]
-    pub fn vertex(&self, index: u32) -> Vec3 {
-        if !self.brick.is_wide {
-            let at = 3 * index as usize;
-            let l = &self.brick.vertices[at..at + 3];
-            return each(|k| barrier(l[k] + self.offset_high[k]));
-        }
-        let at = 6 * index as usize;
-        let l = &self.brick.vertices[at..at + 6];
-        each(|k| barrier(barrier(l[k] + self.offset_high[k]) + barrier(l[3 + k] + self.offset_low[k])))
-    }
-
     /// The vertices of a triangle in the object's frame.
     #[inline(always)]
     pub fn vertices(&self, triangle: u32) -> [Vec3; 3] {
-        let [a, b, c] = self.brick.triangle_indices(triangle);
-        [self.vertex(a), self.vertex(b), self.vertex(c)]
+        self.brick.vertices(triangle, self.offset_high, self.offset_low)
     }
 
     /// The global id of a triangle.

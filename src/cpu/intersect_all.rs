@@ -6,6 +6,7 @@ use super::brick::Best;
 use super::isa::{Isa, Lanes};
 use super::leaf::BrickRay;
 use super::node::{FramedRay, framed_ray, inner_before};
+use super::packet_node::Place;
 use super::packet_walk::{PacketGroup, PacketScratch, put, take};
 use super::pair_counts::PairCounts;
 use super::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
@@ -66,6 +67,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
         let bound = self.bound;
         let any_hit = bound.has(PARAM_ANY_HIT);
         let flip = packets.packet.flip;
+        let place = Place { offset_high: [0.0; 3], offset_low: [0.0; 3], slack: bound.params.instance_pad };
         let mut depth = 0;
         // The node whose children are visited next, and who visits it.
         let mut next = Some((0, packets.packet.all()));
@@ -73,8 +75,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
             if let Some((index, rays)) = next.take() {
                 let node = &bound.scene.top8[index as usize];
                 let mut group = PacketGroup { group: Group { base: index, bits: 0 }, rays: [0; 8] };
-                let (zero, pad) = ([0.0; 3], bound.params.instance_pad);
-                let mut met = packets.packet.open(isa, node, zero, zero, pad, rays, &mut group.rays);
+                let mut met = packets.packet.open(isa, node, &place, rays, &mut group.rays);
                 packets.visits.nodes = packets.visits.nodes.wrapping_add(rays.count_ones());
                 while met != 0 {
                     group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ flip);

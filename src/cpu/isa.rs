@@ -37,6 +37,22 @@ pub trait Isa: Copy + Send + Sync {
     /// The first of `from`, a number a lane.
     fn load(self, from: &[f32]) -> Self::Wide;
 
+    /// The same word in all lanes.
+    #[inline(always)]
+    fn splat_bits(self, x: u32) -> Self::Wide {
+        self.splat(f32::from_bits(x))
+    }
+
+    /// The first of `from`, a word a lane.
+    #[inline(always)]
+    fn load_bits(self, from: &[u32]) -> Self::Wide {
+        self.load(bytemuck::cast_slice(from))
+    }
+
+    /// Asks for the memory of `at` to be brought near, for it will be read.
+    #[inline(always)]
+    fn prefetch<T>(self, _at: &T) {}
+
     /// The traversal mask of a brick's node ([`traversal_mask`]): what `ray` enters of it up to `t_max`. `lanes` are the ray's.
     fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32;
 
@@ -121,6 +137,16 @@ macro_rules! isa_of_x86 {
             fn load(self, from: &[f32]) -> $wide {
                 // SAFETY: a value of the type exists only where the instructions have been detected.
                 unsafe { <$wide>::load(from) }
+            }
+
+            #[inline(always)]
+            fn prefetch<T>(self, at: &T) {
+                use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+                let lines = size_of::<T>().div_ceil(64);
+                for line in 0..lines {
+                    // SAFETY: SSE is part of x86-64, and a prefetch of any address does no harm.
+                    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(at).cast::<i8>().wrapping_add(64 * line)) }
+                }
             }
 
             #[inline(always)]

@@ -24,6 +24,7 @@ pub mod leaf;
 mod light;
 pub mod node;
 mod packet;
+mod packet_node;
 mod packet_surface;
 mod packet_triangle;
 mod packet_walk;

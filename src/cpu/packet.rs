@@ -1,23 +1,34 @@
 //! Up to 64 rays of one octant that walk the scene together, each with exactly the visits that it has alone: rays of an octant
 //! meet the children of every node in the same order, and a ray takes part in what follows only where it would have gone itself.
 //! So hits, uses and counters do not tell whether rays went together.
+//!
+//! All that is known of a ray lies in columns, a number or a word a ray, because it is read and written by vectors.
 
 use super::brick::Best;
 use super::isa::Isa;
-use super::node::{FramedRay, UNIT};
-use super::vector::{Vec3, each, least, most, most3};
+use super::node::{FramedRay, framed_ray};
+use super::packet_triangle::turned;
+use super::vector::{Vec3, least, most};
 use super::wide::{Wide, three};
-use crate::kernel::layout::NONE;
-use crate::math::exact::TriangleHit;
-use bricks::Node;
+use crate::kernel::layout::{Hit, NONE, Ray};
+use crate::math::exact::{GREATEST_INVERSE, LEAST_SHEAR, RayFrame, TriangleHit};
 
 /// Most rays of a packet: a bit each in a u64.
 pub const RAYS: usize = 64;
+
+/// Components of directions are plain below this magnitude, and so is the largest above its inverse: quotients are what f32
+/// division gives.
+const PLAIN: f32 = f32::from_bits((127 + 90) << 23);
 
 /// A number a ray.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Column(pub [f32; RAYS]);
+
+/// A word a ray.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub struct Words(pub [u32; RAYS]);
 
 impl Column {
     const ZERO: Self = Self([0.0; RAYS]);
@@ -27,6 +38,74 @@ impl Column {
     pub fn get<I: Isa>(&self, isa: I, number: usize) -> I::Wide {
         isa.load(&self.0[number * I::Wide::LANES..])
     }
+
+    /// Writes the lanes of vector `number`.
+    #[inline(always)]
+    pub fn set<W: Wide>(&mut self, number: usize, x: W) {
+        x.store(&mut self.0[number * W::LANES..]);
+    }
+
+    /// The least and the greatest of the first vectors.
+    #[inline(always)]
+    fn range<I: Isa>(&self, isa: I, vectors: usize) -> [f32; 2] {
+        let first = self.get(isa, 0);
+        let (mut low, mut high) = (first, first);
+        for v in 1..vectors {
+            let x = self.get(isa, v);
+            (low, high) = (low.least(x), high.most(x));
+        }
+        let (mut least_of, mut most_of) = ([0.0; 16], [0.0; 16]);
+        low.store(&mut least_of);
+        high.store(&mut most_of);
+        let mut half = I::Wide::LANES / 2;
+        while half > 0 {
+            for i in 0..half {
+                least_of[i] = least(least_of[i], least_of[i + half]);
+                most_of[i] = most(most_of[i], most_of[i + half]);
+            }
+            half /= 2;
+        }
+        [least_of[0], most_of[0]]
+    }
+
+    /// Writes those lanes of vector `number` whose bit is set.
+    #[inline(always)]
+    pub fn replace<I: Isa>(&mut self, isa: I, number: usize, lanes: u32, x: I::Wide) {
+        self.set(number, x.or_else(lanes, self.get(isa, number)));
+    }
+}
+
+impl Words {
+    const NONE: Self = Self([NONE; RAYS]);
+
+    /// The lanes of vector `number`.
+    #[inline(always)]
+    pub fn get<I: Isa>(&self, isa: I, number: usize) -> I::Wide {
+        isa.load_bits(&self.0[number * I::Wide::LANES..])
+    }
+
+    /// Writes those lanes of vector `number` whose bit is set.
+    #[inline(always)]
+    pub fn replace<I: Isa>(&mut self, isa: I, number: usize, lanes: u32, x: I::Wide) {
+        let all = x.or_else(lanes, self.get(isa, number));
+        all.store(bytemuck::cast_slice_mut(&mut self.0[number * I::Wide::LANES..]));
+    }
+}
+
+/// What the rays of a packet have found, but for the distances: [`Best`] by columns.
+pub struct Found {
+    /// Global ids.
+    pub id: Words,
+    /// Leaves; NONE where nothing has been found.
+    pub leaf: Words,
+    /// Numbers in the brick.
+    pub triangle: Words,
+    /// Triangles that rays start from.
+    pub source: Words,
+    /// Edge values u, v, w, not divided.
+    pub edges: [Column; 3],
+    /// Their sums.
+    pub det: Column,
 }
 
 /// Rays with their hits.
@@ -43,58 +122,48 @@ pub struct Packet {
     pub largest: [u64; 2],
     /// Where they begin.
     pub origin: [Column; 3],
+    /// Where they go.
+    pub direction: [Column; 3],
     /// 1 / direction.
     pub inverse: [Column; 3],
-    /// [`crate::math::exact::RayFrame::sx`].
-    pub shear_x: Column,
-    /// [`crate::math::exact::RayFrame::sy`].
-    pub shear_y: Column,
-    /// [`crate::math::exact::RayFrame::iz`].
+    /// [`RayFrame::sx`] and [`RayFrame::sy`].
+    pub shear: [Column; 2],
+    /// [`RayFrame::iz`].
     pub along: Column,
     /// Least parameters.
     pub t_min: Column,
     /// Distances of the hits.
     pub t: Column,
     /// Greatest magnitude of the origin's components.
-    reach: Column,
-    /// All of them, one by one.
-    pub rays: [FramedRay; RAYS],
-    /// Their hits, but for the distance.
-    pub best: [Best; RAYS],
-    bounds: Bounds,
+    pub reach: Column,
+    /// Their hits.
+    pub found: Found,
+    /// Bounds of all of this.
+    pub bounds: Bounds,
 }
 
 /// Bounds of the rays of a packet.
 #[derive(Clone, Copy, Default)]
-struct Bounds {
-    origin: [Vec3; 2],
-    inverse: [Vec3; 2],
-    t_min: f32,
-    t_max: f32,
-    reach: f32,
+pub struct Bounds {
+    /// Least and greatest origin.
+    pub origin: [Vec3; 2],
+    /// Least and greatest inverse of the direction.
+    pub inverse: [Vec3; 2],
+    /// Least and greatest first parameter.
+    pub t_min: [f32; 2],
+    /// Least and greatest distance of the hits.
+    pub t: [f32; 2],
+    /// Greatest magnitude of an origin's component.
+    pub reach: f32,
     /// Whether all begin at one point.
-    is_point: bool,
-}
-
-/// A node as all rays of a packet see it.
-struct Seen {
-    /// Its origin in their frame.
-    at: Vec3,
-    /// Steps of its grid.
-    step: Vec3,
-    /// Terms of the padding by axis.
-    pad: [Vec3; 2],
-    slack: f32,
-    /// Bounds of the children as numbers, by axis; near ones, then far ones.
-    bounds: [[[f32; 8]; 3]; 2],
+    pub is_point: bool,
 }
 
 impl Packet {
     /// Without rays.
     pub fn empty() -> Self {
-        let ray = super::node::framed_ray([0.0; 3], [1.0, 0.0, 0.0], 0.0);
-        let hit = TriangleHit::default();
-        let zero = Column::ZERO;
+        let (zero, none) = (Column::ZERO, Words::NONE);
+        let found = Found { id: none, leaf: none, triangle: none, source: none, edges: [zero; 3], det: zero };
         Self {
             count: 0,
             flip: 0,
@@ -102,15 +171,14 @@ impl Packet {
             axis: 3,
             largest: [0; 2],
             origin: [zero; 3],
+            direction: [zero; 3],
             inverse: [zero; 3],
-            shear_x: zero,
-            shear_y: zero,
+            shear: [zero; 2],
             along: zero,
             t_min: zero,
             t: zero,
             reach: zero,
-            rays: [ray; RAYS],
-            best: [Best { t: 0.0, id: NONE, leaf: NONE, triangle: 0, hit, source: NONE }; RAYS],
+            found,
             bounds: Bounds::default(),
         }
     }
@@ -120,61 +188,141 @@ impl Packet {
         (self.count, self.done, self.flip) = (0, 0, flip);
     }
 
-    /// Adds a ray of the octant.
+    /// Adds a ray of the octant that knows `hit` and starts from triangle `source`, to at most 63 others.
     #[inline(always)]
-    pub fn add(&mut self, ray: FramedRay, best: Best) {
-        let i = self.count;
+    pub fn add(&mut self, ray: &Ray, hit: &Hit, source: u32) {
+        let i = self.count % RAYS;
         self.count += 1;
         for k in 0..3 {
             self.origin[k].0[i] = ray.origin[k];
-            self.inverse[k].0[i] = ray.frame.inv[k];
+            self.direction[k].0[i] = ray.direction[k];
         }
-        (self.shear_x.0[i], self.shear_y.0[i], self.along.0[i]) = (ray.frame.sx, ray.frame.sy, ray.frame.iz);
-        (self.t_min.0[i], self.t.0[i]) = (ray.t_min, best.t);
-        self.reach.0[i] = most3(each(|k| ray.origin[k].abs()));
-        self.rays[i] = ray;
-        self.best[i] = best;
+        (self.t_min.0[i], self.t.0[i]) = (most(ray.t_min, 0.0), hit.t);
+        (self.found.id.0[i], self.found.leaf.0[i], self.found.source.0[i]) = (hit.id, NONE, source);
     }
 
-    /// Completes the packet: lanes without a ray of their own repeat the first, and no mask has them.
+    /// Completes the packet: the frames of all rays, and their bounds. Lanes without a ray of their own repeat the first, and no
+    /// mask has them.
     #[inline(always)]
-    pub fn seal<I: Isa>(&mut self, _: I) {
-        let kz = self.rays[0].frame.kz;
-        let is_uniform = self.rays[..self.count].iter().all(|ray| ray.frame.kz == kz);
-        self.axis = if is_uniform { kz } else { 3 };
-        self.largest = [0, 1].map(|k| {
-            let bits = self.rays[..self.count].iter().enumerate().map(|(i, ray)| u64::from(ray.frame.kz == k) << i);
-            bits.sum()
-        });
+    pub fn seal<I: Isa>(&mut self, isa: I) {
         for i in self.count..self.vectors::<I>() * I::Wide::LANES {
-            for column in self.origin.iter_mut().chain(&mut self.inverse) {
-                column.0[i] = column.0[0];
+            for column in self.origin.iter_mut().chain(&mut self.direction).chain([&mut self.t_min, &mut self.t]) {
+                column.0[i % RAYS] = column.0[0];
             }
-            let columns = [&mut self.shear_x, &mut self.shear_y, &mut self.along, &mut self.t_min, &mut self.t];
-            for column in columns {
-                column.0[i] = column.0[0];
-            }
-            self.reach.0[i] = self.reach.0[0];
         }
-        let range = |column: &Column| {
-            let numbers = &column.0[..self.count];
-            numbers.iter().fold((numbers[0], numbers[0]), |(lo, hi), &x| (least(lo, x), most(hi, x)))
+        self.largest = [0; 2];
+        for v in 0..self.vectors::<I>() {
+            self.frame(isa, v);
+        }
+        let all = self.all();
+        self.axis = match self.largest.map(|rays| rays & all) {
+            [x, _] if x == all => 0,
+            [_, y] if y == all => 1,
+            [0, 0] => 2,
+            _ => 3,
         };
-        let ranges = |columns: &[Column; 3]| {
-            let all = [range(&columns[0]), range(&columns[1]), range(&columns[2])];
-            [all.map(|r| r.0), all.map(|r| r.1)]
+        let vectors = self.vectors::<I>();
+        let origin = three!(k => self.origin[k].range(isa, vectors));
+        let inverse = three!(k => self.inverse[k].range(isa, vectors));
+        self.bounds = Bounds {
+            origin: [origin.map(|x| x[0]), origin.map(|x| x[1])],
+            inverse: [inverse.map(|x| x[0]), inverse.map(|x| x[1])],
+            t_min: self.t_min.range(isa, vectors),
+            t: self.t.range(isa, vectors),
+            reach: self.reach.range(isa, vectors)[1],
+            is_point: origin.iter().all(|x| x[0] == x[1]),
         };
-        let (origin, inverse) = (ranges(&self.origin), ranges(&self.inverse));
-        let is_point =
-            (0..3).all(|k| self.origin[k].0[..self.count].iter().all(|x| x.to_bits() == origin[0][k].to_bits()));
-        let (t_min, t_max, reach) = (range(&self.t_min).0, range(&self.t).1, range(&self.reach).1);
-        self.bounds = Bounds { origin, inverse, t_min, t_max, reach, is_point };
+    }
+
+    /// [`framed_ray`] of the rays of a vector.
+    #[inline(always)]
+    fn frame<I: Isa>(&mut self, isa: I, v: usize) {
+        let d = three!(k => self.direction[k].get(isa, v));
+        let (zero, one, sign) = (isa.splat(0.0), isa.splat(1.0), isa.splat(-0.0));
+        let m = three!(k => d[k].abs());
+        let is_y = m[0].less(m[1]);
+        let is_z = m[0].most(m[1]).less(m[2]);
+        let axes = [!is_y & !is_z, is_y & !is_z];
+        let largest = m[0].most(m[1].most(m[2]));
+        let plain = largest.less(isa.splat(PLAIN)) & isa.splat(1.0 / PLAIN).less(largest);
+        let inverse = three!(k => {
+            (one / m[k].most(isa.splat(f32::MIN_POSITIVE))).least(isa.splat(GREATEST_INVERSE)) ^ (d[k] & sign)
+        });
+        let along = turned::<I>(inverse, 3, axes)[2];
+        let across = turned::<I>(d, 3, axes);
+        for k in 0..2 {
+            let shear = across[k] * along;
+            self.shear[k].set(v, zero.or_else(shear.abs().less(isa.splat(LEAST_SHEAR)), shear));
+        }
+        for k in 0..3 {
+            self.inverse[k].set(v, inverse[k]);
+        }
+        self.along.set(v, along);
+        let o = three!(k => self.origin[k].get(isa, v).abs());
+        self.reach.set(v, o[0].most(o[1].most(o[2])));
+        let (lanes, shift) = (u32::MAX >> (32 - I::Wide::LANES), v * I::Wide::LANES);
+        for k in 0..2 {
+            self.largest[k] |= u64::from(axes[k] & lanes) << shift;
+        }
+        let mut alone = !plain & lanes;
+        while alone != 0 {
+            let i = shift + alone.trailing_zeros() as usize;
+            alone &= alone - 1;
+            let frame = framed_ray([0.0; 3], [0, 1, 2].map(|k| self.direction[k].0[i]), 0.0).frame;
+            for k in 0..3 {
+                self.inverse[k].0[i] = frame.inv[k];
+            }
+            (self.shear[0].0[i], self.shear[1].0[i], self.along.0[i]) = (frame.sx, frame.sy, frame.iz);
+            for k in 0..2 {
+                self.largest[k] &= !(1 << i);
+                self.largest[k] |= u64::from(frame.kz == k as u32) << i;
+            }
+        }
+    }
+
+    /// Ray `i`.
+    #[inline(always)]
+    pub fn ray(&self, i: usize) -> FramedRay {
+        let i = i % RAYS;
+        let at = |columns: &[Column; 3]| [columns[0].0[i], columns[1].0[i], columns[2].0[i]];
+        let kz = match self.largest.map(|rays| rays >> i & 1) {
+            [1, _] => 0,
+            [_, 1] => 1,
+            _ => 2,
+        };
+        let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
+        let (sx, sy, iz) = (self.shear[0].0[i], self.shear[1].0[i], self.along.0[i]);
+        let frame = RayFrame { kx, ky, kz, sx, sy, iz, inv: at(&self.inverse) };
+        let (origin, direction) = (at(&self.origin), at(&self.direction));
+        FramedRay { origin, t_min: self.t_min.0[i], direction, flip: self.flip, frame }
+    }
+
+    /// What ray `i` has found.
+    #[inline(always)]
+    pub fn best(&self, i: usize) -> Best {
+        let (i, found) = (i % RAYS, &self.found);
+        let [u, v, w] = [found.edges[0].0[i], found.edges[1].0[i], found.edges[2].0[i]];
+        let hit = TriangleHit { hit: true, t: self.t.0[i], u, v, w, det: found.det.0[i] };
+        let [id, leaf, triangle, source] = [&found.id, &found.leaf, &found.triangle, &found.source].map(|x| x.0[i]);
+        Best { t: self.t.0[i], id, leaf, triangle, hit, source }
+    }
+
+    /// Has ray `i` have found what `best` says.
+    #[inline(always)]
+    pub fn set_best(&mut self, i: usize, best: &Best) {
+        let (i, found) = (i % RAYS, &mut self.found);
+        self.t.0[i] = best.t;
+        (found.id.0[i], found.leaf.0[i], found.triangle.0[i]) = (best.id, best.leaf, best.triangle);
+        for (column, x) in found.edges.iter_mut().zip([best.hit.u, best.hit.v, best.hit.w]) {
+            column.0[i] = x;
+        }
+        found.det.0[i] = best.hit.det;
     }
 
     /// Vectors that hold the rays.
     #[inline(always)]
     pub fn vectors<I: Isa>(&self) -> usize {
-        self.count.div_ceil(I::Wide::LANES)
+        self.count.div_ceil(I::Wide::LANES).min(RAYS / I::Wide::LANES)
     }
 
     /// A bit for every ray.
@@ -186,148 +334,16 @@ impl Packet {
     /// The rays whose hits are not nearer than `near`.
     #[inline(always)]
     pub fn reaching<I: Isa>(&self, isa: I, near: f32) -> u64 {
-        let bits = |v: usize| u64::from(isa.splat(near).less_equal(self.t.get(isa, v))) << (v * I::Wide::LANES);
-        (0..self.vectors::<I>()).map(bits).sum::<u64>() & self.all()
+        let mut rays = 0;
+        for v in 0..self.vectors::<I>() {
+            rays |= u64::from(isa.splat(near).less_equal(self.t.get(isa, v))) << (v * I::Wide::LANES);
+        }
+        rays & self.all()
     }
 
     /// Takes note that hits have come nearer.
     #[inline(always)]
     pub fn shorten<I: Isa>(&mut self, isa: I) {
-        let mut far = self.t.get(isa, 0);
-        for v in 1..self.vectors::<I>() {
-            far = far.most(self.t.get(isa, v));
-        }
-        let mut lanes = [0.0; 16];
-        far.store(&mut lanes);
-        // Halves at a time; distances are not negative.
-        for half in [8, 4, 2, 1] {
-            for i in 0..half {
-                lanes[i] = most(lanes[i], lanes[i + half]);
-            }
-        }
-        self.bounds.t_max = lanes[0];
-    }
-
-    /// Which of `rays` enter each child of `node`, as [`super::node::node_hits`] says, written to `entered` for the children of the
-    /// mask that comes back; no ray enters another child that exists. See [`super::node::NodeFrame::new`] for offset and slack.
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    pub fn open<I: Isa>(
-        &self,
-        isa: I,
-        node: &Node,
-        offset_high: Vec3,
-        offset_low: Vec3,
-        slack: f32,
-        rays: u64,
-        entered: &mut [u64; 8],
-    ) -> u32 {
-        let negative = [self.flip & 4 != 0, self.flip & 2 != 0, self.flip & 1 != 0];
-        let at = each(|k| (node.origin[k] + offset_high[k]) + offset_low[k]);
-        let mut seen = Seen {
-            at,
-            step: each(|k| f32::from_bits(u32::from(node.exponent[k]) << 23)),
-            pad: [each(|k| 4.0 * UNIT * at[k].abs()), each(|k| 2.0 * UNIT * offset_low[k].abs())],
-            slack,
-            bounds: [[[0.0; 8]; 3]; 2],
-        };
-        for (k, negative) in negative.into_iter().enumerate() {
-            let (near, far) = if negative { (&node.hi[k], &node.lo[k]) } else { (&node.lo[k], &node.hi[k]) };
-            for i in 0..8 {
-                seen.bounds[0][k][i] = f32::from(near[i]);
-                seen.bounds[1][k][i] = f32::from(far[i]);
-            }
-        }
-        let mut exist = 0;
-        for (i, &meta) in node.meta.iter().enumerate() {
-            exist |= u32::from(meta != 0) << i;
-        }
-        let some = self.bounds.meet(&seen, negative) & exist;
-        let mut met = 0;
-        for v in 0..self.vectors::<I>() {
-            let shift = v * I::Wide::LANES;
-            let lanes = (rays >> shift) & (u64::MAX >> (RAYS - I::Wide::LANES));
-            if lanes == 0 {
-                continue;
-            }
-            let [scale, near, far] = self.frame(isa, v, &seen, negative);
-            let (t_min, t_max) = (self.t_min.get(isa, v), self.t.get(isa, v));
-            let mut left = some;
-            while left != 0 {
-                let i = left.trailing_zeros() as usize;
-                left &= left - 1;
-                let n = three!(k => isa.splat(seen.bounds[0][k][i]) * scale[k] + near[k]);
-                let f = three!(k => isa.splat(seen.bounds[1][k][i]) * scale[k] + far[k]);
-                let (tn, tf) = (n[0].most(n[1]).most(n[2].most(t_min)), f[0].least(f[1]).least(f[2].least(t_max)));
-                let bits = u64::from(tn.less_equal(tf)) & lanes;
-                entered[i] |= bits << shift;
-                met |= u32::from(bits != 0) << i;
-            }
-        }
-        met
-    }
-
-    /// [`super::node::NodeFrame`] of the rays of a vector: scale, near, far.
-    #[inline(always)]
-    fn frame<I: Isa>(&self, isa: I, v: usize, seen: &Seen, negative: [bool; 3]) -> [[I::Wide; 3]; 3] {
-        let inverse = three!(k => self.inverse[k].get(isa, v));
-        let scale = three!(k => isa.splat(seen.step[k]) * inverse[k]);
-        if self.bounds.is_point {
-            let (low, high) = seen.padded(self.bounds.origin, self.bounds.reach);
-            let near = three!(k => isa.splat(if negative[k] { high[k] } else { low[k] }) * inverse[k]);
-            let far = three!(k => isa.splat(if negative[k] { low[k] } else { high[k] }) * inverse[k]);
-            return [scale, near, far];
-        }
-        let w = three!(k => isa.splat(seen.at[k]) - self.origin[k].get(isa, v));
-        let size = three!(k => w[k].abs() + isa.splat(255.0 * seen.step[k]));
-        let m = size[0].most(size[1].most(size[2]));
-        let mut all = isa.splat(64.0 * UNIT) * m;
-        if seen.slack != 0.0 {
-            all = all + isa.splat(seen.slack) * (m + self.reach.get(isa, v));
-        }
-        let delta = three!(k => all + isa.splat(seen.pad[0][k]) + isa.splat(seen.pad[1][k]));
-        let near = three!(k => (if negative[k] { w[k] + delta[k] } else { w[k] - delta[k] }) * inverse[k]);
-        let far = three!(k => (if negative[k] { w[k] - delta[k] } else { w[k] + delta[k] }) * inverse[k]);
-        [scale, near, far]
-    }
-}
-
-impl Seen {
-    /// The least padded lower and the greatest padded upper plane relative to origins within bounds. Each operation is
-    /// monotonic in f32, too.
-    #[inline(always)]
-    fn padded(&self, origin: [Vec3; 2], reach: f32) -> (Vec3, Vec3) {
-        let (low, high) = (each(|k| self.at[k] - origin[1][k]), each(|k| self.at[k] - origin[0][k]));
-        let m = most3(each(|k| most(low[k].abs(), high[k].abs()) + 255.0 * self.step[k]));
-        let all = 64.0 * UNIT * m + self.slack * (m + reach);
-        let delta = each(|k| all + self.pad[0][k] + self.pad[1][k]);
-        (each(|k| low[k] - delta[k]), each(|k| high[k] + delta[k]))
-    }
-}
-
-impl Bounds {
-    /// The children that a ray within the bounds may enter.
-    #[inline(always)]
-    fn meet(&self, seen: &Seen, negative: [bool; 3]) -> u32 {
-        let (low, high) = seen.padded(self.origin, self.reach);
-        let [slow, fast] = self.inverse;
-        // Inverses have one sign on an axis.
-        let lesser = |k: usize, x: f32| least(x * slow[k], x * fast[k]);
-        let greater = |k: usize, x: f32| most(x * slow[k], x * fast[k]);
-        let near = each(|k| lesser(k, if negative[k] { high[k] } else { low[k] }));
-        let far = each(|k| greater(k, if negative[k] { low[k] } else { high[k] }));
-        let scale = [each(|k| seen.step[k] * slow[k]), each(|k| seen.step[k] * fast[k])];
-        let (mut tn, mut tf) = ([self.t_min; 8], [self.t_max; 8]);
-        for k in 0..3 {
-            for i in 0..8 {
-                tn[i] = most(seen.bounds[0][k][i] * scale[0][k] + near[k], tn[i]);
-                tf[i] = least(seen.bounds[1][k][i] * scale[1][k] + far[k], tf[i]);
-            }
-        }
-        let mut bits = 0;
-        for i in 0..8 {
-            bits |= u32::from(tn[i] <= tf[i]) << i;
-        }
-        bits
+        self.bounds.t = self.t.range(isa, self.vectors::<I>());
     }
 }

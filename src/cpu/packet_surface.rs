@@ -1,11 +1,10 @@
-//! What the rays of a packet have hit: [`BrickRay::write_hit`] lane by lane, with the same operations in the same order. Hits on
+//! What the rays of a packet have hit: [`super::leaf::BrickRay::write_hit`] lane by lane, with the same operations in the same order. Hits on
 //! instances, and lanes whose numbers leave the range in which an f32 operation is what the kernel carries out in integers, are
 //! written alone.
 
 use super::brick::Best;
 use super::isa::Isa;
-use super::leaf::BrickRay;
-use super::packet::Packet;
+use super::packet::{Packet, RAYS};
 use super::scene::Bound;
 use super::walk_brick::write_found;
 use super::wide::{Wide, inside, three};
@@ -23,11 +22,6 @@ type Lane = [f32; MOST];
 struct Hits {
     /// Vertices a, b, c, by axis.
     vertices: [[Lane; 3]; 3],
-    /// Directions.
-    direction: [Lane; 3],
-    /// u, v, w.
-    edges: [Lane; 3],
-    det: Lane,
 }
 
 /// What follows from it.
@@ -98,11 +92,11 @@ fn diffprod<I: Isa>(isa: I, a: I::Wide, b: I::Wide, c: I::Wide, d: I::Wide) -> (
 
 /// [`crate::math::exact::surface_point`], and the barycentrics. Returns the lanes that are right.
 #[inline(always)]
-fn points<I: Isa>(isa: I, hits: &Hits, out: &mut Points) -> u32 {
+fn points<I: Isa>(isa: I, packet: &Packet, number: usize, hits: &Hits, out: &mut Points) -> u32 {
     let a = three!(k => isa.load(&hits.vertices[0][k]));
     let b = three!(k => isa.load(&hits.vertices[1][k]));
     let c = three!(k => isa.load(&hits.vertices[2][k]));
-    let d = three!(k => isa.load(&hits.direction[k]));
+    let d = three!(k => packet.direction[k].get(isa, number));
     let (ab, bc, ca) = (three!(k => b[k] - a[k]), three!(k => c[k] - b[k]), three!(k => a[k] - c[k]));
     let (s0, plain0) = diffprod(isa, ab[2], ca[1], ab[1], ca[2]);
     let (s1, plain1) = diffprod(isa, ab[0], ca[2], ab[2], ca[0]);
@@ -126,8 +120,8 @@ fn points<I: Isa>(isa: I, hits: &Hits, out: &mut Points) -> u32 {
     let n = three!(k => (n[k] ^ isa.splat(-0.0)).or_else(away, n[k]));
     out.down = three!(k => n[k].less(zero) | (n[k].less_equal(zero) & zero.less_equal(n[k]) & zero.less(d[k])));
 
-    let det = isa.load(&hits.det);
-    let edges = three!(k => divide(isa, isa.load(&hits.edges[k]), det));
+    let det = packet.found.det.get(isa, number);
+    let edges = three!(k => divide(isa, packet.found.edges[k].get(isa, number), det));
     plain &= edges[0].1 & edges[1].1 & edges[2].1;
     edges[1].0.store(&mut out.weights[0]);
     edges[2].0.store(&mut out.weights[1]);
@@ -168,18 +162,17 @@ impl Packet {
                 together |= u32::from(self.gather(bound, i, i - first, &mut hits)) << (i - first);
             }
             if together != 0 {
-                together &= points(isa, &hits, &mut points_of);
+                together &= points(isa, self, v, &hits, &mut points_of);
             }
             for i in first..end {
-                let best = &self.best[i];
-                if best.leaf == NONE {
+                if self.found.leaf.0[i % RAYS] == NONE {
                     continue;
                 }
                 let (hit, surface) = (&mut hits_of[places[i] as usize], &mut surfaces[places[i] as usize]);
                 if together >> (i - first) & 1 != 0 {
-                    points_of.write(i - first, best, hit, surface);
+                    points_of.write(i - first, &self.best(i), hit, surface);
                 } else {
-                    write_found(bound, &self.rays[i], best, hit, surface);
+                    write_found(bound, &self.ray(i), &self.best(i), hit, surface);
                 }
             }
         }
@@ -188,28 +181,21 @@ impl Packet {
     /// Puts the hit of ray `i` into a lane. False: it has none, or lies on an instance.
     #[inline(always)]
     fn gather(&self, bound: &Bound, i: usize, lane: usize, hits: &mut Hits) -> bool {
-        let best = &self.best[i];
-        if best.leaf == NONE {
+        let leaf = self.found.leaf.0[i % RAYS];
+        if leaf == NONE {
             return false;
         }
-        let leaf = &bound.scene.leaves[best.leaf as usize];
+        let leaf = &bound.scene.leaves[leaf as usize];
         if bound.scene.instances[leaf.instance as usize].flags & INSTANCE_IDENTITY == 0 {
             return false;
         }
-        let mut r = BrickRay::outside(&self.rays[i]);
-        (r.offset_high, r.offset_low) = (leaf.offset_high, leaf.offset_low);
-        r.brick = bound.bricks[leaf.brick as usize];
-        let vertices = r.vertices(best.triangle);
+        let brick = &bound.bricks[leaf.brick as usize];
+        let vertices = brick.vertices(self.found.triangle.0[i % RAYS], leaf.offset_high, leaf.offset_low);
         for (vertex, to) in vertices.iter().zip(&mut hits.vertices) {
             for k in 0..3 {
-                to[k][lane] = vertex[k];
+                to[k][lane % MOST] = vertex[k];
             }
         }
-        for k in 0..3 {
-            hits.direction[k][lane] = self.rays[i].direction[k];
-        }
-        (hits.edges[0][lane], hits.edges[1][lane], hits.edges[2][lane]) = (best.hit.u, best.hit.v, best.hit.w);
-        hits.det[lane] = best.hit.det;
         true
     }
 }

@@ -7,7 +7,7 @@ use super::leaf::BrickRay;
 use super::packet::{Packet, RAYS};
 use super::vector::{Vec3, each};
 use super::wide::{Wide, inside, three};
-use crate::math::exact::{CLAMP_ULPS, TINY, TriangleHit, intersect_triangle};
+use crate::math::exact::{CLAMP_ULPS, TINY, intersect_triangle};
 
 impl Packet {
     /// Tests a triangle of the brick that `r` is in with `rays`, and keeps nearer hits as [`BrickRay::test_triangle`] does. With
@@ -25,7 +25,7 @@ impl Packet {
             let origin = three!(k => self.origin[k].get(isa, v));
             let (a, b, c) = (relative(isa, a, origin), relative(isa, b, origin), relative(isa, c, origin));
             let axes = self.axes(shift, I::Wide::LANES);
-            let by = [self.shear_x.get(isa, v), self.shear_y.get(isa, v)];
+            let by = [self.shear[0].get(isa, v), self.shear[1].get(isa, v)];
             let sa = shear(turned::<I>(a, self.axis, axes), by);
             let sb = shear(turned::<I>(b, self.axis, axes), by);
             let sc = shear(turned::<I>(c, self.axis, axes), by);
@@ -65,28 +65,15 @@ impl Packet {
                 let t = t.least(x).most(n.most(t_min)).abs();
                 hit &= t.less_equal(t_max);
                 if hit != 0 {
-                    let mut numbers = [[0.0; 16]; 5];
-                    t.store(&mut numbers[0]);
-                    u.store(&mut numbers[1]);
-                    v_.store(&mut numbers[2]);
-                    w.store(&mut numbers[3]);
-                    det.store(&mut numbers[4]);
-                    while hit != 0 {
-                        let i = hit.trailing_zeros() as usize;
-                        hit &= hit - 1;
-                        let [t, u, v, w, det] = &numbers;
-                        let found = TriangleHit { hit: true, t: t[i], u: u[i], v: v[i], w: w[i], det: det[i] };
-                        is_nearer |= self.keep(r, triangle, shift + i, found, any_hit);
-                    }
+                    hit = self.keep(isa, r, triangle, (v, hit), [t, u, v_, w, det]);
+                    is_nearer |= hit != 0;
+                    self.done |= if any_hit { u64::from(hit) << shift } else { 0 };
                 }
             }
             while alone != 0 {
                 let i = shift + alone.trailing_zeros() as usize;
                 alone &= alone - 1;
-                let ray = self.rays[i];
-                let [a, b, c] = r.vertices(triangle).map(|x| each(|k| x[k] - ray.origin[k]));
-                let found = intersect_triangle(&ray.frame, a, b, c, ray.t_min);
-                is_nearer |= found.hit && self.keep(r, triangle, i, found, any_hit);
+                is_nearer |= self.test_alone(r, triangle, i, any_hit);
             }
         }
         is_nearer
@@ -99,15 +86,43 @@ impl Packet {
         [((self.largest[0] >> shift) & all) as u32, ((self.largest[1] >> shift) & all) as u32]
     }
 
-    /// Keeps a hit of ray `i`, if it is the best so far.
+    /// [`BrickRay::keep`] for the lanes of `hit` of vector `v`, whose distances are not beyond what they have. Returns those that
+    /// keep it.
     #[inline(always)]
-    fn keep(&mut self, r: &BrickRay, triangle: u32, i: usize, hit: TriangleHit, any_hit: bool) -> bool {
-        let best = &mut self.best[i];
-        best.t = self.t.0[i];
-        if !r.keep(best, triangle, hit) {
+    fn keep<I: Isa>(
+        &mut self,
+        isa: I,
+        r: &BrickRay,
+        triangle: u32,
+        (v, mut hit): (usize, u32),
+        [t, u, v_, w, det]: [I::Wide; 5],
+    ) -> u32 {
+        let found = &mut self.found;
+        let id = isa.splat_bits(r.id(triangle));
+        hit &= !self.t.get(isa, v).less_equal(t) | id.less_bits(found.id.get(isa, v));
+        hit &= !id.same_bits(found.source.get(isa, v));
+        if hit != 0 {
+            self.t.replace(isa, v, hit, t);
+            found.id.replace(isa, v, hit, id);
+            found.leaf.replace(isa, v, hit, isa.splat_bits(r.leaf));
+            found.triangle.replace(isa, v, hit, isa.splat_bits(triangle));
+            found.edges[0].replace(isa, v, hit, u);
+            found.edges[1].replace(isa, v, hit, v_);
+            found.edges[2].replace(isa, v, hit, w);
+            found.det.replace(isa, v, hit, det);
+        }
+        hit
+    }
+
+    /// Tests a triangle with ray `i` alone, and keeps the hit if it is the best so far.
+    fn test_alone(&mut self, r: &BrickRay, triangle: u32, i: usize, any_hit: bool) -> bool {
+        let (ray, mut best) = (self.ray(i), self.best(i));
+        let [a, b, c] = r.vertices(triangle).map(|x| each(|k| x[k] - ray.origin[k]));
+        let hit = intersect_triangle(&ray.frame, a, b, c, ray.t_min);
+        if !hit.hit || !r.keep(&mut best, triangle, hit) {
             return false;
         }
-        self.t.0[i] = best.t;
+        self.set_best(i, &best);
         self.done |= u64::from(any_hit) << i;
         true
     }
@@ -127,7 +142,7 @@ fn shear<W: Wide>(p: [W; 3], by: [W; 2]) -> [W; 3] {
 
 /// A vector's components in the order of [`crate::math::exact::RayFrame`]: kx, ky, kz.
 #[inline(always)]
-fn turned<I: Isa>(x: [I::Wide; 3], axis: u32, [along_x, along_y]: [u32; 2]) -> [I::Wide; 3] {
+pub fn turned<I: Isa>(x: [I::Wide; 3], axis: u32, [along_x, along_y]: [u32; 2]) -> [I::Wide; 3] {
     match axis {
         0 => [x[1], x[2], x[0]],
         1 => [x[2], x[0], x[1]],

@@ -3,6 +3,7 @@
 use super::isa::{Isa, Lanes};
 use super::leaf::BrickRay;
 use super::packet::Packet;
+use super::packet_node::Place;
 use super::rays::Scratch;
 use super::scene::{Bound, Tally};
 use super::walk_brick::{Group, STACK_SIZE, Stack, Visits};
@@ -85,7 +86,8 @@ impl PacketScratch {
         any_hit: bool,
     ) {
         let Scratch { tally, stack, .. } = scratch;
-        let mut r = BrickRay::outside(&self.packet.rays[0]);
+        let first = self.packet.ray(0);
+        let mut r = BrickRay::outside(&first);
         let instance = &bound.scene.instances[bound.scene.leaves[leaf as usize].instance as usize];
         r.brick = bound.bricks[bound.brick_of(leaf)];
         if instance.flags & INSTANCE_IDENTITY == 0 {
@@ -94,12 +96,13 @@ impl PacketScratch {
             while left != 0 {
                 let i = left.trailing_zeros() as usize;
                 left &= left - 1;
-                r.enter_leaf(bound.scene, &self.packet.rays[i], leaf);
+                r.enter_leaf(bound.scene, &self.packet.ray(i), leaf);
                 self.walk_alone(isa, bound, &r, stack, tally, (i, 0), any_hit);
             }
             return;
         }
-        r.enter_leaf(bound.scene, &self.packet.rays[0], leaf);
+        r.enter_leaf(bound.scene, &first, leaf);
+        let place = Place { offset_high: r.offset_high, offset_low: r.offset_low, slack: 0.0 };
         let flip = self.packet.flip;
         self.bricks[0] = PacketGroup { group: Group::root(flip), rays: [rays; 8] };
         let mut depth = 1;
@@ -112,13 +115,13 @@ impl PacketScratch {
                 while left != 0 {
                     let i = left.trailing_zeros() as usize;
                     left &= left - 1;
-                    r.ray = self.packet.rays[i];
+                    r.ray = self.packet.ray(i);
                     r.lanes = Lanes::new(&r.ray, r.offset_high, r.offset_low);
                     self.walk_alone(isa, bound, &r, stack, tally, (i, index), any_hit);
                 }
                 continue;
             }
-            let children = self.open_node(isa, bound, &r, index, rays, any_hit);
+            let children = self.open_node(isa, bound, &r, &place, (index, rays), any_hit);
             if !put(&mut self.bricks, &mut depth, children, tally) {
                 break;
             }
@@ -132,13 +135,13 @@ impl PacketScratch {
         isa: I,
         bound: &Bound,
         r: &BrickRay,
-        index: u32,
-        rays: u64,
+        place: &Place,
+        (index, rays): (u32, u64),
         any_hit: bool,
     ) -> PacketGroup {
         let node = &r.brick.nodes[index as usize];
         let mut entered = [0; 8];
-        let met = self.packet.open(isa, node, r.offset_high, r.offset_low, 0.0, rays, &mut entered);
+        let met = self.packet.open(isa, node, place, rays, &mut entered);
         self.visits.nodes = self.visits.nodes.wrapping_add(rays.count_ones());
         if index == 0 && met != 0 {
             bound.note_use(r.leaf);
@@ -192,8 +195,8 @@ impl PacketScratch {
         any_hit: bool,
     ) {
         let packet = &mut self.packet;
-        let best = &mut packet.best[i];
-        best.t = packet.t.0[i];
+        let mut best = packet.best(i);
+        best.leaf = NONE;
         let mut depth = 0;
         let mut group = Group { base: index, ..Group::root(r.ray.flip) };
         loop {
@@ -216,14 +219,16 @@ impl PacketScratch {
             let opened = r.open_node(isa, bound, &mut self.visits, best.t, group.child_index(child));
             group = opened.children;
             if opened.triangles.bits != 0 {
-                r.test_triangles(&mut self.visits, best, opened.triangles, any_hit);
+                r.test_triangles(&mut self.visits, &mut best, opened.triangles, any_hit);
                 if any_hit && best.leaf != NONE {
                     packet.done |= 1 << i;
                     break;
                 }
             }
         }
-        packet.t.0[i] = best.t;
+        if best.leaf != NONE {
+            packet.set_best(i, &best);
+        }
     }
 
     /// Counts visits, if they are asked for, and begins anew.

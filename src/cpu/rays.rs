@@ -1,8 +1,7 @@
 //! Rays of a set and the loops over them.
 
-use super::brick::Best as Found;
 use super::isa::{Best, Isa};
-use super::node::{framed_ray, octant};
+use super::node::octant;
 use super::packet::RAYS;
 use super::packet_walk::PacketScratch;
 use super::scene::{Bound, Tally};
@@ -11,7 +10,7 @@ use super::walk_brick::{STACK_SIZE, Stack};
 use crate::kernel::layout::{Hit, NONE, Ray, Surface};
 use rayon::prelude::*;
 
-/// Edge of the blocks of rays that one thread traces in a row; also the rows of a band.
+/// Edge of the blocks of rays that one thread traces in a row.
 const BLOCK: usize = 8;
 
 /// Rays, hits and surfaces of one set, row by row.
@@ -113,13 +112,23 @@ struct Block {
 }
 
 impl Block {
-    /// Numbers of its rays within the band of rows of `width`: squares of 8 x 8 one after the other.
-    fn places(&self, width: usize) -> impl Iterator<Item = usize> + use<> {
-        let Self { first, columns, rows, .. } = *self;
-        let squares = (first..first + columns).step_by(BLOCK);
-        let end = first + columns;
-        squares
-            .flat_map(move |x| (0..rows).flat_map(move |row| (x..(x + BLOCK).min(end)).map(move |x| row * width + x)))
+    /// Calls `visit` with the numbers of its rays within the band of rows of `width`: squares of 8 x 8 one after the other, in each
+    /// squares of 4 x 4, so that neighbours come together.
+    #[inline(always)]
+    fn for_each_place(&self, width: usize, mut visit: impl FnMut(usize)) {
+        let end = self.first + self.columns;
+        for y in (0..self.rows).step_by(BLOCK) {
+            for x in (self.first..end).step_by(BLOCK) {
+                for quarter in 0..4 {
+                    let (x, y) = (x + quarter % 2 * BLOCK / 2, y + quarter / 2 * BLOCK / 2);
+                    for row in y..(y + BLOCK / 2).min(self.rows) {
+                        for column in x..(x + BLOCK / 2).min(end) {
+                            visit(row * width + column);
+                        }
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -137,28 +146,28 @@ impl Band<'_> {
     }
 }
 
-/// Calls `visit` for the blocks of `work`, at most `columns` wide: bands of rows in parallel.
+/// Calls `visit` for the blocks of `work`, at most `edge` wide and high: bands of rows in parallel.
 fn for_each_block(
     set: &mut RaySet,
     bound: &Bound,
     work: Work,
-    columns: usize,
+    edge: usize,
     visit: impl Fn(&mut Scratch, &mut Band, Block) + Sync,
 ) {
-    let [width, edge, tiles_x] = [bound.params.width, bound.params.tile, bound.params.tiles_x].map(|x| x as usize);
+    let [width, tile_edge, tiles_x] = [bound.params.width, bound.params.tile, bound.params.tiles_x].map(|x| x as usize);
     // Tiles are powers of two of at least 8.
-    let columns = columns.min(edge);
-    let band = BLOCK * width;
+    let edge = edge.min(tile_edge);
+    let band = edge * width;
     let RaySet { rays, hits, surfaces } = set;
     let bands = rays.par_chunks(band).zip(hits.par_chunks_mut(band)).zip(surfaces.par_chunks_mut(band));
     bands.enumerate().for_each(|(number, ((rays, hits), surfaces))| {
         let mut scratch = Scratch::default();
         let rows = rays.len() / width;
         let mut band = Band { rays, hits, surfaces };
-        for first in (0..width).step_by(columns) {
-            let tile = number * BLOCK / edge * tiles_x + first / edge;
+        for first in (0..width).step_by(edge) {
+            let tile = number * edge / tile_edge * tiles_x + first / tile_edge;
             if work.includes(tile) {
-                let columns = columns.min(width - first);
+                let columns = edge.min(width - first);
                 visit(&mut scratch, &mut band, Block { tile, first, columns, rows });
             }
         }
@@ -171,9 +180,7 @@ fn for_each_block(
 pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn(&mut Scratch, Slot) + Sync) {
     let width = bound.params.width as usize;
     for_each_block(set, bound, work, BLOCK, |scratch, band, block| {
-        for at in block.places(width) {
-            kernel(scratch, band.slot(block.tile, at));
-        }
+        block.for_each_place(width, |at| kernel(scratch, band.slot(block.tile, at)));
     });
 }
 
@@ -216,14 +223,16 @@ fn run_avx2<I: Isa>(isa: I, kernel: &impl RayKernel, scratch: &mut Scratch, slot
     kernel.run(isa, scratch, slot);
 }
 
-/// Columns of the blocks whose rays are made packets of: 256 rays, of which those of an octant go together.
-const PACKET_COLUMNS: usize = 32;
+/// Edge of the blocks whose rays are made packets of, those of an octant together.
+const PACKET_BLOCK: usize = 32;
+/// Rays of such a block.
+const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
 /// Fewer rays of an octant go one by one.
 const LEAST_PACKET: usize = 4;
 
 /// [`run_for_each_ray`], rays of an octant together.
 pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
-    for_each_block(set, bound, work, PACKET_COLUMNS, |scratch, band, block| match bound.isa {
+    for_each_block(set, bound, work, PACKET_BLOCK, |scratch, band, block| match bound.isa {
         Best::Scalar(isa) => run_block(isa, bound, kernel, scratch, band, block),
         #[cfg(target_arch = "x86_64")]
         Best::Avx2(isa) => {
@@ -274,19 +283,14 @@ fn run_block<I: Isa>(
     band: &mut Band,
     block: Block,
 ) {
-    let mut octants = [[0u32; PACKET_COLUMNS * BLOCK]; 8];
-    let mut counts = [0; 8];
-    for at in block.places(bound.params.width as usize) {
-        let slot = band.slot(block.tile, at);
-        if kernel.takes(&slot) {
-            let octant = octant(slot.ray.direction) as usize;
-            octants[octant][counts[octant]] = at as u32;
-            counts[octant] += 1;
-        }
-    }
     let mut packets = scratch.packets.take().unwrap_or_default();
-    for flip in 0..8 {
-        for places in octants[flip][..counts[flip]].chunks(RAYS) {
+    let mut order = [0; BLOCK_RAYS];
+    let counts = sorted(bound, kernel, band, &block, &mut order);
+    let mut rest = &order[..];
+    for (flip, count) in counts.into_iter().enumerate() {
+        let (octant, others) = rest.split_at(count);
+        rest = others;
+        for places in octant.chunks(RAYS) {
             if places.len() < LEAST_PACKET {
                 for &at in places {
                     kernel.run(isa, scratch, band.slot(block.tile, at as usize));
@@ -296,8 +300,7 @@ fn run_block<I: Isa>(
             packets.packet.clear(flip as u32);
             for &at in places {
                 let slot = band.slot(block.tile, at as usize);
-                let ray = framed_ray(slot.ray.origin, slot.ray.direction, slot.ray.t_min);
-                packets.packet.add(ray, Found::before(&slot));
+                packets.packet.add(slot.ray, slot.hit, slot.surface.source);
             }
             packets.packet.seal(isa);
             kernel.run_packet(isa, scratch, &mut packets, block.tile);
@@ -306,6 +309,37 @@ fn run_block<I: Isa>(
         }
     }
     scratch.packets = Some(packets);
+}
+
+/// The rays of a block for which `kernel` does anything, in `order` by octants; how many are of each.
+#[inline(always)]
+fn sorted(
+    bound: &Bound,
+    kernel: &impl PacketKernel,
+    band: &mut Band,
+    block: &Block,
+    order: &mut [u32; BLOCK_RAYS],
+) -> [usize; 8] {
+    let mut taken = [(0u32, 0u8); BLOCK_RAYS];
+    let (mut count, mut counts) = (0, [0; 8]);
+    block.for_each_place(bound.params.width as usize, |at| {
+        let slot = band.slot(block.tile, at);
+        let octant = octant(slot.ray.direction);
+        taken[count % BLOCK_RAYS] = (at as u32, octant as u8);
+        let takes = usize::from(kernel.takes(&slot));
+        counts[octant as usize % 8] += takes;
+        count += takes;
+    });
+    let mut next = [0; 8];
+    for octant in 1..8 {
+        next[octant] = next[octant - 1] + counts[octant - 1];
+    }
+    for &(at, octant) in &taken[..count] {
+        let to = &mut next[octant as usize % 8];
+        order[*to % BLOCK_RAYS] = at;
+        *to += 1;
+    }
+    counts
 }
 
 /// Starts a ray's hit: nothing found within its range; triangle `source`, from which it starts, is not met (NONE: of none).

@@ -39,6 +39,12 @@ pub trait Wide:
     /// `self` where the bit is set, elsewhere `other`.
     fn or_else(self, bits: u32, other: Self) -> Self;
 
+    /// Where both have the same bits.
+    fn same_bits(self, other: Self) -> u32;
+
+    /// Where self < other, both read as u32.
+    fn less_bits(self, other: Self) -> u32;
+
     /// Writes the lanes to the first of `to`.
     fn store(self, to: &mut [f32]);
 }
@@ -184,6 +190,16 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
+    fn same_bits(self, other: Self) -> u32 {
+        self.bits(other, |a, b| a.to_bits() == b.to_bits())
+    }
+
+    #[inline(always)]
+    fn less_bits(self, other: Self) -> u32 {
+        self.bits(other, |a, b| a.to_bits() < b.to_bits())
+    }
+
+    #[inline(always)]
     fn store(self, to: &mut [f32]) {
         to[..8].copy_from_slice(&self.0);
     }
@@ -194,7 +210,7 @@ impl Wide for Portable {
 macro_rules! over_intrinsics {
     ($name:ident, $vector:ty, $lanes:literal, $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident, $min:ident,
      $sqrt:ident, $set:ident, $load:ident, $store:ident, $and_not:ident, $and:ident, $xor:ident, $less:ident,
-     $less_equal:ident, $blend:ident) => {
+     $less_equal:ident, $same_bits:ident, $less_bits:ident, $blend:ident) => {
         /// Numbers in one register.
         #[derive(Clone, Copy)]
         pub struct $name($vector);
@@ -276,6 +292,18 @@ macro_rules! over_intrinsics {
             }
 
             #[inline(always)]
+            fn same_bits(self, other: Self) -> u32 {
+                // SAFETY: a value of the type exists only where the processor has the instructions.
+                unsafe { $same_bits(self.0, other.0) }
+            }
+
+            #[inline(always)]
+            fn less_bits(self, other: Self) -> u32 {
+                // SAFETY: a value of the type exists only where the processor has the instructions.
+                unsafe { $less_bits(self.0, other.0) }
+            }
+
+            #[inline(always)]
             fn store(self, to: &mut [f32]) {
                 let to = &mut to[..$lanes];
                 // SAFETY: a value of the type exists only where the processor has the instructions; there is room for all lanes.
@@ -323,6 +351,20 @@ pub mod x86 {
 
     #[inline]
     #[target_feature(enable = "avx2")]
+    fn same_bits(a: __m256, b: __m256) -> u32 {
+        lanes(_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b))))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn less_bits(a: __m256, b: __m256) -> u32 {
+        // There is the comparison of signed numbers alone.
+        let signed = |x: __m256| _mm256_xor_si256(_mm256_castps_si256(x), _mm256_set1_epi32(i32::MIN));
+        lanes(_mm256_castsi256_ps(_mm256_cmpgt_epi32(signed(b), signed(a))))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
     fn blend(bits: u32, yes: __m256, no: __m256) -> __m256 {
         let lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
         let set = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(bits as i32), lane), lane);
@@ -348,6 +390,8 @@ pub mod x86 {
         _mm256_xor_ps,
         less,
         less_equal,
+        same_bits,
+        less_bits,
         blend
     );
 
@@ -361,6 +405,18 @@ pub mod x86 {
     #[target_feature(enable = "avx512f,avx512dq")]
     fn less_equal_512(a: __m512, b: __m512) -> u32 {
         u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn same_bits_512(a: __m512, b: __m512) -> u32 {
+        u32::from(_mm512_cmpeq_epi32_mask(_mm512_castps_si512(a), _mm512_castps_si512(b)))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn less_bits_512(a: __m512, b: __m512) -> u32 {
+        u32::from(_mm512_cmplt_epu32_mask(_mm512_castps_si512(a), _mm512_castps_si512(b)))
     }
 
     #[inline]
@@ -388,6 +444,8 @@ pub mod x86 {
         _mm512_xor_ps,
         less_512,
         less_equal_512,
+        same_bits_512,
+        less_bits_512,
         blend_512
     );
 }

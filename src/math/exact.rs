@@ -18,7 +18,7 @@ pub const TINY: f32 = f32::from_bits(TINY_EDGE);
 /// 2^-60.
 pub const LEAST_SHEAR: f32 = f32::from_bits((127 - 60) << 23);
 /// 2^96.
-const GREATEST_INVERSE: f32 = f32::from_bits((127 + 96) << 23);
+pub const GREATEST_INVERSE: f32 = f32::from_bits((127 + 96) << 23);
 /// 2^-60.
 const LEAST_COORDINATE: f32 = LEAST_SHEAR;
 /// 32 u with u = 2^-24.
