@@ -76,7 +76,8 @@ impl<'a> BrickView<'a> {
     #[inline(always)]
     pub fn vertices(&self, triangle: u32, offset_high: Vec3, offset_low: Vec3) -> [Vec3; 3] {
         let [a, b, c] = self.triangle_indices(triangle);
-        [a, b, c].map(|index| self.vertex(index, offset_high, offset_low))
+        let vertex = |index| self.vertex(index, offset_high, offset_low);
+        [vertex(a), vertex(b), vertex(c)]
     }
 }
 

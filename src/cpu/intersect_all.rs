@@ -67,7 +67,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
         let bound = self.bound;
         let any_hit = bound.has(PARAM_ANY_HIT);
         let flip = packets.packet.flip;
-        let place = Place { offset_high: [0.0; 3], offset_low: [0.0; 3], slack: bound.params.instance_pad };
+        let place = Place::new([0.0; 3], [0.0; 3], bound.params.instance_pad);
         let mut depth = 0;
         // The node whose children are visited next, and who visits it.
         let mut next = Some((0, packets.packet.all()));

@@ -31,6 +31,21 @@ pub trait Isa: Copy + Send + Sync {
     /// Numbers of several rays.
     type Wide: Wide;
 
+    /// Eight numbers.
+    type Eight: Wide;
+
+    /// The same number in all eight lanes.
+    fn eight(self, x: f32) -> Self::Eight;
+
+    /// Eight numbers, one a lane.
+    fn load_eight(self, from: &[f32; 8]) -> Self::Eight;
+
+    /// Eight bounds as numbers.
+    fn numbers(self, bytes: &[u8; 8]) -> Self::Eight;
+
+    /// Origin and steps of a node's grid by axis; the other lanes are 0.
+    fn grid(self, node: &Node) -> [Self::Eight; 2];
+
     /// The same number in all lanes.
     fn splat(self, x: f32) -> Self::Wide;
 
@@ -67,6 +82,29 @@ pub struct Scalar;
 
 impl Isa for Scalar {
     type Wide = Portable;
+    type Eight = Portable;
+
+    #[inline(always)]
+    fn eight(self, x: f32) -> Portable {
+        Portable([x; 8])
+    }
+
+    #[inline(always)]
+    fn load_eight(self, from: &[f32; 8]) -> Portable {
+        Portable(*from)
+    }
+
+    #[inline(always)]
+    fn numbers(self, bytes: &[u8; 8]) -> Portable {
+        Portable(bytes.map(f32::from))
+    }
+
+    #[inline(always)]
+    fn grid(self, node: &Node) -> [Portable; 2] {
+        let [x, y, z] = node.origin;
+        let [i, j, k] = node.exponent.map(|e| f32::from_bits(u32::from(e) << 23));
+        [Portable([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]), Portable([i, j, k, 0.0, 0.0, 0.0, 0.0, 0.0])]
+    }
 
     #[inline(always)]
     fn splat(self, x: f32) -> Portable {
@@ -126,6 +164,34 @@ macro_rules! isa_of_x86 {
         #[cfg(target_arch = "x86_64")]
         impl Isa for $name {
             type Wide = $wide;
+            type Eight = super::wide::x86::Eight;
+
+            #[inline(always)]
+            fn eight(self, x: f32) -> Self::Eight {
+                // SAFETY: a value of the type exists only where AVX2 has been detected.
+                unsafe { Self::Eight::splat(x) }
+            }
+
+            #[inline(always)]
+            fn load_eight(self, from: &[f32; 8]) -> Self::Eight {
+                // SAFETY: a value of the type exists only where AVX2 has been detected.
+                unsafe { Self::Eight::load(from) }
+            }
+
+            #[inline(always)]
+            fn numbers(self, bytes: &[u8; 8]) -> Self::Eight {
+                // SAFETY: a value of the type exists only where AVX2 has been detected.
+                unsafe { Self::Eight::of(avx2::numbers(bytes)) }
+            }
+
+            #[inline(always)]
+            fn grid(self, node: &Node) -> [Self::Eight; 2] {
+                // SAFETY: a value of the type exists only where AVX2 has been detected.
+                unsafe {
+                    let [origin, step] = avx2::grid(node);
+                    [Self::Eight::of(avx2::extended(origin)), Self::Eight::of(avx2::extended(step))]
+                }
+            }
 
             #[inline(always)]
             fn splat(self, x: f32) -> $wide {
@@ -263,21 +329,34 @@ mod avx2 {
     /// Eight bounds as numbers.
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn numbers(bytes: &[u8; 8]) -> __m256 {
+    pub fn numbers(bytes: &[u8; 8]) -> __m256 {
         _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_cvtsi64_si128(i64::from_le_bytes(*bytes))))
+    }
+
+    /// Origin and steps of a node's grid; the last lanes are 0.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub fn grid(node: &Node) -> [__m128; 2] {
+        let [first, ..]: &[[u32; 4]; 5] = bytemuck::cast_ref(node);
+        // The last word holds the exponents and the mask of inner children; as a lane it is 0, because small numbers are slow.
+        let exponents = _mm_cvtepu8_epi32(_mm_cvtsi32_si128((first[3] & 0x00ff_ffff) as i32));
+        let p = vector(bytemuck::cast_ref(first));
+        [_mm_insert_ps::<0b1000>(p, p), _mm_castsi128_ps(_mm_slli_epi32::<23>(exponents))]
+    }
+
+    /// Four numbers, and four zeros.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub fn extended(x: __m128) -> __m256 {
+        _mm256_zextps128_ps256(x)
     }
 
     /// All bits set in the lanes of the children that `ray` enters: `NodeFrame::new` and `node_hits`.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> __m256i {
-        let [first, ..]: &[[u32; 4]; 5] = bytemuck::cast_ref(node);
-        // The last word holds the exponents and the mask of inner children; as a lane it is 0, because small numbers are slow.
-        let exponents = _mm_cvtepu8_epi32(_mm_cvtsi32_si128((first[3] & 0x00ff_ffff) as i32));
-        let s = _mm_castsi128_ps(_mm_slli_epi32::<23>(exponents));
+        let [p, s] = grid(node);
         let low = vector(&lanes.offset_low);
-        let p = vector(bytemuck::cast_ref(first));
-        let p = _mm_insert_ps::<0b1000>(p, p);
         let pc = _mm_add_ps(_mm_add_ps(p, vector(&lanes.offset_high)), low);
         let origin = vector(&lanes.origin);
         let w = _mm_sub_ps(pc, origin);

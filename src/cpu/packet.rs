@@ -7,8 +7,9 @@
 use super::brick::Best;
 use super::isa::Isa;
 use super::node::{FramedRay, framed_ray};
+use super::packet_node::{Axes, axes};
 use super::packet_triangle::turned;
-use super::vector::{Vec3, least, most};
+use super::vector::{least, most};
 use super::wide::{Wide, three};
 use crate::kernel::layout::{Hit, NONE, Ray};
 use crate::math::exact::{GREATEST_INVERSE, LEAST_SHEAR, RayFrame, TriangleHit};
@@ -146,9 +147,9 @@ pub struct Packet {
 #[derive(Clone, Copy, Default)]
 pub struct Bounds {
     /// Least and greatest origin.
-    pub origin: [Vec3; 2],
+    pub origin: [Axes; 2],
     /// Least and greatest inverse of the direction.
-    pub inverse: [Vec3; 2],
+    pub inverse: [Axes; 2],
     /// Least and greatest first parameter.
     pub t_min: [f32; 2],
     /// Least and greatest distance of the hits.
@@ -225,8 +226,8 @@ impl Packet {
         let origin = three!(k => self.origin[k].range(isa, vectors));
         let inverse = three!(k => self.inverse[k].range(isa, vectors));
         self.bounds = Bounds {
-            origin: [origin.map(|x| x[0]), origin.map(|x| x[1])],
-            inverse: [inverse.map(|x| x[0]), inverse.map(|x| x[1])],
+            origin: [axes(three!(k => origin[k][0])), axes(three!(k => origin[k][1]))],
+            inverse: [axes(three!(k => inverse[k][0])), axes(three!(k => inverse[k][1]))],
             t_min: self.t_min.range(isa, vectors),
             t: self.t.range(isa, vectors),
             reach: self.reach.range(isa, vectors)[1],
@@ -242,14 +243,14 @@ impl Packet {
         let m = three!(k => d[k].abs());
         let is_y = m[0].less(m[1]);
         let is_z = m[0].most(m[1]).less(m[2]);
-        let axes = [!is_y & !is_z, is_y & !is_z];
+        let along_xy = [!is_y & !is_z, is_y & !is_z];
         let largest = m[0].most(m[1].most(m[2]));
         let plain = largest.less(isa.splat(PLAIN)) & isa.splat(1.0 / PLAIN).less(largest);
         let inverse = three!(k => {
             (one / m[k].most(isa.splat(f32::MIN_POSITIVE))).least(isa.splat(GREATEST_INVERSE)) ^ (d[k] & sign)
         });
-        let along = turned::<I>(inverse, 3, axes)[2];
-        let across = turned::<I>(d, 3, axes);
+        let along = turned::<I>(inverse, 3, along_xy)[2];
+        let across = turned::<I>(d, 3, along_xy);
         for k in 0..2 {
             let shear = across[k] * along;
             self.shear[k].set(v, zero.or_else(shear.abs().less(isa.splat(LEAST_SHEAR)), shear));
@@ -262,7 +263,7 @@ impl Packet {
         self.reach.set(v, o[0].most(o[1].most(o[2])));
         let (lanes, shift) = (u32::MAX >> (32 - I::Wide::LANES), v * I::Wide::LANES);
         for k in 0..2 {
-            self.largest[k] |= u64::from(axes[k] & lanes) << shift;
+            self.largest[k] |= u64::from(along_xy[k] & lanes) << shift;
         }
         let mut alone = !plain & lanes;
         while alone != 0 {
@@ -285,9 +286,9 @@ impl Packet {
     pub fn ray(&self, i: usize) -> FramedRay {
         let i = i % RAYS;
         let at = |columns: &[Column; 3]| [columns[0].0[i], columns[1].0[i], columns[2].0[i]];
-        let kz = match self.largest.map(|rays| rays >> i & 1) {
-            [1, _] => 0,
-            [_, 1] => 1,
+        let kz = match (self.largest[0] >> i & 1, self.largest[1] >> i & 1) {
+            (1, _) => 0,
+            (_, 1) => 1,
             _ => 2,
         };
         let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
@@ -303,8 +304,8 @@ impl Packet {
         let (i, found) = (i % RAYS, &self.found);
         let [u, v, w] = [found.edges[0].0[i], found.edges[1].0[i], found.edges[2].0[i]];
         let hit = TriangleHit { hit: true, t: self.t.0[i], u, v, w, det: found.det.0[i] };
-        let [id, leaf, triangle, source] = [&found.id, &found.leaf, &found.triangle, &found.source].map(|x| x.0[i]);
-        Best { t: self.t.0[i], id, leaf, triangle, hit, source }
+        let (id, leaf, triangle) = (found.id.0[i], found.leaf.0[i], found.triangle.0[i]);
+        Best { t: self.t.0[i], id, leaf, triangle, hit, source: found.source.0[i] }
     }
 
     /// Has ray `i` have found what `best` says.

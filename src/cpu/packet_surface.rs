@@ -6,10 +6,11 @@ use super::brick::Best;
 use super::isa::Isa;
 use super::packet::{Packet, RAYS};
 use super::scene::Bound;
+use super::vector::Vec3;
 use super::walk_brick::write_found;
 use super::wide::{Wide, inside, three};
 use crate::kernel::layout::{Hit, INSTANCE_IDENTITY, NONE, Surface};
-use crate::math::exact::{LEAST_SHEAR, OFFSET_ULPS, SurfacePoint, THIRD, offset_origin};
+use crate::math::exact::{LEAST_COORDINATE, LEAST_SHEAR, OFFSET_ULPS, THIRD};
 
 /// Most lanes of a vector.
 const MOST: usize = 16;
@@ -22,17 +23,18 @@ type Lane = [f32; MOST];
 struct Hits {
     /// Vertices a, b, c, by axis.
     vertices: [[Lane; 3]; 3],
+    /// Leaf and number of the triangle of the last lane, and its vertices.
+    which: [u32; 2],
+    last: [Vec3; 3],
 }
 
 /// What follows from it.
 #[derive(Default)]
 struct Points {
+    /// [`crate::math::exact::offset_origin`] of it.
     point: [Lane; 3],
     normal: [Lane; 3],
-    delta: Lane,
     area: Lane,
-    /// [`SurfacePoint::down`] by axis, a bit a lane.
-    down: [u32; 3],
     /// Weights of vertices b and c.
     weights: [Lane; 2],
 }
@@ -118,7 +120,7 @@ fn points<I: Isa>(isa: I, packet: &Packet, number: usize, hits: &Hits, out: &mut
     let n = three!(k => n[k].0);
     let away = zero.less(dot(n, d));
     let n = three!(k => (n[k] ^ isa.splat(-0.0)).or_else(away, n[k]));
-    out.down = three!(k => n[k].less(zero) | (n[k].less_equal(zero) & zero.less_equal(n[k]) & zero.less(d[k])));
+    let down = three!(k => n[k].less(zero) | (n[k].less_equal(zero) & zero.less_equal(n[k]) & zero.less(d[k])));
 
     let det = packet.found.det.get(isa, number);
     let edges = three!(k => divide(isa, packet.found.edges[k].get(isa, number), det));
@@ -140,20 +142,34 @@ fn points<I: Isa>(isa: I, packet: &Packet, number: usize, hits: &Hits, out: &mut
     let near = three!(k => dot(weights, [a[k].abs(), b[k].abs(), c[k].abs()]));
     let delta = isa.splat(OFFSET_ULPS) * dot(three!(k => n[k].abs()), near);
     let p = three!(k => dot(weights, [a[k], b[k], c[k]]));
+    let moved = three!(k => offset(isa, p[k], delta * n[k], down[k]));
     for k in 0..3 {
-        p[k].store(&mut out.point[k]);
+        moved[k].store(&mut out.point[k]);
         n[k].store(&mut out.normal[k]);
     }
-    delta.store(&mut out.delta);
     area.store(&mut out.area);
     plain
+}
+
+/// [`crate::math::exact::offset_origin`] on an axis.
+#[inline(always)]
+fn offset<I: Isa>(isa: I, p: I::Wide, step: I::Wide, down: u32) -> I::Wide {
+    let moved = p + step;
+    let is_down = isa.splat(-0.0).or_else(down, isa.splat(0.0));
+    // Away from zero where the point lies on the side to which it moves.
+    let is_away = ((p ^ is_down) & isa.splat(-0.0)).same_bits(isa.splat(0.0));
+    let next = p.add_bits(isa.splat_bits(1).or_else(is_away, isa.splat_bits(u32::MAX)));
+    let tiny = p.abs().less(isa.splat(LEAST_COORDINATE));
+    let least = (isa.splat(LEAST_COORDINATE) ^ is_down).or_else(tiny, next);
+    moved.least(least).or_else(down, moved.most(least))
 }
 
 impl Packet {
     /// Writes what ray i has found to the i-th of `places`.
     #[inline(always)]
     pub fn write<I: Isa>(&self, isa: I, bound: &Bound, hits_of: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
-        let (mut hits, mut points_of) = (Hits::default(), Points::default());
+        let mut hits = Hits { which: [NONE; 2], ..Hits::default() };
+        let mut points_of = Points::default();
         for v in 0..self.vectors::<I>() {
             let first = v * I::Wide::LANES;
             let end = self.count.min(first + I::Wide::LANES);
@@ -189,9 +205,14 @@ impl Packet {
         if bound.scene.instances[leaf.instance as usize].flags & INSTANCE_IDENTITY == 0 {
             return false;
         }
-        let brick = &bound.bricks[leaf.brick as usize];
-        let vertices = brick.vertices(self.found.triangle.0[i % RAYS], leaf.offset_high, leaf.offset_low);
-        for (vertex, to) in vertices.iter().zip(&mut hits.vertices) {
+        // Neighbours often hit the same triangle.
+        let which = [self.found.leaf.0[i % RAYS], self.found.triangle.0[i % RAYS]];
+        if hits.which != which {
+            hits.which = which;
+            let brick = &bound.bricks[leaf.brick as usize];
+            hits.last = brick.vertices(which[1], leaf.offset_high, leaf.offset_low);
+        }
+        for (vertex, to) in hits.last.iter().zip(&mut hits.vertices) {
             for k in 0..3 {
                 to[k][lane % MOST] = vertex[k];
             }
@@ -203,18 +224,15 @@ impl Packet {
 impl Points {
     #[inline(always)]
     fn write(&self, lane: usize, best: &Best, hit: &mut Hit, surface: &mut Surface) {
+        let lane = lane % MOST;
         let at = |from: &[Lane; 3]| [from[0][lane], from[1][lane], from[2][lane]];
-        let bit = |k: usize| (self.down[k] >> lane & 1) << k;
-        let (n, area) = (at(&self.normal), self.area[lane]);
-        let down = bit(0) | bit(1) | bit(2);
-        let point = SurfacePoint { p: at(&self.point), delta: self.delta[lane], n, down, area };
         *hit = Hit { t: best.t, id: best.id, u: self.weights[0][lane], v: self.weights[1][lane] };
         *surface = Surface {
-            point: offset_origin(&point),
+            point: at(&self.point),
             leaf: best.leaf,
-            normal: n,
+            normal: at(&self.normal),
             triangle: best.triangle,
-            area,
+            area: self.area[lane],
             source: best.source,
             pending: surface.pending,
             padding: 0,

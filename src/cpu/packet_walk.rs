@@ -102,7 +102,7 @@ impl PacketScratch {
             return;
         }
         r.enter_leaf(bound.scene, &first, leaf);
-        let place = Place { offset_high: r.offset_high, offset_low: r.offset_low, slack: 0.0 };
+        let place = Place::new(r.offset_high, r.offset_low, 0.0);
         let flip = self.packet.flip;
         self.bricks[0] = PacketGroup { group: Group::root(flip), rays: [rays; 8] };
         let mut depth = 1;

@@ -88,17 +88,14 @@ pub struct Scratch {
     pub entered: Vec<(u32, f32)>,
     /// What packets work with, once there was one.
     packets: Option<Box<PacketScratch>>,
+    /// How rays come together in packets, once there was one.
+    groups: Option<Box<Groups>>,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self {
-            tally: Tally::default(),
-            stack: [Default::default(); STACK_SIZE],
-            nodes: Vec::new(),
-            entered: Vec::new(),
-            packets: None,
-        }
+        let (tally, stack) = (Tally::default(), [Default::default(); STACK_SIZE]);
+        Self { tally, stack, nodes: Vec::new(), entered: Vec::new(), packets: None, groups: None }
     }
 }
 
@@ -112,20 +109,24 @@ struct Block {
 }
 
 impl Block {
-    /// Calls `visit` with the numbers of its rays within the band of rows of `width`: squares of 8 x 8 one after the other, in each
-    /// squares of 4 x 4, so that neighbours come together.
+    /// Squares of 8 x 8 that it consists of.
     #[inline(always)]
-    fn for_each_place(&self, width: usize, mut visit: impl FnMut(usize)) {
-        let end = self.first + self.columns;
-        for y in (0..self.rows).step_by(BLOCK) {
-            for x in (self.first..end).step_by(BLOCK) {
-                for quarter in 0..4 {
-                    let (x, y) = (x + quarter % 2 * BLOCK / 2, y + quarter / 2 * BLOCK / 2);
-                    for row in y..(y + BLOCK / 2).min(self.rows) {
-                        for column in x..(x + BLOCK / 2).min(end) {
-                            visit(row * width + column);
-                        }
-                    }
+    fn squares(&self) -> usize {
+        self.columns.div_ceil(BLOCK) * self.rows.div_ceil(BLOCK)
+    }
+
+    /// Calls `visit` with the numbers of the rays of a square within the band of rows of `width`: squares of 4 x 4 one after the
+    /// other, so that neighbours come together.
+    #[inline(always)]
+    fn for_each_place(&self, width: usize, square: usize, mut visit: impl FnMut(usize)) {
+        let across = self.columns.div_ceil(BLOCK);
+        let (first, row, end) =
+            (self.first + square % across * BLOCK, square / across * BLOCK, self.first + self.columns);
+        for quarter in 0..4 {
+            let (x, y) = (first + quarter % 2 * BLOCK / 2, row + quarter / 2 * BLOCK / 2);
+            for row in y..(y + BLOCK / 2).min(self.rows) {
+                for column in x..(x + BLOCK / 2).min(end) {
+                    visit(row * width + column);
                 }
             }
         }
@@ -140,6 +141,16 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
+    /// Brings what is known of a ray near, if there is one.
+    #[inline(always)]
+    fn prefetch<I: Isa>(&self, isa: I, at: usize) {
+        if let (Some(ray), Some(hit), Some(surface)) = (self.rays.get(at), self.hits.get(at), self.surfaces.get(at)) {
+            isa.prefetch(ray);
+            isa.prefetch(hit);
+            isa.prefetch(surface);
+        }
+    }
+
     #[inline(always)]
     fn slot(&mut self, tile: usize, at: usize) -> Slot<'_> {
         Slot { tile, ray: &self.rays[at], hit: &mut self.hits[at], surface: &mut self.surfaces[at] }
@@ -180,7 +191,9 @@ fn for_each_block(
 pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn(&mut Scratch, Slot) + Sync) {
     let width = bound.params.width as usize;
     for_each_block(set, bound, work, BLOCK, |scratch, band, block| {
-        block.for_each_place(width, |at| kernel(scratch, band.slot(block.tile, at)));
+        for square in 0..block.squares() {
+            block.for_each_place(width, square, |at| kernel(scratch, band.slot(block.tile, at)));
+        }
     });
 }
 
@@ -225,6 +238,8 @@ fn run_avx2<I: Isa>(isa: I, kernel: &impl RayKernel, scratch: &mut Scratch, slot
 
 /// Edge of the blocks whose rays are made packets of, those of an octant together.
 const PACKET_BLOCK: usize = 32;
+/// So many rays of a square of 8 x 8 go together if they are of one octant; others wait for those of their octant in the block.
+const LEAST_SQUARE: usize = 16;
 /// Rays of such a block.
 const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
 /// Fewer rays of an octant go one by one.
@@ -284,62 +299,127 @@ fn run_block<I: Isa>(
     block: Block,
 ) {
     let mut packets = scratch.packets.take().unwrap_or_default();
-    let mut order = [0; BLOCK_RAYS];
-    let counts = sorted(bound, kernel, band, &block, &mut order);
-    let mut rest = &order[..];
-    for (flip, count) in counts.into_iter().enumerate() {
-        let (octant, others) = rest.split_at(count);
-        rest = others;
-        for places in octant.chunks(RAYS) {
-            if places.len() < LEAST_PACKET {
-                for &at in places {
-                    kernel.run(isa, scratch, band.slot(block.tile, at as usize));
-                }
-                continue;
-            }
-            packets.packet.clear(flip as u32);
+    let mut groups = scratch.groups.take().unwrap_or_default();
+    groups.clear();
+    while groups.next(isa, bound, kernel, band, &block) {
+        let places = &groups.places[..groups.count];
+        if places.len() < LEAST_PACKET {
             for &at in places {
-                let slot = band.slot(block.tile, at as usize);
-                packets.packet.add(slot.ray, slot.hit, slot.surface.source);
+                kernel.run(isa, scratch, band.slot(block.tile, at as usize));
             }
-            packets.packet.seal(isa);
-            kernel.run_packet(isa, scratch, &mut packets, block.tile);
-            packets.count(bound, &mut scratch.tally);
-            packets.packet.write(isa, bound, band.hits, band.surfaces, places);
+            continue;
         }
+        packets.packet.clear(groups.octant as u32);
+        for &at in places {
+            let slot = band.slot(block.tile, at as usize);
+            packets.packet.add(slot.ray, slot.hit, slot.surface.source);
+        }
+        packets.packet.seal(isa);
+        kernel.run_packet(isa, scratch, &mut packets, block.tile);
+        packets.count(bound, &mut scratch.tally);
+        packets.packet.write(isa, bound, band.hits, band.surfaces, places);
     }
-    scratch.packets = Some(packets);
+    (scratch.packets, scratch.groups) = (Some(packets), Some(groups));
 }
 
-/// The rays of a block for which `kernel` does anything, in `order` by octants; how many are of each.
-#[inline(always)]
-fn sorted(
-    bound: &Bound,
-    kernel: &impl PacketKernel,
-    band: &mut Band,
-    block: &Block,
-    order: &mut [u32; BLOCK_RAYS],
-) -> [usize; 8] {
-    let mut taken = [(0u32, 0u8); BLOCK_RAYS];
-    let (mut count, mut counts) = (0, [0; 8]);
-    block.for_each_place(bound.params.width as usize, |at| {
-        let slot = band.slot(block.tile, at);
-        let octant = octant(slot.ray.direction);
-        taken[count % BLOCK_RAYS] = (at as u32, octant as u8);
-        let takes = usize::from(kernel.takes(&slot));
-        counts[octant as usize % 8] += takes;
-        count += takes;
-    });
-    let mut next = [0; 8];
-    for octant in 1..8 {
-        next[octant] = next[octant - 1] + counts[octant - 1];
+/// Takes the rays of a block by groups of an octant: those of a square of 8 x 8 where they are of one, then the others.
+struct Groups {
+    /// The square that is looked at next.
+    square: usize,
+    /// Rays that wait for others of their octant, and their octants.
+    waiting: [(u32, u8); BLOCK_RAYS],
+    /// The same by octants, once there are no more squares.
+    sorted: [u32; BLOCK_RAYS],
+    /// How many of them are of each octant.
+    counts: [usize; 8],
+    /// How many have been taken.
+    taken: usize,
+    /// The group: its octant and the places of its rays.
+    octant: usize,
+    count: usize,
+    places: [u32; RAYS],
+}
+
+impl Default for Groups {
+    fn default() -> Self {
+        let (waiting, sorted, places) = ([(0, 0); BLOCK_RAYS], [0; BLOCK_RAYS], [0; RAYS]);
+        Self { square: 0, waiting, sorted, counts: [0; 8], taken: 0, octant: 0, count: 0, places }
     }
-    for &(at, octant) in &taken[..count] {
-        let to = &mut next[octant as usize % 8];
-        order[*to % BLOCK_RAYS] = at;
-        *to += 1;
+}
+
+impl Groups {
+    /// Begins with a block.
+    fn clear(&mut self) {
+        (self.square, self.counts, self.taken) = (0, [0; 8], 0);
     }
-    counts
+
+    /// Takes the next group of rays for which `kernel` does anything. False: there is none.
+    #[inline(always)]
+    fn next<I: Isa>(
+        &mut self,
+        isa: I,
+        bound: &Bound,
+        kernel: &impl PacketKernel,
+        band: &mut Band,
+        block: &Block,
+    ) -> bool {
+        let width = bound.params.width as usize;
+        while self.square < block.squares() {
+            let (mut octants, mut octant_of) = (0u32, [0u8; RAYS]);
+            self.count = 0;
+            block.for_each_place(width, self.square, |at| {
+                band.prefetch(isa, at + BLOCK);
+                let slot = band.slot(block.tile, at);
+                if kernel.takes(&slot) {
+                    let octant = octant(slot.ray.direction) % 8;
+                    self.places[self.count % RAYS] = at as u32;
+                    octant_of[self.count % RAYS] = octant as u8;
+                    octants |= 1 << octant;
+                    self.count += 1;
+                }
+            });
+            self.square += 1;
+            if octants.is_power_of_two() && self.count >= LEAST_SQUARE {
+                self.octant = octants.trailing_zeros() as usize;
+                return true;
+            }
+            let waiting: usize = self.counts.iter().sum();
+            for i in 0..self.count {
+                let octant = octant_of[i % RAYS];
+                self.waiting[(waiting + i) % BLOCK_RAYS] = (self.places[i % RAYS], octant);
+                self.counts[octant as usize % 8] += 1;
+            }
+        }
+        if self.square == block.squares() {
+            self.sort();
+            self.square += 1;
+        }
+        let mut end = 0;
+        for octant in 0..8 {
+            end += self.counts[octant];
+            if self.taken < end {
+                (self.octant, self.count) = (octant, (end - self.taken).min(RAYS));
+                self.places[..self.count].copy_from_slice(&self.sorted[self.taken..self.taken + self.count]);
+                self.taken += self.count;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Sorts the rays that wait by octants.
+    fn sort(&mut self) {
+        let mut next = [0; 8];
+        for octant in 1..8 {
+            next[octant] = next[octant - 1] + self.counts[octant - 1];
+        }
+        let waiting: usize = self.counts.iter().sum();
+        for &(at, octant) in &self.waiting[..waiting] {
+            let to = &mut next[octant as usize % 8];
+            self.sorted[*to % BLOCK_RAYS] = at;
+            *to += 1;
+        }
+    }
 }
 
 /// Starts a ray's hit: nothing found within its range; triangle `source`, from which it starts, is not met (NONE: of none).

@@ -45,6 +45,9 @@ pub trait Wide:
     /// Where self < other, both read as u32.
     fn less_bits(self, other: Self) -> u32;
 
+    /// The sum of both, read as u32, that wraps around.
+    fn add_bits(self, other: Self) -> Self;
+
     /// Writes the lanes to the first of `to`.
     fn store(self, to: &mut [f32]);
 }
@@ -200,6 +203,11 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
+    fn add_bits(self, other: Self) -> Self {
+        self.with(other, |a, b| f32::from_bits(a.to_bits().wrapping_add(b.to_bits())))
+    }
+
+    #[inline(always)]
     fn store(self, to: &mut [f32]) {
         to[..8].copy_from_slice(&self.0);
     }
@@ -210,7 +218,7 @@ impl Wide for Portable {
 macro_rules! over_intrinsics {
     ($name:ident, $vector:ty, $lanes:literal, $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident, $min:ident,
      $sqrt:ident, $set:ident, $load:ident, $store:ident, $and_not:ident, $and:ident, $xor:ident, $less:ident,
-     $less_equal:ident, $same_bits:ident, $less_bits:ident, $blend:ident) => {
+     $less_equal:ident, $same_bits:ident, $less_bits:ident, $add_bits:ident, $blend:ident) => {
         /// Numbers in one register.
         #[derive(Clone, Copy)]
         pub struct $name($vector);
@@ -304,6 +312,12 @@ macro_rules! over_intrinsics {
             }
 
             #[inline(always)]
+            fn add_bits(self, other: Self) -> Self {
+                // SAFETY: a value of the type exists only where the processor has the instructions.
+                Self(unsafe { $add_bits(self.0, other.0) })
+            }
+
+            #[inline(always)]
             fn store(self, to: &mut [f32]) {
                 let to = &mut to[..$lanes];
                 // SAFETY: a value of the type exists only where the processor has the instructions; there is room for all lanes.
@@ -365,10 +379,27 @@ pub mod x86 {
 
     #[inline]
     #[target_feature(enable = "avx2")]
+    fn add_bits(a: __m256, b: __m256) -> __m256 {
+        _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
     fn blend(bits: u32, yes: __m256, no: __m256) -> __m256 {
         let lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
         let set = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(bits as i32), lane), lane);
         _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(set))
+    }
+
+    impl Eight {
+        /// Of numbers in a register.
+        ///
+        /// # Safety
+        /// The processor has the instructions.
+        #[inline(always)]
+        pub unsafe fn of(x: __m256) -> Self {
+            Self(x)
+        }
     }
 
     over_intrinsics!(
@@ -392,6 +423,7 @@ pub mod x86 {
         less_equal,
         same_bits,
         less_bits,
+        add_bits,
         blend
     );
 
@@ -421,6 +453,12 @@ pub mod x86 {
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq")]
+    fn add_bits_512(a: __m512, b: __m512) -> __m512 {
+        _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
     fn blend_512(bits: u32, yes: __m512, no: __m512) -> __m512 {
         _mm512_mask_blend_ps(bits as u16, no, yes)
     }
@@ -446,6 +484,7 @@ pub mod x86 {
         less_equal_512,
         same_bits_512,
         less_bits_512,
+        add_bits_512,
         blend_512
     );
 }

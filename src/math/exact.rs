@@ -20,7 +20,7 @@ pub const LEAST_SHEAR: f32 = f32::from_bits((127 - 60) << 23);
 /// 2^96.
 pub const GREATEST_INVERSE: f32 = f32::from_bits((127 + 96) << 23);
 /// 2^-60.
-const LEAST_COORDINATE: f32 = LEAST_SHEAR;
+pub const LEAST_COORDINATE: f32 = LEAST_SHEAR;
 /// 32 u with u = 2^-24.
 pub const CLAMP_ULPS: f32 = 1.0 / 524_288.0;
 /// The greatest number below 1 / 3.
