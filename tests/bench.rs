@@ -169,3 +169,21 @@ fn what_cannot_be_measured_is_refused() {
     let (code, message) = refused("");
     assert!(code == Some(1) && message.contains("out"), "{message}");
 }
+
+#[test]
+fn executors_render_the_same_frames() {
+    let folder = folder();
+    let output = folder.path().join("out");
+    let line = "--quick --triangles 10K --size 64x36 --frames 1 --effects primary,ao --adapter cpu --adapter cpu";
+    let first = ["bench".as_ref(), "executors".as_ref(), "-o".as_ref(), output.as_os_str()];
+    let printed = succeed(first.into_iter().chain(line.split_whitespace().map(std::ffi::OsStr::new)).collect());
+    let json: Value = serde_json::from_slice(&std::fs::read(output.join("executors.json")).unwrap()).unwrap();
+    let rows = json["table"]["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 4, "two devices, two passes: {rows:?}");
+    for row in rows {
+        assert_eq!((row[0].as_str(), number(&row[6]), number(&row[7])), (Some("cpu"), 0.0, 0.0), "the same pictures");
+        assert!(number(&row[3]) > 0.0, "it takes time");
+    }
+    assert!(rows.iter().filter(|row| row[1] == "primary").all(|row| number(&row[2]) == 64.0 * 36.0));
+    assert_eq!(printed, std::fs::read_to_string(output.join("executors.md")).unwrap());
+}

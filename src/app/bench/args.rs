@@ -20,6 +20,68 @@ pub struct BenchArgs {
 pub enum Experiments {
     /// The experiments of the CHC+RT paper: its tables 2 to 5 and figures 5, 7 and 8, each ratio beside the paper's
     Chc(Box<ChcArgs>),
+    /// The same frames on every device that is present: rates, and how far pictures differ from those of the first device
+    Executors(Box<ExecutorsArgs>),
+}
+
+/// Options of `bench executors`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct ExecutorsArgs {
+    /// Folder for the results: executors.md, executors.json
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// A small scene, small pictures, few frames
+    #[arg(long)]
+    pub quick: bool,
+    /// Triangles of the city [default: 1M; with --quick 50K]
+    #[arg(long, value_name = "N", value_parser = positive_count)]
+    pub triangles: Option<u64>,
+    /// Folder of the generated scene; if it is missing it is generated there [default: DIR/scenes]
+    #[arg(long, value_name = "DIR")]
+    pub scenes: Option<PathBuf>,
+    /// Width and height of the pictures [default: 1280x720; with --quick 96x54]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<ImageSize>,
+    /// Frames of a walk [default: 5; with --quick 2]
+    #[arg(long, value_name = "N", value_parser = frames)]
+    pub frames: Option<u32>,
+    /// Walks of each device, beside one that brings in what frames need [default: 5; with --quick 1]
+    #[arg(long, value_name = "N", value_parser = repetitions)]
+    pub repeat: Option<u32>,
+    /// What is traced, as `walk --effects` has it
+    #[arg(long, value_name = "LIST", default_value = "primary,ao,diffuse")]
+    pub effects: String,
+    /// Occlusion and diffuse rays a pixel
+    #[arg(long, value_name = "N", default_value = "1", value_parser = repetitions)]
+    pub rays: u32,
+    /// Device bytes for bricks, as `walk --cache` has it
+    #[arg(long, value_name = "SIZE|P%", default_value = "100%")]
+    pub cache: String,
+    /// The schedule, as `walk --schedule` has it
+    #[arg(long, value_name = "NAME", default_value = "chc")]
+    pub schedule: String,
+    /// A device to be measured, as `walk --adapter` has it; repeated: each of them, and the pictures of the others are compared with
+    /// those of the first [default: cpu, then every graphics adapter]
+    #[arg(long = "adapter", value_name = "NAME")]
+    pub adapters: Vec<Adapter>,
+}
+
+impl ExecutorsArgs {
+    /// Options with their defaults.
+    pub fn settings(&self) -> Settings {
+        let or = |full, small| if self.quick { small } else { full };
+        let (width, height) = if self.quick { (96, 54) } else { (1280, 720) };
+        Settings {
+            triangles: [self.triangles.unwrap_or(if self.quick { 50_000 } else { 1_000_000 }); 3],
+            size: self.size.unwrap_or(ImageSize { width, height }),
+            frames: self.frames.unwrap_or(or(5, 2)),
+            tile: or(64, 16),
+            skip: 0,
+            repeat: self.repeat.unwrap_or(or(5, 1)),
+            rays: self.rays,
+        }
+    }
 }
 
 /// Options of `bench chc`.

@@ -22,6 +22,7 @@ use crate::stream::{Item, Residency};
 use anyhow::{Context, Result, bail};
 use clap::Parser;
 use std::ffi::OsString;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 
 /// Frames of the walk that a path is made for: the camera moves as fast in a shorter one, which ends earlier.
@@ -265,8 +266,16 @@ fn words(case: &Case, place: &Place, settings: &Settings, adapter: &Adapter) -> 
     if !without.is_empty() {
         line += &format!(" --without {without}");
     }
+    walk_args(&line, &place.scene, adapter)
+}
+
+/// The options of a walk as a user would type them, words separated by spaces.
+///
+/// # Errors
+/// They are none.
+pub(super) fn walk_args(line: &str, scene: &Path, adapter: &Adapter) -> Result<WalkArgs> {
     let mut words: Vec<OsString> = ["brickwalk", "walk", "-o", "."].map(OsString::from).to_vec();
-    words.push(place.scene.clone().into());
+    words.push(scene.into());
     words.extend(line.split_whitespace().map(OsString::from));
     words.extend(["--adapter".into(), adapter.to_string().into()]);
     match Cli::try_parse_from(words).context("the bench's own walk")?.command {

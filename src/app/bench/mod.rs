@@ -1,10 +1,11 @@
-//! `brickwalk bench chc`: the experiments of Mattausch et al. 2015 on the generated scenes, each ratio beside the paper's.
+//! `brickwalk bench executors` (`executors.rs`), and `brickwalk bench chc`: the experiments of Mattausch et al. 2015 on the generated scenes, each ratio beside the paper's.
 //!
 //! Everything runs in this process: a renderer a scene, cache and size of tiles, in which the cases of a group take turns. Each
 //! finished walk is a line of `cells.jsonl`; tables, plots and pages are made from these lines alone.
 
 pub mod args;
 mod cells;
+mod executors;
 mod measure;
 mod output;
 mod paper;
@@ -33,7 +34,10 @@ use std::time::{Duration, Instant};
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let Experiments::Chc(args) = &args.experiments;
+    let args = match &args.experiments {
+        Experiments::Chc(args) => args,
+        Experiments::Executors(args) => return executors::run(args),
+    };
     let settings = args.settings();
     if settings.frames <= settings.skip {
         return Err(super::Usage(format!("--frames {}: it must be above {}", settings.frames, settings.skip)).into());
