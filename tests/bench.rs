@@ -176,7 +176,7 @@ fn executors_render_the_same_frames() {
     let output = folder.path().join("out");
     let line = "--quick --triangles 10K --size 64x36 --frames 1 --effects primary,ao --adapter cpu --adapter cpu";
     let first = ["bench".as_ref(), "executors".as_ref(), "-o".as_ref(), output.as_os_str()];
-    let printed = succeed(first.into_iter().chain(line.split_whitespace().map(std::ffi::OsStr::new)).collect());
+    let printed = succeed(first.into_iter().chain(line.split_whitespace().map(std::ffi::OsStr::new)));
     let json: Value = serde_json::from_slice(&std::fs::read(output.join("executors.json")).unwrap()).unwrap();
     let rows = json["table"]["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 4, "two devices, two passes: {rows:?}");

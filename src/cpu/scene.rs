@@ -54,6 +54,12 @@ pub struct Demand {
     pub next: AtomicU32,
 }
 
+/// Bits of the distance at which a ray enters, ordered as distances are.
+#[inline(always)]
+pub fn entry_bits(near: f32) -> u32 {
+    if near > 0.0 { near.to_bits() } else { 0 }
+}
+
 impl Default for Demand {
     fn default() -> Self {
         Self { rays: AtomicU32::new(0), nearest: AtomicU32::new(u32::MAX), next: AtomicU32::new(0) }
@@ -69,7 +75,7 @@ impl Demand {
 
     /// Adds a ray that enters at `near`.
     pub fn add_ray(&self, near: f32) {
-        self.add(1, if near > 0.0 { near.to_bits() } else { 0 });
+        self.add(1, entry_bits(near));
     }
 
     /// Adds a ray that enters before any other brick that it asks for.
