@@ -157,28 +157,29 @@ impl Band<'_> {
     }
 }
 
-/// Calls `visit` for the blocks of `work`, at most `edge` wide and high: bands of rows in parallel.
+/// Calls `visit` for the blocks of `work`, of at most so many rows and columns: bands of rows in parallel.
 fn for_each_block(
     set: &mut RaySet,
     bound: &Bound,
     work: Work,
-    edge: usize,
+    [rows, columns]: [usize; 2],
     visit: impl Fn(&mut Scratch, &mut Band, Block) + Sync,
 ) {
     let [width, tile_edge, tiles_x] = [bound.params.width, bound.params.tile, bound.params.tiles_x].map(|x| x as usize);
     // Tiles are powers of two of at least 8.
-    let edge = edge.min(tile_edge);
-    let band = edge * width;
+    let (rows, columns) = (rows.min(tile_edge), columns.min(tile_edge));
+    let band = rows * width;
     let RaySet { rays, hits, surfaces } = set;
     let bands = rays.par_chunks(band).zip(hits.par_chunks_mut(band)).zip(surfaces.par_chunks_mut(band));
     bands.enumerate().for_each(|(number, ((rays, hits), surfaces))| {
         let mut scratch = Scratch::default();
+        let row = number * rows;
         let rows = rays.len() / width;
         let mut band = Band { rays, hits, surfaces };
-        for first in (0..width).step_by(edge) {
-            let tile = number * edge / tile_edge * tiles_x + first / tile_edge;
+        for first in (0..width).step_by(columns) {
+            let tile = row / tile_edge * tiles_x + first / tile_edge;
             if work.includes(tile) {
-                let columns = edge.min(width - first);
+                let columns = columns.min(width - first);
                 visit(&mut scratch, &mut band, Block { tile, first, columns, rows });
             }
         }
@@ -190,7 +191,7 @@ fn for_each_block(
 /// nodes.
 pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn(&mut Scratch, Slot) + Sync) {
     let width = bound.params.width as usize;
-    for_each_block(set, bound, work, BLOCK, |scratch, band, block| {
+    for_each_block(set, bound, work, [BLOCK; 2], |scratch, band, block| {
         for square in 0..block.squares() {
             block.for_each_place(width, square, |at| kernel(scratch, band.slot(block.tile, at)));
         }
@@ -238,6 +239,8 @@ fn run_avx2<I: Isa>(isa: I, kernel: &impl RayKernel, scratch: &mut Scratch, slot
 
 /// Edge of the blocks whose rays are made packets of, those of an octant together.
 const PACKET_BLOCK: usize = 32;
+/// Bands that a thread has at least, if they can be so low.
+const BANDS: usize = 8;
 /// So many rays of a square of 8 x 8 go together if they are of one octant; others wait for those of their octant in the block.
 const LEAST_SQUARE: usize = 16;
 /// Rays of such a block.
@@ -247,7 +250,10 @@ const LEAST_PACKET: usize = 4;
 
 /// [`run_for_each_ray`], rays of an octant together.
 pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
-    for_each_block(set, bound, work, PACKET_BLOCK, |scratch, band, block| match bound.isa {
+    // Where there are many threads, each has its share of bands.
+    let height = bound.params.height as usize;
+    let rows = if height < PACKET_BLOCK * BANDS * rayon::current_num_threads() { BLOCK } else { PACKET_BLOCK };
+    for_each_block(set, bound, work, [rows, BLOCK_RAYS / rows], |scratch, band, block| match bound.isa {
         Best::Scalar(isa) => run_block(isa, bound, kernel, scratch, band, block),
         #[cfg(target_arch = "x86_64")]
         Best::Avx2(isa) => {
