@@ -313,6 +313,7 @@ impl Packet {
     pub fn set_best(&mut self, i: usize, best: &Best) {
         let (i, found) = (i % RAYS, &mut self.found);
         self.t.0[i] = best.t;
+        self.bounds.t[0] = least(self.bounds.t[0], best.t);
         (found.id.0[i], found.leaf.0[i], found.triangle.0[i]) = (best.id, best.leaf, best.triangle);
         for (column, x) in found.edges.iter_mut().zip([best.hit.u, best.hit.v, best.hit.w]) {
             column.0[i] = x;
