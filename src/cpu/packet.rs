@@ -251,19 +251,19 @@ impl Packet {
         });
         let along = turned::<I>(inverse, 3, along_xy)[2];
         let across = turned::<I>(d, 3, along_xy);
-        for k in 0..2 {
-            let shear = across[k] * along;
-            self.shear[k].set(v, zero.or_else(shear.abs().less(isa.splat(LEAST_SHEAR)), shear));
+        for (column, across) in self.shear.iter_mut().zip(across) {
+            let shear = across * along;
+            column.set(v, zero.or_else(shear.abs().less(isa.splat(LEAST_SHEAR)), shear));
         }
-        for k in 0..3 {
-            self.inverse[k].set(v, inverse[k]);
+        for (column, inverse) in self.inverse.iter_mut().zip(inverse) {
+            column.set(v, inverse);
         }
         self.along.set(v, along);
         let o = three!(k => self.origin[k].get(isa, v).abs());
         self.reach.set(v, o[0].most(o[1].most(o[2])));
         let (lanes, shift) = (u32::MAX >> (32 - I::Wide::LANES), v * I::Wide::LANES);
-        for k in 0..2 {
-            self.largest[k] |= u64::from(along_xy[k] & lanes) << shift;
+        for (largest, along) in self.largest.iter_mut().zip(along_xy) {
+            *largest |= u64::from(along & lanes) << shift;
         }
         let mut alone = !plain & lanes;
         while alone != 0 {

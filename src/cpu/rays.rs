@@ -239,12 +239,12 @@ fn run_avx2<I: Isa>(isa: I, kernel: &impl RayKernel, scratch: &mut Scratch, slot
 
 /// Edge of the blocks whose rays are made packets of, those of an octant together.
 const PACKET_BLOCK: usize = 32;
+/// Rays of such a block.
+const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
 /// Bands that a thread has at least, if they can be so low.
 const BANDS: usize = 8;
 /// So many rays of a square of 8 x 8 go together if they are of one octant; others wait for those of their octant in the block.
 const LEAST_SQUARE: usize = 16;
-/// Rays of such a block.
-const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
 /// Fewer rays of an octant go one by one.
 const LEAST_PACKET: usize = 4;
 
