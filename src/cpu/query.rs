@@ -39,7 +39,8 @@ impl RayKernel for Query<'_> {
 impl PacketKernel for Query<'_> {
     #[inline(always)]
     fn takes(&self, slot: &Slot) -> bool {
-        slot.is_traced() && !(self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE)
+        let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
+        slot.is_traced() && !is_occluded && self.lists.nearest[slot.tile] <= slot.hit.t
     }
 
     /// As [`ask`], where the rays that enter no child of a root are told together.

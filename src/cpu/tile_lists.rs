@@ -4,7 +4,7 @@
 use super::interval::tile_meets_box;
 use super::pair_counts::PairCounts;
 use super::scene::{Bound, Demand, Tally};
-use super::vector::{dot, each, most};
+use super::vector::{dot, each, least, most};
 use crate::kernel::layout::{
     COUNTER_FRONT_TO_BACK, COUNTER_LIST_ENTRIES, COUNTER_MOST_SELECTED, COUNTER_PAIRS_INTERSECTED,
     COUNTER_PAIRS_INVISIBLE, COUNTER_PAIRS_VISIBLE, COUNTER_TILE_BATCH_LEAVES, COUNTER_TILE_BATCHES,
@@ -29,6 +29,8 @@ pub struct TileLists {
     pub list: Vec<Entry>,
     /// Positions in `list`, per tile.
     pub selection: Vec<u32>,
+    /// The least distance of the entries that are selected, per tile.
+    pub nearest: Vec<f32>,
     /// What is asked of every position of `list`.
     pub pair_demand: Vec<Demand>,
     /// Queries of pairs.
@@ -45,7 +47,7 @@ impl TileLists {
     /// For so many tiles.
     pub fn new(tiles: usize) -> Self {
         let (bounds, lists) = (vec![TileBounds::default(); tiles], vec![TileList::default(); tiles]);
-        Self { bounds, lists, chosen: vec![false; tiles], ..Self::default() }
+        Self { bounds, lists, chosen: vec![false; tiles], nearest: vec![0.0; tiles], ..Self::default() }
     }
 
     /// Makes room for so many entries.
@@ -121,18 +123,20 @@ pub fn tile_scan(bound: &Bound, tiles: &mut TileLists) -> Result<(), ExecutorErr
 /// Picks from each tile's list the leaves whose brick is in the wanted state, but for culled pairs, keeping their order. `INTERSECT`: the selection is
 /// intersected next, and counted as such.
 pub fn tile_select<const INTERSECT: bool>(bound: &Bound, tiles: &mut TileLists) {
-    let TileLists { lists, list, selection, pair_counts, .. } = tiles;
+    let TileLists { lists, list, selection, nearest, pair_counts, .. } = tiles;
     let places = of_tiles(lists, selection);
-    lists.par_iter_mut().zip(places).enumerate().for_each(|(tile, (entry, selection))| {
+    lists.par_iter_mut().zip(places).zip(nearest).enumerate().for_each(|(tile, ((entry, selection), nearest))| {
         let mut selected = 0;
+        *nearest = f32::INFINITY;
         // From the order of the leaves' numbers.
         let (mut departures, mut last) = (0, 0);
         let count = if entry.from_root != 0 { 0 } else { entry.count };
         for i in entry.first..entry.first + count {
-            let leaf = list[i as usize].leaf;
+            let Entry { leaf, near } = list[i as usize];
             if bound.is_selected(bound.brick_of(leaf)) && !pair_counts.is_culled(bound, tile, leaf) {
                 selection[selected as usize] = i;
                 selected += 1;
+                *nearest = least(*nearest, near);
                 departures += u32::from(leaf < last);
                 last = leaf;
             }
