@@ -182,8 +182,8 @@ fn help_explains_units_and_defaults() {
     let mut names: Vec<_> = cli.get_subcommands().map(|c| c.get_name().to_string()).collect();
     names.sort();
     let commands = [
-        "adapters", "bench", "compare", "convert", "demo", "info", "repair", "replay", "scene", "trace", "verify",
-        "walk",
+        "adapters", "bench", "compare", "convert", "demo", "info", "repair", "replay", "scene", "selftest", "trace",
+        "verify", "walk",
     ];
     assert_eq!(names, commands);
     for name in commands {
