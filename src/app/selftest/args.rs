@@ -21,6 +21,7 @@ pub struct SelftestArgs {
     pub rays: u32,
     /// Instead of the cases: measure the error against scale and against the distance from the origin, of this program's arithmetic,
     /// of plain f32 in world space and of Möller-Trumbore, and write tables and plots into this folder, which is made if missing
+    /// [default: none]
     #[arg(long, value_name = "DIR")]
     pub errors: Option<PathBuf>,
     /// Print JSON
