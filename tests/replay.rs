@@ -65,7 +65,9 @@ fn prefetching_changes_nothing_but_the_host_cache() {
     let run = |scene: &Path, name: &str, options: &str| {
         let output = folder.path().join(name);
         let requests = output.with_extension("jsonl");
-        walk(scene, &output, &format!("{} --cache 10% {options} --requests-out {}", near(scene), requests.display()));
+        // A fixed schedule: a clock decides what auto asks for.
+        let fixed = format!("{} --schedule chc --cache 10%", near(scene));
+        walk(scene, &output, &format!("{fixed} {options} --requests-out {}", requests.display()));
         let summary = json(&output.join("summary.json"));
         (frames(&output), std::fs::read(&requests).expect("a trace"), summary)
     };
