@@ -141,7 +141,9 @@ pub fn add_occlusion(bound: &Bound, pixels: &mut Pixels, shaded: usize, own: &Ra
 
 /// Counts, per brick, the final hits of a pass.
 pub fn hit_demand(bound: &Bound, own: &RaySet) {
-    own.surfaces.par_iter().filter(|surface| surface.leaf != NONE).for_each(|surface| {
-        bound.demand[bound.brick_of(surface.leaf)].add(1, 0);
+    own.surfaces.par_chunks(RUN).for_each(|run| {
+        for hits in run.chunk_by(|a, b| a.leaf == b.leaf).filter(|hits| hits[0].leaf != NONE) {
+            bound.demand[bound.brick_of(hits[0].leaf)].add(hits.len() as u32, 0);
+        }
     });
 }
