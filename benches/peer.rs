@@ -27,6 +27,8 @@ use std::process::{Child, ChildStdin, ChildStdout, Stdio};
 const EXTENT: Extent = Extent { width: 1280, height: 720, tile: 64 };
 /// Metres.
 const OCCLUSION_LENGTH: f64 = 4.0;
+/// Metres from a hit to where rays from it begin: none meets its own surface, which Embree is not told to leave out.
+const START: f64 = 1e-3;
 const SETS: [&str; 3] = ["primary", "AO", "diffuse"];
 const REPETITIONS: usize = 5;
 
@@ -94,8 +96,9 @@ impl Ours {
         let mut state = 7;
         let [_, occlusion, diffuse] = &mut ours.sets;
         for (hit, surface) in hits.iter().zip(&surfaces) {
-            occlusion.push(leaving(hit, surface, (OCCLUSION_LENGTH / frame.unit) as f32, &mut state));
-            diffuse.push(leaving(hit, surface, T_INFINITE, &mut state));
+            let t_min = (START / frame.unit) as f32;
+            occlusion.push(leaving(hit, surface, [t_min, (OCCLUSION_LENGTH / frame.unit) as f32], &mut state));
+            diffuse.push(leaving(hit, surface, [t_min, T_INFINITE], &mut state));
         }
         ours
     }
@@ -154,7 +157,7 @@ impl Ours {
 }
 
 /// A ray from a hit, distributed by the cosine about the normal; where there is no hit, one that is not traced.
-fn leaving(hit: &Hit, surface: &Surface, t_max: f32, state: &mut u64) -> Ray {
+fn leaving(hit: &Hit, surface: &Surface, [t_min, t_max]: [f32; 2], state: &mut u64) -> Ray {
     if hit.id == NONE {
         return Ray { origin: [0.0; 3], t_min: 1.0, direction: [1.0, 0.0, 0.0], t_max: 0.0 };
     }
@@ -162,7 +165,7 @@ fn leaving(hit: &Hit, surface: &Surface, t_max: f32, state: &mut u64) -> Ray {
     let (z, turn) = (1.0 - 2.0 * random(state), std::f64::consts::TAU * random(state));
     let across = (1.0 - z * z).sqrt();
     let direction = (normal + DVec3::new(across * turn.cos(), across * turn.sin(), z)).normalize_or(normal);
-    Ray { origin: surface.point, t_min: 0.0, direction: direction.as_vec3().to_array(), t_max }
+    Ray { origin: surface.point, t_min, direction: direction.as_vec3().to_array(), t_max }
 }
 
 /// Embree in a process of its own.
