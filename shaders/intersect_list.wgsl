@@ -5,7 +5,7 @@
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
 #include "shared/cache.wgsl"
-#include "shared/exact.wgsl"
+#include "shared/surface.wgsl"
 #include "shared/node.wgsl"
 #include "shared/leaf.wgsl"
 #include "shared/brick.wgsl"

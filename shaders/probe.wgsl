@@ -8,7 +8,7 @@ fn zero_bits() -> u32 {
     return params.x;
 }
 
-#include "shared/exact.wgsl"
+#include "shared/surface.wgsl"
 
 fn put(at: u32, x: f32) {
     results[at] = bitcast<u32>(x);

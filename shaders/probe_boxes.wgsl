@@ -8,7 +8,7 @@ fn zero_bits() -> u32 {
     return params.x;
 }
 
-#include "shared/exact.wgsl"
+#include "shared/triangle.wgsl"
 #include "shared/node.wgsl"
 
 // One thread a case of 32 words: a node, origin and t_min of a ray, its direction and t_max, the offset of the node's brick; 9 words

@@ -5,7 +5,7 @@
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/tiles.wgsl"
-#include "shared/exact.wgsl"
+#include "shared/triangle.wgsl"
 #include "shared/node.wgsl"
 #include "shared/leaf.wgsl"
 

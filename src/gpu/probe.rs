@@ -45,7 +45,7 @@ pub struct ProbeReport {
 /// One function or property, over all cases that concern it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// Function of exact.wgsl, the property, or the pipeline.
+    /// Function of the exact arithmetic, the property, or the pipeline.
     pub name: &'static str,
     /// What it was compared with.
     pub against: &'static str,
@@ -106,7 +106,7 @@ impl Check {
     }
 }
 
-/// What results of exact.wgsl are compared with.
+/// What results of exact arithmetic are compared with.
 const TWIN: &str = "its twin";
 
 /// Words of results per case of the kernel `arithmetic`.
@@ -126,9 +126,11 @@ pub fn source() -> String {
     let file = |name: &str| match name {
         "probe.wgsl" => Some(include_str!("../../shaders/probe.wgsl").to_string()),
         "shared/exact.wgsl" => Some(include_str!("../../shaders/shared/exact.wgsl").to_string()),
+        "shared/triangle.wgsl" => Some(include_str!("../../shaders/shared/triangle.wgsl").to_string()),
+        "shared/surface.wgsl" => Some(include_str!("../../shaders/shared/surface.wgsl").to_string()),
         _ => None,
     };
-    // Both files are embedded, so that assembly cannot fail.
+    // All files are embedded, so that assembly cannot fail.
     wgsl::assemble("probe.wgsl", Pages { cache: 1, texels: 1 }, &file).unwrap_or_default()
 }
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/shared/exact.wgsl`: watertight, deterministic f32 ray-triangle arithmetic.
+//! Twin of `shaders/shared/exact.wgsl`, `triangle.wgsl` and `surface.wgsl`: watertight, deterministic f32 ray-triangle arithmetic.
 //!
 //! Woop, Benthin, Wald 2013 ("Watertight Ray/Triangle Intersection", JCGT 2). Their f64 fallback is replaced by
 //! [`diffprod`] in integers, because WGSL has no f64, and the kernel rounds every product before it is added
