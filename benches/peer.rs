@@ -108,7 +108,7 @@ impl Ours {
         let pass = if set == 1 { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
         let Session { executor, cache, .. } = &mut self.session;
         // As `chc` bounds its lists for camera rays, and for others.
-        executor.set_list_most(if set == 0 { 128 } else { 12 });
+        executor.tuning().list_most = if set == 0 { 128 } else { 12 };
         executor.set_rays(pass, &self.sets[set]);
         executor.run(pass, &[Step::StartHits], &cache.states).expect("hits are started");
         let steps: &[Step] =

@@ -1,11 +1,12 @@
 //! What a ray meets inside one brick: twin of `shaders/shared/brick.wgsl`.
 
+use super::indices::Indices;
 use super::leaf::{BrickRay, row_direction, rows_point};
 use super::node::UNIT;
 use super::rays::Slot;
 use super::scene::Scene;
 use super::vector::{Vec3, each, most3};
-use crate::kernel::layout::{BRICK_INDEX32, BRICK_WIDE, Hit, INSTANCE_IDENTITY, NONE, Surface};
+use crate::kernel::layout::{BRICK_WIDE, Hit, INSTANCE_IDENTITY, NONE, Surface};
 use crate::math::exact::{
     SurfacePoint, TriangleHit, barrier, divide, intersect_triangle, length_of, offset_origin, surface_point,
 };
@@ -21,10 +22,8 @@ pub struct BrickView<'a> {
     vertices: &'a [f32],
     /// Mesh-local ids of the triangles.
     ids: &'a [u32],
-    /// Three indices a triangle where they have 16 bits,
-    short: &'a [u16],
-    /// and where they have 32.
-    long: &'a [u32],
+    /// The triangles' vertices.
+    indices: Indices<'a>,
     /// Whether vertices have two parts.
     is_wide: bool,
 }
@@ -34,28 +33,13 @@ impl<'a> BrickView<'a> {
     pub fn new(brick: &Brick, bytes: &'a [u8]) -> Self {
         let layout = GeometryLayout::of(brick);
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
-        let indices = part(layout.indices, layout.bytes);
-        let is_long = brick.flags & BRICK_INDEX32 != 0;
         Self {
             nodes: bytemuck::cast_slice(part(0, layout.vertices)),
             vertices: bytemuck::cast_slice(part(layout.vertices, layout.ids)),
             ids: bytemuck::cast_slice(part(layout.ids, layout.indices)),
-            short: if is_long { &[] } else { bytemuck::cast_slice(indices) },
-            long: if is_long { bytemuck::cast_slice(indices) } else { &[] },
+            indices: Indices::new(brick, part(layout.indices, layout.bytes)),
             is_wide: brick.flags & BRICK_WIDE != 0,
         }
-    }
-
-    /// The vertices of a triangle, as numbers of them.
-    #[inline(always)]
-    fn triangle_indices(&self, triangle: u32) -> [u32; 3] {
-        let at = 3 * triangle as usize;
-        if self.long.is_empty() {
-            let i = &self.short[at..at + 3];
-            return [i[0].into(), i[1].into(), i[2].into()];
-        }
-        let i = &self.long[at..at + 3];
-        [i[0], i[1], i[2]]
     }
 
     /// A vertex in the object's frame, in which the brick's origin lies at the offset: the correctly rounded difference of its
@@ -75,7 +59,7 @@ impl<'a> BrickView<'a> {
     /// The vertices of a triangle in the object's frame.
     #[inline(always)]
     pub fn vertices(&self, triangle: u32, offset_high: Vec3, offset_low: Vec3) -> [Vec3; 3] {
-        let [a, b, c] = self.triangle_indices(triangle);
+        let [a, b, c] = self.indices.of(triangle);
         let vertex = |index| self.vertex(index, offset_high, offset_low);
         [vertex(a), vertex(b), vertex(c)]
     }

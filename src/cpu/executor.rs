@@ -20,7 +20,7 @@ use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_se
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
-use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, View, padded, report};
+use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, padded, report};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{WorkerPool, Workers};
 use bricks::SceneFile;
@@ -50,10 +50,8 @@ pub struct CpuExecutor {
     extent: Extent,
     view: Params,
     directions: Directions,
-    threshold: u32,
+    tuning: Tuning,
     pairs_are_culled: bool,
-    leaf_cache: bool,
-    list_most: u32,
     count: bool,
     isa: Best,
 }
@@ -67,7 +65,7 @@ impl CpuExecutor {
     /// # Errors
     /// Textures that cannot be read.
     pub fn new(file: Arc<SceneFile>, workers: Workers<Shared>, setup: Setup) -> Result<Self, ExecutorError> {
-        let Setup { extent, threshold, count } = setup;
+        let Setup { extent, count, .. } = setup;
         let rays = extent.rays();
         let sets = [RaySet::new(rays), RaySet::new(rays), RaySet::new(0)];
         let tiles = TileLists::new(extent.tiles() as usize);
@@ -80,10 +78,8 @@ impl CpuExecutor {
             extent,
             view: Params::default(),
             directions: Directions::default(),
-            threshold,
+            tuning: Tuning::new(&setup),
             pairs_are_culled: false,
-            leaf_cache: false,
-            list_most: u32::MAX,
             count,
             isa: Best::detect(),
             file,
@@ -103,25 +99,13 @@ impl CpuExecutor {
             tiles: extent.tiles(),
             // Lists grow as they are placed.
             list_capacity: u32::MAX,
-            threshold: self.threshold,
-            list_most: self.list_most,
+            threshold: self.tuning.threshold,
+            list_most: self.tuning.list_most,
             pair_count: self.buffers.tiles.pairs.len() as u32,
             top_count: self.scene.top2.len() as u32,
             instance_pad: self.scene.instance_pad,
             ..self.view
         }
-    }
-
-    /// Whether lists are intersected by the kernel that postpones groups of triangles, for tests.
-    #[cfg(test)]
-    pub(super) fn leaf_cache(&self) -> bool {
-        self.leaf_cache
-    }
-
-    /// What too few rays are, for tests.
-    #[cfg(test)]
-    pub(super) fn threshold(&self) -> u32 {
-        self.threshold
     }
 
     /// The tiles and their lists, for tests.
@@ -235,10 +219,10 @@ impl Executor for CpuExecutor {
         let mut ms_phases = [0.0; 3];
         let everything = bricks.all_geometry_resident();
         for &step in steps {
-            self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.threshold);
+            self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            for dispatch in dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything) {
+            for dispatch in dispatches(pass, step, &params, &self.directions, self.tuning.leaf_cache, everything) {
                 let start = Instant::now();
                 let bound = Bound {
                     params: &dispatch.params,
@@ -294,16 +278,8 @@ impl FrameExecutor for CpuExecutor {
         Ok(())
     }
 
-    fn set_leaf_cache(&mut self, on: bool) {
-        self.leaf_cache = on;
-    }
-
-    fn set_list_most(&mut self, leaves: u32) {
-        self.list_most = leaves;
-    }
-
-    fn set_threshold(&mut self, threshold: u32) {
-        self.threshold = threshold;
+    fn tuning(&mut self) -> &mut Tuning {
+        &mut self.tuning
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -6,7 +6,7 @@ use super::rays::{RaySet, start_hit};
 use super::scene::Bound;
 use super::shade::surface_share;
 use super::vector::{Vec3, cross, dot, each, normalize, xyz};
-use crate::kernel::layout::{GBuffer, NONE, PARAM_RECTANGLE, Ray, T_INFINITE};
+use crate::kernel::layout::{GBuffer, NONE, PARAM_RECTANGLE, Ray, Surface, T_INFINITE};
 use crate::math::exact::barrier;
 use crate::math::sampling::random2;
 use rayon::prelude::*;
@@ -95,7 +95,7 @@ fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
 }
 
 /// A ray from a hit in `direction`, up to `t_max`; none where that leads below the surface.
-fn leaving(surface: &crate::kernel::layout::Surface, direction: Vec3, t_max: f32) -> Ray {
+fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
     let above = dot(surface.normal, direction) > 0.0;
     let (t_min, t_max) = if above { (0.0, t_max) } else { (1.0, 0.0) };
     Ray { origin: surface.point, t_min, direction, t_max }
@@ -106,16 +106,20 @@ fn none(origin: Vec3) -> Ray {
     Ray { origin, t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 }
 }
 
+/// Makes a ray from every hit of the shaded set; where there is none, none.
+fn for_each_leaving(own: &mut RaySet, seen: &RaySet, make: impl Fn(usize, &Surface) -> Ray + Sync) {
+    for_each_new(own, |index| {
+        let surface = &seen.surfaces[index];
+        let ray = if surface.leaf == NONE { none(surface.point) } else { make(index, surface) };
+        (ray, seen.hits[index].id)
+    });
+}
+
 /// One ray of limited length from every primary hit in the pass's direction around the interpolated normal (CHC+RT §5.3); where
 /// that leads below the surface, none.
 pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer]) {
-    for_each_new(own, |index| {
-        let surface = &seen.surfaces[index];
-        let ray = match surface.leaf {
-            NONE => none(surface.point),
-            _ => leaving(surface, turned(bound, index, gbuffer[index].normal), bound.params.length),
-        };
-        (ray, seen.hits[index].id)
+    for_each_leaving(own, seen, |index, surface| {
+        leaving(surface, turned(bound, index, gbuffer[index].normal), bound.params.length)
     });
 }
 
@@ -127,13 +131,8 @@ pub fn generate_diffuse(
     gbuffer: &[GBuffer],
     throughput: &mut [[f32; 4]],
 ) {
-    for_each_new(own, |index| {
-        let surface = &seen.surfaces[index];
-        let ray = match surface.leaf {
-            NONE => none(surface.point),
-            _ => leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE),
-        };
-        (ray, seen.hits[index].id)
+    for_each_leaving(own, seen, |index, surface| {
+        leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
     });
     for ((carried, ray), g) in throughput.iter_mut().zip(&own.rays).zip(gbuffer) {
         let share = |k: usize| surface_share(bound) * bound.params.share * g.albedo[k];
@@ -149,17 +148,10 @@ pub fn generate_mirror(
     gbuffer: &[GBuffer],
     throughput: &mut [[f32; 4]],
 ) {
-    for_each_new(own, |index| {
-        let surface = &seen.surfaces[index];
-        let ray = match surface.leaf {
-            NONE => none(surface.point),
-            _ => {
-                let (d, n) = (normalize(seen.rays[index].direction), gbuffer[index].normal);
-                let along = 2.0 * dot(n, d);
-                leaving(surface, normalize(each(|k| d[k] - along * n[k])), T_INFINITE)
-            }
-        };
-        (ray, seen.hits[index].id)
+    for_each_leaving(own, seen, |index, surface| {
+        let (d, n) = (normalize(seen.rays[index].direction), gbuffer[index].normal);
+        let along = 2.0 * dot(n, d);
+        leaving(surface, normalize(each(|k| d[k] - along * n[k])), T_INFINITE)
     });
     for (carried, ray) in throughput.iter_mut().zip(&own.rays) {
         let share = if ray.t_min <= ray.t_max { 1.0 - bound.params.surface_share } else { 0.0 };

@@ -11,8 +11,8 @@ use super::packet_walk::{PacketGroup, PacketScratch, put, take};
 use super::pair_counts::PairCounts;
 use super::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
 use super::scene::Bound;
-use super::walk_brick::{Group, STACK_SIZE, Visits, finish_walk};
-use crate::kernel::layout::{COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT};
+use super::walk_brick::{Group, Visits, finish_walk};
+use crate::kernel::layout::{NONE, PARAM_ANY_HIT};
 
 /// A group of the top level: the node, and its entered children, inner ones and leaves alike, by priority in the high byte,
 /// so that bricks are met near to far.
@@ -147,15 +147,7 @@ impl<const SELECT: bool> IntersectAll<'_, SELECT> {
                     depth -= 1;
                     group = stack[depth];
                 }
-                let (child, rest) = group.nearest_child(r.ray.flip);
-                if rest.has_children() {
-                    if depth == STACK_SIZE {
-                        tally.add(COUNTER_STACK_OVERFLOW, 1);
-                        break;
-                    }
-                    stack[depth] = rest;
-                    depth += 1;
-                }
+                let Some(child) = group.take_nearest(r.ray.flip, stack, &mut depth, tally) else { break };
                 if in_brick {
                     let opened = r.open_node(isa, bound, &mut visits, best.t, group.child_index(child));
                     group = opened.children;

@@ -9,8 +9,8 @@ use super::packet_walk::PacketScratch;
 use super::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet, run_for_each_ray};
 use super::scene::Bound;
 use super::tile_lists::TileLists;
-use super::walk_brick::{Group, STACK_SIZE, Visits, finish_walk};
-use crate::kernel::layout::{COUNTER_LEAF_GROUPS, COUNTER_STACK_OVERFLOW, Entry, NONE, PARAM_ANY_HIT};
+use super::walk_brick::{Group, Visits, finish_walk};
+use crate::kernel::layout::{COUNTER_LEAF_GROUPS, Entry, NONE, PARAM_ANY_HIT};
 
 /// Of the rays of chosen tiles. With `LEAF_CACHE` two groups of triangles are gathered, as long as the ray does not enter another
 /// leaf.
@@ -115,15 +115,7 @@ fn trace<I: Isa, const LEAF_CACHE: bool>(
                     group = Group::root(r.ray.flip);
                 }
             }
-            let (child, rest) = group.nearest_child(r.ray.flip);
-            if rest.has_children() {
-                if depth == STACK_SIZE {
-                    tally.add(COUNTER_STACK_OVERFLOW, 1);
-                    break;
-                }
-                stack[depth] = rest;
-                depth += 1;
-            }
+            let Some(child) = group.take_nearest(r.ray.flip, stack, &mut depth, tally) else { break };
             let opened = r.open_node(isa, bound, &mut visits, best.t, group.child_index(child));
             group = opened.children;
             triangles = opened.triangles;

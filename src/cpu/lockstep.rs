@@ -8,7 +8,7 @@ use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
 use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
-use crate::kernel::{DeviceInfo, Directions, FrameExecutor, View};
+use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,6 +45,7 @@ pub struct Lockstep {
     bound: f32,
     defect: Option<Defect>,
     directions: Directions,
+    tuning: Tuning,
     findings: Arc<Mutex<Findings>>,
 }
 
@@ -122,8 +123,9 @@ impl Findings {
 
 impl Lockstep {
     /// Of both, over the same scene and with the same extent. `bound`: of differences where they are allowed.
-    pub fn new(gpu: GpuExecutor, cpu: CpuExecutor, bound: f32, findings: Arc<Mutex<Findings>>) -> Self {
-        Self { gpu, cpu, bound, defect: None, directions: Directions::default(), findings }
+    pub fn new(gpu: GpuExecutor, mut cpu: CpuExecutor, bound: f32, findings: Arc<Mutex<Findings>>) -> Self {
+        let tuning = *cpu.tuning();
+        Self { gpu, cpu, bound, defect: None, directions: Directions::default(), tuning, findings }
     }
 
     /// Breaks the processor's side.
@@ -246,13 +248,14 @@ impl Executor for Lockstep {
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let context = format!("{pass:?}, {steps:?}");
-        let threshold = self.cpu.threshold();
+        let Tuning { threshold, leaf_cache: has_leaf_cache, .. } = self.tuning;
+        (*self.gpu.tuning(), *self.cpu.tuning()) = (self.tuning, self.tuning);
         let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, threshold, ..Params::default() };
         for &step in steps {
             let everything = bricks.all_geometry_resident();
             for leaf_cache in [false, true] {
                 let list = dispatches(pass, step, &params, &self.directions, leaf_cache, everything);
-                let ran = |name: &str| leaf_cache == self.cpu.leaf_cache() || !name.starts_with("intersect_list");
+                let ran = |name: &str| leaf_cache == has_leaf_cache || !name.starts_with("intersect_list");
                 let names = list.iter().map(|dispatch| dispatch.kernel).filter(|name| ran(name));
                 self.findings.lock().expect("findings").kernels.extend(names);
             }
@@ -300,19 +303,8 @@ impl FrameExecutor for Lockstep {
         self.cpu.make_binary()
     }
 
-    fn set_leaf_cache(&mut self, on: bool) {
-        self.gpu.set_leaf_cache(on);
-        self.cpu.set_leaf_cache(on);
-    }
-
-    fn set_list_most(&mut self, leaves: u32) {
-        self.gpu.set_list_most(leaves);
-        self.cpu.set_list_most(leaves);
-    }
-
-    fn set_threshold(&mut self, threshold: u32) {
-        self.gpu.set_threshold(threshold);
-        self.cpu.set_threshold(threshold);
+    fn tuning(&mut self) -> &mut Tuning {
+        &mut self.tuning
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -170,7 +170,7 @@ fn render(
         executor = executor.with_defect(defect);
     }
     executor.allow_bounces();
-    executor.set_list_most(variant.list_most);
+    executor.tuning().list_most = variant.list_most;
     if variant.schedule == Schedule::PlainBinary {
         executor.make_binary().unwrap();
     }

@@ -15,6 +15,7 @@ pub mod brick;
 pub mod cache;
 pub mod executor;
 mod generate;
+mod indices;
 mod intersect_all;
 mod intersect_binary;
 mod intersect_list;

@@ -207,15 +207,7 @@ impl PacketScratch {
                 depth -= 1;
                 group = stack[depth];
             }
-            let (child, rest) = group.nearest_child(r.ray.flip);
-            if rest.has_children() {
-                if depth == STACK_SIZE {
-                    tally.add(COUNTER_STACK_OVERFLOW, 1);
-                    break;
-                }
-                stack[depth] = rest;
-                depth += 1;
-            }
+            let Some(child) = group.take_nearest(r.ray.flip, stack, &mut depth, tally) else { break };
             let opened = r.open_node(isa, bound, &mut self.visits, best.t, group.child_index(child));
             group = opened.children;
             if opened.triangles.bits != 0 {

@@ -1,10 +1,11 @@
 //! Reads the attributes of hits in bricks whose attributes are resident: twin of `shaders/resolve.wgsl`. Normal, texture coordinates,
 //! base colour.
 
+use super::indices::Indices;
 use super::rays::RaySet;
 use super::scene::Bound;
 use super::vector::{Vec3, dot, each, most, normalize, xyz};
-use crate::kernel::layout::{BRICK_INDEX32, GBuffer, NO_NORMAL, NONE, Params, STATE_ATTRIBUTES, Texture};
+use crate::kernel::layout::{GBuffer, NO_NORMAL, NONE, Params, STATE_ATTRIBUTES, Texture};
 use crate::schedule::ExecutorError;
 use bricks::{AttributeLayout, AttributeVertex, Brick, Payload, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT, SceneFile};
 use rayon::prelude::*;
@@ -15,8 +16,7 @@ pub struct AttributeView<'a> {
     vertices: &'a [AttributeVertex],
     /// Material and rotation of each triangle.
     surfaces: &'a [u32],
-    short: &'a [u16],
-    long: &'a [u32],
+    indices: Indices<'a>,
 }
 
 impl<'a> AttributeView<'a> {
@@ -24,23 +24,15 @@ impl<'a> AttributeView<'a> {
     pub fn new(brick: &Brick, bytes: &'a [u8]) -> Self {
         let layout = AttributeLayout::of(brick);
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
-        let indices = part(layout.indices, layout.bytes);
-        let is_long = brick.flags & BRICK_INDEX32 != 0;
         Self {
             vertices: bytemuck::cast_slice(part(0, layout.surfaces)),
             surfaces: bytemuck::cast_slice(part(layout.surfaces, layout.indices)),
-            short: if is_long { &[] } else { bytemuck::cast_slice(indices) },
-            long: if is_long { bytemuck::cast_slice(indices) } else { &[] },
+            indices: Indices::new(brick, part(layout.indices, layout.bytes)),
         }
     }
 
     fn corners(&self, triangle: u32) -> [AttributeVertex; 3] {
-        let at = 3 * triangle as usize;
-        let index = |k: usize| match self.long {
-            [] => usize::from(self.short[at + k]),
-            long => long[at + k] as usize,
-        };
-        [0, 1, 2].map(|k| self.vertices[index(k)])
+        self.indices.of(triangle).map(|index| self.vertices[index as usize])
     }
 }
 

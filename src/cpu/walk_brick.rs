@@ -6,7 +6,7 @@ use super::leaf::BrickRay;
 use super::node::{FramedRay, inner_before};
 use super::rays::Slot;
 use super::scene::{Bound, Tally};
-use crate::kernel::layout::{COUNTER_NODES, COUNTER_TRIANGLES, Hit, NONE, Surface};
+use crate::kernel::layout::{COUNTER_NODES, COUNTER_STACK_OVERFLOW, COUNTER_TRIANGLES, Hit, NONE, Surface};
 
 /// MAX_BRICK_HEIGHT + MAX_TOP_HEIGHT and the entries that a change of tree leaves.
 pub const STACK_SIZE: usize = 52;
@@ -43,6 +43,22 @@ impl Group {
     pub fn nearest_child(self, flip: u32) -> (u32, Self) {
         let bit = 31 - self.bits.leading_zeros();
         ((31 - bit) ^ flip, Self { base: self.base, bits: self.bits & !(1 << bit) })
+    }
+
+    /// Slot of the nearest child; the others are left on the stack, of which `depth` are in use. `None`: there is no room for them,
+    /// which is counted.
+    #[inline(always)]
+    pub fn take_nearest(self, flip: u32, stack: &mut Stack, depth: &mut usize, tally: &mut Tally) -> Option<u32> {
+        let (child, rest) = self.nearest_child(flip);
+        if rest.has_children() {
+            if *depth == STACK_SIZE {
+                tally.add(COUNTER_STACK_OVERFLOW, 1);
+                return None;
+            }
+            stack[*depth] = rest;
+            *depth += 1;
+        }
+        Some(child)
     }
 
     /// Node index of the inner child in `slot`: children lie in the order of their slots.

@@ -13,7 +13,7 @@ use super::timing::Timing;
 use super::wgsl::Pages;
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Workgroups, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
-use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, View, padded, report};
+use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, padded, report};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
 use bricks::SceneFile;
@@ -44,12 +44,10 @@ pub struct GpuExecutor {
     timing: Timing,
     view: Params,
     directions: Directions,
-    threshold: u32,
+    tuning: Tuning,
     pairs_are_culled: bool,
     pair_count: u32,
     pair_nodes: u32,
-    leaf_cache: bool,
-    list_most: u32,
 }
 
 impl GpuExecutor {
@@ -124,7 +122,7 @@ impl GpuExecutor {
             Readback::new(&gpu, (bricks * size_of::<layout::Demand>() + layout::COUNTERS_AND_WORK * 4) as u64);
         let timing = Timing::new(&gpu, MOST_DISPATCHES as u32);
         let groups = Groups::new(&gpu, &kernels, &buffers);
-        let (view, directions, threshold) = (Params::default(), Directions::default(), setup.threshold);
+        let (view, directions) = (Params::default(), Directions::default());
         Ok(Self {
             gpu,
             scene,
@@ -138,12 +136,10 @@ impl GpuExecutor {
             timing,
             view,
             directions,
-            threshold,
+            tuning: Tuning::new(&setup),
             pairs_are_culled: false,
             pair_count: 0,
             pair_nodes: 0,
-            leaf_cache: false,
-            list_most: u32::MAX,
         })
     }
 
@@ -188,8 +184,8 @@ impl GpuExecutor {
             tiles_x: extent.tiles_x(),
             tiles: extent.tiles(),
             list_capacity: self.buffers.tiles.capacity,
-            threshold: self.threshold,
-            list_most: self.list_most,
+            threshold: self.tuning.threshold,
+            list_most: self.tuning.list_most,
             pair_count: self.pair_count,
             top_count: self.scene.resident().top2.len() as u32,
             instance_pad: self.buffers.scene.instance_pad,
@@ -204,10 +200,10 @@ impl GpuExecutor {
         let everything = bricks.all_geometry_resident();
         let mut list: Vec<Dispatch> = Vec::new();
         for &step in steps {
-            self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.threshold);
+            self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            list.extend(dispatches(pass, step, &params, &self.directions, self.leaf_cache, everything));
+            list.extend(dispatches(pass, step, &params, &self.directions, self.tuning.leaf_cache, everything));
         }
         let dispatches = list;
         if dispatches.iter().any(|dispatch| dispatch.kernel == COUNT_PAIRS) {
@@ -323,16 +319,8 @@ impl FrameExecutor for GpuExecutor {
         self.rebind();
     }
 
-    fn set_leaf_cache(&mut self, on: bool) {
-        self.leaf_cache = on;
-    }
-
-    fn set_list_most(&mut self, leaves: u32) {
-        self.list_most = leaves;
-    }
-
-    fn set_threshold(&mut self, threshold: u32) {
-        self.threshold = threshold;
+    fn tuning(&mut self) -> &mut Tuning {
+        &mut self.tuning
     }
 
     fn make_binary(&mut self) -> Result<(), ExecutorError> {

@@ -1,7 +1,7 @@
 //! What a frame needs of an executor beside steps.
 
-use super::View;
 use super::layout::{GBuffer, Hit, Ray, Surface};
+use super::{Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
 use crate::stream::WorkerPool;
 use serde::Serialize;
@@ -47,15 +47,8 @@ pub trait FrameExecutor: Executor {
     /// A brick that cannot be read; more nodes than the device holds, with how much is needed.
     fn make_binary(&mut self) -> Result<(), ExecutorError>;
 
-    /// Whether lists are intersected by the kernel that postpones groups of triangles.
-    fn set_leaf_cache(&mut self, on: bool);
-
-    /// Bounds the lists of [`crate::schedule::Step::ShortLists`] to so many leaves, for every pass; with 0 all rays walk from the
-    /// root.
-    fn set_list_most(&mut self, leaves: u32);
-
-    /// Changes [`super::Setup::threshold`].
-    fn set_threshold(&mut self, threshold: u32);
+    /// What holds for submissions from now on.
+    fn tuning(&mut self) -> &mut Tuning;
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

@@ -13,7 +13,7 @@ mod setup;
 
 pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
-pub use setup::{Extent, Setup, View};
+pub use setup::{Extent, Setup, Tuning, View};
 
 #[rustfmt::skip]
 mod layout_checks {

@@ -121,7 +121,7 @@ impl Renderer {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
-        self.executor.set_leaf_cache(self.settings.tracing.optimisations.leaf_cache);
+        self.executor.tuning().leaf_cache = self.settings.tracing.optimisations.leaf_cache;
         if let Some(captures) = &mut self.captures {
             captures.clear();
         }

@@ -140,7 +140,7 @@ impl<'a> Bench<'a> {
         renderer.settings = walk::settings(&args, schedule);
         renderer.fronts = case.variant.fronts.then(Fronts::default);
         renderer.auto = Auto::default();
-        renderer.executor.set_threshold(scaled_threshold(case.variant.threshold, case.tile));
+        renderer.executor.tuning().threshold = scaled_threshold(case.variant.threshold, case.tile);
         if case.cache < 100 {
             let old = &renderer.cache;
             let sizes: Vec<(u64, u64)> = old.bytes.iter().map(|b| (b.geometry, b.attributes)).collect();

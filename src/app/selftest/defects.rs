@@ -8,7 +8,7 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::wgsl::Pages;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
-use crate::kernel::{DeviceInfo, FrameExecutor, View};
+use crate::kernel::{DeviceInfo, FrameExecutor, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
 use anyhow::{Result, bail};
@@ -252,16 +252,8 @@ impl FrameExecutor for Faulty {
         self.inner.make_binary()
     }
 
-    fn set_leaf_cache(&mut self, on: bool) {
-        self.inner.set_leaf_cache(on);
-    }
-
-    fn set_list_most(&mut self, leaves: u32) {
-        self.inner.set_list_most(leaves);
-    }
-
-    fn set_threshold(&mut self, threshold: u32) {
-        self.inner.set_threshold(threshold);
+    fn tuning(&mut self) -> &mut Tuning {
+        self.inner.tuning()
     }
 
     fn begin_frame(&mut self, view: &View) {

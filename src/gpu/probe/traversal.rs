@@ -135,7 +135,7 @@ fn trace(
             if way.is_cold {
                 cache = empty()?;
             }
-            executor.set_list_most(way.list_most);
+            executor.tuning().list_most = way.list_most;
             executor.set_rays(pass, rays);
             cache.begin_pass("probe", 0);
             let tracing = Tracing::default();
