@@ -112,7 +112,7 @@ pub fn test(args: &SelftestArgs) -> Result<Report> {
         list::CASES.iter().filter(|case| args.case.is_empty() || args.case.contains(&case.number)).collect();
     let mut rows = Vec::new();
     if let Some(probe) = probe.filter(|_| args.case.is_empty()) {
-        rows.push(probe_row(&probe));
+        rows.push(probe_row(&probe, args));
     }
     let progress = Progress::new();
     progress.phase("cases", wanted.len() as u64);
@@ -154,15 +154,16 @@ fn run_case(case: &Case, lab: &mut Lab, args: &SelftestArgs) -> Row {
             Err(error) => (false, Vec::new(), Some(format!("{error:#}"))),
         };
         row = Row { status: if passed { Status::Pass } else { Status::Fail }, checks, error, ..row };
-        row.replay = (!passed).then(|| replay(number, args));
+        row.replay = (!passed).then(|| replay(Some(number), args));
     }
     row.ms = start.elapsed().as_secs_f64() * 1e3;
     row
 }
 
-/// The command that repeats a case.
-fn replay(number: u32, args: &SelftestArgs) -> String {
-    let mut text = format!("brickwalk selftest --case {number} --seed {}", args.seed);
+/// The command that repeats a case; the probe, which goes before the cases, with all of them.
+fn replay(number: Option<u32>, args: &SelftestArgs) -> String {
+    let case = number.map_or(String::new(), |number| format!(" --case {number}"));
+    let mut text = format!("brickwalk selftest{case} --seed {}", args.seed);
     let _ = write!(text, " --rays {} --adapter {:?}", args.rays, args.adapter.to_string());
     if let Some(defect) = args.plant {
         let _ = write!(text, " --plant {}", defect.name());
@@ -203,7 +204,7 @@ fn device_traits(device: &Device, defect: Option<Defect>) -> (Traits, Option<Pro
 }
 
 /// The probe as a line before the cases.
-fn probe_row(report: &ProbeReport) -> Row {
+fn probe_row(report: &ProbeReport, args: &SelftestArgs) -> Row {
     let check = |check: &probe::Check| Check {
         measured: format!("{}: {} of {} unlike {}", check.name, check.different, check.cases, check.against),
         bound: "0".into(),
@@ -219,7 +220,7 @@ fn probe_row(report: &ProbeReport) -> Row {
         checks,
         error: None,
         ms: report.ms,
-        replay: (!passed).then(|| "brickwalk selftest".into()),
+        replay: (!passed).then(|| replay(None, args)),
     }
 }
 

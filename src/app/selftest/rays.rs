@@ -20,6 +20,19 @@ pub enum Aim {
 impl Aim {
     /// Every kind.
     pub const ALL: [Self; 3] = [Self::Vertex, Self::Edge, Self::Inside];
+
+    /// The first vertex of a triangle, a point of its first edge, or one inside.
+    pub fn point(self, rng: &mut Rng, [a, b, c]: [DVec3; 3]) -> DVec3 {
+        match self {
+            Self::Vertex => a,
+            Self::Edge => a + rng.unit() * (b - a),
+            Self::Inside => {
+                let (s, t) = (rng.unit(), rng.unit());
+                let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+                a + s * (b - a) + t * (c - a)
+            }
+        }
+    }
 }
 
 /// Triangles in device units relative to a frame's reference point, where lattice points are exact in f64.
@@ -32,20 +45,17 @@ impl Targets {
         Self(truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(relative)).collect())
     }
 
-    /// A point of a random triangle.
-    pub fn point(&self, rng: &mut Rng, aim: Aim) -> DVec3 {
+    /// A random triangle, from any of its vertices on.
+    pub fn triangle(&self, rng: &mut Rng) -> [DVec3; 3] {
         let index = rng.int(0, self.0.len() as i64 - 1) as usize;
         let [a, b, c] = self.0[index];
-        let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]][rng.int(0, 2) as usize];
-        match aim {
-            Aim::Vertex => a,
-            Aim::Edge => a + rng.unit() * (b - a),
-            Aim::Inside => {
-                let (s, t) = (rng.unit(), rng.unit());
-                let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
-                a + s * (b - a) + t * (c - a)
-            }
-        }
+        [[a, b, c], [b, c, a], [c, a, b]][rng.int(0, 2) as usize]
+    }
+
+    /// A point of a random triangle.
+    pub fn point(&self, rng: &mut Rng, aim: Aim) -> DVec3 {
+        let triangle = self.triangle(rng);
+        aim.point(rng, triangle)
     }
 
     /// A ray from `origin` at a random target. Where origin and vertex are lattice points with at most 24 bits between them, the ray

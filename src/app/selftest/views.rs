@@ -2,7 +2,7 @@
 
 use super::case::Checks;
 use super::lab::{Lab, settings, truth_ray};
-use super::meshes::{SHIFTS, aimed, step_of};
+use super::meshes::{OTHER_SHIFTS, SHIFTS, aimed, note, step_of};
 use super::rays::Targets;
 use crate::app::output::npy;
 use crate::app::trace::{check, device_ray, trace};
@@ -17,6 +17,7 @@ use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
 use brickwalk_scenes::{Kind, Settings, Stiff, generate, moved, stiff};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// The smallest city, on a lattice of 2⁻¹⁴ m, moved.
 ///
@@ -71,6 +72,20 @@ pub fn far_city(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
         let place = format!("city {:.0} m away", DVec3::from(shift).length());
         checks.none(&format!("{place}: pixels unlike those at the origin"), unlike, of);
         checks.at_least(&format!("{place}: pixels that show something"), met, 1000);
+    }
+    // Elsewhere: the rule of exactness.
+    for shift in OTHER_SHIFTS {
+        let (file, path, _) = lab.build(city(lab.seed, shift)?, &settings(1024, -14))?;
+        let truth = Truth::load(&file)?;
+        let options = "--size 96x64 --tile 16 --cache 30% --schedule chc --effects primary";
+        let mut renderer = lab.renderer(&file, &path, options)?;
+        let camera = in_city(0, shift);
+        renderer.frame(0, &camera)?;
+        let frame = Frame::near(file.resident(), camera.position);
+        let (tally, missed) = judge_picture(&mut *renderer.executor, &truth, &frame)?;
+        let place = format!("city {:.0} m away, beside the lattice", DVec3::from(shift).length());
+        note(checks, &place, &tally);
+        checks.at_least(&format!("{place}: pixels that show something"), tally.total() - missed, 1000);
     }
     Ok(())
 }
@@ -214,7 +229,7 @@ fn judge_picture(
     let (rays, hits) = (executor.read_rays(Pass::Primary)?, executor.read_hits(Pass::Primary)?);
     let verdict = |(ray, hit)| judge(truth, &truth_ray(frame, ray), super::lab::found(hit));
     let missed = hits.iter().filter(|hit| hit.id == NONE).count() as u64;
-    Ok((rays.iter().zip(&hits).map(verdict).collect(), missed))
+    Ok((rays.par_iter().zip(&hits).map(verdict).collect::<Vec<_>>().into_iter().collect(), missed))
 }
 
 /// Renders pictures of odd sizes from inside of a closed mesh with each schedule.
