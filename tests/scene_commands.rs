@@ -133,6 +133,77 @@ fn a_scene_by_way_of_glb_is_the_same() {
 }
 
 #[test]
+fn stiff_scenes_convert_verify_and_walk() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for case in brickwalk_scenes::Stiff::ALL {
+        let few = if case == brickwalk_scenes::Stiff::Duplicates { "--triangles 20K" } else { "" };
+        let said = done(folder, &format!("scene stiff --case {case} -o {case}.bricks {few}"));
+        let is_empty = case == brickwalk_scenes::Stiff::Empty;
+        assert!(said.contains(&format!("{case}.bricks: ")) && is_empty != said.contains(".far.json"), "{said}");
+        assert!(done(folder, &format!("verify {case}.bricks")).contains("whole"));
+        let info: serde_json::Value =
+            serde_json::from_str(&done(folder, &format!("info {case}.bricks --json"))).unwrap();
+        let stored = info["triangles_stored"].as_u64().unwrap();
+        // Of the series what is smaller than a step of the lattice has no area.
+        let asked = if few.is_empty() { case.default_triangles() } else { 20_000 };
+        assert!(stored <= asked && 2 * stored >= asked, "{case}: {stored} of {asked}");
+        let view = if is_empty { String::new() } else { format!("--path {case}.far.json") };
+        done(
+            folder,
+            &format!("walk {case}.bricks -o out --adapter cpu --size 48x32 --frames 2 --cache 100% --aov {view}"),
+        );
+        let summary = std::fs::read(folder.join("out/summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
+        assert_eq!(summary["non_finite"], 0, "{case}");
+    }
+    // By way of glTF, which is f32, the triangles are as many.
+    done(folder, "scene stiff --case sheets -o g.glb");
+    done(folder, "convert g.glb -o g.bricks");
+    let stored = |file: &str| -> serde_json::Value {
+        let info: serde_json::Value = serde_json::from_str(&done(folder, &format!("info {file} --json"))).unwrap();
+        info["triangles_stored"].clone()
+    };
+    assert_eq!(stored("g.bricks"), stored("sheets.bricks"));
+    assert!(folder.join("g.far.json").exists() && !folder.join("g.near.json").exists());
+    // What it was made from is in its name, with the lattice of the case.
+    let scene = bricks::SceneFile::open(folder.join("slivers.bricks")).unwrap();
+    let span = scene.span(bricks::Payload::Geometry(0));
+    let whole = std::fs::read(folder.join("slivers.bricks")).unwrap();
+    let mut damaged = whole.clone();
+    damaged[(span.offset + span.bytes / 2) as usize] ^= 0x10;
+    std::fs::write(folder.join("slivers.bricks"), damaged).unwrap();
+    done(folder, "repair slivers.bricks");
+    assert!(std::fs::read(folder.join("slivers.bricks")).unwrap() == whole);
+}
+
+#[test]
+fn light_that_is_not_finite_fails_a_walk_loudly() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    done(folder, "scene stiff --case cube -o c.bricks");
+    // With the usual cache, which holds some of its bricks.
+    let walk = "walk c.bricks -o out --adapter cpu --size 48x32 --frames 1 --path c.far.json";
+    done(folder, walk);
+    // Of light too bright for f32 each pass counts what it left out; what overflows in sums is counted, too.
+    for (light, pass) in [("--sun-intensity 1e300", "shadow"), ("--sky-intensity 1e300", "primary")] {
+        let line = refused(folder, &format!("{walk} {light}"));
+        assert!(line.contains("not finite") && line.contains("records.jsonl"), "{line}");
+        let json = |text: &str| -> serde_json::Value { serde_json::from_str(text).unwrap() };
+        let summary = json(&std::fs::read_to_string(folder.join("out/summary.json")).unwrap());
+        let records = std::fs::read_to_string(folder.join("out/records.jsonl")).unwrap();
+        let counts: Vec<(String, u64)> = records
+            .lines()
+            .map(json)
+            .map(|record| (record["pass"].as_str().unwrap().into(), record["non_finite"].as_u64().unwrap()))
+            .collect();
+        assert_eq!(summary["non_finite"], counts.iter().map(|(_, n)| n).sum::<u64>());
+        let of_pass = counts.iter().find(|(name, _)| name == pass).unwrap().1;
+        assert!(of_pass > 0, "{light}: {counts:?}");
+    }
+}
+
+#[test]
 fn verify_names_the_damaged_brick() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

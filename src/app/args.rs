@@ -7,11 +7,12 @@ use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
 use super::optimisation_args::OptimisationArgs;
+use super::scene_kind::{SceneKind, scene_help};
 use super::selftest::args::SelftestArgs;
 use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
 use crate::stream::Policy;
-use brickwalk_scenes::Kind;
+use brickwalk_scenes::Stiff;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -171,19 +172,24 @@ pub struct WorkArgs {
 
 /// Options of `scene`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = UNITS)]
+#[command(after_help = scene_help())]
 pub struct SceneArgs {
     /// What to generate: city (blocks of houses along streets), pipes (a plant in an open frame of steel), terrain
-    /// (mountains, woods and meadows around a pond), stadium (an ornate teapot in a stadium)
+    /// (mountains, woods and meadows around a pond), stadium (an ornate teapot in a stadium), stiff (a small scene that is hard for
+    /// arithmetic or for builders, see --case)
     #[arg(value_name = "KIND")]
-    pub kind: Kind,
+    pub kind: SceneKind,
+    /// Which stiff scene: one of the cases below [default: none, stiff needs one]
+    #[arg(long, value_name = "NAME")]
+    pub case: Option<Stiff>,
     /// The file to write: S.bricks, or S.glb or S.gltf (with S.bin) for other programs; S.near.json and S.far.json, camera
-    /// paths, are written beside it
+    /// paths, are written beside it, for stiff scenes the latter alone
     #[arg(short, long, value_name = "S.bricks")]
     pub output: PathBuf,
-    /// Triangles of the scene with its instances, about; up to 150M
-    #[arg(long, value_name = "COUNT", default_value = "1M", value_parser = positive_count)]
-    pub triangles: u64,
+    /// Triangles of the scene with its instances, about; up to 150M, of stiff scenes up to 10M [default: 1M; of stiff scenes as
+    /// listed below]
+    #[arg(long, value_name = "COUNT", value_parser = positive_count)]
+    pub triangles: Option<u64>,
     /// Seed; the same seed and count make the same scene
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,

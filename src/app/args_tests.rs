@@ -1,5 +1,6 @@
 use super::super::sizes::Direction;
 use super::*;
+use brickwalk_scenes::Kind;
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
@@ -156,7 +157,12 @@ fn options_of_other_commands_arrive() {
     assert_eq!((c.build.brick_triangles, c.build.work.threads, c.build.work.lattice), (Some(4000), Some(2), Some(-12)));
     assert!(c.mesh.drop_non_finite);
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
-    assert_eq!((s.kind, s.triangles, s.seed, s.build.brick_triangles), (Kind::City, 200_000, 7, None));
+    assert_eq!((s.kind, s.triangles, s.seed), (SceneKind::Generated(Kind::City), Some(200_000), 7));
+    assert_eq!((s.case, s.build.brick_triangles), (None, None));
+    let Command::Scene(s) = parse("scene stiff --case slivers -o s.glb").unwrap() else { panic!() };
+    assert_eq!((s.kind, s.case, s.triangles), (SceneKind::Stiff, Some(Stiff::Slivers), None));
+    let help = parse("scene --help").unwrap_err().to_string();
+    assert!(Stiff::ALL.iter().all(|kind| help.contains(kind.about())), "{help}");
     let Command::Replay(r) = parse("replay f.jsonl --cache 5% 1M,2M --cache 7K --json").unwrap() else { panic!() };
     assert_eq!(r.cache[..2], [CacheSize::Percent(5.0), CacheSize::Bytes(1 << 20)]);
     assert!(r.cache.len() == 4 && r.json);

@@ -19,6 +19,7 @@ pub mod quality;
 pub mod repair;
 pub mod replay;
 pub mod scene;
+pub mod scene_kind;
 pub mod selftest;
 pub mod session;
 pub mod sizes;

@@ -15,8 +15,8 @@ use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, W
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::import::{ImportSettings, import};
 use brickwalk_convert::progress::Progress;
-use brickwalk_convert::source::Source;
-use brickwalk_scenes::{Kind, Settings, generate};
+use brickwalk_convert::source::{InMemory, Source};
+use brickwalk_scenes::{Kind, Settings, Stiff, generate, stiff};
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
@@ -103,8 +103,10 @@ fn rebuild(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Prog
     let manifest = &scene.resident().manifest;
     let source = source(args, scene, scratch, progress)?;
     same_sources(scene, &source.outline().sources)?;
+    let of_case = || stiff_scene(manifest).and_then(|(kind, ..)| kind.lattice_log2());
     let settings = BuildSettings {
         brick_triangles: manifest.brick_triangles,
+        lattice_log2: args.work.lattice.or_else(of_case),
         proxies: manifest.has_proxies,
         // Beside the output, which is in a folder of its own.
         scratch: None,
@@ -127,11 +129,20 @@ fn source(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Progr
         let settings = ImportSettings { threads, scratch: Some(scratch.to_owned()) };
         return Ok(Box::new(import(&expand(&args.inputs.inputs)?, &settings, progress)?));
     }
+    if let Some((kind, n, seed)) = stiff_scene(&scene.resident().manifest) {
+        return Ok(Box::new(InMemory::from(stiff(kind, n, seed))));
+    }
     let settings = generated(&scene.resident().manifest).ok_or_else(|| {
         let name = scene.path().display();
         super::Usage(format!("{name} is no generated scene: give what it was converted from with --from"))
     })?;
     Ok(Box::new(generate(&settings, progress)?))
+}
+
+/// What a stiff scene was made from.
+fn stiff_scene(manifest: &Manifest) -> Option<(Stiff, u32, u64)> {
+    let [source] = &manifest.sources[..] else { return None };
+    Stiff::of_source(&source.name).filter(|_| source.bytes == 0)
 }
 
 /// The settings of a generated scene. Its name does not tell whether trees and vehicles are instances, but the file does.

@@ -4,48 +4,32 @@ use super::Usage;
 use super::args::{BuildArgs, SceneArgs};
 use super::convert::{build_settings, refuse_folder, summarise, usage};
 use super::interrupt;
+use super::scene_kind::SceneKind;
 use super::sizes::human_count;
 use anyhow::{Context, Result};
-use brickwalk_convert::build::{BuildSummary, build_source};
-use brickwalk_scenes::{Error, GltfForm, Settings, generate, write_gltf, write_paths};
+use brickwalk_convert::build::{BuildSettings, BuildSummary, build_source};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{InMemory, Source};
+use brickwalk_scenes::{
+    Error, GltfForm, Kind, Settings, Stiff, far_path, generate, stiff, write_far_path, write_gltf, write_paths,
+};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Runs `scene`.
 ///
 /// # Errors
-/// A count of triangles that the kind cannot have, or a file cannot be written.
+/// Options that the kind does not have, a count of triangles that it cannot have, or a file cannot be written.
 pub fn run(args: &SceneArgs) -> Result<()> {
     let start = Instant::now();
-    let settings = Settings {
-        kind: args.kind,
-        triangles: args.triangles,
-        seed: args.seed,
-        instanced: args.instanced,
-        copies: args.copies,
-    };
     let progress = interrupt::job();
     refuse_folder(&args.output)?;
-    let gltf = GltfForm::of(&args.output);
-    if gltf.is_some() {
+    if GltfForm::of(&args.output).is_some() {
         refuse_building(&args.build)?;
     }
-    let (paths, summary) = in_pool(args.build.work.threads, || -> Result<_> {
-        let scene = generate(&settings, &progress).map_err(|error| match error {
-            // The count is an option's value, known only here.
-            Error::Triangles { .. } => Usage(format!("--triangles: {error}")).into(),
-            error => anyhow::Error::new(error),
-        })?;
-        let summary = match gltf {
-            Some(form) => {
-                write_gltf(&scene, &args.output, form, &progress)?;
-                Written::Gltf { triangles: scene.placed_triangles() }
-            }
-            None => {
-                let settings = build_settings(&args.build);
-                Written::Bricks(usage(build_source(&scene, &settings, &args.output, &progress))?)
-            }
-        };
-        Ok((write_paths(&scene, &args.output)?, summary))
+    let (paths, summary) = in_pool(args.build.work.threads, || match args.kind {
+        SceneKind::Generated(kind) => generated(args, kind, &progress),
+        SceneKind::Stiff => made_stiff(args, &progress),
     })??;
     progress.finish();
     match summary {
@@ -61,6 +45,71 @@ pub fn run(args: &SceneArgs) -> Result<()> {
         super::print(&format!("{}: a camera path\n", path.display()))?;
     }
     Ok(())
+}
+
+/// Writes a scene of a kind and its paths.
+fn generated(args: &SceneArgs, kind: Kind, progress: &Progress) -> Result<(Vec<PathBuf>, Written)> {
+    if args.case.is_some() {
+        return Err(Usage(format!("--case: {kind} has none; the kind stiff has")).into());
+    }
+    let settings = Settings {
+        kind,
+        triangles: args.triangles.unwrap_or(1_000_000),
+        seed: args.seed,
+        instanced: args.instanced,
+        copies: args.copies,
+    };
+    let scene = generate(&settings, progress).map_err(|error| match error {
+        // The count is an option's value, known only here.
+        Error::Triangles { .. } => Usage(format!("--triangles: {error}")).into(),
+        error => anyhow::Error::new(error),
+    })?;
+    let summary = write(&scene, &args.output, &build_settings(&args.build), progress)?;
+    Ok((write_paths(&scene, &args.output)?, summary))
+}
+
+/// Writes a stiff scene and its path.
+fn made_stiff(args: &SceneArgs, progress: &Progress) -> Result<(Vec<PathBuf>, Written)> {
+    let Some(case) = args.case else {
+        let names = Stiff::ALL.map(Stiff::name).join(", ");
+        return Err(Usage(format!("stiff: name the scene with --case: {names}")).into());
+    };
+    if args.instanced || args.copies > 1 {
+        return Err(Usage("--instanced, --copies: a stiff scene is one mesh, placed once".into()).into());
+    }
+    let triangles = args.triangles.unwrap_or(case.default_triangles());
+    if triangles > Stiff::MOST_TRIANGLES {
+        let most = Stiff::MOST_TRIANGLES;
+        return Err(Usage(format!(
+            "--triangles: a stiff scene of {triangles} is not possible; ask for at most {most}"
+        ))
+        .into());
+    }
+    if case == Stiff::Empty && GltfForm::of(&args.output).is_some() {
+        return Err(Usage("--case empty: glTF has no buffer of no bytes; write S.bricks".into()).into());
+    }
+    let scene = stiff(case, case.size_of(triangles), args.seed);
+    let path = far_path(&scene);
+    let usual = build_settings(&args.build);
+    let settings = BuildSettings {
+        lattice_log2: usual.lattice_log2.or(case.lattice_log2()),
+        brick_triangles: args.build.brick_triangles.or(case.brick_triangles()).unwrap_or(usual.brick_triangles),
+        ..usual
+    };
+    let summary = write(&InMemory::from(scene), &args.output, &settings, progress)?;
+    let path = path.map(|path| write_far_path(&path, &args.output)).transpose()?;
+    Ok((path.into_iter().collect(), summary))
+}
+
+/// Writes a scene in the form that the name of the file stands for.
+fn write(scene: &dyn Source, output: &Path, settings: &BuildSettings, progress: &Progress) -> Result<Written> {
+    let Some(form) = GltfForm::of(output) else {
+        return Ok(Written::Bricks(usage(build_source(scene, settings, output, progress))?));
+    };
+    write_gltf(scene, output, form, progress)?;
+    let outline = scene.outline();
+    let triangles = outline.placements.iter().map(|p| outline.meshes[p.mesh as usize].triangle_count()).sum();
+    Ok(Written::Gltf { triangles })
 }
 
 /// What became of a scene.
@@ -158,6 +207,32 @@ mod tests {
             assert!(error.is::<Usage>() && error.to_string().contains(".bricks"), "{option}: {error:?}");
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), before);
+    }
+
+    #[test]
+    fn stiff_scenes_refuse_what_they_do_not_have() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |line: &str| {
+            let words = format!("brickwalk scene {line} -o {}", folder.path().join("s.glb").display());
+            let Command::Scene(args) = Cli::parse_from(words.split_whitespace()).command else { panic!() };
+            let error = run(&args).unwrap_err();
+            assert!(error.is::<Usage>(), "{line}: {error:?}");
+            error.to_string()
+        };
+        for (line, says) in [
+            ("stiff", "far-origin, scale-mix"),
+            ("stiff --case shell --copies 2", "--copies"),
+            ("stiff --case shell --instanced", "--instanced"),
+            ("stiff --case shell --triangles 11M", "at most 10000000"),
+            ("stiff --case empty", "S.bricks"),
+            ("city --case shell", "stiff"),
+        ] {
+            assert!(refused(line).contains(says), "{line}: {}", refused(line));
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        let unknown = |words: [&str; 6]| Cli::try_parse_from(words).unwrap_err().to_string();
+        assert!(unknown(["brickwalk", "scene", "stif", "-o", "s.glb", "--fast"]).contains("stadium, stiff"));
+        assert!(unknown(["brickwalk", "scene", "stiff", "-o", "s.glb", "--case=luck"]).contains("slivers"));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A mesh of the scene is a mesh there, a part a primitive, a placement a node; all keep their order, and so do triangles.
 //! Positions are f32 relative to an anchor of their mesh, by which its nodes are moved.
 
-use crate::{Error, Scene, output};
+use crate::{Error, output};
 use bricks::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{PART_TRIANGLES, PartOutline, Placement, Primitive, Source, SourceError};
@@ -59,7 +59,7 @@ impl GltfForm {
 ///
 /// [`Error::GlbSize`] for a scene too large for [`GltfForm::Binary`], [`Error::Write`] when a file cannot be written,
 /// [`Error::Interrupted`].
-pub fn write_gltf(scene: &Scene, path: &Path, form: GltfForm, progress: &Progress) -> Result<(), Error> {
+pub fn write_gltf(scene: &dyn Source, path: &Path, form: GltfForm, progress: &Progress) -> Result<(), Error> {
     match form {
         GltfForm::Binary => write_binary(scene, path, u32::MAX.into(), progress),
         GltfForm::Separate => write_separate(scene, path, progress),

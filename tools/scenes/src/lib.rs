@@ -42,11 +42,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 pub use gltf::{GltfForm, write_gltf};
-pub use path::{CameraPath, Keyframe, LONG_FRAMES, NEAR_FRAMES, write_paths};
+pub use path::{CameraPath, Keyframe, LONG_FRAMES, NEAR_FRAMES, write_far_path, write_paths};
 pub use rng::Rng;
 pub use scene::Scene;
 pub use soup::{SoupKind, rotated_instances, soup};
-pub use stiff::{Stiff, moved, one_mesh, stiff};
+pub use stiff::{Stiff, far_path, moved, one_mesh, stiff};
 
 /// Kinds of generated scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -140,6 +140,12 @@ pub enum Error {
     /// No such kind.
     #[error("there is no generated scene {name:?}; the kinds are: {}", Kind::ALL.map(Kind::name).join(", "))]
     Kind {
+        /// What was asked for.
+        name: String,
+    },
+    /// No such stiff scene.
+    #[error("there is no stiff scene {name:?}; there are: {}", Stiff::ALL.map(Stiff::name).join(", "))]
+    Case {
         /// What was asked for.
         name: String,
     },

@@ -140,18 +140,28 @@ pub fn around(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64) -> Ca
 ///
 /// [`Error::Write`] when a file cannot be written.
 pub fn write_paths(scene: &Scene, base: &Path) -> Result<Vec<PathBuf>, Error> {
+    let near = |frames| scene.near_path(frames);
+    let paths = [("near", near(NEAR_FRAMES)), ("near-300", near(LONG_FRAMES)), ("far", scene.far_path())];
+    paths.iter().map(|(suffix, path)| write_beside(path, base, suffix)).collect()
+}
+
+/// As [`write_paths`], of a path that has all of the scene in view: `dir/S.far.json`.
+///
+/// # Errors
+///
+/// [`Error::Write`] when the file cannot be written.
+pub fn write_far_path(path: &CameraPath, base: &Path) -> Result<PathBuf, Error> {
+    write_beside(path, base, "far")
+}
+
+fn write_beside(path: &CameraPath, base: &Path, suffix: &str) -> Result<PathBuf, Error> {
     let is_scene = base.extension().is_some_and(|e| SCENE_EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)));
     let stem = if is_scene { base.with_extension("") } else { base.to_path_buf() };
-    let mut written = Vec::new();
-    let near = |frames| scene.near_path(frames);
-    for (suffix, path) in [("near", near(NEAR_FRAMES)), ("near-300", near(LONG_FRAMES)), ("far", scene.far_path())] {
-        let mut name = stem.clone().into_os_string();
-        name.push(format!(".{suffix}.json"));
-        let file = PathBuf::from(name);
-        write_json(&path, &file).map_err(|source| Error::Write { path: file.clone(), source })?;
-        written.push(file);
-    }
-    Ok(written)
+    let mut name = stem.into_os_string();
+    name.push(format!(".{suffix}.json"));
+    let file = PathBuf::from(name);
+    write_json(path, &file).map_err(|source| Error::Write { path: file.clone(), source })?;
+    Ok(file)
 }
 
 fn write_json(path: &CameraPath, file: &Path) -> std::io::Result<()> {

@@ -1,7 +1,7 @@
 //! Stiff scenes are what they say: closed, flat, long, many.
 
 use brickwalk_convert::source::SourceScene;
-use brickwalk_scenes::{Stiff, moved, stiff};
+use brickwalk_scenes::{Stiff, far_path, moved, stiff};
 use std::collections::HashMap;
 
 fn triangles(scene: &SourceScene) -> Vec<[[f64; 3]; 3]> {
@@ -51,6 +51,46 @@ fn every_kind_is_made_and_depends_on_its_seed_alone() {
     assert_eq!(all[..18], all[18..36]);
     let flat = triangles(&stiff(Stiff::FlatBoxes, 9, 0));
     assert!(flat.iter().flatten().flatten().all(|x| (x * 64.0).fract() == 0.0));
+}
+
+#[test]
+fn kinds_are_found_by_name_and_source_and_have_the_size_asked_for() {
+    for kind in Stiff::ALL {
+        assert_eq!(kind.name().parse::<Stiff>().expect("its name"), kind);
+        let count = |triangles_asked: u64| {
+            let scene = stiff(kind, kind.size_of(triangles_asked), 3);
+            assert_eq!(Stiff::of_source(&scene.sources[0].name), Some((kind, kind.size_of(triangles_asked), 3)));
+            triangles(&scene).len() as u64
+        };
+        let asked = kind.default_triangles().min(20_000);
+        let made = count(asked);
+        assert!(made <= asked && 10 * made >= 6 * asked, "{kind}: {made} of {asked}");
+        if asked > 1 {
+            let made = count(3 * asked);
+            assert!(made <= 3 * asked && 4 * made >= 3 * asked, "{kind}: {made} of {}", 3 * asked);
+        }
+    }
+    assert!("luck".parse::<Stiff>().unwrap_err().to_string().contains("slivers"));
+    assert_eq!(Stiff::of_source("city seed=0 triangles=2000000"), None);
+}
+
+#[test]
+fn far_paths_see_the_scene() {
+    for kind in Stiff::ALL {
+        let scene = stiff(kind, kind.size_of(500), 1);
+        let Some(path) = far_path(&scene) else {
+            assert_eq!(kind, Stiff::Empty);
+            continue;
+        };
+        let all = triangles(&scene);
+        let center =
+            all.as_flattened().iter().map(|p| glam::DVec3::from(*p)).sum::<glam::DVec3>() / (3 * all.len()) as f64;
+        for key in &path.keyframes {
+            let [eye, target] = [key.position, key.target].map(glam::DVec3::from);
+            let toward = (target - eye).normalize();
+            assert!(toward.dot((center - eye).normalize()) > 0.6, "{kind}: {key:?}");
+        }
+    }
 }
 
 #[test]

@@ -1,68 +1,14 @@
 //! Scenes that are hard for arithmetic or for builders: extremes of size, shape, place and depth, each one mesh placed once.
 
+mod kind;
+
+pub use kind::Stiff;
+
+use crate::path::{CameraPath, around as path_around};
 use crate::rng::Rng;
 use crate::soup::{bumpy_sphere, inside, scene};
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene};
 use glam::DVec3;
-use std::fmt;
-
-/// Kinds of stiff scenes. `n` is the size that [`stiff`] is given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stiff {
-    /// A closed bumpy sphere around the origin, radius 0.8 to 1.2: an icosahedron divided `n` times, 20 · 4ⁿ triangles.
-    Shell,
-    /// A closed double cone around the origin, radius 1, height 2: two fans of `n` triangles.
-    Fans,
-    /// A closed cube around the origin, side 2, its faces `n` x `n` squares of two triangles; coordinates are multiples of 1/n.
-    Cube,
-    /// `n` triangles a hundred million times longer than wide, in all directions within a cube of side 2; they need a lattice of
-    /// 2⁻³⁰ or finer.
-    Slivers,
-    /// Four times the same sheet of `n` x `n` squares, triangle by triangle, in a plane that no axis lies in.
-    Sheets,
-    /// `n` triangles at one corner, each 0.985 times as large as the one before, from 1000 down.
-    Series,
-    /// `n` triangles, the k-th of size k, whose boxes all have the origin as their centre.
-    EqualCentroids,
-    /// One triangle `n` times.
-    Duplicates,
-    /// Thirty-two triangles of size 200 through a cube of side 20 that holds `n` of size 0.3.
-    Spanning,
-    /// `n` axis-aligned boxes of 12 triangles, two thirds of them flat on one axis, on multiples of 1/64 within a cube of side 8.
-    FlatBoxes,
-    /// Closed bumpy spheres around the origin, one in the other, of sizes from 10⁻⁴ to 10⁶, a decade each; icosahedra divided `n` times.
-    /// They need a lattice of 2⁻¹⁹, the finest that there is for them.
-    ScaleMix,
-    /// One triangle.
-    Triangle,
-    /// Nothing.
-    Empty,
-}
-
-impl Stiff {
-    /// Every kind.
-    pub const ALL: [Self; 13] = [
-        Self::Shell,
-        Self::Fans,
-        Self::Cube,
-        Self::Slivers,
-        Self::Sheets,
-        Self::Series,
-        Self::EqualCentroids,
-        Self::Duplicates,
-        Self::Spanning,
-        Self::FlatBoxes,
-        Self::ScaleMix,
-        Self::Triangle,
-        Self::Empty,
-    ];
-}
-
-impl fmt::Display for Stiff {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(&format!("{self:?}").to_lowercase())
-    }
-}
 
 /// The scene of a kind. It depends on the arguments alone.
 pub fn stiff(kind: Stiff, n: u32, seed: u64) -> SourceScene {
@@ -94,8 +40,18 @@ pub fn stiff(kind: Stiff, n: u32, seed: u64) -> SourceScene {
             soup_of([[DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::new(0.0, 1.0, 0.0)]])
         }
         Stiff::Empty => Primitive::default(),
+        Stiff::FarOrigin => bumpy_sphere(&mut rng, n),
     };
-    one_mesh(&format!("stiff {kind} seed={seed} n={n}"), primitive)
+    let made = one_mesh(&format!("stiff {kind} seed={seed} n={n}"), primitive);
+    if kind == Stiff::FarOrigin { moved(made, 1.0 / 16384.0, 1.0, [1e7, 0.0, 0.0]) } else { made }
+}
+
+/// A path that has all of a scene in view, whose placements are all the identity; `None` of an empty one.
+pub fn far_path(source: &SourceScene) -> Option<CameraPath> {
+    let all = source.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|primitive| &primitive.positions);
+    let [low, high] =
+        all.map(|&p| DVec3::from(p)).map(|p| [p, p]).reduce(|[low, high], [p, _]| [low.min(p), high.max(p)])?;
+    Some(path_around(0.5 * (low + high), &[[low, high]], 26f64.to_radians(), 0.7))
 }
 
 /// A scene of one mesh, placed once where it is.
