@@ -138,14 +138,17 @@ fn stiff_scenes_convert_verify_and_walk() {
     let folder = folder.path();
     for case in brickwalk_scenes::Stiff::ALL {
         let few = if case == brickwalk_scenes::Stiff::Duplicates { "--triangles 20K" } else { "" };
-        let said = done(folder, &format!("scene stiff --case {case} -o {case}.bricks {few}"));
+        let output = brickwalk(folder, &format!("scene stiff --case {case} -o {case}.bricks {few}"));
+        let (said, warned) = (stdout(&output), stderr(&output));
+        // The least triangles of the series are no larger than a step of the lattice.
+        let is_known = case == brickwalk_scenes::Stiff::Series && warned.contains("triangles without area");
+        assert!(output.status.success() && (warned.is_empty() || is_known), "{case}: {warned}");
         let is_empty = case == brickwalk_scenes::Stiff::Empty;
         assert!(said.contains(&format!("{case}.bricks: ")) && is_empty != said.contains(".far.json"), "{said}");
         assert!(done(folder, &format!("verify {case}.bricks")).contains("whole"));
         let info: serde_json::Value =
             serde_json::from_str(&done(folder, &format!("info {case}.bricks --json"))).unwrap();
         let stored = info["triangles_stored"].as_u64().unwrap();
-        // Of the series what is smaller than a step of the lattice has no area.
         let asked = if few.is_empty() { case.default_triangles() } else { 20_000 };
         assert!(stored <= asked && 2 * stored >= asked, "{case}: {stored} of {asked}");
         let view = if is_empty { String::new() } else { format!("--path {case}.far.json") };
