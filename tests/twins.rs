@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{brickwalk, city, folder, frames, succeed, walk};
+use common::{brickwalk, city, folder, frames, shared_scenes, succeed, walk};
 use exr::prelude::{FlatSamples, read_all_flat_layers_from_file};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -147,6 +147,19 @@ fn soups_and_instances_look_the_same() {
         build(source, &settings, &scene, &Progress::hidden()).expect("a scene");
         let options = format!("{EFFECTS} --schedule chc --cache 35% --tile 16");
         check(folder.path(), &software, name, &scene, &options);
+    }
+}
+
+#[test]
+fn sponza_looks_the_same() {
+    let (Some(software), Some(scenes)) = (software(), shared_scenes()) else { return };
+    let folder = folder();
+    let scene = folder.path().join("sponza.bricks");
+    let input = scenes.join("sponza/Sponza.gltf");
+    let words = ["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()];
+    succeed(words.into_iter().chain(["--brick-triangles", "4K"].map(std::ffi::OsStr::new)));
+    for (schedule, cache) in [("plain", "100%"), ("chc", "40%"), ("chc", "15%"), ("demand", "25%")] {
+        check(folder.path(), &software, "sponza", &scene, &format!("{EFFECTS} --schedule {schedule} --cache {cache}"));
     }
 }
 
