@@ -227,6 +227,8 @@ pub fn run_for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: &im
             // SAFETY: a value of the type exists only where AVX2 has been detected.
             unsafe { run_avx2(isa, kernel, scratch, slot) }
         }),
+        #[cfg(target_arch = "aarch64")]
+        Best::Neon(isa) => for_each_ray(set, bound, work, |scratch, slot| kernel.run(isa, scratch, slot)),
     }
 }
 
@@ -265,6 +267,8 @@ pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: 
             // SAFETY: a value of the type exists only where AVX-512 and AVX2 have been detected.
             unsafe { run_block_avx512(isa, bound, kernel, scratch, band, block) }
         }
+        #[cfg(target_arch = "aarch64")]
+        Best::Neon(isa) => run_block(isa, bound, kernel, scratch, band, block),
     });
 }
 
