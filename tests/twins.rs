@@ -208,13 +208,18 @@ fn the_number_of_threads_does_not_show() {
 fn no_driver_is_needed() {
     let folder = folder();
     let scene = city(folder.path(), "20K", "1K");
-    let without_driver = |words: &[&str]| {
+    let command = |words: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_brickwalk"));
+        command.env_remove("BRICKWALK_ADAPTER").args(words);
+        command
+    };
+    let without_driver = |words: &[&str]| {
+        let mut command = command(words);
         // The loader finds no driver in a folder that does not exist.
         for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
             command.env(variable, folder.path().join("none.json"));
         }
-        command.env_remove("BRICKWALK_ADAPTER").args(words).output().expect("the command starts")
+        command.output().expect("the command starts")
     };
     let listed = without_driver(&["adapters", "--json"]);
     assert!(listed.status.success());
@@ -233,4 +238,16 @@ fn no_driver_is_needed() {
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("llvmpipe"));
     assert_eq!(brickwalk(["walk", scene, "-o", out, "--adapter", "no such thing"]).status.code(), Some(1));
+    // Where the loader, too, is no library that can be loaded.
+    let libraries = folder.path().join("libraries");
+    std::fs::create_dir(&libraries).expect("a folder");
+    for name in ["libvulkan.so.1", "libvulkan.so"] {
+        std::fs::write(libraries.join(name), "").expect("a file");
+    }
+    let output = folder.path().join("demo");
+    let out = output.to_str().expect("test paths are UTF-8");
+    let demo = ["demo", "-o", out, "--triangles", "20K", "--frames", "1", "--size", "32x24"];
+    let demo = command(&demo).env("LD_LIBRARY_PATH", &libraries).output().expect("the command starts");
+    assert!(demo.status.success(), "{}", String::from_utf8_lossy(&demo.stderr));
+    assert!(output.join("report.html").is_file());
 }
