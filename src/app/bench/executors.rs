@@ -10,6 +10,7 @@ use super::scenes;
 use crate::app::device::Adapter;
 use crate::app::output::atomic;
 use crate::app::session::{Session, open_scene};
+use crate::app::sizes::human_count;
 use crate::app::{interrupt, walk};
 use crate::gpu::device::candidates;
 use crate::kernel::{DeviceInfo, Extent};
@@ -18,41 +19,62 @@ use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use brickwalk_report::{Table, Value};
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
 /// Raised when a field of `executors.json` changes its meaning.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// A device with all that it renders with.
 struct Side {
     renderer: Renderer,
     info: DeviceInfo,
-    /// Rays and wall time of every pass of a frame, by effect.
-    passes: BTreeMap<&'static str, Vec<(u64, f64)>>,
+    /// Rays and wall times of all frames, by pass, in the order of passes.
+    passes: Vec<(&'static str, Vec<(u64, f64)>)>,
     differences: Differences,
 }
 
 /// How pictures differ from those of the first device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Differences {
+    /// Pixels of all pictures.
+    pixels: u64,
     /// Pixels whose triangles differ.
     ids: u64,
     /// The greatest difference of depths where they do not, in units of the last place.
     depth_ulps: u32,
+    /// The sum of the squares of the differences of radiance, over pixels and channels.
+    squares: f64,
 }
 
 impl Differences {
-    /// Adds those of a frame.
+    /// Adds those of a frame of the same size.
     fn add(&mut self, one: &Pixels, other: &Pixels) {
-        for i in 0..one.id.len().max(other.id.len()) {
-            if one.id.get(i) != other.id.get(i) {
+        self.pixels += one.radiance.len() as u64;
+        for ((a, b), (da, db)) in one.id.iter().zip(&other.id).zip(one.depth.iter().zip(&other.depth)) {
+            if a == b {
+                self.depth_ulps = self.depth_ulps.max(da.to_bits().abs_diff(db.to_bits()));
+            } else {
                 self.ids += 1;
-            } else if let (Some(a), Some(b)) = (one.depth.get(i), other.depth.get(i)) {
-                self.depth_ulps = self.depth_ulps.max(a.to_bits().abs_diff(b.to_bits()));
             }
         }
+        let squared = |a: &f32, b: &f32| (f64::from(*a) - f64::from(*b)).powi(2);
+        let channels = one.radiance.as_flattened().iter().zip(other.radiance.as_flattened());
+        self.squares += channels.map(|(a, b)| squared(a, b)).sum::<f64>();
+    }
+
+    /// The root of the mean square of the differences of radiance.
+    fn radiance_rmse(&self) -> f64 {
+        (self.squares / (3 * self.pixels.max(1)) as f64).sqrt()
+    }
+}
+
+impl Side {
+    /// Median rays of a frame, and milliseconds, of a pass, if the device has one of this name.
+    fn medians(&self, pass: &str) -> Option<(f64, f64)> {
+        let (_, all) = self.passes.iter().find(|(name, _)| *name == pass)?;
+        let (rays, ms) = all.iter().map(|&(rays, ms)| (rays as f64, ms)).unzip();
+        Some((median(rays), median(ms)))
     }
 }
 
@@ -94,7 +116,11 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
                     continue;
                 }
                 for record in output.records {
-                    side.passes.entry(record.pass).or_default().push((record.rays, record.ms));
+                    let one = (record.rays, record.ms);
+                    match side.passes.iter_mut().find(|(name, _)| *name == record.pass) {
+                        Some((_, all)) => all.push(one),
+                        None => side.passes.push((record.pass, vec![one])),
+                    }
                 }
             }
             progress.advance(1);
@@ -136,7 +162,7 @@ fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapt
     let session = Session::open(open_scene(scene)?, scene, &walk_args.stream, extent)?;
     let renderer = walk::renderer(session, &walk_args);
     let info = renderer.executor.device();
-    Ok(Side { renderer, info, passes: BTreeMap::new(), differences: Differences::default() })
+    Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
 }
 
 /// The median, of an even number of values the upper one.
@@ -147,29 +173,43 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// The table of all devices and passes.
 fn table(sides: &[Side]) -> Table {
-    let columns = ["device", "pass", "rays a frame", "ms", "Mray/s", "over the first", "other ids", "depth, ulps"];
+    let columns = ["device", "pass", "rays a frame", "ms", "Mray/s", "over the first"];
     let mut rows = Vec::new();
-    let ms = |side: &Side, pass: &str| side.passes.get(pass).map(|all| median(all.iter().map(|(_, ms)| *ms).collect()));
     for side in sides {
-        for (&pass, all) in &side.passes {
-            let rays = median(all.iter().map(|(rays, _)| *rays as f64).collect());
-            let own = ms(side, pass);
-            let first = sides.first().and_then(|first| ms(first, pass));
+        for (pass, _) in &side.passes {
+            let own = side.medians(pass);
+            let first = sides.first().and_then(|first| first.medians(pass));
             rows.push(vec![
                 Value::Text(side.info.name.clone()),
-                Value::Text(pass.into()),
-                Value::Number(rays),
-                Value::number(own),
-                Value::number(own.map(|ms| rays * 1e-3 / ms)),
-                Value::ratio(own.zip(first).map(|(own, first)| first / own)),
-                Value::Number(side.differences.ids as f64),
-                Value::Number(f64::from(side.differences.depth_ulps)),
+                Value::Text((*pass).into()),
+                Value::number(own.map(|(rays, _)| rays)),
+                Value::number(own.map(|(_, ms)| ms)),
+                Value::number(own.map(|(rays, ms)| rays * 1e-3 / ms)),
+                Value::ratio(own.zip(first).map(|((_, own), (_, first))| first / own)),
             ]);
         }
     }
-    let caption = "Medians over frames and repetitions of the wall time of a pass; \"other ids\": pixels of all frames whose triangle \
-                   is not that of the first device.";
+    let caption = "Medians over frames and repetitions of the wall time of a pass.";
     Table { name: "executors".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows }
+}
+
+/// How the pictures of each device but the first differ from those of the first, a line each.
+fn differences(sides: &[Side]) -> String {
+    let Some((first, others)) = sides.split_first() else { return String::new() };
+    let line = |side: &Side| {
+        let d = &side.differences;
+        format!(
+            "- {} beside {}: {} of {} pixels show another triangle; where it is the same, depths differ by at most {} ulps; \
+             radiance differs by an RMSE of {}.\n",
+            side.info.name,
+            first.info.name,
+            human_count(d.ids),
+            human_count(d.pixels),
+            human_count(u64::from(d.depth_ulps)),
+            Value::Number(d.radiance_rmse()).show()
+        )
+    };
+    others.iter().map(line).collect()
 }
 
 /// Writes the results; returns what to print.
@@ -179,7 +219,17 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
         .iter()
         .map(|side| {
             let DeviceInfo { name, driver, driver_info, backend, .. } = &side.info;
-            json!({ "name": name, "driver": driver, "driver_info": driver_info, "backend": backend })
+            let d = &side.differences;
+            json!({
+                "name": name,
+                "driver": driver,
+                "driver_info": driver_info,
+                "backend": backend,
+                "pixels_compared": d.pixels,
+                "other_ids": d.ids,
+                "depth_ulps": d.depth_ulps,
+                "radiance_rmse": d.radiance_rmse(),
+            })
         })
         .collect();
     let json = json!({
@@ -204,7 +254,12 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
     atomic::write(&args.output.join("executors.json"), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
     let mut text = format!(
         "# The same frames on every device\n\nCity of {} triangles, {}, cache {}, schedule {}, {} frames, {} repetitions.\n\n",
-        settings.triangles[0], settings.size, args.cache, args.schedule, settings.frames, settings.repeat
+        human_count(settings.triangles[0]),
+        settings.size,
+        args.cache,
+        args.schedule,
+        settings.frames,
+        settings.repeat
     );
     for side in sides {
         text +=
@@ -214,6 +269,9 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
         text += &format!("- {note}\n");
     }
     text += &format!("\n{}\n\n{}", table.caption, table.to_markdown());
+    if sides.len() > 1 {
+        text += &format!("\n{}", differences(sides));
+    }
     atomic::write(&args.output.join("executors.md"), text.as_bytes())?;
     Ok(text)
 }
@@ -223,16 +281,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn differences_count_triangles_and_measure_depths() {
-        let pixels = |id: &[u32], depth: &[f32]| Pixels { id: id.to_vec(), depth: depth.to_vec(), ..Pixels::default() };
-        let one = pixels(&[1, 2, 3], &[1.0, 2.0, f32::INFINITY]);
+    fn differences_count_triangles_and_measure_depths_and_radiance() {
+        let pixels = |id: [u32; 3], depth: [f32; 3], red: f32| Pixels {
+            id: id.to_vec(),
+            depth: depth.to_vec(),
+            radiance: vec![[red, 0.5, 0.5]; 3],
+            ..Pixels::default()
+        };
+        let one = pixels([1, 2, 3], [1.0, 2.0, f32::INFINITY], 0.25);
         let mut all = Differences::default();
         all.add(&one, &one);
-        assert_eq!(all, Differences::default());
-        all.add(&one, &pixels(&[1, 5, 3], &[1.0f32.next_up().next_up(), 9.0, f32::INFINITY]));
-        assert_eq!(all, Differences { ids: 1, depth_ulps: 2 });
-        // A picture that ends early differs in what it lacks.
-        all.add(&one, &pixels(&[1], &[1.0]));
-        assert_eq!(all.ids, 3);
+        assert_eq!(all, Differences { pixels: 3, ..Differences::default() });
+        all.add(&one, &pixels([1, 5, 3], [1.0f32.next_up().next_up(), 9.0, f32::INFINITY], 0.75));
+        assert_eq!((all.pixels, all.ids, all.depth_ulps), (6, 1, 2));
+        // Half of the pixels differ by 0.5 in one of three channels.
+        assert_eq!(all.radiance_rmse(), (0.25f64 / 6.0).sqrt());
     }
 }
