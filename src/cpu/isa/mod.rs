@@ -131,8 +131,7 @@ impl Isa for Scalar {
     }
 }
 
-/// [`Isa`] by the intrinsics of the module where this is used: a value of `$name` is proof
-/// that the processor has them.
+/// [`Isa`] by the functions of the module where this is used. A value of `$name` is proof that the processor has their instructions.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 macro_rules! isa_over_intrinsics {
     ($name:ident, $wide:ty, $eight:ty) => {
