@@ -246,7 +246,7 @@ fn no_driver_is_needed() {
     }
     let output = folder.path().join("demo");
     let out = output.to_str().expect("test paths are UTF-8");
-    let demo = ["demo", "-o", out, "--triangles", "20K", "--frames", "1", "--size", "32x24"];
+    let demo = ["demo", "-o", out, "--triangles", "20K", "--cache", "1M", "--frames", "1", "--size", "32x24"];
     let demo = command(&demo).env("LD_LIBRARY_PATH", &libraries).output().expect("the command starts");
     assert!(demo.status.success(), "{}", String::from_utf8_lossy(&demo.stderr));
     assert!(output.join("report.html").is_file());
