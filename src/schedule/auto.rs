@@ -150,7 +150,7 @@ mod tests {
         for (spell, shift) in (1..40).flat_map(|spell| (0..8).map(move |shift| (spell, shift))) {
             let mut auto = Auto::default();
             let cost = |fixed, i: u32| {
-                let speed = if (i + shift) / spell % 2 == 0 { 1.4 } else { 1.0 };
+                let speed = if ((i + shift) / spell).is_multiple_of(2) { 1.4 } else { 1.0 };
                 speed * if fixed == Fixed::Chc { 1.15 } else { 1.0 }
             };
             let over = run(&mut auto, 48, false, cost);
