@@ -116,7 +116,7 @@ fn layout_checks(module: &naga::Module) -> String {
     }
     for (_, constant) in module.constants.iter() {
         let Some(name) = constant.name.as_deref() else { continue };
-        let prefixes = ["PARAM_", "STATE_", "COUNTER_", "WORK_", "INSTANCE_", "BRICK_", "BINARY_", "NONE"];
+        let prefixes = ["PARAM_", "STATE_", "COUNTER_", "WORK_", "INSTANCE_", "BRICK_", "BINARY_", "BATCH_", "NONE"];
         if prefixes.iter().any(|p| name.starts_with(p))
             && let naga::Expression::Literal(naga::Literal::U32(value)) = module.global_expressions[constant.init]
         {

@@ -1,4 +1,4 @@
-// Empties the G-buffer of the shaded set, and before the first sample the radiance.
+// Empties the G-buffer of the shaded set, and before the first sample of a batch the radiance.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -11,7 +11,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     gbuffer[index] = GBuffer(vec3<f32>(0.0), 0u, vec3<f32>(0.0), 0u, vec3<f32>(0.0), 0u, vec2<f32>(0.0), vec2<f32>(0.0));
-    if params.sample == 0u && (params.flags & PARAM_BOUNCE) == 0u {
+    if params.sample % BATCH_SAMPLES == 0u && (params.flags & PARAM_BOUNCE) == 0u {
         radiance[index] = vec4<f32>(0.0);
     }
 }

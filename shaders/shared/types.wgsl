@@ -51,6 +51,8 @@ const PARAM_TIGHTER: u32 = 128u;  // pairs are queried by the boxes of the node'
 const PARAM_NEXT: u32 = 256u;     // a ray asks up to the first brick that it enters of those it asks for, not for all
 const PARAM_CULLED: u32 = 512u;   // pairs of a tile and a leaf that no more rays see than the threshold are left out
 
+const BATCH_SAMPLES: u32 = 64u;   // samples that are summed before the radiance is emptied
+
 struct Ray {
     origin: vec3<f32>,    // in the frame, device units
     t_min: f32,

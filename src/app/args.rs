@@ -7,6 +7,7 @@ use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
 use super::optimisation_args::OptimisationArgs;
+use super::picture_args::PictureArgs;
 use super::scene_kind::{SceneKind, scene_help};
 use super::selftest::args::SelftestArgs;
 use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
@@ -338,7 +339,7 @@ pub struct WalkArgs {
     /// How secondary rays are answered: exact
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
-    /// Samples per pixel
+    /// Samples per pixel, 1 to 1M; beyond 64 they are summed in f64, so that no number of them makes the sum drift
     #[arg(long, value_name = "N", default_value = "1", value_parser = samples)]
     pub spp: u32,
     /// Seed of random sampling
@@ -347,6 +348,9 @@ pub struct WalkArgs {
     /// Write an EXR with radiance, depth, normal, triangle id and albedo beside each PNG
     #[arg(long)]
     pub aov: bool,
+    /// Pictures.
+    #[command(flatten)]
+    pub pictures: PictureArgs,
     /// Ask after every pass which bricks it needed (bricks_needed in the records); takes a traversal more a pass
     #[arg(long)]
     pub measure_needed: bool,
@@ -507,7 +511,7 @@ fn copies(text: &str) -> Result<u32, String> {
 }
 
 fn samples(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 65_536)
+    ranged(text, 1, 1_000_000)
 }
 
 fn threads(text: &str) -> Result<u32, String> {

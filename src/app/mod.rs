@@ -15,6 +15,8 @@ pub mod light_args;
 mod named;
 pub mod optimisation_args;
 pub mod output;
+pub mod picture_args;
+mod pictures;
 pub mod quality;
 pub mod repair;
 pub mod replay;

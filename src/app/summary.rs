@@ -2,6 +2,7 @@
 
 use super::args::WalkArgs;
 use super::optimisation_args::names;
+use super::pictures::Pictures;
 use crate::render::{Renderer, Schedule};
 use crate::stats::Record;
 use serde_json::{Map, Value, json};
@@ -10,7 +11,13 @@ use serde_json::{Map, Value, json};
 const FORMAT: u32 = 1;
 
 /// The summary of a walk of `frames` finished frames.
-pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], frames: u32) -> Value {
+pub fn of_walk(
+    args: &WalkArgs,
+    renderer: &mut Renderer,
+    pictures: &Pictures,
+    records: &[Record],
+    frames: u32,
+) -> Value {
     let streaming = streaming(renderer);
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
@@ -63,6 +70,7 @@ pub fn of_walk(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], fra
             "rect_light": args.light.rect_light.map(|light| light.map(|v| v.to_array())),
         },
         "frames": frames,
+        "pictures": pictures.summary(args),
         "auto": (renderer.settings.schedule == Schedule::Auto).then(|| json!({
             "switches": renderer.auto.switches,
             "passes_last_by": renderer.auto.in_force().into_iter().collect::<std::collections::BTreeMap<_, _>>(),

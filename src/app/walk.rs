@@ -1,11 +1,12 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::args::WalkArgs;
-use super::output::{atomic, exr, png};
+use super::output::atomic;
+use super::pictures::Pictures;
 use super::session::{Session, open_scene, write_requests};
 use super::summary;
 use crate::kernel::Extent;
-use crate::render::{Captures, FrameOutput, Light, RenderSettings, Renderer, Schedule};
+use crate::render::{BATCH_SAMPLES, Captures, Light, RenderError, RenderSettings, Renderer, Schedule};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
@@ -17,7 +18,6 @@ use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -47,9 +47,15 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     let mut renderer = renderer(session, args);
     renderer.captures = args.measure_error.then(Captures::default);
     let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
+    let mut pictures = Pictures::create(&frames_folder, args)?;
     let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
     let progress = Progress::new();
-    progress.phase("frames", args.frames.into());
+    // A frame of many samples takes long: the samples are counted then.
+    let counts_samples = args.spp > BATCH_SAMPLES;
+    match counts_samples {
+        true => progress.phase("samples", u64::from(args.frames) * u64::from(args.spp)),
+        false => progress.phase("frames", args.frames.into()),
+    }
     let stop = super::interrupt::flag();
     let mut records = Vec::new();
     let mut finished = 0;
@@ -58,7 +64,18 @@ pub fn run(args: &WalkArgs) -> Result<()> {
             break;
         }
         let camera = path.frame(frame, args.frames);
-        let mut output = renderer.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
+        let mut told = 0;
+        let mut watch = |samples: u32| {
+            if counts_samples {
+                progress.advance(u64::from(samples - told));
+                told = samples;
+            }
+            samples == args.spp || !stop.load(Ordering::Relaxed)
+        };
+        let mut output = match renderer.frame_watched(frame, &camera, &mut watch) {
+            Err(RenderError::Interrupted) => break,
+            output => output.with_context(|| args.scene.display().to_string())?,
+        };
         if let Some(reference) = &mut reference {
             reference.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
             note_errors(&mut output.records, &renderer, reference);
@@ -66,7 +83,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         if let Some(prefetcher) = prefetcher.as_mut().filter(|_| frame + 1 < args.frames) {
             look_ahead(&mut renderer, prefetcher, &camera);
         }
-        write_frame(&frames_folder, frame, args, &output)?;
+        pictures.frame(frame, path.frame_time(args.frames), &output.pixels)?;
         for record in output.records {
             let line = lines.push(&record)?;
             if args.json {
@@ -75,10 +92,11 @@ pub fn run(args: &WalkArgs) -> Result<()> {
             records.push(record);
         }
         finished += 1;
-        progress.advance(1);
+        progress.advance(u64::from(!counts_samples));
     }
     progress.finish();
-    finish(args, &mut renderer, &records, finished)?;
+    pictures.finish(args.json)?;
+    finish(args, &mut renderer, &pictures, &records, finished)?;
     if finished < args.frames {
         bail!("interrupted after {finished} of {} frames; {} holds what is done", args.frames, args.output.display());
     }
@@ -178,28 +196,14 @@ pub fn look_ahead(renderer: &mut Renderer, prefetcher: &mut Prefetcher, camera: 
     workers.prefetch(&items);
 }
 
-fn write_frame(folder: &Path, frame: u32, args: &WalkArgs, output: &FrameOutput) -> Result<()> {
-    let pixels = &output.pixels;
-    let name = folder.join(format!("{frame:04}.png"));
-    let srgb: Vec<[u8; 3]> = pixels.radiance.iter().map(|c| c.map(png::srgb8)).collect();
-    png::write(&name, args.size.width, args.size.height, &srgb)?;
-    if args.aov {
-        let aovs = exr::Aovs {
-            width: args.size.width,
-            height: args.size.height,
-            radiance: &pixels.radiance,
-            depth: &pixels.depth,
-            normal: &pixels.normal,
-            triangle: &pixels.id,
-            albedo: &pixels.albedo,
-        };
-        exr::write(&name.with_extension("exr"), &aovs)?;
-    }
-    Ok(())
-}
-
-fn finish(args: &WalkArgs, renderer: &mut Renderer, records: &[Record], frames: u32) -> Result<()> {
-    let summary = summary::of_walk(args, renderer, records, frames);
+fn finish(
+    args: &WalkArgs,
+    renderer: &mut Renderer,
+    pictures: &Pictures,
+    records: &[Record],
+    frames: u32,
+) -> Result<()> {
+    let summary = summary::of_walk(args, renderer, pictures, records, frames);
     let text = serde_json::to_string_pretty(&summary)? + "\n";
     atomic::write(&args.output.join("summary.json"), text.as_bytes())?;
     write_requests(&args.stream, &renderer.cache)?;

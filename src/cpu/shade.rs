@@ -5,7 +5,7 @@ use super::light::{add_light as add, ambient, sky, sunlight};
 use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, cross, dot, each, most, xyz};
-use crate::kernel::layout::{GBuffer, NONE, PARAM_BOUNCE, PARAM_RECTANGLE, PARAM_SKY, PARAM_SUN, Ray};
+use crate::kernel::layout::{BATCH_SAMPLES, GBuffer, NONE, PARAM_BOUNCE, PARAM_RECTANGLE, PARAM_SKY, PARAM_SUN, Ray};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
@@ -17,7 +17,7 @@ const RUN: usize = 1024;
 pub struct Pixels {
     /// Of the hits of sets 0 and 1.
     pub gbuffers: [Vec<GBuffer>; 2],
-    /// Summed over samples; w counts them.
+    /// Summed over the samples of a batch; w counts them.
     pub radiance: Vec<[f32; 4]>,
     /// Of the light that the rays of set 1 bring.
     pub throughput: Vec<[f32; 4]>,
@@ -43,10 +43,10 @@ pub fn surface_share(bound: &Bound) -> f32 {
     if bound.has(PARAM_BOUNCE) { 1.0 } else { bound.params.surface_share }
 }
 
-/// Empties the G-buffer of the shaded set, and before the first sample the radiance.
+/// Empties the G-buffer of the shaded set, and before the first sample of a batch the radiance.
 pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
     pixels.gbuffers[shaded].fill(GBuffer::default());
-    if bound.params.sample == 0 && !bound.has(PARAM_BOUNCE) {
+    if bound.params.sample.is_multiple_of(BATCH_SAMPLES) && !bound.has(PARAM_BOUNCE) {
         pixels.radiance.fill([0.0; 4]);
     }
 }

@@ -45,7 +45,7 @@ pub struct TileBuffers {
 pub struct PixelBuffers {
     /// [`layout::GBuffer`] of the hits of sets 0 and 1.
     pub gbuffers: [wgpu::Buffer; 2],
-    /// Radiance summed over samples.
+    /// Radiance summed over the samples of a batch.
     pub radiance: wgpu::Buffer,
     /// Share of the light that the rays of set 1 bring.
     pub throughput: wgpu::Buffer,

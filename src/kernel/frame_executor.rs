@@ -80,7 +80,7 @@ pub trait FrameExecutor: Executor {
     /// The device's.
     fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError>;
 
-    /// Reads the radiance summed over samples back; w counts them.
+    /// Reads the radiance summed over the samples of a batch back ([`super::layout::BATCH_SAMPLES`] of a frame in a row); w counts them.
     ///
     /// # Errors
     /// The device's.

@@ -42,6 +42,8 @@ pub const COUNTER_TILES_CHOSEN: u32 = 19;
 pub const WORK_CHOSEN: u32 = 24;
 pub const WORK_ROOTED: u32 = 28;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
+/// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
+pub const BATCH_SAMPLES: u32 = 64;
 /// Number of counters.
 pub const COUNTERS: usize = 24;
 /// Counters and, behind them, what indirect dispatches take: from [`WORK_CHOSEN`] and [`WORK_ROOTED`] on, four words each.

@@ -7,7 +7,7 @@ use crate::schedule::{ExecutorError, Lamp, Pass};
 /// The pictures of the effects of one frame.
 #[derive(Clone, Debug, Default)]
 pub struct Captures {
-    /// Radiance summed over samples when the pass before ended.
+    /// Radiance summed over the samples of the batch when the pass before ended.
     before: Vec<[f32; 4]>,
     effects: Vec<Capture>,
 }
@@ -17,7 +17,7 @@ pub struct Captures {
 struct Capture {
     name: &'static str,
     /// What they added to the radiance summed over samples, per pixel.
-    radiance: Vec<[f32; 3]>,
+    radiance: Vec<[f64; 3]>,
     /// Per pixel a digest of what the rays hit, pass by pass: closest hits by their triangles, any hits by whether there is one.
     hits: Vec<u64>,
 }
@@ -38,6 +38,11 @@ impl Captures {
     pub fn clear(&mut self) {
         self.before.clear();
         self.effects.clear();
+    }
+
+    /// Begins a batch of samples, whose radiance is summed from nothing.
+    pub fn begin_batch(&mut self) {
+        self.before.clear();
     }
 
     /// Notes what a pass of the effect `name`, which has just ended, did.
@@ -63,7 +68,7 @@ impl Captures {
         self.before.resize(now.len(), [0.0; 4]);
         for ((sum, now), before) in effect.radiance.iter_mut().zip(&now).zip(&self.before) {
             for (channel, sum) in sum.iter_mut().enumerate() {
-                *sum += now[channel] - before[channel];
+                *sum += f64::from(now[channel]) - f64::from(before[channel]);
             }
         }
         for (digest, hit) in effect.hits.iter_mut().zip(&hits) {
@@ -81,8 +86,8 @@ impl Captures {
         let find = |captures: &Self| captures.effects.iter().position(|effect| effect.name == name);
         let (Some(a), Some(b)) = (find(self), find(exact)) else { return EffectError::default() };
         let (a, b) = (&self.effects[a], &exact.effects[b]);
-        let difference = |(a, b): (&[f32; 3], &[f32; 3])| {
-            let channels = a.iter().zip(b).map(|(&a, &b)| (f64::from(a) - f64::from(b)).abs());
+        let difference = |(a, b): (&[f64; 3], &[f64; 3])| {
+            let channels = a.iter().zip(b).map(|(a, b)| (a - b).abs());
             channels.sum::<f64>() / 3.0 / f64::from(samples)
         };
         let mut tiles = std::collections::BTreeMap::<(u32, u32), (f64, u32)>::new();

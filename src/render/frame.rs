@@ -1,7 +1,7 @@
 //! The frame loop.
 
 use super::pass_record::FrameRecords;
-use super::{Captures, Effects, Light, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Light, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -54,6 +54,9 @@ pub enum RenderError {
     /// The executor's error.
     #[error(transparent)]
     Executor(#[from] ExecutorError),
+    /// Whoever watched the frame wished it to stop.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 /// What a frame shows, row by row from the top.
@@ -121,6 +124,20 @@ impl Renderer {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
+        self.frame_watched(frame, camera, &mut |_| true)
+    }
+
+    /// [`Renderer::frame`]; `watch` is told the number of finished samples after every [`BATCH_SAMPLES`] and at the end, and says
+    /// whether to go on.
+    ///
+    /// # Errors
+    /// As those of [`Renderer::frame`], or `watch` said no.
+    pub fn frame_watched(
+        &mut self,
+        frame: u32,
+        camera: &Camera,
+        watch: &mut dyn FnMut(u32) -> bool,
+    ) -> Result<FrameOutput, RenderError> {
         self.executor.tuning().leaf_cache = self.settings.tracing.optimisations.leaf_cache;
         if let Some(captures) = &mut self.captures {
             captures.clear();
@@ -128,7 +145,13 @@ impl Renderer {
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
         let effects = self.settings.effects;
+        let mut accumulation = Accumulation::default();
         for sample in 0..self.settings.samples {
+            if sample.is_multiple_of(BATCH_SAMPLES)
+                && let Some(captures) = &mut self.captures
+            {
+                captures.begin_batch();
+            }
             let seed = self.settings.seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9));
             let view = camera_view(self.scene.resident(), camera, &self.light, &effects, self.size, sample, seed);
             self.executor.begin_frame(&view);
@@ -152,9 +175,15 @@ impl Renderer {
             if sample == 0 && self.settings.aov {
                 self.read_aovs(view.frame.unit, &mut output.pixels)?;
             }
+            let finished = sample + 1;
+            if finished.is_multiple_of(BATCH_SAMPLES) || finished == self.settings.samples {
+                accumulation.add(&self.executor.read_radiance()?);
+                if !watch(finished) {
+                    return Err(RenderError::Interrupted);
+                }
+            }
         }
-        let radiance = self.executor.read_radiance()?;
-        output.pixels.radiance = radiance.iter().map(|c| [c[0] / c[3], c[1] / c[3], c[2] / c[3]]).collect();
+        output.pixels.radiance = accumulation.mean();
         output.records = records.finish(self);
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
         if let Some(primary) = output.records.first_mut() {

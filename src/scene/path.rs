@@ -196,6 +196,12 @@ impl CameraPath {
         self.at(time)
     }
 
+    /// The time from one frame of `frames` to the next.
+    pub fn frame_time(&self, frames: u32) -> f64 {
+        let range = self.keyframes[self.keyframes.len() - 1].time - self.keyframes[0].time;
+        range / f64::from(frames.saturating_sub(1).max(1))
+    }
+
     /// The camera at a time, clamped to the range of the keyframes.
     pub fn at(&self, time: f64) -> Camera {
         let keys = &self.keyframes;

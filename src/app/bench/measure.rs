@@ -7,7 +7,7 @@ use super::plan::{Case, PLAIN, PLAIN_BVH2, Variant};
 use super::scenes::Place;
 use crate::app::args::{Cli, Command, WalkArgs};
 use crate::app::device::Adapter;
-use crate::app::output::png;
+use crate::app::output::srgb;
 use crate::app::session::{Session, open_scene, scaled_threshold};
 use crate::app::walk;
 use crate::kernel::Extent;
@@ -201,7 +201,7 @@ impl<'a> Bench<'a> {
             let mut picture = |case: &Case| -> Result<Vec<[u8; 3]>> {
                 self.prepare(case)?;
                 let radiance = self.frame(&path, frame)?.pixels.radiance;
-                Ok(radiance.iter().map(|pixel| pixel.map(png::srgb8)).collect())
+                Ok(srgb::pixels(&radiance))
             };
             let (a, b) = (picture(case)?, picture(&exact)?);
             let error = difference(&a, &b, self.settings.size.width as usize, case.tile as usize);

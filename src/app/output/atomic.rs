@@ -3,7 +3,8 @@
 use anyhow::{Context, Result};
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Creates a folder and its parents; one that exists is kept with what it holds.
 ///
@@ -22,30 +23,67 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Writes a file under a temporary name in its final folder, then renames it: a reader sees the old file, or all of the new
-/// one. On an error the temporary is removed and the old file stays.
+/// A file that is written under a temporary name in its final folder and renamed when it is finished: until then a reader sees the
+/// old file, then all of the new one. Dropped before that, it leaves no trace.
 ///
 /// The contents are not synced to the disk: after a power cut an image may have to be rendered again.
+#[derive(Debug)]
+pub struct Replacement {
+    out: BufWriter<NamedTempFile>,
+    path: PathBuf,
+}
+
+impl Replacement {
+    /// Starts a file that will be `path`.
+    ///
+    /// # Errors
+    /// The folder does not exist or cannot be written to, or the final name is that of a folder.
+    pub fn create(path: &Path) -> Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".brickwalk-").suffix(".tmp");
+        #[cfg(unix)]
+        {
+            // Temporaries are private by default; the finished file has the permissions of any other new file.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        anyhow::ensure!(!path.is_dir(), "{}: this is a folder; choose the name of a file", path.display());
+        let temporary = builder.tempfile_in(folder_of(path)).with_context(|| cannot_write(path))?;
+        Ok(Self { out: BufWriter::with_capacity(1 << 20, temporary), path: path.into() })
+    }
+
+    /// Appends `bytes`.
+    ///
+    /// # Errors
+    /// The disk is full.
+    pub fn push(&mut self, bytes: &[u8]) -> Result<()> {
+        self.out.write_all(bytes).with_context(|| cannot_write(&self.path))
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// The disk is full, or the name has been taken by a folder.
+    pub fn finish(self) -> Result<()> {
+        let context = || cannot_write(&self.path);
+        let temporary = self.out.into_inner().map_err(std::io::IntoInnerError::into_error).with_context(context)?;
+        temporary.persist(&self.path).map_err(|e| e.error).with_context(context)?;
+        Ok(())
+    }
+}
+
+fn cannot_write(path: &Path) -> String {
+    format!("{}: cannot write this file; check its folder and the space left", path.display())
+}
+
+/// Writes a whole file as a [`Replacement`]. On an error the old file stays.
 ///
 /// # Errors
-/// The folder does not exist or is full, `write` fails, or the final name is that of a folder.
-pub fn write_with(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> Result<()>) -> Result<()> {
-    let context = || format!("{}: cannot write this file; check its folder and the space left", path.display());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".brickwalk-").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        // Temporaries are private by default; the finished file has the permissions of any other new file.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let temporary = builder.tempfile_in(folder_of(path)).with_context(context)?;
-    let mut buffered = BufWriter::with_capacity(1 << 20, temporary.as_file());
-    write(&mut buffered)?;
-    buffered.flush().with_context(context)?;
-    drop(buffered);
-    temporary.persist(path).map_err(|e| e.error).with_context(context)?;
-    Ok(())
+/// As those of [`Replacement`], or `write` fails.
+pub fn write_with(path: &Path, write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> Result<()>) -> Result<()> {
+    let mut file = Replacement::create(path)?;
+    write(&mut file.out)?;
+    file.finish()
 }
 
 /// [`write_with`] for contents in memory.

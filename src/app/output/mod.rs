@@ -5,3 +5,5 @@ pub mod atomic;
 pub mod exr;
 pub mod npy;
 pub mod png;
+pub mod srgb;
+pub mod video;

@@ -6,14 +6,6 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use std::path::Path;
 
-/// The sRGB value (IEC 61966-2-1), 0..=255, of a linear value: clamped to 0..=1, rounded to nearest; NaN is black.
-pub fn srgb8(linear: f32) -> u8 {
-    let x = f64::from(linear).clamp(0.0, 1.0);
-    let encoded = if x <= 0.0031308 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-    // A NaN survives the clamp and becomes 0 in the cast.
-    (encoded * 255.0 + 0.5) as u8
-}
-
 /// Writes `pixels` (sRGB, row by row from the top) as a PNG; the same pixels give the same bytes.
 ///
 /// # Errors
@@ -35,30 +27,6 @@ pub fn write(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn srgb_matches_the_standard() {
-        for (linear, srgb) in [
-            (0.0, 0),
-            (1.0, 255),
-            (0.5, 188),
-            (0.18, 118),
-            (0.0031308, 10),
-            (-1.0, 0),
-            (7.0, 255),
-            (f32::NAN, 0),
-            (f32::INFINITY, 255),
-            (f32::NEG_INFINITY, 0),
-        ] {
-            assert_eq!(srgb8(linear), srgb, "{linear}");
-        }
-        // Decoding each byte and encoding it again is the identity.
-        for byte in 0..=255u8 {
-            let e = f64::from(byte) / 255.0;
-            let linear = if e <= 0.04045 { e / 12.92 } else { ((e + 0.055) / 1.055).powf(2.4) };
-            assert_eq!(srgb8(linear as f32), byte);
-        }
-    }
 
     #[test]
     fn round_trip_with_equal_bytes() {

@@ -3,7 +3,7 @@
 use super::case::Source::{Analytic, Exact, Paths, Reference, Unit};
 use super::case::{Case, Checks, Source};
 use super::lab::Lab;
-use super::{boxes, maps, meshes, shapes, streaming, surfaces, views};
+use super::{boxes, maps, meshes, samples, shapes, streaming, surfaces, views};
 use anyhow::Result;
 
 const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab) -> Result<Checks>) -> Case {
@@ -69,7 +69,7 @@ pub const CASES: &[Case] = &[
     later(51, "E_all - E_occ in a closed box", Analytic),
     later(52, "NaN in the history", Unit),
     later(53, "running variance: mean 10^8, sigma 1", Analytic),
-    later(54, "10^6 accumulated frames", Analytic),
+    case(54, "10^6 accumulated frames", Analytic, samples::accumulation),
     case(55, "albedo 0", Analytic, surfaces::black),
     later(56, "distances in f16", Reference),
     later(57, "jump flooding without a seed", Unit),

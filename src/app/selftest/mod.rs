@@ -17,6 +17,7 @@ mod list;
 mod maps;
 mod meshes;
 mod rays;
+mod samples;
 mod shapes;
 mod streaming;
 mod surfaces;
