@@ -26,7 +26,9 @@ fn main() {
     names.sort();
     let mut structures = None;
     for name in &names {
-        for pages in [wgsl::Pages { cache: 1, texels: 1 }, wgsl::Pages { cache: 3, texels: 2 }] {
+        for pages in
+            [wgsl::Pages { cache: 1, texels: 1, opacity: false }, wgsl::Pages { cache: 3, texels: 2, opacity: true }]
+        {
             let text =
                 wgsl::assemble(name, pages, &read).unwrap_or_else(|| panic!("{name}: an included file is missing"));
             let module =
@@ -91,6 +93,7 @@ fn layout_checks(module: &naga::Module) -> String {
         "Leaf",
         "Instance",
         "Brick",
+        "Opacity",
         "Slot",
         "Demand",
         "Pair",

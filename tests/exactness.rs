@@ -18,7 +18,7 @@ use brickwalk::scene::path::{CameraPath, path_from_bounds};
 use brickwalk::schedule::{Lamp, Pass};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
-use brickwalk_convert::source::SourceScene;
+use brickwalk_convert::source::{SourceScene, SourceTexture};
 use brickwalk_scenes::{SoupKind, rotated_instances, soup};
 use clap::Parser;
 use glam::DVec3;
@@ -232,6 +232,43 @@ fn soups_are_exact() {
         let scene = made(folder.path(), soup(kind, if kind == SoupKind::Slivers { 20_000 } else { 3000 }, 11), 256);
         let (size, rays) = if kind == SoupKind::Slivers { ("48x32", 2000) } else { ("128x96", 8000) };
         check(&format!("{kind:?} soup"), &scene, size, None, rays);
+    }
+}
+
+/// `source` with holes in every triangle, by an alpha that varies over it.
+fn cut_out(mut source: SourceScene) -> SourceScene {
+    let mut state = 3u32;
+    let mut random = || {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        (state >> 8) as f32 / (1 << 24) as f32
+    };
+    for primitive in source.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
+        primitive.uvs =
+            Some(primitive.positions.iter().map(|_| [3.0 * random() - 1.0, 3.0 * random() - 1.0]).collect());
+    }
+    for material in &mut source.materials {
+        material.base_color_texture = 0;
+        material.alpha_cutoff = 0.5;
+        material.flags |= bricks::MATERIAL_MASK;
+    }
+    source.textures = vec![SourceTexture {
+        name: "cloth".into(),
+        width: 13,
+        height: 8,
+        wrap: bricks::WRAP_REPEAT | bricks::WRAP_MIRROR << 16,
+        rgba: (0..13 * 8).flat_map(|_| [90, 120, 50, (random() * 256.0) as u8]).collect(),
+    }];
+    source
+}
+
+#[test]
+fn what_is_cut_out_is_exact() {
+    for (name, source) in [("soup", soup(SoupKind::Uniform, 6000, 12)), ("instances", rotated_instances(5))] {
+        let folder = common::folder();
+        let scene = made(folder.path(), cut_out(source), 256);
+        let file = open_scene(&scene).expect("the scene");
+        assert!(file.resident().bricks.iter().all(|brick| brick.opacity_count == brick.triangle_count));
+        check(&format!("{name}, cut out"), &scene, "96x64", None, 6000);
     }
 }
 

@@ -15,7 +15,7 @@ fn sponza_converts_streams_and_verifies() {
     succeed(["verify".as_ref(), scene.as_os_str()]);
     let info = succeed(["info".as_ref(), scene.as_os_str(), "--json".as_ref()]);
     let info: serde_json::Value = serde_json::from_str(&info).expect("JSON");
-    assert_eq!(info["format"], 2);
+    assert_eq!(info["format"], 3);
 
     let (small, all) = (folder.path().join("small"), folder.path().join("all"));
     let view = "--frames 2 --size 160x90 --aov";

@@ -97,6 +97,7 @@ impl SceneFile {
             bricks: reader.section(&directory, Section::Bricks)?,
             materials: reader.section(&directory, Section::Materials)?,
             textures: reader.section(&directory, Section::Textures)?,
+            opacity_maps: reader.section(&directory, Section::OpacityMaps)?,
             occupancy: reader.section(&directory, Section::Occupancy)?,
         };
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;
@@ -137,6 +138,7 @@ impl SceneFile {
             Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes,
             Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies,
             Payload::Texture(texture) => self.resident.textures[texture as usize].texels,
+            Payload::Opacity(map) => self.resident.opacity_maps[map as usize].texels,
         }
     }
 
@@ -224,6 +226,7 @@ impl SceneFile {
             Payload::Geometry(_) | Payload::Attributes(_) => format!("one of {} bricks", self.resident.bricks.len()),
             Payload::Proxies(_) => format!("one of {} bricks with proxies", self.resident.occupancy.len()),
             Payload::Texture(_) => format!("one of {} textures", self.resident.textures.len()),
+            Payload::Opacity(_) => format!("one of {} opacity maps", self.resident.opacity_maps.len()),
         };
         Error::Request { path: self.path.clone(), payload, found: payload.to_string(), expected }
     }
@@ -247,6 +250,7 @@ struct Validated {
     attributes: Box<[AtomicBool]>,
     proxies: Box<[AtomicBool]>,
     textures: Box<[AtomicBool]>,
+    opacity: Box<[AtomicBool]>,
 }
 
 impl Validated {
@@ -258,6 +262,7 @@ impl Validated {
             attributes: none(bricks),
             proxies: none(resident.occupancy.len()),
             textures: none(textures),
+            opacity: none(resident.opacity_maps.len()),
         }
     }
 
@@ -268,6 +273,7 @@ impl Validated {
             Payload::Attributes(brick) => &self.attributes[brick as usize],
             Payload::Proxies(brick) => &self.proxies[brick as usize],
             Payload::Texture(texture) => &self.textures[texture as usize],
+            Payload::Opacity(map) => &self.opacity[map as usize],
         }
     }
 }

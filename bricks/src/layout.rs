@@ -5,7 +5,7 @@
 //! the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
 
 use crate::occupancy::Occupancy;
-use crate::records::{Brick, Instance, Leaf, Material, Object, Texture, TopNode2, TopNode8};
+use crate::records::{Brick, Instance, Leaf, Material, Object, OpacityMap, Texture, TopNode2, TopNode8};
 use bytemuck::{Pod, Zeroable};
 use std::fmt;
 use xxhash_rust::xxh3::xxh3_64;
@@ -14,7 +14,7 @@ use xxhash_rust::xxh3::xxh3_64;
 pub const MAGIC: [u8; 8] = *b"BRICKS\x1a\n";
 
 /// The version of the format that this crate writes and reads. No other version is read.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// Alignment of payloads and of the directory, and length of the header page.
 pub const PAGE_BYTES: u64 = 4096;
@@ -125,13 +125,15 @@ pub enum Section {
     Materials = 8,
     /// [`Texture`]s.
     Textures = 9,
+    /// [`OpacityMap`]s.
+    OpacityMaps = 10,
     /// [`Occupancy`] of the bricks, in their order, or nothing.
     Occupancy = 16,
 }
 
 impl Section {
     /// All sections in the order of the file.
-    pub const ALL: [Section; 10] = [
+    pub const ALL: [Section; 11] = [
         Section::Manifest,
         Section::Objects,
         Section::Instances,
@@ -141,6 +143,7 @@ impl Section {
         Section::Bricks,
         Section::Materials,
         Section::Textures,
+        Section::OpacityMaps,
         Section::Occupancy,
     ];
 
@@ -169,6 +172,7 @@ impl Section {
             Section::Bricks => size_of::<Brick>(),
             Section::Materials => size_of::<Material>(),
             Section::Textures => size_of::<Texture>(),
+            Section::OpacityMaps => size_of::<OpacityMap>(),
             Section::Occupancy => size_of::<Occupancy>(),
         };
         bytes as u32
@@ -186,6 +190,7 @@ impl Section {
             Section::Bricks => "bricks",
             Section::Materials => "materials",
             Section::Textures => "textures",
+            Section::OpacityMaps => "opacity maps",
             Section::Occupancy => "occupancy",
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A payload of the file: what is read on demand, by index of its [`crate::Brick`] or [`crate::Texture`].
+/// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`] or [`crate::OpacityMap`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Payload {
     /// What traversal of a brick reads, laid out as [`crate::GeometryLayout`] says.
@@ -13,6 +13,8 @@ pub enum Payload {
     Proxies(u32),
     /// The texels of a texture, all levels.
     Texture(u32),
+    /// The texels of an opacity map.
+    Opacity(u32),
 }
 
 impl fmt::Display for Payload {
@@ -22,6 +24,7 @@ impl fmt::Display for Payload {
             Payload::Attributes(brick) => write!(f, "brick {brick} attributes"),
             Payload::Proxies(brick) => write!(f, "brick {brick} proxies"),
             Payload::Texture(texture) => write!(f, "texture {texture}"),
+            Payload::Opacity(map) => write!(f, "opacity map {map}"),
         }
     }
 }

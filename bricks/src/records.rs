@@ -99,6 +99,8 @@ pub struct Span {
 pub const BRICK_WIDE: u32 = 1;
 /// [`Brick::flags`]: indices are u32, not u16.
 pub const BRICK_INDEX32: u32 = 2;
+/// [`Brick::flags`]: rays may pass through some of its triangles, see [`OpacityTriangle`].
+pub const BRICK_OPACITY: u32 = 4;
 
 /// A brick: the always-resident facts about one BVH subtree and where its payloads lie.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -138,8 +140,10 @@ pub struct Brick {
     pub mean_emission: [f32; 3],
     /// Copy of node 0.
     pub root: Node,
+    /// Number of [`OpacityTriangle`]s; with [`BRICK_OPACITY`] at least one.
+    pub opacity_count: u32,
     /// Zero.
-    pub _reserved1: [u32; 4],
+    pub _reserved1: [u32; 3],
 }
 
 /// An object: triangles on one lattice, placed by one or more instances. Object 0 is the world: everything baked.
@@ -274,8 +278,10 @@ pub struct Material {
     pub flags: u32,
     /// Base colour texture (sRGB).
     pub base_color_texture: u32,
-    /// Zero; for normal, metallic-roughness, occlusion and emissive textures and their transforms.
-    pub _reserved: [u32; 4],
+    /// [`OpacityMap`] of the base colour texture, where alpha is of MASK or BLEND and not 1 throughout.
+    pub opacity_map: u32,
+    /// Zero; for normal, metallic-roughness, occlusion and emissive textures.
+    pub _reserved: [u32; 3],
 }
 
 /// [`Texture::wrap`]: repeat.
@@ -312,6 +318,43 @@ impl Texture {
     }
 }
 
+/// The alpha of a base colour texture, where rays ask for it: 8 bits a texel (255 is 1), rows top to bottom, tightly packed, in full
+/// resolution. It is resident throughout, so that what a ray meets does not depend on what is loaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct OpacityMap {
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// `WRAP_*` of s in the low half, of t in the high half.
+    pub wrap: u32,
+    /// Zero.
+    pub _reserved: u32,
+    /// The texels.
+    pub texels: Span,
+}
+
+impl OpacityMap {
+    /// Bytes of the texels, without the padding of the payload to 16.
+    pub fn texel_bytes(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+}
+
+/// What decides whether a ray passes through a triangle: the alpha of its material there, which is that of its base colour factor
+/// times [`OpacityMap`] times vertex colour. With MASK a ray passes below the cutoff, with BLEND with a probability of 1 - alpha.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct OpacityTriangle {
+    /// Texture coordinates of the vertices, in stored order.
+    pub uv: [[f32; 2]; 3],
+    /// The material.
+    pub material: u32,
+    /// Alpha of the vertices, unorm8, in stored order, the first lowest; the high byte is zero.
+    pub alphas: u32,
+}
+
 /// [`AttributeVertex::normal`]: the source has no usable normal, and shading takes the geometric one. No unit vector is
 /// encoded so, since a snorm16 is never -32768.
 pub const NO_NORMAL: u32 = 0x8000_8000;
@@ -344,6 +387,10 @@ pub struct GeometryLayout {
     pub ids: u64,
     /// Offset of the indices.
     pub indices: u64,
+    /// Offset of the number of each triangle's [`OpacityTriangle`], u32, [`NONE`] where no ray passes; with [`BRICK_OPACITY`].
+    pub opacity_of: u64,
+    /// Offset of the [`OpacityTriangle`]s; with [`BRICK_OPACITY`].
+    pub opacities: u64,
     /// Length of the payload.
     pub bytes: u64,
 }
@@ -356,8 +403,11 @@ impl GeometryLayout {
         let vertices = brick.node_count as u64 * size_of::<Node>() as u64;
         let ids = vertices + pad16(brick.vertex_count as u64 * vertex_bytes);
         let indices = ids + pad16(brick.triangle_count as u64 * 4);
-        let bytes = indices + pad16(brick.triangle_count as u64 * index_bytes);
-        Self { vertices, ids, indices, bytes }
+        let opacity_of = indices + pad16(brick.triangle_count as u64 * index_bytes);
+        let has_opacity = u64::from(brick.flags & BRICK_OPACITY != 0);
+        let opacities = opacity_of + has_opacity * pad16(brick.triangle_count as u64 * 4);
+        let bytes = opacities + has_opacity * u64::from(brick.opacity_count) * size_of::<OpacityTriangle>() as u64;
+        Self { vertices, ids, indices, opacity_of, opacities, bytes }
     }
 }
 

@@ -4,7 +4,9 @@ use crate::layout::Section;
 use crate::manifest::Manifest;
 use crate::occupancy::Occupancy;
 use crate::payload::Payload;
-use crate::records::{AttributeLayout, Brick, Instance, Leaf, Material, Object, Span, Texture, TopNode2, TopNode8};
+use crate::records::{
+    AttributeLayout, Brick, Instance, Leaf, Material, Object, OpacityMap, Span, Texture, TopNode2, TopNode8,
+};
 
 /// The always-resident part of a scene file: everything but the payloads.
 ///
@@ -31,6 +33,8 @@ pub struct Resident {
     pub materials: Vec<Material>,
     /// Textures.
     pub textures: Vec<Texture>,
+    /// Opacity maps.
+    pub opacity_maps: Vec<OpacityMap>,
     /// The occupancy of each brick, or nothing: then the scene has no proxies.
     pub occupancy: Vec<Occupancy>,
 }
@@ -48,11 +52,17 @@ impl Resident {
             Section::Bricks => self.bricks.len(),
             Section::Materials => self.materials.len(),
             Section::Textures => self.textures.len(),
+            Section::OpacityMaps => self.opacity_maps.len(),
             Section::Occupancy => self.occupancy.len(),
         }
     }
 
-    /// Where a payload lies, or `None` if there is no such brick or texture, or no proxies.
+    /// Bytes of all opacity maps.
+    pub fn opacity_bytes(&self) -> u64 {
+        self.opacity_maps.iter().map(|map| map.texels.bytes).sum()
+    }
+
+    /// Where a payload lies, or `None` if there is no such brick, texture or map, or no proxies.
     pub fn span(&self, payload: Payload) -> Option<Span> {
         match payload {
             Payload::Geometry(brick) => self.bricks.get(brick as usize).map(|brick| brick.geometry),
@@ -62,6 +72,7 @@ impl Resident {
                 brick.map(|brick| brick.proxies).filter(|span| *span != Span::default())
             }
             Payload::Texture(texture) => self.textures.get(texture as usize).map(|texture| texture.texels),
+            Payload::Opacity(map) => self.opacity_maps.get(map as usize).map(|map| map.texels),
         }
     }
 
@@ -74,7 +85,8 @@ impl Resident {
         }
     }
 
-    /// Every payload with its span: the bricks' geometry, attributes and, if any, proxies in order of bricks, then the textures.
+    /// Every payload with its span: the bricks' geometry, attributes and, if any, proxies in order of bricks, then the textures, then the
+    /// opacity maps.
     pub fn payloads(&self) -> impl Iterator<Item = (Payload, Span)> + '_ {
         let bricks = (0u32..).zip(&self.bricks);
         let bricks = bricks.flat_map(|(index, brick)| {
@@ -83,6 +95,7 @@ impl Resident {
             spans.filter(|(payload, span)| !matches!(payload, Payload::Proxies(_)) || *span != Span::default())
         });
         let textures = (0u32..).zip(&self.textures);
-        bricks.chain(textures.map(|(index, texture)| (Payload::Texture(index), texture.texels)))
+        let maps = (0u32..).zip(&self.opacity_maps).map(|(index, map)| (Payload::Opacity(index), map.texels));
+        bricks.chain(textures.map(|(index, texture)| (Payload::Texture(index), texture.texels))).chain(maps)
     }
 }

@@ -123,6 +123,7 @@ impl Verifier<'_> {
         let bricks: Option<Vec<Brick>> = self.section(directory, Section::Bricks);
         let materials = self.section(directory, Section::Materials);
         let textures: Option<Vec<Texture>> = self.section(directory, Section::Textures);
+        let opacity_maps = self.section(directory, Section::OpacityMaps);
         let occupancy = self.section(directory, Section::Occupancy);
         self.advance(directory.iter().map(|entry| entry.bytes).sum());
 
@@ -135,6 +136,7 @@ impl Verifier<'_> {
             && bricks.is_some()
             && materials.is_some()
             && textures.is_some()
+            && opacity_maps.is_some()
             && occupancy.is_some();
         let resident = Resident {
             manifest: manifest.unwrap_or_default(),
@@ -146,6 +148,7 @@ impl Verifier<'_> {
             bricks: bricks.unwrap_or_default(),
             materials: materials.unwrap_or_default(),
             textures: textures.unwrap_or_default(),
+            opacity_maps: opacity_maps.unwrap_or_default(),
             occupancy: occupancy.unwrap_or_default(),
         };
         let valid = whole && self.keep_flaw(validate::resident(&resident));

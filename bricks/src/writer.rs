@@ -333,6 +333,7 @@ fn section_bytes(resident: &Resident, section: Section) -> serde_json::Result<Co
         Section::Bricks => bytemuck::cast_slice(&resident.bricks),
         Section::Materials => bytemuck::cast_slice(&resident.materials),
         Section::Textures => bytemuck::cast_slice(&resident.textures),
+        Section::OpacityMaps => bytemuck::cast_slice(&resident.opacity_maps),
         Section::Occupancy => bytemuck::cast_slice(&resident.occupancy),
     }))
 }

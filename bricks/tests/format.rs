@@ -96,6 +96,7 @@ fn structs() -> BTreeMap<String, Table> {
             mean_albedo,
             mean_emission,
             root,
+            opacity_count,
             _reserved1
         }),
         table!(Material {
@@ -106,9 +107,12 @@ fn structs() -> BTreeMap<String, Table> {
             alpha_cutoff,
             flags,
             base_color_texture,
+            opacity_map,
             _reserved
         }),
         table!(Texture { width, height, levels, wrap, texels }),
+        table!(OpacityMap { width, height, wrap, _reserved, texels }),
+        table!(OpacityTriangle { uv, material, alphas }),
         table!(Node { origin, exponent, inner_mask, child_base, triangle_base, meta, lo, hi }),
         table!(Occupancy { cell_log2, _reserved, origin, bits }),
         table!(AttributeVertex { normal, uv, color }),

@@ -89,14 +89,22 @@ fn leaves() {
 
 #[test]
 fn materials_and_textures() {
-    use Section::{Materials, Textures};
-    refused(record(Materials, 1), "reserved", |r| r.materials[1]._reserved[3] = 1);
+    use Section::{Bricks, Materials, OpacityMaps, Textures};
+    refused(record(Materials, 1), "reserved", |r| r.materials[1]._reserved[2] = 1);
     refused(record(Materials, 1), "flags 0x10", |r| r.materials[1].flags = 16);
     refused(record(Materials, 1), "flags 0x3", |r| r.materials[1].flags = MATERIAL_MASK | MATERIAL_BLEND);
     refused(record(Materials, 0), "texture 1", |r| r.materials[0].base_color_texture = 1);
     refused(record(Materials, 0), "NaN", |r| r.materials[0].base_color[3] = f32::NAN);
     refused(record(Materials, 0), "inf", |r| r.materials[0].emission[2] = f32::INFINITY);
     refused(record(Materials, 0), "roughness: -1", |r| r.materials[0].roughness = -1.0);
+    refused(record(Materials, 0), "opacity map 1", |r| r.materials[0].opacity_map = 1);
+    refused(record(OpacityMaps, 0), "0 by 3 texels", |r| r.opacity_maps[0].width = 0);
+    refused(record(OpacityMaps, 0), "wrap 0x3", |r| r.opacity_maps[0].wrap = 3);
+    refused(record(OpacityMaps, 0), "reserved word 1", |r| r.opacity_maps[0]._reserved = 1);
+    refused(Part::Payload(Payload::Opacity(0)), "16 bytes", |r| r.opacity_maps[0].height = 4);
+    refused(record(Bricks, 2), "0 triangles with opacity", |r| r.bricks[2].opacity_count = 0);
+    refused(record(Bricks, 2), "11 triangles with opacity", |r| r.bricks[2].opacity_count = 11);
+    refused(record(Bricks, 0), "1 triangles with opacity", |r| r.bricks[0].opacity_count = 1);
     refused(record(Textures, 0), "0 by 2 texels", |r| r.textures[0].width = 0);
     refused(record(Textures, 0), "4 by 16385 texels", |r| r.textures[0].height = 16385);
     for levels in [0, 2, 4, u32::MAX] {
@@ -111,9 +119,9 @@ fn materials_and_textures() {
 #[test]
 fn bricks_by_themselves() {
     use Section::Bricks;
-    refused(record(Bricks, 1), "flags 0x7", |r| r.bricks[1].flags = 7);
+    refused(record(Bricks, 1), "flags 0xb", |r| r.bricks[1].flags = 11);
     refused(record(Bricks, 0), "reserved", |r| r.bricks[0]._reserved0 = 1);
-    refused(record(Bricks, 0), "reserved", |r| r.bricks[0]._reserved1[3] = 1);
+    refused(record(Bricks, 0), "reserved", |r| r.bricks[0]._reserved1[2] = 1);
     refused(record(Bricks, 0), "0, 27,", |r| r.bricks[0].node_count = 0);
     refused(record(Bricks, 0), "vertices", |r| r.bricks[0].vertex_count = 0);
     refused(record(Bricks, 0), "vertices", |r| r.bricks[0].attribute_vertex_count = 0);
@@ -489,6 +497,18 @@ fn attributes_and_texels() {
     payload_refused(Payload::Attributes(1), "index 4294967295 of a vertex", |b| put(b, wide.indices + 56, [255; 4]));
     for at in [44, 47] {
         payload_refused(Payload::Texture(0), &format!("0x01 at its byte {at}"), |b| put(b, at, [1]));
+    }
+    payload_refused(Payload::Opacity(0), "0x01 at its byte 15", |b| put(b, 15, [1]));
+    let opacity = GeometryLayout::of(&common::scene().resident.bricks[2]);
+    let (of, opacities) = (opacity.opacity_of, opacity.opacities);
+    for (at, value, what) in [
+        (of, 5u32, "number 5"),
+        (of + 40, 1, "0x01 at its byte"),
+        (opacities, f32::NAN.to_bits(), "NaN"),
+        (opacities + 24, 2, "material: 2"),
+        (opacities + 28, 1 << 24, "alphas: 16777216"),
+    ] {
+        payload_refused(Payload::Geometry(2), what, |b| put(b, at, value.to_le_bytes()));
     }
 }
 

@@ -141,8 +141,19 @@ struct Brick {
     flags: u32,           // BRICK_* bits
     surfaces: u32,        // word offsets within the attribute payload
     attribute_indices: u32,
-    padding0: u32,
-    padding1: u32,
+    opacity_of: u32,      // word offsets within the geometry payload, with BRICK_OPACITY
+    opacities: u32,
+}
+
+struct Opacity {          // of a material
+    factor: f32,          // alpha of the base colour factor
+    cutoff: f32,          // of MASK
+    blends: u32,          // 1: BLEND
+    texels: u32,          // first vector of the texels in the table; NONE without a map
+    width: u32,
+    height: u32,
+    wrap: u32,            // WRAP_* of s in the low half, of t in the high half
+    padding: u32,
 }
 
 struct Slot {             // where a brick lies in the cache, and its part in the pass
@@ -216,6 +227,7 @@ const T_INFINITE: f32 = 3.4028234e38;
 const INSTANCE_IDENTITY: u32 = 1u;
 const BRICK_WIDE: u32 = 1u;
 const BRICK_INDEX32: u32 = 2u;
+const BRICK_OPACITY: u32 = 4u;
 const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex without one
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident

@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::fmt::Write;
 
 /// Raised when a field of the JSON changes its meaning.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 /// Runs `info`.
 ///
@@ -39,11 +39,10 @@ pub struct LeftOut {
 pub fn left_out(manifest: &Manifest) -> Vec<LeftOut> {
     let facts = [
         (!manifest.has_textures, "texture lookups", "no material has a texture"),
-        (!manifest.has_alpha_mask, "alpha tests", "no material in use cuts out by alpha"),
+        (!manifest.has_alpha_mask && !manifest.has_alpha_blend, "alpha tests", "no material in use has alpha"),
         (!manifest.has_instances, "ray transforms of instances", "everything is placed once"),
         (!manifest.has_wide_bricks, "two-part positions", "no brick is wide"),
         (!manifest.has_emission, "emission", "no material in use emits light"),
-        (manifest.has_alpha_blend, "transparency", "blended materials are drawn opaque"),
         (manifest.has_animation, "animation", "the scene is drawn at rest"),
     ];
     let facts = facts.into_iter().filter(|(left_out, ..)| *left_out);
@@ -150,7 +149,7 @@ impl<'a> Info<'a> {
             attribute_bytes: bytes(|p| matches!(p, Payload::Attributes(_))),
             loaded_attribute_bytes: r.bricks.iter().map(|b| AttributeLayout::of(b).bytes).sum(),
             proxy_bytes: bytes(|p| matches!(p, Payload::Proxies(_))),
-            texture_bytes: bytes(|p| matches!(p, Payload::Texture(_))),
+            texture_bytes: bytes(|p| matches!(p, Payload::Texture(_) | Payload::Opacity(_))),
             two_largest_bricks_bytes: largest.iter().take(2).sum(),
             lattice_step: world.map_or(0.0, |o| 2f64.powi(o.step_log2)),
             device_unit: world.map_or(0.0, |o| 2f64.powi(o.unit_log2)),

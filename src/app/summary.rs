@@ -3,6 +3,7 @@
 use super::args::WalkArgs;
 use super::optimisation_args::names;
 use super::pictures::Pictures;
+use crate::kernel::opacity;
 use crate::render::{Renderer, Schedule};
 use crate::stats::Record;
 use serde_json::{Map, Value, json};
@@ -139,6 +140,9 @@ pub fn left_out(renderer: &Renderer) -> Vec<Value> {
     }
     if !manifest.has_textures {
         add("texture lookups", "no material has a texture");
+    }
+    if !opacity::is_needed(renderer.scene.resident()) {
+        add("alpha tests in traversal", "no ray passes through a triangle");
     }
     if !manifest.has_instances {
         add("instance transforms", "everything is baked into the world");

@@ -3,6 +3,7 @@
 use super::indices::Indices;
 use super::leaf::{BrickRay, row_direction, rows_point};
 use super::node::UNIT;
+use super::opacity::OpacityView;
 use super::rays::Slot;
 use super::scene::Scene;
 use super::vector::{Vec3, each, most3};
@@ -26,18 +27,26 @@ pub struct BrickView<'a> {
     indices: Indices<'a>,
     /// Whether vertices have two parts.
     is_wide: bool,
+    /// Which rays pass through its triangles.
+    pub opacity: OpacityView<'a>,
 }
 
 impl<'a> BrickView<'a> {
-    /// The arrays in the verified geometry of `brick`, which is aligned for u32 and of the length that the record implies.
-    pub fn new(brick: &Brick, bytes: &'a [u8]) -> Self {
+    /// The arrays in the verified geometry of `brick`, which is aligned for u32 and of the length that the record implies; `table` is
+    /// that of [`crate::kernel::opacity`].
+    pub fn new(brick: &Brick, bytes: &'a [u8], table: &'a [[u32; 4]]) -> Self {
         let layout = GeometryLayout::of(brick);
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
         Self {
             nodes: bytemuck::cast_slice(part(0, layout.vertices)),
             vertices: bytemuck::cast_slice(part(layout.vertices, layout.ids)),
             ids: bytemuck::cast_slice(part(layout.ids, layout.indices)),
-            indices: Indices::new(brick, part(layout.indices, layout.bytes)),
+            indices: Indices::new(brick, part(layout.indices, layout.opacity_of)),
+            opacity: OpacityView {
+                of: bytemuck::cast_slice(part(layout.opacity_of, layout.opacities)),
+                triangles: bytemuck::cast_slice(part(layout.opacities, layout.bytes)),
+                table,
+            },
             is_wide: brick.flags & BRICK_WIDE != 0,
         }
     }
@@ -122,7 +131,7 @@ impl BrickRay<'_> {
             return false;
         }
         let id = self.id(triangle);
-        if (hit.t == best.t && id >= best.id) || id == best.source {
+        if (hit.t == best.t && id >= best.id) || id == best.source || self.passes(triangle, id, &hit) {
             return false;
         }
         *best = Best { t: hit.t, id, leaf: self.leaf, triangle, hit, source: best.source };

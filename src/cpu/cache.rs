@@ -84,18 +84,19 @@ impl BrickCache {
         }
     }
 
-    /// Every brick's geometry; of bricks that are not resident, nothing.
+    /// Every brick's geometry, with the table `opacity` ([`crate::kernel::opacity`]); of bricks that are not resident, nothing.
     ///
     /// # Errors
     /// A brick that `bricks` says is resident and was never loaded; with `all`, a brick that is not resident.
-    pub fn geometry(
-        &self,
+    pub fn geometry<'a>(
+        &'a self,
         resident: &Resident,
         bricks: &BrickStates,
         all: bool,
-    ) -> Result<Vec<BrickView<'_>>, ExecutorError> {
+        opacity: &'a [[u32; 4]],
+    ) -> Result<Vec<BrickView<'a>>, ExecutorError> {
         let view = |(i, brick)| match &self.held[Item::geometry(i as u32).index()] {
-            Some(held) => Ok(BrickView::new(brick, &held.bytes)),
+            Some(held) => Ok(BrickView::new(brick, &held.bytes, opacity)),
             None if all || bricks.geometry(i).is_some() => Err(missing(Item::geometry(i as u32))),
             None => Ok(BrickView::default()),
         };

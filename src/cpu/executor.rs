@@ -20,7 +20,7 @@ use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_se
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
-use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, padded, report};
+use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, opacity, padded, report};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{WorkerPool, Workers};
 use bricks::SceneFile;
@@ -45,6 +45,8 @@ pub struct CpuExecutor {
     cache: BrickCache,
     scene: Scene,
     texels: Texels,
+    /// [`crate::kernel::opacity::table`].
+    opacity: Vec<[u32; 4]>,
     buffers: Buffers,
     binary: Option<BinaryTrees>,
     extent: Extent,
@@ -73,6 +75,7 @@ impl CpuExecutor {
             cache: BrickCache::new(file.resident().bricks.len()),
             scene: Scene::new(file.resident()),
             texels: Texels::new(&file)?,
+            opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
             buffers: Buffers { sets, pixels: Pixels::new(rays), tiles },
             binary: None,
             extent,
@@ -208,7 +211,7 @@ impl Executor for CpuExecutor {
         let params = self.params();
         let resident = self.file.resident();
         let needs_all = steps.iter().any(|step| matches!(step, Step::IntersectAll | Step::IntersectBinary));
-        let geometry = self.cache.geometry(resident, bricks, needs_all)?;
+        let geometry = self.cache.geometry(resident, bricks, needs_all, &self.opacity)?;
         let attributes = match steps.contains(&Step::Resolve) {
             true => self.cache.attributes(resident, bricks)?,
             false => Vec::new(),
@@ -261,7 +264,7 @@ impl FrameExecutor for CpuExecutor {
     }
 
     fn texture_bytes(&self) -> u64 {
-        self.texels.bytes
+        self.texels.bytes + self.file.resident().opacity_bytes()
     }
 
     fn workers(&self) -> &dyn WorkerPool {

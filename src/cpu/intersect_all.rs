@@ -172,7 +172,7 @@ impl<const SELECT: bool> IntersectAll<'_, SELECT> {
                     floor = depth;
                     in_brick = true;
                     r.enter_leaf(bound.scene, &world, leaf);
-                    r.brick = bound.bricks[brick];
+                    r.enter_brick(bound, brick);
                     group = Group::root(r.ray.flip);
                 }
             }

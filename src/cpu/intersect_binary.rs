@@ -148,7 +148,7 @@ fn trace(bound: &Bound, scratch: &mut Scratch, mut slot: Slot, trees: &BinaryTre
             let brick = bound.brick_of(leaf);
             bound.note_use(leaf);
             r.enter_leaf(bound.scene, &world, leaf);
-            r.brick = bound.bricks[brick];
+            r.enter_brick(bound, brick);
             tree = &trees.trees[brick];
             walk.floor = walk.stack.len();
             walk.in_brick = true;

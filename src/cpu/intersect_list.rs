@@ -111,7 +111,7 @@ fn trace<I: Isa, const LEAF_CACHE: bool>(
                         continue;
                     }
                     r.enter_leaf(bound.scene, &world, listed.leaf);
-                    r.brick = bound.bricks[bound.brick_of(listed.leaf)];
+                    r.enter_brick(bound, bound.brick_of(listed.leaf));
                     group = Group::root(r.ray.flip);
                 }
             }

@@ -3,7 +3,8 @@
 use super::brick::BrickView;
 use super::isa::Lanes;
 use super::node::{FramedRay, framed_ray};
-use super::scene::Scene;
+use super::opacity::Draw;
+use super::scene::{Bound, Scene};
 use super::vector::Vec3;
 use crate::kernel::layout::INSTANCE_IDENTITY;
 use crate::math::exact::barrier;
@@ -23,6 +24,8 @@ pub struct BrickRay<'a> {
     pub base: u32,
     /// The brick's geometry, once it has been entered.
     pub brick: BrickView<'a>,
+    /// What is drawn from where rays pass through triangles at random.
+    pub draw: Draw,
     /// The ray and the offset as vectors.
     pub lanes: Lanes,
 }
@@ -59,8 +62,16 @@ impl<'a> BrickRay<'a> {
             leaf: 0,
             base: 0,
             brick: BrickView::default(),
+            draw: Draw::default(),
             lanes: Lanes::default(),
         }
+    }
+
+    /// Points the ray at the geometry of a brick.
+    #[inline(always)]
+    pub fn enter_brick(&mut self, bound: &Bound<'a>, brick: usize) {
+        self.brick = bound.bricks[brick];
+        self.draw = Draw { seed: bound.params.seed, stream: bound.params.stream };
     }
 
     /// Points the ray at a leaf. The ray of the instance is made anew only where the instance is not the world.

@@ -35,11 +35,12 @@ fn device() -> Option<(Gpu, Arc<Kernels>)> {
         println!("skipped: no adapter");
         return None;
     };
-    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1 }, true));
+    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true }, true));
     Some((gpu, kernels))
 }
 
-/// Triangles in all directions with normals, colours and textures of every way to wrap; turned and mirrored copies of them.
+/// Triangles in all directions with normals, colours and textures of every way to wrap, most of which let rays pass; turned and
+/// mirrored copies of them.
 fn textured() -> Arc<SceneFile> {
     let mut state = 7u64;
     let mut random = || {
@@ -73,8 +74,10 @@ fn textured() -> Arc<SceneFile> {
         rgba: (0..4 * (8 << i) * (16 >> i)).map(|k: u32| (k * 37 + k / 7 * 11) as u8).collect(),
     };
     let material = |i: u32| bricks::Material {
-        base_color: [0.9, 0.8, 0.7, 1.0],
+        base_color: [0.9, 0.8, 0.7, 1.0 - 0.1 * i as f32],
         emission: [0.25 * i as f32; 3],
+        alpha_cutoff: 0.25,
+        flags: [0, bricks::MATERIAL_MASK, bricks::MATERIAL_BLEND, bricks::MATERIAL_BLEND][i as usize],
         base_color_texture: if i < 3 { i } else { bricks::NONE },
         ..bytemuck::Zeroable::zeroed()
     };
@@ -101,6 +104,7 @@ fn textured() -> Arc<SceneFile> {
     build(source, &settings, &path, &Progress::hidden()).unwrap();
     let scene = SceneFile::from_bytes("the textured scene", std::fs::read(&path).unwrap()).unwrap();
     assert!(scene.resident().manifest.has_textures && scene.resident().instances.len() == 3);
+    assert_eq!(scene.resident().opacity_maps.len(), 2);
     Arc::new(scene)
 }
 
@@ -251,11 +255,18 @@ fn twins_agree_with_their_kernels() {
 #[test]
 fn a_twin_that_differs_is_noticed() {
     let Some(device) = device() else { return };
-    let scene = textured();
-    for (defect, what) in [(Defect::Rays, "hits"), (Defect::Seed, "directions"), (Defect::Light, "radiance")] {
+    let (opaque, textured) = (Arc::new(probe::scene().unwrap()), textured());
+    let cases = [
+        (Defect::Rays, &textured, "hits"),
+        (Defect::Seed, &opaque, "directions"),
+        // What lets rays pass by chance is drawn anew.
+        (Defect::Seed, &textured, "hits"),
+        (Defect::Light, &textured, "radiance"),
+    ];
+    for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
         let variant = Variant { schedule: Schedule::Plain, everything_fits: true, ..VARIANT };
-        render(&device, &scene, &variant, Some(defect), &findings);
+        render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();
         assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);
     }

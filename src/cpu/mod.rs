@@ -24,6 +24,7 @@ pub mod isa;
 pub mod leaf;
 mod light;
 pub mod node;
+mod opacity;
 mod packet;
 mod packet_node;
 mod packet_surface;

@@ -41,7 +41,7 @@ impl Stage {
         let views: Vec<BrickView> = records
             .iter()
             .zip(&self.payloads)
-            .map(|(b, words)| BrickView::new(b, bytemuck::cast_slice(words)))
+            .map(|(b, words)| BrickView::new(b, bytemuck::cast_slice(words), &[]))
             .collect();
         let params = Params {
             width,

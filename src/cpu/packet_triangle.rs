@@ -7,7 +7,7 @@ use super::leaf::BrickRay;
 use super::packet::{Packet, RAYS};
 use super::vector::{Vec3, each};
 use super::wide::{Wide, inside, three};
-use crate::math::exact::{CLAMP_ULPS, TINY, intersect_triangle};
+use crate::math::exact::{CLAMP_ULPS, TINY, TriangleHit, intersect_triangle};
 
 impl Packet {
     /// Tests a triangle of the brick that `r` is in with `rays`, and keeps nearer hits as [`BrickRay::test_triangle`] does. With
@@ -101,6 +101,10 @@ impl Packet {
         let id = isa.splat_bits(r.id(triangle));
         hit &= !self.t.get(isa, v).less_equal(t) | id.less_bits(found.id.get(isa, v));
         hit &= !id.same_bits(found.source.get(isa, v));
+        if hit != 0 && !r.brick.opacity.of.is_empty() {
+            hit = self.stopped(r, triangle, (v, hit), [u, v_, w, det]);
+        }
+        let found = &mut self.found;
         if hit != 0 {
             self.t.replace(isa, v, hit, t);
             found.id.replace(isa, v, hit, id);
@@ -114,12 +118,30 @@ impl Packet {
         hit
     }
 
+    /// Of the lanes of `hit` of vector `v`, which meet a triangle of a brick that rays may pass through, those that do not pass through it.
+    fn stopped<W: Wide>(&self, r: &BrickRay, triangle: u32, (v, hit): (usize, u32), edges: [W; 4]) -> u32 {
+        // The longest vectors have 16 lanes.
+        let mut values = [[0.0; 16]; 4];
+        for (lane, edge) in values.iter_mut().zip(edges) {
+            edge.store(lane);
+        }
+        let id = r.id(triangle);
+        let stops = |&i: &usize| {
+            let [u, v_, w, det] = values.map(|lane| lane[i]);
+            let alone = BrickRay { ray: self.ray(v * W::LANES + i), ..*r };
+            // The distance decides nothing.
+            !alone.passes(triangle, id, &TriangleHit { hit: true, t: 0.0, u, v: v_, w, det })
+        };
+        (0..W::LANES).filter(|i| hit >> i & 1 != 0).filter(stops).fold(0, |lanes, i| lanes | 1 << i)
+    }
+
     /// Tests a triangle with ray `i` alone, and keeps the hit if it is the best so far.
     fn test_alone(&mut self, r: &BrickRay, triangle: u32, i: usize, any_hit: bool) -> bool {
         let (ray, mut best) = (self.ray(i), self.best(i));
         let [a, b, c] = r.vertices(triangle).map(|x| each(|k| x[k] - ray.origin[k]));
         let hit = intersect_triangle(&ray.frame, a, b, c, ray.t_min);
-        if !hit.hit || !r.keep(&mut best, triangle, hit) {
+        let alone = BrickRay { ray, ..*r };
+        if !hit.hit || !alone.keep(&mut best, triangle, hit) {
             return false;
         }
         self.set_best(i, &best);

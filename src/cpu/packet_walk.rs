@@ -89,7 +89,7 @@ impl PacketScratch {
         let first = self.packet.ray(0);
         let mut r = BrickRay::outside(&first);
         let instance = &bound.scene.instances[bound.scene.leaves[leaf as usize].instance as usize];
-        r.brick = bound.bricks[bound.brick_of(leaf)];
+        r.enter_brick(bound, bound.brick_of(leaf));
         if instance.flags & INSTANCE_IDENTITY == 0 {
             // Rays of one octant of the world may be of several here.
             let mut left = rays & !self.packet.done;

@@ -120,7 +120,7 @@ pub fn write_found(bound: &Bound, world: &FramedRay, best: &Best, hit: &mut Hit,
     if best.leaf != NONE {
         let mut r = BrickRay::outside(world);
         r.enter_leaf(bound.scene, world, best.leaf);
-        r.brick = bound.bricks[bound.brick_of(best.leaf)];
+        r.enter_brick(bound, bound.brick_of(best.leaf));
         r.write_hit(bound.scene, best, world.direction, hit, surface);
     }
 }

@@ -1,5 +1,6 @@
 //! The adapter, its limits, and the device made from it.
 
+use super::wgsl::Pages;
 use crate::kernel::DeviceInfo;
 use thiserror::Error;
 
@@ -246,9 +247,9 @@ impl Gpu {
         page_bytes(&self.limits)
     }
 
-    /// Most pages of cache beside `texel_pages` pages of texels.
-    pub fn max_cache_pages(&self, texel_pages: usize) -> usize {
+    /// Most pages of cache beside so many pages of texels, and the table of opacity.
+    pub fn max_cache_pages(&self, beside: Pages) -> usize {
         let left = self.limits.max_storage_buffers_per_shader_stage as usize - FIXED_STORAGE_BUFFERS as usize;
-        left.saturating_sub(texel_pages).min(64)
+        left.saturating_sub(beside.texels + usize::from(beside.opacity)).min(64)
     }
 }

@@ -13,7 +13,7 @@ use super::timing::Timing;
 use super::wgsl::Pages;
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Workgroups, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
-use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, padded, report};
+use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, opacity, padded, report};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
 use bricks::SceneFile;
@@ -63,8 +63,9 @@ impl GpuExecutor {
         setup: Setup,
     ) -> Result<Self, ExecutorError> {
         // A cache of nothing has a page, too.
-        let pages = Pages { cache: page_sizes.len().max(1), texels: Texels::page_count(&gpu, &scene) };
-        let most_pages = gpu.max_cache_pages(pages.texels);
+        let texels = Texels::page_count(&gpu, &scene);
+        let pages = Pages { cache: page_sizes.len().max(1), texels, opacity: opacity::is_needed(scene.resident()) };
+        let most_pages = gpu.max_cache_pages(pages);
         if pages.cache > most_pages {
             let text = format!(
                 "{:?} holds caches of at most {} bytes ({most_pages} pages); ask for a smaller --cache",
@@ -97,7 +98,7 @@ impl GpuExecutor {
         }
         let bricks = scene.resident().bricks.len();
         let buffers = Buffers {
-            scene: SceneBuffers::new(&gpu, scene.resident()),
+            scene: SceneBuffers::new(&gpu, &scene)?,
             cache: CachePages::new(&gpu, page_sizes),
             texels: Texels::new(&gpu, &scene)?,
             sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
@@ -329,7 +330,7 @@ impl FrameExecutor for GpuExecutor {
     }
 
     fn texture_bytes(&self) -> u64 {
-        self.buffers.texels.bytes
+        self.buffers.texels.bytes + self.scene.resident().opacity_bytes()
     }
 
     fn workers(&self) -> &dyn WorkerPool {

@@ -88,8 +88,9 @@ impl Groups {
             group("shading", &kernels.shading, &entries)
         };
         let cache = filled(cache.pages(), kernels.pages.cache);
+        let bound = 7 + usize::from(kernels.pages.opacity);
         Self {
-            scene: group("scene", &kernels.scene, &numbered(scene.buffers(), 0)),
+            scene: group("scene", &kernels.scene, &numbered(scene.buffers().into_iter().take(bound), 0)),
             rays: [rays(&sets[0]), rays(&sets[1]), rays(&sets[2])],
             cache: group("cache", &kernels.cache, &numbered(cache, 0)),
             empty: group("none", &kernels.none, &[]),

@@ -134,7 +134,7 @@ impl Kernels {
     pub fn from_sources(gpu: &Gpu, pages: Pages, count: bool, source: &dyn Fn(&str) -> String) -> Self {
         use Bound::{Params, Read, Write};
         let device = &gpu.device;
-        let scene = layout(device, "scene", &[Read; 7]);
+        let scene = layout(device, "scene", &[Read; 8][..7 + usize::from(pages.opacity)]);
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write]);
         let cache = layout(device, "cache", &vec![Read; pages.cache]);
         let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write, Read]);
@@ -224,13 +224,13 @@ mod tests {
     #[test]
     fn as_many_pages_as_are_promised_can_be_bound() {
         let gpu = Gpu::open(None).unwrap();
-        let texels = 1;
-        let cache = gpu.max_cache_pages(texels);
+        let pages = |cache| Pages { cache, texels: 1, opacity: true };
+        let cache = gpu.max_cache_pages(pages(0));
         assert!(cache > 1, "{cache} pages");
-        Kernels::new(&gpu, Pages { cache, texels }, false);
-        let one_more = Pages { cache: cache + 1, texels };
+        Kernels::new(&gpu, pages(cache), false);
         let is_at_the_limit = cache < 64;
-        let refused = std::panic::catch_unwind(AssertUnwindSafe(|| Kernels::new(&gpu, one_more, false))).is_err();
+        let refused =
+            std::panic::catch_unwind(AssertUnwindSafe(|| Kernels::new(&gpu, pages(cache + 1), false))).is_err();
         assert_eq!(refused, is_at_the_limit, "one page more than {cache}");
     }
 }

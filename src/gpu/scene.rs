@@ -1,9 +1,11 @@
 //! The resident part of a scene on the device, relative to the reference point of the frame.
 
 use super::device::Gpu;
+use super::pages::device_error;
 use crate::kernel::frame::{Frame, Placement, brick_record};
-use crate::kernel::layout;
-use bricks::Resident;
+use crate::kernel::{layout, opacity};
+use crate::schedule::ExecutorError;
+use bricks::{Resident, SceneFile};
 
 /// The buffers of group 0.
 pub struct SceneBuffers {
@@ -13,6 +15,7 @@ pub struct SceneBuffers {
     instances: wgpu::Buffer,
     bricks: wgpu::Buffer,
     roots: wgpu::Buffer,
+    opacity: wgpu::Buffer,
     /// Slots and states, written before every submission.
     pub slots: wgpu::Buffer,
     frame: Option<Frame>,
@@ -21,8 +24,21 @@ pub struct SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Allocates buffers for `resident` and fills what does not depend on the frame.
-    pub fn new(gpu: &Gpu, resident: &Resident) -> Self {
+    /// Allocates buffers for a scene and fills what does not depend on the frame.
+    ///
+    /// # Errors
+    /// Opacity maps that cannot be read, or that are larger than a buffer of the device.
+    pub fn new(gpu: &Gpu, scene: &SceneFile) -> Result<Self, ExecutorError> {
+        let resident = scene.resident();
+        let table = opacity::table(scene).map_err(device_error)?;
+        let bytes = size_of_val(table.as_slice()) as u64;
+        if bytes > gpu.page_bytes() {
+            let most = gpu.page_bytes();
+            let text = format!(
+                "holds opacity maps of at most {most} bytes, this scene has {bytes}; scale its images with alpha down"
+            );
+            return Err(ExecutorError::Device(text));
+        }
         let buffer = |label: &str, count: usize, stride: usize| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -40,6 +56,7 @@ impl SceneBuffers {
             bricks: buffer("bricks", count, size_of::<layout::Brick>()),
             roots: buffer("roots", count, size_of::<bricks::Node>()),
             slots: buffer("slots", count, size_of::<layout::Slot>()),
+            opacity: buffer("opacity", table.len(), size_of::<[u32; 4]>()),
             frame: None,
             instance_pad: 0.0,
         };
@@ -47,12 +64,14 @@ impl SceneBuffers {
         let roots: Vec<bricks::Node> = resident.bricks.iter().map(|b| b.root).collect();
         gpu.queue.write_buffer(&buffers.bricks, 0, bytemuck::cast_slice(&records));
         gpu.queue.write_buffer(&buffers.roots, 0, bytemuck::cast_slice(&roots));
-        buffers
+        gpu.queue.write_buffer(&buffers.opacity, 0, bytemuck::cast_slice(&table));
+        Ok(buffers)
     }
 
-    /// All of them, in the order of their bindings.
-    pub fn buffers(&self) -> [&wgpu::Buffer; 7] {
-        [&self.top8, &self.top2, &self.leaves, &self.instances, &self.bricks, &self.roots, &self.slots]
+    /// All of them, in the order of their bindings; the last is bound where kernels ask for opacity.
+    pub fn buffers(&self) -> [&wgpu::Buffer; 8] {
+        let Self { top8, top2, leaves, instances, bricks, roots, slots, opacity, .. } = self;
+        [top8, top2, leaves, instances, bricks, roots, slots, opacity]
     }
 
     /// Moves everything to `frame`, if it is not there yet.

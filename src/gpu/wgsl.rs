@@ -1,5 +1,5 @@
 //! Assembly of WGSL: `#include "shared/x.wgsl"` lines are replaced by the file, each file once; the accessors of paged
-//! buffers are generated for the number of pages at hand, so that one page costs no branch.
+//! buffers are generated for the number of pages at hand, so that one page costs no branch, and so is what a scene does not need.
 //!
 //! The build script includes this file to check every kernel; it must not depend on the rest of the crate.
 
@@ -12,6 +12,8 @@ pub struct Pages {
     pub cache: usize,
     /// Pages of texels.
     pub texels: usize,
+    /// Whether rays may pass through triangles.
+    pub opacity: bool,
 }
 
 /// The text of kernel `name`, with includes taken from `file`. `None` if a file is missing.
@@ -36,6 +38,7 @@ fn append(
     let text = match name {
         "shared/cache.wgsl" => cache_accessors(pages.cache),
         "shared/texels.wgsl" => texel_accessors(pages.texels),
+        "shared/opacity.wgsl" if !pages.opacity => OPAQUE.into(),
         _ => file(name)?,
     };
     for line in text.lines() {
@@ -49,6 +52,13 @@ fn append(
     }
     Some(())
 }
+
+/// What stands for `shared/opacity.wgsl` where no ray passes through a triangle.
+const OPAQUE: &str = "\
+fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) -> bool {
+    return false;
+}
+";
 
 /// Accessors of the brick cache: group 2, binding k is page k. A word is a component of a vector, so that a page is bound once.
 fn cache_accessors(pages: usize) -> String {

@@ -63,7 +63,8 @@ pub fn brick_record(brick: &Brick) -> layout::Brick {
         flags: brick.flags,
         surfaces: words(attributes.surfaces),
         attribute_indices: words(attributes.indices),
-        ..Default::default()
+        opacity_of: words(geometry.opacity_of),
+        opacities: words(geometry.opacities),
     }
 }
 

@@ -4,7 +4,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-pub use bricks::{BRICK_INDEX32, BRICK_WIDE, INSTANCE_IDENTITY, NO_NORMAL, NONE};
+pub use bricks::{BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, INSTANCE_IDENTITY, NO_NORMAL, NONE};
 
 pub const PARAM_ANY_HIT: u32 = 1;
 pub const PARAM_NEEDED: u32 = 2;
@@ -91,7 +91,10 @@ mirror! {
     }
     struct Brick {
         vertices: u32, ids: u32, indices: u32, flags: u32,
-        surfaces: u32, attribute_indices: u32, padding0: u32, padding1: u32,
+        surfaces: u32, attribute_indices: u32, opacity_of: u32, opacities: u32,
+    }
+    struct Opacity {
+        factor: f32, cutoff: f32, blends: u32, texels: u32, width: u32, height: u32, wrap: u32, padding: u32,
     }
     struct Slot {
         geometry_page: u32, geometry_offset: u32, attributes_page: u32, attributes_offset: u32,

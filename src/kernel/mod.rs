@@ -8,6 +8,7 @@ pub mod dispatch;
 pub mod frame;
 mod frame_executor;
 pub mod layout;
+pub mod opacity;
 pub mod report;
 mod setup;
 

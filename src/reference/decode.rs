@@ -1,8 +1,8 @@
 //! Scene files back to integers: every triangle of every object on its lattice.
 
 use bricks::{
-    AttributeLayout, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Object, Payload, SURFACE_ROTATION_SHIFT,
-    SceneFile,
+    AttributeLayout, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout, NONE, Object, OpacityTriangle,
+    Payload, SURFACE_ROTATION_SHIFT, SceneFile,
 };
 use rayon::prelude::*;
 
@@ -15,6 +15,15 @@ pub struct TruthTriangle {
     pub rotation: u32,
     /// Stored vertices, in steps of the object's lattice.
     pub vertices: [[i64; 3]; 3],
+    /// Words of the [`OpacityTriangle`] that says which rays pass, if some do.
+    pub opacity: Option<[u32; 8]>,
+}
+
+impl TruthTriangle {
+    /// What says which rays pass.
+    pub(super) fn opacity(&self) -> Option<OpacityTriangle> {
+        self.opacity.map(bytemuck::cast)
+    }
 }
 
 /// An object on its lattice.
@@ -84,7 +93,9 @@ fn object(file: &SceneFile, index: u32) -> Result<TruthObject, DecodeError> {
     let parts: Vec<Vec<TruthTriangle>> =
         bricks.into_par_iter().map(|index| brick(file, &object, index)).collect::<Result<_, _>>()?;
     let mut triangles: Vec<TruthTriangle> = parts.into_iter().flatten().collect();
-    triangles.par_sort_unstable_by_key(|triangle| (triangle.local_id, triangle.vertices, triangle.rotation));
+    triangles.par_sort_unstable_by_key(|triangle| {
+        (triangle.local_id, triangle.vertices, triangle.rotation, triangle.opacity)
+    });
     triangles.dedup();
     if let Some(pair) = triangles.windows(2).find(|pair| pair[0].local_id == pair[1].local_id) {
         return Err(DecodeError::Copies { object: index, local_id: pair[0].local_id });
@@ -116,10 +127,16 @@ fn brick(file: &SceneFile, object: &Object, index: u32) -> Result<Vec<TruthTrian
             (indices[at / 2] >> (16 * (at % 2)) & 0xffff) as usize
         }
     };
+    let words_at = |offset: u64| &geometry[offset as usize / 4..];
+    let opacity = |i: usize| {
+        let number = (brick.flags & BRICK_OPACITY != 0).then(|| words_at(layout.opacity_of)[i])?;
+        (number != NONE).then(|| words_at(layout.opacities).as_chunks().0[number as usize])
+    };
     let triangle = |i: usize| TruthTriangle {
         local_id: ids[i],
         rotation: surfaces[i] >> SURFACE_ROTATION_SHIFT,
         vertices: std::array::from_fn(|k| vertices[corner(3 * i + k)]),
+        opacity: opacity(i),
     };
     Ok((0..brick.triangle_count as usize).map(triangle).collect())
 }

@@ -13,11 +13,14 @@
 //! Then one of the two triangles has an edge within ε_edge of the ray, or the two distances cannot be told apart, or
 //! a hit lies at an end of the ray's interval.
 //!
+//! A triangle that f32 cannot tell from one that lets the ray pass may be met, and need not be.
+//!
 //! The triangle that a ray excludes is as if it were not there: it may not be named, need not be found, and is no part
 //! of a patch, which then has a hole where its neighbours' edges lack a side.
 
 use super::bounds::{Assessment, assess_index, distance_to_segment, orientation, padding, stretch};
 use super::bvh::Padding;
+use super::opacity::Passing;
 use super::ray::TruthRay;
 use super::truth::Truth;
 use std::collections::{BTreeSet, HashMap};
@@ -32,6 +35,8 @@ pub enum Excuse {
     Tie,
     /// A hit is within ε_t of an end of the ray's interval.
     IntervalEnd,
+    /// The ray meets a triangle where its alpha, as far as f32 can tell, or chance, lets it pass or not.
+    Opacity,
 }
 
 /// What is wrong with an answer.
@@ -109,6 +114,8 @@ pub struct Tally {
     pub tie: u64,
     /// [`Excuse::IntervalEnd`].
     pub interval_end: u64,
+    /// [`Excuse::Opacity`].
+    pub opacity: u64,
     /// [`Verdict::Mismatch`].
     pub mismatches: u64,
     /// The first mismatch: which in the order of adding, counted from 0, and what.
@@ -124,6 +131,7 @@ impl Tally {
             Verdict::Excused(Excuse::Edge) => self.edge += 1,
             Verdict::Excused(Excuse::Tie) => self.tie += 1,
             Verdict::Excused(Excuse::IntervalEnd) => self.interval_end += 1,
+            Verdict::Excused(Excuse::Opacity) => self.opacity += 1,
             Verdict::Mismatch(fault) => {
                 self.mismatches += 1;
                 self.first.get_or_insert((index, fault));
@@ -133,7 +141,7 @@ impl Tally {
 
     /// Verdicts excused.
     pub fn excused(&self) -> u64 {
-        self.edge + self.tie + self.interval_end
+        self.edge + self.tie + self.interval_end + self.opacity
     }
 
     /// All verdicts.
@@ -153,7 +161,11 @@ impl FromIterator<Verdict> for Tally {
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} rays: {} equal, {} excused ", self.total(), self.equal, self.excused())?;
-        write!(f, "({} at edges, {} ties, {} at interval ends), ", self.edge, self.tie, self.interval_end)?;
+        write!(
+            f,
+            "({} at edges, {} ties, {} at interval ends, {} by alpha), ",
+            self.edge, self.tie, self.interval_end, self.opacity
+        )?;
         write!(f, "{} mismatches", self.mismatches)?;
         if let Some((ray, fault)) = &self.first {
             write!(f, ", first of ray {ray}: {fault:?}")?;
@@ -188,6 +200,7 @@ pub fn judge_any(truth: &Truth, ray: &TruthRay, occluded: bool) -> Verdict {
     let verdict = if occluded {
         let possible = |c: &&Candidate| c.at.possibly_met() && c.at.t_low <= ray.t_max && c.at.t_high >= ray.t_min;
         match nearby.candidates.iter().find(possible) {
+            Some(candidate) if candidate.may_pass => Ok(Excuse::Opacity),
             Some(candidate) if candidate.at.near_edge() => Ok(Excuse::Edge),
             Some(_) => Ok(Excuse::IntervalEnd),
             None => Err(Fault::NothingMet),
@@ -195,7 +208,12 @@ pub fn judge_any(truth: &Truth, ray: &TruthRay, occluded: bool) -> Verdict {
     } else {
         nearby.nothing_certain_before(f64::INFINITY, None).map(|()| {
             let edge = nearby.candidates.iter().any(|c| c.at.near_edge());
-            if edge { Excuse::Edge } else { Excuse::IntervalEnd }
+            let passes = nearby.candidates.iter().any(|c| c.may_pass && c.at.possibly_met());
+            match (passes, edge) {
+                (true, _) => Excuse::Opacity,
+                (_, true) => Excuse::Edge,
+                _ => Excuse::IntervalEnd,
+            }
         })
     };
     verdict.map_or_else(Verdict::Mismatch, Verdict::Excused)
@@ -223,7 +241,7 @@ fn difference(
             return Err(Fault::Excluded { id });
         }
         let at = assess_index(truth, ray, index);
-        if !at.possibly_met() {
+        if !at.possibly_met() || !truth.passing(index, &at).may_stop {
             return Err(Fault::NotMet { id });
         }
         if let Some(fault) = check_distance(ray, id, t, &at) {
@@ -239,6 +257,9 @@ fn difference(
     let before = found.map_or(f64::INFINITY, |(_, t)| t);
     nearby.nothing_certain_before(before, named.map(|(index, _)| index))?;
 
+    if nearby.candidates.iter().any(|c| c.may_pass && c.at.possibly_met() && nearby.may_be_before(&c.at, before)) {
+        return Ok(Excuse::Opacity);
+    }
     let expected = expected.map(|index| assess_index(truth, ray, index));
     let pair = [expected, named.map(|(_, at)| at)];
     if pair.iter().flatten().any(Assessment::near_edge) {
@@ -253,6 +274,7 @@ fn difference(
 struct Candidate {
     index: usize,
     at: Assessment,
+    may_pass: bool,
 }
 
 /// The triangles that the ray comes near.
@@ -269,7 +291,11 @@ fn gather(truth: &Truth, ray: &TruthRay, padding: Padding, limit: f64) -> Vec<Ca
     truth.bvh.visit(ray, padding, limit, |index| {
         let index = index as usize;
         if !truth.is_excluded(ray, index) {
-            candidates.push(Candidate { index, at: assess_index(truth, ray, index) });
+            let at = assess_index(truth, ray, index);
+            let Passing { may_stop, may_pass } = truth.passing(index, &at);
+            if may_stop {
+                candidates.push(Candidate { index, at, may_pass });
+            }
         }
         limit
     });
@@ -298,9 +324,14 @@ impl<'a> Nearby<'a> {
         self.within_interval(at) && at.t_high < t
     }
 
+    /// Whether a hit of this triangle may come at or before `t`.
+    fn may_be_before(&self, at: &Assessment, t: f64) -> bool {
+        at.t_high >= self.ray.t_min && at.t_low <= t.min(self.ray.t_max)
+    }
+
     /// Fails if a kernel had to find something before `t`, other than triangle `named`.
     fn nothing_certain_before(&self, t: f64, named: Option<usize>) -> Result<(), Fault> {
-        let counts = |c: &&Candidate| Some(c.index) != named && self.is_before(&c.at, t);
+        let counts = |c: &&Candidate| Some(c.index) != named && !c.may_pass && self.is_before(&c.at, t);
         let before: Vec<&Candidate> = self.candidates.iter().filter(counts).collect();
         if let Some(candidate) = before.iter().find(|c| c.at.certainly_met()) {
             return Err(Fault::Missed { id: self.id(candidate.index) });

@@ -14,6 +14,7 @@ mod bvh;
 mod decode;
 mod expansion;
 mod judge;
+mod opacity;
 mod predicate;
 mod ray;
 mod truth;

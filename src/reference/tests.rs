@@ -148,7 +148,7 @@ fn closed_mesh(random: &mut Random, n: usize, center: DVec3, size: f64, first: u
                 let [p, q, r] = vertices;
                 if p != q && q != r && r != p {
                     let local_id = first + triangles.len() as u32;
-                    triangles.push(TruthTriangle { local_id, rotation: 0, vertices });
+                    triangles.push(TruthTriangle { local_id, rotation: 0, vertices, opacity: None });
                 }
             }
         }
@@ -173,7 +173,7 @@ fn soup(random: &mut Random, count: u32, center: DVec3, first: u32) -> Vec<Truth
         let cross = DVec3::from(sub(vertices[1], vertices[0])).cross(sub(vertices[2], vertices[0]).into());
         if cross != DVec3::ZERO {
             let local_id = first + triangles.len() as u32;
-            triangles.push(TruthTriangle { local_id, rotation: random.below(3) as u32, vertices });
+            triangles.push(TruthTriangle { local_id, rotation: random.below(3) as u32, vertices, opacity: None });
         }
     }
     triangles
@@ -385,7 +385,7 @@ fn fan(n: u32, closed: bool) -> Truth {
     let wall = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]].map(|[x, y]| lattice(DVec3::new(x, y, -1.0)));
     let sides = (0..count).map(|i| [[0; 3], corner(i), corner(i + 1)]);
     let all = sides.chain([[wall[0], wall[1], wall[2]], [wall[0], wall[2], wall[3]]]);
-    let triangle = |(local_id, vertices)| TruthTriangle { local_id, rotation: 0, vertices };
+    let triangle = |(local_id, vertices)| TruthTriangle { local_id, rotation: 0, vertices, opacity: None };
     Truth::new(vec![TruthObject::new(STEP_LOG2, (0..).zip(all).map(triangle).collect())], vec![identity(0)]).unwrap()
 }
 
@@ -429,7 +429,7 @@ fn lowest_id_at_equal_distance_and_ties() {
     let at = |local_id, z: i64, rotation: usize| {
         let mut vertices = vertices.map(|[x, y, _]| [x, y, z]);
         vertices.rotate_left(rotation);
-        TruthTriangle { local_id, rotation: rotation as u32, vertices }
+        TruthTriangle { local_id, rotation: rotation as u32, vertices, opacity: None }
     };
     let triangles = [at(9, 0, 0), at(4, 0, 0), at(2, -1, 0), at(6, -16_384, 0), at(1, 0, 1)];
     let truth = |without: &[u32]| {
@@ -468,7 +468,7 @@ fn weights_follow_the_source_order() {
     for rotation in 0..3 {
         let mut vertices = source;
         vertices.rotate_left(rotation);
-        let triangle = TruthTriangle { local_id: 3, rotation: rotation as u32, vertices };
+        let triangle = TruthTriangle { local_id: 3, rotation: rotation as u32, vertices, opacity: None };
         let truth = Truth::new(vec![TruthObject::new(STEP_LOG2, vec![triangle])], vec![identity(5)]).unwrap();
         let hit = truth.closest(&TruthRay::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0], 0.0, 10.0)).unwrap();
         assert_eq!((hit.id, hit.t, hit.u, hit.v), (8, 1.0, 0.25, 0.5), "rotation {rotation}");
@@ -498,7 +498,8 @@ fn bounds_are_of_the_order_of_f32() {
 
 #[test]
 fn ids_are_unique_and_invalid_rays_miss() {
-    let triangle = |local_id| TruthTriangle { local_id, rotation: 0, vertices: [[0, 0, 0], [9, 0, 0], [0, 9, 0]] };
+    let triangle =
+        |local_id| TruthTriangle { local_id, rotation: 0, vertices: [[0, 0, 0], [9, 0, 0], [0, 9, 0]], opacity: None };
     let object = |id| TruthObject::new(0, vec![triangle(id)]);
     let at = |object, base| TruthInstance { object, base, world_from_object: None };
     let build = |second: TruthInstance| Truth::new(vec![object(7), object(5)], vec![at(0, 0), second]);

@@ -1,8 +1,9 @@
 //! The scene in f64 and its closest hits.
 
-use super::bounds::Extremes;
+use super::bounds::{Assessment, Extremes};
 use super::bvh::{Bounds, Bvh, Padding};
 use super::decode::{self, DecodeError, TruthObject, TruthTriangle};
+use super::opacity::{Opacities, Passing};
 use super::predicate::{Crossing, crossing, order};
 use super::ray::TruthRay;
 use bricks::{INSTANCE_IDENTITY, SceneFile};
@@ -48,6 +49,7 @@ pub struct Truth {
     /// By increasing id.
     pub(super) placed: Vec<Placed>,
     pub(super) bvh: Bvh,
+    opacities: Opacities,
     /// Of the instances.
     pub(super) extremes: Extremes,
 }
@@ -64,10 +66,11 @@ impl Truth {
             world_from_object: (instance.flags & INSTANCE_IDENTITY == 0).then_some(instance.world_from_object),
         };
         let instances = file.resident().instances.iter().map(instance).collect();
-        Self::new(decode::objects(file)?, instances)
+        let truth = Self::new(decode::objects(file)?, instances)?;
+        Ok(Self { opacities: Opacities::load(file)?, ..truth })
     }
 
-    /// The truth of these objects and instances, whose indices into `objects` must be valid.
+    /// The truth of these objects and instances, whose indices into `objects` must be valid, and whose triangles stop all rays.
     ///
     /// # Errors
     /// An id given twice or beyond the greatest.
@@ -87,7 +90,8 @@ impl Truth {
             return Err(DecodeError::Id { id: pair[0].id.into() });
         }
         let extremes = Extremes::of(&objects, &instances);
-        let mut truth = Self { objects, instances, placed, bvh: Bvh::build(&[]), extremes };
+        let mut truth =
+            Self { objects, instances, placed, bvh: Bvh::build(&[]), opacities: Opacities::default(), extremes };
         let bounds: Vec<Bounds> = (0..truth.placed.len()).map(|i| Bounds::of(&truth.world_vertices(i))).collect();
         truth.bvh = Bvh::build(&bounds);
         Ok(truth)
@@ -180,12 +184,21 @@ impl Truth {
         ray.exclude == Some(self.placed[index].id)
     }
 
-    /// Where the ray meets a triangle within its interval.
+    /// Where the ray meets a triangle within its interval, and does not pass.
     fn crossing(&self, ray: &TruthRay, index: usize) -> Option<Crossing> {
         if self.is_excluded(ray, index) {
             return None;
         }
-        crossing(ray, self.world_vertices(index)).filter(|hit| ray.t_min <= hit.t && hit.t <= ray.t_max)
+        let within = |hit: &Crossing| ray.t_min <= hit.t && hit.t <= ray.t_max;
+        let opacity = self.stored(index).2.opacity();
+        let stops = |hit: &Crossing| opacity.is_none_or(|opacity| !self.opacities.passes(&opacity, hit.weights));
+        crossing(ray, self.world_vertices(index)).filter(within).filter(stops)
+    }
+
+    /// What a kernel may do with a ray that meets a triangle, as assessed.
+    pub(super) fn passing(&self, index: usize, at: &Assessment) -> Passing {
+        let opacity = self.stored(index).2.opacity();
+        opacity.map_or(Passing::NEVER, |opacity| self.opacities.assess(&opacity, at))
     }
 
     /// Keeps the better of `best` and the hit of a triangle.

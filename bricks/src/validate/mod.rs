@@ -22,7 +22,7 @@ pub use payload::payload;
 use crate::error::{Flaw, Part};
 use crate::layout::{MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
 use crate::payload::Payload;
-use crate::records::{AttributeLayout, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, LATTICE_LIMIT};
+use crate::records::{AttributeLayout, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout, LATTICE_LIMIT};
 use crate::records::{MAX_BRICK_HEIGHT, NEAR_STEPS, ORIGIN_STEPS, Span, WIDE_STEPS};
 use crate::resident::Resident;
 use std::fmt::Display;
@@ -37,6 +37,7 @@ pub fn resident(resident: &Resident) -> Result<(), Flaw> {
     scene::instances(resident)?;
     scene::materials(resident)?;
     scene::textures(resident)?;
+    scene::opacity_maps(resident)?;
     for (index, record) in (0u32..).zip(&resident.bricks) {
         brick(index, record)?;
     }
@@ -78,10 +79,10 @@ pub fn spans(resident: &Resident, payload_end: u64) -> Result<(), Flaw> {
 /// Checks a brick's record by itself.
 fn brick(index: u32, brick: &Brick) -> Result<(), Flaw> {
     let part = Part::Record(Section::Bricks, index);
-    rule(brick.flags & !(BRICK_WIDE | BRICK_INDEX32) == 0, part, || {
+    rule(brick.flags & !(BRICK_WIDE | BRICK_INDEX32 | BRICK_OPACITY) == 0, part, || {
         (format!("flags {:#x}", brick.flags), "known flags")
     })?;
-    rule(brick._reserved0 == 0 && brick._reserved1 == [0; 4], part, || ("reserved words", "zero in them"))?;
+    rule(brick._reserved0 == 0 && brick._reserved1 == [0; 3], part, || ("reserved words", "zero in them"))?;
     rule(
         brick.node_count > 0 && brick.triangle_count > 0 && brick.vertex_count > 0 && brick.attribute_vertex_count > 0,
         part,
@@ -90,6 +91,11 @@ fn brick(index: u32, brick: &Brick) -> Result<(), Flaw> {
             (format!("{counts:?} nodes, triangles, vertices, attribute vertices"), "at least one of each")
         },
     )?;
+    let has_opacity = brick.flags & BRICK_OPACITY != 0;
+    rule(has_opacity == (brick.opacity_count > 0) && brick.opacity_count <= brick.triangle_count, part, || {
+        let found = format!("{} triangles with opacity, flags {:#x}", brick.opacity_count, brick.flags);
+        (found, "at most all, the flag if and only if there are some")
+    })?;
     rule((1..=MAX_BRICK_HEIGHT).contains(&brick.height), part, || {
         (format!("height {}", brick.height), format!("1 to {MAX_BRICK_HEIGHT}"))
     })?;

@@ -7,8 +7,10 @@ use super::node::NodeView;
 use super::{occupancy, rule};
 use crate::error::{Flaw, Part};
 use crate::payload::Payload;
-use crate::records::{AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Node};
-use crate::records::{SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
+use crate::records::{
+    AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout,
+};
+use crate::records::{Node, OpacityTriangle, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use crate::resident::Resident;
 
 /// Checks the bytes of a payload, as it is loaded, against the resident part, which satisfies [`super::resident`]: every index that
@@ -23,7 +25,8 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
     match payload {
         Payload::Geometry(index) => {
             let brick = &resident.bricks[index as usize];
-            geometry(part, brick, resident.objects[brick.object as usize].triangle_ids, bytes)
+            geometry(part, brick, resident.objects[brick.object as usize].triangle_ids, bytes)?;
+            opacity(part, brick, resident.materials.len() as u32, bytes)
         }
         Payload::Attributes(index) => {
             attributes(part, &resident.bricks[index as usize], resident.materials.len() as u32, bytes)
@@ -31,6 +34,9 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
         Payload::Proxies(index) => occupancy::map(resident, index, bytes),
         Payload::Texture(index) => {
             padding(part, bytes, resident.textures[index as usize].texel_bytes().unwrap_or(0), bytes.len() as u64)
+        }
+        Payload::Opacity(index) => {
+            padding(part, bytes, resident.opacity_maps[index as usize].texel_bytes(), bytes.len() as u64)
         }
     }
 }
@@ -46,7 +52,34 @@ fn geometry(part: Part, brick: &Brick, triangle_ids: u32, bytes: &[u8]) -> Resul
         (format!("triangle id {id}"), format!("less than {triangle_ids}, as its object says"))
     })?;
     padding(part, bytes, ids_end, layout.indices)?;
-    indices(part, brick, brick.vertex_count, bytes, layout.indices)
+    let up_to_indices = &bytes[..layout.opacity_of as usize];
+    indices(part, brick, brick.vertex_count, up_to_indices, layout.indices)
+}
+
+/// Checks what decides which rays pass through triangles.
+fn opacity(part: Part, brick: &Brick, materials: u32, bytes: &[u8]) -> Result<(), Flaw> {
+    if brick.flags & BRICK_OPACITY == 0 {
+        return Ok(());
+    }
+    let layout = GeometryLayout::of(brick);
+    let end = layout.opacity_of + u64::from(brick.triangle_count) * 4;
+    // Of numbers one more, so that none is 0.
+    let most = max_u32_by(&bytes[layout.opacity_of as usize..end as usize], |number| number.wrapping_add(1));
+    rule(most <= brick.opacity_count, part, || {
+        (format!("number {} of a triangle with opacity", most - 1), format!("less than {}", brick.opacity_count))
+    })?;
+    padding(part, bytes, end, layout.opacities)?;
+    let (triangles, _) = bytes[layout.opacities as usize..].as_chunks::<{ size_of::<OpacityTriangle>() }>();
+    for (index, bytes) in triangles.iter().enumerate() {
+        let triangle: OpacityTriangle = bytemuck::pod_read_unaligned(bytes);
+        let right = triangle.material < materials
+            && triangle.alphas >> 24 == 0
+            && triangle.uv.as_flattened().iter().all(|x| x.is_finite());
+        rule(right, part, || {
+            (format!("{triangle:?} as number {index}"), format!("finite numbers and a material less than {materials}"))
+        })?;
+    }
+    Ok(())
 }
 
 fn attributes(part: Part, brick: &Brick, materials: u32, bytes: &[u8]) -> Result<(), Flaw> {

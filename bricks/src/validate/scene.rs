@@ -130,7 +130,7 @@ pub(super) fn leaves(resident: &Resident) -> Result<(), Flaw> {
 pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
     for (index, material) in (0u32..).zip(&resident.materials) {
         let part = Part::Record(Section::Materials, index);
-        rule(material._reserved == [0; 4], part, || ("reserved words", "zero in them"))?;
+        rule(material._reserved == [0; 3], part, || ("reserved words", "zero in them"))?;
         let both = MATERIAL_MASK | MATERIAL_BLEND;
         let known = both | MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT;
         rule(material.flags & !known == 0 && material.flags & both != both, part, || {
@@ -144,6 +144,10 @@ pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
         let texture = material.base_color_texture;
         rule(texture == NONE || (texture as usize) < resident.textures.len(), part, || {
             (format!("texture {texture}"), format!("none or less than {}", resident.textures.len()))
+        })?;
+        let map = material.opacity_map;
+        rule(map == NONE || (map as usize) < resident.opacity_maps.len(), part, || {
+            (format!("opacity map {map}"), format!("none or less than {}", resident.opacity_maps.len()))
         })?;
     }
     Ok(())
@@ -165,6 +169,21 @@ pub(super) fn textures(resident: &Resident) -> Result<(), Flaw> {
         })?;
         let bytes = texture.texel_bytes().map_or(0, |bytes| bytes.next_multiple_of(16));
         length(Payload::Texture(index), texture.texels, bytes)?;
+    }
+    Ok(())
+}
+
+pub(super) fn opacity_maps(resident: &Resident) -> Result<(), Flaw> {
+    for (index, map) in (0u32..).zip(&resident.opacity_maps) {
+        let part = Part::Record(Section::OpacityMaps, index);
+        let sizes = [map.width, map.height];
+        rule(sizes.iter().all(|size| (1..=MAX_TEXTURE_SIZE).contains(size)), part, || {
+            (format!("{} by {} texels", sizes[0], sizes[1]), format!("1 to {MAX_TEXTURE_SIZE} each way"))
+        })?;
+        rule(map.wrap & 0xffff <= WRAP_MIRROR && map.wrap >> 16 <= WRAP_MIRROR && map._reserved == 0, part, || {
+            (format!("wrap {:#x}, reserved word {}", map.wrap, map._reserved), "known ways of wrapping, and zero")
+        })?;
+        length(Payload::Opacity(index), map.texels, map.texel_bytes().next_multiple_of(16))?;
     }
     Ok(())
 }

@@ -2,8 +2,8 @@
 
 use bricks::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, PAGE_BYTES};
 use bricks::{
-    BRICK_INDEX32, Brick, GeometryLayout, MAX_BRICK_HEIGHT, Node, OCCUPANCY_LEVELS, OccupancyMap, Payload, Resident,
-    SceneFile, Section, Span, Texture, validate,
+    BRICK_INDEX32, Brick, GeometryLayout, MAX_BRICK_HEIGHT, Node, OCCUPANCY_LEVELS, OccupancyMap, OpacityMap, Payload,
+    Resident, SceneFile, Section, Span, Texture, validate,
 };
 use bytemuck::Pod;
 use std::ops::Range;
@@ -103,6 +103,7 @@ pub fn seal(bytes: &mut [u8]) {
                 });
             }
             Section::Textures => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.texels]),
+            Section::OpacityMaps => records::<OpacityMap>(bytes, &entry, |map| vec![&mut map.texels]),
             _ => {}
         }
         if let Some(section) = range(bytes, entry.offset, entry.bytes) {

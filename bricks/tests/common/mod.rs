@@ -166,6 +166,19 @@ pub fn brick(
     attributes.extend_from_slice(&index_bytes(&(0..corners.len() as u32).collect::<Vec<_>>()));
     pad16(&mut attributes);
 
+    let opacity_count = if flags & BRICK_OPACITY != 0 { triangles.len() as u32 / 2 } else { 0 };
+    if opacity_count > 0 {
+        // Every other triangle.
+        let of: Vec<u32> = (0..triangles.len() as u32).map(|i| if i % 2 == 1 { i / 2 } else { NONE }).collect();
+        geometry.extend_from_slice(bytemuck::cast_slice(&of));
+        pad16(&mut geometry);
+        for i in 0..opacity_count {
+            let uv = [[i as f32, 0.25], [0.5, -1.0], [2.0, 3.0]];
+            let triangle = OpacityTriangle { uv, material: i % materials, alphas: 0x00ff_80c0 };
+            geometry.extend_from_slice(bytemuck::bytes_of(&triangle));
+        }
+    }
+
     let (min, max) = bounds(triangles);
     let brick = Brick {
         object: object.0,
@@ -181,6 +194,7 @@ pub fn brick(
         mean_albedo: [0.5, 0.25, 0.125],
         mean_emission: [0.0, 1.5, 0.0],
         root: nodes[0],
+        opacity_count,
         ..bytemuck::Zeroable::zeroed()
     };
     (brick, geometry, attributes)
@@ -235,7 +249,8 @@ fn top_node(children: &[(Triangle, u8)], child_base: u32, leaf_base: u32) -> Top
     }
 }
 
-/// Three bricks (near, wide, of an instanced object), three instances, a texture; spans not yet known.
+/// Three bricks (near, wide, of an instanced object that rays pass through), three instances, a texture, an opacity map; spans not
+/// yet known.
 pub fn scene() -> Scene {
     let object = |step_log2, unit_log2, first_brick, brick_count, triangle_ids, triangle_count| Object {
         step_log2,
@@ -254,7 +269,7 @@ pub fn scene() -> Scene {
     let built = [
         brick((0, &objects[0]), 0, [3 << 20, 0, 0], &near, &ids(0..27), 2),
         brick((0, &objects[0]), BRICK_WIDE | BRICK_INDEX32, [0; 3], &wide, &ids(37..42), 2),
-        brick((1, &objects[1]), 0, [0; 3], &small, &ids(0..10), 2),
+        brick((1, &objects[1]), BRICK_OPACITY, [0; 3], &small, &ids(0..10), 2),
     ];
     let mut payloads = BTreeMap::new();
     let (mut bricks, mut occupancy) = (Vec::new(), Vec::new());
@@ -272,6 +287,11 @@ pub fn scene() -> Scene {
     let mut texels: Vec<u8> = (1..=44).collect();
     pad16(&mut texels);
     payloads.insert(Payload::Texture(0), texels);
+    let opacity_map =
+        OpacityMap { width: 5, height: 3, wrap: WRAP_MIRROR | WRAP_CLAMP << 16, _reserved: 0, texels: Span::default() };
+    let mut alphas: Vec<u8> = (100..115).collect();
+    pad16(&mut alphas);
+    payloads.insert(Payload::Opacity(0), alphas);
 
     let instance =
         |object, base, flags, world_from_object| Instance { object, base, flags, _reserved: 0, world_from_object };
@@ -288,7 +308,8 @@ pub fn scene() -> Scene {
         alpha_cutoff: 0.5,
         flags,
         base_color_texture,
-        _reserved: [0; 4],
+        opacity_map: if base_color_texture == NONE { NONE } else { 0 },
+        _reserved: [0; 3],
     };
     let provenance = |first_id, count, node: &str| Provenance {
         first_id,
@@ -335,6 +356,7 @@ pub fn scene() -> Scene {
             material(NONE, MATERIAL_UNLIT, [0.0, 3.0, 0.0]),
         ],
         textures: vec![texture],
+        opacity_maps: vec![opacity_map],
         occupancy,
         ..Resident::default()
     };
@@ -396,6 +418,7 @@ impl Scene {
                 Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes = span,
                 Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies = span,
                 Payload::Texture(texture) => self.resident.textures[texture as usize].texels = span,
+                Payload::Opacity(map) => self.resident.opacity_maps[map as usize].texels = span,
             }
         }
     }
@@ -474,6 +497,7 @@ impl Image {
         let (section, index) = match payload {
             Payload::Geometry(index) | Payload::Attributes(index) | Payload::Proxies(index) => (Section::Bricks, index),
             Payload::Texture(index) => (Section::Textures, index),
+            Payload::Opacity(index) => (Section::OpacityMaps, index),
         };
         let bytes = &mut self.bytes.clone();
         let update = |span: &mut Span| {
@@ -493,6 +517,12 @@ impl Image {
                 record.root = root;
                 self.bytes.copy_from_slice(bytes);
                 self.edit(section, index, |brick| *brick = record);
+            }
+            Section::OpacityMaps => {
+                let mut record = self.record::<OpacityMap>(section, index);
+                update(&mut record.texels);
+                self.bytes.copy_from_slice(bytes);
+                self.edit(section, index, |map| *map = record);
             }
             _ => {
                 let mut record = self.record::<Texture>(section, index);

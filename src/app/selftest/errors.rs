@@ -67,6 +67,7 @@ impl Place {
             local_id: id,
             rotation: 0,
             vertices: [corner(&t[0]), corner(&t[1]), corner(&t[2])],
+            opacity: None,
         };
         let triangles: Vec<TruthTriangle> = (0..).zip(primitive.indices.chunks(3)).map(triangle).collect();
         let world = |v: [i64; 3]| DVec3::from(v.map(|x| x as f64)) * step;

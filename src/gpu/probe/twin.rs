@@ -40,7 +40,7 @@ impl Twin {
                 offset_high: leaf.offset_high,
                 offset_low: leaf.offset_low,
                 base: placement.instances[instance].base,
-                brick: BrickView::new(brick, bytemuck::cast_slice(&words)),
+                brick: BrickView::new(brick, bytemuck::cast_slice(&words), &[]),
                 ..BrickRay::outside(&framed_ray([0.0; 3], [1.0, 0.0, 0.0], 0.0))
             };
             let triangle = |i| Triangle { instance, id: r.id(i), vertices: r.vertices(i) };

@@ -80,6 +80,7 @@ pub fn material(color: [f32; 3], roughness: f32, flags: u32) -> Material {
         alpha_cutoff: 0.5,
         flags,
         base_color_texture: NONE,
-        _reserved: [0; 4],
+        opacity_map: NONE,
+        _reserved: [0; 3],
     }
 }

@@ -180,7 +180,8 @@ pub(super) fn summary(resident: &Resident, bytes_file: u64, phases: Vec<(&'stati
         bytes_attributes: resident.bricks.iter().map(|brick| brick.attributes.bytes).sum(),
         bytes_proxies: resident.bricks.iter().map(|brick| brick.proxies.bytes).sum::<u64>()
             + size_of_val(resident.occupancy.as_slice()) as u64,
-        bytes_textures: resident.textures.iter().map(|texture| texture.texels.bytes).sum(),
+        bytes_textures: resident.textures.iter().map(|texture| texture.texels.bytes).sum::<u64>()
+            + resident.opacity_bytes(),
         bytes_file,
         warnings: manifest.warnings.clone(),
         phases,

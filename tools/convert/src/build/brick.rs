@@ -5,12 +5,14 @@ use super::binary::{BinaryTree, Box3};
 use super::intern::Interner;
 use super::lattice::{Lattice, pow2};
 use super::node;
+use super::opacity::MaterialOpacity;
 use super::triangle::Triangle as Rounded;
 use super::voxelise::voxelise;
 use super::wide::{WideTree, collapse, collapse_levels};
 use bricks::{
-    AttributeLayout, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, LEAF_TRIANGLES, MAX_BRICK_HEIGHT, NEAR_STEPS,
-    ORIGIN_STEPS, Occupancy, OccupancyGrid, SURFACE_ROTATION_SHIFT, Span, WIDE_HIGH_STEPS,
+    AttributeLayout, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout, LEAF_TRIANGLES, MAX_BRICK_HEIGHT,
+    NEAR_STEPS, NONE, ORIGIN_STEPS, Occupancy, OccupancyGrid, OpacityTriangle, SURFACE_MATERIAL,
+    SURFACE_ROTATION_SHIFT, Span, WIDE_HIGH_STEPS,
 };
 use bytemuck::Zeroable;
 
@@ -26,6 +28,8 @@ pub(super) struct BrickContext<'a> {
     pub lattice: Lattice,
     /// Mean colours by material.
     pub materials: &'a [MeanColors],
+    /// Opacity by material.
+    pub opacity: &'a [MaterialOpacity],
     /// Whether trees are built fast rather than well.
     pub is_fast: bool,
     /// Whether bricks have proxies.
@@ -164,9 +168,26 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     let index32 = vertices.old_of_new.len().max(attribute_vertices.old_of_new.len()) > 1 << 16;
     let step_unit_log2 = context.lattice.step_unit_log2();
     let nodes: Vec<bricks::Node> = tree.nodes.iter().map(|node| node::encode(node, step_unit_log2)).collect();
+    // By the triangles' places in the tree's order, as they were interned: `triangles` are numbered anew.
+    let opacity = |&item: &u32| {
+        let triangle = &contents.triangles[item as usize];
+        let material = triangle.surface & SURFACE_MATERIAL;
+        let vertices = triangle.attributes.map(|vertex| &contents.attributes.values()[vertex as usize]);
+        context.opacity[material as usize].triangle(material, vertices)
+    };
+    let mut opacities: Vec<OpacityTriangle> = Vec::new();
+    let number = |opacity: Option<OpacityTriangle>| {
+        opacity.map_or(NONE, |opacity| {
+            opacities.push(opacity);
+            opacities.len() as u32 - 1
+        })
+    };
+    let opacity_of: Vec<u32> = tree.items.iter().map(opacity).map(number).collect();
+    let flag = |set: bool, flag: u32| if set { flag } else { 0 };
     let record = Brick {
         object: context.index,
-        flags: if wide { BRICK_WIDE } else { 0 } | if index32 { BRICK_INDEX32 } else { 0 },
+        flags: flag(wide, BRICK_WIDE) | flag(index32, BRICK_INDEX32) | flag(!opacities.is_empty(), BRICK_OPACITY),
+        opacity_count: opacities.len() as u32,
         node_count: nodes.len() as u32,
         triangle_count: triangles.len() as u32,
         vertex_count: vertices.old_of_new.len() as u32,
@@ -194,7 +215,12 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     geometry.extend(triangles.iter().flat_map(|triangle| triangle.id.to_le_bytes()));
     geometry.resize(layout.indices as usize, 0);
     push_indices(&mut geometry, triangles.iter().map(|triangle| triangle.positions), index32);
-    geometry.resize(layout.bytes as usize, 0);
+    geometry.resize(layout.opacity_of as usize, 0);
+    if !opacities.is_empty() {
+        geometry.extend_from_slice(bytemuck::cast_slice(&opacity_of));
+        geometry.resize(layout.opacities as usize, 0);
+        geometry.extend_from_slice(bytemuck::cast_slice(&opacities));
+    }
 
     let layout = AttributeLayout::of(&record);
     let mut attributes = Vec::with_capacity(layout.bytes as usize);

@@ -10,6 +10,7 @@ use super::error::BuildError;
 use super::journal::{self, Journal, Step};
 use super::lattice::Lattice;
 use super::objects::{ObjectPlan, Placed, Plan};
+use super::opacity::Opacities;
 use super::parts::Reader;
 use super::scratch::{self, Scratch};
 use super::settings::{BuildSettings, BuildSummary};
@@ -45,6 +46,7 @@ pub(super) struct Conversion<'a> {
 /// What is written, but for the resident part.
 struct Written {
     textures: Textures,
+    opacities: Opacities,
     cuts: Vec<ObjectCut>,
     used_materials: Vec<u64>,
     lattices: Vec<Lattice>,
@@ -74,6 +76,7 @@ impl Conversion<'_> {
     fn write_in_memory(&self, writer: &mut Writer, clock: &mut Clock) -> Result<Written, BuildError> {
         let Self { outline, plan, settings, progress, .. } = self;
         let textures = textures::write(self.source, rayon::current_num_threads(), writer, progress)?;
+        let opacities = self.write_opacity(&textures, writer)?;
         let mut warnings = textures.warnings.clone();
         clock.end("textures");
         let reader = Reader::eager(self.source, plan, progress)?;
@@ -83,7 +86,8 @@ impl Conversion<'_> {
         clock.end("partition");
         let lattices = cut::choose(plan, &outline.meshes, &cuts, settings, &mut warnings)?;
         let means = textures.material_means();
-        let contexts = encode::contexts(&lattices, &means, settings);
+        let opacity = opacities.of_materials(&outline.materials);
+        let contexts = encode::contexts(&lattices, &means, &opacity, settings);
         let jobs = encode::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
         progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.len(), BATCH_TRIANGLES);
@@ -91,7 +95,12 @@ impl Conversion<'_> {
         bricks.write(&jobs, encode, progress)?;
         let (bricks, occupancy, rounded_away) = (bricks.records, bricks.occupancy, bricks.dropped);
         clock.end("bricks");
-        Ok(Written { textures, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
+        Ok(Written { textures, opacities, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
+    }
+
+    fn write_opacity(&self, textures: &Textures, writer: &mut Writer) -> Result<Opacities, BuildError> {
+        let is_stored = |texture| textures.is_stored(texture);
+        Opacities::write(self.source, &self.outline.materials, is_stored, writer, self.progress)
     }
 
     /// Converts by way of the disk.
@@ -190,6 +199,11 @@ impl Conversion<'_> {
             Ok(textures.to_words(writer.checkpoint()?))
         })?;
         let textures = Textures::from_words(&words, outline).ok_or_else(|| journal.damaged())?;
+        let words = journal.step(Step::Opacity, || {
+            let opacities = self.write_opacity(&textures, writer)?;
+            Ok(opacities.to_words(writer.checkpoint()?))
+        })?;
+        let opacities = Opacities::from_words(&words, outline.materials.len()).ok_or_else(|| journal.damaged())?;
         let mut warnings = textures.warnings.clone();
         clock.end("textures");
         let reader = Reader::lazy(self.source);
@@ -207,7 +221,8 @@ impl Conversion<'_> {
         clock.end("partition");
         let lattices = cut::choose(plan, &outline.meshes, &cuts.objects, settings, &mut warnings)?;
         let means = textures.material_means();
-        let contexts = encode::contexts(&lattices, &means, settings);
+        let opacity = opacities.of_materials(&outline.materials);
+        let contexts = encode::contexts(&lattices, &means, &opacity, settings);
         let jobs = encode::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
         let (chunks, rounded_away) = bounded.distribute(&cuts, &jobs, &lattices, journal)?;
         clock.end("distribute");
@@ -216,13 +231,24 @@ impl Conversion<'_> {
         let (bricks, occupancy) = (bricks.records, bricks.occupancy);
         clock.end("bricks");
         let (cuts, used_materials) = (cuts.objects, cuts.materials);
-        Ok(Written { textures, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
+        Ok(Written { textures, opacities, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
     }
 
     /// Builds the resident part and finishes the file.
     fn finish(&self, written: Written, writer: Writer, mut clock: Clock) -> Result<BuildSummary, BuildError> {
-        let Written { textures, cuts, used_materials, lattices, bricks, occupancy, rounded_away, mut warnings } =
-            written;
+        let Written {
+            textures,
+            opacities,
+            cuts,
+            used_materials,
+            lattices,
+            bricks,
+            occupancy,
+            rounded_away,
+            mut warnings,
+        } = written;
+        let mut materials = textures.materials;
+        opacities.name_maps(&mut materials);
         self.progress.phase("top level", 0);
         let objects = assemble::object_records(&self.plan, &lattices, &bricks);
         let instances = assemble::instance_records(&self.plan);
@@ -235,8 +261,9 @@ impl Conversion<'_> {
             top2: top.top2,
             top8: top.top8,
             bricks,
-            materials: textures.materials,
+            materials,
             textures: textures.records,
+            opacity_maps: opacities.records,
             occupancy,
         };
         let dropped = Dropped::count(&resident, &cuts, &rounded_away);

@@ -37,6 +37,8 @@ pub(super) enum Step {
     Distribute,
     /// A chunk is encoded.
     Encode,
+    /// The opacity maps are written.
+    Opacity,
 }
 
 /// A journal that grows by a record with each step.
@@ -92,7 +94,7 @@ impl Journal {
     /// that write begin with. `None` if there was no such step.
     pub fn written(&self) -> Result<Option<(u64, Vec<Span>)>, BuildError> {
         let (mut position, mut spans) = (None, Vec::new());
-        let writes = |step: u64| step == Step::Textures as u64 || step == Step::Encode as u64;
+        let writes = |step: u64| [Step::Textures, Step::Opacity, Step::Encode].iter().any(|kind| *kind as u64 == step);
         for (_, words) in self.done.iter().filter(|(step, _)| writes(*step)) {
             let mut words = WordReader(words);
             position = words.take();

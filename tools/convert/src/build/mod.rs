@@ -30,6 +30,7 @@ mod lattice;
 mod matrix;
 mod node;
 mod objects;
+mod opacity;
 mod partition;
 mod parts;
 mod scratch;

@@ -90,6 +90,11 @@ impl Textures {
         materials.iter().map(renumber).collect()
     }
 
+    /// Whether a texture, by its index in the source, is stored.
+    pub fn is_stored(&self, texture: u32) -> bool {
+        self.new_of_old[texture as usize] != NONE
+    }
+
     /// Mean colours by material.
     pub fn material_means(&self) -> Vec<MeanColors> {
         self.materials.iter().map(|material| MeanColors::of(material, &self.means)).collect()
@@ -125,6 +130,12 @@ impl Textures {
     }
 }
 
+/// How a texture is repeated, in ways that are known.
+pub(super) fn sound_wrap(texture: &SourceTexture) -> u32 {
+    let is_known = texture.wrap & 0xffff <= WRAP_MIRROR && texture.wrap >> 16 <= WRAP_MIRROR;
+    if is_known { texture.wrap } else { WRAP_REPEAT | WRAP_REPEAT << 16 }
+}
+
 /// Makes the mip chain of a texture.
 pub(super) fn encode(source: &SourceTexture) -> Result<EncodedTexture, BuildError> {
     let (width, height) = (source.width, source.height);
@@ -136,8 +147,7 @@ pub(super) fn encode(source: &SourceTexture) -> Result<EncodedTexture, BuildErro
     rule(in_range, "size", format!("{width} by {height}"), format!("1 to {MAX_TEXTURE_SIZE} texels each way"))?;
     let bytes = width as usize * height as usize * 4;
     rule(source.rgba.len() == bytes, "length", source.rgba.len().to_string(), format!("{bytes} bytes"))?;
-    let wraps = source.wrap & 0xffff <= WRAP_MIRROR && source.wrap >> 16 <= WRAP_MIRROR;
-    let wrap = if wraps { source.wrap } else { WRAP_REPEAT | WRAP_REPEAT << 16 };
+    let wrap = sound_wrap(source);
 
     let levels = width.max(height).ilog2() + 1;
     let mut texels = source.rgba.clone();

@@ -58,7 +58,8 @@ pub(super) fn material() -> Material {
         alpha_cutoff: 0.5,
         flags: MATERIAL_DOUBLE_SIDED,
         base_color_texture: NONE,
-        _reserved: [0; 4],
+        opacity_map: NONE,
+        _reserved: [0; 3],
     }
 }
 

@@ -35,7 +35,8 @@ pub(super) fn default_material() -> Material {
         alpha_cutoff: 0.5,
         flags: 0,
         base_color_texture: NONE,
-        _reserved: [0; 4],
+        opacity_map: NONE,
+        _reserved: [0; 3],
     }
 }
 
@@ -111,7 +112,8 @@ fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> 
         alpha_cutoff: json.alpha_cutoff.unwrap_or(0.5).clamp(0.0, f32::MAX as f64) as f32,
         flags,
         base_color_texture: NONE,
-        _reserved: [0; 4],
+        opacity_map: NONE,
+        _reserved: [0; 3],
     }
 }
 
