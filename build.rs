@@ -100,6 +100,7 @@ fn layout_checks(module: &naga::Module) -> String {
         "Material",
         "Texture",
         "GBuffer",
+        "Emitter",
     ];
     let mut s = String::new();
     for name in mirrored {
@@ -119,7 +120,8 @@ fn layout_checks(module: &naga::Module) -> String {
     }
     for (_, constant) in module.constants.iter() {
         let Some(name) = constant.name.as_deref() else { continue };
-        let prefixes = ["PARAM_", "STATE_", "COUNTER_", "WORK_", "INSTANCE_", "BRICK_", "BINARY_", "BATCH_", "NONE"];
+        let prefixes =
+            ["PARAM_", "STATE_", "COUNTER_", "WORK_", "INSTANCE_", "BRICK_", "BINARY_", "BATCH_", "EMITTER_", "NONE"];
         if prefixes.iter().any(|p| name.starts_with(p))
             && let naga::Expression::Literal(naga::Literal::U32(value)) = module.global_expressions[constant.init]
         {

@@ -2,6 +2,8 @@
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
+#include "shared/random.wgsl"
+#include "shared/lamps.wgsl"
 #include "shared/light.wgsl"
 
 // One thread a pixel.
@@ -17,15 +19,17 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let g = gbuffer[index];
     var light: vec3<f32>;
-    if (params.flags & PARAM_RECTANGLE) == 0u {
-        light = sunlight(g.normal);
-    } else {
-        // One point of the light, drawn evenly over its area: radiance * cos * cos' * area / distance^2 / pi. The direction leads
-        // from the surface to the point, and the length of the cross product is the area.
-        let d = ray.direction;
+    let d = ray.direction;
+    if (params.flags & PARAM_EMITTER) != 0u {
+        // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction leads from the
+        // surface to the point.
+        let e = emitter_of(index);
         let squared = dot(d, d);
-        let from_light = max(dot(-d, cross(params.lamp_u.xyz, params.lamp_v.xyz)), 0.0);
-        light = params.lamp_color.rgb * max(dot(g.normal, d), 0.0) * from_light / (PI * squared * squared);
+        light = e.radiance * max(dot(g.normal, d), 0.0) * shines(e, d) / (PI * squared * squared) / e.probability;
+    } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
+        light = environment_sample(lamp_words(index)).light * max(dot(g.normal, d), 0.0) / PI;
+    } else {
+        light = sunlight(g.normal);
     }
     add_light(index, surface_share() * g.albedo * light);
 }

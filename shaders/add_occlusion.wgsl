@@ -2,6 +2,8 @@
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
+#include "shared/random.wgsl"
+#include "shared/lamps.wgsl"
 #include "shared/light.wgsl"
 
 // One thread a pixel.

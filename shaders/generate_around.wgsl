@@ -1,6 +1,6 @@
 // One ray from every primary hit in the pass's direction around the interpolated normal, turned about it at random within limits
 // (CHC+RT §5.3); where that leads below the surface, none. Limited rays ask for occlusion; for the others the throughput
-// is noted: what the surface reflects, by the share of the direction.
+// is noted: what the surface reflects, by the share of the direction; in w the direction's number.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -37,7 +37,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     rays[index] = ray;
     if !LIMITED {
-        throughput[index] = vec4<f32>(carried, 0.0);
+        throughput[index] = vec4<f32>(carried, f32(params.direction));
     }
     start_hit(index, ray.t_max, seen_hits[index].id);
 }

@@ -4,9 +4,42 @@
 #include "shared/shading.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/random.wgsl"
+#include "shared/lamps.wgsl"
 
-// Rays to the rectangular light end short of it by this share of the distance, so that what lies in its plane casts no shadow.
+// Rays to emitters end short of them by this share of the distance, so that what lies in their plane casts no shadow.
 const SHORT_OF_LIGHT: f32 = 1.0 / 65536.0;
+// Of the coordinates: more than what three roundings may leave a point of an emitter beside its triangle, and more on instances.
+const BESIDE: f32 = 1.0 / 1048576.0;
+
+fn greatest(v: vec3<f32>) -> f32 {
+    return max(abs(v.x), max(abs(v.y), abs(v.z)));
+}
+
+// From `start` to the point of `e` that `r` draws evenly. Triangles are surfaces of the scene themselves, so the point is lifted off them by
+// what roundings leave; a start that lies in the plane of the triangle within as much has no light from it: zero.
+fn toward(e: Emitter, start: vec3<f32>, r: vec2<f32>) -> vec3<f32> {
+    let kind = e.kind & EMITTER_KIND;
+    if kind == EMITTER_DISTANT {
+        return -e.u;
+    }
+    if kind > EMITTER_TRIANGLE {
+        return barrier3(e.corner - start);
+    }
+    let is_triangle = kind == EMITTER_TRIANGLE;
+    let s = select(r, vec2<f32>(1.0) - r, is_triangle && r.x + r.y > 1.0);
+    let p = barrier3(e.corner + barrier3(barrier3(s.x * e.u) + barrier3(s.y * e.v)));
+    let direction = barrier3(p - start);
+    if !is_triangle {
+        return direction;
+    }
+    let n = normalize(cross(e.u, e.v));
+    let above = -dot(direction, n);
+    let beside = BESIDE * (greatest(p) + greatest(start));
+    if abs(above) <= beside {
+        return vec3<f32>(0.0);
+    }
+    return direction + select(-beside, beside, above > 0.0) * n;
+}
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -21,11 +54,15 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let r = random2(index, params.stream, params.seed);
         var faces = true;
         var t_max = T_INFINITE;
-        if (params.flags & PARAM_RECTANGLE) != 0u {
-            let p = barrier3(params.lamp_corner.xyz + barrier3(barrier3(r.x * params.lamp_u.xyz) + barrier3(r.y * params.lamp_v.xyz)));
-            ray.direction = barrier3(p - surface.point);
-            faces = dot(ray.direction, cross(params.lamp_u.xyz, params.lamp_v.xyz)) < 0.0;
-            t_max = 1.0 - SHORT_OF_LIGHT;
+        if (params.flags & PARAM_EMITTER) != 0u {
+            let e = emitter_of(index);
+            ray.direction = toward(e, surface.point, r);
+            faces = shines(e, ray.direction) > 0.0;
+            t_max = select(1.0 - SHORT_OF_LIGHT, T_INFINITE, (e.kind & EMITTER_KIND) == EMITTER_DISTANT);
+        } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
+            let drawn = environment_sample(lamp_words(index));
+            ray.direction = drawn.direction;
+            faces = any(drawn.light > vec3<f32>(0.0));
         } else if params.sun_radius > 0.0 {
             let d = params.sun.xyz;
             let disc = disc_point(r) * params.sun_radius;

@@ -1,8 +1,10 @@
-// What the hits of the shaded set show by themselves: the sky on a miss, else their emission, and, unless passes of their own bring
-// it, the light of the sun and of the sky on a Lambertian surface. The first shading of a sample counts it.
+// What the hits of the shaded set show by themselves, unless passes of their own bring it: the background on a miss, else their emission
+// and the light of the sun and of the background on a Lambertian surface. The first shading of a sample counts it.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
+#include "shared/random.wgsl"
+#include "shared/lamps.wgsl"
 #include "shared/light.wgsl"
 
 // One thread a pixel.
@@ -20,7 +22,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     if seen_surfaces[index].leaf == NONE {
-        add_light(index, sky(ray.direction));
+        if (params.flags & PARAM_MISS) != 0u {
+            add_light(index, background(ray.direction));
+        }
         return;
     }
     let g = gbuffer[index];
@@ -31,5 +35,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if (params.flags & PARAM_SKY) != 0u {
         light += ambient(g.normal);
     }
-    add_light(index, surface_share() * (g.albedo * light + g.emission));
+    var shown = g.albedo * light;
+    if (params.flags & PARAM_EMISSION) != 0u {
+        shown += g.emission;
+    }
+    add_light(index, surface_share() * shown);
 }

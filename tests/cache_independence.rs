@@ -91,6 +91,29 @@ fn effects_do_not_depend_on_the_cache() {
 }
 
 #[test]
+fn light_of_the_sky_does_not_depend_on_the_cache() {
+    let folder = folder();
+    let scene = city(folder.path(), "30K", "1K");
+    let options = "--effects shadow,diffuse,mirror,environment --environment sky --diffuse-rays 2 --rotation full";
+    let view = near(&scene).replace("--frames 3", "--frames 2");
+    let run = |name: &str, more: &str| {
+        let output = folder.path().join(name);
+        walk(&scene, &output, &format!("{view} {options} {more}"));
+        frames(&output)
+    };
+    let truth = run("plain", "--schedule plain --cache 100%");
+    for more in [
+        "--schedule chc --cache 20% --tile 16",
+        "--schedule chc --cache 20% --fronts on",
+        "--schedule demand --cache 20%",
+    ] {
+        assert!(run("other", more) == truth, "{more}: frames differ from plain");
+    }
+    // Negative control: other random numbers give other pictures.
+    assert!(run("other", "--cache 20% --seed 1") != truth, "a different seed must draw other directions");
+}
+
+#[test]
 fn ten_runs_are_one() {
     let folder = folder();
     let scene = city(folder.path(), "30K", "1K");

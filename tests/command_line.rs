@@ -38,7 +38,7 @@ fn usage_is_refused_with_status_2() {
         ("--cache", "99999999999999999999G"),
         ("--cache", "101%"),
         ("--effects", "primary,glow"),
-        ("--effects", "environment"),
+        ("--environment-rotation", "400"),
         ("--secondary", "roma"),
         ("--schedule", "best"),
         ("--spp", "0"),

@@ -70,7 +70,7 @@ fn check_walk(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, si
     let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
     let session = Session::open(file.clone(), scene, &args.stream, extent).expect("a session");
-    let mut renderer = renderer(session, &args);
+    let mut renderer = renderer(session, &args).expect("lamps");
     let manifest = &file.resident().manifest;
     let path = path.unwrap_or_else(|| path_from_bounds(manifest.min, manifest.max));
     let (mut primary, mut shadow) = (Tally::default(), Tally::default());
@@ -113,19 +113,21 @@ fn check_walk(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, si
 fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
     let file = open_scene(scene).expect("the scene");
     let truth = Truth::load(&file).expect("truth");
-    let light = "--rect-light 0,60,0,9,0,0,0,0,9 --rotation full --ao-rays 2 --diffuse-rays 2 --ao-length 5";
+    let light =
+        "--rect-light 0,60,0,9,0,0,0,0,9 --environment sky --rotation full --ao-rays 2 --diffuse-rays 2 --ao-length 5";
     let words = format!("brickwalk walk s -o o {OPTIONS} {size} {light} --effects shadow,ao,diffuse,mirror");
     let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
     let session = Session::open(file.clone(), scene, &args.stream, extent).expect("a session");
-    let mut renderer = renderer(session, &args);
+    let mut renderer = renderer(session, &args).expect("lamps");
     let all = renderer.settings.effects;
-    let none = Effects { shadow: false, occlusion: None, diffuse: None, mirror: false, ..all };
+    let none = Effects { shadow: false, environment: false, occlusion: None, diffuse: None, mirror: false, ..all };
     let cases = [
         ("ao", Effects { occlusion: all.occlusion, ..none }, Pass::Occlusion(1)),
         ("diffuse", Effects { diffuse: all.diffuse, shadow: true, ..none }, Pass::Diffuse(1)),
         ("mirror", Effects { mirror: true, shadow: true, ..none }, Pass::Mirror),
-        ("rectangular light", Effects { shadow: true, ..none }, Pass::Shadow(Lamp::Rectangle)),
+        ("rectangular light", Effects { shadow: true, ..none }, Pass::Shadow(Lamp::Emitter)),
+        ("environment", Effects { environment: true, ..none }, Pass::Shadow(Lamp::Environment)),
     ];
     for (effect, effects, pass) in cases {
         renderer.settings.effects = effects;
@@ -136,7 +138,7 @@ fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
             let frame = Frame::near(file.resident(), camera.position);
             let mut passes = vec![(Pass::Primary, pass)];
             if effects.has_bounces() {
-                passes.push((pass, Pass::BounceShadow(Lamp::Rectangle)));
+                passes.push((pass, Pass::BounceShadow(Lamp::Emitter)));
             }
             for (from, pass) in passes {
                 let starts = renderer.executor.read_hits(from).expect("hits");

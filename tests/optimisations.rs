@@ -26,7 +26,7 @@ fn open(scene: &Path, options: &str) -> Renderer {
     let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
     let file = open_scene(scene).expect("the scene");
-    renderer(Session::open(file, scene, &args.stream, extent).expect("a session"), &args)
+    renderer(Session::open(file, scene, &args.stream, extent).expect("a session"), &args).expect("lamps")
 }
 
 /// The least cache of a scene, bytes, from the error that asks for it.

@@ -272,7 +272,7 @@ fn wrong_usage_is_exit_status_2_and_help_is_0() {
         "info",
         "walk s.bricks",
         "walk s.bricks -o out --frames 0",
-        "walk s.bricks -o out --effects environment",
+        "walk s.bricks -o out --effects surroundings",
         "walk s.bricks -o out --schedule fastest",
         "scene pipe -o s.bricks",
         "scene city -o s.bricks --triangles 3",

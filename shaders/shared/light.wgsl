@@ -1,4 +1,4 @@
-// Light: the sky, and what is added to pixels.
+// Light: the background, and what is added to pixels.
 
 const PI: f32 = 3.14159265;
 
@@ -11,8 +11,30 @@ fn sky(d: vec3<f32>) -> vec3<f32> {
     return mix(horizon, params.sky_color.rgb, sqrt(up));
 }
 
-// What a white surface reflects of a sky over a ground, each of one radiance: a cosine-weighted hemisphere sees the share of both.
+// What rays see that meet nothing.
+fn background(d: vec3<f32>) -> vec3<f32> {
+    if params.environment_width != 0u {
+        return environment_at(d);
+    }
+    return sky(d);
+}
+
+// What a white surface reflects of the background, by its normal: of an environment by its spherical harmonics up to order 2
+// (Ramamoorthi, Hanrahan 2001); else of a sky over a ground, each of one radiance: a cosine-weighted hemisphere sees the share of both.
 fn ambient(normal: vec3<f32>) -> vec3<f32> {
+    if params.environment_width != 0u {
+        let n = normal;
+        var sum = params.ambient[0].rgb;
+        sum += params.ambient[1].rgb * n.y;
+        sum += params.ambient[2].rgb * n.z;
+        sum += params.ambient[3].rgb * n.x;
+        sum += params.ambient[4].rgb * (n.x * n.y);
+        sum += params.ambient[5].rgb * (n.y * n.z);
+        sum += params.ambient[6].rgb * (3.0 * n.z * n.z - 1.0);
+        sum += params.ambient[7].rgb * (n.x * n.z);
+        sum += params.ambient[8].rgb * (n.x * n.x - n.y * n.y);
+        return max(sum, vec3<f32>(0.0));
+    }
     return mix(params.ground_color.rgb, params.sky_color.rgb, 0.5 + 0.5 * normal.y);
 }
 

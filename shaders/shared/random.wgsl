@@ -32,3 +32,11 @@ fn tangent(n: vec3<f32>) -> vec3<f32> {
     let axis = select(vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0), abs(n.x) > 0.7);
     return normalize(cross(n, axis));
 }
+
+// Four words; the first two are those of `random2`.
+fn random4(pixel: u32, sample: u32, seed: u32) -> vec4<u32> {
+    let a = pcg(pixel ^ pcg(sample ^ pcg(seed)));
+    let b = pcg(a);
+    let c = pcg(b);
+    return vec4<u32>(a, b, c, pcg(c));
+}

@@ -26,10 +26,6 @@ struct Params {
     sky_color: vec4<f32>,
     ground_color: vec4<f32>,
     jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
-    lamp_corner: vec4<f32>,  // the rectangular light in the frame: a corner,
-    lamp_u: vec4<f32>,       // and its two edges; it shines to the side of cross(u, v)
-    lamp_v: vec4<f32>,
-    lamp_color: vec4<f32>,   // its radiance
     around: vec4<f32>,    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
     share: f32,           // of the light that the pass's direction stands for
     surface_share: f32,   // of its own light that a primary hit shows, the rest being mirrored
@@ -39,6 +35,12 @@ struct Params {
     run_first: u32,       // of a tile's selected leaves, the first that intersect_list takes
     run_count: u32,       // and how many it takes at most
     list_most: u32,       // leaves of the longest list that rays are intersected with
+    emitter_count: u32,
+    direction: u32,       // number of the pass's direction
+    environment_width: u32,  // texels of a row of the environment; 0: the sky is the background
+    environment_height: u32,
+    environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
+    ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
 
 const PARAM_ANY_HIT: u32 = 1u;
@@ -46,10 +48,13 @@ const PARAM_NEEDED: u32 = 2u;     // queries ask what a pass needed, from its fi
 const PARAM_SUN: u32 = 4u;        // shade: with the sun, unshadowed
 const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
 const PARAM_BOUNCE: u32 = 16u;    // the hits that are shaded are those of set 1
-const PARAM_RECTANGLE: u32 = 32u; // the pass's lamp is the rectangular light
+const PARAM_EMITTER: u32 = 32u;   // the pass's lamp is one of the emitters
+const PARAM_ENVIRONMENT: u32 = 64u; // the pass's lamp is the environment
 const PARAM_TIGHTER: u32 = 128u;  // pairs are queried by the boxes of the node's children
 const PARAM_NEXT: u32 = 256u;     // a ray asks up to the first brick that it enters of those it asks for, not for all
 const PARAM_CULLED: u32 = 512u;   // pairs of a tile and a leaf that no more rays see than the threshold are left out
+const PARAM_EMISSION: u32 = 1024u; // shade: with the hits' emission
+const PARAM_MISS: u32 = 2048u;    // shade: with the background, where rays missed
 
 const BATCH_SAMPLES: u32 = 64u;   // samples that are summed before the radiance is emptied
 
@@ -222,7 +227,26 @@ struct GBuffer {          // what shading reads of a primary hit
     uv: vec2<f32>,
 }
 
+struct Emitter {          // in the frame, device units; one of them is drawn by an alias table over their power
+    corner: vec3<f32>,    // a corner, or where the light is
+    kind: u32,            // EMITTER_*, with EMITTER_TWO_SIDED
+    u: vec3<f32>,         // an edge that starts at the corner; of spots and distant lights the unit vector along the light
+    probability: f32,     // of being drawn
+    v: vec3<f32>,         // the other edge: it shines to the side of cross(u, v); of spots: scale and offset of the cosine, x and y; of
+                          // spots and points z: 1 / range, 0 without one
+    threshold: u32,       // below it a random number of 32 bits stays with this entry of the table,
+    radiance: vec3<f32>,  // or of points and spots radiant intensity, of distant lights irradiance
+    other: u32,           // else it goes to this one
+}
+
 const NONE: u32 = 0xffffffffu;
+const EMITTER_PARALLELOGRAM: u32 = 0u;
+const EMITTER_TRIANGLE: u32 = 1u;
+const EMITTER_POINT: u32 = 2u;
+const EMITTER_SPOT: u32 = 3u;
+const EMITTER_DISTANT: u32 = 4u;
+const EMITTER_KIND: u32 = 7u;      // the bits of the above
+const EMITTER_TWO_SIDED: u32 = 8u;
 const T_INFINITE: f32 = 3.4028234e38;
 const INSTANCE_IDENTITY: u32 = 1u;
 const BRICK_WIDE: u32 = 1u;

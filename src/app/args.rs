@@ -371,9 +371,6 @@ pub struct WalkArgs {
     /// Optimisations.
     #[command(flatten)]
     pub optimisations: OptimisationArgs,
-    /// Environment image; comes with a later version.
-    #[arg(long, hide = true, value_parser = not_built)]
-    pub environment: Option<String>,
 }
 
 /// Options of `trace`.
@@ -486,11 +483,6 @@ named_values! {
 /// Accepts the values of a list.
 fn one_of(text: &str, known: &[&str]) -> Result<String, String> {
     if known.contains(&text) { Ok(text.into()) } else { Err(unknown(text, known, &[])) }
-}
-
-/// Refuses an option that this version only knows by name.
-fn not_built(_: &str) -> Result<String, String> {
-    Err("this option is not in this version; leave it out".into())
 }
 
 /// Parses a whole number or count and checks its range.

@@ -76,7 +76,6 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--cache 99999999999G", "64 bits"),
         ("--host-cache 1.5G", "whole number"),
         ("--schedule fastest", "known: chc, demand, plain, plain-bvh2, auto"),
-        ("--effects environment", "not in this version"),
         ("--effects glitter", "no 'glitter'"),
         ("--effects=", "known: primary, shadow"),
         ("--secondary roma", "roma is not in this version"),
@@ -95,7 +94,8 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--query-threshold 40001", "0 to 40000"),
         ("--evict fifo", "known: round-robin, second-chance, lru"),
         ("--prefetch 65537", "0 to 65536"),
-        ("--environment f.hdr", "not in this version"),
+        ("--environment-rotation 361", "-360 to 360"),
+        ("--environment-intensity=-1", "at least 0"),
         ("--nonsense", "--nonsense"),
     ] {
         let error = walk(options).unwrap_err();

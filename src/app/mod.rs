@@ -12,6 +12,7 @@ pub mod info;
 mod inputs;
 pub mod interrupt;
 pub mod light_args;
+pub mod lighting;
 mod named;
 pub mod optimisation_args;
 pub mod output;

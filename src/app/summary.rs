@@ -1,6 +1,7 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
 use super::args::WalkArgs;
+use super::lighting::Lighting;
 use super::optimisation_args::names;
 use super::pictures::Pictures;
 use crate::kernel::opacity;
@@ -16,6 +17,7 @@ pub fn of_walk(
     args: &WalkArgs,
     renderer: &mut Renderer,
     pictures: &Pictures,
+    lighting: &Lighting,
     records: &[Record],
     frames: u32,
 ) -> Value {
@@ -68,7 +70,21 @@ pub fn of_walk(
             "seed": args.seed,
             "sun": args.light.sun.0,
             "sun_angle_degrees": args.light.sun_angle,
+            "sun_intensity": args.light.sun_intensity(),
+            "sky_intensity": args.light.sky_intensity,
+            "environment": args.light.environment.as_ref().map(ToString::to_string),
+            "environment_rotation_degrees": args.light.environment_rotation,
+            "environment_intensity": args.light.environment_intensity,
             "rect_light": args.light.rect_light.map(|light| light.map(|v| v.to_array())),
+        },
+        "lamps": {
+            "emitters": renderer.light.lamps.emitters().len(),
+            "environment": renderer.light.lamps.environment.as_ref().zip(lighting.environment).map(|(map, notes)| json!({
+                "width": map.width,
+                "height": map.height,
+                "bad_texels": notes.bad_texels,
+                "energy_change": notes.energy_change,
+            })),
         },
         "frames": frames,
         "pictures": pictures.summary(args),

@@ -1,6 +1,7 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::args::WalkArgs;
+use super::lighting::{Lighting, lighting};
 use super::output::atomic;
 use super::pictures::Pictures;
 use super::session::{Session, open_scene, write_requests};
@@ -17,7 +18,7 @@ use crate::stream::{BrickBox, HostCacheStats, Item, Prefetcher};
 use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
 use brickwalk_convert::progress::Progress;
-use glam::DVec3;
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -36,15 +37,20 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         path = path.with_fov_y_degrees(fov)?;
     }
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let lighting = lighting(args, &scene)?;
+    for warning in &lighting.warnings {
+        let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(warning));
+    }
     let session = Session::open(scene.clone(), &args.scene, &args.stream, extent)?;
-    let mut reference = if args.measure_error { Some(reference(scene, args, extent)?) } else { None };
+    let mut reference =
+        if args.measure_error { Some(reference(scene, args, lighting.light.clone(), extent)?) } else { None };
     let frames_folder = args.output.join("frames");
     atomic::create_folder(&frames_folder)?;
     for stale in ["summary.json", "report.html"] {
         // What is left of an earlier walk must not be taken for a part of this one.
         let _ = std::fs::remove_file(args.output.join(stale));
     }
-    let mut renderer = renderer(session, args);
+    let mut renderer = lit_renderer(session, args, lighting.light.clone());
     renderer.captures = args.measure_error.then(Captures::default);
     let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
     let mut pictures = Pictures::create(&frames_folder, args)?;
@@ -96,7 +102,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     }
     progress.finish();
     pictures.finish(args.json)?;
-    finish(args, &mut renderer, &pictures, &records, finished)?;
+    finish(args, &mut renderer, &pictures, &lighting, &records, finished)?;
     if finished < args.frames {
         bail!("interrupted after {finished} of {} frames; {} holds what is done", args.frames, args.output.display());
     }
@@ -108,19 +114,21 @@ pub fn run(args: &WalkArgs) -> Result<()> {
 }
 
 /// The renderer that the options of a walk ask for.
-pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
+///
+/// # Errors
+/// Those of [`lighting`].
+pub fn renderer(session: Session, args: &WalkArgs) -> Result<Renderer> {
+    let light = lighting(args, &session.scene)?.light;
+    Ok(lit_renderer(session, args, light))
+}
+
+/// The same with this light.
+fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer {
     let Session { scene, mut executor, cache, schedule } = session;
     if args.effects.effects().has_bounces() {
         executor.allow_bounces();
     }
     let settings = settings(args, schedule);
-    let mut light = Light::new(
-        DVec3::from_array(args.light.sun.0),
-        args.light.sun_angle,
-        args.light.sun_intensity as f32,
-        args.light.sky_intensity as f32,
-    );
-    light.rectangle = args.light.rectangle();
     let fronts = (args.stream.fronts == "on").then(Fronts::default);
     let size = (args.size.width, args.size.height);
     Renderer {
@@ -139,7 +147,7 @@ pub fn renderer(session: Session, args: &WalkArgs) -> Renderer {
 }
 
 /// A renderer of the same frames, exactly, with a cache and a device session of its own.
-fn reference(scene: Arc<SceneFile>, args: &WalkArgs, extent: Extent) -> Result<Renderer> {
+fn reference(scene: Arc<SceneFile>, args: &WalkArgs, light: Light, extent: Extent) -> Result<Renderer> {
     let mut args = args.clone();
     args.stream.query_threshold = 0;
     args.stream.prefetch = 0;
@@ -147,7 +155,7 @@ fn reference(scene: Arc<SceneFile>, args: &WalkArgs, extent: Extent) -> Result<R
     args.measure_needed = false;
     args.aov = false;
     let session = Session::open(scene, &args.scene, &args.stream, extent)?;
-    let mut reference = renderer(session, &args);
+    let mut reference = lit_renderer(session, &args, light);
     reference.captures = Some(Captures::default());
     Ok(reference)
 }
@@ -200,10 +208,11 @@ fn finish(
     args: &WalkArgs,
     renderer: &mut Renderer,
     pictures: &Pictures,
+    lighting: &Lighting,
     records: &[Record],
     frames: u32,
 ) -> Result<()> {
-    let summary = summary::of_walk(args, renderer, pictures, records, frames);
+    let summary = summary::of_walk(args, renderer, pictures, lighting, records, frames);
     let text = serde_json::to_string_pretty(&summary)? + "\n";
     atomic::write(&args.output.join("summary.json"), text.as_bytes())?;
     write_requests(&args.stream, &renderer.cache)?;

@@ -8,6 +8,7 @@ use super::intersect_all::intersect_all;
 use super::intersect_binary::{BinaryTrees, intersect_binary};
 use super::intersect_list::intersect_list;
 use super::isa::Best;
+use super::lamps::LampTables;
 use super::query::query;
 use super::query_all::{count_pairs, query_all};
 use super::query_pairs::query_pairs;
@@ -20,7 +21,9 @@ use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_se
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
-use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, opacity, padded, report};
+use crate::kernel::{
+    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report,
+};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{WorkerPool, Workers};
 use bricks::SceneFile;
@@ -47,6 +50,7 @@ pub struct CpuExecutor {
     texels: Texels,
     /// [`crate::kernel::opacity::table`].
     opacity: Vec<[u32; 4]>,
+    lamps: LampTables,
     buffers: Buffers,
     binary: Option<BinaryTrees>,
     extent: Extent,
@@ -76,6 +80,7 @@ impl CpuExecutor {
             scene: Scene::new(file.resident()),
             texels: Texels::new(&file)?,
             opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
+            lamps: LampTables::default(),
             buffers: Buffers { sets, pixels: Pixels::new(rays), tiles },
             binary: None,
             extent,
@@ -137,7 +142,7 @@ fn run_kernel(
     let seen = before.last().unwrap_or(&none);
     match dispatch.kernel {
         "generate_primary" => generate_primary(bound, own),
-        "generate_shadow" => generate_shadow(bound, own, seen),
+        "generate_shadow" => generate_shadow(bound, own, seen, &pixels.throughput),
         "generate_occlusion" => generate_occlusion(bound, own, seen, &pixels.gbuffers[shaded]),
         "generate_diffuse" => {
             generate_diffuse(bound, own, seen, &pixels.gbuffers[shaded], &mut pixels.throughput);
@@ -234,6 +239,7 @@ impl Executor for CpuExecutor {
                     slots: &slots,
                     demand: &demand,
                     counters: &counters,
+                    lamps: &self.lamps,
                     count: self.count,
                     isa: self.isa,
                 };
@@ -285,8 +291,14 @@ impl FrameExecutor for CpuExecutor {
         &mut self.tuning
     }
 
+    fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
+        self.lamps.set(lamps);
+        Ok(())
+    }
+
     fn begin_frame(&mut self, view: &View) {
         self.scene.rebase(self.file.resident(), view.frame);
+        self.lamps.rebase(view.frame);
         self.view = view.params;
         self.directions = view.directions;
     }

@@ -1,18 +1,25 @@
 //! Rays from the camera and from hits: twins of `shaders/generate_primary.wgsl`, `generate_shadow.wgsl`, `generate_around.wgsl`,
 //! `generate_mirror.wgsl` and `start_hits.wgsl`.
 
+use super::lamps::{emitter_of, environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
 use super::rays::{RaySet, start_hit};
 use super::scene::Bound;
 use super::shade::surface_share;
-use super::vector::{Vec3, cross, dot, each, normalize, xyz};
-use crate::kernel::layout::{GBuffer, NONE, PARAM_RECTANGLE, Ray, Surface, T_INFINITE};
+use super::vector::{Vec3, cross, dot, each, most3, normalize, xyz};
+use crate::kernel::layout::{
+    EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT, Ray,
+    Surface, T_INFINITE,
+};
 use crate::math::exact::barrier;
 use crate::math::sampling::random2;
 use rayon::prelude::*;
 
-/// Rays to the rectangular light end short of it by this share of the distance, so that what lies in its plane casts no shadow.
+/// Rays to emitters end short of them by this share of the distance, so that what lies in their plane casts no shadow.
 const SHORT_OF_LIGHT: f32 = 1.0 / 65_536.0;
+
+/// Of the coordinates: more than what three roundings may leave a point of an emitter beside its triangle, and more on instances.
+const BESIDE: f32 = 1.0 / 1_048_576.0;
 
 /// Makes every ray of `own`, with the triangle that it starts from.
 fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32) + Sync) {
@@ -49,8 +56,36 @@ pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
     });
 }
 
+/// From `start` to the point of `e` that `r` draws evenly. Triangles are surfaces of the scene themselves, so the point is lifted
+/// off them by what roundings leave; a start that lies in the plane of the triangle within as much has no light from it: zero.
+fn toward(e: &Emitter, start: Vec3, r: [f32; 2]) -> Vec3 {
+    let kind = e.kind & EMITTER_KIND;
+    if kind == EMITTER_DISTANT {
+        return e.u.map(|x| -x);
+    }
+    if kind > EMITTER_TRIANGLE {
+        return each(|k| barrier(e.corner[k] - start[k]));
+    }
+    let is_triangle = kind == EMITTER_TRIANGLE;
+    let s = if is_triangle && r[0] + r[1] > 1.0 { r.map(|r| 1.0 - r) } else { r };
+    let across = |k: usize| barrier(barrier(s[0] * e.u[k]) + barrier(s[1] * e.v[k]));
+    let p = each(|k| barrier(e.corner[k] + across(k)));
+    let direction = each(|k| barrier(p[k] - start[k]));
+    if !is_triangle {
+        return direction;
+    }
+    let n = normalize(cross(e.u, e.v));
+    let above = -dot(direction, n);
+    let beside = BESIDE * (most3(p.map(f32::abs)) + most3(start.map(f32::abs)));
+    if above.abs() <= beside {
+        return [0.0; 3];
+    }
+    let lift = if above > 0.0 { beside } else { -beside };
+    each(|k| direction[k] + lift * n[k])
+}
+
 /// One ray from every hit of the shaded set to a point of the pass's lamp; from surfaces that face away, none.
-pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet) {
+pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughput: &[[f32; 4]]) {
     let p = bound.params;
     let sun = xyz(p.sun);
     for_each_new(own, |index| {
@@ -60,12 +95,15 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet) {
             let r = random2(index as u32, p.stream, p.seed);
             let mut faces = true;
             let mut t_max = T_INFINITE;
-            if bound.has(PARAM_RECTANGLE) {
-                let (u, v) = (xyz(p.lamp_u), xyz(p.lamp_v));
-                let across = |k: usize| barrier(barrier(r[0] * u[k]) + barrier(r[1] * v[k]));
-                ray.direction = each(|k| barrier(barrier(p.lamp_corner[k] + across(k)) - surface.point[k]));
-                faces = dot(ray.direction, cross(u, v)) < 0.0;
-                t_max = 1.0 - SHORT_OF_LIGHT;
+            if bound.has(PARAM_EMITTER) {
+                let e = emitter_of(bound, index, throughput);
+                ray.direction = toward(e, surface.point, r);
+                faces = shines(e, ray.direction) > 0.0;
+                t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
+            } else if bound.has(PARAM_ENVIRONMENT) {
+                let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
+                ray.direction = drawn.direction;
+                faces = drawn.light.iter().any(|&c| c > 0.0);
             } else if p.sun_radius > 0.0 {
                 let disc = disc_point(r).map(|x| x * p.sun_radius);
                 let x = tangent(sun);
@@ -123,7 +161,8 @@ pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffe
     });
 }
 
-/// As [`generate_occlusion`], of unlimited length. The throughput is noted: what the surface reflects, by the share of the direction.
+/// As [`generate_occlusion`], of unlimited length. The throughput is noted: what the surface reflects, by the share of the direction;
+/// in w the direction's number.
 pub fn generate_diffuse(
     bound: &Bound,
     own: &mut RaySet,
@@ -134,9 +173,11 @@ pub fn generate_diffuse(
     for_each_leaving(own, seen, |index, surface| {
         leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
     });
+    let number = bound.params.direction as f32;
     for ((carried, ray), g) in throughput.iter_mut().zip(&own.rays).zip(gbuffer) {
         let share = |k: usize| surface_share(bound) * bound.params.share * g.albedo[k];
-        *carried = if ray.t_min <= ray.t_max { [share(0), share(1), share(2), 0.0] } else { [0.0; 4] };
+        *carried =
+            if ray.t_min <= ray.t_max { [share(0), share(1), share(2), number] } else { [0.0, 0.0, 0.0, number] };
     }
 }
 

@@ -1,5 +1,6 @@
-//! Light: the sky, and what is added to pixels. Twin of `shaders/shared/light.wgsl`.
+//! Light: the background, and what is added to pixels. Twin of `shaders/shared/light.wgsl`.
 
+use super::lamps::environment_at;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, dot, each, mix, most, normalize, xyz};
 use crate::kernel::layout::{COUNTER_NON_FINITE, PARAM_BOUNCE, Params};
@@ -17,8 +18,24 @@ pub fn sky(params: &Params, d: Vec3) -> Vec3 {
     each(|k| mix(horizon[k], sky[k], up.sqrt()))
 }
 
-/// What a white surface reflects of a sky over a ground, each of one radiance: a cosine-weighted hemisphere sees the share of both.
+/// What rays see that meet nothing.
+pub fn background(bound: &Bound, d: Vec3) -> Vec3 {
+    if bound.params.environment_width != 0 { environment_at(bound, d) } else { sky(bound.params, d) }
+}
+
+/// What a white surface reflects of the background, by its normal: of an environment by its spherical harmonics up to order 2
+/// (Ramamoorthi, Hanrahan 2001); else of a sky over a ground, each of one radiance: a cosine-weighted hemisphere sees the share
+/// of both.
 pub fn ambient(params: &Params, normal: Vec3) -> Vec3 {
+    if params.environment_width != 0 {
+        let [x, y, z] = normal;
+        let terms = [1.0, y, z, x, x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y];
+        let mut sum = xyz(params.ambient[0]);
+        for (color, term) in params.ambient.iter().zip(terms).skip(1) {
+            sum = each(|k| sum[k] + color[k] * term);
+        }
+        return sum.map(|c| most(c, 0.0));
+    }
     let share = 0.5 + 0.5 * normal[1];
     each(|k| mix(params.ground_color[k], params.sky_color[k], share))
 }

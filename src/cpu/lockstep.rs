@@ -8,7 +8,7 @@ use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
 use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
-use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Tuning, View};
+use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
 use std::collections::{BTreeMap, BTreeSet};
@@ -305,6 +305,11 @@ impl FrameExecutor for Lockstep {
 
     fn tuning(&mut self) -> &mut Tuning {
         &mut self.tuning
+    }
+
+    fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
+        self.gpu.set_lamps(lamps)?;
+        self.cpu.set_lamps(lamps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -8,8 +8,11 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernel::dispatch::INTERSECT_BINARY;
+use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::{Extent, FrameExecutor, Setup};
-use crate::render::{Effects, Light, Occlusion, RectangleLight, RenderSettings, Renderer, Schedule};
+use crate::render::{
+    Effects, Equirectangular, Light, Occlusion, RenderSettings, Renderer, Schedule, emissive_triangles, environment,
+};
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::{BrickBytes, Cache};
@@ -133,11 +136,31 @@ const VARIANT: Variant = Variant {
 fn effects() -> Effects {
     Effects {
         shadow: true,
+        environment: true,
         occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
         diffuse: Some(1),
         mirror: true,
         turn_degrees: 360.0,
     }
+}
+
+/// An environment, and emitters of every kind around `top`.
+fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
+    let image = Equirectangular::of(24, 12, |[x, y, z]| [1.2 + x, 1.1 + y, 1.5 + x * z]);
+    let rectangle = Shape::Parallelogram { corner: top, edges: [DVec3::X * 3.0, DVec3::Z * 3.0] };
+    let down = DVec3::new(0.1, -1.0, 0.2).normalize();
+    let shapes = [
+        rectangle,
+        Shape::Point { position: top, range: 0.0 },
+        Shape::Point { position: top + DVec3::X, range: 9.0 },
+        Shape::Spot { position: top, direction: down, range: 20.0, cone: [0.3, 0.9] },
+        Shape::Distant { direction: down },
+    ];
+    let radiance = [4.0, 3.0, 2.0];
+    let mut emitters: Vec<Emitter> = shapes.map(|shape| Emitter { shape, two_sided: false, radiance }).into();
+    let surfaces = emissive_triangles(scene, 1 << 20).unwrap().unwrap();
+    emitters.extend(surfaces.iter().enumerate().map(|(i, e)| Emitter { two_sided: i % 2 == 0, ..*e }));
+    Lamps::new(Some(environment(image, 1.0, 40.0).0), emitters, 10.0)
 }
 
 /// Renders two frames in lockstep.
@@ -185,7 +208,7 @@ fn render(
     let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
     let manifest = &scene.resident().manifest;
     let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
-    light.rectangle = Some(RectangleLight { corner: top, edges: [DVec3::X * 3.0, DVec3::Z * 3.0], radiance: [4.0; 3] });
+    light.lamps = Arc::new(lamps(scene, top));
     let mut renderer = Renderer {
         scene: scene.clone(),
         executor: Box::new(executor),

@@ -21,6 +21,7 @@ mod intersect_binary;
 mod intersect_list;
 mod interval;
 pub mod isa;
+mod lamps;
 pub mod leaf;
 mod light;
 pub mod node;

@@ -1,6 +1,7 @@
 use super::brick::BrickView;
 use super::intersect_all::intersect_all;
 use super::isa::{Best, Scalar};
+use super::lamps::LampTables;
 use super::pair_counts::PairCounts;
 use super::rays::{RaySet, Work, start_hit};
 use super::scene::{Bound, Counters, Demand, Scene};
@@ -63,6 +64,7 @@ impl Stage {
             slots: &slots,
             demand: &demand,
             counters: &counters,
+            lamps: &LampTables::default(),
             count: true,
             isa,
         };

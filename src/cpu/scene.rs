@@ -3,6 +3,7 @@
 
 use super::brick::BrickView;
 use super::isa::Best;
+use super::lamps::LampTables;
 use crate::kernel::frame::{Frame, Placement};
 use crate::kernel::layout::{self, Params};
 use bricks::{Node, Resident};
@@ -146,6 +147,8 @@ pub struct Bound<'a> {
     pub demand: &'a [Demand],
     /// Counters.
     pub counters: &'a Counters,
+    /// The environment and the emitters.
+    pub lamps: &'a LampTables,
     /// Whether nodes and triangles are counted.
     pub count: bool,
     /// The instruction set.

@@ -1,11 +1,15 @@
 //! What hits show and the light on them: twins of `shaders/clear_gbuffer.wgsl`, `shade.wgsl`, `add_light.wgsl`,
 //! `add_occlusion.wgsl` and `hit_demand.wgsl`.
 
-use super::light::{add_light as add, ambient, sky, sunlight};
+use super::lamps::{emitter_of, environment_sample, lamp_words, shines};
+use super::light::{add_light as add, ambient, background, sunlight};
 use super::rays::RaySet;
 use super::scene::{Bound, Tally};
-use super::vector::{Vec3, cross, dot, each, most, xyz};
-use crate::kernel::layout::{BATCH_SAMPLES, GBuffer, NONE, PARAM_BOUNCE, PARAM_RECTANGLE, PARAM_SKY, PARAM_SUN, Ray};
+use super::vector::{Vec3, dot, each, most};
+use crate::kernel::layout::{
+    BATCH_SAMPLES, GBuffer, NONE, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_MISS,
+    PARAM_SKY, PARAM_SUN, Ray,
+};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
@@ -51,20 +55,20 @@ pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
     }
 }
 
-/// Calls `light` for every pixel and adds what it gives.
+/// Calls `light` for every pixel, with the throughputs of all, and adds what it gives.
 fn for_each_pixel(
     bound: &Bound,
     pixels: &mut Pixels,
     shaded: usize,
-    light: impl Fn(usize, &GBuffer, &mut [f32; 4]) -> Option<Vec3> + Sync,
+    light: impl Fn(usize, &GBuffer, &mut [f32; 4], &[[f32; 4]]) -> Option<Vec3> + Sync,
 ) {
     let Pixels { gbuffers, radiance, throughput } = pixels;
-    let gbuffer = &gbuffers[shaded];
+    let (gbuffer, throughput) = (&gbuffers[shaded], &throughput[..]);
     radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
         let mut tally = Tally::default();
         for (i, radiance) in radiance.iter_mut().enumerate() {
             let index = run * RUN + i;
-            if let Some(light) = light(index, &gbuffer[index], radiance) {
+            if let Some(light) = light(index, &gbuffer[index], radiance, throughput) {
                 add(bound, &mut tally, radiance, throughput.get(index), light);
             }
         }
@@ -76,11 +80,11 @@ fn is_traced(ray: &Ray) -> bool {
     ray.t_min <= ray.t_max
 }
 
-/// What the hits of the shaded set show by themselves: the sky on a miss, else their emission, and, unless passes of their own
-/// bring it, the light of the sun and of the sky on a Lambertian surface. The first shading of a sample counts it.
+/// What the hits of the shaded set show by themselves, unless passes of their own bring it: the background on a miss, else their
+/// emission and the light of the sun and of the background on a Lambertian surface. The first shading of a sample counts it.
 pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet) {
     let params = bound.params;
-    for_each_pixel(bound, pixels, shaded, |index, g, radiance| {
+    for_each_pixel(bound, pixels, shaded, |index, g, radiance, _| {
         if !bound.has(PARAM_BOUNCE) {
             radiance[3] += 1.0;
         }
@@ -89,7 +93,7 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet) {
             return None;
         }
         if seen.surfaces[index].leaf == NONE {
-            return Some(sky(params, ray.direction));
+            return bound.has(PARAM_MISS).then(|| background(bound, ray.direction));
         }
         let mut light = [0.0; 3];
         if bound.has(PARAM_SUN) {
@@ -100,29 +104,30 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet) {
             let ambient = ambient(params, g.normal);
             light = each(|k| light[k] + ambient[k]);
         }
-        Some(each(|k| surface_share(bound) * (g.albedo[k] * light[k] + g.emission[k])))
+        let emission = if bound.has(PARAM_EMISSION) { g.emission } else { [0.0; 3] };
+        Some(each(|k| surface_share(bound) * (g.albedo[k] * light[k] + emission[k])))
     });
 }
 
 /// Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free: Lambertian surfaces.
 pub fn add_light(bound: &Bound, pixels: &mut Pixels, shaded: usize, own: &RaySet) {
-    let params = bound.params;
-    for_each_pixel(bound, pixels, shaded, |index, g, _| {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, throughput| {
         let ray = &own.rays[index];
         if !is_traced(ray) || own.hits[index].id != NONE {
             return None;
         }
-        let light = if bound.has(PARAM_RECTANGLE) {
-            // One point of the light, drawn evenly over its area: radiance * cos * cos' * area / distance^2 / pi. The direction
-            // leads from the surface to the point, and the length of the cross product is the area.
-            let d = ray.direction;
+        let d = ray.direction;
+        let cosine = most(dot(g.normal, d), 0.0);
+        let light = if bound.has(PARAM_EMITTER) {
+            // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction leads from
+            // the surface to the point.
+            let e = emitter_of(bound, index, throughput);
             let squared = dot(d, d);
-            let facing = cross(xyz(params.lamp_u), xyz(params.lamp_v));
-            let from_light = most(dot(d.map(|x| -x), facing), 0.0);
-            let cosine = most(dot(g.normal, d), 0.0);
-            each(|k| params.lamp_color[k] * cosine * from_light / (PI * squared * squared))
+            each(|k| e.radiance[k] * cosine * shines(e, d) / (PI * squared * squared) / e.probability)
+        } else if bound.has(PARAM_ENVIRONMENT) {
+            environment_sample(bound, lamp_words(bound, index, throughput)).light.map(|c| c * cosine / PI)
         } else {
-            sunlight(params, g.normal)
+            sunlight(bound.params, g.normal)
         };
         Some(each(|k| surface_share(bound) * g.albedo[k] * light[k]))
     });
@@ -130,7 +135,7 @@ pub fn add_light(bound: &Bound, pixels: &mut Pixels, shaded: usize, own: &RaySet
 
 /// Adds the share of the sky's light that the pass's direction stands for, where its ray went free.
 pub fn add_occlusion(bound: &Bound, pixels: &mut Pixels, shaded: usize, own: &RaySet) {
-    for_each_pixel(bound, pixels, shaded, |index, g, _| {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
         if !is_traced(&own.rays[index]) || own.hits[index].id != NONE {
             return None;
         }

@@ -82,6 +82,8 @@ fn adapters(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
 
 /// Storage buffers a kernel needs besides cache and texel pages: 7 of the scene, 5 of the rays, 8 of the shading.
 const FIXED_STORAGE_BUFFERS: u32 = 20;
+/// Storage buffers of the lamps, in place of pages of the cache.
+const LAMP_STORAGE_BUFFERS: usize = 3;
 
 /// An adapter that there is.
 pub struct Candidate {
@@ -168,12 +170,12 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
 /// Refuses what lacks something without which nothing works.
 fn check_limits(info: &wgpu::AdapterInfo, limits: &wgpu::Limits) -> Result<(), DeviceError> {
     let found = limits.max_storage_buffers_per_shader_stage;
-    if found < FIXED_STORAGE_BUFFERS + 2 {
+    if found < FIXED_STORAGE_BUFFERS + 4 {
         return Err(DeviceError::Limit {
             adapter: info.name.clone(),
             what: "storage buffers a kernel",
             found: found.into(),
-            needed: (FIXED_STORAGE_BUFFERS + 2).into(),
+            needed: (FIXED_STORAGE_BUFFERS + 4).into(),
         });
     }
     Ok(())
@@ -250,6 +252,8 @@ impl Gpu {
     /// Most pages of cache beside so many pages of texels, and the table of opacity.
     pub fn max_cache_pages(&self, beside: Pages) -> usize {
         let left = self.limits.max_storage_buffers_per_shader_stage as usize - FIXED_STORAGE_BUFFERS as usize;
-        left.saturating_sub(beside.texels + usize::from(beside.opacity)).min(64)
+        // Kernels that light bind lamps in place of the cache.
+        let pages = left.saturating_sub(beside.texels + usize::from(beside.opacity));
+        if pages < LAMP_STORAGE_BUFFERS { 0 } else { pages.min(64) }
     }
 }

@@ -4,6 +4,7 @@ use super::binary::BinaryTrees;
 use super::device::Gpu;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
+use super::lamps::LampBuffers;
 use super::pages::{CachePages, MappedRange};
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
 use super::readback::Readback;
@@ -13,7 +14,9 @@ use super::timing::Timing;
 use super::wgsl::Pages;
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Workgroups, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
-use crate::kernel::{DeviceInfo, Directions, Extent, FrameExecutor, Setup, Tuning, View, opacity, padded, report};
+use crate::kernel::{
+    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report,
+};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
 use bricks::SceneFile;
@@ -101,6 +104,7 @@ impl GpuExecutor {
             scene: SceneBuffers::new(&gpu, &scene)?,
             cache: CachePages::new(&gpu, page_sizes),
             texels: Texels::new(&gpu, &scene)?,
+            lamps: LampBuffers::new(&gpu),
             sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
             pixels: PixelBuffers::new(&gpu, extent.rays(), 0),
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),
@@ -242,7 +246,12 @@ impl GpuExecutor {
             compute.set_pipeline(binary.map_or_else(|| self.kernels.pipeline(dispatch.kernel), |b| &b.pipeline));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
-            compute.set_bind_group(2, if dispatch.cache { &self.groups.cache } else { &self.groups.empty }, &[]);
+            let second = match (dispatch.cache, dispatch.shading) {
+                (true, _) => &self.groups.cache,
+                (false, true) => &self.groups.lamps,
+                (false, false) => &self.groups.empty,
+            };
+            compute.set_bind_group(2, second, &[]);
             let shading = &self.groups.shading[pass.set().saturating_sub(1)];
             let third = if dispatch.shading { shading } else { &self.groups.tiles };
             compute.set_bind_group(3, binary.map_or(third, |b| &b.group), &[]);
@@ -337,8 +346,16 @@ impl FrameExecutor for GpuExecutor {
         &self.workers
     }
 
+    fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
+        if self.buffers.lamps.set(&self.gpu, lamps)? {
+            self.rebind();
+        }
+        Ok(())
+    }
+
     fn begin_frame(&mut self, view: &View) {
         self.buffers.scene.rebase(&self.gpu, self.scene.resident(), view.frame);
+        self.buffers.lamps.rebase(&self.gpu, view.frame);
         self.view = view.params;
         self.directions = view.directions;
     }

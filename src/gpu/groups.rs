@@ -2,6 +2,7 @@
 
 use super::device::Gpu;
 use super::kernels::{Kernels, TEXEL_BINDING};
+use super::lamps::LampBuffers;
 use super::pages::CachePages;
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers};
 use super::scene::SceneBuffers;
@@ -16,6 +17,8 @@ pub struct Buffers {
     pub cache: CachePages,
     /// Textures and materials.
     pub texels: Texels,
+    /// The environment and the emitters.
+    pub lamps: LampBuffers,
     /// Rays and hits, by their set ([`crate::schedule::Pass::set`]).
     pub sets: [RayBuffers; 3],
     /// What shading keeps per pixel.
@@ -40,7 +43,9 @@ pub struct Groups {
     pub rays: [wgpu::BindGroup; 3],
     /// 2: the cache.
     pub cache: wgpu::BindGroup,
-    /// 2 of kernels that do not read the cache.
+    /// 2 of kernels that shade and do not read the cache.
+    pub lamps: wgpu::BindGroup,
+    /// 2 of others that do not.
     pub empty: wgpu::BindGroup,
     /// 3 of kernels that work on tiles.
     pub tiles: wgpu::BindGroup,
@@ -54,7 +59,7 @@ impl Groups {
         let group = |label, layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries })
         };
-        let Buffers { scene, cache, texels, sets, pixels, tiles, demand, counters, params, .. } = buffers;
+        let Buffers { scene, cache, texels, lamps, sets, pixels, tiles, demand, counters, params, .. } = buffers;
         let params = wgpu::BindGroupEntry {
             binding: 0,
             resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -93,6 +98,7 @@ impl Groups {
             scene: group("scene", &kernels.scene, &numbered(scene.buffers().into_iter().take(bound), 0)),
             rays: [rays(&sets[0]), rays(&sets[1]), rays(&sets[2])],
             cache: group("cache", &kernels.cache, &numbered(cache, 0)),
+            lamps: group("lamps", &kernels.lamps, &numbered(lamps.buffers(), 0)),
             empty: group("none", &kernels.none, &[]),
             tiles: group("tiles", &kernels.tiles, &numbered(tile_buffers, 0)),
             shading: [shading(0), shading(1)],

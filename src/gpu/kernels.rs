@@ -34,7 +34,7 @@ enum Groups {
     Tiles,
     /// 2: cache, 3: tiles.
     CacheTiles,
-    /// 3: shading.
+    /// 2: lamps, 3: shading.
     Shading,
     /// 2: cache, 3: shading.
     CacheShading,
@@ -50,6 +50,8 @@ pub struct Kernels {
     pub rays: wgpu::BindGroupLayout,
     /// Group 2: pages of the cache.
     pub cache: wgpu::BindGroupLayout,
+    /// Group 2 of shading kernels that do not read the cache: the lamps.
+    pub lamps: wgpu::BindGroupLayout,
     /// Group 3 of tile kernels.
     pub tiles: wgpu::BindGroupLayout,
     /// Group 3 of shading kernels.
@@ -139,6 +141,7 @@ impl Kernels {
         let cache = layout(device, "cache", &vec![Read; pages.cache]);
         let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write, Read]);
         let shading = shading_layout(device, &[Read, Read, Write, Write, Write, Write, Write, Write], pages.texels);
+        let lamps = layout(device, "lamps", &[Read; 3]);
         let none = layout(device, "none", &[]);
         let mut pipelines = HashMap::new();
         let mut layouts = HashMap::new();
@@ -148,7 +151,7 @@ impl Kernels {
                 let (second, third) = match groups {
                     Groups::Tiles => (&none, &tiles),
                     Groups::CacheTiles => (&cache, &tiles),
-                    Groups::Shading => (&none, &shading),
+                    Groups::Shading => (&lamps, &shading),
                     Groups::CacheShading => (&cache, &shading),
                 };
                 device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -171,7 +174,7 @@ impl Kernels {
             });
             pipelines.insert(name, pipeline);
         }
-        Self { pages, scene, rays, cache, tiles, shading, none, pipelines }
+        Self { pages, scene, rays, cache, lamps, tiles, shading, none, pipelines }
     }
 
     /// The pipeline of a specialisation of the table above.

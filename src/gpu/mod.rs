@@ -5,6 +5,7 @@ pub mod device;
 pub mod executor;
 pub mod groups;
 pub mod kernels;
+pub mod lamps;
 pub mod pages;
 pub mod probe;
 pub mod rays;

@@ -23,18 +23,24 @@ impl Directions {
         // Every kind of pass takes random numbers of its own. Those of a sun alone depend on the sample only.
         let (stream, direction) = match pass {
             Pass::Primary | Pass::Mirror | Pass::Shadow(Lamp::Sun) => (0, None),
-            Pass::Shadow(Lamp::Rectangle) => (1, None),
+            Pass::Shadow(Lamp::Emitter) => (1, None),
             Pass::BounceShadow(Lamp::Sun) => (2, None),
-            Pass::BounceShadow(Lamp::Rectangle) => (3, None),
+            Pass::BounceShadow(Lamp::Emitter) => (3, None),
+            Pass::Shadow(Lamp::Environment) => (6, None),
+            Pass::BounceShadow(Lamp::Environment) => (7, None),
             Pass::Occlusion(index) => (4, Some((index, self.occlusion))),
             Pass::Diffuse(index) => (5, Some((index, self.diffuse))),
         };
-        let rectangle = matches!(pass, Pass::Shadow(Lamp::Rectangle) | Pass::BounceShadow(Lamp::Rectangle));
+        let lamp = match pass {
+            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) => Some(lamp),
+            _ => None,
+        };
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let mut params = Params {
             flags: params.flags
                 | flag(pass.is_any_hit(), layout::PARAM_ANY_HIT)
-                | flag(rectangle, layout::PARAM_RECTANGLE)
+                | flag(lamp == Some(Lamp::Emitter), layout::PARAM_EMITTER)
+                | flag(lamp == Some(Lamp::Environment), layout::PARAM_ENVIRONMENT)
                 | flag(pass.set() == 2, layout::PARAM_BOUNCE),
             stream: params.sample.wrapping_add(stream << 24),
             length: self.occlusion_length,
@@ -45,6 +51,7 @@ impl Directions {
             let [x, y, z] = cosine_hemisphere([halton(index + 1, 0), halton(index + 1, 1)]);
             params.around = [x, y, z, self.turn];
             params.share = 1.0 / count.max(1) as f32;
+            params.direction = index;
         }
         params
     }
@@ -69,7 +76,7 @@ pub struct Dispatch {
     pub params: Params,
     /// Its workgroups.
     pub groups: Workgroups,
-    /// Whether group 2 is the cache.
+    /// Whether group 2 is the cache; else it is the lamps of kernels that shade, and nothing of others.
     pub cache: bool,
     /// Whether group 3 is what shading the set before the pass's needs, not the tiles.
     pub shading: bool,
@@ -232,7 +239,10 @@ pub fn dispatches(
         Step::Shade(light) => {
             let sun = if light.sun { layout::PARAM_SUN } else { 0 };
             let sky = if light.sky { layout::PARAM_SKY } else { 0 };
-            vec![shading("shade", Params { flags: params.flags | sun | sky, ..params }, false)]
+            let emission = if light.emission { layout::PARAM_EMISSION } else { 0 };
+            let miss = if light.miss { layout::PARAM_MISS } else { 0 };
+            let flags = params.flags | sun | sky | emission | miss;
+            vec![shading("shade", Params { flags, ..params }, false)]
         }
         Step::AddLight => vec![shading("add_light", params, false)],
         Step::AddOcclusion => vec![shading("add_occlusion", params, false)],

@@ -1,10 +1,11 @@
 //! What a frame needs of an executor beside steps.
 
 use super::layout::{GBuffer, Hit, Ray, Surface};
-use super::{Tuning, View};
+use super::{Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
 use crate::stream::WorkerPool;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// The device that an executor runs on, as summaries name it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -49,6 +50,12 @@ pub trait FrameExecutor: Executor {
 
     /// What holds for submissions from now on.
     fn tuning(&mut self) -> &mut Tuning;
+
+    /// Takes the environment and the emitters of the frames to come; the same ones again cost nothing.
+    ///
+    /// # Errors
+    /// More emitters, or a larger environment, than the device holds in one buffer, with how many it does.
+    fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError>;
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

@@ -11,10 +11,13 @@ pub const PARAM_NEEDED: u32 = 2;
 pub const PARAM_SUN: u32 = 4;
 pub const PARAM_SKY: u32 = 8;
 pub const PARAM_BOUNCE: u32 = 16;
-pub const PARAM_RECTANGLE: u32 = 32;
+pub const PARAM_EMITTER: u32 = 32;
+pub const PARAM_ENVIRONMENT: u32 = 64;
 pub const PARAM_TIGHTER: u32 = 128;
 pub const PARAM_NEXT: u32 = 256;
 pub const PARAM_CULLED: u32 = 512;
+pub const PARAM_EMISSION: u32 = 1024;
+pub const PARAM_MISS: u32 = 2048;
 pub const STATE_GEOMETRY: u32 = 1;
 pub const STATE_DONE: u32 = 2;
 pub const STATE_BATCH: u32 = 4;
@@ -44,6 +47,13 @@ pub const WORK_ROOTED: u32 = 28;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
+pub const EMITTER_PARALLELOGRAM: u32 = 0;
+pub const EMITTER_TRIANGLE: u32 = 1;
+pub const EMITTER_POINT: u32 = 2;
+pub const EMITTER_SPOT: u32 = 3;
+pub const EMITTER_DISTANT: u32 = 4;
+pub const EMITTER_KIND: u32 = 7;
+pub const EMITTER_TWO_SIDED: u32 = 8;
 /// Number of counters.
 pub const COUNTERS: usize = 24;
 /// Counters and, behind them, what indirect dispatches take: from [`WORK_CHOSEN`] and [`WORK_ROOTED`] on, four words each.
@@ -67,9 +77,11 @@ mirror! {
         sample: u32, seed: u32, instance_pad: f32, sun_radius: f32,
         origin: [f32; 4], base: [f32; 4], step_x: [f32; 4], step_y: [f32; 4],
         sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
-        lamp_corner: [f32; 4], lamp_u: [f32; 4], lamp_v: [f32; 4], lamp_color: [f32; 4], around: [f32; 4],
+        around: [f32; 4],
         share: f32, surface_share: f32, length: f32, stream: u32,
         pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
+        emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
+        environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
     struct Hit { t: f32, id: u32, u: f32, v: f32 }
@@ -113,5 +125,9 @@ mirror! {
     struct GBuffer {
         albedo: [f32; 3], state: u32, normal: [f32; 3], material: u32, emission: [f32; 3], padding: u32,
         weights: [f32; 2], uv: [f32; 2],
+    }
+    struct Emitter {
+        corner: [f32; 3], kind: u32, u: [f32; 3], probability: f32,
+        v: [f32; 3], threshold: u32, radiance: [f32; 3], other: u32,
     }
 }

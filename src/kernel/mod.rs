@@ -7,6 +7,7 @@ pub mod binary_tree;
 pub mod dispatch;
 pub mod frame;
 mod frame_executor;
+pub mod lamps;
 pub mod layout;
 pub mod opacity;
 pub mod report;
@@ -14,6 +15,7 @@ mod setup;
 
 pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
+pub use lamps::Lamps;
 pub use setup::{Extent, Setup, Tuning, View};
 
 #[rustfmt::skip]

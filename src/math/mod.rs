@@ -1,5 +1,6 @@
 //! Arithmetic that the rest builds on: the exact ray-triangle test, sampling patterns, encodings of directions.
 
+pub mod alias;
 pub mod exact;
 pub mod octahedral;
 pub mod sampling;

@@ -69,6 +69,14 @@ pub fn random2(pixel: u32, sample: u32, seed: u32) -> [f32; 2] {
     [a, pcg(a)].map(|x| (x >> 8) as f32 / 16_777_216.0)
 }
 
+/// Four words; the first two are those of [`random2`]: the kernels' `random4`.
+pub fn random4(pixel: u32, sample: u32, seed: u32) -> [u32; 4] {
+    let a = pcg(pixel ^ pcg(sample ^ pcg(seed)));
+    let b = pcg(a);
+    let c = pcg(b);
+    [a, b, c, pcg(c)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,5 +162,7 @@ mod tests {
         let [x, y] = random2(7, 3, 1);
         assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y) && x != y);
         assert_ne!(random2(7, 3, 1), random2(7, 3, 2));
+        let words = random4(7, 3, 1);
+        assert_eq!([words[0], words[1]].map(|w| (w >> 8) as f32 / 16_777_216.0), [x, y]);
     }
 }

@@ -51,13 +51,13 @@ impl Captures {
     /// The device's.
     pub fn note(&mut self, executor: &mut dyn FrameExecutor, name: &'static str) -> Result<(), ExecutorError> {
         let now = executor.read_radiance()?;
-        let of_bounce = name.ends_with("-shadow");
+        let of_bounce = name.ends_with("-shadow") || name.ends_with("-environment");
         let pass = match name {
             "primary" => Pass::Primary,
             _ if of_bounce => Pass::BounceShadow(Lamp::Sun),
             _ => Pass::Shadow(Lamp::Sun),
         };
-        let any_hit = of_bounce || name == "shadow" || name == "ao";
+        let any_hit = of_bounce || ["shadow", "environment", "ao"].contains(&name);
         let hits: Vec<Hit> = executor.read_hits(pass)?;
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
             let (radiance, hits) = (vec![[0.0; 3]; now.len()], vec![0; now.len()]);

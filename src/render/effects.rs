@@ -6,8 +6,11 @@ pub const SURFACE_SHARE: f32 = 0.5;
 /// Effects of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effects {
-    /// Shadows of all lamps, at primary hits and at the hits of diffuse and mirrored rays.
+    /// Shadows of the sun and of emitters, at primary hits and at the hits of diffuse and mirrored rays.
     pub shadow: bool,
+    /// The light of the environment, shadowed, at the same hits: a direction of each is drawn by its radiance. Diffuse rays that
+    /// miss bring nothing then.
+    pub environment: bool,
     /// Ambient occlusion, of the sky's light.
     pub occlusion: Option<Occlusion>,
     /// Diffuse interreflection, one bounce: rays of each pixel and sample, as long as the scene. Their hits show their

@@ -146,6 +146,7 @@ impl Renderer {
         let mut records = FrameRecords::new(frame);
         let effects = self.settings.effects;
         let mut accumulation = Accumulation::default();
+        self.executor.set_lamps(&self.light.lamps)?;
         for sample in 0..self.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
                 && let Some(captures) = &mut self.captures
@@ -158,19 +159,21 @@ impl Renderer {
             records.pass(self, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, stats)?;
                 attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
-                let sky = effects.occlusion.is_none() && effects.diffuse.is_none();
-                r.shade(Pass::Shadow(Lamp::Sun), Shading { sun: !effects.shadow, sky }, stats)
+                let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
+                let shading = Shading { sun: !effects.shadow, sky, emission: true, miss: true };
+                r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
-            self.light(&mut records, "primary", "shadow", Pass::Shadow)?;
+            self.light(&mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
             let directions = |count: u32| sample * count..(sample + 1) * count;
             for index in directions(effects.occlusion.map_or(0, |occlusion| occlusion.rays)) {
                 records.pass(self, "ao", |r, stats| r.trace_and_add(frame, Pass::Occlusion(index), stats))?;
             }
             for index in directions(effects.diffuse.unwrap_or(0)) {
-                self.bounce(&mut records, "diffuse", "diffuse-shadow", Pass::Diffuse(index))?;
+                let names = ["diffuse", "diffuse-shadow", "diffuse-environment"];
+                self.bounce(&mut records, names, Pass::Diffuse(index))?;
             }
             if effects.mirror {
-                self.bounce(&mut records, "mirror", "mirror-shadow", Pass::Mirror)?;
+                self.bounce(&mut records, ["mirror", "mirror-shadow", "mirror-environment"], Pass::Mirror)?;
             }
             if sample == 0 && self.settings.aov {
                 self.read_aovs(view.frame.unit, &mut output.pixels)?;
@@ -192,46 +195,62 @@ impl Renderer {
         Ok(output)
     }
 
-    /// Traces rays from primary hits whose own hits are shaded, and lights those: `name` and `shadow` are the effects that it
-    /// counts for.
+    /// Whether rays lead to the environment.
+    fn draws_environment(&self) -> bool {
+        self.settings.effects.environment && self.light.lamps.environment.is_some()
+    }
+
+    /// Traces rays from primary hits whose own hits are shaded, and lights those: `names` are the effects that it counts for, as in
+    /// [`Renderer::light`].
     fn bounce(
         &mut self,
         records: &mut FrameRecords,
-        name: &'static str,
-        shadow: &'static str,
+        names: [&'static str; 3],
         pass: Pass,
     ) -> Result<(), ExecutorError> {
         let (frame, effects) = (records.frame(), self.settings.effects);
-        records.pass(self, name, |r, stats| {
+        records.pass(self, names[0], |r, stats| {
             r.trace(frame, pass, stats)?;
             attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
-            let sky = pass == Pass::Mirror;
-            r.shade(Pass::BounceShadow(Lamp::Sun), Shading { sun: !effects.shadow, sky }, stats)
+            let (is_mirror, draws) = (pass == Pass::Mirror, r.draws_environment());
+            // What rays to lamps bring to the surface itself must not come by diffuse rays as well.
+            let shading = Shading {
+                sun: !effects.shadow,
+                sky: is_mirror && !draws,
+                emission: is_mirror || !r.light.lamps.has_surfaces(),
+                miss: is_mirror || !draws,
+            };
+            r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats)
         })?;
-        self.light(records, name, shadow, Pass::BounceShadow)
+        self.light(records, names, Pass::BounceShadow)
     }
 
-    /// Lights the hits that the passes `of_lamp` start from by all lamps, with shadows if they are on. The sun without shadows
-    /// has been added before.
+    /// Lights the hits that the passes `of_lamp` start from by all lamps, with shadows if they are on; the environment has them
+    /// always. The sun without shadows has been added before. Light without shadows counts for the first of the effects, rays to sun and
+    /// emitters for the second, those to the environment for the third.
     fn light(
         &mut self,
         records: &mut FrameRecords,
-        name: &'static str,
-        shadow: &'static str,
+        [name, shadow, environment]: [&'static str; 3],
         of_lamp: impl Fn(Lamp) -> Pass,
     ) -> Result<(), ExecutorError> {
         let frame = records.frame();
-        let lamps = [Some(Lamp::Sun), self.light.rectangle.map(|_| Lamp::Rectangle)];
+        let has_emitters = !self.light.lamps.emitters().is_empty();
+        let lamps = [Some(Lamp::Sun), has_emitters.then_some(Lamp::Emitter)];
         for lamp in lamps.into_iter().flatten() {
             let pass = of_lamp(lamp);
             if self.settings.effects.shadow {
                 records.pass(self, shadow, |r, stats| r.trace_and_add(frame, pass, stats))?;
-            } else if lamp == Lamp::Rectangle {
+            } else if lamp == Lamp::Emitter {
                 records.more(self, name, |r, stats| {
                     stats.add(r.executor.run(pass, &[Step::Generate, Step::AddLight], &r.cache.states)?);
                     Ok(())
                 })?;
             }
+        }
+        if self.draws_environment() {
+            let pass = of_lamp(Lamp::Environment);
+            records.pass(self, environment, |r, stats| r.trace_and_add(frame, pass, stats))?;
         }
         Ok(())
     }

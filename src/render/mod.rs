@@ -4,18 +4,24 @@
 mod accumulate;
 mod capture;
 mod effects;
+mod emissive;
+mod environment;
 mod exposure;
 mod frame;
 mod light;
 mod pass_record;
+mod sky_model;
 mod tone_map;
 mod view;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};
 pub use capture::{Captures, EffectError};
 pub use effects::{Effects, Occlusion};
+pub use emissive::{MOST_TRIANGLES, emissive_triangles};
+pub use environment::{EnvironmentNotes, Equirectangular, environment};
 pub use exposure::{Exposure, MOST_STOPS, Meter};
 pub use frame::{FrameOutput, Pixels, RenderError, RenderSettings, Renderer, Schedule};
-pub use light::{Light, RectangleLight};
+pub use light::Light;
+pub use sky_model::SkyModel;
 pub use tone_map::ToneMap;
 pub use view::camera_view;

@@ -36,12 +36,7 @@ pub fn camera_view(
     let color = |c: [f32; 3]| [c[0], c[1], c[2], 0.0];
     let origin = frame.point(camera.position);
     let centre = basis.direction(f64::from(width) / 2.0, f64::from(height) / 2.0);
-    let length = |d: DVec3| vec4(d / frame.unit, 0.0);
-    let [lamp_corner, lamp_u, lamp_v, lamp_color] = light.rectangle.map_or([[0.0; 4]; 4], |lamp| {
-        let [x, y, z] = frame.point(lamp.corner);
-        [[x, y, z, 0.0], length(lamp.edges[0]), length(lamp.edges[1]), color(lamp.radiance)]
-    });
-    let params = Params {
+    let mut params = Params {
         origin: [origin[0], origin[1], origin[2], 0.0],
         base: vec4(basis.b, 0.0),
         step_x: vec4(basis.dx, 0.0),
@@ -52,15 +47,18 @@ pub fn camera_view(
         sky_color: color(light.sky_color),
         ground_color: color(light.ground_color),
         jitter: [jx, jy, 0.0, 0.0],
-        lamp_corner,
-        lamp_u,
-        lamp_v,
-        lamp_color,
+        emitter_count: light.lamps.emitters().len() as u32,
         surface_share: if effects.mirror { SURFACE_SHARE } else { 1.0 },
         sample,
         seed,
         ..Params::default()
     };
+    if let Some(environment) = &light.lamps.environment {
+        (params.environment_width, params.environment_height) = (environment.width, environment.height);
+        let (sin, cos) = environment.turn.sin_cos();
+        params.environment_turn = [cos as f32, sin as f32, 0.0, 0.0];
+        params.ambient = environment.ambient.map(color);
+    }
     let directions = Directions {
         occlusion: effects.occlusion.map_or(0, |occlusion| occlusion.rays),
         occlusion_length: effects.occlusion.map_or(0.0, |occlusion| (occlusion.length / frame.unit) as f32),

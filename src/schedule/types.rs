@@ -9,8 +9,10 @@ use thiserror::Error;
 pub enum Lamp {
     /// A point of the sun's disc.
     Sun,
-    /// A point of the rectangular light.
-    Rectangle,
+    /// A point of one of the emitters: area lights, emissive triangles, points, spots, distant lights.
+    Emitter,
+    /// A direction of the environment.
+    Environment,
 }
 
 /// The rays that a step works on. One pass has one ray a pixel at most.
@@ -48,9 +50,10 @@ impl Pass {
     }
 
     /// The pass whose visibility from the frame before stands for this one's: each direction has one of its own, shadow rays
-    /// share one (CHC+RT §5.4).
+    /// share one (CHC+RT §5.4), but for those to the environment, which go everywhere.
     pub fn visibility_state(self) -> Pass {
         match self {
+            Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment) => self,
             Pass::Shadow(_) => Pass::Shadow(Lamp::Sun),
             Pass::BounceShadow(_) => Pass::BounceShadow(Lamp::Sun),
             own => own,
@@ -120,7 +123,7 @@ pub enum Step {
     ClearAttributes,
     /// Read the attributes of the hits of the set before, where they are resident.
     Resolve,
-    /// Add what the hits of the set before show by themselves, and the sky where they missed.
+    /// Add what the hits of the set before show by themselves, and the background where they missed.
     Shade(Shading),
     /// Add the light of the pass's lamp where its shadow ray went free.
     AddLight,
@@ -155,13 +158,17 @@ impl Step {
     }
 }
 
-/// Light that [`Step::Shade`] adds to hits beside their emission.
+/// What [`Step::Shade`] adds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Shading {
-    /// The sun's, unshadowed.
+    /// The sun's light on hits, unshadowed.
     pub sun: bool,
-    /// The sky's, unshadowed.
+    /// The background's, unshadowed.
     pub sky: bool,
+    /// The emission of hits.
+    pub emission: bool,
+    /// The background itself, where rays missed.
+    pub miss: bool,
 }
 
 /// A query over pairs of one rectangle of rays: each with a node of the binary top-level tree.

@@ -160,7 +160,7 @@ fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapt
     let walk_args = walk_args(&line, scene, adapter)?;
     let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
     let session = Session::open(open_scene(scene)?, scene, &walk_args.stream, extent)?;
-    let renderer = walk::renderer(session, &walk_args);
+    let renderer = walk::renderer(session, &walk_args)?;
     let info = renderer.executor.device();
     Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
 }

@@ -83,7 +83,7 @@ impl<'a> Bench<'a> {
             let args = words(&Case { variant, ..*case }, place, settings, adapter)?;
             let extent = Extent { width: args.size.width, height: args.size.height, tile: case.tile };
             let session = Session::open(open_scene(&args.scene)?, &args.scene, &args.stream, extent)?;
-            let mut renderer = walk::renderer(session, &args);
+            let mut renderer = walk::renderer(session, &args)?;
             renderer.executor.allow_bounces();
             Ok(renderer)
         };

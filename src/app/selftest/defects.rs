@@ -8,7 +8,7 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::wgsl::Pages;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
-use crate::kernel::{DeviceInfo, FrameExecutor, Tuning, View};
+use crate::kernel::{DeviceInfo, FrameExecutor, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
 use anyhow::{Result, bail};
@@ -254,6 +254,10 @@ impl FrameExecutor for Faulty {
 
     fn tuning(&mut self) -> &mut Tuning {
         self.inner.tuning()
+    }
+
+    fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
+        self.inner.set_lamps(lamps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -135,7 +135,7 @@ impl Lab {
         let page_bytes = self.device.page_bytes();
         let make = |needs: Needs| self.executor(needs);
         let session = Session::open_on(file.clone(), path, &args.stream, extent, page_bytes, make)?;
-        Ok(renderer(session, &args))
+        renderer(session, &args)
     }
 
     fn executor(&mut self, needs: Needs) -> Result<Box<dyn FrameExecutor>> {

@@ -3,7 +3,7 @@
 use super::case::Source::{Analytic, Exact, Paths, Reference, Unit};
 use super::case::{Case, Checks, Source};
 use super::lab::Lab;
-use super::{boxes, maps, meshes, samples, shapes, streaming, surfaces, views};
+use super::{boxes, lights, maps, meshes, samples, shapes, streaming, surfaces, views};
 use anyhow::Result;
 
 const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab) -> Result<Checks>) -> Case {
@@ -65,7 +65,7 @@ pub const CASES: &[Case] = &[
     later(47, "DVF: empty cell, point on a face", Unit),
     later(48, "prefix sum over 3M areas from 10^-12 to 10^6", Reference),
     later(49, "spherical harmonics of a delta light", Analytic),
-    later(50, "texel of the sun, 10^6", Analytic),
+    case(50, "texel of the sun, 10^6", Analytic, lights::sun_texel),
     later(51, "E_all - E_occ in a closed box", Analytic),
     later(52, "NaN in the history", Unit),
     later(53, "running variance: mean 10^8, sigma 1", Analytic),

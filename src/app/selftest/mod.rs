@@ -13,6 +13,7 @@ pub mod case;
 pub mod defects;
 mod errors;
 mod lab;
+mod lights;
 mod list;
 mod maps;
 mod meshes;
