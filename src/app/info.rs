@@ -365,6 +365,6 @@ mod tests {
             has_wide_bricks: true,
             ..Manifest::default()
         };
-        assert_eq!(names(&full), ["transparency", "animation"]);
+        assert_eq!(names(&full), ["animation"]);
     }
 }
