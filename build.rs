@@ -99,6 +99,8 @@ fn layout_checks(module: &naga::Module) -> String {
         "Pair",
         "Material",
         "Texture",
+        "TileSlot",
+        "TileDemand",
         "GBuffer",
         "Emitter",
     ];
@@ -120,8 +122,21 @@ fn layout_checks(module: &naga::Module) -> String {
     }
     for (_, constant) in module.constants.iter() {
         let Some(name) = constant.name.as_deref() else { continue };
-        let prefixes =
-            ["PARAM_", "STATE_", "COUNTER_", "WORK_", "INSTANCE_", "BRICK_", "BINARY_", "BATCH_", "EMITTER_", "NONE"];
+        let prefixes = [
+            "PARAM_",
+            "STATE_",
+            "COUNTER_",
+            "WORK_",
+            "INSTANCE_",
+            "BRICK_",
+            "BINARY_",
+            "BATCH_",
+            "EMITTER_",
+            "GBUFFER_",
+            "TEXTURE_",
+            "TILE_",
+            "NONE",
+        ];
         if prefixes.iter().any(|p| name.starts_with(p))
             && let naga::Expression::Literal(naga::Literal::U32(value)) = module.global_expressions[constant.init]
         {

@@ -145,7 +145,8 @@ impl Ours {
             let mut words = vec![0u32; scene.loaded_bytes(payload) as usize / 4];
             scene.copy(payload, bytemuck::cast_slice_mut(&mut words)).map_err(std::io::Error::other)?;
             let record = &records[leaf.brick as usize];
-            let brick = BrickView::new(record, bytemuck::cast_slice(&words));
+            // Only its vertices are asked for.
+            let brick = BrickView::new(record, bytemuck::cast_slice(&words), &[]);
             let rows = &placed.instances[leaf.instance as usize].world_from_object;
             for triangle in 0..record.triangle_count {
                 let corners = brick.vertices(triangle, leaf.offset_high, leaf.offset_low);

@@ -1,9 +1,13 @@
-// Reads the attributes of hits in bricks whose attributes are resident: normal, texture coordinates, base colour.
+// Reads the attributes of hits in bricks whose attributes are resident: normal, texture coordinates, base colour without
+// textures, and what of textures the pixel covers.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
+#include "shared/exact.wgsl"
 #include "shared/cache.wgsl"
-#include "shared/texels.wgsl"
 #include "shared/shading.wgsl"
+
+// Of the angle between a ray and a normal; below it a footprint is that of this one.
+const LEAST_COSINE: f32 = 0.05;
 
 // The normal of an attribute vertex; zero if it has none.
 fn octahedral(word: u32) -> vec3<f32> {
@@ -18,46 +22,25 @@ fn octahedral(word: u32) -> vec3<f32> {
     return normalize(n);
 }
 
-fn wrap(x: i32, size: i32, mode: u32) -> i32 {
-    if mode == 1u {
-        return clamp(x, 0, size - 1);
-    }
-    if mode == 2u {
-        let period = 2 * size;
-        let m = ((x % period) + period) % period;
-        return select(m, period - 1 - m, m >= size);
-    }
-    return ((x % size) + size) % size;
+// x y + ..., rounded after every operation.
+fn rounded_dot(a: vec3<f32>, b: vec3<f32>) -> f32 {
+    return barrier(barrier(barrier(a.x * b.x) + barrier(a.y * b.y)) + barrier(a.z * b.z));
 }
 
-fn linear_from_srgb(c: vec3<f32>) -> vec3<f32> {
-    return select(pow((c + vec3<f32>(0.055)) / 1.055, vec3<f32>(2.4)), c / 12.92, c <= vec3<f32>(0.04045));
-}
-
-fn texel(t: Texture, level_offset: u32, size: vec2<i32>, x: i32, y: i32) -> vec4<f32> {
-    let u = wrap(x, size.x, t.wrap & 0xffffu);
-    let v = wrap(y, size.y, t.wrap >> 16u);
-    let c = unpack4x8unorm(texel_word(t.page, t.offset + level_offset + u32(v * size.x + u)));
-    return vec4<f32>(linear_from_srgb(c.rgb), c.a);
-}
-
-// Bilinear lookup in the level nearest to the footprint: `texels_squared` is the area of a pixel in texels of level 0.
-fn sample_texture(t: Texture, uv: vec2<f32>, texels_squared: f32) -> vec4<f32> {
-    let lod = 0.5 * log2(clamp(texels_squared, 1.0e-12, 1.0e12));
-    let level = u32(clamp(floor(lod + 0.5), 0.0, f32(t.levels - 1u)));
-    var offset = 0u;
-    for (var l = 0u; l < level; l++) {
-        offset += max(1u, t.width >> l) * max(1u, t.height >> l);
-    }
-    let size = vec2<i32>(vec2<u32>(max(1u, t.width >> level), max(1u, t.height >> level)));
-    // Whole turns are taken off first so that large coordinates keep their fraction; the bound keeps integers in range.
-    let turned = select(uv - 2.0 * floor(0.5 * uv), uv, vec2<bool>((t.wrap & 0xffffu) == 1u, (t.wrap >> 16u) == 1u));
-    let p = clamp(turned, vec2<f32>(-4.0), vec2<f32>(4.0)) * vec2<f32>(size) - vec2<f32>(0.5);
-    let f = p - floor(p);
-    let i = vec2<i32>(floor(p));
-    let top = mix(texel(t, offset, size, i.x, i.y), texel(t, offset, size, i.x + 1, i.y), f.x);
-    let bottom = mix(texel(t, offset, size, i.x, i.y + 1), texel(t, offset, size, i.x + 1, i.y + 1), f.x);
-    return mix(top, bottom, f.y);
+// What the pixel covers of the textures' unit square, an area, by ray cones (Akenine-Möller et al. 2021, "Improved shader and
+// texture level of detail using ray cones", eq. 2): the cone's width at the hit by the cosine there, squared, times the area of the
+// triangle in texture coordinates by that in the world. Cones are as wide as a pixel and go on from hits without a change, so
+// their width follows from the way from the camera. Rounded as it stands: which tiles are read depends on it.
+fn footprint_of(ray: Ray, t: f32, surface: Surface, uvs: array<vec2<f32>, 3>) -> f32 {
+    let e1 = uvs[1] - uvs[0];
+    let e2 = uvs[2] - uvs[0];
+    let uv_area = abs(barrier(barrier(e1.x * e2.y) - barrier(e1.y * e2.x)));
+    let way = ray.origin - params.origin.xyz;
+    let length = square_root(rounded_dot(ray.direction, ray.direction));
+    let distance = barrier(square_root(rounded_dot(way, way)) + barrier(t * length));
+    let cosine = max(divide(abs(rounded_dot(ray.direction, surface.normal)), length), LEAST_COSINE);
+    let width = divide(barrier(distance * params.step_y.w), cosine);
+    return barrier(divide(uv_area, max(surface.area, 1.0e-30)) * barrier(width * width));
 }
 
 // One thread a pixel.
@@ -106,7 +89,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let v = cache_vec4(page, (at >> 2u) + corner[k]);
         normal += weights[k] * octahedral(v.x);
         uvs[k] = bitcast<vec2<f32>>(v.yz);
-        uv += weights[k] * uvs[k];
+        // Rounded as it stands: which tiles are read depends on it.
+        uv.x = barrier(uv.x + barrier(weights[k] * uvs[k].x));
+        uv.y = barrier(uv.y + barrier(weights[k] * uvs[k].y));
         color += weights[k] * unpack4x8unorm(v.w);
     }
     let m = instances[leaf.instance].object_from_world;
@@ -117,19 +102,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if dot(n, surface.normal) < 0.0 {
         n = -n;
     }
-    var base = material.base_color * color;
+    let base = material.base_color * color;
+    var state = GBUFFER_READ;
+    var footprint = 0.0;
     if material.base_color_texture != NONE {
-        let t = textures[material.base_color_texture];
-        let e1 = uvs[1] - uvs[0];
-        let e2 = uvs[2] - uvs[0];
-        let uv_area = abs(e1.x * e2.y - e1.y * e2.x) * f32(t.width) * f32(t.height);
-        let ray = seen_rays[index];
-        let distance = hit.t * length(ray.direction);
-        let cosine = max(abs(dot(ray.direction, surface.normal)) / length(ray.direction), 0.05);
-        let footprint = distance * params.step_y.w;
-        base *= sample_texture(t, uv, uv_area / max(surface.area, 1.0e-30) * footprint * footprint / cosine);
+        state = GBUFFER_WAITS;
+        footprint = footprint_of(seen_rays[index], hit.t, surface, uvs);
     }
     // Source vertex (i + rotation) mod 3 was stored as vertex i.
     let source = array<f32, 3>(weights[(3u - rotation) % 3u], weights[(4u - rotation) % 3u], weights[(5u - rotation) % 3u]);
-    gbuffer[index] = GBuffer(base.rgb, 1u, n, word & 0x3fffffffu, material.emission, 0u, vec2<f32>(source[1], source[2]), uv);
+    gbuffer[index] = GBuffer(base.rgb, state, n, word & 0x3fffffffu, material.emission, footprint, vec2<f32>(source[1], source[2]), uv);
 }

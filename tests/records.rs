@@ -103,18 +103,20 @@ fn recount(spy: &Spy, sizes: &[[u64; 3]], memory: &mut Memory, in_frame: &mut BT
     let mut fields = BTreeMap::from([("bricks_resident_start", memory.lies.len() as u64)]);
     let mut seen = BTreeSet::new();
     for load in spy.batches.iter().flatten() {
-        let [nodes, geometry, attributes] = sizes[load.item.brick as usize];
+        let number = load.item.number as usize;
         let mut add = |field, amount| *fields.entry(field).or_default() += amount;
         let bytes = match load.item.kind {
             Kind::Geometry => {
+                let [nodes, geometry, _] = sizes[number];
                 add("bytes_bvh", nodes);
                 add("bytes_geometry", geometry - nodes);
                 geometry
             }
             Kind::Attributes => {
-                add("bytes_attributes", attributes);
-                attributes
+                add("bytes_attributes", sizes[number][2]);
+                sizes[number][2]
             }
+            Kind::Tile => unreachable!("a scene without textures"),
         };
         add("bricks_loaded", 1);
         add("bricks_reloaded", u64::from(!seen.insert(load.item)));
@@ -324,7 +326,7 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
             let cache = &mut renderer.cache;
             trace(&mut spy, cache, Pass::Primary, &[Step::Generate], &tracing, &mut stats).expect("a pass");
             let needed: BTreeSet<u32> = stats.bricks_needed.into_iter().flatten().collect();
-            let loaded = spy.batches.iter().flatten().map(|load| load.item.brick);
+            let loaded = spy.batches.iter().flatten().map(|load| load.item.number);
             let vain = loaded.filter(|brick| !needed.contains(brick)).count();
             *in_vain.entry((schedule == Fixed::Chc, nearest_first)).or_insert(0) += vain;
             assert!(number > 0 || !spy.batches.is_empty(), "something is loaded");

@@ -31,7 +31,7 @@ fn ground(folder: &Path) -> PathBuf {
 
 fn texture(folder: &Path, seed: u8) {
     let texel = |x, y| image::Rgb([(x * 5) as u8, (y * 9) as u8, seed]);
-    image::RgbImage::from_fn(16, 8, texel).save(folder.join("g.png")).expect("an image");
+    image::RgbImage::from_fn(160, 8, texel).save(folder.join("g.png")).expect("an image");
 }
 
 /// Flips a bit in the middle of each payload, and one in the padding after the first.
@@ -65,7 +65,8 @@ fn repair(scene: &Path, options: &str) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(said).into_owned())
 }
 
-const DAMAGED: [Payload; 4] = [Payload::Geometry(2), Payload::Attributes(5), Payload::Proxies(3), Payload::Texture(0)];
+const DAMAGED: [Payload; 5] =
+    [Payload::Geometry(2), Payload::Attributes(5), Payload::Proxies(3), Payload::Texture(0), Payload::Tile(1)];
 
 #[test]
 fn damaged_bricks_and_textures_are_rebuilt_to_the_same_bytes() {
@@ -75,7 +76,10 @@ fn damaged_bricks_and_textures_are_rebuilt_to_the_same_bytes() {
     assert_ne!(damage(&scene, &DAMAGED), whole);
     let (status, said) = repair(&scene, "--from DIR/g.obj");
     assert_eq!(status, Some(0), "{said}");
-    assert!(said.contains("brick 2 geometry, brick 5 attributes, brick 3 proxies, texture 0 rebuilt"), "{said}");
+    assert!(
+        said.contains("brick 2 geometry, brick 5 attributes, brick 3 proxies, texture 0, tile 1 rebuilt"),
+        "{said}"
+    );
     assert!(std::fs::read(&scene).expect("the scene") == whole);
     assert_eq!(names(folder.path()), before, "nothing is left behind");
 

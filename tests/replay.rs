@@ -202,7 +202,11 @@ fn a_replay_reproduces_the_walk() {
     assert_eq!(rows["skipped_cache_bytes"], serde_json::json!([16]));
     assert_eq!(rows["results"].as_array().expect("rows").len(), 12, "recorded, 30 %, 40 %");
     let text = succeed(["replay", trace.to_str().expect("UTF-8"), "--cache", "16"]);
-    assert!(text.contains("as recorded") && text.contains(&format!("Skipped, below the two largest bricks ({least}")));
+    assert!(
+        text.contains("as recorded")
+            && text
+                .contains(&format!("Skipped, below the two largest bricks, or the tiles of a texture lookup ({least}"))
+    );
 }
 
 #[test]
@@ -229,7 +233,7 @@ fn a_trace_that_is_not_whole_is_refused() {
 
     let good = std::fs::read(whole).expect("a trace");
     let last_line = good[..good.len() - 1].iter().rposition(|&byte| byte == b'\n').expect("two lines") + 1;
-    let huge = br#"{"format":3,"policy":"lru","budget_bytes":18446744073709551600,"page_bytes":16,"passes":0,"sizes":[[18446744073709551600,16]]}"#;
+    let huge = br#"{"format":4,"policy":"lru","budget_bytes":18446744073709551600,"page_bytes":16,"passes":0,"sizes":[[18446744073709551600,16]],"tiles":[]}"#;
     let file = folder.path().join("bad.jsonl");
     let name = file.to_str().expect("UTF-8");
     for bad in [

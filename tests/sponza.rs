@@ -30,6 +30,23 @@ fn sponza_converts_streams_and_verifies() {
         .filter_map(|r| r["bricks_evicted"].as_u64())
         .sum();
     assert!(evicted > 0, "2 MiB make it stream");
+    // Through a cache smaller than its textures: close enough to see tiles of many, it shows the same in core.
+    let tiles: u64 = bricks::SceneFile::open(&scene).expect("the scene").resident().tiles.iter().map(|t| t.bytes).sum();
+    assert!(tiles > 8 << 20, "{tiles} bytes of tiles");
+    let close = "--adapter cpu --frames 3 --size 96x54 --aov --effects shadow,diffuse --diffuse-rays 1 --fov 5";
+    let least = info["least_cache_bytes"].as_u64().expect("a size").to_string();
+    let [few, whole] = [&least[..], "100%"].map(|cache| {
+        let output = folder.path().join(format!("close-{cache}"));
+        walk(&scene, &output, &format!("{close} --cache {cache}"));
+        let records = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
+        let of = |l: &str| serde_json::from_str::<serde_json::Value>(l).ok()?["bytes_textures"].as_u64();
+        (frames(&output), records.lines().filter_map(of).sum::<u64>())
+    });
+    assert!(few.0 == whole.0, "the least cache shows what a resident scene shows");
+    assert!(few.1 > whole.1 && whole.1 > 0, "tiles are streamed: {} bytes, {} in core", few.1, whole.1);
+    let other = folder.path().join("other");
+    walk(&scene, &other, &format!("{}.01 --cache 100%", close));
+    assert!(frames(&other) != whole.0, "another view shows something else");
 
     // Textured: many colours, neither all dark nor all sky.
     let image = image::open(small.join("frames/0000.png")).expect("a frame").to_rgb8();

@@ -2,6 +2,7 @@
 
 use crate::layout::{MAGIC, Section, VERSION};
 use crate::payload::Payload;
+use crate::resident::Resident;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -164,6 +165,14 @@ pub enum Error {
         /// What can be asked for.
         expected: String,
     },
+    /// A part of a texture is at fault.
+    #[error("{error} ({place})")]
+    Texture {
+        /// What is wrong.
+        error: Box<Error>,
+        /// Which part of which texture, by its name in the source.
+        place: String,
+    },
 }
 
 impl Error {
@@ -175,6 +184,7 @@ impl Error {
             Error::Corrupt { part, .. } | Error::Padding { part, .. } => Some(*part),
             Error::Invalid { flaw, .. } => Some(flaw.part),
             Error::Request { payload, .. } => Some(Part::Payload(*payload)),
+            Error::Texture { error, .. } => error.part(),
         }
     }
 
@@ -189,6 +199,25 @@ impl Error {
             | Error::Padding { path, .. }
             | Error::Invalid { path, .. }
             | Error::Request { path, .. } => path,
+            Error::Texture { error, .. } => error.path(),
+        }
+    }
+
+    /// What is wrong, without the texture that it is about.
+    pub fn cause(&self) -> &Error {
+        match self {
+            Error::Texture { error, .. } => error.cause(),
+            other => other,
+        }
+    }
+
+    /// The same error, said to be about the texture that `payload` is part of, if it is of one.
+    pub(crate) fn within(self, resident: &Resident, payload: Payload) -> Self {
+        match (resident.texture_of(payload), self) {
+            (Some(place), error @ (Error::Io { .. } | Error::Corrupt { .. } | Error::Invalid { .. })) => {
+                Error::Texture { error: Box::new(error), place }
+            }
+            (_, error) => error,
         }
     }
 }

@@ -98,6 +98,7 @@ impl SceneFile {
             materials: reader.section(&directory, Section::Materials)?,
             textures: reader.section(&directory, Section::Textures)?,
             opacity_maps: reader.section(&directory, Section::OpacityMaps)?,
+            tiles: reader.section(&directory, Section::Tiles)?,
             occupancy: reader.section(&directory, Section::Occupancy)?,
         };
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;
@@ -131,14 +132,15 @@ impl SceneFile {
     ///
     /// # Panics
     ///
-    /// If the scene has no such brick or texture, as indexing the resident part would.
+    /// If the scene has no such brick, texture or tile, as indexing the resident part would.
     pub fn span(&self, payload: Payload) -> Span {
         match payload {
             Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry,
             Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes,
             Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies,
-            Payload::Texture(texture) => self.resident.textures[texture as usize].texels,
             Payload::Opacity(map) => self.resident.opacity_maps[map as usize].texels,
+            Payload::Texture(texture) => self.resident.textures[texture as usize].tail,
+            Payload::Tile(tile) => self.resident.tiles[tile as usize],
         }
     }
 
@@ -160,6 +162,10 @@ impl SceneFile {
     ///
     /// `out` must be [`Self::loaded_bytes`] long; it needs no alignment. After an error its contents are of no use.
     pub fn copy(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
+        self.copy_checked(payload, out).map_err(|error| error.within(&self.resident, payload))
+    }
+
+    fn copy_checked(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
         let length = self.resident.loaded_bytes(payload).ok_or_else(|| self.no_such(payload))?;
         let (span, reader) = self.request(payload, length, out)?;
         match payload {
@@ -198,7 +204,7 @@ impl SceneFile {
     pub fn copy_stored(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
         let span = self.resident.span(payload).ok_or_else(|| self.no_such(payload))?;
         let (span, reader) = self.request(payload, span.bytes, out)?;
-        reader.payload(payload, span, out)
+        reader.payload(payload, span, out).map_err(|error| error.within(&self.resident, payload))
     }
 
     /// Where `payload` lies, and a reader of it, if `out` is of the `length` asked for.
@@ -227,6 +233,7 @@ impl SceneFile {
             Payload::Proxies(_) => format!("one of {} bricks with proxies", self.resident.occupancy.len()),
             Payload::Texture(_) => format!("one of {} textures", self.resident.textures.len()),
             Payload::Opacity(_) => format!("one of {} opacity maps", self.resident.opacity_maps.len()),
+            Payload::Tile(_) => format!("one of {} tiles", self.resident.tiles.len()),
         };
         Error::Request { path: self.path.clone(), payload, found: payload.to_string(), expected }
     }
@@ -251,6 +258,7 @@ struct Validated {
     proxies: Box<[AtomicBool]>,
     textures: Box<[AtomicBool]>,
     opacity: Box<[AtomicBool]>,
+    tiles: Box<[AtomicBool]>,
 }
 
 impl Validated {
@@ -263,6 +271,7 @@ impl Validated {
             proxies: none(resident.occupancy.len()),
             textures: none(textures),
             opacity: none(resident.opacity_maps.len()),
+            tiles: none(resident.tiles.len()),
         }
     }
 
@@ -274,6 +283,7 @@ impl Validated {
             Payload::Proxies(brick) => &self.proxies[brick as usize],
             Payload::Texture(texture) => &self.textures[texture as usize],
             Payload::Opacity(map) => &self.opacity[map as usize],
+            Payload::Tile(tile) => &self.tiles[tile as usize],
         }
     }
 }

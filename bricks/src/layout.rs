@@ -5,7 +5,7 @@
 //! the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
 
 use crate::occupancy::Occupancy;
-use crate::records::{Brick, Instance, Leaf, Material, Object, OpacityMap, Texture, TopNode2, TopNode8};
+use crate::records::{Brick, Instance, Leaf, Material, Object, OpacityMap, Span, Texture, TopNode2, TopNode8};
 use bytemuck::{Pod, Zeroable};
 use std::fmt;
 use xxhash_rust::xxh3::xxh3_64;
@@ -125,15 +125,17 @@ pub enum Section {
     Materials = 8,
     /// [`Texture`]s.
     Textures = 9,
+    /// [`Span`]s of the tiles of all textures.
+    Tiles = 10,
     /// [`OpacityMap`]s.
-    OpacityMaps = 10,
+    OpacityMaps = 11,
     /// [`Occupancy`] of the bricks, in their order, or nothing.
     Occupancy = 16,
 }
 
 impl Section {
     /// All sections in the order of the file.
-    pub const ALL: [Section; 11] = [
+    pub const ALL: [Section; 12] = [
         Section::Manifest,
         Section::Objects,
         Section::Instances,
@@ -143,6 +145,7 @@ impl Section {
         Section::Bricks,
         Section::Materials,
         Section::Textures,
+        Section::Tiles,
         Section::OpacityMaps,
         Section::Occupancy,
     ];
@@ -173,6 +176,7 @@ impl Section {
             Section::Materials => size_of::<Material>(),
             Section::Textures => size_of::<Texture>(),
             Section::OpacityMaps => size_of::<OpacityMap>(),
+            Section::Tiles => size_of::<Span>(),
             Section::Occupancy => size_of::<Occupancy>(),
         };
         bytes as u32
@@ -191,6 +195,7 @@ impl Section {
             Section::Materials => "materials",
             Section::Textures => "textures",
             Section::OpacityMaps => "opacity maps",
+            Section::Tiles => "tiles",
             Section::Occupancy => "occupancy",
         }
     }

@@ -27,6 +27,8 @@ pub struct Manifest {
     pub max: [f64; 3],
     /// Any base colour texture.
     pub has_textures: bool,
+    /// What the textures are called in the source, for messages.
+    pub texture_names: Vec<String>,
     /// Any MASK material in use.
     pub has_alpha_mask: bool,
     /// Any BLEND material in use.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`] or [`crate::OpacityMap`].
+/// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`], tile or [`crate::OpacityMap`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Payload {
     /// What traversal of a brick reads, laid out as [`crate::GeometryLayout`] says.
@@ -11,10 +11,12 @@ pub enum Payload {
     Attributes(u32),
     /// The [`crate::OccupancyMap`] of a brick, packed.
     Proxies(u32),
-    /// The texels of a texture, all levels.
+    /// The tail of a texture: its levels that fit into a tile.
     Texture(u32),
     /// The texels of an opacity map.
     Opacity(u32),
+    /// A tile of a level of a texture, by its number in the file; see [`crate::Resident::tile_of`].
+    Tile(u32),
 }
 
 impl fmt::Display for Payload {
@@ -25,6 +27,7 @@ impl fmt::Display for Payload {
             Payload::Proxies(brick) => write!(f, "brick {brick} proxies"),
             Payload::Texture(texture) => write!(f, "texture {texture}"),
             Payload::Opacity(map) => write!(f, "opacity map {map}"),
+            Payload::Tile(tile) => write!(f, "tile {tile}"),
         }
     }
 }

@@ -291,8 +291,16 @@ pub const WRAP_CLAMP: u32 = 1;
 /// [`Texture::wrap`]: mirrored repeat.
 pub const WRAP_MIRROR: u32 = 2;
 
-/// A texture: an RGBA8 sRGB image with a full chain of mip levels, level 0 first, rows top to bottom, tightly packed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+/// [`Texture::encoding`]: RGBA8, a texel after the other.
+pub const TEXTURE_RGBA8: u32 = 0;
+/// [`Texture::encoding`]: BC7 blocks of 4 x 4 texels, 16 bytes each.
+pub const TEXTURE_BC7: u32 = 1;
+
+/// [`Texture::flags`]: red, green and blue are sRGB; else they are linear. Alpha always is.
+pub const TEXTURE_SRGB: u32 = 1;
+
+/// A texture: an image with a full chain of mip levels, rows top to bottom, cut into tiles and a tail; see [`crate::texture`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Texture {
     /// Width of level 0 in texels.
@@ -303,19 +311,16 @@ pub struct Texture {
     pub levels: u32,
     /// `WRAP_*` of s in the low half, of t in the high half.
     pub wrap: u32,
-    /// The texels.
-    pub texels: Span,
-}
-
-impl Texture {
-    /// Bytes of the texels of all levels, without the padding of the payload to 16; `None` if the sizes are too large for
-    /// a number.
-    pub fn texel_bytes(&self) -> Option<u64> {
-        (0..self.levels.min(32)).try_fold(0u64, |bytes, level| {
-            let (width, height) = ((self.width >> level).max(1), (self.height >> level).max(1));
-            bytes.checked_add((u64::from(width) * u64::from(height)).checked_mul(4)?)
-        })
-    }
+    /// `TEXTURE_RGBA8` or `TEXTURE_BC7`.
+    pub encoding: u32,
+    /// `TEXTURE_SRGB` or 0.
+    pub flags: u32,
+    /// First tile of level 0; the tiles of a texture are contiguous.
+    pub first_tile: u32,
+    /// Number of tiles.
+    pub tile_count: u32,
+    /// The levels that fit into a tile, one after the other.
+    pub tail: Span,
 }
 
 /// The alpha of a base colour texture, where rays ask for it: 8 bits a texel (255 is 1), rows top to bottom, tightly packed, in full

@@ -7,6 +7,7 @@ use crate::payload::Payload;
 use crate::records::{
     AttributeLayout, Brick, Instance, Leaf, Material, Object, OpacityMap, Span, Texture, TopNode2, TopNode8,
 };
+use crate::texture::TilePlace;
 
 /// The always-resident part of a scene file: everything but the payloads.
 ///
@@ -35,6 +36,8 @@ pub struct Resident {
     pub textures: Vec<Texture>,
     /// Opacity maps.
     pub opacity_maps: Vec<OpacityMap>,
+    /// The tiles of all textures, those of one together.
+    pub tiles: Vec<Span>,
     /// The occupancy of each brick, or nothing: then the scene has no proxies.
     pub occupancy: Vec<Occupancy>,
 }
@@ -53,6 +56,7 @@ impl Resident {
             Section::Materials => self.materials.len(),
             Section::Textures => self.textures.len(),
             Section::OpacityMaps => self.opacity_maps.len(),
+            Section::Tiles => self.tiles.len(),
             Section::Occupancy => self.occupancy.len(),
         }
     }
@@ -62,7 +66,13 @@ impl Resident {
         self.opacity_maps.iter().map(|map| map.texels.bytes).sum()
     }
 
-    /// Where a payload lies, or `None` if there is no such brick, texture or map, or no proxies.
+    /// Bytes of all textures: tails, tiles and opacity maps.
+    pub fn texture_bytes(&self) -> u64 {
+        let spans = self.textures.iter().map(|texture| &texture.tail).chain(&self.tiles);
+        spans.map(|span| span.bytes).sum::<u64>() + self.opacity_bytes()
+    }
+
+    /// Where a payload lies, or `None` if there is no such brick, texture, tile or map, or no proxies.
     pub fn span(&self, payload: Payload) -> Option<Span> {
         match payload {
             Payload::Geometry(brick) => self.bricks.get(brick as usize).map(|brick| brick.geometry),
@@ -71,12 +81,13 @@ impl Resident {
                 let brick = self.bricks.get(brick as usize);
                 brick.map(|brick| brick.proxies).filter(|span| *span != Span::default())
             }
-            Payload::Texture(texture) => self.textures.get(texture as usize).map(|texture| texture.texels),
             Payload::Opacity(map) => self.opacity_maps.get(map as usize).map(|map| map.texels),
+            Payload::Texture(texture) => self.textures.get(texture as usize).map(|texture| texture.tail),
+            Payload::Tile(tile) => self.tiles.get(tile as usize).copied(),
         }
     }
 
-    /// Length of a payload as it is loaded by [`crate::SceneFile::copy`], or `None` if there is no such brick or texture. It
+    /// Length of a payload as it is loaded by [`crate::SceneFile::copy`], or `None` if there is no such payload. It
     /// is that of its span but for attributes, which are encoded in the file.
     pub fn loaded_bytes(&self, payload: Payload) -> Option<u64> {
         match payload {
@@ -85,8 +96,8 @@ impl Resident {
         }
     }
 
-    /// Every payload with its span: the bricks' geometry, attributes and, if any, proxies in order of bricks, then the textures, then the
-    /// opacity maps.
+    /// Every payload with its span: the bricks' geometry, attributes and, if any, proxies in order of bricks, then the
+    /// textures' tails, then the tiles, then the opacity maps.
     pub fn payloads(&self) -> impl Iterator<Item = (Payload, Span)> + '_ {
         let bricks = (0u32..).zip(&self.bricks);
         let bricks = bricks.flat_map(|(index, brick)| {
@@ -95,7 +106,34 @@ impl Resident {
             spans.filter(|(payload, span)| !matches!(payload, Payload::Proxies(_)) || *span != Span::default())
         });
         let textures = (0u32..).zip(&self.textures);
+        let tails = textures.map(|(index, texture)| (Payload::Texture(index), texture.tail));
+        let tiles = (0u32..).zip(&self.tiles).map(|(index, span)| (Payload::Tile(index), *span));
         let maps = (0u32..).zip(&self.opacity_maps).map(|(index, map)| (Payload::Opacity(index), map.texels));
-        bricks.chain(textures.map(|(index, texture)| (Payload::Texture(index), texture.texels))).chain(maps)
+        bricks.chain(tails).chain(tiles).chain(maps)
+    }
+
+    /// The texture of a tile, and where the tile is in it; `None` if there is no such tile.
+    pub fn tile_of(&self, tile: u32) -> Option<(u32, TilePlace)> {
+        // Of textures with the same first tile, all but the last have none.
+        let index = self.textures.partition_point(|texture| texture.first_tile <= tile).checked_sub(1)?;
+        let texture = &self.textures[index];
+        let own = tile - texture.first_tile;
+        (own < texture.tile_count).then(|| (index as u32, texture.place_of(own)))
+    }
+
+    /// The texture, by its name in the source, that a payload is part of, and which part, in words; `None` if it is of a brick.
+    pub fn texture_of(&self, payload: Payload) -> Option<String> {
+        let named = |texture: u32| {
+            let name = self.manifest.texture_names.get(texture as usize).map_or("", String::as_str);
+            format!("texture {texture} \"{name}\"")
+        };
+        match payload {
+            Payload::Texture(texture) => Some(format!("the coarse levels of {}", named(texture))),
+            Payload::Tile(tile) => {
+                let (texture, TilePlace { level, x, y }) = self.tile_of(tile)?;
+                Some(format!("column {x}, row {y} of level {level} of {}", named(texture)))
+            }
+            Payload::Geometry(_) | Payload::Attributes(_) | Payload::Proxies(_) | Payload::Opacity(_) => None,
+        }
     }
 }

@@ -38,7 +38,7 @@ impl VerifyReport {
 /// ([`validate::contents`]), and that all padding is zero. A flip of any byte is found and named.
 ///
 /// What depends on a damaged part cannot be checked: behind a damaged header or directory nothing; if a section is
-/// damaged, the other sections, and the checksums of the payloads that the sections of bricks and textures name.
+/// damaged, the other sections, and the checksums of the payloads that the sections of bricks, textures and tiles name.
 ///
 /// Payloads are read by the threads of the current rayon pool, each with buffers as long as its longest payload; the
 /// problems come in the order of the file all the same.
@@ -124,6 +124,7 @@ impl Verifier<'_> {
         let materials = self.section(directory, Section::Materials);
         let textures: Option<Vec<Texture>> = self.section(directory, Section::Textures);
         let opacity_maps = self.section(directory, Section::OpacityMaps);
+        let tiles: Option<Vec<Span>> = self.section(directory, Section::Tiles);
         let occupancy = self.section(directory, Section::Occupancy);
         self.advance(directory.iter().map(|entry| entry.bytes).sum());
 
@@ -137,6 +138,7 @@ impl Verifier<'_> {
             && materials.is_some()
             && textures.is_some()
             && opacity_maps.is_some()
+            && tiles.is_some()
             && occupancy.is_some();
         let resident = Resident {
             manifest: manifest.unwrap_or_default(),
@@ -149,6 +151,7 @@ impl Verifier<'_> {
             materials: materials.unwrap_or_default(),
             textures: textures.unwrap_or_default(),
             opacity_maps: opacity_maps.unwrap_or_default(),
+            tiles: tiles.unwrap_or_default(),
             occupancy: occupancy.unwrap_or_default(),
         };
         let valid = whole && self.keep_flaw(validate::resident(&resident));
@@ -185,7 +188,8 @@ impl Verifier<'_> {
             rest = after;
             let reader = &self.reader;
             let check = |buffers: &mut (Vec<u8>, Decoding), &(payload, span): &(Payload, Span)| {
-                check_payload(reader, resident, (payload, span), valid, buffers).err()
+                let checked = check_payload(reader, resident, (payload, span), valid, buffers);
+                checked.err().map(|error| error.within(resident, payload))
             };
             // The collection keeps the order of the batch.
             let problems: Vec<Option<Error>> = batch.par_iter().map_init(Default::default, check).collect();

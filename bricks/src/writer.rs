@@ -88,8 +88,8 @@ impl Writer {
     }
 
     /// Writes a payload at the next multiple of [`PAGE_BYTES`] and returns where it lies. `bytes` must be a multiple of
-    /// 16 long, not empty, and at most [`MAX_PAYLOAD_BYTES`]. Every payload that is written must be that of a brick or a
-    /// texture of the resident part given to [`Self::finish`].
+    /// 16 long, not empty, and at most [`MAX_PAYLOAD_BYTES`]. Every payload that is written must be that of a brick, a
+    /// texture or a tile of the resident part given to [`Self::finish`].
     pub fn write(&mut self, bytes: &[u8]) -> Result<Span, Error> {
         let length = bytes.len() as u64;
         if length == 0 || !length.is_multiple_of(16) || length > MAX_PAYLOAD_BYTES {
@@ -185,7 +185,10 @@ impl Writer {
             None => Ok(()),
             Some(index) => Err(Flaw {
                 part: Part::Section(Section::Bricks),
-                found: format!("no brick or texture with the payload written at byte {}", self.spans[index].offset),
+                found: format!(
+                    "no brick, texture or tile with the payload written at byte {}",
+                    self.spans[index].offset
+                ),
                 expected: "every written payload in use".to_owned(),
             }),
         }
@@ -334,6 +337,7 @@ fn section_bytes(resident: &Resident, section: Section) -> serde_json::Result<Co
         Section::Materials => bytemuck::cast_slice(&resident.materials),
         Section::Textures => bytemuck::cast_slice(&resident.textures),
         Section::OpacityMaps => bytemuck::cast_slice(&resident.opacity_maps),
+        Section::Tiles => bytemuck::cast_slice(&resident.tiles),
         Section::Occupancy => bytemuck::cast_slice(&resident.occupancy),
     }))
 }

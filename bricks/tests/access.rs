@@ -69,7 +69,7 @@ fn requests_that_make_no_sense() {
         assert!(matches!(error, Error::Request { payload: Payload::Geometry(1), .. }), "{error}");
         assert!(error.to_string().contains(&format!("expected {bytes} bytes")), "{error}");
     }
-    for payload in [Payload::Geometry(3), Payload::Attributes(u32::MAX), Payload::Texture(1)] {
+    for payload in [Payload::Geometry(3), Payload::Attributes(u32::MAX), Payload::Texture(2), Payload::Tile(2)] {
         let error = file.copy(payload, &mut [0; 16]).unwrap_err();
         assert!(matches!(error, Error::Request { .. }), "{error}");
         assert!(error.to_string().contains(&payload.to_string()), "{error}");

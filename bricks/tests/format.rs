@@ -110,9 +110,9 @@ fn structs() -> BTreeMap<String, Table> {
             opacity_map,
             _reserved
         }),
-        table!(Texture { width, height, levels, wrap, texels }),
         table!(OpacityMap { width, height, wrap, _reserved, texels }),
         table!(OpacityTriangle { uv, material, alphas }),
+        table!(Texture { width, height, levels, wrap, encoding, flags, first_tile, tile_count, tail }),
         table!(Node { origin, exponent, inner_mask, child_base, triangle_base, meta, lo, hi }),
         table!(Occupancy { cell_log2, _reserved, origin, bits }),
         table!(AttributeVertex { normal, uv, color }),
@@ -202,6 +202,6 @@ fn payloads_are_those_of_the_page() {
         assert_eq!(attributes.indices, attributes.surfaces + pad(5 * 4));
         assert_eq!(attributes.bytes, attributes.indices + pad(5 * index));
     }
-    let texture = Texture { width: 5, height: 3, levels: 3, wrap: 0, texels: Span::default() };
-    assert_eq!(texture.texel_bytes(), Some(4 * (5 * 3 + 2 + 1)));
+    assert_eq!((TILE_TEXELS, BLOCK_TEXELS), (128, 4));
+    assert_eq!((TEXTURE_RGBA8, TEXTURE_BC7, TEXTURE_SRGB), (0, 1, 1));
 }

@@ -14,7 +14,7 @@ fn golden_file_of_version_3() {
         std::fs::copy(&path, &golden).unwrap();
     }
     let bytes = std::fs::read(&golden).unwrap();
-    assert!(bytes.len() < 64 << 10);
+    assert!(bytes.len() < 96 << 10);
     assert!(bytes == std::fs::read(&path).unwrap(), "the writer's bytes are not those of {}", golden.display());
 
     let file = SceneFile::open(&golden).unwrap();

@@ -93,7 +93,7 @@ fn materials_and_textures() {
     refused(record(Materials, 1), "reserved", |r| r.materials[1]._reserved[2] = 1);
     refused(record(Materials, 1), "flags 0x10", |r| r.materials[1].flags = 16);
     refused(record(Materials, 1), "flags 0x3", |r| r.materials[1].flags = MATERIAL_MASK | MATERIAL_BLEND);
-    refused(record(Materials, 0), "texture 1", |r| r.materials[0].base_color_texture = 1);
+    refused(record(Materials, 0), "texture 2", |r| r.materials[0].base_color_texture = 2);
     refused(record(Materials, 0), "NaN", |r| r.materials[0].base_color[3] = f32::NAN);
     refused(record(Materials, 0), "inf", |r| r.materials[0].emission[2] = f32::INFINITY);
     refused(record(Materials, 0), "roughness: -1", |r| r.materials[0].roughness = -1.0);
@@ -112,8 +112,56 @@ fn materials_and_textures() {
     }
     refused(record(Textures, 0), "wrap 0x3", |r| r.textures[0].wrap = 3);
     refused(record(Textures, 0), "wrap 0x30000", |r| r.textures[0].wrap = 3 << 16);
-    refused(Part::Payload(Payload::Texture(0)), "48 bytes", |r| r.textures[0].height = 4);
-    refused(Part::Payload(Payload::Texture(0)), "64 bytes", |r| r.textures[0].texels.bytes = 64);
+    refused(record(Textures, 0), "encoding 2", |r| r.textures[0].encoding = 2);
+    refused(record(Textures, 0), "flags 0x2", |r| r.textures[0].flags = 2);
+    refused(Part::Payload(Payload::Texture(1)), "544 bytes", |r| r.textures[1].width = 200);
+    refused(Part::Payload(Payload::Texture(0)), "64 bytes", |r| r.textures[0].tail.bytes = 64);
+}
+
+#[test]
+fn tiles() {
+    use Section::{Manifest, Textures, Tiles};
+    refused(record(Textures, 0), "1 tiles from 0 on", |r| r.textures[0].tile_count = 1);
+    refused(record(Textures, 1), "3 tiles from 0 on", |r| r.textures[1].tile_count = 3);
+    refused(record(Textures, 1), "2 tiles from 1 on", |r| r.textures[1].first_tile = 1);
+    refused(record(Textures, 1), "2 tiles from 4294967295 on", |r| r.textures[1].first_tile = u32::MAX);
+    refused(record(Textures, 1), "2 tiles from 0 on", |r| (r.textures[1].width, r.textures[1].height) = (255, 255));
+    refused(Part::Section(Tiles), "1 tiles", |r| r.tiles.truncate(1));
+    refused(Part::Section(Tiles), "3 tiles", |r| r.tiles.push(r.tiles[0]));
+    refused(Part::Payload(Payload::Tile(1)), "16400 bytes", |r| r.tiles[1].bytes += 16);
+    refused(Part::Payload(Payload::Texture(1)), "544 bytes", |r| r.textures[1].encoding = TEXTURE_RGBA8);
+    refused(Part::Section(Manifest), "1 names of textures", |r| r.manifest.texture_names.truncate(1));
+}
+
+/// Messages name the texture as its source does, the level and the place of the tile.
+#[test]
+fn tiles_are_named() {
+    let (_folder, path, _) = written();
+    let mut image = Image::read(&path);
+    let file = SceneFile::open(&path).unwrap();
+    image.bytes[file.span(Payload::Tile(1)).offset as usize + 9] ^= 2;
+    image.bytes[file.span(Payload::Texture(0)).offset as usize] ^= 2;
+    fs::write(&path, &image.bytes).unwrap();
+    let file = SceneFile::open(&path).unwrap();
+    for (payload, names) in [
+        (Payload::Tile(1), ["tile 1 is damaged", "column 1, row 0 of level 0 of texture 1 \"long.png\""]),
+        (Payload::Texture(0), ["texture 0 is damaged", "the coarse levels of texture 0 \"small.png\""]),
+    ] {
+        let mut out = vec![0; file.loaded_bytes(payload) as usize];
+        let error = file.copy(payload, &mut out).unwrap_err();
+        assert!(matches!(error.cause(), Error::Corrupt { .. }) && error.part() == Some(Part::Payload(payload)));
+        assert!(names.iter().all(|name| error.to_string().contains(name)), "{error}");
+        assert!(common::problems(&path).contains(&error.to_string()), "verifying says the same");
+    }
+    // Blocks without a mode are seen by verifying alone.
+    let (_folder, path, _) = written();
+    let mut image = Image::read(&path);
+    image.edit_payload(Payload::Tile(0), |bytes| bytes[32] = 0);
+    fs::write(&path, &image.bytes).unwrap();
+    let file = SceneFile::open(&path).unwrap();
+    file.copy(Payload::Tile(0), &mut [0; 16384]).unwrap();
+    let problems = common::problems(&path);
+    assert!(problems.contains("tile 0 is not valid: found block 2 without a mode"), "{problems}");
 }
 
 #[test]
@@ -335,9 +383,11 @@ fn spans_that_do_not_tile_the_file() {
     refused(&|r| r.bricks[0].geometry.offset += 16, end);
     refused(&|r| r.bricks[1].geometry.offset = r.bricks[0].geometry.offset, end);
     refused(&|r| r.bricks[2].attributes.bytes = 5000, end);
-    refused(&|r| r.textures[0].texels.bytes = u64::MAX - 15, end);
-    refused(&|r| r.textures[0].texels.offset = u64::MAX - 15, u64::MAX);
+    refused(&|r| r.textures[0].tail.bytes = u64::MAX - 15, end);
+    refused(&|r| r.textures[0].tail.offset = u64::MAX - 15, u64::MAX);
     refused(&|r| r.textures.clear(), end);
+    refused(&|r| r.tiles[1].offset = r.tiles[0].offset, end);
+    refused(&|r| r.tiles.clear(), end);
 }
 
 /// A file whose checksums are right is refused on opening; verifying lists the same.
@@ -483,7 +533,7 @@ fn a_root_that_differs() {
 }
 
 #[test]
-fn attributes_and_texels() {
+fn attributes() {
     let scene = scene();
     let [near, wide] = [0, 1].map(|brick| AttributeLayout::of(&scene.resident.bricks[brick]));
     let surface = |rotation: u32, material: u32| (rotation << SURFACE_ROTATION_SHIFT | material).to_le_bytes();
@@ -495,9 +545,6 @@ fn attributes_and_texels() {
     payload_refused(Payload::Attributes(0), "index 81 of a vertex", |b| put(b, near.indices + 2 * 80, [81, 0]));
     payload_refused(Payload::Attributes(1), "index 15 of a vertex", |b| put(b, wide.indices, [15, 0, 0, 0]));
     payload_refused(Payload::Attributes(1), "index 4294967295 of a vertex", |b| put(b, wide.indices + 56, [255; 4]));
-    for at in [44, 47] {
-        payload_refused(Payload::Texture(0), &format!("0x01 at its byte {at}"), |b| put(b, at, [1]));
-    }
     payload_refused(Payload::Opacity(0), "0x01 at its byte 15", |b| put(b, 15, [1]));
     let opacity = GeometryLayout::of(&common::scene().resident.bricks[2]);
     let (of, opacities) = (opacity.opacity_of, opacity.opacities);

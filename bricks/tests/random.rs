@@ -112,12 +112,13 @@ proptest! {
 
     #[test]
     fn payloads_with_right_checksums(
-        payload in 0usize..8,
+        payload in 0usize..10,
         edits in prop::collection::vec((any::<prop::sample::Index>(), word(), any::<bool>()), 1..3),
     ) {
         let payloads = [
             Payload::Geometry(0), Payload::Geometry(1), Payload::Geometry(2), Payload::Attributes(0),
-            Payload::Attributes(1), Payload::Attributes(2), Payload::Texture(0), Payload::Opacity(0),
+            Payload::Attributes(1), Payload::Attributes(2), Payload::Texture(0),
+            Payload::Texture(1), Payload::Tile(1), Payload::Opacity(0),
         ];
         let mut image = Image { bytes: whole().to_vec() };
         image.edit_payload(payloads[payload], |bytes| {
@@ -179,7 +180,7 @@ proptest! {
 
 #[test]
 fn the_whole_scene_is_read() {
-    assert_eq!(read_bytes(whole()), (true, 11));
+    assert_eq!(read_bytes(whole()), (true, 14));
     // Sealing a file that is right changes nothing; one with a wrong checksum is read again.
     let mut sealed = whole().to_vec();
     seal(&mut sealed);

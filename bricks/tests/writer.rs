@@ -100,11 +100,11 @@ fn what_could_not_be_read_is_not_written() {
     };
     refused(
         &|_, writer| assert!(writer.write(&[1; 16]).is_ok()),
-        "no brick or texture with the payload written at byte",
+        "no brick, texture or tile with the payload written at byte",
     );
     refused(&|scene, _| scene.resident.bricks[1].geometry.checksum ^= 1, "a span that the writer returned");
     refused(&|scene, _| scene.resident.bricks[1].geometry.offset += 4096, "a span that the writer returned");
-    refused(&|scene, _| scene.resident.textures[0].texels = Default::default(), "texture 0");
+    refused(&|scene, _| scene.resident.textures[0].tail = Default::default(), "texture 0");
     refused(&|scene, _| scene.resident.leaves[0].brick = 9, "record 0 of section leaves");
     refused(&|scene, _| scene.resident.manifest.min[0] = f64::NEG_INFINITY, "section manifest");
     common::scene().write(&path);

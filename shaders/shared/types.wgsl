@@ -210,19 +210,34 @@ struct Texture {
     height: u32,
     levels: u32,
     wrap: u32,            // WRAP_* of s in the low half, of t in the high half
-    page: u32,            // of the texels
-    offset: u32,          // words within the page
+    encoding: u32,        // TEXTURE_RGBA8 or TEXTURE_BC7
+    flags: u32,           // TEXTURE_SRGB
+    first_tile: u32,      // of level 0; the tiles of a level follow each other row by row, and so do levels
+    tail_level: u32,      // the first of the levels that are resident throughout
+    tail_page: u32,       // where these lie
+    tail_offset: u32,     // words within the page
     padding0: u32,
     padding1: u32,
 }
 
+struct TileSlot {         // where a tile of a texture lies in the cache
+    page: u32,            // NONE: nowhere
+    offset: u32,          // in 16-byte units
+}
+
+struct TileDemand {       // what texture lookups ask of a tile
+    rays: atomic<u32>,    // hits that wait for some tile and need this one
+    first: atomic<u32>,   // the least number of a ray among them
+    used: atomic<u32>,    // 1: a lookup has read it
+}
+
 struct GBuffer {          // what shading reads of a primary hit
     albedo: vec3<f32>,    // linear base colour
-    state: u32,           // 0: attributes not read yet
+    state: u32,           // 0: attributes not read yet; else GBUFFER_*
     normal: vec3<f32>,    // interpolated unit normal, world space, on the side of the geometric one
     material: u32,
     emission: vec3<f32>,
-    padding: u32,
+    footprint: f32,       // what the pixel covers of the textures' unit square, an area; 0 without textures
     weights: vec2<f32>,   // barycentric weights of source vertices 1 and 2
     uv: vec2<f32>,
 }
@@ -253,6 +268,11 @@ const BRICK_WIDE: u32 = 1u;
 const BRICK_INDEX32: u32 = 2u;
 const BRICK_OPACITY: u32 = 4u;
 const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex without one
+const GBUFFER_READ: u32 = 1u;      // all is known
+const GBUFFER_WAITS: u32 = 2u;     // but for textures: their lookup comes later
+const TEXTURE_BC7: u32 = 1u;       // encoding: blocks; else RGBA8
+const TEXTURE_SRGB: u32 = 1u;      // flags: red, green and blue are sRGB, else linear
+const TILE_TEXELS: u32 = 128u;     // side of a tile
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass

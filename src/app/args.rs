@@ -13,6 +13,7 @@ use super::selftest::args::SelftestArgs;
 use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
 use crate::scene::camera::check_fov_y_degrees;
 use crate::stream::Policy;
+use brickwalk_convert::build::TextureEncoding;
 use brickwalk_scenes::Stiff;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -113,9 +114,30 @@ pub struct ConvertArgs {
     /// How to cut and round.
     #[command(flatten)]
     pub build: BuildArgs,
+    /// How textures are stored: bc7 (blocks, a byte a texel, the loss measured in benches/results/textures.md) or raw (RGBA8, four bytes)
+    #[arg(long, value_name = "ENCODING", value_enum, default_value = "bc7")]
+    pub textures: Textures,
     /// What becomes of triangles and meshes.
     #[command(flatten)]
     pub mesh: MeshArgs,
+}
+
+/// How textures are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Textures {
+    /// Blocks.
+    Bc7,
+    /// Texels.
+    Raw,
+}
+
+impl From<Textures> for TextureEncoding {
+    fn from(textures: Textures) -> Self {
+        match textures {
+            Textures::Bc7 => Self::Bc7,
+            Textures::Raw => Self::Raw,
+        }
+    }
 }
 
 /// Options of what becomes of the triangles and meshes of inputs.
@@ -254,7 +276,7 @@ pub struct RepairArgs {
 /// Options of what streams bricks to a device.
 #[derive(Clone, Debug, Args)]
 pub struct StreamArgs {
-    /// Device memory for bricks: a size, or a share P% of all bricks; it must hold the two largest
+    /// Device memory for bricks and tiles of textures: a size, or a share P% of all of them; it must hold the two largest bricks
     #[arg(long, value_name = "SIZE|P%", default_value = "25%")]
     pub cache: CacheSize,
     /// Host memory for verified bricks; 0 keeps none

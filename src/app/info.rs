@@ -2,10 +2,13 @@
 
 use super::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
+use super::session::scene_bytes;
 use super::sizes::{human_bytes, human_count};
+use crate::stream::Residency;
 use anyhow::{Context, Result};
-use bricks::{AttributeLayout, BRICK_WIDE, Manifest, Payload, SceneFile};
+use bricks::{AttributeLayout, BRICK_WIDE, Manifest, Payload, SceneFile, Texture};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// Raised when a field of the JSON changes its meaning.
@@ -80,9 +83,14 @@ struct Info<'a> {
     loaded_attribute_bytes: u64,
     /// Occupancy maps that are read on demand.
     proxy_bytes: u64,
+    /// Tiles and tails of textures.
     texture_bytes: u64,
-    /// Geometry and attributes of the two largest bricks, as loaded: what a cache must hold at least.
+    /// Of these, tails: the coarse levels, which stay resident.
+    texture_tail_bytes: u64,
+    /// Geometry and attributes of the two largest bricks, as loaded.
     two_largest_bricks_bytes: u64,
+    /// What a cache must hold at least: the two largest bricks, or the tiles of a texture lookup.
+    least_cache_bytes: u64,
     /// Step of the world's lattice, world units.
     lattice_step: f64,
     /// World units of one unit of length on the device.
@@ -92,6 +100,10 @@ struct Info<'a> {
     top_level_nodes_wide: usize,
     materials: usize,
     textures: usize,
+    /// Tiles of their levels that are streamed.
+    texture_tiles: usize,
+    /// How textures are stored, each encoding once: bc7, raw.
+    texture_encodings: Vec<&'static str>,
     has_textures: bool,
     has_alpha_mask: bool,
     has_alpha_blend: bool,
@@ -118,8 +130,6 @@ impl<'a> Info<'a> {
         let bytes = |wanted: fn(&Payload) -> bool| -> u64 {
             r.payloads().filter(|(payload, _)| wanted(payload)).map(|(_, span)| span.bytes).sum()
         };
-        let mut largest: Vec<u64> = r.bricks.iter().map(|b| b.geometry.bytes + AttributeLayout::of(b).bytes).collect();
-        largest.sort_unstable_by(|a, b| b.cmp(a));
         // The world object always exists.
         let world = r.objects.first();
         let sections = Sections::of(scene);
@@ -149,8 +159,10 @@ impl<'a> Info<'a> {
             attribute_bytes: bytes(|p| matches!(p, Payload::Attributes(_))),
             loaded_attribute_bytes: r.bricks.iter().map(|b| AttributeLayout::of(b).bytes).sum(),
             proxy_bytes: bytes(|p| matches!(p, Payload::Proxies(_))),
-            texture_bytes: bytes(|p| matches!(p, Payload::Texture(_) | Payload::Opacity(_))),
-            two_largest_bricks_bytes: largest.iter().take(2).sum(),
+            texture_bytes: bytes(|p| matches!(p, Payload::Texture(_) | Payload::Tile(_) | Payload::Opacity(_))),
+            texture_tail_bytes: bytes(|p| matches!(p, Payload::Texture(_))),
+            two_largest_bricks_bytes: scene_bytes(scene).sizes().two_largest_bricks(),
+            least_cache_bytes: Residency::least_budget(scene_bytes(scene).sizes()),
             lattice_step: world.map_or(0.0, |o| 2f64.powi(o.step_log2)),
             device_unit: world.map_or(0.0, |o| 2f64.powi(o.unit_log2)),
             top_level_leaves: r.leaves.len(),
@@ -158,6 +170,14 @@ impl<'a> Info<'a> {
             top_level_nodes_wide: r.top8.len(),
             materials: r.materials.len(),
             textures: r.textures.len(),
+            texture_tiles: r.tiles.len(),
+            texture_encodings: r
+                .textures
+                .iter()
+                .map(Texture::encoding_name)
+                .collect::<BTreeSet<_>>()
+                .into_iter()
+                .collect(),
             has_textures: m.has_textures,
             has_alpha_mask: m.has_alpha_mask,
             has_alpha_blend: m.has_alpha_blend,
@@ -239,7 +259,12 @@ impl<'a> Info<'a> {
             row("sections", line);
         }
         row("a triangle", self.per_triangle.human());
-        row("least cache", format!("{} (the two largest bricks)", human_bytes(self.two_largest_bricks_bytes)));
+        let what = if self.least_cache_bytes == self.two_largest_bricks_bytes {
+            "two largest bricks"
+        } else {
+            "tiles of a lookup"
+        };
+        row("least cache", format!("{} (the {what})", human_bytes(self.least_cache_bytes)));
         row("lattice", format!("step {:e}, device unit {}, world units", self.lattice_step, self.device_unit));
         row(
             "top level",
@@ -251,7 +276,16 @@ impl<'a> Info<'a> {
         for (name, value) in self.trees.human() {
             row(name, value);
         }
-        row("materials", format!("{}, {} textures", self.materials, self.textures));
+        let textures = match self.textures {
+            0 => "0 textures".into(),
+            count => format!(
+                "{count} textures ({}): {} tiles, {} of coarse levels always resident",
+                self.texture_encodings.join(", "),
+                human_count(self.texture_tiles as u64),
+                human_bytes(self.texture_tail_bytes)
+            ),
+        };
+        row("materials", format!("{}, {textures}", self.materials));
         for LeftOut { what, why } in &self.left_out {
             row("left out", format!("{what}: {why}"));
         }

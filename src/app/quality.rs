@@ -55,8 +55,7 @@ impl Sections {
             sizes.attributes += brick.attributes.bytes;
             sizes.proxies += brick.proxies.bytes;
         }
-        sizes.textures =
-            resident.textures.iter().map(|texture| texture.texels.bytes).sum::<u64>() + resident.opacity_bytes();
+        sizes.textures = resident.texture_bytes();
         let bytes = |section: Section| resident.count(section) as u64 * u64::from(section.record_bytes());
         sizes.resident = Section::ALL.into_iter().map(|section| (section.name(), bytes(section))).collect();
         let records: u64 = sizes.resident.values().sum();

@@ -12,7 +12,7 @@ use super::{interrupt, verify};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::layout::PAGE_BYTES;
 use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};
-use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
+use brickwalk_convert::build::{BuildError, BuildSettings, TextureEncoding, build_source};
 use brickwalk_convert::import::{ImportSettings, import};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{InMemory, Source};
@@ -88,7 +88,7 @@ fn scratch_folder(asked: Option<&Path>, target: &Path) -> Result<TempDir> {
 
 /// The payloads with problems that writing them again solves: geometry, attributes, proxies, textures.
 fn damaged_payloads(report: &VerifyReport) -> Result<BTreeSet<Payload>> {
-    let payload = |problem: &Error| match (problem, problem.part()) {
+    let payload = |problem: &Error| match (problem.cause(), problem.part()) {
         (
             Error::Corrupt { .. } | Error::Padding { .. } | Error::Io { .. },
             Some(Part::Payload(payload) | Part::PaddingAfterPayload(payload)),
@@ -108,6 +108,10 @@ fn rebuild(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Prog
         brick_triangles: manifest.brick_triangles,
         lattice_log2: args.work.lattice.or_else(of_case),
         proxies: manifest.has_proxies,
+        textures: match scene.resident().textures.first() {
+            Some(texture) if texture.encoding == bricks::TEXTURE_RGBA8 => TextureEncoding::Raw,
+            _ => TextureEncoding::Bc7,
+        },
         // Beside the output, which is in a folder of its own.
         scratch: None,
         ..mesh_settings(&args.mesh, work_settings(&args.work))

@@ -13,7 +13,7 @@ use std::io::BufReader;
 /// Raised when a field changes its meaning.
 const FORMAT: u32 = 1;
 
-/// Shares of all bricks, percent, that are replayed without `--cache`.
+/// Shares of all bricks and tiles, percent, that are replayed without `--cache`.
 const LADDER: [f64; 5] = [5.0, 10.0, 20.0, 50.0, 100.0];
 
 /// The shares with a plot.
@@ -56,9 +56,9 @@ pub fn run(args: &ReplayArgs) -> Result<()> {
     super::print(&format!("{name}: {}", as_text(&trace, &rungs, &skipped)))
 }
 
-/// Bytes of all bricks; saturates.
+/// Bytes of all bricks and tiles; saturates.
 fn all_bytes(trace: &Trace) -> u64 {
-    trace.sizes.iter().fold(0, |sum: u64, size| sum.saturating_add(size.0).saturating_add(size.1))
+    trace.sizes.sum()
 }
 
 /// Replays in the recorded cache and in those asked for, each size once, ascending; and the sizes too small for the scene.
@@ -85,7 +85,7 @@ fn climb(trace: &Trace, asked: &[CacheSize]) -> Result<(Vec<Rung>, Vec<u64>), Tr
     Ok((rungs, skipped))
 }
 
-/// Share of all bricks in percent.
+/// Share of everything in percent.
 fn percent(budget: u64, all: u64) -> f64 {
     100.0 * budget as f64 / all.max(1) as f64
 }
@@ -116,7 +116,8 @@ fn as_json(trace: &Trace, rungs: &[Rung], skipped: &[u64]) -> Value {
             "cache_bytes": trace.budget_bytes,
             "page_bytes": trace.page_bytes,
         },
-        "bricks": trace.sizes.len(),
+        "bricks": trace.sizes.bricks.len(),
+        "tiles": trace.sizes.tiles.len(),
         "brick_bytes": all,
         "least_cache_bytes": Residency::least_budget(&trace.sizes),
         "passes": trace.passes.len(),
@@ -169,7 +170,11 @@ fn as_text(trace: &Trace, rungs: &[Rung], skipped: &[u64]) -> String {
     if !skipped.is_empty() {
         let least = Residency::least_budget(&trace.sizes);
         let sizes: Vec<String> = skipped.iter().map(|&bytes| cache(bytes)).collect();
-        let _ = writeln!(out, "\nSkipped, below the two largest bricks ({least} bytes): {}", sizes.join(", "));
+        let _ = writeln!(
+            out,
+            "\nSkipped, below the two largest bricks, or the tiles of a texture lookup ({least} bytes): {}",
+            sizes.join(", ")
+        );
     }
     out
 }

@@ -5,8 +5,8 @@ use super::device::Device;
 use super::sizes::{CacheSize, option_bytes};
 use crate::kernel::{Extent, FrameExecutor, Setup};
 use crate::render::Schedule;
-use crate::schedule::cache::{BrickBytes, Cache};
-use crate::stream::{HostCache, Policy, Residency, ResidencyError, Trace};
+use crate::schedule::cache::{BrickBytes, Cache, SceneBytes};
+use crate::stream::{HostCache, Policy, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
 use std::io::Write;
@@ -57,10 +57,16 @@ pub fn brick_bytes(scene: &SceneFile) -> Vec<BrickBytes> {
     scene.resident().bricks.iter().map(record).collect()
 }
 
-/// Bytes of the cache that `--cache` asks for, of a scene with bricks of `sizes`. Pages end before what does not fit into
-/// them: a cache that is to hold everything gets that room, too, and no more.
-pub fn cache_budget(cache: CacheSize, sizes: &[(u64, u64)], page_bytes: u64) -> u64 {
-    let all = sizes.iter().fold(0u64, |sum, size| sum.saturating_add(size.0).saturating_add(size.1));
+/// Bytes of everything that is streamed of a scene, as it is loaded.
+pub fn scene_bytes(scene: &SceneFile) -> SceneBytes {
+    let tiles = scene.resident().tiles.iter().map(|tile| tile.bytes).collect();
+    SceneBytes { bricks: brick_bytes(scene), tiles }
+}
+
+/// Bytes of the cache that `--cache` asks for, of a scene with bricks and tiles of `sizes`. Pages end before what does not fit
+/// into them: a cache that is to hold everything gets that room, too, and no more.
+pub fn cache_budget(cache: CacheSize, sizes: &Sizes, page_bytes: u64) -> u64 {
+    let all = sizes.sum();
     let for_all = Residency::budget_for_all(sizes, page_bytes);
     let asked = cache.bytes(all);
     if asked >= all { asked.max(for_all).min(for_all.max(16)) } else { asked }
@@ -115,8 +121,8 @@ impl Session {
         make: impl FnOnce(Needs) -> Result<Box<dyn FrameExecutor>>,
     ) -> Result<Self> {
         let name = path.display();
-        let bytes = brick_bytes(&scene);
-        let sizes: Vec<(u64, u64)> = bytes.iter().map(|b| (b.geometry, b.attributes)).collect();
+        let bytes = scene_bytes(&scene);
+        let sizes = bytes.sizes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
         let budget = cache_budget(args.cache, &sizes, page_bytes);
         let schedule = match args.schedule {
@@ -135,9 +141,9 @@ impl Session {
         };
         let policy: Policy = args.evict.parse().map_err(|error: String| anyhow!(error).context("--evict"))?;
         let residency = Residency::new(&sizes, budget, page_bytes, policy).map_err(|error| match error {
-            ResidencyError::CacheTooSmall { needed, given } => anyhow!(
-                "{name}: a cache of {given} bytes is too small: the two largest bricks need {needed} bytes; give \
-                 --cache {} or more, or convert the scene with fewer --brick-triangles",
+            ResidencyError::CacheTooSmall { what, needed, given } => anyhow!(
+                "{name}: a cache of {given} bytes is too small: {what} need {needed} bytes; give --cache {} or more, or \
+                 convert the scene with fewer --brick-triangles",
                 option_bytes(needed)
             ),
             other => anyhow!(other).context(format!("{name}: --cache")),

@@ -101,22 +101,22 @@ pub fn human_count(count: u64) -> String {
     out
 }
 
-/// The device memory for bricks: bytes, or a share of the sum over all bricks of the scene.
+/// The device memory for bricks and tiles of textures: bytes, or a share of the sum over all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CacheSize {
     /// Bytes, at least 1.
     Bytes(u64),
-    /// Percent of the bytes of all bricks, above 0, at most 100.
+    /// Percent of the bytes of all bricks and tiles, above 0, at most 100.
     Percent(f64),
 }
 
 impl CacheSize {
-    /// Bytes of the cache for a scene whose bricks take `all_bricks` bytes together; a share is rounded up.
-    pub fn bytes(self, all_bricks: u64) -> u64 {
+    /// Bytes of the cache for a scene whose bricks and tiles take `all` bytes together; a share is rounded up.
+    pub fn bytes(self, all: u64) -> u64 {
         match self {
             Self::Bytes(bytes) => bytes,
-            Self::Percent(percent) if percent >= 100.0 => all_bricks,
-            Self::Percent(percent) => (all_bricks as f64 * (percent / 100.0)).ceil() as u64,
+            Self::Percent(percent) if percent >= 100.0 => all,
+            Self::Percent(percent) => (all as f64 * (percent / 100.0)).ceil() as u64,
         }
     }
 }

@@ -24,7 +24,9 @@ pub fn of_walk(
     let streaming = streaming(renderer);
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
-    let brick_bytes: u64 = renderer.cache.bytes.iter().map(|b| b.geometry + b.attributes).sum();
+    let (streamed_bytes, tile_bytes) =
+        (renderer.cache.bytes.sizes().sum(), renderer.cache.bytes.tiles.iter().sum::<u64>());
+    let brick_bytes = streamed_bytes - tile_bytes;
     json!({
         "format": FORMAT,
         "version": env!("CARGO_PKG_VERSION"),
@@ -36,6 +38,7 @@ pub fn of_walk(
             "resident_bytes": renderer.scene.resident_bytes(),
             "bricks": resident.bricks.len(),
             "brick_bytes": brick_bytes,
+            "tile_bytes": tile_bytes,
             "leaves": resident.leaves.len(),
             "triangles": manifest.triangles_instanced,
         },
@@ -62,7 +65,7 @@ pub fn of_walk(
             "tile": args.stream.tile,
             "evict": renderer.cache.residency.policy().name(),
             "cache_bytes": renderer.cache.residency.budget_bytes(),
-            "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / brick_bytes.max(1) as f64,
+            "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
             "host_cache_bytes": args.stream.host_cache,
             "prefetch": args.stream.prefetch,
             "secondary": "exact",
@@ -151,8 +154,8 @@ pub fn left_out(renderer: &Renderer) -> Vec<Value> {
     let manifest = &renderer.scene.resident().manifest;
     let mut out = Vec::new();
     let mut add = |what: &str, why: &str| out.push(json!({ "what": what, "why": why }));
-    if renderer.cache.residency.budget_bytes() >= renderer.cache.bytes.iter().map(|b| b.geometry + b.attributes).sum() {
-        add("queries for missing bricks", "the cache holds every brick");
+    if renderer.cache.residency.budget_bytes() >= renderer.cache.bytes.sizes().sum() {
+        add("queries for missing bricks", "the cache holds every brick and tile");
     }
     if !manifest.has_textures {
         add("texture lookups", "no material has a texture");

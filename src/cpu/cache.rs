@@ -40,9 +40,9 @@ struct Held {
 }
 
 impl BrickCache {
-    /// Nothing of `bricks` bricks.
-    pub fn new(bricks: usize) -> Self {
-        Self { held: (0..2 * bricks).map(|_| None).collect(), places: BTreeMap::new() }
+    /// Nothing of what `rows` rows by [`Item::index`] stand for.
+    pub fn new(rows: usize) -> Self {
+        Self { held: (0..rows).map(|_| None).collect(), places: BTreeMap::new() }
     }
 
     /// Has the workers bring payloads. What lay at their places is given up first, so that never more is held than the budget
@@ -119,6 +119,20 @@ impl BrickCache {
         };
         resident.bricks.iter().enumerate().map(view).collect()
     }
+
+    /// The words of every tile; of tiles that are not resident, none.
+    ///
+    /// # Errors
+    /// A tile that `bricks` says is resident and was never loaded.
+    pub fn tiles(&self, bricks: &BrickStates) -> Result<Vec<&[u32]>, ExecutorError> {
+        let words = |(tile, slot): (u32, &Option<Slot>)| match (&self.held[Item::tile(tile).index()], slot) {
+            // What was evicted may still be held; it is not to be read.
+            (Some(held), Some(_)) => Ok(bytemuck::cast_slice(&held.bytes)),
+            (None, Some(_)) => Err(missing(Item::tile(tile))),
+            (_, None) => Ok(&[][..]),
+        };
+        (0u32..).zip(bricks.tiles()).map(words).collect()
+    }
 }
 
 fn missing(item: Item) -> ExecutorError {
@@ -129,7 +143,7 @@ fn missing(item: Item) -> ExecutorError {
 mod tests {
     use super::*;
     use crate::gpu::probe;
-    use crate::stream::HostCache;
+    use crate::stream::{HostCache, PayloadSource};
 
     fn at(offset: u32) -> Slot {
         Slot { page: 0, offset }
@@ -139,7 +153,7 @@ mod tests {
     fn what_is_overwritten_is_given_up_and_nothing_else() {
         let scene = Arc::new(probe::scene().unwrap());
         let workers = Workers::new(scene.clone(), HostCache::new(0), 1, 0).unwrap();
-        let mut cache = BrickCache::new(scene.resident().bricks.len());
+        let mut cache = BrickCache::new(scene.sizes().rows());
         let mut load = |brick: u32, slot: Slot| {
             cache.load(&scene, &workers, &[Load { item: Item::geometry(brick), slot }]).unwrap();
             let held = |brick: u32| cache.held[Item::geometry(brick).index()].is_some();

@@ -13,7 +13,8 @@ use super::query::query;
 use super::query_all::{count_pairs, query_all};
 use super::query_pairs::query_pairs;
 use super::rays::{RaySet, Work};
-use super::resolve::{AttributeView, Texels, resolve};
+use super::resolve::{AttributeView, resolve};
+use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
 use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
 use super::tile_bounds::tile_bounds;
@@ -22,10 +23,10 @@ use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
 use crate::kernel::{
-    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report,
+    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::stream::{WorkerPool, Workers};
+use crate::stream::{PayloadSource, WorkerPool, Workers};
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -76,7 +77,7 @@ impl CpuExecutor {
         let sets = [RaySet::new(rays), RaySet::new(rays), RaySet::new(0)];
         let tiles = TileLists::new(extent.tiles() as usize);
         Ok(Self {
-            cache: BrickCache::new(file.resident().bricks.len()),
+            cache: BrickCache::new(file.sizes().rows()),
             scene: Scene::new(file.resident()),
             texels: Texels::new(&file)?,
             opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
@@ -116,6 +117,12 @@ impl CpuExecutor {
         }
     }
 
+    /// The G-buffer of the hits of a set, for tests.
+    #[cfg(test)]
+    pub(super) fn gbuffer_of(&mut self, set: usize) -> &mut Vec<layout::GBuffer> {
+        &mut self.buffers.pixels.gbuffers[set]
+    }
+
     /// The tiles and their lists, for tests.
     #[cfg(test)]
     pub(super) fn tiles(&self) -> &TileLists {
@@ -130,7 +137,7 @@ fn run_kernel(
     bound: &Bound,
     buffers: &mut Buffers,
     attributes: &[AttributeView],
-    texels: &Texels,
+    (sampling, tile_demand): (Sampling, &[TileDemand]),
     binary: Option<&BinaryTrees>,
 ) -> Result<(), ExecutorError> {
     let Buffers { sets, pixels, tiles } = buffers;
@@ -151,7 +158,10 @@ fn run_kernel(
         "start_hits" => start_hits(own),
         "clear_gbuffer" => clear_gbuffer(bound, pixels, shaded),
         "hit_demand" => hit_demand(bound, own),
-        "resolve" => resolve(bound, seen, &mut pixels.gbuffers[shaded], texels, attributes),
+        "resolve" => {
+            resolve(bound, seen, &mut pixels.gbuffers[shaded], &sampling.texels.materials, attributes);
+        }
+        "sample" => sample(bound, &mut pixels.gbuffers[shaded], sampling, tile_demand),
         "shade" => shade(bound, pixels, shaded, seen),
         "add_light" => add_light(bound, pixels, shaded, own),
         "add_occlusion" => add_occlusion(bound, pixels, shaded, own),
@@ -221,12 +231,16 @@ impl Executor for CpuExecutor {
             true => self.cache.attributes(resident, bricks)?,
             false => Vec::new(),
         };
+        let samples = steps.contains(&Step::Sample) && !self.texels.textures.is_empty();
+        let tiles = if samples { self.cache.tiles(bricks)? } else { Vec::new() };
+        let tile_demand: Vec<TileDemand> = tiles.iter().map(|_| TileDemand::default()).collect();
+        let sampling = Sampling { texels: &self.texels, tiles: &tiles };
         let slots = report::slots(bricks);
         let demand: Vec<Demand> = (0..bricks.len()).map(|_| Demand::default()).collect();
         let counters = Counters::default();
         let mut ms_phases = [0.0; 3];
         let everything = bricks.all_geometry_resident();
-        for &step in steps {
+        for &step in steps.iter().filter(|step| samples || **step != Step::Sample) {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
@@ -244,7 +258,7 @@ impl Executor for CpuExecutor {
                     isa: self.isa,
                 };
                 let binary = self.binary.as_ref();
-                run_kernel(&dispatch, pass, &bound, &mut self.buffers, &attributes, &self.texels, binary)?;
+                run_kernel(&dispatch, pass, &bound, &mut self.buffers, &attributes, (sampling, &tile_demand), binary)?;
                 if let Some(phase) = dispatch.phase {
                     ms_phases[phase] += start.elapsed().as_secs_f64() * 1e3;
                 }
@@ -253,6 +267,7 @@ impl Executor for CpuExecutor {
         let demand: Vec<layout::Demand> = demand.iter().map(Demand::get).collect();
         let mut report = Report { ms_phases, ..report::of_counters(&counters.get(), &demand)? };
         report::take_used(&mut report, steps, bricks);
+        report.tiles = textures::demand(&tile_demand.iter().map(TileDemand::get).collect::<Vec<_>>());
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) {
             report.pair_rays = std::mem::take(&mut self.buffers.tiles.pair_rays);
         }

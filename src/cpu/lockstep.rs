@@ -2,7 +2,8 @@
 //!
 //! Rays that start at hits are within [`Lockstep::bound`] of each other, because WGSL leaves sine, cosine, division and
 //! inverse square root some ulps; the device's are then given to both, so that everything that follows can be compared exactly:
-//! hits, surfaces, lists, what is asked and counted, bit for bit. What is read and added for shading is compared within the bound.
+//! hits, surfaces, lists, what is asked and counted, bit for bit. What is read and added for shading is compared within the bound;
+//! before textures are looked up both are given the device's, so that which tiles are asked for and read can be compared exactly.
 
 use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
@@ -36,6 +37,8 @@ pub enum Defect {
     Seed,
     /// The light is brighter by 2^-8.
     Light,
+    /// Textures are looked up a quarter of their width aside.
+    Lookups,
 }
 
 /// Both executors.
@@ -86,6 +89,18 @@ impl Findings {
         }
     }
 
+    fn gbuffers(&mut self, context: &str, bound: f32, gpu: &[GBuffer], cpu: &[GBuffer]) {
+        let numbers = |g: &GBuffer| [&g.albedo[..], &g.normal, &g.emission, &g.weights].concat();
+        let whole = |g: &GBuffer| [g.state, g.material];
+        // Which tiles are read depends on these.
+        let exact = |g: &GBuffer| [g.footprint.to_bits(), g.uv[0].to_bits(), g.uv[1].to_bits()];
+        for (g, c) in gpu.iter().zip(cpu) {
+            self.numbers("attributes", context, bound, &numbers(g), &numbers(c));
+            self.words("materials", context, &[whole(g)], &[whole(c)]);
+            self.words("footprints", context, &[exact(g)], &[exact(c)]);
+        }
+    }
+
     fn report(&mut self, context: &str, gpu: &Report, cpu: &Report) {
         // The kernel of binary trees, a baseline, does not count.
         let counts = !context.contains("IntersectBinary");
@@ -116,6 +131,10 @@ impl Findings {
             r.demand.iter().map(|d| [d.brick, d.rays, d.nearest.to_bits(), d.next]).collect()
         };
         self.words("demands", context, &demand(gpu), &demand(cpu));
+        let tiles = |r: &Report| -> Vec<[u32; 4]> {
+            r.tiles.iter().map(|t| [t.tile, t.rays, t.first, t.is_used.into()]).collect()
+        };
+        self.words("tiles", context, &tiles(gpu), &tiles(cpu));
         self.words("used bricks", context, &gpu.used, &cpu.used);
         self.words("rays of pairs", context, &gpu.pair_rays, &cpu.pair_rays);
     }
@@ -173,6 +192,18 @@ impl Lockstep {
         Ok(())
     }
 
+    /// Compares what has been read of the hits of the set before that of `pass`, and gives the processor the device's.
+    fn align(&mut self, context: &str, pass: Pass) -> Result<(), ExecutorError> {
+        let set = pass.set().saturating_sub(1);
+        let gbuffer = self.gpu.read_gbuffer_of(set)?;
+        self.findings.lock().expect("findings").gbuffers(context, self.bound, &gbuffer, self.cpu.gbuffer_of(set));
+        *self.cpu.gbuffer_of(set) = gbuffer;
+        if self.defect == Some(Defect::Lookups) {
+            self.cpu.gbuffer_of(set).iter_mut().for_each(|g| g.uv[0] += 0.25);
+        }
+        Ok(())
+    }
+
     fn compare(&mut self, context: &str, pass: Pass, steps: &[Step]) -> Result<(), ExecutorError> {
         let hits = (self.gpu.read_hits(pass)?, self.cpu.read_hits(pass)?);
         let surfaces = (self.gpu.read_surfaces(pass)?, self.cpu.read_surfaces(pass)?);
@@ -212,21 +243,38 @@ impl Lockstep {
                 }
             }
         }
-        if steps.iter().any(|step| matches!(step, Step::Resolve | Step::Shade(_) | Step::AddLight | Step::AddOcclusion))
-        {
+        let shades = |step: &Step| {
+            matches!(step, Step::Resolve | Step::Sample | Step::Shade(_) | Step::AddLight | Step::AddOcclusion)
+        };
+        if steps.iter().any(shades) {
             let radiance = (self.gpu.read_radiance()?, self.cpu.read_radiance()?);
             let brighter = if self.defect == Some(Defect::Light) { 1.0 + 1.0 / 256.0 } else { 1.0 };
             let own: Vec<f32> = radiance.1.iter().flatten().map(|x| x * brighter).collect();
             findings.numbers("radiance", context, self.bound, radiance.0.as_flattened(), &own);
             let gbuffer = (self.gpu.read_gbuffer()?, self.cpu.read_gbuffer()?);
-            let numbers = |g: &GBuffer| [&g.albedo[..], &g.normal, &g.emission, &g.weights, &g.uv].concat();
-            let whole = |g: &GBuffer| [g.state, g.material];
-            for (g, c) in gbuffer.0.iter().zip(&gbuffer.1) {
-                findings.numbers("attributes", context, self.bound, &numbers(g), &numbers(c));
-                findings.words("materials", context, &[whole(g)], &[whole(c)]);
-            }
+            findings.gbuffers(context, self.bound, &gbuffer.0, &gbuffer.1);
+            let set = pass.set().saturating_sub(1);
+            let gbuffer = (self.gpu.read_gbuffer_of(set)?, self.cpu.gbuffer_of(set));
+            findings.gbuffers(context, self.bound, &gbuffer.0, gbuffer.1);
         }
         Ok(())
+    }
+}
+
+impl Lockstep {
+    /// Runs `steps` on both and compares.
+    fn both(
+        &mut self,
+        context: &str,
+        pass: Pass,
+        steps: &[Step],
+        bricks: &BrickStates,
+    ) -> Result<Report, ExecutorError> {
+        let gpu = self.gpu.run(pass, steps, bricks)?;
+        let cpu = self.cpu.run(pass, steps, bricks)?;
+        self.findings.lock().expect("findings").report(context, &gpu, &cpu);
+        self.compare(context, pass, steps)?;
+        Ok(gpu)
     }
 }
 
@@ -267,11 +315,18 @@ impl Executor for Lockstep {
             }
             all => all,
         };
-        let gpu = self.gpu.run(pass, rest, bricks)?;
-        let cpu = self.cpu.run(pass, rest, bricks)?;
-        self.findings.lock().expect("findings").report(&context, &gpu, &cpu);
-        self.compare(&context, pass, rest)?;
-        Ok(gpu)
+        let Some((before, [Step::Sample])) = rest.split_last_chunk::<1>() else {
+            return self.both(&context, pass, rest, bricks);
+        };
+        let mut report = match before {
+            [] => Report { round_trips: 0, ..Report::default() },
+            before => self.both(&context, pass, before, bricks)?,
+        };
+        self.align(&context, pass)?;
+        let Report { round_trips, tiles, .. } = self.both(&context, pass, &[Step::Sample], bricks)?;
+        report.tiles = tiles;
+        report.round_trips = report.round_trips.max(round_trips);
+        Ok(report)
     }
 }
 

@@ -15,7 +15,7 @@ use crate::render::{
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
-use crate::schedule::cache::{BrickBytes, Cache};
+use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::fronts::Fronts;
 use crate::schedule::{Optimisation, Tracing};
 use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
@@ -43,8 +43,8 @@ fn device() -> Option<(Gpu, Arc<Kernels>)> {
 }
 
 /// Triangles in all directions with normals, colours and textures of every way to wrap, most of which let rays pass; turned and
-/// mirrored copies of them.
-fn textured() -> Arc<SceneFile> {
+/// mirrored copies of them. With `tiled` textures of many tiles, of which each triangle shows a small part.
+fn textured(tiled: bool) -> Arc<SceneFile> {
     let mut state = 7u64;
     let mut random = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -62,7 +62,9 @@ fn textured() -> Arc<SceneFile> {
             ]);
             part.positions.push(around.map(|x: f64| x + near * (random() - 0.5)));
             normals.push([0; 3].map(|_| random() as f32 - 0.5));
-            uvs.push([0; 2].map(|_| 5.0 * random() as f32 - 2.0));
+            let anywhere = [0; 2].map(|_| 5.0 * random() as f32 - 2.0);
+            let beside = uvs.last().filter(|_| tiled && near > 0.0);
+            uvs.push(beside.map_or(anywhere, |uv: &[f32; 2]| [0, 1].map(|k| uv[k] + 0.001 * anywhere[k])));
             colors.push([0; 4].map(|_| random() as f32));
         }
         part.indices = (0..3 * count).collect();
@@ -71,10 +73,12 @@ fn textured() -> Arc<SceneFile> {
     };
     let texture = |i: u32| SourceTexture {
         name: format!("texture {i}"),
-        width: 8 << i,
-        height: 16 >> i,
+        width: if tiled { [700, 257, 500][i as usize] } else { 8 << i },
+        height: if tiled { [300, 640, 500][i as usize] } else { 16 >> i },
         wrap: [bricks::WRAP_REPEAT, bricks::WRAP_CLAMP, bricks::WRAP_MIRROR][i as usize] * 0x0001_0001,
-        rgba: (0..4 * (8 << i) * (16 >> i)).map(|k: u32| (k * 37 + k / 7 * 11) as u8).collect(),
+        rgba: (0..if tiled { 4 * [210_000, 164_480, 250_000][i as usize] } else { 4 * (8 << i) * (16 >> i) })
+            .map(|k: u32| (k * 37 + k / 7 * 11) as u8)
+            .collect(),
     };
     let material = |i: u32| bricks::Material {
         base_color: [0.9, 0.8, 0.7, 1.0 - 0.1 * i as f32],
@@ -108,6 +112,7 @@ fn textured() -> Arc<SceneFile> {
     let scene = SceneFile::from_bytes("the textured scene", std::fs::read(&path).unwrap()).unwrap();
     assert!(scene.resident().manifest.has_textures && scene.resident().instances.len() == 3);
     assert_eq!(scene.resident().opacity_maps.len(), 2);
+    assert_eq!(scene.resident().tiles.len() > 50, tiled);
     Arc::new(scene)
 }
 
@@ -201,7 +206,6 @@ fn render(
     if variant.schedule == Schedule::PlainBinary {
         executor.make_binary().unwrap();
     }
-    let bytes = |&(geometry, attributes): &(u64, u64)| BrickBytes { bvh: 0, geometry, attributes };
     let mut tracing = Tracing { measure_needed: true, ..Tracing::default() };
     variant.without.iter().for_each(|&which| tracing.optimisations.set(which, false));
     variant.with.iter().for_each(|&which| tracing.optimisations.set(which, true));
@@ -212,7 +216,7 @@ fn render(
     let mut renderer = Renderer {
         scene: scene.clone(),
         executor: Box::new(executor),
-        cache: Cache::new(residency, sizes.iter().map(bytes).collect(), None),
+        cache: Cache::new(residency, SceneBytes::from(&sizes), None),
         settings: RenderSettings {
             schedule: variant.schedule,
             effects: effects(),
@@ -259,7 +263,11 @@ fn twins_agree_with_their_kernels() {
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
     ];
     let findings = Arc::new(Mutex::new(Findings::default()));
-    for scene in [Arc::new(probe::scene().unwrap()), textured()] {
+    for (scene, variants) in [
+        (Arc::new(probe::scene().unwrap()), &variants[..]),
+        (textured(false), &variants),
+        (textured(true), &variants[2..9]),
+    ] {
         for (i, variant) in variants.iter().enumerate() {
             render(&device, &scene, variant, None, &findings);
             let found = findings.lock().unwrap();
@@ -278,13 +286,14 @@ fn twins_agree_with_their_kernels() {
 #[test]
 fn a_twin_that_differs_is_noticed() {
     let Some(device) = device() else { return };
-    let (opaque, textured) = (Arc::new(probe::scene().unwrap()), textured());
+    let (opaque, plain, tiled) = (Arc::new(probe::scene().unwrap()), textured(false), textured(true));
     let cases = [
-        (Defect::Rays, &textured, "hits"),
+        (Defect::Rays, &plain, "hits"),
         (Defect::Seed, &opaque, "directions"),
         // What lets rays pass by chance is drawn anew.
-        (Defect::Seed, &textured, "hits"),
-        (Defect::Light, &textured, "radiance"),
+        (Defect::Seed, &plain, "hits"),
+        (Defect::Light, &plain, "radiance"),
+        (Defect::Lookups, &tiled, "tiles"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));

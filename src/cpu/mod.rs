@@ -11,6 +11,7 @@
 //! Geometry and attributes of resident bricks are the verified bytes that a worker read, shared with the host cache: a brick
 //! is traversed where it lies. Slots only say what the budget holds.
 
+mod bc7;
 pub mod brick;
 pub mod cache;
 pub mod executor;
@@ -38,8 +39,10 @@ mod query_pairs;
 mod random;
 mod rays;
 mod resolve;
+mod sample;
 mod scene;
 mod shade;
+mod texture;
 mod tile_bounds;
 mod tile_lists;
 mod tile_walk;
@@ -53,6 +56,8 @@ mod lockstep;
 mod lockstep_tests;
 #[cfg(test)]
 mod packet_tests;
+#[cfg(test)]
+mod texture_tests;
 
 pub use executor::CpuExecutor;
 

@@ -1,14 +1,19 @@
 //! Reads the attributes of hits in bricks whose attributes are resident: twin of `shaders/resolve.wgsl`. Normal, texture coordinates,
-//! base colour.
+//! base colour without textures, and what of textures the pixel covers.
 
 use super::indices::Indices;
 use super::rays::RaySet;
 use super::scene::Bound;
 use super::vector::{Vec3, dot, each, most, normalize, xyz};
-use crate::kernel::layout::{GBuffer, NO_NORMAL, NONE, Params, STATE_ATTRIBUTES, Texture};
-use crate::schedule::ExecutorError;
-use bricks::{AttributeLayout, AttributeVertex, Brick, Payload, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT, SceneFile};
+use crate::kernel::layout::{
+    GBUFFER_READ, GBUFFER_WAITS, GBuffer, NO_NORMAL, NONE, Params, Ray, STATE_ATTRIBUTES, Surface,
+};
+use crate::math::exact::{divide, square_root};
+use bricks::{AttributeLayout, AttributeVertex, Brick, Material, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use rayon::prelude::*;
+
+/// Of the angle between a ray and a normal; below it a footprint is that of this one.
+const LEAST_COSINE: f32 = 0.05;
 
 /// The arrays of a brick's attributes where they lie.
 #[derive(Clone, Copy, Default)]
@@ -36,38 +41,7 @@ impl<'a> AttributeView<'a> {
     }
 }
 
-/// Materials and textures, resident throughout.
-pub struct Texels {
-    materials: Vec<bricks::Material>,
-    textures: Vec<(Texture, Vec<u32>)>,
-    /// Bytes of texels.
-    pub bytes: u64,
-}
-
-impl Texels {
-    /// Reads and verifies every texture.
-    ///
-    /// # Errors
-    /// A texture that cannot be read or verified.
-    pub fn new(scene: &SceneFile) -> Result<Self, ExecutorError> {
-        let resident = scene.resident();
-        let read = |(i, t): (usize, &bricks::Texture)| {
-            let mut texels = vec![0u32; t.texels.bytes as usize / 4];
-            scene
-                .copy(Payload::Texture(i as u32), bytemuck::cast_slice_mut(&mut texels))
-                .map_err(|error| ExecutorError::Device(format!("failed: {error}")))?;
-            let (width, height, levels, wrap) = (t.width, t.height, t.levels, t.wrap);
-            Ok((Texture { width, height, levels, wrap, ..Texture::default() }, texels))
-        };
-        Ok(Self {
-            materials: resident.materials.clone(),
-            textures: resident.textures.iter().enumerate().map(read).collect::<Result<_, ExecutorError>>()?,
-            bytes: resident.textures.iter().map(|t| t.texels.bytes).sum(),
-        })
-    }
-}
-
-fn unpack4x8unorm(word: u32) -> [f32; 4] {
+pub(super) fn unpack4x8unorm(word: u32) -> [f32; 4] {
     word.to_le_bytes().map(|b| f32::from(b) / 255.0)
 }
 
@@ -85,50 +59,27 @@ fn octahedral(word: u32) -> Vec3 {
     normalize(n)
 }
 
-fn wrap(x: i32, size: i32, mode: u32) -> i32 {
-    match mode {
-        bricks::WRAP_CLAMP => x.clamp(0, size - 1),
-        bricks::WRAP_MIRROR => {
-            let period = 2 * size;
-            let m = x.rem_euclid(period);
-            if m >= size { period - 1 - m } else { m }
-        }
-        _ => x.rem_euclid(size),
-    }
-}
-
-fn linear_from_srgb(c: f32) -> f32 {
-    if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-}
-
-/// Bilinear lookup in the level nearest to the footprint: `texels_squared` is the area of a pixel in texels of level 0.
-fn sample_texture((t, texels): &(Texture, Vec<u32>), uv: [f32; 2], texels_squared: f32) -> [f32; 4] {
-    let lod = 0.5 * texels_squared.clamp(1.0e-12, 1.0e12).log2();
-    let level = (lod + 0.5).floor().clamp(0.0, (t.levels - 1) as f32) as u32;
-    let size_of = |level: u32| [(t.width >> level).max(1), (t.height >> level).max(1)];
-    let offset: u32 = (0..level).map(size_of).map(|[w, h]| w * h).sum();
-    let size = size_of(level).map(|s| s as i32);
-    let modes = [t.wrap & 0xffff, t.wrap >> 16];
-    // Whole turns are taken off first so that large coordinates keep their fraction; the bound keeps integers in range.
-    let turned = |k: usize| {
-        if modes[k] == bricks::WRAP_CLAMP { uv[k] } else { uv[k] - 2.0 * (0.5 * uv[k]).floor() }
-    };
-    let p = [0, 1].map(|k| turned(k).clamp(-4.0, 4.0) * size[k] as f32 - 0.5);
-    let f = p.map(|p| p - p.floor());
-    let i = p.map(|p| p.floor() as i32);
-    let texel = |x: i32, y: i32| {
-        let (u, v) = (wrap(x, size[0], modes[0]), wrap(y, size[1], modes[1]));
-        let c = unpack4x8unorm(texels[(offset as i32 + v * size[0] + u) as usize]);
-        [linear_from_srgb(c[0]), linear_from_srgb(c[1]), linear_from_srgb(c[2]), c[3]]
-    };
-    let mix = |a: [f32; 4], b: [f32; 4], t: f32| [0, 1, 2, 3].map(|k| super::vector::mix(a[k], b[k], t));
-    let top = mix(texel(i[0], i[1]), texel(i[0] + 1, i[1]), f[0]);
-    let bottom = mix(texel(i[0], i[1] + 1), texel(i[0] + 1, i[1] + 1), f[0]);
-    mix(top, bottom, f[1])
+/// What the pixel covers of the textures' unit square, an area, by ray cones; see the kernel.
+pub(super) fn footprint_of(params: &Params, ray: &Ray, t: f32, surface: &Surface, [a, b, c]: [[f32; 2]; 3]) -> f32 {
+    let e1 = [0, 1].map(|k| b[k] - a[k]);
+    let e2 = [0, 1].map(|k| c[k] - a[k]);
+    let uv_area = (e1[0] * e2[1] - e1[1] * e2[0]).abs();
+    let way = each(|k| ray.origin[k] - params.origin[k]);
+    let length = square_root(dot(ray.direction, ray.direction));
+    let distance = square_root(dot(way, way)) + t * length;
+    let cosine = most(divide(dot(ray.direction, surface.normal).abs(), length), LEAST_COSINE);
+    let width = divide(distance * params.step_y[3], cosine);
+    divide(uv_area, most(surface.area, 1.0e-30)) * (width * width)
 }
 
 /// Of all hits of the shaded set that have none yet.
-pub fn resolve(bound: &Bound, seen: &RaySet, gbuffer: &mut [GBuffer], texels: &Texels, attributes: &[AttributeView]) {
+pub fn resolve(
+    bound: &Bound,
+    seen: &RaySet,
+    gbuffer: &mut [GBuffer],
+    materials: &[Material],
+    attributes: &[AttributeView],
+) {
     gbuffer.par_iter_mut().enumerate().with_min_len(256).for_each(|(index, g)| {
         let surface = &seen.surfaces[index];
         if surface.leaf == NONE || g.state != 0 {
@@ -136,16 +87,15 @@ pub fn resolve(bound: &Bound, seen: &RaySet, gbuffer: &mut [GBuffer], texels: &T
         }
         let brick = bound.brick_of(surface.leaf);
         if bound.slots[brick].state & STATE_ATTRIBUTES != 0 {
-            *g = read(bound, seen, index, texels, &attributes[brick]);
+            *g = read(bound, seen, index, materials, &attributes[brick]);
         }
     });
 }
 
-fn read(bound: &Bound, seen: &RaySet, index: usize, texels: &Texels, attributes: &AttributeView) -> GBuffer {
-    let params: &Params = bound.params;
+fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attributes: &AttributeView) -> GBuffer {
     let surface = &seen.surfaces[index];
     let word = attributes.surfaces[surface.triangle as usize];
-    let material = &texels.materials[(word & SURFACE_MATERIAL) as usize];
+    let material = &materials[(word & SURFACE_MATERIAL) as usize];
     let rotation = word >> SURFACE_ROTATION_SHIFT;
     let hit = &seen.hits[index];
     let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
@@ -167,30 +117,21 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, texels: &Texels, attributes:
     if dot(n, surface.normal) < 0.0 {
         n = n.map(|x| -x);
     }
-    let mut base = [0, 1, 2, 3].map(|k| material.base_color[k] * color[k]);
+    let base = [0, 1, 2, 3].map(|k| material.base_color[k] * color[k]);
+    let (mut state, mut footprint) = (GBUFFER_READ, 0.0);
     if material.base_color_texture != NONE {
-        let texture = &texels.textures[material.base_color_texture as usize];
-        let [a, b, c] = corners.map(|v| v.uv);
-        let e1 = [0, 1].map(|k| b[k] - a[k]);
-        let e2 = [0, 1].map(|k| c[k] - a[k]);
-        let uv_area = (e1[0] * e2[1] - e1[1] * e2[0]).abs() * texture.0.width as f32 * texture.0.height as f32;
-        let ray = &seen.rays[index];
-        let length = dot(ray.direction, ray.direction).sqrt();
-        let cosine = most(dot(ray.direction, surface.normal).abs() / length, 0.05);
-        let footprint = hit.t * length * params.step_y[3];
-        let area = uv_area / most(surface.area, 1.0e-30) * footprint * footprint / cosine;
-        let sample = sample_texture(texture, uv, area);
-        base = [0, 1, 2, 3].map(|k| base[k] * sample[k]);
+        state = GBUFFER_WAITS;
+        footprint = footprint_of(bound.params, &seen.rays[index], hit.t, surface, corners.map(|v| v.uv));
     }
     // Source vertex (i + rotation) mod 3 was stored as vertex i.
     let source = |i: u32| weights[((i + 3 - rotation) % 3) as usize];
     GBuffer {
         albedo: xyz(base),
-        state: 1,
+        state,
         normal: n,
         material: word & SURFACE_MATERIAL,
         emission: material.emission,
-        padding: 0,
+        footprint,
         weights: [source(1), source(2)],
         uv,
     }

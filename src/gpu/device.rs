@@ -80,10 +80,13 @@ fn adapters(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
 }
 
-/// Storage buffers a kernel needs besides cache and texel pages: 7 of the scene, 5 of the rays, 8 of the shading.
+/// Storage buffers a kernel needs besides cache pages: 7 of the scene, 5 of the rays, 8 of the tiles of rays.
 const FIXED_STORAGE_BUFFERS: u32 = 20;
 /// Storage buffers of the lamps, in place of pages of the cache.
 const LAMP_STORAGE_BUFFERS: usize = 3;
+
+/// Those that texture lookups need besides cache and texel pages: 7 of the scene, 5 of the rays, 5 of their own.
+const SAMPLING_STORAGE_BUFFERS: usize = 17;
 
 /// An adapter that there is.
 pub struct Candidate {
@@ -251,9 +254,10 @@ impl Gpu {
 
     /// Most pages of cache beside so many pages of texels, and the table of opacity.
     pub fn max_cache_pages(&self, beside: Pages) -> usize {
-        let left = self.limits.max_storage_buffers_per_shader_stage as usize - FIXED_STORAGE_BUFFERS as usize;
+        let taken = (SAMPLING_STORAGE_BUFFERS + beside.texels).max(FIXED_STORAGE_BUFFERS as usize)
+            + usize::from(beside.opacity);
+        let pages = (self.limits.max_storage_buffers_per_shader_stage as usize).saturating_sub(taken);
         // Kernels that light bind lamps in place of the cache.
-        let pages = left.saturating_sub(beside.texels + usize::from(beside.opacity));
         if pages < LAMP_STORAGE_BUFFERS { 0 } else { pages.min(64) }
     }
 }

@@ -12,10 +12,12 @@ use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Workgroups, are_pairs_culled, dispatches};
+use crate::kernel::dispatch::{
+    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Third, Workgroups, are_pairs_culled, dispatches,
+};
 use crate::kernel::layout::{self, Params};
 use crate::kernel::{
-    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report,
+    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
@@ -123,8 +125,8 @@ impl GpuExecutor {
                 mapped_at_creation: false,
             }),
         };
-        let readback =
-            Readback::new(&gpu, (bricks * size_of::<layout::Demand>() + layout::COUNTERS_AND_WORK * 4) as u64);
+        let read = [&buffers.counters, &buffers.demand, &buffers.texels.tile_demand];
+        let readback = Readback::new(&gpu, read.iter().map(|buffer| buffer.size()).sum());
         let timing = Timing::new(&gpu, MOST_DISPATCHES as u32);
         let groups = Groups::new(&gpu, &kernels, &buffers);
         let (view, directions) = (Params::default(), Directions::default());
@@ -169,6 +171,12 @@ impl GpuExecutor {
         ))
     }
 
+    /// The G-buffer of the hits of a set, for tests.
+    #[cfg(test)]
+    pub(crate) fn read_gbuffer_of(&mut self, set: usize) -> Result<Vec<layout::GBuffer>, ExecutorError> {
+        self.read(|s| &s.buffers.pixels.gbuffers[set])
+    }
+
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
@@ -203,8 +211,15 @@ impl GpuExecutor {
         self.gpu.queue.write_buffer(&self.buffers.scene.slots, 0, bytemuck::cast_slice(&report::slots(bricks)));
         let params = self.params();
         let everything = bricks.all_geometry_resident();
+        let samples = steps.contains(&Step::Sample) && self.groups.sampling.is_some();
+        if samples {
+            let Texels { tile_slots, tile_demand, tiles, .. } = &self.buffers.texels;
+            self.gpu.queue.write_buffer(tile_slots, 0, bytemuck::cast_slice(&textures::slots(bricks)));
+            let unasked = vec![textures::UNASKED; *tiles];
+            self.gpu.queue.write_buffer(tile_demand, 0, bytemuck::cast_slice(&unasked));
+        }
         let mut list: Vec<Dispatch> = Vec::new();
-        for &step in steps {
+        for &step in steps.iter().filter(|step| samples || **step != Step::Sample) {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
@@ -246,14 +261,18 @@ impl GpuExecutor {
             compute.set_pipeline(binary.map_or_else(|| self.kernels.pipeline(dispatch.kernel), |b| &b.pipeline));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
-            let second = match (dispatch.cache, dispatch.shading) {
+            let second = match (dispatch.cache, dispatch.third) {
                 (true, _) => &self.groups.cache,
-                (false, true) => &self.groups.lamps,
-                (false, false) => &self.groups.empty,
+                (false, Third::Shading) => &self.groups.lamps,
+                _ => &self.groups.empty,
             };
             compute.set_bind_group(2, second, &[]);
-            let shading = &self.groups.shading[pass.set().saturating_sub(1)];
-            let third = if dispatch.shading { shading } else { &self.groups.tiles };
+            let shaded = pass.set().saturating_sub(1);
+            let third = match (dispatch.third, &self.groups.sampling) {
+                (Third::Shading, _) => &self.groups.shading[shaded],
+                (Third::Sampling, Some(sampling)) => &sampling[shaded],
+                _ => &self.groups.tiles,
+            };
             compute.set_bind_group(3, binary.map_or(third, |b| &b.group), &[]);
             match dispatch.groups {
                 Workgroups::Fixed([x, y]) => compute.dispatch_workgroups(x, y, 1),
@@ -263,15 +282,22 @@ impl GpuExecutor {
             }
         }
         self.timing.resolve(&mut encoder, dispatches.len() as u32);
-        self.readback.copy(&mut encoder, &[&self.buffers.counters, &self.buffers.demand]);
+        let mut read = vec![&self.buffers.counters, &self.buffers.demand];
+        read.extend(samples.then_some(&self.buffers.texels.tile_demand));
+        self.readback.copy(&mut encoder, &read);
         self.gpu.queue.submit([encoder.finish()]);
         let bytes = self.readback.wait(&self.gpu)?;
-        let (counters, demand) = bytes.split_at(layout::COUNTERS_AND_WORK * 4);
+        let (counters, rest) = bytes.split_at(layout::COUNTERS_AND_WORK * 4);
+        let (demand, tiles) = rest.split_at(self.buffers.demand.size() as usize);
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
         let demand: Vec<layout::Demand> =
             bytemuck::pod_collect_to_vec(&demand[..bricks.len() * size_of::<layout::Demand>()]);
         let mut report = report::of_counters(&counters, &demand)?;
         report::take_used(&mut report, steps, bricks);
+        if samples {
+            let tiles = &tiles[..self.buffers.texels.tiles * size_of::<layout::TileDemand>()];
+            report.tiles = textures::demand(&bytemuck::pod_collect_to_vec::<_, layout::TileDemand>(tiles));
+        }
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
             let rays: Vec<u32> = self.read(|s| &s.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();

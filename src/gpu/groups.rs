@@ -1,12 +1,13 @@
 //! The bind groups of an executor, over all of its buffers.
 
 use super::device::Gpu;
-use super::kernels::{Kernels, TEXEL_BINDING};
+use super::kernels::Kernels;
 use super::lamps::LampBuffers;
 use super::pages::CachePages;
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
+use super::wgsl::TEXEL_BINDING;
 use crate::kernel::layout::Params;
 
 /// What kernels read and write.
@@ -51,6 +52,8 @@ pub struct Groups {
     pub tiles: wgpu::BindGroup,
     /// 3 of kernels that shade the hits of sets 0 and 1.
     pub shading: [wgpu::BindGroup; 2],
+    /// 3 of texture lookups for the hits of sets 0 and 1; in scenes with textures.
+    pub sampling: Option<[wgpu::BindGroup; 2]>,
 }
 
 impl Groups {
@@ -86,11 +89,14 @@ impl Groups {
         let shading = |set: usize| {
             let RayBuffers { rays, hits, surfaces } = &sets[set];
             let (gbuffer, radiance) = (&pixels.gbuffers[set], &pixels.radiance);
-            let fixed =
-                [&texels.materials, &texels.textures, gbuffer, radiance, rays, hits, surfaces, &pixels.throughput];
-            let mut entries = numbered(fixed, 0);
-            entries.extend(numbered(filled(&texels.pages, kernels.pages.texels), TEXEL_BINDING));
-            group("shading", &kernels.shading, &entries)
+            let buffers = [&texels.materials, gbuffer, radiance, rays, hits, surfaces, &pixels.throughput];
+            group("shading", &kernels.shading, &numbered(buffers, 0))
+        };
+        let sampling = |set: usize| {
+            let Texels { materials, textures, tile_slots, tile_demand, .. } = texels;
+            let mut entries = numbered([materials, textures, tile_slots, &pixels.gbuffers[set], tile_demand], 0);
+            entries.extend(numbered(filled(&texels.pages, kernels.pages.texels), TEXEL_BINDING as u32));
+            group("sampling", &kernels.sampling, &entries)
         };
         let cache = filled(cache.pages(), kernels.pages.cache);
         let bound = 7 + usize::from(kernels.pages.opacity);
@@ -102,6 +108,7 @@ impl Groups {
             empty: group("none", &kernels.none, &[]),
             tiles: group("tiles", &kernels.tiles, &numbered(tile_buffers, 0)),
             shading: [shading(0), shading(1)],
+            sampling: (!texels.pages.is_empty()).then(|| [sampling(0), sampling(1)]),
         }
     }
 }

@@ -38,6 +38,8 @@ enum Groups {
     Shading,
     /// 2: cache, 3: shading.
     CacheShading,
+    /// 2: cache, 3: texture lookups.
+    Sampling,
 }
 
 /// All pipelines and the layouts of their groups.
@@ -56,6 +58,8 @@ pub struct Kernels {
     pub tiles: wgpu::BindGroupLayout,
     /// Group 3 of shading kernels.
     pub shading: wgpu::BindGroupLayout,
+    /// Group 3 of texture lookups.
+    pub sampling: wgpu::BindGroupLayout,
     /// A group of nothing.
     pub none: wgpu::BindGroupLayout,
     pipelines: HashMap<&'static str, wgpu::ComputePipeline>,
@@ -74,6 +78,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("clear_gbuffer", "clear_gbuffer", Groups::Shading, &[]),
     ("hit_demand", "hit_demand", Groups::Tiles, &[]),
     ("resolve", "resolve", Groups::CacheShading, &[]),
+    ("sample", "sample", Groups::Sampling, &[]),
     ("shade", "shade", Groups::Shading, &[]),
     ("add_light", "add_light", Groups::Shading, &[]),
     ("add_occlusion", "add_occlusion", Groups::Shading, &[]),
@@ -140,12 +145,16 @@ impl Kernels {
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write]);
         let cache = layout(device, "cache", &vec![Read; pages.cache]);
         let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write, Read]);
-        let shading = shading_layout(device, &[Read, Read, Write, Write, Write, Write, Write, Write], pages.texels);
+        let shading = layout(device, "shading", &[Read, Write, Write, Write, Write, Write, Write]);
+        let fixed = [Read, Read, Read, Write, Write];
+        let sampling = layout(device, "sampling", &[&fixed[..], &vec![Read; pages.texels]].concat());
         let lamps = layout(device, "lamps", &[Read; 3]);
         let none = layout(device, "none", &[]);
         let mut pipelines = HashMap::new();
         let mut layouts = HashMap::new();
-        for &(kernel, name, groups, constants) in SPECIALISATIONS {
+        // Scenes without textures have no kernel that looks them up.
+        let made = SPECIALISATIONS.iter().filter(|made| made.2 != Groups::Sampling || pages.texels > 0);
+        for &(kernel, name, groups, constants) in made {
             let constants = COUNTING.iter().find(|c| count && c.1 == name).map_or(constants, |c| c.3);
             let layout = layouts.entry(groups).or_insert_with(|| {
                 let (second, third) = match groups {
@@ -153,6 +162,7 @@ impl Kernels {
                     Groups::CacheTiles => (&cache, &tiles),
                     Groups::Shading => (&lamps, &shading),
                     Groups::CacheShading => (&cache, &shading),
+                    Groups::Sampling => (&cache, &sampling),
                 };
                 device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                     label: Some(name),
@@ -174,7 +184,7 @@ impl Kernels {
             });
             pipelines.insert(name, pipeline);
         }
-        Self { pages, scene, rays, cache, lamps, tiles, shading, none, pipelines }
+        Self { pages, scene, rays, cache, lamps, tiles, shading, sampling, none, pipelines }
     }
 
     /// The pipeline of a specialisation of the table above.
@@ -207,15 +217,6 @@ fn layout(device: &wgpu::Device, label: &str, bindings: &[Bound]) -> wgpu::BindG
 /// The layout of a group of `count` storage buffers that are read.
 pub(super) fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
     layout(device, label, &vec![Bound::Read; count])
-}
-
-/// First binding of the texels in the shading group.
-pub const TEXEL_BINDING: u32 = 8;
-
-fn shading_layout(device: &wgpu::Device, fixed: &[Bound], texel_pages: usize) -> wgpu::BindGroupLayout {
-    let mut entries: Vec<_> = fixed.iter().enumerate().map(|(i, &b)| entry(i as u32, b)).collect();
-    entries.extend((0..texel_pages as u32).map(|k| entry(TEXEL_BINDING + k, Bound::Read)));
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("shading"), entries: &entries })
 }
 
 #[cfg(test)]

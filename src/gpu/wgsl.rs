@@ -5,12 +5,15 @@
 
 use std::fmt::Write;
 
+/// First binding of the texels in the group of texture lookups.
+pub const TEXEL_BINDING: usize = 5;
+
 /// Numbers of pages that the generated accessors serve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pages {
     /// Pages of the brick cache.
     pub cache: usize,
-    /// Pages of texels.
+    /// Pages of texels that are resident throughout.
     pub texels: usize,
     /// Whether rays may pass through triangles.
     pub opacity: bool,
@@ -71,13 +74,14 @@ fn cache_accessors(pages: usize) -> String {
     s
 }
 
-/// Accessor of the texels: group 3, from binding 8.
+/// Accessor of the texels of textures that are resident throughout: group 3, from binding [`TEXEL_BINDING`] on.
 fn texel_accessors(pages: usize) -> String {
     let mut s = String::new();
     for k in 0..pages {
-        let _ = writeln!(s, "@group(3) @binding({}) var<storage, read> texels_{k}: array<u32>;", 8 + k);
+        let _ =
+            writeln!(s, "@group(3) @binding({}) var<storage, read> texels_{k}: array<vec4<u32>>;", TEXEL_BINDING + k);
     }
-    accessor(&mut s, "texel_word", "u32", "texels", "[index]", pages);
+    accessor(&mut s, "texel_vec4", "vec4<u32>", "texels", "[index]", pages);
     s
 }
 

@@ -68,6 +68,17 @@ pub enum Workgroups {
     Rooted,
 }
 
+/// What group 3 of a dispatch is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Third {
+    /// Tiles of rays and their lists.
+    Tiles,
+    /// What shading the set before the pass's needs.
+    Shading,
+    /// What texture lookups for the set before the pass's need.
+    Sampling,
+}
+
 /// One dispatch of a kernel.
 pub struct Dispatch {
     /// The kernel's pipeline.
@@ -78,8 +89,8 @@ pub struct Dispatch {
     pub groups: Workgroups,
     /// Whether group 2 is the cache; else it is the lamps of kernels that shade, and nothing of others.
     pub cache: bool,
-    /// Whether group 3 is what shading the set before the pass's needs, not the tiles.
-    pub shading: bool,
+    /// What group 3 is.
+    pub third: Third,
     /// Phase of the schedule that its time counts for, from 0.
     pub phase: Option<usize>,
 }
@@ -131,12 +142,12 @@ pub fn dispatches(
     let by_tile = across(params.tiles * (params.tile / 8) * (params.tile / 8));
     let dispatch = |kernel: &'static str, params, groups, phase| {
         let cache = kernel.starts_with("intersect");
-        Dispatch { kernel, params, groups, cache, shading: false, phase }
+        Dispatch { kernel, params, groups, cache, third: Third::Tiles, phase }
     };
     let kernel = |kernel, params, groups, phase| dispatch(kernel, params, Workgroups::Fixed(groups), phase);
     let shading = |kernel, params, cache| {
         let groups = Workgroups::Fixed(per_ray);
-        Dispatch { kernel, params, groups, cache, shading: true, phase: None }
+        Dispatch { kernel, params, groups, cache, third: Third::Shading, phase: None }
     };
     let list = |params, phase| {
         let name = if leaf_cache { "intersect_list_cached" } else { "intersect_list" };
@@ -236,6 +247,7 @@ pub fn dispatches(
         Step::ClearAttributes => vec![shading("clear_gbuffer", params, false)],
         Step::QueryHits => vec![kernel("hit_demand", params, per_ray, None)],
         Step::Resolve => vec![shading("resolve", params, true)],
+        Step::Sample => vec![Dispatch { third: Third::Sampling, ..shading("sample", params, true) }],
         Step::Shade(light) => {
             let sun = if light.sun { layout::PARAM_SUN } else { 0 };
             let sky = if light.sky { layout::PARAM_SKY } else { 0 };

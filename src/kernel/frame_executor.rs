@@ -32,7 +32,7 @@ pub trait FrameExecutor: Executor {
     /// Largest number of bytes of one page of the cache.
     fn page_bytes(&self) -> u64;
 
-    /// Bytes of textures, which are resident throughout.
+    /// Bytes of the coarse levels of textures that are resident throughout.
     fn texture_bytes(&self) -> u64;
 
     /// The workers that read payloads.

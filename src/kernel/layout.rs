@@ -5,6 +5,7 @@
 use bytemuck::{Pod, Zeroable};
 
 pub use bricks::{BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, INSTANCE_IDENTITY, NO_NORMAL, NONE};
+pub use bricks::{TEXTURE_BC7, TEXTURE_SRGB, TILE_TEXELS};
 
 pub const PARAM_ANY_HIT: u32 = 1;
 pub const PARAM_NEEDED: u32 = 2;
@@ -44,6 +45,8 @@ pub const COUNTER_TILES_FROM_ROOT: u32 = 18;
 pub const COUNTER_TILES_CHOSEN: u32 = 19;
 pub const WORK_CHOSEN: u32 = 24;
 pub const WORK_ROOTED: u32 = 28;
+pub const GBUFFER_READ: u32 = 1;
+pub const GBUFFER_WAITS: u32 = 2;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
@@ -120,10 +123,13 @@ mirror! {
         roughness: f32, alpha_cutoff: f32, flags: u32, base_color_texture: u32, padding: [u32; 4],
     }
     struct Texture {
-        width: u32, height: u32, levels: u32, wrap: u32, page: u32, offset: u32, padding0: u32, padding1: u32,
+        width: u32, height: u32, levels: u32, wrap: u32, encoding: u32, flags: u32, first_tile: u32, tail_level: u32,
+        tail_page: u32, tail_offset: u32, padding0: u32, padding1: u32,
     }
+    struct TileSlot { page: u32, offset: u32 }
+    struct TileDemand { rays: u32, first: u32, used: u32 }
     struct GBuffer {
-        albedo: [f32; 3], state: u32, normal: [f32; 3], material: u32, emission: [f32; 3], padding: u32,
+        albedo: [f32; 3], state: u32, normal: [f32; 3], material: u32, emission: [f32; 3], footprint: f32,
         weights: [f32; 2], uv: [f32; 2],
     }
     struct Emitter {

@@ -12,6 +12,7 @@ pub mod layout;
 pub mod opacity;
 pub mod report;
 mod setup;
+pub mod textures;
 
 pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};

@@ -54,6 +54,7 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
     Ok(Report {
         round_trips: 1,
         demand: wanted.map(asked).collect(),
+        tiles: Vec::new(),
         used: Vec::new(),
         list_entries: counters[layout::COUNTER_LIST_ENTRIES as usize],
         pairs_tested: count(layout::COUNTER_PAIRS_TESTED),

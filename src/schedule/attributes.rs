@@ -1,10 +1,12 @@
-//! Attributes of what was hit: asked for once a pass, loaded in batches as large as the cache allows.
+//! Attributes and textures of what was hit. Attributes are asked for once a pass and loaded in batches as large as the cache
+//! allows. Then lookups name the tiles that they need: a hit is looked up once all of its tiles are resident together, so that its
+//! colour does not depend on what else is, and waits until then.
 
 use super::cache::Cache;
-use super::{Executor, ExecutorError, Lamp, Pass, PassStats, Step};
+use super::{Executor, ExecutorError, Lamp, Pass, PassStats, Report, Step};
 use crate::stream::Item;
 
-/// Reads the attributes of all hits of `pass`, a pass of set 0 or 1.
+/// Reads the attributes of all hits of `pass`, a pass of set 0 or 1, and looks their textures up.
 ///
 /// # Errors
 /// What the executor says.
@@ -24,15 +26,51 @@ pub fn resolve(
     for &brick in &resident {
         cache.touch(Item::attributes(brick));
     }
-    // What is resident is read before a load can overwrite it.
-    stats.add(executor.run(next, &[Step::ClearAttributes, Step::Resolve], &cache.states)?);
+    // What is resident is read before a load can overwrite it. Lookups follow when everything is read.
     let items: Vec<Item> = missing.iter().map(|&brick| Item::attributes(brick)).collect();
     let mut rest = &items[..];
+    let last = |rest: &[Item]| if rest.is_empty() { &[Step::Resolve, Step::Sample][..] } else { &[Step::Resolve] };
+    let mut report = executor.run(next, &[&[Step::ClearAttributes], last(rest)].concat(), &cache.states)?;
     while !rest.is_empty() {
+        stats.add(report);
         let count = cache.load(executor, rest, usize::MAX, stats)?;
         rest = &rest[count..];
-        stats.add(executor.run(next, &[Step::Resolve], &cache.states)?);
+        report = executor.run(next, last(rest), &cache.states)?;
     }
+    sample(executor, cache, next, report, stats)?;
     stats.bricks_hit.get_or_insert_default().extend(hit);
     Ok(())
+}
+
+/// Loads the tiles that hits wait for, and looks these hits up, until none waits. `report`: of the first [`Step::Sample`].
+///
+/// A batch takes tiles in the order of the rays that need them, resident ones as well, which then stay: all tiles of the first hit
+/// are in it, so every batch brings at least that hit to an end.
+fn sample(
+    executor: &mut dyn Executor,
+    cache: &mut Cache,
+    next: Pass,
+    mut report: Report,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
+    let mut first_before = None;
+    loop {
+        let tiles = std::mem::take(&mut report.tiles);
+        stats.add(report);
+        for tile in tiles.iter().filter(|tile| tile.is_used) {
+            cache.touch(Item::tile(tile.tile));
+        }
+        let mut wanted: Vec<_> =
+            tiles.iter().filter(|tile| tile.rays > 0).map(|tile| (tile.first, tile.tile)).collect();
+        wanted.sort_unstable();
+        let Some(&(first, _)) = wanted.first() else { return Ok(()) };
+        if first_before == Some(first) {
+            let text = "cannot hold the tiles of one texture lookup beside each other; give a larger --cache";
+            return Err(ExecutorError::Device(text.into()));
+        }
+        first_before = Some(first);
+        let items: Vec<Item> = wanted.iter().map(|&(_, tile)| Item::tile(tile)).collect();
+        cache.load(executor, &items, usize::MAX, stats)?;
+        report = executor.run(next, &[Step::Sample], &cache.states)?;
+    }
 }

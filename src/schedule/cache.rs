@@ -1,7 +1,7 @@
 //! The cache as a schedule uses it: residency, brick states, and the request trace.
 
 use super::{BrickStates, Executor, ExecutorError, Load, PassStats};
-use crate::stream::{Item, Kind, Residency, Trace};
+use crate::stream::{Item, Kind, Residency, Sizes, Trace};
 use std::time::Instant;
 
 /// Most bricks loaded between two queries where some of them may turn out to be hidden by others.
@@ -21,14 +21,39 @@ pub struct BrickBytes {
     pub attributes: u64,
 }
 
-/// What is resident, what every brick weighs, and what was asked for.
+/// Bytes of everything that is streamed of a scene, as it is loaded.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SceneBytes {
+    /// Of the bricks.
+    pub bricks: Vec<BrickBytes>,
+    /// Of the tiles of textures.
+    pub tiles: Vec<u64>,
+}
+
+impl SceneBytes {
+    /// What residency takes.
+    pub fn sizes(&self) -> Sizes {
+        let bricks = self.bricks.iter().map(|brick| (brick.geometry, brick.attributes)).collect();
+        Sizes { bricks, tiles: self.tiles.clone() }
+    }
+}
+
+/// Without a distinction between nodes and triangles.
+impl From<&Sizes> for SceneBytes {
+    fn from(sizes: &Sizes) -> Self {
+        let brick = |&(geometry, attributes): &(u64, u64)| BrickBytes { bvh: 0, geometry, attributes };
+        Self { bricks: sizes.bricks.iter().map(brick).collect(), tiles: sizes.tiles.clone() }
+    }
+}
+
+/// What is resident, what everything weighs, and what was asked for.
 pub struct Cache {
     /// Placement and eviction.
     pub residency: Residency,
     /// Its mirror for executors, with each brick's part in the pass.
     pub states: BrickStates,
-    /// Bytes per brick.
-    pub bytes: Vec<BrickBytes>,
+    /// Bytes of everything.
+    pub bytes: SceneBytes,
     /// Requests in order, when they are recorded.
     pub trace: Option<Trace>,
     /// The frame, from 1, and per item the frame that loaded it last.
@@ -37,10 +62,10 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// An empty cache over bricks of the given sizes.
-    pub fn new(residency: Residency, bytes: Vec<BrickBytes>, trace: Option<Trace>) -> Self {
-        let states = BrickStates::new(bytes.len());
-        let loaded_in = vec![0; 2 * bytes.len()];
+    /// An empty cache over bricks and tiles of the given sizes.
+    pub fn new(residency: Residency, bytes: SceneBytes, trace: Option<Trace>) -> Self {
+        let states = BrickStates::new(bytes.bricks.len(), bytes.tiles.len());
+        let loaded_in = vec![0; bytes.sizes().rows()];
         Self { residency, states, bytes, trace, frame: 0, loaded_in }
     }
 
@@ -133,13 +158,15 @@ impl Cache {
             return Err(error);
         }
         for load in &loads {
-            let bytes = self.bytes[load.item.brick as usize];
+            let bytes = self.residency.bytes(load.item);
             match load.item.kind {
                 Kind::Geometry => {
-                    stats.bytes_bvh += bytes.bvh;
-                    stats.bytes_geometry += bytes.geometry - bytes.bvh;
+                    let bvh = self.bytes.bricks[load.item.number as usize].bvh;
+                    stats.bytes_bvh += bvh;
+                    stats.bytes_geometry += bytes - bvh;
                 }
-                Kind::Attributes => stats.bytes_attributes += bytes.attributes,
+                Kind::Attributes => stats.bytes_attributes += bytes,
+                Kind::Tile => stats.bytes_textures += bytes,
             }
             if std::mem::replace(&mut self.loaded_in[load.item.index()], self.frame) == self.frame {
                 stats.reloaded_frame += 1;

@@ -92,15 +92,15 @@ impl<'a> Batches<'a> {
         while !wanted.is_empty() {
             let count = cache.load(executor, &wanted, if on.requery { most } else { BATCH_BRICKS }, stats)?;
             let rest = wanted.split_off(count);
-            let batch: Vec<u32> = wanted.iter().map(|item| item.brick).collect();
-            if let Some(lowest) = rest.iter().map(|item| item.brick).min() {
+            let batch: Vec<u32> = wanted.iter().map(|item| item.number).collect();
+            if let Some(lowest) = rest.iter().map(|item| item.number).min() {
                 stats.bricks_nearest_first += batch.iter().filter(|&&brick| brick > lowest).count() as u64;
             }
             cache.states.set_batch(&batch);
             stats.bricks_intersected.extend(&batch);
             if on.requery {
                 report = run(executor, self.pass, &[self.intersect, self.query()], &cache.states, on, stats)?;
-                let still = |item: &&Item| report.demand.binary_search_by_key(&item.brick, |d| d.brick).is_ok();
+                let still = |item: &&Item| report.demand.binary_search_by_key(&item.number, |d| d.brick).is_ok();
                 stats.bricks_no_longer_wanted += (rest.len() - rest.iter().filter(still).count()) as u64;
                 (wanted, most) = in_order(&report.demand, on.nearest_first);
             } else {
@@ -131,7 +131,7 @@ pub fn measure_needed(
     steps.push(Step::QueryNeeded);
     let report = executor.run(pass, &steps, &cache.states)?;
     for &Demand { brick, .. } in &report.demand {
-        let bytes = cache.bytes[brick as usize].geometry;
+        let bytes = cache.bytes.bricks[brick as usize].geometry;
         stats.bytes_needed += bytes;
         if !resident_before[brick as usize] {
             stats.bytes_needed_missing += bytes;
@@ -168,7 +168,7 @@ mod tests {
         let demand: Vec<Demand> =
             demand.iter().map(|&(brick, nearest, next)| Demand { brick, rays: 9, nearest, next }).collect();
         let (items, most) = in_order(&demand, nearest_first);
-        (items.iter().map(|i| i.brick).collect(), most)
+        (items.iter().map(|i| i.number).collect(), most)
     }
 
     #[test]

@@ -2,21 +2,23 @@
 
 use crate::stream::{Item, Kind, Placed, Residency, Slot};
 
-/// Where bricks lie and what part they play in the pass.
+/// Where bricks and tiles of textures lie, and what part bricks play in the pass.
 #[derive(Clone, Debug)]
 pub struct BrickStates {
     geometry: Vec<Option<Slot>>,
     attributes: Vec<Option<Slot>>,
+    tiles: Vec<Option<Slot>>,
     done: Vec<bool>,
     batch: Vec<bool>,
 }
 
 impl BrickStates {
-    /// Nothing resident of `bricks` bricks.
-    pub fn new(bricks: usize) -> Self {
+    /// Nothing resident of `bricks` bricks and `tiles` tiles.
+    pub fn new(bricks: usize, tiles: usize) -> Self {
         Self {
             geometry: vec![None; bricks],
             attributes: vec![None; bricks],
+            tiles: vec![None; tiles],
             done: vec![false; bricks],
             batch: vec![false; bricks],
         }
@@ -40,6 +42,11 @@ impl BrickStates {
     /// Slot of a brick's attributes.
     pub fn attributes(&self, brick: usize) -> Option<Slot> {
         self.attributes[brick]
+    }
+
+    /// Slots of all tiles.
+    pub fn tiles(&self) -> &[Option<Slot>] {
+        &self.tiles
     }
 
     /// Whether every ray of the pass that wanted the brick has been intersected with it.
@@ -94,16 +101,19 @@ impl BrickStates {
 
     /// Whether the slots are those of `residency`, for checks.
     pub fn agrees_with(&self, residency: &Residency) -> bool {
-        (0..self.len()).all(|brick| {
-            self.geometry[brick] == residency.slot(Item::geometry(brick as u32))
-                && self.attributes[brick] == residency.slot(Item::attributes(brick as u32))
-        })
+        let tiles = (0u32..).zip(&self.tiles);
+        tiles.into_iter().all(|(tile, slot)| *slot == residency.slot(Item::tile(tile)))
+            && (0..self.len()).all(|brick| {
+                self.geometry[brick] == residency.slot(Item::geometry(brick as u32))
+                    && self.attributes[brick] == residency.slot(Item::attributes(brick as u32))
+            })
     }
 
     fn slot(&mut self, item: Item) -> &mut Option<Slot> {
         match item.kind {
-            Kind::Geometry => &mut self.geometry[item.brick as usize],
-            Kind::Attributes => &mut self.attributes[item.brick as usize],
+            Kind::Geometry => &mut self.geometry[item.number as usize],
+            Kind::Attributes => &mut self.attributes[item.number as usize],
+            Kind::Tile => &mut self.tiles[item.number as usize],
         }
     }
 }

@@ -123,6 +123,9 @@ pub enum Step {
     ClearAttributes,
     /// Read the attributes of the hits of the set before, where they are resident.
     Resolve,
+    /// Look up the textures of the hits of the set before whose tiles are resident; the report says which tiles the others ask for.
+    /// In scenes without textures nothing is done.
+    Sample,
     /// Add what the hits of the set before show by themselves, and the background where they missed.
     Shade(Shading),
     /// Add the light of the pass's lamp where its shadow ray went free.
@@ -210,6 +213,19 @@ pub struct Demand {
     pub next: u32,
 }
 
+/// What texture lookups ask of a tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileDemand {
+    /// Its number.
+    pub tile: u32,
+    /// Hits that wait for some tile, and need this one, resident or not.
+    pub rays: u32,
+    /// The least number of a ray among them; of none `u32::MAX`.
+    pub first: u32,
+    /// Whether a lookup that was carried out has read it.
+    pub is_used: bool,
+}
+
 /// What came back from one round trip.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
@@ -217,6 +233,8 @@ pub struct Report {
     pub round_trips: u32,
     /// Bricks still wanted, ascending.
     pub demand: Vec<Demand>,
+    /// Tiles that lookups read or ask for, ascending.
+    pub tiles: Vec<TileDemand>,
     /// Resident bricks that a step of intersection entered: some ray met a child box of their root before its hit at that
     /// time. Ascending.
     pub used: Vec<u32>,
@@ -366,6 +384,8 @@ pub struct PassStats {
     pub bytes_geometry: u64,
     /// Bytes of attributes loaded.
     pub bytes_attributes: u64,
+    /// Bytes of tiles of textures loaded.
+    pub bytes_textures: u64,
     /// Batches of loads.
     pub batches: u64,
 }

@@ -98,7 +98,7 @@ pub struct Record {
     pub bytes_geometry: u64,
     /// Bytes of attributes moved.
     pub bytes_attributes: u64,
-    /// Bytes of textures moved.
+    /// Bytes of tiles of textures loaded.
     pub bytes_textures: u64,
     /// Nodes visited, with `--count`.
     pub nodes_visited: u64,
@@ -177,6 +177,7 @@ impl Record {
             bytes_bvh: stats.bytes_bvh,
             bytes_geometry: stats.bytes_geometry,
             bytes_attributes: stats.bytes_attributes,
+            bytes_textures: stats.bytes_textures,
             nodes_visited: r.nodes,
             triangles_tested: r.triangles,
             non_finite: r.non_finite,

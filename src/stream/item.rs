@@ -3,68 +3,81 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// The kind of a streamed payload of a brick.
+/// The kind of a streamed payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Kind {
     /// What traversal reads: nodes, vertices, ids, indices.
     Geometry,
     /// What shading of hits reads: normals, texture coordinates, colours, materials.
     Attributes,
+    /// Texels of a tile of a texture.
+    Tile,
+}
+
+impl Kind {
+    /// Every kind, in the order in which a pass asks for them.
+    pub const ALL: [Self; 3] = [Self::Geometry, Self::Attributes, Self::Tile];
 }
 
 /// One streamed payload: the unit that is loaded, placed and evicted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Item {
-    /// The brick.
-    pub brick: u32,
-    /// Which of its payloads.
+    /// Number of the brick, or of the tile.
+    pub number: u32,
+    /// What of it.
     pub kind: Kind,
 }
 
 impl Item {
     /// The geometry of `brick`.
     pub const fn geometry(brick: u32) -> Self {
-        Self { brick, kind: Kind::Geometry }
+        Self { number: brick, kind: Kind::Geometry }
     }
 
     /// The attributes of `brick`.
     pub const fn attributes(brick: u32) -> Self {
-        Self { brick, kind: Kind::Attributes }
+        Self { number: brick, kind: Kind::Attributes }
     }
 
-    /// Position in a table with two rows a brick, geometry first.
+    /// The texels of tile `tile`.
+    pub const fn tile(tile: u32) -> Self {
+        Self { number: tile, kind: Kind::Tile }
+    }
+
+    /// Position in a table with a row for each number and kind, the kinds of a number together.
     pub const fn index(self) -> usize {
-        self.brick as usize * 2 + self.kind as usize
+        self.number as usize * Kind::ALL.len() + self.kind as usize
     }
 
-    /// The inverse of [`Self::index`]; `None` when no brick number is that large.
+    /// The inverse of [`Self::index`]; `None` when no number is that large.
     pub fn from_index(index: usize) -> Option<Self> {
-        let brick = u32::try_from(index / 2).ok()?;
-        Some(if index.is_multiple_of(2) { Self::geometry(brick) } else { Self::attributes(brick) })
+        let number = u32::try_from(index / Kind::ALL.len()).ok()?;
+        Some(Self { number, kind: Kind::ALL[index % Kind::ALL.len()] })
     }
 
-    /// The short form used in request traces: `g17` or `a17`.
+    /// The short form used in request traces: `g17`, `a17` or, of a tile, `t17`.
     pub fn code(self) -> String {
         match self.kind {
-            Kind::Geometry => format!("g{}", self.brick),
-            Kind::Attributes => format!("a{}", self.brick),
+            Kind::Geometry => format!("g{}", self.number),
+            Kind::Attributes => format!("a{}", self.number),
+            Kind::Tile => format!("t{}", self.number),
         }
     }
 }
 
 impl fmt::Display for Item {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = match self.kind {
-            Kind::Geometry => "geometry",
-            Kind::Attributes => "attributes",
-        };
-        write!(f, "brick {} {kind}", self.brick)
+        match self.kind {
+            Kind::Geometry => write!(f, "brick {} geometry", self.number),
+            Kind::Attributes => write!(f, "brick {} attributes", self.number),
+            Kind::Tile => write!(f, "tile {}", self.number),
+        }
     }
 }
 
 /// A string is not the short form of an [`Item`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not an item: expected g or a and a brick number, such as g17")]
+#[error("{0:?} is not an item: expected g or a and a brick number, or t and that of a tile, such as g17")]
 pub struct ParseItemError(pub String);
 
 impl FromStr for Item {
@@ -76,6 +89,7 @@ impl FromStr for Item {
         let make = match text.as_bytes().first() {
             Some(b'g') => Self::geometry,
             Some(b'a') => Self::attributes,
+            Some(b't') => Self::tile,
             _ => return Err(error()),
         };
         let digits = &text[1..];

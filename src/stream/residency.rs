@@ -3,6 +3,7 @@
 use super::item::{Item, Kind, Policy, Slot};
 use super::lru::Lru;
 use super::ring::Ring;
+use super::sizes::Sizes;
 use super::space::Space;
 
 /// Alignment in bytes of sizes, offsets and the budget.
@@ -14,12 +15,14 @@ const NOWHERE: u64 = u64::MAX;
 /// The cache cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ResidencyError {
-    /// The budget does not hold the two largest bricks.
+    /// The budget does not hold the two largest bricks, or the tiles of a texture lookup.
     #[error(
-        "a cache of {given} bytes is too small: the two largest bricks need {needed} bytes; give it at least that, or \
-         convert the scene with smaller bricks"
+        "a cache of {given} bytes is too small: {what} need {needed} bytes; give it at least that, or convert the scene with \
+         smaller bricks"
     )]
     CacheTooSmall {
+        /// What needs so much: "the two largest bricks" or "the tiles of a texture lookup".
+        what: &'static str,
         /// Least budget in bytes.
         needed: u64,
         /// The budget in bytes, rounded down to 16.
@@ -38,12 +41,12 @@ pub enum ResidencyError {
         /// Bytes of a page, rounded down to 16.
         given: u64,
     },
-    /// The budget makes more pages, or the scene has more bricks, than 32 bits count.
+    /// The budget makes more pages, or the scene has more bricks or tiles, than 32 bits count.
     #[error("{count} {what} are more than the cache can count")]
     TooMany {
         /// How many.
         count: u64,
-        /// What: "pages" or "bricks".
+        /// What: "pages", or "bricks or tiles".
         what: &'static str,
     },
     /// An item's size is not a multiple of 16.
@@ -111,6 +114,8 @@ pub struct Counters {
     pub geometry: KindCounters,
     /// Of attributes.
     pub attributes: KindCounters,
+    /// Of tiles.
+    pub tiles: KindCounters,
 }
 
 impl Counters {
@@ -119,6 +124,7 @@ impl Counters {
         match kind {
             Kind::Geometry => &self.geometry,
             Kind::Attributes => &self.attributes,
+            Kind::Tile => &self.tiles,
         }
     }
 
@@ -126,12 +132,13 @@ impl Counters {
         match kind {
             Kind::Geometry => &mut self.geometry,
             Kind::Attributes => &mut self.attributes,
+            Kind::Tile => &mut self.tiles,
         }
     }
 
-    /// Of both kinds together.
+    /// Of all kinds together.
     pub fn total(&self) -> KindCounters {
-        self.geometry.zip(&self.attributes, |a, b| a + b)
+        self.geometry.zip(&self.attributes, |a, b| a + b).zip(&self.tiles, |a, b| a + b)
     }
 
     /// What happened between `earlier` and `self`, both read from one cache in this order.
@@ -139,6 +146,7 @@ impl Counters {
         Self {
             geometry: self.geometry.zip(&earlier.geometry, u64::saturating_sub),
             attributes: self.attributes.zip(&earlier.attributes, u64::saturating_sub),
+            tiles: self.tiles.zip(&earlier.tiles, u64::saturating_sub),
         }
     }
 }
@@ -179,30 +187,35 @@ pub struct Residency {
 }
 
 impl Residency {
-    /// An empty cache for bricks of `sizes` (geometry bytes, attribute bytes; multiples of 16).
+    /// An empty cache for bricks and tiles of `sizes` (multiples of 16).
     ///
     /// # Errors
     /// [`ResidencyError::CacheTooSmall`] below [`Self::least_budget`]; [`ResidencyError::PageTooSmall`] when the first page
     /// (`page_bytes`, or the budget if that is less) does not hold the largest item.
     pub fn new(
-        sizes: &[(u64, u64)],
+        sizes: impl Into<Sizes>,
         budget_bytes: u64,
         page_bytes: u64,
         policy: Policy,
     ) -> Result<Self, ResidencyError> {
-        // Item tables are indexed by u32, two rows a brick and one spare.
-        if sizes.len() as u64 * 2 >= u32::MAX as u64 {
-            return Err(ResidencyError::TooMany { count: sizes.len() as u64, what: "bricks" });
+        let sizes: Sizes = sizes.into();
+        // Item tables are indexed by u32, with one row to spare.
+        if sizes.rows() as u64 >= u32::MAX as u64 {
+            let count = sizes.rows() as u64 / Kind::ALL.len() as u64;
+            return Err(ResidencyError::TooMany { count, what: "bricks or tiles" });
         }
-        let bytes: Vec<u64> = sizes.iter().flat_map(|&(geometry, attributes)| [geometry, attributes]).collect();
-        let items = || (0..bytes.len()).filter_map(Item::from_index).zip(bytes.iter().copied());
+        let mut bytes = vec![0; sizes.rows()];
+        sizes.items().for_each(|(item, size)| bytes[item.index()] = size);
+        let items = || sizes.items();
         if let Some((item, bytes)) = items().find(|(_, bytes)| bytes % ALIGN != 0) {
             return Err(ResidencyError::Unaligned { item, bytes });
         }
         let budget = round_down(budget_bytes);
-        let needed = Self::least_budget(sizes);
+        let needed = Self::least_budget(&sizes);
         if needed > budget {
-            return Err(ResidencyError::CacheTooSmall { needed, given: budget });
+            let bricks = sizes.two_largest_bricks() == needed;
+            let what = if bricks { "the two largest bricks" } else { "the tiles of a texture lookup" };
+            return Err(ResidencyError::CacheTooSmall { what, needed, given: budget });
         }
         // Offsets are u32. A page of nothing would make no progress.
         let page_bytes = round_down(page_bytes.min(u32::MAX as u64)).max(ALIGN);
@@ -238,32 +251,23 @@ impl Residency {
         })
     }
 
-    /// The least budget in bytes: the two largest bricks, geometry and attributes. Saturates.
-    pub fn least_budget(sizes: &[(u64, u64)]) -> u64 {
-        let (mut first, mut second) = (0u64, 0u64);
-        for &(geometry, attributes) in sizes {
-            let brick = geometry.saturating_add(attributes);
-            if brick > first {
-                (first, second) = (brick, first);
-            } else {
-                second = second.max(brick);
-            }
-        }
-        first.saturating_add(second)
+    /// The least budget in bytes: the two largest bricks, geometry and attributes, or, if that is more, what the tiles of a
+    /// texture lookup take ([`Sizes::tiles_of_a_lookup`]). Saturates.
+    pub fn least_budget(sizes: impl Into<Sizes>) -> u64 {
+        let sizes: Sizes = sizes.into();
+        sizes.two_largest_bricks().max(sizes.tiles_of_a_lookup())
     }
 
     /// A budget in bytes at which everything fits at once in pages of `page_bytes`: the sum of all items, plus what can be
     /// left over at the ends of pages. Saturates.
-    pub fn budget_for_all(sizes: &[(u64, u64)], page_bytes: u64) -> u64 {
-        let sum = sizes
-            .iter()
-            .fold(0u64, |sum, &(geometry, attributes)| sum.saturating_add(geometry).saturating_add(attributes));
+    pub fn budget_for_all(sizes: impl Into<Sizes>, page_bytes: u64) -> u64 {
+        let sizes: Sizes = sizes.into();
         let page_bytes = round_down(page_bytes.min(u32::MAX as u64)).max(ALIGN);
-        let sum = sum.max(Self::least_budget(sizes));
+        let sum = sizes.sum().max(Self::least_budget(&sizes));
         if sum <= page_bytes {
             return sum;
         }
-        let largest = sizes.iter().map(|&(geometry, attributes)| geometry.max(attributes)).max().unwrap_or(0);
+        let largest = sizes.largest();
         // A page is left for the next one when the next item does not fit: it is filled but for less than that item.
         let filled = page_bytes.saturating_sub(largest.saturating_sub(ALIGN)).max(ALIGN);
         sum.div_ceil(filled).saturating_mul(page_bytes)
@@ -293,12 +297,12 @@ impl Residency {
         }
     }
 
-    /// Number of bricks.
-    pub fn brick_count(&self) -> u32 {
-        (self.bytes.len() / 2) as u32
+    /// Numbers of bricks and of tiles are below this.
+    pub fn number_count(&self) -> u32 {
+        (self.bytes.len() / Kind::ALL.len()) as u32
     }
 
-    /// Bytes of `item`. Its brick must be below [`Self::brick_count`], here and in every other method.
+    /// Bytes of `item`. Its number must be below [`Self::number_count`], here and in every other method.
     pub fn bytes(&self, item: Item) -> u64 {
         self.bytes[item.index()]
     }
@@ -475,7 +479,7 @@ impl Residency {
         let mut used = 0;
         let mut last_end = 0;
         let mut residents = 0;
-        let mut by_kind = [(0u64, 0u64); 2];
+        let mut by_kind = [(0u64, 0u64); Kind::ALL.len()];
         for extent in self.space.extents() {
             let (start, end, item) = (extent.start, extent.end, extent.item);
             check(start >= last_end, &|| format!("{item} at {start} overlaps what ends at {last_end}"))?;
@@ -495,7 +499,7 @@ impl Residency {
         check(used == self.used_bytes, &|| format!("{used} bytes are used, {} are noted", self.used_bytes))?;
         let pages: u64 = self.page_sizes().sum();
         check(pages == self.budget_bytes(), &|| format!("pages of {pages} bytes for {}", self.budget_bytes()))?;
-        for kind in [Kind::Geometry, Kind::Attributes] {
+        for kind in Kind::ALL {
             let c = self.counters.kind(kind);
             let found = by_kind[kind as usize];
             let counted = (c.loaded.wrapping_sub(c.evicted), c.loaded_bytes.wrapping_sub(c.evicted_bytes));

@@ -3,6 +3,7 @@
 use bricks::{Payload, SceneFile};
 
 use super::item::{Item, Kind};
+use super::sizes::Sizes;
 
 /// Why a payload could not be had: a corrupt, truncated or unreadable brick. The text names the item, what was found and
 /// what was expected.
@@ -13,8 +14,18 @@ pub trait PayloadSource: Send + Sync + 'static {
     /// Number of bricks.
     fn brick_count(&self) -> u32;
 
+    /// Number of tiles of textures.
+    fn tile_count(&self) -> u32 {
+        0
+    }
+
+    /// Whether there is such an item.
+    fn has(&self, item: Item) -> bool {
+        item.number < if item.kind == Kind::Tile { self.tile_count() } else { self.brick_count() }
+    }
+
     /// Length of a payload as it is loaded in bytes, a multiple of 16, from the always-resident part: touches no payload.
-    /// The brick is below [`Self::brick_count`]. The source may hold fewer bytes, from which it decodes the payload.
+    /// There is such an item. The source may hold fewer bytes, from which it decodes the payload.
     fn bytes(&self, item: Item) -> u64;
 
     /// Loads a payload into `out`, [`Self::bytes`] long, and verifies *the copy*: after `Ok` it can be indexed freely.
@@ -24,19 +35,22 @@ pub trait PayloadSource: Send + Sync + 'static {
     /// The payload is corrupt or cannot be read.
     fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError>;
 
-    /// Bytes of geometry and attributes of every brick, as [`super::Residency::new`] wants them.
-    fn sizes(&self) -> Vec<(u64, u64)> {
-        (0..self.brick_count())
-            .map(|brick| (self.bytes(Item::geometry(brick)), self.bytes(Item::attributes(brick))))
-            .collect()
+    /// Bytes of everything, as [`super::Residency::new`] wants them.
+    fn sizes(&self) -> Sizes {
+        let brick = |brick| (self.bytes(Item::geometry(brick)), self.bytes(Item::attributes(brick)));
+        Sizes {
+            bricks: (0..self.brick_count()).map(brick).collect(),
+            tiles: (0..self.tile_count()).map(|tile| self.bytes(Item::tile(tile))).collect(),
+        }
     }
 }
 
 impl From<Item> for Payload {
     fn from(item: Item) -> Self {
         match item.kind {
-            Kind::Geometry => Payload::Geometry(item.brick),
-            Kind::Attributes => Payload::Attributes(item.brick),
+            Kind::Geometry => Payload::Geometry(item.number),
+            Kind::Attributes => Payload::Attributes(item.number),
+            Kind::Tile => Payload::Tile(item.number),
         }
     }
 }
@@ -45,6 +59,10 @@ impl PayloadSource for SceneFile {
     fn brick_count(&self) -> u32 {
         // The format numbers bricks by u32; opening checked it.
         self.resident().bricks.len() as u32
+    }
+
+    fn tile_count(&self) -> u32 {
+        self.resident().tiles.len() as u32
     }
 
     fn bytes(&self, item: Item) -> u64 {

@@ -3,17 +3,17 @@
 //! The file's first line describes the cache, every other line one pass:
 //!
 //! ```text
-//! {"format":3,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"passes":1,"sizes":[[1024,512],[2048,512]]}
-//! {"frame":0,"pass":"primary","requests":["g0","g1","a1"],"batches":[1]}
+//! {"format":4,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"passes":1,"sizes":[[1024,512],[2048,512]],"tiles":[256]}
+//! {"frame":0,"pass":"primary","requests":["g0","g1","a1","t0"],"batches":[1,3]}
 //! ```
 //!
-//! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick, as loaded; `g1`
-//! is the geometry of brick 1, `a1` its attributes. A request is one use of an item by a pass: of a resident one that rays met,
+//! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick, as loaded, `tiles` those
+//! of the tiles of textures; `g1` is the geometry of brick 1, `a1` its attributes, `t1` tile 1. A request is one use of an item by a pass: of a resident one that rays met,
 //! or a load. `batches` are the positions in `requests` at which a batch of loads began: what a batch loads is not evicted
 //! before the next one begins.
 //!
 //! A pass meets what is resident before it loads, first geometry, then attributes; so does a replay, whatever the order of the
-//! lines. Which missing bricks a pass asks for depends a little on what was resident, as hits hide what lies behind: a
+//! lines. Tiles come last, and in their order: a lookup needs several at once, so a pass may ask for one again that it had and lost. Which missing bricks a pass asks for depends a little on what was resident, as hits hide what lies behind: a
 //! replay shows what another cache makes of these requests, which are nearly those of the same frames.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,9 +24,10 @@ use serde::{Deserialize, Serialize};
 
 use super::item::{Item, Kind, Policy};
 use super::residency::{Residency, ResidencyError};
+use super::sizes::Sizes;
 
 /// The format number of a trace.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 /// Why a trace cannot be written, read or replayed.
 #[derive(Debug, thiserror::Error)]
@@ -42,13 +43,15 @@ pub enum TraceError {
         /// What is wrong.
         reason: String,
     },
-    /// A request names a brick that has no size.
-    #[error("the request trace asks for {item}, yet there are {bricks} bricks")]
-    NoSuchBrick {
+    /// A request names a brick or a tile that has no size.
+    #[error("the request trace asks for {item}, yet there are {bricks} bricks and {tiles} tiles")]
+    NoSuchItem {
         /// The request.
         item: Item,
         /// Number of bricks.
         bricks: usize,
+        /// Number of tiles.
+        tiles: usize,
     },
     /// The cache to replay against cannot be made.
     #[error(transparent)]
@@ -71,8 +74,8 @@ pub struct PassRequests {
 /// The sequence of requests of a walk.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Trace {
-    /// Bytes of geometry and attributes of every brick.
-    pub sizes: Vec<(u64, u64)>,
+    /// Bytes of everything.
+    pub sizes: Sizes,
     /// The budget it was recorded with, bytes.
     pub budget_bytes: u64,
     /// The length of its pages, bytes.
@@ -92,6 +95,7 @@ struct Head {
     page_bytes: u64,
     passes: usize,
     sizes: Vec<(u64, u64)>,
+    tiles: Vec<u64>,
 }
 
 /// The part of the first line by which another format is told.
@@ -111,8 +115,8 @@ struct Line {
 
 impl Trace {
     /// An empty trace of a walk with this cache.
-    pub fn new(sizes: Vec<(u64, u64)>, budget_bytes: u64, page_bytes: u64, policy: Policy) -> Self {
-        Self { sizes, budget_bytes, page_bytes, policy, passes: Vec::new() }
+    pub fn new(sizes: impl Into<Sizes>, budget_bytes: u64, page_bytes: u64, policy: Policy) -> Self {
+        Self { sizes: sizes.into(), budget_bytes, page_bytes, policy, passes: Vec::new() }
     }
 
     /// Begins a pass; requests count towards it.
@@ -150,7 +154,8 @@ impl Trace {
             budget_bytes: self.budget_bytes,
             page_bytes: self.page_bytes,
             passes: self.passes.len(),
-            sizes: self.sizes.clone(),
+            sizes: self.sizes.bricks.clone(),
+            tiles: self.sizes.tiles.clone(),
         };
         let mut line = |value: serde_json::Result<String>| writeln!(out, "{}", value.map_err(std::io::Error::from)?);
         line(serde_json::to_string(&head))?;
@@ -198,7 +203,8 @@ impl Trace {
                     }
                     let head: Head = parse(&text).map_err(wrong)?;
                     let policy = head.policy.parse().map_err(wrong)?;
-                    trace = Some((Self::new(head.sizes, head.budget_bytes, head.page_bytes, policy), head.passes));
+                    let sizes = Sizes { bricks: head.sizes, tiles: head.tiles };
+                    trace = Some((Self::new(sizes, head.budget_bytes, head.page_bytes, policy), head.passes));
                 }
                 Some((trace, _)) => {
                     let Line { frame, pass, requests, batches } = parse(&text).map_err(wrong)?;
@@ -288,16 +294,16 @@ impl ReplayResult {
     }
 }
 
-/// Replays `trace` against a cache that begins empty: bricks of `sizes`, `budget_bytes` in pages of `page_bytes`.
+/// Replays `trace` against a cache that begins empty: bricks and tiles of `sizes`, `budget_bytes` in pages of `page_bytes`.
 ///
 /// A cache with a policy pins batches as the walk did, and begins a new batch where one does not fit: with the recorded
 /// sizes, budget, pages and policy it does exactly what the recorded cache did.
 ///
 /// # Errors
-/// A request for a brick without a size, or a cache that cannot be made ([`Residency::new`], for Bélády too).
+/// A request for something without a size, or a cache that cannot be made ([`Residency::new`], for Bélády too).
 pub fn replay(
     trace: &Trace,
-    sizes: &[(u64, u64)],
+    sizes: impl Into<Sizes>,
     budget_bytes: u64,
     page_bytes: u64,
     against: Replay,
@@ -306,9 +312,10 @@ pub fn replay(
         Replay::Cache(policy) => policy,
         Replay::Belady => Policy::default(),
     };
-    let mut cache = Residency::new(sizes, budget_bytes, page_bytes, policy)?;
-    if let Some(item) = trace.requests().find(|item| item.brick as usize >= sizes.len()) {
-        return Err(TraceError::NoSuchBrick { item, bricks: sizes.len() });
+    let sizes: Sizes = sizes.into();
+    let mut cache = Residency::new(&sizes, budget_bytes, page_bytes, policy)?;
+    if let Some(item) = trace.requests().find(|&item| sizes.of(item).is_none()) {
+        return Err(TraceError::NoSuchItem { item, bricks: sizes.bricks.len(), tiles: sizes.tiles.len() });
     }
     let stages = stages(trace, |item| cache.bytes(item));
     let requests = stages.iter().map(|stage| stage.requests.len() as u64).sum();
@@ -332,11 +339,10 @@ pub fn replay(
     Ok(result)
 }
 
-/// The requests of one kind of one pass: what is resident of them is met first, then the rest is loaded.
+/// The requests of one kind of one pass: what is resident of them is met first, then the rest is loaded; tiles come in order.
 struct Stage<'a> {
     pass: &'a PassRequests,
-    /// Whether the pass begins with it.
-    is_first: bool,
+    kind: Kind,
     /// Positions in the pass's requests, and items.
     requests: Vec<(usize, Item)>,
 }
@@ -347,18 +353,19 @@ fn stages(trace: &Trace, bytes: impl Fn(Item) -> u64) -> Vec<Stage<'_>> {
         let requests = pass.requests.iter().copied().enumerate();
         requests.filter(|&(_, item)| item.kind == kind && bytes(item) > 0).collect()
     };
-    let both = trace.passes.iter().flat_map(|pass| [(pass, Kind::Geometry), (pass, Kind::Attributes)]);
-    both.map(|(pass, kind)| Stage { pass, is_first: kind == Kind::Geometry, requests: of_kind(pass, kind) }).collect()
+    let all = trace.passes.iter().flat_map(|pass| Kind::ALL.map(|kind| (pass, kind)));
+    all.map(|(pass, kind)| Stage { pass, kind, requests: of_kind(pass, kind) }).collect()
 }
 
 /// One stage against a cache; returns the hits.
 fn replay_stage(cache: &mut Residency, stage: &Stage) -> u64 {
-    if stage.is_first {
+    // A pass begins with geometry.
+    if stage.kind == Kind::Geometry {
         cache.begin_pass();
         cache.unpin_all();
     }
     let (present, missing): (Vec<_>, Vec<_>) =
-        stage.requests.iter().copied().partition(|&(_, item)| cache.slot(item).is_some());
+        stage.requests.iter().copied().partition(|&(_, item)| stage.kind != Kind::Tile && cache.slot(item).is_some());
     for &(_, item) in &present {
         cache.touch(item);
     }
@@ -371,9 +378,12 @@ fn replay_stage(cache: &mut Residency, stage: &Stage) -> u64 {
             in_batch = true;
         }
         if cache.slot(item).is_some() {
-            // Asked for twice.
+            // A tile, or asked for twice.
             hits += 1;
             cache.touch(item);
+            if in_batch && stage.kind == Kind::Tile {
+                cache.pin(item);
+            }
             continue;
         }
         if cache.insert(item).is_err() {

@@ -81,13 +81,15 @@ pub enum StreamError {
         /// What is wrong with it; names the item.
         reason: SourceError,
     },
-    /// The scene has no such brick.
-    #[error("{item} does not exist: the scene has {bricks} bricks")]
-    NoSuchBrick {
+    /// The scene has no such brick or tile.
+    #[error("{item} does not exist: the scene has {bricks} bricks and {tiles} tiles")]
+    NoSuchItem {
         /// The item.
         item: Item,
         /// Number of bricks of the scene.
         bricks: u32,
+        /// Number of tiles of its textures.
+        tiles: u32,
     },
     /// A worker panicked over it; it goes on with other items.
     #[error("{item}: the worker panicked: {message}")]
@@ -237,9 +239,9 @@ impl<D: Destination> Workers<D> {
     /// Several threads may call it at once.
     pub fn load_each(&self, requests: Vec<(Item, D)>) -> Vec<Loaded<D>> {
         let shared = &*self.shared;
-        let bricks = shared.source.brick_count();
+        let (bricks, tiles) = (shared.source.brick_count(), shared.source.tile_count());
         let cache = &shared.host_cache;
-        let known = |item: Item| item.brick < bricks;
+        let known = |item: Item| shared.source.has(item);
         // First every look-up, then every reservation: what this batch finds is in use and not evicted by it.
         let found: Vec<_> =
             requests.iter().map(|&(item, _)| if known(item) { cache.get(item) } else { None }).collect();
@@ -259,7 +261,7 @@ impl<D: Destination> Workers<D> {
             items.push(item);
             if !known(item) {
                 // Never blocks nor fails: there is room for one answer a request, and `answered` is alive.
-                let _ = answers.send((index, destination, Err(StreamError::NoSuchBrick { item, bricks })));
+                let _ = answers.send((index, destination, Err(StreamError::NoSuchItem { item, bricks, tiles })));
                 continue;
             }
             let job = Job { index, item, bytes, destination, cached, reservation, answers: answers.clone() };
@@ -302,8 +304,7 @@ impl<D: Destination> Workers<D> {
             && wishes.capacity() != Some(0)
             && shared.host_cache.budget_bytes() > 0
         {
-            let bricks = shared.source.brick_count();
-            for &item in items.iter().filter(|item| item.brick < bricks && !shared.host_cache.contains(**item)) {
+            for &item in items.iter().filter(|item| shared.source.has(**item) && !shared.host_cache.contains(**item)) {
                 match wishes.try_send(item) {
                     Ok(()) => queued += 1,
                     Err(_) => dropped += 1,

@@ -5,18 +5,28 @@ use super::{occupancy, rule};
 use crate::error::{Flaw, Part};
 use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
-use crate::records::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NEAR_STEPS, NODE_WIDTH, Node, WIDE_HIGH_STEPS};
+use crate::records::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NEAR_STEPS, NODE_WIDTH, Node};
+use crate::records::{TEXTURE_BC7, Texture, WIDE_HIGH_STEPS};
 use crate::resident::Resident;
 
 /// Checks the contents of a payload, as it is loaded, that [`super::payload`] found right. For geometry: quantisation grids of nodes are
 /// finite, every triangle is in exactly one leaf, the brick is as high as it says, vertices lie on the lattice within the
 /// brick's bounds and, if `map` is given, in occupied cells, every triangle starts with its smallest vertex.
+/// Blocks of textures have a mode.
 ///
 /// # Panics
 ///
 /// May, if [`super::payload`] did not find `bytes` right.
 pub fn contents(resident: &Resident, payload: Payload, bytes: &[u8], map: Option<&OccupancyMap>) -> Result<(), Flaw> {
-    let Payload::Geometry(index) = payload else { return Ok(()) };
+    let index = match payload {
+        Payload::Geometry(index) => index,
+        Payload::Texture(texture) => return blocks(payload, &resident.textures[texture as usize], bytes),
+        Payload::Tile(tile) => {
+            let texture = resident.tile_of(tile).map(|(texture, _)| &resident.textures[texture as usize]);
+            return texture.map_or(Ok(()), |texture| blocks(payload, texture, bytes));
+        }
+        Payload::Attributes(_) | Payload::Proxies(_) | Payload::Opacity(_) => return Ok(()),
+    };
     let brick = &resident.bricks[index as usize];
     let object = &resident.objects[brick.object as usize];
     let part = Part::Payload(payload);
@@ -25,6 +35,15 @@ pub fn contents(resident: &Resident, payload: Payload, bytes: &[u8], map: Option
     let vertices = vertices(part, brick, object.step_log2 - object.unit_log2, &bytes[layout.vertices as usize..])?;
     map.map_or(Ok(()), |map| occupancy::vertices(resident, index, &vertices, map))?;
     rotations(part, brick, &vertices, &bytes[layout.indices as usize..])
+}
+
+/// Checks that BC7 blocks have a mode; the format reserves a first byte of zero.
+fn blocks(payload: Payload, texture: &Texture, bytes: &[u8]) -> Result<(), Flaw> {
+    let has_mode = |block: &[u8; 16]| texture.encoding != TEXTURE_BC7 || block[0] != 0;
+    let without = bytes.as_chunks::<16>().0.iter().position(|block| !has_mode(block));
+    rule(without.is_none(), Part::Payload(payload), || {
+        (format!("block {} without a mode", without.unwrap_or(0)), "BC7 blocks of modes 0 to 7")
+    })
 }
 
 /// Checks the quantisation grid of a node and the order of its children's bounds.

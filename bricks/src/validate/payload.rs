@@ -32,9 +32,8 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
             attributes(part, &resident.bricks[index as usize], resident.materials.len() as u32, bytes)
         }
         Payload::Proxies(index) => occupancy::map(resident, index, bytes),
-        Payload::Texture(index) => {
-            padding(part, bytes, resident.textures[index as usize].texel_bytes().unwrap_or(0), bytes.len() as u64)
-        }
+        // Whatever the bytes are, they are texels.
+        Payload::Texture(_) | Payload::Tile(_) => Ok(()),
         Payload::Opacity(index) => {
             padding(part, bytes, resident.opacity_maps[index as usize].texel_bytes(), bytes.len() as u64)
         }

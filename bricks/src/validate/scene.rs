@@ -8,7 +8,7 @@ use crate::records::{
     BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED,
 };
 use crate::records::{MATERIAL_MASK, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE, MAX_TRIANGLE_IDS, NONE};
-use crate::records::{STEP_UNIT_LOG2, WRAP_MIRROR};
+use crate::records::{STEP_UNIT_LOG2, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR};
 use crate::resident::Resident;
 
 /// Every brick belongs to one object, whose bricks are contiguous.
@@ -154,6 +154,7 @@ pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
 }
 
 pub(super) fn textures(resident: &Resident) -> Result<(), Flaw> {
+    let mut tiles = 0;
     for (index, texture) in (0u32..).zip(&resident.textures) {
         let part = Part::Record(Section::Textures, index);
         let sizes = [texture.width, texture.height];
@@ -167,10 +168,25 @@ pub(super) fn textures(resident: &Resident) -> Result<(), Flaw> {
         rule(texture.wrap & 0xffff <= WRAP_MIRROR && texture.wrap >> 16 <= WRAP_MIRROR, part, || {
             (format!("wrap {:#x}", texture.wrap), "known ways of wrapping")
         })?;
-        let bytes = texture.texel_bytes().map_or(0, |bytes| bytes.next_multiple_of(16));
-        length(Payload::Texture(index), texture.texels, bytes)?;
+        rule([TEXTURE_RGBA8, TEXTURE_BC7].contains(&texture.encoding), part, || {
+            (format!("encoding {}", texture.encoding), "a known one")
+        })?;
+        rule(texture.flags & !TEXTURE_SRGB == 0, part, || (format!("flags {:#x}", texture.flags), "known flags"))?;
+        let own = (u64::from(texture.first_tile), u64::from(texture.tile_count));
+        rule(own == (tiles, texture.expected_tiles()), part, || {
+            let expected = format!("{} from {tiles} on, as its size says", texture.expected_tiles());
+            (format!("{} tiles from {} on", own.1, own.0), expected)
+        })?;
+        length(Payload::Texture(index), texture.tail, texture.tail_bytes())?;
+        for tile in tiles..(tiles + own.1).min(resident.tiles.len() as u64) {
+            // A section has less than 2^32 records.
+            length(Payload::Tile(tile as u32), resident.tiles[tile as usize], texture.tile_bytes())?;
+        }
+        tiles += own.1;
     }
-    Ok(())
+    rule(tiles == resident.tiles.len() as u64, Part::Section(Section::Tiles), || {
+        (format!("{} tiles", resident.tiles.len()), format!("{tiles}, those of all textures"))
+    })
 }
 
 pub(super) fn opacity_maps(resident: &Resident) -> Result<(), Flaw> {
@@ -210,6 +226,8 @@ pub(super) fn manifest(resident: &Resident) -> Result<(), Flaw> {
     rule(manifest.has_instances == (resident.instances.len() > 1), part, || {
         (format!("has_instances {}", manifest.has_instances), format!("as of {} instances", resident.instances.len()))
     })?;
+    let (names, textures) = (manifest.texture_names.len(), resident.textures.len());
+    rule(names == textures, part, || (format!("{names} names of textures"), format!("{textures}, one for each")))?;
     let wide = resident.bricks.iter().any(|brick| brick.flags & BRICK_WIDE != 0);
     rule(manifest.has_wide_bricks == wide, part, || (format!("has_wide_bricks {}", manifest.has_wide_bricks), wide))?;
     let empty = resident.leaves.is_empty();

@@ -102,8 +102,9 @@ pub fn seal(bytes: &mut [u8]) {
                     vec![&mut brick.geometry, &mut brick.attributes, &mut brick.proxies]
                 });
             }
-            Section::Textures => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.texels]),
             Section::OpacityMaps => records::<OpacityMap>(bytes, &entry, |map| vec![&mut map.texels]),
+            Section::Textures => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.tail]),
+            Section::Tiles => records::<Span>(bytes, &entry, |span| vec![span]),
             _ => {}
         }
         if let Some(section) = range(bytes, entry.offset, entry.bytes) {

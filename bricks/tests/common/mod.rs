@@ -282,16 +282,31 @@ pub fn scene() -> Scene {
         payloads.insert(Payload::Attributes(index), attributes);
         payloads.insert(Payload::Proxies(index), map.pack());
     }
-    let texture =
-        Texture { width: 4, height: 2, levels: 3, wrap: WRAP_CLAMP | WRAP_MIRROR << 16, texels: Span::default() };
-    let mut texels: Vec<u8> = (1..=44).collect();
-    pad16(&mut texels);
-    payloads.insert(Payload::Texture(0), texels);
     let opacity_map =
         OpacityMap { width: 5, height: 3, wrap: WRAP_MIRROR | WRAP_CLAMP << 16, _reserved: 0, texels: Span::default() };
     let mut alphas: Vec<u8> = (100..115).collect();
     pad16(&mut alphas);
     payloads.insert(Payload::Opacity(0), alphas);
+    let texture = |width, height, levels, encoding, flags, tile_count| Texture {
+        width,
+        height,
+        levels,
+        wrap: WRAP_CLAMP | WRAP_MIRROR << 16,
+        encoding,
+        flags,
+        first_tile: 0,
+        tile_count,
+        tail: Span::default(),
+    };
+    // One that is all tail, and one with two tiles. The bytes are any, but blocks have modes.
+    let textures = vec![texture(4, 2, 3, TEXTURE_RGBA8, TEXTURE_SRGB, 0), texture(130, 3, 8, TEXTURE_BC7, 0, 2)];
+    let texels = |from: u64, bytes: u64| -> Vec<u8> { (from..from + bytes).map(|i| ((i * i / 3) | 1) as u8).collect() };
+    for (index, texture) in (0..).zip(&textures) {
+        payloads.insert(Payload::Texture(index), texels(u64::from(index), texture.tail_bytes()));
+    }
+    for tile in 0..2 {
+        payloads.insert(Payload::Tile(tile), texels(7 + u64::from(tile), textures[1].tile_bytes()));
+    }
 
     let instance =
         |object, base, flags, world_from_object| Instance { object, base, flags, _reserved: 0, world_from_object };
@@ -329,6 +344,7 @@ pub fn scene() -> Scene {
         min: [-1048576.0, -1.5, -2.0],
         max: [7340032.0, 8388608.0, 8388608.0],
         has_textures: true,
+        texture_names: vec!["small.png".to_owned(), "long.png".to_owned()],
         has_alpha_mask: true,
         has_emission: true,
         has_instances: true,
@@ -355,8 +371,9 @@ pub fn scene() -> Scene {
             material(0, MATERIAL_MASK | MATERIAL_DOUBLE_SIDED, [0.0; 3]),
             material(NONE, MATERIAL_UNLIT, [0.0, 3.0, 0.0]),
         ],
-        textures: vec![texture],
         opacity_maps: vec![opacity_map],
+        textures,
+        tiles: vec![Span::default(); 2],
         occupancy,
         ..Resident::default()
     };
@@ -417,8 +434,9 @@ impl Scene {
                 Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry = span,
                 Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes = span,
                 Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies = span,
-                Payload::Texture(texture) => self.resident.textures[texture as usize].texels = span,
                 Payload::Opacity(map) => self.resident.opacity_maps[map as usize].texels = span,
+                Payload::Texture(texture) => self.resident.textures[texture as usize].tail = span,
+                Payload::Tile(tile) => self.resident.tiles[tile as usize] = span,
             }
         }
     }
@@ -498,6 +516,7 @@ impl Image {
             Payload::Geometry(index) | Payload::Attributes(index) | Payload::Proxies(index) => (Section::Bricks, index),
             Payload::Texture(index) => (Section::Textures, index),
             Payload::Opacity(index) => (Section::OpacityMaps, index),
+            Payload::Tile(index) => (Section::Tiles, index),
         };
         let bytes = &mut self.bytes.clone();
         let update = |span: &mut Span| {
@@ -518,6 +537,12 @@ impl Image {
                 self.bytes.copy_from_slice(bytes);
                 self.edit(section, index, |brick| *brick = record);
             }
+            Section::Tiles => {
+                let mut record = self.record::<Span>(section, index);
+                update(&mut record);
+                self.bytes.copy_from_slice(bytes);
+                self.edit(section, index, |span| *span = record);
+            }
             Section::OpacityMaps => {
                 let mut record = self.record::<OpacityMap>(section, index);
                 update(&mut record.texels);
@@ -526,7 +551,7 @@ impl Image {
             }
             _ => {
                 let mut record = self.record::<Texture>(section, index);
-                update(&mut record.texels);
+                update(&mut record.tail);
                 self.bytes.copy_from_slice(bytes);
                 self.edit(section, index, |texture| *texture = record);
             }

@@ -116,8 +116,7 @@ impl<'a> Bench<'a> {
     /// Makes everything resident, so that walks in core begin alike.
     fn load_all(&mut self) -> Result<()> {
         let Renderer { executor, cache, .. } = &mut self.renderer;
-        let items = (0..cache.bytes.len() as u32).flat_map(|brick| [Item::geometry(brick), Item::attributes(brick)]);
-        let items: Vec<Item> = items.collect();
+        let items: Vec<Item> = cache.bytes.sizes().items().map(|(item, _)| item).collect();
         let mut rest = &items[..];
         while !rest.is_empty() {
             let count = cache.load(&mut **executor, rest, AT_A_TIME, &mut PassStats::default())?;
@@ -143,7 +142,7 @@ impl<'a> Bench<'a> {
         renderer.executor.tuning().threshold = scaled_threshold(case.variant.threshold, case.tile);
         if case.cache < 100 {
             let old = &renderer.cache;
-            let sizes: Vec<(u64, u64)> = old.bytes.iter().map(|b| (b.geometry, b.attributes)).collect();
+            let sizes = old.bytes.sizes();
             let page_bytes = renderer.executor.page_bytes();
             let residency = Residency::new(&sizes, old.residency.budget_bytes(), page_bytes, old.residency.policy())?;
             renderer.cache = Cache::new(residency, old.bytes.clone(), None);

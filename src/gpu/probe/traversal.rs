@@ -11,7 +11,7 @@ use crate::gpu::executor::GpuExecutor;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{Hit, NONE, Params, Ray, Surface};
 use crate::kernel::{Directions, Extent, FrameExecutor, Setup, View};
-use crate::schedule::cache::{BrickBytes, Cache};
+use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Step, Tracing, chc, demand, plain};
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
@@ -111,16 +111,15 @@ fn trace(
     rays: &[Ray],
 ) -> Result<[Vec<Traced>; 2], Box<dyn std::error::Error>> {
     let sizes = scene.sizes();
-    let largest = sizes.iter().map(|s| s.0.max(s.1)).max().unwrap_or(0).max(16);
+    let largest = sizes.largest().max(16);
     // Pages as small as their number allows, so that bricks lie in as many of them as the pipelines know.
     let pages = |page_bytes: u64| Residency::budget_for_all(&sizes, page_bytes).div_ceil(page_bytes);
     let most = executor.kernels().pages.cache as u64;
     let page_bytes = (1..).map(|k| k * largest).find(|&bytes| pages(bytes) <= most).unwrap_or(largest);
     let budget = Residency::budget_for_all(&sizes, page_bytes);
-    let weigh = |&(geometry, attributes): &(u64, u64)| BrickBytes { bvh: 0, geometry, attributes };
     let empty = || -> Result<Cache, ResidencyError> {
         let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin)?;
-        Ok(Cache::new(residency, sizes.iter().map(weigh).collect(), None))
+        Ok(Cache::new(residency, SceneBytes::from(&sizes), None))
     };
     let mut cache = empty()?;
     let page_sizes: Vec<u64> = cache.residency.page_sizes().collect();

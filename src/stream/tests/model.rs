@@ -1,13 +1,13 @@
 //! A naive model of the cache: one cell for every 16 bytes, every search by trying every address.
 
-use crate::stream::{Item, Policy};
+use crate::stream::{Item, Policy, Sizes};
 use std::collections::HashMap;
 
 /// A model that behaves as the documentation of `Residency` says, or is broken in one way.
 #[derive(Clone, Debug)]
 pub struct Model {
     policy: Policy,
-    sizes: Vec<(u64, u64)>,
+    sizes: Sizes,
     page_cells: usize,
     cells: Vec<Option<Item>>,
     head: usize,
@@ -45,16 +45,15 @@ pub enum Broken {
 }
 
 /// Bytes of an item.
-pub fn bytes(sizes: &[(u64, u64)], item: Item) -> u64 {
-    let (geometry, attributes) = sizes[item.brick as usize];
-    if item == Item::geometry(item.brick) { geometry } else { attributes }
+pub fn bytes(sizes: &Sizes, item: Item) -> u64 {
+    sizes.of(item).unwrap_or(0)
 }
 
 impl Model {
-    pub fn new(sizes: &[(u64, u64)], budget: u64, page: u64, policy: Policy, broken: Broken) -> Self {
+    pub fn new(sizes: &Sizes, budget: u64, page: u64, policy: Policy, broken: Broken) -> Self {
         Self {
             policy,
-            sizes: sizes.to_vec(),
+            sizes: sizes.clone(),
             page_cells: (page / 16) as usize,
             cells: vec![None; (budget / 16) as usize],
             head: 0,

@@ -2,17 +2,21 @@
 
 use super::model::{Broken, Model, Random, bytes};
 use crate::stream::residency::Placement;
-use crate::stream::{Item, NoRoom, Policy, Residency, ResidencyError, Slot};
+use crate::stream::{Item, NoRoom, Policy, Residency, ResidencyError, Sizes, Slot};
 
 /// Sizes, budget and page of a random small cache; the budget is often the least one.
-fn random_cache(random: &mut Random) -> (Vec<(u64, u64)>, u64, u64) {
+fn random_cache(random: &mut Random) -> (Sizes, u64, u64) {
     let bricks = 1 + random.below(24);
     let most = 1 + random.below(12);
-    let sizes: Vec<(u64, u64)> =
-        (0..bricks).map(|_| (16 * (1 + random.below(most)), 16 * random.below(most + 1))).collect();
+    let brick = |random: &mut Random| (16 * (1 + random.below(most)), 16 * random.below(most + 1));
+    let bricks = (0..bricks).map(|_| brick(random)).collect();
+    // Every other scene has textures, some more tiles than bricks.
+    let tiles = random.below(2) * random.below(40);
+    let tiles = (0..tiles).map(|_| 16 * (1 + random.below(2))).collect();
+    let sizes = Sizes { bricks, tiles };
     let least = Residency::least_budget(&sizes);
     let budget = least + if random.below(3) == 0 { 0 } else { 16 * random.below(4 * most * 2) };
-    let largest = sizes.iter().map(|&(geometry, attributes)| geometry.max(attributes)).max().unwrap();
+    let largest = sizes.largest();
     let page = if random.below(2) == 0 { budget } else { largest + 16 * random.below(2 * most) };
     (sizes, budget, page.max(16))
 }
@@ -26,7 +30,7 @@ fn run_schedule(seed: u64, policy: Policy, broken: Broken, steps: usize) -> Resu
     let address = |slot: Slot| slot.page as u64 * page + slot.offset as u64;
     for step in 0..steps {
         let at = |what: &str| format!("seed {seed}, {policy}, step {step}: {what}");
-        let items = sizes.len() as u64 * 2;
+        let items = sizes.rows() as u64;
         // Every other schedule goes round through everything, with a step aside now and then.
         let index =
             if seed.is_multiple_of(2) && random.below(8) > 0 { step as u64 % items } else { random.below(items) }
@@ -79,7 +83,7 @@ fn run_schedule(seed: u64, policy: Policy, broken: Broken, steps: usize) -> Resu
             }
         }
         cache.validate().map_err(|what| at(&what))?;
-        for index in 0..sizes.len() * 2 {
+        for index in 0..sizes.rows() {
             let item = Item::from_index(index).unwrap();
             if bytes(&sizes, item) > 0 && cache.slot(item).map(address) != model.address(item) {
                 return Err(at(&format!("{item} lies elsewhere")));
@@ -192,7 +196,7 @@ fn the_least_cache_holds_the_two_largest_bricks() {
         let needed = 320 + 64 + 320 + 16;
         assert_eq!(
             Residency::new(&sizes, needed - 1, 1 << 20, policy).unwrap_err(),
-            ResidencyError::CacheTooSmall { needed, given: needed - 16 }
+            ResidencyError::CacheTooSmall { what: "the two largest bricks", needed, given: needed - 16 }
         );
         let mut cache = Residency::new(&sizes, needed, 1 << 20, policy).unwrap();
         for brick in [1, 3] {
@@ -211,6 +215,42 @@ fn the_least_cache_holds_the_two_largest_bricks() {
             assert!(cache.slot(item).is_some());
             cache.validate().unwrap();
         }
+    }
+}
+
+/// The tiles of a lookup find room beside each other, wherever those of them lie that are resident already.
+#[test]
+fn the_least_cache_holds_the_tiles_of_any_lookup() {
+    let sizes = Sizes { bricks: vec![(48, 16), (32, 0)], tiles: vec![64; 30] };
+    let least = Residency::least_budget(&sizes);
+    assert_eq!(least, 2 * 8 * 64);
+    for policy in Policy::ALL {
+        let what = "the tiles of a texture lookup";
+        let refused = Residency::new(&sizes, least - 16, 1 << 20, policy).unwrap_err();
+        assert_eq!(refused, ResidencyError::CacheTooSmall { what, needed: least, given: least - 16 });
+        let mut cache = Residency::new(&sizes, least, 1 << 20, policy).unwrap();
+        let mut random = Random(5);
+        let (mut had, mut full) = (0, 0);
+        for _ in 0..500 {
+            // Something else, of another size, moves what comes next.
+            cache.unpin_all();
+            cache.insert(Item::geometry(random.below(2) as u32)).unwrap();
+            let wanted: Vec<Item> = (0..8).map(|_| Item::tile(random.below(30) as u32)).collect();
+            for &item in &wanted {
+                had += u32::from(cache.slot(item).is_some());
+                cache.insert(item).unwrap();
+                assert!(cache.pin(item));
+            }
+            assert!(wanted.iter().all(|&item| cache.slot(item).is_some()));
+            // Control: a few more do not find room.
+            full +=
+                u32::from((0..30).any(|tile| cache.insert(Item::tile(tile)).is_err() || !cache.pin(Item::tile(tile))));
+            cache.validate().unwrap();
+        }
+        assert!(had > 100 && full == 500, "{policy}: {had}, {full}");
+        let tiles = cache.counters().tiles;
+        assert_eq!(tiles.loaded_bytes, 64 * tiles.loaded);
+        assert!(cache.counters().total().loaded > tiles.loaded);
     }
 }
 
@@ -254,7 +294,7 @@ fn sizes_beyond_32_bits() {
     // Sums beyond 64 bits saturate into a clear error.
     assert_eq!(
         Residency::new(&[(u64::MAX - 15, u64::MAX - 15); 2], 1 << 40, 1 << 30, Policy::Lru).unwrap_err(),
-        ResidencyError::CacheTooSmall { needed: u64::MAX, given: 1 << 40 }
+        ResidencyError::CacheTooSmall { what: "the two largest bricks", needed: u64::MAX, given: 1 << 40 }
     );
     for policy in Policy::ALL {
         let mut cache = Residency::new(&sizes, 5 * item, u64::MAX, policy).unwrap();
@@ -339,8 +379,9 @@ fn counters_tell_loaded_reloaded_and_evicted_apart() {
     let mut cache = Residency::new(&[(64, 32), (64, 32)], 192, 192, Policy::RoundRobin).unwrap();
     cache.begin_pass();
     for _ in 0..2 {
-        for index in 0..4 {
-            cache.insert(Item::from_index(index).unwrap()).unwrap();
+        for brick in 0..2 {
+            cache.insert(Item::geometry(brick)).unwrap();
+            cache.insert(Item::attributes(brick)).unwrap();
         }
     }
     // All fit: the second round hits.
@@ -374,8 +415,8 @@ fn the_budget_for_all_holds_all() {
         let budget = Residency::budget_for_all(&sizes, page);
         for policy in Policy::ALL {
             let mut cache = Residency::new(&sizes, budget, page, policy).unwrap();
-            for _ in 0..sizes.len() * 4 {
-                let item = Item::from_index(random.below(sizes.len() as u64 * 2) as usize).unwrap();
+            for _ in 0..sizes.rows() * 2 {
+                let item = Item::from_index(random.below(sizes.rows() as u64) as usize).unwrap();
                 if cache.slot(item).is_none() {
                     assert_eq!(cache.insert(item).unwrap().evicted, [], "seed {seed}, {policy}");
                 }
@@ -432,7 +473,7 @@ fn fillings_are_counted_within_a_pass() {
                 cache.begin_pass();
                 let mut used = std::collections::BTreeSet::new();
                 for _ in 0..40 {
-                    let item = Item::from_index(random.below(sizes.len() as u64 * 2) as usize).unwrap();
+                    let item = Item::from_index(random.below(sizes.rows() as u64) as usize).unwrap();
                     cache.insert(item).unwrap();
                     used.insert(item);
                 }

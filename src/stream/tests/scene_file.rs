@@ -26,14 +26,14 @@ fn open(bytes: &[u8]) -> (tempfile::TempDir, Arc<SceneFile>) {
 }
 
 fn items(scene: &SceneFile) -> Vec<Item> {
-    (0..scene.brick_count()).flat_map(|brick| [Item::geometry(brick), Item::attributes(brick)]).collect()
+    scene.sizes().items().map(|(item, _)| item).collect()
 }
 
 #[test]
 fn payloads_arrive_as_the_file_gives_them() {
     let (_folder, scene) = open(SCENE);
     let items = items(&scene);
-    assert!(!items.is_empty());
+    assert_eq!(items.iter().filter(|item| item.kind == Kind::Tile).count(), 2);
     let workers = Workers::new(scene.clone(), HostCache::new(1 << 20), 2, 0).unwrap();
     for _ in 0..2 {
         let loaded = workers.load(items.iter().map(|&item| (item, Sink::default())).collect()).unwrap();
@@ -44,11 +44,9 @@ fn payloads_arrive_as_the_file_gives_them() {
             assert_eq!(sink.0, expected, "{item}");
             let span = scene.span(payload);
             let stored = &SCENE[span.offset as usize..(span.offset + span.bytes) as usize];
-            // Geometry as it lies in the file, attributes decoded.
-            assert_eq!(sink.0 == stored, item.kind == Kind::Geometry, "{item}");
-            let [geometry, attributes] = [Payload::Geometry(item.brick), Payload::Attributes(item.brick)];
-            let sizes = (scene.loaded_bytes(geometry), scene.loaded_bytes(attributes));
-            assert_eq!(scene.sizes()[item.brick as usize], sizes);
+            // Geometry and tiles as they lie in the file, attributes decoded.
+            assert_eq!(sink.0 == stored, item.kind != Kind::Attributes, "{item}");
+            assert_eq!(scene.sizes().of(item), Some(scene.loaded_bytes(payload)));
         }
     }
     assert_eq!(workers.stats().read, items.len() as u64);

@@ -1,7 +1,7 @@
 //! Traces: file format, replay against caches, Bélády's rule against exhaustive search.
 
 use super::model::Random;
-use crate::stream::{Counters, Item, Policy, Replay, ReplayResult, Residency, Trace, TraceError, replay};
+use crate::stream::{Counters, Item, Policy, Replay, ReplayResult, Residency, Sizes, Trace, TraceError, replay};
 
 /// Passes that ask for one brick each.
 fn trace_of(bricks: &[u32], sizes: Vec<(u64, u64)>) -> Trace {
@@ -15,13 +15,15 @@ fn trace_of(bricks: &[u32], sizes: Vec<(u64, u64)>) -> Trace {
 
 #[test]
 fn lines_round_trip() {
-    let mut trace = Trace::new(vec![(1024, 512), (2048, 0)], 65536, 4096, Policy::Lru);
+    let sizes = Sizes { bricks: vec![(1024, 512), (2048, 0)], tiles: vec![256, 64] };
+    let mut trace = Trace::new(sizes, 65536, 4096, Policy::Lru);
     trace.request(Item::geometry(0));
     assert_eq!(trace.requests().count(), 0, "there is no pass yet");
     trace.begin_pass(0, "primary");
     trace.request(Item::geometry(1));
     trace.begin_batch();
     trace.request(Item::attributes(0));
+    trace.request(Item::tile(1));
     trace.begin_pass(1, "sha\"dow");
     let mut bytes = Vec::new();
     trace.write(&mut bytes).unwrap();
@@ -29,9 +31,9 @@ fn lines_round_trip() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
         lines[0],
-        r#"{"format":3,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"passes":2,"sizes":[[1024,512],[2048,0]]}"#
+        r#"{"format":4,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"passes":2,"sizes":[[1024,512],[2048,0]],"tiles":[256,64]}"#
     );
-    assert_eq!(lines[1], r#"{"frame":0,"pass":"primary","requests":["g1","a0"],"batches":[1]}"#);
+    assert_eq!(lines[1], r#"{"frame":0,"pass":"primary","requests":["g1","a0","t1"],"batches":[1]}"#);
     assert_eq!(lines.len(), 3);
     assert_eq!(Trace::read(&bytes[..]).unwrap(), trace);
 
@@ -45,12 +47,13 @@ fn lines_round_trip() {
 
 #[test]
 fn a_wrong_line_is_named() {
-    let good = r#"{"format":3,"policy":"lru","budget_bytes":64,"page_bytes":64,"passes":1,"sizes":[[16,16]]}"#;
+    let good =
+        r#"{"format":4,"policy":"lru","budget_bytes":64,"page_bytes":64,"passes":1,"sizes":[[16,16]],"tiles":[]}"#;
     let pass = r#"{"frame":0,"pass":"a","requests":["g0"],"batches":[0]}"#;
     let cases = [
         ("".to_owned(), 1),
         ("{}".to_owned(), 1),
-        (good.replace("\"format\":3", "\"format\":2"), 1),
+        (good.replace("\"format\":4", "\"format\":3"), 1),
         (good.replace("lru", "fifo"), 1),
         (format!("{good}\n{pass}\n{{\"frame\":1"), 3),
         (format!("{good}\n{}", pass.replace("g0", "h0")), 2),
@@ -164,7 +167,8 @@ fn belady_is_the_optimum_for_one_size() {
 /// What a cache does when it pins each batch that it loads, as the render loop does, and the trace of it.
 fn walk(seed: u64, policy: Policy) -> (Trace, Counters) {
     let mut random = Random(seed);
-    let sizes: Vec<(u64, u64)> = (0..30).map(|_| (16 * (1 + random.below(9)), 16 * random.below(3))).collect();
+    let bricks = (0..30).map(|_| (16 * (1 + random.below(9)), 16 * random.below(3))).collect();
+    let sizes = Sizes { bricks, tiles: (0..30).map(|_| 16 * (1 + random.below(2))).collect() };
     let budget = Residency::least_budget(&sizes) + 16 * random.below(40);
     let mut cache = Residency::new(&sizes, budget, 256, policy).unwrap();
     let mut trace = Trace::new(sizes, budget, 256, policy);
@@ -195,6 +199,24 @@ fn walk(seed: u64, policy: Policy) -> (Trace, Counters) {
                 });
                 let loaded = loaded.count();
                 rest.drain(..loaded);
+            }
+        }
+        // Tiles are asked for in turns, some again and again, resident ones in batches as well.
+        for _ in 0..3 {
+            for item in (0..4).map(|_| Item::tile(random.below(30) as u32)).collect::<Vec<_>>() {
+                if cache.slot(item).is_some() {
+                    cache.touch(item);
+                    trace.request(item);
+                }
+            }
+            cache.unpin_all();
+            trace.begin_batch();
+            for item in (0..6).map(|_| Item::tile(random.below(30) as u32)).collect::<Vec<_>>() {
+                if cache.insert(item).is_err() {
+                    break;
+                }
+                cache.pin(item);
+                trace.request(item);
             }
         }
     }
@@ -232,7 +254,7 @@ fn replay_checks_what_it_is_given() {
     let trace = trace_of(&[0, 1, 2], vec![(16, 0); 3]);
     assert!(matches!(
         replay(&trace, &[(16, 0); 2], 64, 64, Replay::Belady),
-        Err(TraceError::NoSuchBrick { item, bricks: 2 }) if item == Item::geometry(2)
+        Err(TraceError::NoSuchItem { item, bricks: 2, tiles: 0 }) if item == Item::geometry(2)
     ));
     for against in Replay::ALL {
         assert!(matches!(replay(&trace, &[(16, 0); 3], 16, 64, against), Err(TraceError::Cache(_))));

@@ -23,6 +23,7 @@ enum Fault {
 #[derive(Default)]
 struct Mock {
     bricks: u32,
+    tiles: u32,
     faults: HashMap<Item, Fault>,
     copies: AtomicU64,
     /// When set, every copy waits for one message.
@@ -40,8 +41,9 @@ impl Drop for Bomb {
 
 fn payload(item: Item) -> Vec<u8> {
     let bytes = match item.kind {
-        Kind::Geometry => 16 * (1 + item.brick as usize % 7),
-        Kind::Attributes => 16 * (item.brick as usize % 3),
+        Kind::Geometry => 16 * (1 + item.number as usize % 7),
+        Kind::Attributes => 16 * (item.number as usize % 3),
+        Kind::Tile => 64,
     };
     (0..bytes).map(|byte| (byte + item.index() * 31) as u8).collect()
 }
@@ -49,6 +51,10 @@ fn payload(item: Item) -> Vec<u8> {
 impl PayloadSource for Mock {
     fn brick_count(&self) -> u32 {
         self.bricks
+    }
+
+    fn tile_count(&self) -> u32 {
+        self.tiles
     }
 
     fn bytes(&self, item: Item) -> u64 {
@@ -125,7 +131,7 @@ fn every_destination_gets_its_payload_in_the_order_of_requests() {
         assert_ne!(payload(Item::geometry(3)), payload(Item::geometry(10)));
         let stats = workers.stats();
         assert_eq!((stats.read, stats.cached, stats.failed), (400, 0, 0));
-        assert_eq!(stats.read_bytes, mock.sizes().iter().map(|size| size.0 + size.1).sum::<u64>());
+        assert_eq!(stats.read_bytes, mock.sizes().sum());
         assert!(workers.load(Vec::new()).unwrap().is_empty());
     }
 }
@@ -178,7 +184,7 @@ fn a_panicking_destination_is_an_error() {
 fn a_brick_beyond_the_last_is_an_error() {
     let (workers, mock) = start(Mock { bricks: 4, ..Mock::default() }, 1 << 20, 1);
     let loaded = workers.load_each(requests([Item::geometry(4), Item::geometry(3)]));
-    assert!(matches!(loaded[0].result, Err(StreamError::NoSuchBrick { bricks: 4, .. })));
+    assert!(matches!(loaded[0].result, Err(StreamError::NoSuchItem { bricks: 4, .. })));
     assert!(loaded[1].result.is_ok());
     assert_eq!(workers.prefetch(&[Item::geometry(9)]), 0);
     assert_eq!(mock.copies.load(Ordering::Relaxed), 1);
@@ -255,7 +261,7 @@ fn the_host_cache_answers_the_second_time() {
 
 /// The statistics after a seeded sequence of batches through a host cache far too small for them.
 fn stats_of_a_walk(threads: usize, seed: u64) -> impl PartialEq + std::fmt::Debug {
-    let (workers, _) = start(Mock { bricks: 60, ..Mock::default() }, 1200, threads);
+    let (workers, _) = start(Mock { bricks: 60, tiles: 40, ..Mock::default() }, 1200, threads);
     let mut random = Random(seed);
     for _ in 0..60 {
         let count = random.below(30);

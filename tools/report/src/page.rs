@@ -370,7 +370,7 @@ fn memory(walk: &Walk) -> Markup {
             None => p.note { "The system did not tell how much memory the walk used." },
         }
         @if let Some(bytes) = walk.number("texture_bytes_resident") {
-            p { "Textures on the device: " (format::bytes(bytes)) ", outside of the cache's budget." }
+            p { "Coarse levels of textures on the device: " (format::bytes(bytes)) ", outside of the cache's budget." }
         }
     }
 }

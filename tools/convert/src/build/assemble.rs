@@ -145,6 +145,7 @@ pub(super) fn manifest(
         min,
         max,
         has_textures: any(&|material| material.base_color_texture != bricks::NONE),
+        texture_names: Vec::new(),
         has_alpha_mask: any(&|material| material.flags & MATERIAL_MASK != 0),
         has_alpha_blend: any(&|material| material.flags & MATERIAL_BLEND != 0),
         has_emission: any(&|material| material.emission.iter().any(|x| *x > 0.0)),
@@ -180,8 +181,7 @@ pub(super) fn summary(resident: &Resident, bytes_file: u64, phases: Vec<(&'stati
         bytes_attributes: resident.bricks.iter().map(|brick| brick.attributes.bytes).sum(),
         bytes_proxies: resident.bricks.iter().map(|brick| brick.proxies.bytes).sum::<u64>()
             + size_of_val(resident.occupancy.as_slice()) as u64,
-        bytes_textures: resident.textures.iter().map(|texture| texture.texels.bytes).sum::<u64>()
-            + resident.opacity_bytes(),
+        bytes_textures: resident.texture_bytes(),
         bytes_file,
         warnings: manifest.warnings.clone(),
         phases,

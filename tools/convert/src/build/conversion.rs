@@ -75,7 +75,8 @@ impl Conversion<'_> {
 
     fn write_in_memory(&self, writer: &mut Writer, clock: &mut Clock) -> Result<Written, BuildError> {
         let Self { outline, plan, settings, progress, .. } = self;
-        let textures = textures::write(self.source, rayon::current_num_threads(), writer, progress)?;
+        let textures =
+            textures::write(self.source, self.settings.textures, rayon::current_num_threads(), writer, progress)?;
         let opacities = self.write_opacity(&textures, writer)?;
         let mut warnings = textures.warnings.clone();
         clock.end("textures");
@@ -195,7 +196,7 @@ impl Conversion<'_> {
         let mut textures = Textures::default();
         let words = journal.step(Step::Textures, || {
             // One at a time, for images may be large.
-            textures = textures::write(self.source, 1, writer, progress)?;
+            textures = textures::write(self.source, settings.textures, 1, writer, progress)?;
             Ok(textures.to_words(writer.checkpoint()?))
         })?;
         let textures = Textures::from_words(&words, outline).ok_or_else(|| journal.damaged())?;
@@ -264,12 +265,16 @@ impl Conversion<'_> {
             materials,
             textures: textures.records,
             opacity_maps: opacities.records,
+            tiles: textures.tiles,
             occupancy,
         };
         let dropped = Dropped::count(&resident, &cuts, &rounded_away);
         dropped.warn(&mut warnings);
         let made = (self.outline, &self.plan, self.settings);
-        resident.manifest = assemble::manifest(&resident, made, &used_materials, &dropped, warnings);
+        resident.manifest = Manifest {
+            texture_names: textures.names,
+            ..assemble::manifest(&resident, made, &used_materials, &dropped, warnings)
+        };
         clock.end("top level");
         writer.finish(&resident)?;
         clock.end("finish");

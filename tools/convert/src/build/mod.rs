@@ -45,7 +45,7 @@ mod voxelise_tests;
 mod wide;
 
 pub use error::BuildError;
-pub use settings::{BuildSettings, BuildSummary};
+pub use settings::{BuildSettings, BuildSummary, TextureEncoding};
 pub use wide::ITEM_COST as TRIANGLE_COST;
 
 use crate::progress::Progress;

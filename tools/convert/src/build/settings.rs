@@ -7,6 +7,16 @@ use std::time::Duration;
 /// Largest number of triangles a brick may be allowed.
 const LARGEST_BRICK: u32 = 1 << 20;
 
+/// How textures are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TextureEncoding {
+    /// As blocks of BC7, a byte a texel.
+    #[default]
+    Bc7,
+    /// As they are, four bytes a texel.
+    Raw,
+}
+
 /// How to build.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BuildSettings {
@@ -30,6 +40,8 @@ pub struct BuildSettings {
     pub fast: bool,
     /// Stores an occupancy map with every brick. Changes nothing else of the scene.
     pub proxies: bool,
+    /// How textures are stored.
+    pub textures: TextureEncoding,
     /// Folder for the scratch folder; `None`: that of the output.
     pub scratch: Option<PathBuf>,
     /// Continues an interrupted conversion of the same source with the same settings, if there is one. Only a conversion
@@ -49,6 +61,7 @@ impl Default for BuildSettings {
             memory_bytes: None,
             fast: false,
             proxies: true,
+            textures: TextureEncoding::default(),
             scratch: None,
             resume: false,
         }

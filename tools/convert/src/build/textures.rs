@@ -1,21 +1,27 @@
-//! Mip chains of textures, averaged in linear light.
+//! Mip chains of textures, averaged in linear light, cut into tiles.
 
 use super::attributes::MeanColors;
 use super::error::BuildError;
 use super::journal::{WordReader, Words};
+use super::settings::TextureEncoding;
 use crate::progress::Progress;
 use crate::source::{Outline, Source, SourceTexture};
-use bricks::{MAX_TEXTURE_SIZE, Material, NONE, Span, Texture, WRAP_MIRROR, WRAP_REPEAT, Writer};
+use block_compression::encode::compress_rgba8;
+use block_compression::{BC7Settings, CompressionVariant};
+use bricks::{BLOCK_TEXELS, MAX_TEXTURE_SIZE, Material, NONE, Span, TILE_TEXELS, Texture, Writer};
+use bricks::{TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// A texture with all its levels.
 #[derive(Debug)]
 pub(super) struct EncodedTexture {
-    /// The record, without the place of its payload.
+    /// The record, without the places of its payloads.
     pub record: Texture,
-    /// The payload.
-    pub texels: Vec<u8>,
+    /// Payloads of the tiles.
+    pub tiles: Vec<Vec<u8>>,
+    /// Payload of the tail.
+    pub tail: Vec<u8>,
     /// Mean linear RGB.
     pub mean: [f32; 3],
 }
@@ -36,6 +42,10 @@ pub(super) struct Textures {
     pub materials: Vec<Material>,
     /// Records of the textures in use.
     pub records: Vec<Texture>,
+    /// Their tiles.
+    pub tiles: Vec<Span>,
+    /// Their names in the source.
+    pub names: Vec<String>,
     /// What the source warned of, and which textures were left out.
     pub warnings: Vec<String>,
     /// Mean linear RGB of the textures.
@@ -48,6 +58,7 @@ pub(super) struct Textures {
 /// warning.
 pub(super) fn write(
     source: &dyn Source,
+    encoding: TextureEncoding,
     at_once: usize,
     writer: &mut Writer,
     progress: &Progress,
@@ -59,11 +70,14 @@ pub(super) fn write(
     progress.phase("textures", used.len() as u64);
     for some in used.chunks(at_once) {
         progress.check()?;
-        let read = |&index: &usize| source.texture(index).map(|texture| encode(&texture));
+        let read = |&index: &usize| source.texture(index).map(|texture| encode(&texture, encoding));
         let encoded: Vec<_> = some.par_iter().with_max_len(1).map(read).collect();
         for (&index, texture) in some.iter().zip(encoded) {
             match texture {
-                Ok(texture) => stored.push(index, texture?, writer)?,
+                Ok(texture) => {
+                    stored.push(index, texture?, writer)?;
+                    stored.names.push(names[index].clone());
+                }
                 Err(error) => stored.warnings.push(format!("{error}; the texture is left out")),
             }
             progress.advance(1);
@@ -76,7 +90,11 @@ pub(super) fn write(
 impl Textures {
     fn push(&mut self, index: usize, texture: EncodedTexture, writer: &mut Writer) -> Result<(), BuildError> {
         self.new_of_old[index] = self.records.len() as u32;
-        self.records.push(Texture { texels: writer.write(&texture.texels)?, ..texture.record });
+        let first_tile = self.tiles.len() as u32;
+        for tile in &texture.tiles {
+            self.tiles.push(writer.write(tile)?);
+        }
+        self.records.push(Texture { first_tile, tail: writer.write(&texture.tail)?, ..texture.record });
         self.means.push(texture.mean);
         Ok(())
     }
@@ -102,12 +120,23 @@ impl Textures {
 
     /// For the journal: first how far the scene file is written and the payloads.
     pub fn to_words(&self, position: u64) -> Vec<u64> {
-        let spans: Vec<Span> = self.records.iter().map(|record| record.texels).collect();
+        // As they were written.
+        let spans = self.records.iter().flat_map(|record| {
+            let tiles = &self.tiles[record.first_tile as usize..][..record.tile_count as usize];
+            tiles.iter().copied().chain([record.tail])
+        });
+        let spans: Vec<Span> = spans.collect();
         let mut words = Words::default();
-        words.put(position).put_records(&spans).put_records(&self.records).put_records(&self.means);
-        words.put_records(&self.new_of_old).put(self.warnings.len() as u64);
-        for warning in &self.warnings {
-            words.put_records(warning.as_bytes());
+        words
+            .put(position)
+            .put_records(&spans)
+            .put_records(&self.records)
+            .put_records(&self.tiles)
+            .put_records(&self.means);
+        words.put_records(&self.new_of_old);
+        for texts in [&self.names, &self.warnings] {
+            words.put(texts.len() as u64);
+            texts.iter().for_each(|text| _ = words.put_records(text.as_bytes()));
         }
         words.0
     }
@@ -117,11 +146,14 @@ impl Textures {
         let mut words = WordReader(words);
         words.take()?;
         words.take_records::<Span>()?;
-        let (records, means) = (words.take_records()?, words.take_records()?);
+        let (records, tiles, means) = (words.take_records()?, words.take_records()?, words.take_records()?);
         let new_of_old: Vec<u32> = words.take_records()?;
-        let count = words.take()?;
-        let warnings = (0..count).map(|_| String::from_utf8(words.take_records()?).ok()).collect::<Option<_>>()?;
-        let mut stored = Self { materials: Vec::new(), records, warnings, means, new_of_old };
+        let mut texts = || -> Option<Vec<String>> {
+            let count = words.take()?;
+            (0..count).map(|_| String::from_utf8(words.take_records()?).ok()).collect()
+        };
+        let (names, warnings) = (texts()?, texts()?);
+        let mut stored = Self { materials: Vec::new(), records, tiles, names, warnings, means, new_of_old };
         if stored.new_of_old.len() != outline.textures.len() {
             return None;
         }
@@ -136,8 +168,8 @@ pub(super) fn sound_wrap(texture: &SourceTexture) -> u32 {
     if is_known { texture.wrap } else { WRAP_REPEAT | WRAP_REPEAT << 16 }
 }
 
-/// Makes the mip chain of a texture.
-pub(super) fn encode(source: &SourceTexture) -> Result<EncodedTexture, BuildError> {
+/// Makes the mip chain of a texture and encodes it.
+pub(super) fn encode(source: &SourceTexture, encoding: TextureEncoding) -> Result<EncodedTexture, BuildError> {
     let (width, height) = (source.width, source.height);
     let rule = |ok: bool, what: &str, found: String, expected: String| {
         let what = format!("texture \"{}\": {what}", source.name);
@@ -150,16 +182,65 @@ pub(super) fn encode(source: &SourceTexture) -> Result<EncodedTexture, BuildErro
     let wrap = sound_wrap(source);
 
     let levels = width.max(height).ilog2() + 1;
-    let mut texels = source.rgba.clone();
+    let (encoding, grid) = match encoding {
+        TextureEncoding::Raw => (TEXTURE_RGBA8, None),
+        // The fastest settings: the next ones take six times as long.
+        TextureEncoding::Bc7 if source.rgba.iter().skip(3).step_by(4).all(|&alpha| alpha == 255) => {
+            (TEXTURE_BC7, Some(BC7Settings::opaque_ultra_fast()))
+        }
+        TextureEncoding::Bc7 => (TEXTURE_BC7, Some(BC7Settings::alpha_ultrafast())),
+    };
+    let mut record = Texture { width, height, levels, wrap, encoding, flags: TEXTURE_SRGB, ..Texture::default() };
+    let (mut tiles, mut tail) = (Vec::new(), Vec::new());
     let mut level = Image { width: width as usize, height: height as usize, texels: decode(&source.rgba) };
-    for _ in 1..levels {
-        level = level.halve();
-        encode_level(&level, &mut texels);
+    let mut texels = source.rgba.clone();
+    for number in 0..levels {
+        if number > 0 {
+            level = level.halve();
+            texels.clear();
+            encode_level(&level, &mut texels);
+        }
+        let size = record.size(number);
+        if number < record.tail_level() {
+            let [columns, rows] = record.tiles_of(number);
+            let of_level = (0..columns * rows).into_par_iter().map(|tile| {
+                let corner = [tile % columns * TILE_TEXELS, tile / columns * TILE_TEXELS];
+                encode_grid(cut(&texels, size, corner, [TILE_TEXELS; 2]), TILE_TEXELS, grid)
+            });
+            tiles.par_extend(of_level);
+        } else {
+            let padded = size.map(|side| side.next_multiple_of(BLOCK_TEXELS));
+            tail.extend(encode_grid(cut(&texels, size, [0; 2], padded), padded[0], grid));
+        }
     }
+    record.tile_count = tiles.len() as u32;
     let [red, green, blue, _] = level.texels[0];
-    texels.resize(texels.len().next_multiple_of(16), 0);
-    let record = Texture { width, height, levels, wrap, texels: bricks::Span::default() };
-    Ok(EncodedTexture { record, texels, mean: [red, green, blue] })
+    Ok(EncodedTexture { record, tiles, tail, mean: [red, green, blue] })
+}
+
+/// The texels from `corner` on, `to` each way, of an image of `size`; beyond its edges its last texels are repeated.
+fn cut(rgba: &[u8], size: [u32; 2], corner: [u32; 2], to: [u32; 2]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(to[0] as usize * to[1] as usize * 4);
+    for y in 0..to[1] {
+        let row = (corner[1] + y).min(size[1] - 1) as usize * size[0] as usize;
+        let inside = (size[0] - corner[0]).min(to[0]) as usize;
+        let first = row + corner[0] as usize;
+        out.extend_from_slice(&rgba[4 * first..4 * (first + inside)]);
+        let last = 4 * (row + size[0] as usize - 1);
+        for _ in inside..to[0] as usize {
+            out.extend_from_slice(&rgba[last..last + 4]);
+        }
+    }
+    out
+}
+
+/// Texels in rows of `width`, as blocks if there are settings for them.
+fn encode_grid(rgba: Vec<u8>, width: u32, settings: Option<BC7Settings>) -> Vec<u8> {
+    let Some(settings) = settings else { return rgba };
+    let mut blocks = vec![0; rgba.len() / 4];
+    let height = (rgba.len() / 4) as u32 / width;
+    compress_rgba8(CompressionVariant::BC7(settings), &rgba, &mut blocks, width, height, 4 * width);
+    blocks
 }
 
 /// Linear RGBA.
@@ -289,9 +370,9 @@ mod tests {
     fn means_are_those_of_linear_light_for_odd_sizes_too() {
         for (width, height) in [(1, 1), (2, 2), (5, 3), (7, 1), (1, 6), (13, 11), (64, 3)] {
             let source = texture(width, height, |x, y| [(x * 19 % 256) as u8, (y * 83 % 256) as u8, 255, 128]);
-            let encoded = encode(&source).unwrap();
+            let encoded = encode(&source, TextureEncoding::Raw).unwrap();
             assert_eq!(encoded.record.levels, width.max(height).ilog2() + 1);
-            assert_eq!(Some(encoded.texels.len() as u64), encoded.record.texel_bytes().map(|b| b.next_multiple_of(16)));
+            assert_eq!(encoded.tail.len() as u64, encoded.record.tail_bytes());
             let linear = decode(&source.rgba);
             for k in 0..3 {
                 let mean = linear.iter().map(|texel| f64::from(texel[k])).sum::<f64>() / linear.len() as f64;
@@ -299,8 +380,9 @@ mod tests {
             }
         }
         // Half black, half white is lighter than the mean of the codes.
-        let encoded = encode(&texture(2, 1, |x, _| [(x * 255) as u8; 4])).unwrap();
-        assert_eq!(encoded.texels[8..12], [188, 188, 188, 128]);
+        let encoded = encode(&texture(2, 1, |x, _| [(x * 255) as u8; 4]), TextureEncoding::Raw).unwrap();
+        let level_1 = encoded.record.tail_offset(1) as usize;
+        assert_eq!(encoded.tail[level_1..level_1 + 4], [188, 188, 188, 128]);
     }
 
     #[test]
@@ -318,8 +400,8 @@ mod tests {
     #[test]
     fn wrong_lengths_are_errors() {
         let mut source = texture(3, 3, |_, _| [0; 4]);
-        assert!(encode(&source).is_ok());
+        assert!(encode(&source, TextureEncoding::Raw).is_ok());
         source.rgba.pop();
-        assert!(matches!(encode(&source), Err(BuildError::Inconsistent { .. })));
+        assert!(matches!(encode(&source, TextureEncoding::Raw), Err(BuildError::Inconsistent { .. })));
     }
 }
