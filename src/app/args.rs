@@ -395,6 +395,20 @@ pub struct WalkArgs {
     pub optimisations: OptimisationArgs,
 }
 
+impl WalkArgs {
+    /// Refuses options that do not go together.
+    ///
+    /// # Errors
+    /// Which option to leave out.
+    pub fn check(&self) -> Result<(), super::Usage> {
+        if self.pictures.taa && self.aov {
+            let text = "--aov: depth, normals, ids and albedo are taken through the centres of pixels, which --taa moves; leave one out";
+            return Err(super::Usage(text.into()));
+        }
+        Ok(())
+    }
+}
+
 /// Options of `trace`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]

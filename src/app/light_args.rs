@@ -29,7 +29,7 @@ pub struct EffectArgs {
     #[arg(long, value_name = "N", default_value = "20", value_parser = direction_count)]
     pub diffuse_rays: u32,
     /// Greatest random turn about the normal, a pixel, of the directions of ao and diffuse, in degrees from 0 to 360, or full;
-    /// a small one keeps rays of neighbouring pixels alike
+    /// a small one keeps rays of neighbouring pixels alike. Not with --denoise or --taa, which give every pixel directions of its own
     #[arg(long, value_name = "DEG|full", default_value = "36", value_parser = turn)]
     pub rotation: f32,
 }

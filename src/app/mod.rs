@@ -79,6 +79,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Repair(args) => repair::run(args),
         Command::Walk(args) => {
             args.optimisations.check(&args.stream)?;
+            args.check()?;
             walk::run(args)
         }
         Command::Trace(args) => {

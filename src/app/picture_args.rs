@@ -25,6 +25,15 @@ pub struct PictureArgs {
     /// Frames a second of the video, 1 to 1000
     #[arg(long, value_name = "N", default_value = "30", value_parser = |s: &str| ranged(s, 1, 1000))]
     pub video_fps: u32,
+    /// Take the noise of few samples out of the frames: variance-guided filtering over frames and neighbours (SVGF), which trades noise
+    /// for a small error; without it the picture is the unbiased estimate. It runs on the processor, whatever the device. EXR has the
+    /// filtered radiance. summary.json says what energy was cut off fireflies (denoise)
+    #[arg(long)]
+    pub denoise: bool,
+    /// Temporal anti-aliasing: samples lie at other points of their pixels in every frame, and frames are averaged where the world was
+    /// seen before. AOVs are taken through the centres of pixels: not together with --aov
+    #[arg(long)]
+    pub taa: bool,
 }
 
 fn exposure(text: &str) -> Result<Exposure, String> {

@@ -5,6 +5,7 @@ use super::lighting::Lighting;
 use super::optimisation_args::names;
 use super::pictures::Pictures;
 use crate::kernel::opacity;
+use crate::render::denoise::Resolve;
 use crate::render::{Renderer, Schedule};
 use crate::stats::Record;
 use serde_json::{Map, Value, json};
@@ -16,8 +17,7 @@ const FORMAT: u32 = 1;
 pub fn of_walk(
     args: &WalkArgs,
     renderer: &mut Renderer,
-    pictures: &Pictures,
-    lighting: &Lighting,
+    (pictures, lighting, resolve): (&Pictures, &Lighting, &Resolve),
     records: &[Record],
     frames: u32,
 ) -> Value {
@@ -91,6 +91,8 @@ pub fn of_walk(
         },
         "frames": frames,
         "pictures": pictures.summary(args),
+        "denoise": resolve.report(),
+        "taa": resolve.taa.is_some(),
         "auto": (renderer.settings.schedule == Schedule::Auto).then(|| json!({
             "switches": renderer.auto.switches,
             "passes_last_by": renderer.auto.in_force().into_iter().collect::<std::collections::BTreeMap<_, _>>(),

@@ -1,12 +1,13 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::args::WalkArgs;
-use super::lighting::{Lighting, lighting};
+use super::lighting::lighting;
 use super::output::atomic;
 use super::pictures::Pictures;
 use super::session::{Session, open_scene, write_requests};
 use super::summary;
 use crate::kernel::Extent;
+use crate::render::denoise::Resolve;
 use crate::render::{BATCH_SAMPLES, Captures, Light, RenderError, RenderSettings, Renderer, Schedule};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
@@ -53,6 +54,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     let mut renderer = lit_renderer(session, args, lighting.light.clone());
     renderer.captures = args.measure_error.then(Captures::default);
     let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
+    let mut resolve = Resolve::new(args.pictures.denoise, args.pictures.taa);
     let mut pictures = Pictures::create(&frames_folder, args)?;
     let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
     let progress = Progress::new();
@@ -89,6 +91,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         if let Some(prefetcher) = prefetcher.as_mut().filter(|_| frame + 1 < args.frames) {
             look_ahead(&mut renderer, prefetcher, &camera);
         }
+        resolve.frame(&mut output);
         pictures.frame(frame, path.frame_time(args.frames), &output.pixels)?;
         for record in output.records {
             let line = lines.push(&record)?;
@@ -102,7 +105,8 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     }
     progress.finish();
     pictures.finish(args.json)?;
-    finish(args, &mut renderer, &pictures, &lighting, &records, finished)?;
+    let summary = summary::of_walk(args, &mut renderer, (&pictures, &lighting, &resolve), &records, finished);
+    finish(args, &renderer, &summary)?;
     if finished < args.frames {
         bail!("interrupted after {finished} of {} frames; {} holds what is done", args.frames, args.output.display());
     }
@@ -182,6 +186,8 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         seed: (args.seed ^ (args.seed >> 32)) as u32,
         tracing: Tracing { measure_needed: args.measure_needed, optimisations: args.optimisations.optimisations() },
         aov: args.aov,
+        guides: args.pictures.denoise || args.pictures.taa,
+        taa: args.pictures.taa,
     }
 }
 
@@ -204,16 +210,8 @@ pub fn look_ahead(renderer: &mut Renderer, prefetcher: &mut Prefetcher, camera: 
     workers.prefetch(&items);
 }
 
-fn finish(
-    args: &WalkArgs,
-    renderer: &mut Renderer,
-    pictures: &Pictures,
-    lighting: &Lighting,
-    records: &[Record],
-    frames: u32,
-) -> Result<()> {
-    let summary = summary::of_walk(args, renderer, pictures, lighting, records, frames);
-    let text = serde_json::to_string_pretty(&summary)? + "\n";
+fn finish(args: &WalkArgs, renderer: &Renderer, summary: &serde_json::Value) -> Result<()> {
+    let text = serde_json::to_string_pretty(summary)? + "\n";
     atomic::write(&args.output.join("summary.json"), text.as_bytes())?;
     write_requests(&args.stream, &renderer.cache)?;
     brickwalk_report::write(&args.output)?;

@@ -6,10 +6,10 @@ use super::random::{disc_point, tangent};
 use super::rays::{RaySet, start_hit};
 use super::scene::Bound;
 use super::shade::surface_share;
-use super::vector::{Vec3, cross, dot, each, most3, normalize, xyz};
+use super::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
 use crate::kernel::layout::{
-    EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT, Ray,
-    Surface, T_INFINITE,
+    EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT,
+    PARAM_SCATTER, Ray, Surface, T_INFINITE,
 };
 use crate::math::exact::barrier;
 use crate::math::sampling::random2;
@@ -120,14 +120,22 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
     });
 }
 
-/// The pass's direction around the normal, turned about it at random within limits.
+/// The pass's direction around the normal, turned about it at random within limits, or scattered over the hemisphere.
 fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
     let p = bound.params;
-    let a = p.around;
-    let angle = a[3] * random2(index as u32, p.stream, p.seed)[0];
+    let mut a = p.around;
+    let r = random2(index as u32, p.stream, p.seed);
+    let angle = a[3] * r[0];
     let (c, s) = (angle.cos(), angle.sin());
     let x = tangent(normal);
     let y = cross(normal, x);
+    if bound.has(PARAM_SCATTER) {
+        // The same bits everywhere: near 1 the height of the direction is sensitive to them.
+        let squared = barrier(barrier(a[0] * a[0]) + barrier(a[1] * a[1]));
+        let moved = barrier(squared + r[1]).fract();
+        let scale = (moved / most(squared, 1e-6)).sqrt();
+        a = [scale * a[0], scale * a[1], (1.0 - moved).sqrt(), a[3]];
+    }
     let turned = [c * a[0] - s * a[1], s * a[0] + c * a[1], a[2]];
     normalize(each(|k| turned[0] * x[k] + turned[1] * y[k] + turned[2] * normal[k]))
 }

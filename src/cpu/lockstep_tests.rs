@@ -223,6 +223,8 @@ fn render(
             samples: 1,
             seed: 3,
             tracing,
+            guides: false,
+            taa: false,
             aov: false,
         },
         light,
@@ -235,6 +237,8 @@ fn render(
     };
     let path = path_from_bounds(manifest.min, manifest.max);
     for frame in 0..2 {
+        // The second frame scatters directions.
+        renderer.settings.guides = frame == 1;
         renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
     }
 }

@@ -15,6 +15,8 @@ pub struct Directions {
     pub diffuse: u32,
     /// Greatest random turn about the normal, radians.
     pub turn: f32,
+    /// Every pixel has directions of its own, all over the hemisphere: what filters over pixels and frames needs.
+    pub scatter: bool,
 }
 
 impl Directions {
@@ -49,7 +51,8 @@ impl Directions {
         if let Some((index, count)) = direction {
             // The first point of the sequence is a corner of the square.
             let [x, y, z] = cosine_hemisphere([halton(index + 1, 0), halton(index + 1, 1)]);
-            params.around = [x, y, z, self.turn];
+            params.around = [x, y, z, if self.scatter { std::f32::consts::TAU } else { self.turn }];
+            params.flags |= flag(self.scatter, layout::PARAM_SCATTER);
             params.share = 1.0 / count.max(1) as f32;
             params.direction = index;
         }

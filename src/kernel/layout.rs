@@ -14,6 +14,7 @@ pub const PARAM_SKY: u32 = 8;
 pub const PARAM_BOUNCE: u32 = 16;
 pub const PARAM_EMITTER: u32 = 32;
 pub const PARAM_ENVIRONMENT: u32 = 64;
+pub const PARAM_SCATTER: u32 = 4096;
 pub const PARAM_TIGHTER: u32 = 128;
 pub const PARAM_NEXT: u32 = 256;
 pub const PARAM_CULLED: u32 = 512;

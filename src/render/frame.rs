@@ -1,5 +1,6 @@
 //! The frame loop.
 
+use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
 use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Light, camera_view};
 use crate::kernel::FrameExecutor;
@@ -46,6 +47,10 @@ pub struct RenderSettings {
     pub tracing: Tracing,
     /// Read depth, normals, ids and albedo back.
     pub aov: bool,
+    /// Read back what guides denoising and temporal anti-aliasing, and give every pixel directions of its own for ao and diffuse.
+    pub guides: bool,
+    /// Samples lie at other points of their pixels in every frame.
+    pub taa: bool,
 }
 
 /// Why a frame could not be rendered.
@@ -90,6 +95,8 @@ pub struct FrameOutput {
     pub pixels: Pixels,
     /// One record a pass.
     pub records: Vec<Record>,
+    /// What it saw, where settings ask for it.
+    pub guides: Option<Guides>,
 }
 
 /// A scene, an executor and a cache that frames are rendered with.
@@ -147,6 +154,7 @@ impl Renderer {
         let effects = self.settings.effects;
         let mut accumulation = Accumulation::default();
         self.executor.set_lamps(&self.light.lamps)?;
+        let mut guides = self.settings.guides.then(|| GuideReader::new(camera, self.size));
         for sample in 0..self.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
                 && let Some(captures) = &mut self.captures
@@ -154,7 +162,12 @@ impl Renderer {
                 captures.begin_batch();
             }
             let seed = self.settings.seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9));
-            let view = camera_view(self.scene.resident(), camera, &self.light, &effects, self.size, sample, seed);
+            let mut view = camera_view(self.scene.resident(), camera, &self.light, &effects, self.size, sample, seed);
+            view.directions.scatter = self.settings.guides;
+            if self.settings.taa {
+                let [x, y] = taa_jitter(frame, sample, self.settings.samples);
+                view.params.jitter = [x, y, 0.0, 0.0];
+            }
             self.executor.begin_frame(&view);
             records.pass(self, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, stats)?;
@@ -164,6 +177,9 @@ impl Renderer {
                 r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
             self.light(&mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
+            if let Some(guides) = &mut guides {
+                guides.lamps(&mut *self.executor, sample)?;
+            }
             let directions = |count: u32| sample * count..(sample + 1) * count;
             for index in directions(effects.occlusion.map_or(0, |occlusion| occlusion.rays)) {
                 records.pass(self, "ao", |r, stats| r.trace_and_add(frame, Pass::Occlusion(index), stats))?;
@@ -178,6 +194,9 @@ impl Renderer {
             if sample == 0 && self.settings.aov {
                 self.read_aovs(view.frame.unit, &mut output.pixels)?;
             }
+            if let Some(guides) = &mut guides {
+                guides.sample(&mut *self.executor, &view, (sample, self.settings.samples))?;
+            }
             let finished = sample + 1;
             if finished.is_multiple_of(BATCH_SAMPLES) || finished == self.settings.samples {
                 accumulation.add(&self.executor.read_radiance()?);
@@ -187,6 +206,7 @@ impl Renderer {
             }
         }
         output.pixels.radiance = accumulation.mean();
+        output.guides = guides.map(GuideReader::finish);
         output.records = records.finish(self);
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
         if let Some(primary) = output.records.first_mut() {

@@ -1,8 +1,9 @@
 //! A frame, from camera to picture: primary rays, attributes of what they hit, shadows, occlusion, bounces, shading, the sum of the
-//! samples, exposure and tone map.
+//! samples, denoising, exposure and tone map.
 
 mod accumulate;
 mod capture;
+pub mod denoise;
 mod effects;
 mod emissive;
 mod environment;

@@ -3,7 +3,7 @@
 use super::case::Source::{Analytic, Exact, Paths, Reference, Unit};
 use super::case::{Case, Checks, Source};
 use super::lab::Lab;
-use super::{boxes, lights, maps, meshes, samples, shapes, streaming, surfaces, views};
+use super::{boxes, histories, lights, maps, meshes, samples, shapes, streaming, surfaces, views};
 use anyhow::Result;
 
 const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab) -> Result<Checks>) -> Case {
@@ -67,8 +67,8 @@ pub const CASES: &[Case] = &[
     later(49, "spherical harmonics of a delta light", Analytic),
     case(50, "texel of the sun, 10^6", Analytic, lights::sun_texel),
     later(51, "E_all - E_occ in a closed box", Analytic),
-    later(52, "NaN in the history", Unit),
-    later(53, "running variance: mean 10^8, sigma 1", Analytic),
+    case(52, "NaN in the history", Unit, histories::not_a_number),
+    case(53, "running variance: mean 10^8, sigma 1", Analytic, histories::running_variance),
     case(54, "10^6 accumulated frames", Analytic, samples::accumulation),
     case(55, "albedo 0", Analytic, surfaces::black),
     later(56, "distances in f16", Reference),

@@ -12,6 +12,7 @@ mod boxes;
 pub mod case;
 pub mod defects;
 mod errors;
+mod histories;
 mod lab;
 mod lights;
 mod list;

@@ -231,5 +231,6 @@ pub fn black(lab: &mut Lab) -> Result<Checks> {
     checks.none("pixels of a black sphere that are not black", lit, met().count() as u64);
     let sky = output.pixels.radiance.iter().zip(&output.pixels.id).filter(|(c, id)| **id == NONE && c[0] > 0.0);
     checks.at_least("pixels of the sky that are not black", sky.count(), 500);
+    super::histories::black(lab, &mut checks)?;
     Ok(checks)
 }

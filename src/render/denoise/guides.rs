@@ -1,0 +1,165 @@
+//! What a frame saw, to guide the filter.
+
+use super::Projection;
+use crate::kernel::layout::{BATCH_SAMPLES, GBuffer, Hit, NONE, Ray, Surface};
+use crate::kernel::{FrameExecutor, View};
+use crate::scene::Camera;
+use crate::schedule::{ExecutorError, Pass};
+use glam::{DVec3, Vec3};
+
+/// What a pixel's first sample saw.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// The hit point, world units; on a miss the direction.
+    pub point: DVec3,
+    /// Geometric unit normal toward the camera.
+    pub plane: Vec3,
+    /// Unit normal that is shaded.
+    pub normal: Vec3,
+    /// Triangle, [`NONE`] on a miss.
+    pub id: u32,
+    /// Width of the pixel at the hit, world units.
+    pub footprint: f32,
+    /// Linear base colour.
+    pub albedo: [f32; 3],
+    /// Linear radiance that it shows by itself, as much of it as is in the picture.
+    pub emission: [f32; 3],
+}
+
+impl Seen {
+    /// Whether a surface was seen.
+    pub fn is_hit(&self) -> bool {
+        self.id != NONE
+    }
+
+    /// Distance of `other` from the plane of this surface in pixels of this one.
+    pub fn off_plane(&self, other: &Self) -> f32 {
+        let offset = (other.point - self.point).as_vec3();
+        offset.dot(self.plane).abs() / self.footprint.max(f32::MIN_POSITIVE)
+    }
+
+    /// Whether both show the same surface: the same triangle, or normals within 26 degrees and planes within two pixels.
+    pub fn is_same_surface(&self, other: &Self) -> bool {
+        let both = self.is_hit() && other.is_hit();
+        both && (self.id == other.id || (self.normal.dot(other.normal) > 0.9 && self.off_plane(other) <= 2.0))
+    }
+}
+
+/// What a frame saw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guides {
+    /// Width and height, pixels.
+    pub size: (u32, u32),
+    /// The camera's picture.
+    pub projection: Projection,
+    /// Where in its pixel the first sample lies.
+    pub jitter: [f64; 2],
+    /// Pixel by pixel.
+    pub seen: Vec<Seen>,
+    /// What hits show by themselves and the light of the lamps, the mean over the samples.
+    pub direct: Vec<[f32; 3]>,
+}
+
+/// Reads guides from an executor while it renders a frame.
+#[derive(Clone, Debug)]
+pub struct GuideReader {
+    size: (u32, u32),
+    projection: Projection,
+    jitter: [f64; 2],
+    seen: Vec<Seen>,
+    /// Radiance summed over the batch before the sample at hand.
+    before: Vec<[f32; 4]>,
+    /// What the lamps' passes added, summed over samples.
+    direct: Vec<[f64; 3]>,
+    samples: u32,
+}
+
+impl GuideReader {
+    /// Of a frame of `width` x `height` pixels.
+    pub fn new(camera: &Camera, size: (u32, u32)) -> Self {
+        Self {
+            size,
+            projection: Projection::new(camera, size),
+            jitter: [0.5; 2],
+            seen: Vec::new(),
+            before: Vec::new(),
+            direct: Vec::new(),
+            samples: 0,
+        }
+    }
+
+    /// Takes the light of the lamps, whose passes for sample `sample` have just ended.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn lamps(&mut self, executor: &mut dyn FrameExecutor, sample: u32) -> Result<(), ExecutorError> {
+        let now = executor.read_radiance()?;
+        if sample.is_multiple_of(BATCH_SAMPLES) {
+            self.before = vec![[0.0; 4]; now.len()];
+        }
+        self.direct.resize(now.len(), [0.0; 3]);
+        for (sum, (now, before)) in self.direct.iter_mut().zip(now.iter().zip(&self.before)) {
+            for k in 0..3 {
+                sum[k] += f64::from(now[k]) - f64::from(before[k]);
+            }
+        }
+        self.samples += 1;
+        Ok(())
+    }
+
+    /// Ends sample `sample` of `samples`, seen as `view` says.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn sample(
+        &mut self,
+        executor: &mut dyn FrameExecutor,
+        view: &View,
+        (sample, samples): (u32, u32),
+    ) -> Result<(), ExecutorError> {
+        if sample == 0 {
+            self.jitter = [0, 1].map(|k| f64::from(view.params.jitter[k]));
+            self.read(executor, view)?;
+        }
+        if sample + 1 < samples {
+            self.before = executor.read_radiance()?;
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, executor: &mut dyn FrameExecutor, view: &View) -> Result<(), ExecutorError> {
+        let rays: Vec<Ray> = executor.read_rays(Pass::Primary)?;
+        let hits: Vec<Hit> = executor.read_hits(Pass::Primary)?;
+        let surfaces: Vec<Surface> = executor.read_surfaces(Pass::Primary)?;
+        let gbuffer: Vec<GBuffer> = executor.read_gbuffer()?;
+        let share = view.params.surface_share;
+        let in_f64 = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+        let all = rays.iter().zip(&hits).zip(surfaces.iter().zip(&gbuffer));
+        self.seen = all
+            .map(|((ray, hit), (surface, g))| {
+                let is_hit = hit.id != NONE;
+                let way = in_f64(ray.direction);
+                let point = view.frame.origin + view.frame.unit * (in_f64(ray.origin) + f64::from(hit.t) * way);
+                let point = if is_hit { point } else { way };
+                Seen {
+                    point,
+                    plane: Vec3::from_array(surface.normal),
+                    normal: Vec3::from_array(g.normal),
+                    id: hit.id,
+                    footprint: if is_hit { self.projection.footprint(point) as f32 } else { 0.0 },
+                    albedo: if is_hit { g.albedo } else { [0.0; 3] },
+                    emission: if is_hit { g.emission.map(|x| share * x) } else { [0.0; 3] },
+                }
+            })
+            .collect();
+        Ok(())
+    }
+
+    /// The guides of the frame.
+    pub fn finish(self) -> Guides {
+        let count = f64::from(self.samples.max(1));
+        let direct = self.direct.iter().map(|sum| sum.map(|x| (x / count) as f32)).collect();
+        let Self { size, projection, jitter, seen, .. } = self;
+        Guides { size, projection, jitter, seen, direct }
+    }
+}
