@@ -58,6 +58,13 @@ impl Journal {
         File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == MAGIC
     }
 
+    /// Whether `path` is a journal that was being made: less than its start is there.
+    pub fn is_torn(path: &Path) -> bool {
+        let mut start = Vec::new();
+        let read = File::open(path).and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut start));
+        read.is_ok() && start.len() < MAGIC.len() && MAGIC.starts_with(&start)
+    }
+
     /// Starts an empty journal.
     pub fn create(path: PathBuf) -> Result<Self, BuildError> {
         let file = File::create_new(&path).and_then(|mut file| file.write_all(&MAGIC).map(|()| file));
@@ -248,7 +255,13 @@ mod tests {
         journal.step(Step::Begin, || Ok(vec![7])).unwrap();
         journal.step(Step::Gather, || Ok(vec![1, 2, 3])).unwrap();
         let whole = std::fs::read(&path).unwrap();
-        assert!(Journal::is_one(&path));
+        assert!(Journal::is_one(&path) && !Journal::is_torn(&path));
+        for length in 0..MAGIC.len() {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            assert!(!Journal::is_one(&path) && Journal::is_torn(&path));
+        }
+        std::fs::write(&path, b"another").unwrap();
+        assert!(!Journal::is_torn(&path));
         for length in MAGIC.len()..=whole.len() {
             std::fs::write(&path, &whole[..length]).unwrap();
             let mut journal = Journal::open(path.clone()).unwrap();

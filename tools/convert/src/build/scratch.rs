@@ -48,9 +48,11 @@ pub(super) fn earlier(path: &Path, resume: bool) -> Result<Option<(Scratch, Jour
     match fs::read_dir(path) {
         Err(failure) if failure.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(failure) => return Err(error("read", failure)),
-        Ok(mut entries) => {
-            let is_journal = Journal::is_one(&path.join(JOURNAL));
-            if !is_journal && entries.next().is_some() {
+        Ok(entries) => {
+            let (is_journal, count) = (Journal::is_one(&path.join(JOURNAL)), entries.count());
+            // One that was killed as it began left nothing, or a piece of the journal.
+            let is_begun = count == 0 || (count == 1 && Journal::is_torn(&path.join(JOURNAL)));
+            if !is_journal && !is_begun {
                 return Err(BuildError::NotScratch { path: path.to_owned() });
             }
             if resume && is_journal {
@@ -59,8 +61,19 @@ pub(super) fn earlier(path: &Path, resume: bool) -> Result<Option<(Scratch, Jour
             }
         }
     }
-    fs::remove_dir_all(path).map_err(|source| error("remove", source))?;
+    remove(path).map_err(|source| error("remove", source))?;
     Ok(None)
+}
+
+/// Removes a scratch folder. Its journal goes last: as long as anything is there, it tells what the folder is.
+fn remove(path: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(path)? {
+        let entry = entry?;
+        if entry.file_name() != JOURNAL {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    fs::remove_dir_all(path)
 }
 
 impl Scratch {
@@ -96,7 +109,7 @@ impl Drop for Scratch {
     fn drop(&mut self) {
         if !self.is_kept {
             // The next conversion to the same file tries again.
-            let _ = fs::remove_dir_all(&self.path);
+            let _ = remove(&self.path);
         }
     }
 }

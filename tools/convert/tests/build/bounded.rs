@@ -208,6 +208,29 @@ fn interrupted_anew(source: &Computed, settings: &BuildSettings, path: &Path) {
     assert!(build_source(&source, settings, path, &progress).is_err());
 }
 
+/// A kill while the journal is made leaves a piece of it, and nothing else.
+#[test]
+fn a_conversion_killed_as_it_began_is_begun_anew() {
+    let source = Computed::new(100_000, 60_000);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.bricks");
+    let scratch = folder.path().join(".a.bricks.scratch");
+    for (piece, resume) in [("", true), ("brickwalk", true), ("brickwalk", false)] {
+        std::fs::create_dir(&scratch).unwrap();
+        std::fs::write(scratch.join("journal"), piece).unwrap();
+        let settings = BuildSettings { resume, ..bounded(2, 40) };
+        build_source(&source, &settings, &path, &Progress::hidden()).unwrap();
+        assert_eq!(names(folder.path()), ["a.bricks"]);
+    }
+    // Beside other files it is none.
+    std::fs::create_dir(&scratch).unwrap();
+    std::fs::write(scratch.join("journal"), "").unwrap();
+    std::fs::write(scratch.join("mine"), "mine").unwrap();
+    let result = build_source(&source, &bounded(2, 40), &path, &Progress::hidden());
+    assert!(matches!(result, Err(BuildError::NotScratch { .. })), "{result:?}");
+    assert_eq!(std::fs::read(scratch.join("mine")).unwrap(), b"mine");
+}
+
 #[test]
 fn folders_of_others_are_left_alone() {
     let source = Computed::new(100_000, 60_000);
