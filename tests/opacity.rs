@@ -35,7 +35,7 @@ fn sheets(folder: &Path, materials: &[Alpha]) -> PathBuf {
         alpha_cutoff,
         flags,
         base_color_texture,
-        ..bytemuck::Zeroable::zeroed()
+        ..bricks::Material::DIFFUSE
     };
     let source = SourceScene {
         meshes: vec![Mesh { name: "sheets".into(), primitives: (0..materials.len() as u32).map(sheet).collect() }],

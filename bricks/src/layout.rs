@@ -14,7 +14,7 @@ use xxhash_rust::xxh3::xxh3_64;
 pub const MAGIC: [u8; 8] = *b"BRICKS\x1a\n";
 
 /// The version of the format that this crate writes and reads. No other version is read.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// Alignment of payloads and of the directory, and length of the header page.
 pub const PAGE_BYTES: u64 = 4096;

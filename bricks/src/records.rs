@@ -102,6 +102,9 @@ pub const BRICK_INDEX32: u32 = 2;
 /// [`Brick::flags`]: rays may pass through some of its triangles, see [`OpacityTriangle`].
 pub const BRICK_OPACITY: u32 = 4;
 
+/// [`Brick::flags`]: attribute vertices have an [`AttributeDetail`] each.
+pub const BRICK_DETAIL: u32 = 8;
+
 /// A brick: the always-resident facts about one BVH subtree and where its payloads lie.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -260,7 +263,23 @@ pub const MATERIAL_DOUBLE_SIDED: u32 = 4;
 /// [`Material::flags`]: KHR_materials_unlit.
 pub const MATERIAL_UNLIT: u32 = 8;
 
+/// Textures of a material, each with its place in [`Material::uv_from_set`] and [`Material::uv_sets`].
+pub const MATERIAL_TEXTURES: usize = 5;
+/// Place of the base colour texture.
+pub const BASE_COLOR: usize = 0;
+/// Place of the normal texture.
+pub const NORMAL: usize = 1;
+/// Place of the metallic-roughness texture.
+pub const METALLIC_ROUGHNESS: usize = 2;
+/// Place of the occlusion texture.
+pub const OCCLUSION: usize = 3;
+/// Place of the emissive texture.
+pub const EMISSIVE: usize = 4;
+
 /// A glTF metallic-roughness material. Texture fields are indices of [`Texture`], or [`NONE`].
+///
+/// Its dielectric part reflects `specular` along the normal and `specular_weight` at grazing angles: 0.04 and 1 by default
+/// (KHR_materials_ior, KHR_materials_specular), and both 0 make it Lambertian.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Material {
@@ -280,8 +299,102 @@ pub struct Material {
     pub base_color_texture: u32,
     /// [`OpacityMap`] of the base colour texture, where alpha is of MASK or BLEND and not 1 throughout.
     pub opacity_map: u32,
-    /// Zero; for normal, metallic-roughness, occlusion and emissive textures.
-    pub _reserved: [u32; 3],
+    /// Normal texture (linear): the normal in tangent space is 2 rgb - 1.
+    pub normal_texture: u32,
+    /// Metallic-roughness texture (linear): roughness in green, metallic in blue.
+    pub metallic_roughness_texture: u32,
+    /// Occlusion texture (linear), in red.
+    pub occlusion_texture: u32,
+    /// Emissive texture (sRGB).
+    pub emissive_texture: u32,
+    /// Of x and y of the normal texture.
+    pub normal_scale: f32,
+    /// Of the occlusion texture, 0..=1: 0 is none of it.
+    pub occlusion_strength: f32,
+    /// Share of the surface that a clear coat covers (KHR_materials_clearcoat), 0..=1.
+    pub clearcoat: f32,
+    /// What the dielectric part reflects along the normal, linear RGB, 0..=1.
+    pub specular: [f32; 3],
+    /// What it reflects at grazing angles, 0..=1.
+    pub specular_weight: f32,
+    /// Roughness of the clear coat.
+    pub clearcoat_roughness: f32,
+    /// Share of the light that thin walls let through (KHR_materials_transmission), 0..=1.
+    pub transmission: f32,
+    /// Bit i: texture i takes the second set of texture coordinates ([`AttributeDetail::uv`]).
+    pub uv_sets: u32,
+    /// Zero.
+    pub _reserved: u32,
+    /// Two rows a texture: coordinate = row[0] s + row[1] t + row[2] of the set's coordinates (s, t). The fourth of the first row is
+    /// the absolute determinant, by which areas grow; of the second row it is zero.
+    pub uv_from_set: [[f32; 4]; 2 * MATERIAL_TEXTURES],
+}
+
+impl Material {
+    /// [`Self::uv_from_set`] that leaves coordinates as they are.
+    pub const SAME_UV: [[f32; 4]; 2 * MATERIAL_TEXTURES] = {
+        let (u, v) = ([1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]);
+        [u, v, u, v, u, v, u, v, u, v]
+    };
+
+    /// White, opaque and Lambertian, without textures.
+    pub const DIFFUSE: Self = Self {
+        base_color: [1.0; 4],
+        emission: [0.0; 3],
+        metallic: 0.0,
+        roughness: 1.0,
+        alpha_cutoff: 0.5,
+        flags: 0,
+        base_color_texture: NONE,
+        opacity_map: NONE,
+        normal_texture: NONE,
+        metallic_roughness_texture: NONE,
+        occlusion_texture: NONE,
+        emissive_texture: NONE,
+        normal_scale: 1.0,
+        occlusion_strength: 1.0,
+        clearcoat: 0.0,
+        specular: [0.0; 3],
+        specular_weight: 0.0,
+        clearcoat_roughness: 0.0,
+        transmission: 0.0,
+        uv_sets: 0,
+        _reserved: 0,
+        uv_from_set: Self::SAME_UV,
+    };
+
+    /// The textures in their places; [`NONE`] for those that it has not.
+    pub fn textures(&self) -> [u32; MATERIAL_TEXTURES] {
+        [
+            self.base_color_texture,
+            self.normal_texture,
+            self.metallic_roughness_texture,
+            self.occlusion_texture,
+            self.emissive_texture,
+        ]
+    }
+
+    /// The fields that hold them.
+    pub fn textures_mut(&mut self) -> [&mut u32; MATERIAL_TEXTURES] {
+        [
+            &mut self.base_color_texture,
+            &mut self.normal_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.occlusion_texture,
+            &mut self.emissive_texture,
+        ]
+    }
+
+    /// Whether it reflects in another way than a Lambertian surface.
+    pub fn is_glossy(&self) -> bool {
+        let is_unlit = self.flags & MATERIAL_UNLIT != 0;
+        !is_unlit && (self.metallic > 0.0 || self.specular_weight > 0.0 || self.clearcoat > 0.0)
+    }
+
+    /// Whether its triangles need [`AttributeDetail`]s.
+    pub fn needs_details(&self) -> bool {
+        self.normal_texture != NONE || self.uv_sets != 0
+    }
 }
 
 /// [`Texture::wrap`]: repeat.
@@ -376,6 +489,19 @@ pub struct AttributeVertex {
     pub color: u32,
 }
 
+/// What a vertex of the attributes has besides, 16 bytes, in bricks with [`BRICK_DETAIL`]: where a normal texture or a second set of
+/// texture coordinates is looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct AttributeDetail {
+    /// Unit tangent in object space, encoded as normals are; or [`NO_NORMAL`].
+    pub tangent: u32,
+    /// The bitangent is this times cross(normal, tangent): 1 or -1; 0 without a tangent.
+    pub handedness: f32,
+    /// Texture coordinates of set 1.
+    pub uv: [f32; 2],
+}
+
 /// Rounds `bytes` up to a multiple of 16.
 const fn pad16(bytes: u64) -> u64 {
     bytes.next_multiple_of(16)
@@ -424,13 +550,15 @@ pub const SURFACE_ROTATION_SHIFT: u32 = 30;
 /// Byte offsets of the arrays in a brick's attributes as they are loaded, each 16-aligned, in this order: [`AttributeVertex`]s;
 /// surface words (u32 a triangle: the material in the low 30 bits, above it the rotation r, such that stored vertex i is
 /// source vertex (i + r) mod 3); indices of attribute vertices (three u16 or u32 a triangle, in stored, rotated order;
-/// u32 under the same flag as the geometry's indices).
+/// u32 under the same flag as the geometry's indices); with [`BRICK_DETAIL`] [`AttributeDetail`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AttributeLayout {
     /// Offset of the surface words.
     pub surfaces: u64,
     /// Offset of the indices.
     pub indices: u64,
+    /// Offset of the [`AttributeDetail`]s; with [`BRICK_DETAIL`].
+    pub details: u64,
     /// Length of the attributes as they are loaded; in the file they are encoded.
     pub bytes: u64,
 }
@@ -441,7 +569,9 @@ impl AttributeLayout {
         let index_bytes = if brick.flags & BRICK_INDEX32 != 0 { 12 } else { 6 };
         let surfaces = brick.attribute_vertex_count as u64 * size_of::<AttributeVertex>() as u64;
         let indices = surfaces + pad16(brick.triangle_count as u64 * 4);
-        let bytes = indices + pad16(brick.triangle_count as u64 * index_bytes);
-        Self { surfaces, indices, bytes }
+        let details = indices + pad16(brick.triangle_count as u64 * index_bytes);
+        let has_details = u64::from(brick.flags & BRICK_DETAIL != 0);
+        let bytes = details + has_details * brick.attribute_vertex_count as u64 * size_of::<AttributeDetail>() as u64;
+        Self { surfaces, indices, details, bytes }
     }
 }

@@ -108,7 +108,20 @@ fn structs() -> BTreeMap<String, Table> {
             flags,
             base_color_texture,
             opacity_map,
-            _reserved
+            normal_texture,
+            metallic_roughness_texture,
+            occlusion_texture,
+            emissive_texture,
+            normal_scale,
+            occlusion_strength,
+            clearcoat,
+            specular,
+            specular_weight,
+            clearcoat_roughness,
+            transmission,
+            uv_sets,
+            _reserved,
+            uv_from_set
         }),
         table!(OpacityMap { width, height, wrap, _reserved, texels }),
         table!(OpacityTriangle { uv, material, alphas }),
@@ -116,6 +129,7 @@ fn structs() -> BTreeMap<String, Table> {
         table!(Node { origin, exponent, inner_mask, child_base, triangle_base, meta, lo, hi }),
         table!(Occupancy { cell_log2, _reserved, origin, bits }),
         table!(AttributeVertex { normal, uv, color }),
+        table!(AttributeDetail { tangent, handedness, uv }),
     ])
 }
 

@@ -435,7 +435,7 @@ mod tests {
         let corners = (0..n * row).filter(|at| at % row < n);
         let indices = corners.flat_map(|at| [at, at + row, at + 1, at + 1, at + row, at + row + 1]).collect();
         let primitive = Primitive { positions, indices, ..Primitive::default() };
-        let material = bricks::Material { base_color_texture: bricks::NONE, ..bytemuck::Zeroable::zeroed() };
+        let material = bricks::Material { base_color_texture: bricks::NONE, ..bricks::Material::DIFFUSE };
         let scene = SourceScene {
             meshes: vec![Mesh { name: "sheet".into(), primitives: vec![primitive] }],
             placements: vec![Placement { world_from_mesh: IDENTITY, ..Placement::default() }],

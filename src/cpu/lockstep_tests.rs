@@ -86,7 +86,7 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
         alpha_cutoff: 0.25,
         flags: [0, bricks::MATERIAL_MASK, bricks::MATERIAL_BLEND, bricks::MATERIAL_BLEND][i as usize],
         base_color_texture: if i < 3 { i } else { bricks::NONE },
-        ..bytemuck::Zeroable::zeroed()
+        ..bricks::Material::DIFFUSE
     };
     let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
     let place = |mesh, world_from_mesh| Placement { name: "p".into(), mesh, source: 0, world_from_mesh };

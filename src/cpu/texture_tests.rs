@@ -58,11 +58,8 @@ fn scene(encoding: TextureEncoding, textures: Vec<SourceTexture>) -> SceneFile {
         indices: vec![0, 1, 2],
         ..Primitive::default()
     };
-    let material = |i: usize| bricks::Material {
-        base_color: [1.0; 4],
-        base_color_texture: i as u32,
-        ..bytemuck::Zeroable::zeroed()
-    };
+    let material =
+        |i: usize| bricks::Material { base_color: [1.0; 4], base_color_texture: i as u32, ..bricks::Material::DIFFUSE };
     let source = SourceScene {
         meshes: vec![Mesh { name: "m".into(), primitives: vec![primitive] }],
         placements: vec![Placement { name: "p".into(), mesh: 0, source: 0, world_from_mesh: IDENTITY }],

@@ -31,7 +31,7 @@ fn sheet(n: u32, size: f64, lift: f64) -> Mesh {
 fn source() -> SourceScene {
     let place = |mesh, matrix: [f64; 12]| Placement { mesh, world_from_mesh: matrix, ..Placement::default() };
     let material =
-        bricks::Material { base_color: [1.0; 4], base_color_texture: bricks::NONE, ..bytemuck::Zeroable::zeroed() };
+        bricks::Material { base_color: [1.0; 4], base_color_texture: bricks::NONE, ..bricks::Material::DIFFUSE };
     SourceScene {
         meshes: vec![sheet(9, 7.0, 0.0), sheet(6, 2.0, 1.5)],
         placements: vec![

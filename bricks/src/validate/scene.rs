@@ -130,7 +130,7 @@ pub(super) fn leaves(resident: &Resident) -> Result<(), Flaw> {
 pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
     for (index, material) in (0u32..).zip(&resident.materials) {
         let part = Part::Record(Section::Materials, index);
-        rule(material._reserved == [0; 3], part, || ("reserved words", "zero in them"))?;
+        rule(material._reserved == 0, part, || ("reserved words", "zero in them"))?;
         let both = MATERIAL_MASK | MATERIAL_BLEND;
         let known = both | MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT;
         rule(material.flags & !known == 0 && material.flags & both != both, part, || {

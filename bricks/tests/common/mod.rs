@@ -318,13 +318,11 @@ pub fn scene() -> Scene {
     let material = |base_color_texture, flags, emission| Material {
         base_color: [1.0, 0.5, 0.25, 1.0],
         emission,
-        metallic: 0.0,
         roughness: 0.75,
-        alpha_cutoff: 0.5,
         flags,
         base_color_texture,
         opacity_map: if base_color_texture == NONE { NONE } else { 0 },
-        _reserved: [0; 3],
+        ..Material::DIFFUSE
     };
     let provenance = |first_id, count, node: &str| Provenance {
         first_id,

@@ -1,6 +1,6 @@
 //! The materials of generated scenes. Vertex colours multiply the base colour and bring the variety.
 
-use bricks::{MATERIAL_DOUBLE_SIDED, Material, NONE};
+use bricks::{MATERIAL_DOUBLE_SIDED, Material};
 
 /// A linear colour that multiplies a base colour.
 pub type Tint = [f32; 3];
@@ -72,15 +72,5 @@ pub fn city_materials() -> Vec<Material> {
 
 /// A plain material.
 pub fn material(color: [f32; 3], roughness: f32, flags: u32) -> Material {
-    Material {
-        base_color: [color[0], color[1], color[2], 1.0],
-        emission: [0.0; 3],
-        metallic: 0.0,
-        roughness,
-        alpha_cutoff: 0.5,
-        flags,
-        base_color_texture: NONE,
-        opacity_map: NONE,
-        _reserved: [0; 3],
-    }
+    Material { base_color: [color[0], color[1], color[2], 1.0], roughness, flags, ..Material::DIFFUSE }
 }

@@ -387,7 +387,7 @@ mod tests {
 
     #[test]
     fn unused_textures_are_left_out() {
-        let material = |texture| Material { base_color_texture: texture, ..bytemuck::Zeroable::zeroed() };
+        let material = |texture| Material { base_color_texture: texture, ..Material::DIFFUSE };
         let materials = [material(3), material(NONE), material(1), material(3), material(2)];
         assert_eq!(used(5, &materials), [1, 2, 3]);
         // Texture 2 could not be read.

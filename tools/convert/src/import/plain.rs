@@ -6,7 +6,7 @@ use super::error::{EXPORT_AGAIN, ImportError, show};
 use super::table::Table;
 use super::warnings::Warnings;
 use crate::source::{MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive};
-use bricks::{MATERIAL_DOUBLE_SIDED, Material, NONE};
+use bricks::{MATERIAL_DOUBLE_SIDED, Material};
 use std::io;
 use std::path::Path;
 use xxhash_rust::xxh3::Xxh3;
@@ -50,17 +50,7 @@ pub(super) fn outline(
 
 /// White and matt, seen from both sides: scans and exported surfaces do not promise a winding.
 pub(super) fn material() -> Material {
-    Material {
-        base_color: [1.0; 4],
-        emission: [0.0; 3],
-        metallic: 0.0,
-        roughness: 1.0,
-        alpha_cutoff: 0.5,
-        flags: MATERIAL_DOUBLE_SIDED,
-        base_color_texture: NONE,
-        opacity_map: NONE,
-        _reserved: [0; 3],
-    }
+    Material { flags: MATERIAL_DOUBLE_SIDED, ..Material::DIFFUSE }
 }
 
 /// The name of a mesh that has none: that of its file without the extension.

@@ -1,6 +1,6 @@
 //! Small scenes, and building them.
 
-use bricks::{Material, NONE, Source};
+use bricks::{Material, Source};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene};
@@ -54,7 +54,7 @@ impl Random {
 }
 
 pub fn material(color: [f32; 4]) -> Material {
-    Material { base_color: color, roughness: 1.0, base_color_texture: NONE, ..bytemuck::Zeroable::zeroed() }
+    Material { base_color: color, ..Material::DIFFUSE }
 }
 
 pub fn mesh(name: &str, primitives: Vec<Primitive>) -> Mesh {

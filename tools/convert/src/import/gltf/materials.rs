@@ -4,7 +4,7 @@ use super::document::{Document, Index, Lenient, Material as Json, TextureTransfo
 use super::file::{File, Problem, item};
 use super::label;
 use crate::import::warnings::Warnings;
-use bricks::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT, Material, NONE};
+use bricks::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT, Material};
 use bricks::{WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT};
 use std::collections::BTreeMap;
 
@@ -27,17 +27,7 @@ pub(super) fn base_color_set(material: &Json) -> Option<(Uint, Option<&TextureTr
 
 /// The material of primitives that name none (glTF 2.0, section 3.9.5).
 pub(super) fn default_material() -> Material {
-    Material {
-        base_color: [1.0; 4],
-        emission: [0.0; 3],
-        metallic: 1.0,
-        roughness: 1.0,
-        alpha_cutoff: 0.5,
-        flags: 0,
-        base_color_texture: NONE,
-        opacity_map: NONE,
-        _reserved: [0; 3],
-    }
+    Material { metallic: 1.0, specular: [0.04; 3], specular_weight: 1.0, ..Material::DIFFUSE }
 }
 
 /// Every material of the file, in order, and the textures of those that `is_used` marks, in order of first use.
@@ -111,9 +101,7 @@ fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> 
         roughness: unit(pbr.roughness_factor.unwrap_or(1.0)),
         alpha_cutoff: json.alpha_cutoff.unwrap_or(0.5).clamp(0.0, f32::MAX as f64) as f32,
         flags,
-        base_color_texture: NONE,
-        opacity_map: NONE,
-        _reserved: [0; 3],
+        ..default_material()
     }
 }
 
