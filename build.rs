@@ -26,9 +26,10 @@ fn main() {
     names.sort();
     let mut structures = None;
     for name in &names {
-        for pages in
-            [wgsl::Pages { cache: 1, texels: 1, opacity: false }, wgsl::Pages { cache: 3, texels: 2, opacity: true }]
-        {
+        for pages in [
+            wgsl::Pages { cache: 1, texels: 1, opacity: false, gloss: false },
+            wgsl::Pages { cache: 3, texels: 2, opacity: true, gloss: true },
+        ] {
             let text =
                 wgsl::assemble(name, pages, &read).unwrap_or_else(|| panic!("{name}: an included file is missing"));
             let module =
@@ -135,6 +136,9 @@ fn layout_checks(module: &naga::Module) -> String {
             "GBUFFER_",
             "TEXTURE_",
             "TILE_",
+            "MATERIAL_DOUBLE",
+            "MATERIAL_UNLIT",
+            "REFLECTANCE_",
             "NONE",
         ];
         if prefixes.iter().any(|p| name.starts_with(p))

@@ -1,10 +1,12 @@
-// Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free: Lambertian surfaces.
+// Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free. What is not diffuse shares a
+// direction with the rays that surfaces draw by their gloss.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
 #include "shared/random.wgsl"
 #include "shared/lamps.wgsl"
 #include "shared/light.wgsl"
+#include "shared/gloss.wgsl"
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -19,17 +21,37 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let g = gbuffer[index];
     var light: vec3<f32>;
+    var density = 0.0; // by which the lamp drew the direction, where the rays of the gloss may meet it
     let d = ray.direction;
     if (params.flags & PARAM_EMITTER) != 0u {
         // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction leads from the
         // surface to the point.
         let e = emitter_of(index);
         let squared = dot(d, d);
-        light = e.radiance * max(dot(g.normal, d), 0.0) * shines(e, d) / (PI * squared * squared) / e.probability;
+        let shone = shines(e, d);
+        light = e.radiance * max(dot(g.normal, d), 0.0) * shone / (PI * squared * squared) / e.probability;
+        if (e.kind & EMITTER_KIND) == EMITTER_TRIANGLE {
+            density = e.probability * squared * sqrt(squared) / shone;
+        }
     } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
-        light = environment_sample(lamp_words(index)).light * max(dot(g.normal, d), 0.0) / PI;
+        let drawn = environment_sample(lamp_words(index));
+        light = drawn.light * max(dot(g.normal, d), 0.0) / PI;
+        density = drawn.density;
     } else {
         light = sunlight(g.normal);
+        if params.sun_radius > 0.0 {
+            density = sun_density(d);
+        }
     }
-    add_light(index, surface_share() * g.albedo * light);
+    let s = gloss_of(g, -seen_rays[index].direction);
+    var reflects = s.diffuse;
+    if is_glossy(s) {
+        let unit_d = normalize(d);
+        var weight = 1.0;
+        if (params.flags & (PARAM_GLOSSY | PARAM_BOUNCE)) == PARAM_GLOSSY && density > 0.0 {
+            weight = outweighs(density, density_of(s, unit_d));
+        }
+        reflects += weight * reflected(s, unit_d);
+    }
+    add_light(index, surface_share() * reflects * light);
 }

@@ -5,6 +5,7 @@
 #include "shared/random.wgsl"
 #include "shared/lamps.wgsl"
 #include "shared/light.wgsl"
+#include "shared/gloss.wgsl"
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -18,5 +19,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let g = gbuffer[index];
-    add_light(index, surface_share() * params.share * g.albedo * ambient(g.normal));
+    let s = gloss_of(g, -seen_rays[index].direction);
+    add_light(index, surface_share() * params.share * (s.diffuse * ambient(g.normal) + reflected_ambient(s)));
 }

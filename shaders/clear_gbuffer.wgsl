@@ -10,7 +10,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let index = global.y * params.width + global.x;
-    gbuffer[index] = GBuffer(vec3<f32>(0.0), 0u, vec3<f32>(0.0), 0u, vec3<f32>(0.0), 0.0, vec2<f32>(0.0), vec2<f32>(0.0));
+    gbuffer[index] = GBuffer();
     if params.sample % BATCH_SAMPLES == 0u && (params.flags & PARAM_BOUNCE) == 0u {
         radiance[index] = vec4<f32>(0.0);
     }

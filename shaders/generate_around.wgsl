@@ -1,12 +1,15 @@
 // One ray from every primary hit in the pass's direction around the interpolated normal, turned about it at random within limits
 // (CHC+RT §5.3), or, scattered, moved over the whole hemisphere by a random step in the two numbers that it comes from (Cranley and
 // Patterson 1976: the turn, and the square of the sine); where that leads below the surface, none. Limited rays ask for occlusion; for
-// the others the throughput is noted: what the surface reflects, by the share of the direction; in w the direction's number.
+// the others the throughput is noted: what of light from around the surface reflects, by the share of the direction; in w the direction's number.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/random.wgsl"
+#include "shared/lamps.wgsl"
+#include "shared/light.wgsl"
+#include "shared/gloss.wgsl"
 
 override LIMITED: bool = false;
 
@@ -41,12 +44,15 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         if dot(surface.normal, ray.direction) > 0.0 {
             ray.t_min = 0.0;
             ray.t_max = select(T_INFINITE, params.length, LIMITED);
-            carried = surface_share() * params.share * g.albedo;
+            if !LIMITED {
+                carried = surface_share() * params.share * reflected_by_diffuse_rays(gloss_of(g, -seen_rays[index].direction));
+            }
         }
     }
     rays[index] = ray;
     if !LIMITED {
         throughput[index] = vec4<f32>(carried, f32(params.direction));
+        densities[index] = 0.0;
     }
     start_hit(index, ray.t_max, seen_hits[index].id);
 }

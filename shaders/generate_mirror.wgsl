@@ -24,5 +24,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     rays[index] = ray;
     throughput[index] = vec4<f32>(vec3<f32>(carried), 0.0);
+    densities[index] = 0.0;
     start_hit(index, ray.t_max, seen_hits[index].id);
 }

@@ -1,10 +1,11 @@
-// Reads the attributes of hits in bricks whose attributes are resident: normal, texture coordinates, base colour without
-// textures, and what of textures the pixel covers.
+// Reads the attributes of hits in bricks whose attributes are resident: normal, tangent, texture coordinates, the material without its
+// textures, and what of these the pixel covers.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/cache.wgsl"
 #include "shared/shading.wgsl"
+#include "shared/material.wgsl"
 
 // Of the angle between a ray and a normal; below it a footprint is that of this one.
 const LEAST_COSINE: f32 = 0.05;
@@ -99,17 +100,59 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let size = dot(n, n);
     // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric one.
     n = select(surface.normal, n * inverseSqrt(max(size, 1.0e-30)), size > 1.0e-12);
-    if dot(n, surface.normal) < 0.0 {
+    let is_turned = dot(n, surface.normal) < 0.0;
+    if is_turned {
         n = -n;
     }
     let base = material.base_color * color;
-    var state = GBUFFER_READ;
-    var footprint = 0.0;
-    if material.base_color_texture != NONE {
-        state = GBUFFER_WAITS;
-        footprint = footprint_of(seen_rays[index], hit.t, surface, uvs);
-    }
     // Source vertex (i + rotation) mod 3 was stored as vertex i.
     let source = array<f32, 3>(weights[(3u - rotation) % 3u], weights[(4u - rotation) % 3u], weights[(5u - rotation) % 3u]);
-    gbuffer[index] = GBuffer(base.rgb, state, n, word & 0x3fffffffu, material.emission, footprint, vec2<f32>(source[1], source[2]), uv);
+    var g: GBuffer;
+    g.albedo = base.rgb;
+    g.state = GBUFFER_READ;
+    g.normal = n;
+    g.material = word & 0x3fffffffu;
+    g.emission = material.emission;
+    g.weights = vec2<f32>(source[1], source[2]);
+    g.uv = uv;
+    g.occlusion = 1.0;
+    g.metallic = material.metallic;
+    g.roughness = material.roughness;
+    for (var place = 0u; place < MATERIAL_TEXTURES; place++) {
+        if texture_of(material, place) != NONE {
+            g.state |= 1u << (GBUFFER_FIRST + place);
+        }
+    }
+    if g.state != GBUFFER_READ {
+        g.footprint = footprint_of(seen_rays[index], hit.t, surface, uvs);
+        if (b.flags & BRICK_DETAIL) != 0u {
+            var along = vec3<f32>(0.0);
+            for (var k = 0u; k < 3u; k++) {
+                let v = cache_vec4(page, ((at + b.details) >> 2u) + corner[k]);
+                along += weights[k] * octahedral(v.x);
+                g.handedness = bitcast<f32>(v.y);
+                uvs[k] = bitcast<vec2<f32>>(v.zw);
+                g.uv1.x = barrier(g.uv1.x + barrier(weights[k] * uvs[k].x));
+                g.uv1.y = barrier(g.uv1.y + barrier(weights[k] * uvs[k].y));
+            }
+            g.footprint1 = footprint_of(seen_rays[index], hit.t, surface, uvs);
+            let w = instances[leaf.instance].world_from_object;
+            g.tangent = vec3<f32>(dot(w[0].xyz, along), dot(w[1].xyz, along), dot(w[2].xyz, along));
+            // Seen from behind, the frame is turned about with its normal.
+            if is_turned {
+                g.tangent = -g.tangent;
+                g.handedness = -g.handedness;
+            }
+            if (instances[leaf.instance].flags & INSTANCE_MIRRORED) != 0u {
+                g.handedness = -g.handedness;
+            }
+        }
+        if g.handedness == 0.0 {
+            g.state &= ~(1u << (GBUFFER_FIRST + NORMAL));
+        }
+    }
+    if g.state == GBUFFER_READ {
+        g = settled(g, material.flags);
+    }
+    gbuffer[index] = g;
 }

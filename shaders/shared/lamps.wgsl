@@ -4,6 +4,8 @@
                                                                              // directions are drawn, over both angles
 @group(2) @binding(1) var<storage, read> environment_table: array<vec2<u32>>; // threshold and other entry of each texel's
 @group(2) @binding(2) var<storage, read> emitters: array<Emitter>;
+@group(2) @binding(3) var<storage, read> reflectances: array<vec2<f32>>; // see shared/gloss.wgsl: rows by the root of alpha, in them by that
+                                                                         // of the cosine
 
 const TURN: f32 = 6.2831855;      // 2 pi
 const HALF_TURN: f32 = 3.1415927;
@@ -78,20 +80,33 @@ fn environment_size() -> vec2<f32> {
     return vec2<f32>(vec2<u32>(params.environment_width, params.environment_height));
 }
 
-// Radiance from direction d, of any length: the image's centre lies along -Z, its right along +X, turned about +Y.
-fn environment_at(d: vec3<f32>) -> vec3<f32> {
-    let n = normalize(d);
+// Where in the image direction d, a unit vector, leads, in texels: its centre lies along -Z, its right along +X, turned about +Y.
+fn environment_place(d: vec3<f32>) -> vec2<f32> {
     let turn = params.environment_turn;
-    let x = turn.x * n.x - turn.y * n.z;
-    let z = turn.y * n.x + turn.x * n.z;
+    let x = turn.x * d.x - turn.y * d.z;
+    let z = turn.y * d.x + turn.x * d.z;
     let u = 0.5 + angle_of(x, -z) / TURN;
-    let v = angle_of(sqrt(x * x + z * z), n.y) / HALF_TURN;
-    return environment_lookup(vec2<f32>(u, v) * environment_size());
+    let v = angle_of(sqrt(x * x + z * z), d.y) / HALF_TURN;
+    return vec2<f32>(u, v) * environment_size();
+}
+
+// Radiance from direction d, of any length.
+fn environment_at(d: vec3<f32>) -> vec3<f32> {
+    return environment_lookup(environment_place(normalize(d)));
+}
+
+// By which environment_sample draws direction d, a unit vector.
+fn environment_density(d: vec3<f32>) -> f32 {
+    let place = vec2<u32>(max(environment_place(d), vec2<f32>(0.0)));
+    let x = min(place.x, params.environment_width - 1u);
+    let y = min(place.y, params.environment_height - 1u);
+    return environment[y * params.environment_width + x].w / max(sqrt(d.x * d.x + d.z * d.z), 1.0e-7);
 }
 
 struct EnvironmentSample {
     direction: vec3<f32>,
     light: vec3<f32>, // radiance over the density of directions; zero where none was drawn
+    density: f32,
 }
 
 // A direction drawn by the density that the texels state: a texel by their table, a place in it evenly over both angles.
@@ -116,7 +131,7 @@ fn environment_sample(words: vec4<u32>) -> EnvironmentSample {
     if density > 0.0 {
         light = environment_lookup(place) * (max(level, 0.0) / density);
     }
-    return EnvironmentSample(direction, light);
+    return EnvironmentSample(direction, light, density / max(level, 1.0e-7));
 }
 
 // The emitter that the ray of a pixel leads to.
@@ -155,4 +170,16 @@ fn shines(e: Emitter, d: vec3<f32>) -> f32 {
         cone = clamp(dot(-normalize(d), e.u) * e.v.x + e.v.y, 0.0, 1.0);
     }
     return window * cone * cone * sqrt(squared);
+}
+
+// By which the sun's disc draws d, with a part of 1 along the sun: evenly over a disc across it.
+fn sun_density(d: vec3<f32>) -> f32 {
+    let squared = dot(d, d);
+    return squared * sqrt(squared) / (HALF_TURN * params.sun_radius * params.sun_radius);
+}
+
+// The share of a direction that was drawn by `own` where the other way draws it by `other` (Veach, Guibas 1995, the power heuristic).
+fn outweighs(own: f32, other: f32) -> f32 {
+    let ratio = other / own;
+    return 1.0 / (1.0 + ratio * ratio);
 }

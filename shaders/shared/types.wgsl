@@ -39,6 +39,10 @@ struct Params {
     direction: u32,       // number of the pass's direction
     environment_width: u32,  // texels of a row of the environment; 0: the sky is the background
     environment_height: u32,
+    emitter_density: f32, // of points of surfaces that shine, by the luminance of their radiance, an area of 1: how rays to them are drawn
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -56,6 +60,8 @@ const PARAM_NEXT: u32 = 256u;     // a ray asks up to the first brick that it en
 const PARAM_CULLED: u32 = 512u;   // pairs of a tile and a leaf that no more rays see than the threshold are left out
 const PARAM_EMISSION: u32 = 1024u; // shade: with the hits' emission
 const PARAM_MISS: u32 = 2048u;    // shade: with the background, where rays missed
+
+const PARAM_GLOSSY: u32 = 8192u;   // what surfaces reflect otherwise than diffusely comes by rays of its own, too
 
 const BATCH_SAMPLES: u32 = 64u;   // samples that are summed before the radiance is emptied
 
@@ -149,6 +155,10 @@ struct Brick {
     attribute_indices: u32,
     opacity_of: u32,      // word offsets within the geometry payload, with BRICK_OPACITY
     opacities: u32,
+    details: u32,         // word offset within the attribute payload, with BRICK_DETAIL
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
 }
 
 struct Opacity {          // of a material
@@ -201,9 +211,23 @@ struct Material {
     metallic: f32,
     roughness: f32,
     alpha_cutoff: f32,
-    flags: u32,
-    base_color_texture: u32,
-    padding: vec4<u32>,
+    flags: u32,           // MATERIAL_* bits
+    base_color_texture: u32, // NONE: it has none; so with the others
+    opacity_map: u32,
+    normal_texture: u32,
+    metallic_roughness_texture: u32,
+    occlusion_texture: u32,
+    emissive_texture: u32,
+    normal_scale: f32,
+    occlusion_strength: f32,
+    clearcoat: f32,       // share that it covers
+    specular: vec3<f32>,  // what its dielectric part reflects along the normal
+    specular_weight: f32, // and at grazing angles
+    clearcoat_roughness: f32,
+    transmission: f32,
+    uv_sets: u32,         // bit i: texture i takes the second set of coordinates
+    padding: u32,
+    uv_from_set: array<vec4<f32>, 10>, // two rows a texture; w of the first: by what areas grow
 }
 
 struct Texture {
@@ -235,12 +259,21 @@ struct TileDemand {       // what texture lookups ask of a tile
 struct GBuffer {          // what shading reads of a primary hit
     albedo: vec3<f32>,    // linear base colour
     state: u32,           // 0: attributes not read yet; else GBUFFER_*
-    normal: vec3<f32>,    // interpolated unit normal, world space, on the side of the geometric one
+    normal: vec3<f32>,    // unit normal, world space: interpolated on the side of the geometric one, then by its texture
     material: u32,
     emission: vec3<f32>,
-    footprint: f32,       // what the pixel covers of the textures' unit square, an area; 0 without textures
+    footprint: f32,       // what the pixel covers of the first coordinates' unit square, an area; 0 without textures
     weights: vec2<f32>,   // barycentric weights of source vertices 1 and 2
     uv: vec2<f32>,
+    tangent: vec3<f32>,   // of the normal texture, world space, not unit
+    handedness: f32,      // the bitangent is this times cross(normal, tangent); 0 without a tangent
+    uv1: vec2<f32>,       // second coordinates
+    footprint1: f32,      // of these
+    occlusion: f32,       // share of unshadowed light that the occlusion texture leaves
+    metallic: f32,
+    roughness: f32,
+    padding0: u32,
+    padding1: u32,
 }
 
 struct Emitter {          // in the frame, device units; one of them is drawn by an alias table over their power
@@ -265,12 +298,24 @@ const EMITTER_KIND: u32 = 7u;      // the bits of the above
 const EMITTER_TWO_SIDED: u32 = 8u;
 const T_INFINITE: f32 = 3.4028234e38;
 const INSTANCE_IDENTITY: u32 = 1u;
+const INSTANCE_MIRRORED: u32 = 2u;
 const BRICK_WIDE: u32 = 1u;
 const BRICK_INDEX32: u32 = 2u;
 const BRICK_OPACITY: u32 = 4u;
 const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex without one
-const GBUFFER_READ: u32 = 1u;      // all is known
-const GBUFFER_WAITS: u32 = 2u;     // but for textures: their lookup comes later
+const BRICK_DETAIL: u32 = 8u;
+const MATERIAL_DOUBLE_SIDED: u32 = 4u;
+const MATERIAL_UNLIT: u32 = 8u;
+const GBUFFER_READ: u32 = 1u;      // attributes are read
+const GBUFFER_WAITS: u32 = 62u;    // bits of textures that have still to be looked up, the first is that of texture 0
+const GBUFFER_FIRST: u32 = 1u;     // its place
+const BASE_COLOR: u32 = 0u;        // textures of a material
+const NORMAL: u32 = 1u;
+const METALLIC_ROUGHNESS: u32 = 2u;
+const OCCLUSION: u32 = 3u;
+const EMISSIVE: u32 = 4u;
+const MATERIAL_TEXTURES: u32 = 5u;
+const REFLECTANCE_SIZE: u32 = 32u; // rows and columns of the table of reflectances
 const TEXTURE_BC7: u32 = 1u;       // encoding: blocks; else RGBA8
 const TEXTURE_SRGB: u32 = 1u;      // flags: red, green and blue are sRGB, else linear
 const TILE_TEXELS: u32 = 128u;     // side of a tile

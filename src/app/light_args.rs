@@ -16,7 +16,8 @@ pub struct EffectArgs {
     /// What to trace, separated by commas: primary, shadow (of the sun, the rectangular light and surfaces that emit, which light
     /// others by it), ao (ambient occlusion of the sky's light), diffuse (one bounce between surfaces, the sky's light with it),
     /// environment (the light of the environment, or of the sky, with shadows: rays in directions drawn by its brightness; ao and the
-    /// sky's share of diffuse are left out beside it), mirror (every surface is half a mirror, for tests); all include primary
+    /// sky's share of diffuse are left out beside it), glossy (what metals and polished surfaces mirror: one ray in a direction drawn by
+    /// their roughness, whose hits are lit), mirror (every surface is half a mirror, for tests); all include primary
     #[arg(long, value_name = "LIST", default_value = "primary,shadow")]
     pub effects: EffectList,
     /// Rays a pixel and sample of ao, 1 to 1024
@@ -37,13 +38,14 @@ pub struct EffectArgs {
 impl EffectArgs {
     /// The effects of every frame.
     pub fn effects(&self) -> Effects {
-        let EffectList { shadow, ao, diffuse, mirror, environment } = self.effects;
+        let EffectList { shadow, ao, diffuse, mirror, glossy, environment } = self.effects;
         Effects {
             shadow,
             environment,
             occlusion: (ao && !environment).then_some(Occlusion { rays: self.ao_rays, length: self.ao_length }),
             diffuse: diffuse.then_some(self.diffuse_rays),
             mirror,
+            glossy,
             turn_degrees: self.rotation,
         }
     }
@@ -62,6 +64,8 @@ named_values! {
         Diffuse = "diffuse",
         /// Mirrored rays whose hits are shaded.
         Mirror = "mirror",
+        /// Rays drawn by the gloss of surfaces, whose hits are shaded.
+        Glossy = "glossy",
         /// Rays towards the environment.
         Environment = "environment",
     } later &[]
@@ -78,6 +82,8 @@ pub struct EffectList {
     pub diffuse: bool,
     /// Mirrored rays.
     pub mirror: bool,
+    /// Reflections by the gloss of surfaces.
+    pub glossy: bool,
     /// Rays towards the environment.
     pub environment: bool,
 }
@@ -94,6 +100,7 @@ impl FromStr for EffectList {
                 Effect::Ao => effects.ao = true,
                 Effect::Diffuse => effects.diffuse = true,
                 Effect::Mirror => effects.mirror = true,
+                Effect::Glossy => effects.glossy = true,
                 Effect::Environment => effects.environment = true,
             }
         }
@@ -108,6 +115,7 @@ impl std::fmt::Display for EffectList {
             (self.ao, ",ao"),
             (self.diffuse, ",diffuse"),
             (self.mirror, ",mirror"),
+            (self.glossy, ",glossy"),
             (self.environment, ",environment"),
         ];
         f.write_str("primary")?;
@@ -235,7 +243,7 @@ mod tests {
 
     #[test]
     fn lists_are_read_and_written_alike() {
-        for text in ["primary", "primary,shadow", "primary,ao", "primary,shadow,ao,diffuse,mirror,environment"] {
+        for text in ["primary", "primary,shadow", "primary,ao", "primary,shadow,ao,diffuse,mirror,glossy,environment"] {
             assert_eq!(text.parse::<EffectList>().unwrap().to_string(), text);
         }
         assert_eq!("ao".parse::<EffectList>().unwrap().to_string(), "primary,ao");

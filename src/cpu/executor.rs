@@ -2,7 +2,8 @@
 
 use super::cache::{BrickCache, Shared};
 use super::generate::{
-    generate_diffuse, generate_mirror, generate_occlusion, generate_primary, generate_shadow, start_hits,
+    generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
+    start_hits,
 };
 use super::intersect_all::intersect_all;
 use super::intersect_binary::{BinaryTrees, intersect_binary};
@@ -147,24 +148,24 @@ fn run_kernel(
     let own = &mut from[0];
     let none = RaySet::default();
     let seen = before.last().unwrap_or(&none);
+    let materials = &sampling.texels.materials;
     match dispatch.kernel {
         "generate_primary" => generate_primary(bound, own),
         "generate_shadow" => generate_shadow(bound, own, seen, &pixels.throughput),
         "generate_occlusion" => generate_occlusion(bound, own, seen, &pixels.gbuffers[shaded]),
-        "generate_diffuse" => {
-            generate_diffuse(bound, own, seen, &pixels.gbuffers[shaded], &mut pixels.throughput);
-        }
-        "generate_mirror" => generate_mirror(bound, own, seen, &pixels.gbuffers[shaded], &mut pixels.throughput),
+        "generate_diffuse" => generate_diffuse(bound, own, seen, pixels, materials),
+        "generate_mirror" => generate_mirror(bound, own, seen, pixels),
+        "generate_glossy" => generate_glossy(bound, own, seen, pixels, materials),
         "start_hits" => start_hits(own),
         "clear_gbuffer" => clear_gbuffer(bound, pixels, shaded),
         "hit_demand" => hit_demand(bound, own),
         "resolve" => {
-            resolve(bound, seen, &mut pixels.gbuffers[shaded], &sampling.texels.materials, attributes);
+            resolve(bound, seen, &mut pixels.gbuffers[shaded], materials, attributes);
         }
         "sample" => sample(bound, &mut pixels.gbuffers[shaded], sampling, tile_demand),
-        "shade" => shade(bound, pixels, shaded, seen),
-        "add_light" => add_light(bound, pixels, shaded, own),
-        "add_occlusion" => add_occlusion(bound, pixels, shaded, own),
+        "shade" => shade(bound, pixels, shaded, seen, materials),
+        "add_light" => add_light(bound, pixels, shaded, (seen, own), materials),
+        "add_occlusion" => add_occlusion(bound, pixels, shaded, (seen, own), materials),
         "tile_bounds" => tile_bounds(bound, own, &mut tiles.bounds),
         "tile_walk_count" => tile_walk_count(bound, tiles),
         "tile_scan" => tile_scan(bound, tiles)?,

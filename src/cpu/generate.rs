@@ -1,19 +1,22 @@
 //! Rays from the camera and from hits: twins of `shaders/generate_primary.wgsl`, `generate_shadow.wgsl`, `generate_around.wgsl`,
-//! `generate_mirror.wgsl` and `start_hits.wgsl`.
+//! `generate_mirror.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
 
+use super::gloss::Gloss;
 use super::lamps::{emitter_of, environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
 use super::rays::{RaySet, start_hit};
 use super::scene::Bound;
-use super::shade::surface_share;
+use super::shade::{Pixels, surface_share};
 use super::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
 use crate::kernel::layout::{
     EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT,
     PARAM_SCATTER, Ray, Surface, T_INFINITE,
 };
 use crate::math::exact::barrier;
-use crate::math::sampling::random2;
+use crate::math::sampling::{random2, random4};
+use bricks::Material;
 use rayon::prelude::*;
+use std::f32::consts::PI;
 
 /// Rays to emitters end short of them by this share of the distance, so that what lies in their plane casts no shadow.
 const SHORT_OF_LIGHT: f32 = 1.0 / 65_536.0;
@@ -169,41 +172,73 @@ pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffe
     });
 }
 
-/// As [`generate_occlusion`], of unlimited length. The throughput is noted: what the surface reflects, by the share of the direction;
-/// in w the direction's number.
-pub fn generate_diffuse(
-    bound: &Bound,
-    own: &mut RaySet,
-    seen: &RaySet,
-    gbuffer: &[GBuffer],
-    throughput: &mut [[f32; 4]],
-) {
+/// As [`generate_occlusion`], of unlimited length. The throughput is noted: what of light from around the surface reflects, by the share of
+/// the direction; in w the direction's number.
+pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
+    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
     for_each_leaving(own, seen, |index, surface| {
         leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
     });
+    densities.fill(0.0);
     let number = bound.params.direction as f32;
-    for ((carried, ray), g) in throughput.iter_mut().zip(&own.rays).zip(gbuffer) {
-        let share = |k: usize| surface_share(bound) * bound.params.share * g.albedo[k];
-        *carried =
-            if ray.t_min <= ray.t_max { [share(0), share(1), share(2), number] } else { [0.0, 0.0, 0.0, number] };
-    }
+    throughput.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, carried)| {
+        let ray = &own.rays[index];
+        *carried = [0.0, 0.0, 0.0, number];
+        if ray.t_min <= ray.t_max {
+            let g = &gbuffer[index];
+            let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+            let reflected = s.reflected_by_diffuse_rays(bound);
+            (0..3).for_each(|k| carried[k] = surface_share(bound) * bound.params.share * reflected[k]);
+        }
+    });
 }
 
 /// The mirrored ray of every primary hit, about the interpolated normal; where that leads below the surface, none.
-pub fn generate_mirror(
-    bound: &Bound,
-    own: &mut RaySet,
-    seen: &RaySet,
-    gbuffer: &[GBuffer],
-    throughput: &mut [[f32; 4]],
-) {
+pub fn generate_mirror(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels) {
+    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
     for_each_leaving(own, seen, |index, surface| {
         let (d, n) = (normalize(seen.rays[index].direction), gbuffer[index].normal);
         let along = 2.0 * dot(n, d);
         leaving(surface, normalize(each(|k| d[k] - along * n[k])), T_INFINITE)
     });
+    densities.fill(0.0);
     for (carried, ray) in throughput.iter_mut().zip(&own.rays) {
         let share = if ray.t_min <= ray.t_max { 1.0 - bound.params.surface_share } else { 0.0 };
         *carried = [share, share, share, 0.0];
     }
+}
+
+/// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss; where that leads below the
+/// surface, none. The throughput and by which density the direction was drawn are noted.
+pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
+    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
+    let p = bound.params;
+    let gloss = |index: usize| {
+        let g = &gbuffer[index];
+        Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x))
+    };
+    for_each_leaving(own, seen, |index, surface| {
+        let s = gloss(index);
+        if !s.is_glossy() {
+            return none(surface.point);
+        }
+        let direction = s.direction(random4(index as u32, p.stream, p.seed));
+        if s.density(direction) > 0.0 {
+            leaving(surface, direction, T_INFINITE)
+        } else {
+            Ray { direction, ..none(surface.point) }
+        }
+    });
+    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut());
+    carried.enumerate().with_min_len(1024).for_each(|(index, (carried, density))| {
+        (*carried, *density) = ([0.0; 4], 0.0);
+        let ray = &own.rays[index];
+        if ray.t_min <= ray.t_max {
+            let s = gloss(index);
+            *density = s.density(ray.direction);
+            let reflected = s.reflected(ray.direction);
+            let share = dot(gbuffer[index].normal, ray.direction) / (PI * *density);
+            (0..3).for_each(|k| carried[k] = surface_share(bound) * reflected[k] * share);
+        }
+    });
 }

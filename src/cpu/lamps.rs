@@ -42,7 +42,7 @@ fn multiply_high(a: u32, b: u32) -> u32 {
 }
 
 /// A random word as a number in [0, 1).
-fn unit(word: u32) -> f32 {
+pub(super) fn unit(word: u32) -> f32 {
     (word >> 8) as f32 / 16_777_216.0
 }
 
@@ -104,16 +104,40 @@ fn environment_size(p: &Params) -> [f32; 2] {
     [p.environment_width as f32, p.environment_height as f32]
 }
 
-/// Radiance from direction d, of any length: the image's centre lies along -Z, its right along +X, turned about +Y.
-pub fn environment_at(bound: &Bound, d: Vec3) -> Vec3 {
-    let n = normalize(d);
-    let turn = bound.params.environment_turn;
-    let x = turn[0] * n[0] - turn[1] * n[2];
-    let z = turn[1] * n[0] + turn[0] * n[2];
+/// Where in the image direction d, a unit vector, leads, in texels: its centre lies along -Z, its right along +X, turned about +Y.
+fn environment_place(params: &Params, d: Vec3) -> [f32; 2] {
+    let turn = params.environment_turn;
+    let x = turn[0] * d[0] - turn[1] * d[2];
+    let z = turn[1] * d[0] + turn[0] * d[2];
     let u = 0.5 + angle_of(x, -z) / TAU;
-    let v = angle_of((x * x + z * z).sqrt(), n[1]) / PI;
-    let size = environment_size(bound.params);
-    environment_lookup(bound, [u * size[0], v * size[1]])
+    let v = angle_of((x * x + z * z).sqrt(), d[1]) / PI;
+    let size = environment_size(params);
+    [u * size[0], v * size[1]]
+}
+
+/// Radiance from direction d, of any length.
+pub fn environment_at(bound: &Bound, d: Vec3) -> Vec3 {
+    environment_lookup(bound, environment_place(bound.params, normalize(d)))
+}
+
+/// By which [`environment_sample`] draws direction d, a unit vector.
+pub fn environment_density(bound: &Bound, d: Vec3) -> f32 {
+    let (width, height) = (bound.params.environment_width, bound.params.environment_height);
+    let [x, y] = environment_place(bound.params, d).map(|x| most(x, 0.0) as u32);
+    let texel = y.min(height - 1) * width + x.min(width - 1);
+    bound.lamps.lamps.texels()[texel as usize][3] / most((d[0] * d[0] + d[2] * d[2]).sqrt(), 1.0e-7)
+}
+
+/// By which the sun's disc draws d, with a part of 1 along the sun: evenly over a disc across it.
+pub fn sun_density(params: &Params, d: Vec3) -> f32 {
+    let squared = dot(d, d);
+    squared * squared.sqrt() / (PI * params.sun_radius * params.sun_radius)
+}
+
+/// The share of a direction that was drawn by `own` where the other way draws it by `other` (Veach, Guibas 1995, the power heuristic).
+pub fn outweighs(own: f32, other: f32) -> f32 {
+    let ratio = other / own;
+    1.0 / (1.0 + ratio * ratio)
 }
 
 /// A direction, and its radiance over the density of directions; zero where none was drawn.
@@ -122,6 +146,8 @@ pub struct EnvironmentSample {
     pub direction: Vec3,
     /// Radiance over density.
     pub light: Vec3,
+    /// The density.
+    pub density: f32,
 }
 
 /// A direction drawn by the density that the texels state: a texel by their table, a place in it evenly over both angles.
@@ -149,7 +175,7 @@ pub fn environment_sample(bound: &Bound, words: [u32; 4]) -> EnvironmentSample {
         let weight = most(level, 0.0) / density;
         light = environment_lookup(bound, place).map(|c| c * weight);
     }
-    EnvironmentSample { direction, light }
+    EnvironmentSample { direction, light, density: density / most(level, 1.0e-7) }
 }
 
 /// The emitter that the ray of a pixel leads to.

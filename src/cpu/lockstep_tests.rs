@@ -38,7 +38,7 @@ fn device() -> Option<(Gpu, Arc<Kernels>)> {
         println!("skipped: no adapter");
         return None;
     };
-    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true }, true));
+    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true }, true));
     Some((gpu, kernels))
 }
 
@@ -86,6 +86,17 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
         alpha_cutoff: 0.25,
         flags: [0, bricks::MATERIAL_MASK, bricks::MATERIAL_BLEND, bricks::MATERIAL_BLEND][i as usize],
         base_color_texture: if i < 3 { i } else { bricks::NONE },
+        // Metal, polished and coated things; one Lambertian.
+        metallic: [0.0, 0.8, 0.3, 0.0][i as usize],
+        roughness: [1.0, 0.5, 0.9, 0.4][i as usize],
+        specular: [0.0, 0.04, 0.08, 0.04].map(|f0: f32| [f0, f0, 0.5 * f0])[i as usize],
+        specular_weight: [0.0, 1.0, 0.7, 1.0][i as usize],
+        clearcoat: [0.0, 0.0, 0.6, 1.0][i as usize],
+        clearcoat_roughness: 0.4,
+        metallic_roughness_texture: [bricks::NONE, 2, bricks::NONE, 1][i as usize],
+        occlusion_texture: [2, bricks::NONE, 0, 1][i as usize],
+        emissive_texture: [bricks::NONE, 0, 1, bricks::NONE][i as usize],
+        occlusion_strength: 0.7,
         ..bricks::Material::DIFFUSE
     };
     let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
@@ -145,6 +156,7 @@ fn effects() -> Effects {
         occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
         diffuse: Some(1),
         mirror: true,
+        glossy: true,
         turn_degrees: 360.0,
     }
 }

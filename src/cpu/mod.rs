@@ -16,6 +16,7 @@ pub mod brick;
 pub mod cache;
 pub mod executor;
 mod generate;
+mod gloss;
 mod indices;
 mod intersect_all;
 mod intersect_binary;

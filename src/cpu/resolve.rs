@@ -1,15 +1,19 @@
-//! Reads the attributes of hits in bricks whose attributes are resident: twin of `shaders/resolve.wgsl`. Normal, texture coordinates,
-//! base colour without textures, and what of textures the pixel covers.
+//! Reads the attributes of hits in bricks whose attributes are resident: twin of `shaders/resolve.wgsl`. Normal, tangent, texture
+//! coordinates, the material without its textures, and what of these the pixel covers.
 
 use super::indices::Indices;
 use super::rays::RaySet;
+use super::sample::settle;
 use super::scene::Bound;
 use super::vector::{Vec3, dot, each, most, normalize, xyz};
 use crate::kernel::layout::{
-    GBUFFER_READ, GBUFFER_WAITS, GBuffer, NO_NORMAL, NONE, Params, Ray, STATE_ATTRIBUTES, Surface,
+    GBUFFER_FIRST, GBUFFER_READ, GBuffer, INSTANCE_MIRRORED, NO_NORMAL, NONE, Params, Ray, STATE_ATTRIBUTES, Surface,
 };
 use crate::math::exact::{divide, square_root};
-use bricks::{AttributeLayout, AttributeVertex, Brick, Material, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
+use bricks::{
+    AttributeDetail, AttributeLayout, AttributeVertex, Brick, Material, NORMAL, SURFACE_MATERIAL,
+    SURFACE_ROTATION_SHIFT,
+};
 use rayon::prelude::*;
 
 /// Of the angle between a ray and a normal; below it a footprint is that of this one.
@@ -22,6 +26,8 @@ pub struct AttributeView<'a> {
     /// Material and rotation of each triangle.
     surfaces: &'a [u32],
     indices: Indices<'a>,
+    /// As many as vertices, or none.
+    details: &'a [AttributeDetail],
 }
 
 impl<'a> AttributeView<'a> {
@@ -32,12 +38,19 @@ impl<'a> AttributeView<'a> {
         Self {
             vertices: bytemuck::cast_slice(part(0, layout.surfaces)),
             surfaces: bytemuck::cast_slice(part(layout.surfaces, layout.indices)),
-            indices: Indices::new(brick, part(layout.indices, layout.bytes)),
+            indices: Indices::new(brick, part(layout.indices, layout.details)),
+            details: bytemuck::cast_slice(part(layout.details, layout.bytes)),
         }
     }
 
     fn corners(&self, triangle: u32) -> [AttributeVertex; 3] {
         self.indices.of(triangle).map(|index| self.vertices[index as usize])
+    }
+
+    /// What its corners have besides, where they have.
+    fn details(&self, triangle: u32) -> Option<[AttributeDetail; 3]> {
+        let corners = self.indices.of(triangle);
+        (!self.details.is_empty()).then(|| corners.map(|index| self.details[index as usize]))
     }
 }
 
@@ -114,25 +127,60 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
     // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric one.
     let inverse = 1.0 / most(size, 1.0e-30).sqrt();
     n = if size > 1.0e-12 { n.map(|x| x * inverse) } else { surface.normal };
-    if dot(n, surface.normal) < 0.0 {
+    let is_turned = dot(n, surface.normal) < 0.0;
+    if is_turned {
         n = n.map(|x| -x);
     }
     let base = [0, 1, 2, 3].map(|k| material.base_color[k] * color[k]);
-    let (mut state, mut footprint) = (GBUFFER_READ, 0.0);
-    if material.base_color_texture != NONE {
-        state = GBUFFER_WAITS;
-        footprint = footprint_of(bound.params, &seen.rays[index], hit.t, surface, corners.map(|v| v.uv));
-    }
     // Source vertex (i + rotation) mod 3 was stored as vertex i.
     let source = |i: u32| weights[((i + 3 - rotation) % 3) as usize];
-    GBuffer {
+    let mut g = GBuffer {
         albedo: xyz(base),
-        state,
+        state: GBUFFER_READ,
         normal: n,
         material: word & SURFACE_MATERIAL,
         emission: material.emission,
-        footprint,
         weights: [source(1), source(2)],
         uv,
+        occlusion: 1.0,
+        metallic: material.metallic,
+        roughness: material.roughness,
+        ..GBuffer::default()
+    };
+    for (place, texture) in (0..).zip(material.textures()) {
+        if texture != NONE {
+            g.state |= 1 << (GBUFFER_FIRST + place);
+        }
     }
+    if g.state != GBUFFER_READ {
+        let footprint = |uvs| footprint_of(bound.params, &seen.rays[index], hit.t, surface, uvs);
+        g.footprint = footprint(corners.map(|v| v.uv));
+        if let Some(details) = attributes.details(surface.triangle) {
+            let mut along = [0.0; 3];
+            for (weight, v) in weights.into_iter().zip(&details) {
+                let t = octahedral(v.tangent);
+                along = each(|k| along[k] + weight * t[k]);
+                g.uv1 = [0, 1].map(|k| g.uv1[k] + weight * v.uv[k]);
+                g.handedness = v.handedness;
+            }
+            g.footprint1 = footprint(details.map(|v| v.uv));
+            let place = &bound.scene.instances[instance as usize];
+            g.tangent = place.world_from_object.map(|row| dot(xyz(row), along));
+            // Seen from behind, the frame is turned about with its normal.
+            if is_turned {
+                g.tangent = g.tangent.map(|x| -x);
+                g.handedness = -g.handedness;
+            }
+            if place.flags & INSTANCE_MIRRORED != 0 {
+                g.handedness = -g.handedness;
+            }
+        }
+        if g.handedness == 0.0 {
+            g.state &= !(1 << (GBUFFER_FIRST + NORMAL as u32));
+        }
+    }
+    if g.state == GBUFFER_READ {
+        settle(&mut g, material.flags);
+    }
+    g
 }

@@ -1,15 +1,17 @@
 //! What hits show and the light on them: twins of `shaders/clear_gbuffer.wgsl`, `shade.wgsl`, `add_light.wgsl`,
 //! `add_occlusion.wgsl` and `hit_demand.wgsl`.
 
-use super::lamps::{emitter_of, environment_sample, lamp_words, shines};
+use super::gloss::Gloss;
+use super::lamps::{emitter_of, environment_density, environment_sample, lamp_words, outweighs, shines, sun_density};
 use super::light::{add_light as add, ambient, background, sunlight};
 use super::rays::RaySet;
 use super::scene::{Bound, Tally};
-use super::vector::{Vec3, dot, each, most};
+use super::vector::{Vec3, cross, dot, each, most, normalize, xyz};
 use crate::kernel::layout::{
-    BATCH_SAMPLES, GBuffer, NONE, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_MISS,
-    PARAM_SKY, PARAM_SUN, Ray,
+    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, PARAM_BOUNCE,
+    PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_SKY, PARAM_SUN, Ray,
 };
+use bricks::Material;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
@@ -25,13 +27,15 @@ pub struct Pixels {
     pub radiance: Vec<[f32; 4]>,
     /// Of the light that the rays of set 1 bring.
     pub throughput: Vec<[f32; 4]>,
+    /// By which their directions were drawn; 0 where no lamp's rays bring the same light.
+    pub densities: Vec<f32>,
 }
 
 impl Pixels {
     /// Of `rays` pixels.
     pub fn new(rays: usize) -> Self {
         let gbuffers = [vec![GBuffer::default(); rays], Vec::new()];
-        Self { gbuffers, radiance: vec![[0.0; 4]; rays], throughput: Vec::new() }
+        Self { gbuffers, radiance: vec![[0.0; 4]; rays], throughput: Vec::new(), densities: Vec::new() }
     }
 
     /// Makes room for bounces at every pixel.
@@ -39,6 +43,7 @@ impl Pixels {
         let rays = self.radiance.len();
         self.gbuffers[1] = vec![GBuffer::default(); rays];
         self.throughput = vec![[0.0; 4]; rays];
+        self.densities = vec![0.0; rays];
     }
 }
 
@@ -55,21 +60,24 @@ pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
     }
 }
 
-/// Calls `light` for every pixel, with the throughputs of all, and adds what it gives.
+/// What the rays of set 1 carry: throughputs and densities.
+type Carried<'a> = (&'a [[f32; 4]], &'a [f32]);
+
+/// Calls `light` for every pixel, with what the rays of all carry, and adds what it gives.
 fn for_each_pixel(
     bound: &Bound,
     pixels: &mut Pixels,
     shaded: usize,
-    light: impl Fn(usize, &GBuffer, &mut [f32; 4], &[[f32; 4]]) -> Option<Vec3> + Sync,
+    light: impl Fn(usize, &GBuffer, &mut [f32; 4], Carried) -> Option<Vec3> + Sync,
 ) {
-    let Pixels { gbuffers, radiance, throughput } = pixels;
-    let (gbuffer, throughput) = (&gbuffers[shaded], &throughput[..]);
+    let Pixels { gbuffers, radiance, throughput, densities } = pixels;
+    let (gbuffer, carried) = (&gbuffers[shaded], (&throughput[..], &densities[..]));
     radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
         let mut tally = Tally::default();
         for (i, radiance) in radiance.iter_mut().enumerate() {
             let index = run * RUN + i;
-            if let Some(light) = light(index, &gbuffer[index], radiance, throughput) {
-                add(bound, &mut tally, radiance, throughput.get(index), light);
+            if let Some(light) = light(index, &gbuffer[index], radiance, carried) {
+                add(bound, &mut tally, radiance, carried.0.get(index), light);
             }
         }
         bound.counters.add(&tally);
@@ -80,11 +88,60 @@ fn is_traced(ray: &Ray) -> bool {
     ray.t_min <= ray.t_max
 }
 
-/// What the hits of the shaded set show by themselves, unless passes of their own bring it: the background on a miss, else their
-/// emission and the light of the sun and of the background on a Lambertian surface. The first shading of a sample counts it.
-pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet) {
+/// Of the background in direction `d`, which was drawn by `density`; 0: where no lamp draws it as well.
+fn seen_background(bound: &Bound, d: Vec3, density: f32) -> Vec3 {
     let params = bound.params;
-    for_each_pixel(bound, pixels, shaded, |index, g, radiance, _| {
+    let mut light = background(bound, d);
+    if density > 0.0 {
+        let n = normalize(d);
+        if bound.has(PARAM_ENVIRONMENT) && params.environment_width != 0 {
+            let weight = outweighs(density, environment_density(bound, n));
+            light = light.map(|c| c * weight);
+        }
+        // The sun's disc, unless its light is without shadows.
+        let sun = xyz(params.sun);
+        let along = dot(n, sun);
+        if !bound.has(PARAM_SUN) && params.sun_radius > 0.0 && along > 0.0 {
+            let across = cross(n, sun);
+            if dot(across, across) <= params.sun_radius * params.sun_radius * along * along {
+                let of_sun = sun_density(params, n.map(|x| x / along));
+                let weight = PI * of_sun * outweighs(density, of_sun);
+                light = each(|k| light[k] + params.sun_color[k] * weight);
+            }
+        }
+    }
+    light
+}
+
+/// The emission of the hit of ray `index` of `seen`, which was drawn by `density`, as above.
+fn seen_emission(bound: &Bound, g: &GBuffer, m: &Material, seen: &RaySet, index: usize, density: f32) -> Vec3 {
+    // Only these are lamps.
+    let is_lamp = m.emissive_texture == NONE && m.flags & MATERIAL_UNLIT == 0;
+    if !is_lamp {
+        return g.emission;
+    }
+    if !bound.has(PARAM_EMISSION) {
+        return [0.0; 3];
+    }
+    if density > 0.0 && bound.params.emitter_density > 0.0 {
+        let d = seen.rays[index].direction;
+        let length = seen.hits[index].t * dot(d, d).sqrt();
+        let cosine = most(dot(normalize(d), seen.surfaces[index].normal).abs(), 1.0e-6);
+        let sides = if m.flags & MATERIAL_DOUBLE_SIDED != 0 { 2.0 } else { 1.0 };
+        let luminance = dot(m.emission, [0.2126, 0.7152, 0.0722]);
+        let of_lamp = luminance * sides * bound.params.emitter_density * (length * length / cosine);
+        let weight = outweighs(density, of_lamp);
+        return g.emission.map(|c| c * weight);
+    }
+    g.emission
+}
+
+/// What the hits of the shaded set show by themselves, unless passes of their own bring it: the background on a miss, else their
+/// emission and the light of the sun and of the background, unshadowed. Where rays were drawn by the gloss of surfaces, what rays to
+/// lamps bring as well is weighted. The first shading of a sample counts it.
+pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, materials: &[Material]) {
+    let params = bound.params;
+    for_each_pixel(bound, pixels, shaded, |index, g, radiance, (_, densities)| {
         if !bound.has(PARAM_BOUNCE) {
             radiance[3] += 1.0;
         }
@@ -92,55 +149,99 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet) {
         if !is_traced(ray) {
             return None;
         }
+        let density = if bound.has(PARAM_BOUNCE) { densities[index] } else { 0.0 };
         if seen.surfaces[index].leaf == NONE {
-            return bound.has(PARAM_MISS).then(|| background(bound, ray.direction));
+            return bound.has(PARAM_MISS).then(|| seen_background(bound, ray.direction, density));
         }
-        let mut light = [0.0; 3];
+        let m = &materials[g.material as usize];
+        let s = Gloss::of(g, m, ray.direction.map(|x| -x));
+        let (mut light, mut mirrored) = ([0.0; 3], [0.0; 3]);
         if bound.has(PARAM_SUN) {
             let sun = sunlight(params, g.normal);
+            let reflected = s.reflected(xyz(params.sun));
             light = each(|k| light[k] + sun[k]);
+            mirrored = each(|k| mirrored[k] + reflected[k] * sun[k]);
         }
         if bound.has(PARAM_SKY) {
             let ambient = ambient(params, g.normal);
-            light = each(|k| light[k] + ambient[k]);
+            let reflected = s.reflected_ambient(bound);
+            light = each(|k| light[k] + ambient[k] * g.occlusion);
+            mirrored = each(|k| mirrored[k] + reflected[k] * g.occlusion);
         }
-        let emission = if bound.has(PARAM_EMISSION) { g.emission } else { [0.0; 3] };
-        Some(each(|k| surface_share(bound) * (g.albedo[k] * light[k] + emission[k])))
+        let emission = seen_emission(bound, g, m, seen, index, density);
+        Some(each(|k| surface_share(bound) * (s.diffuse[k] * light[k] + mirrored[k] + emission[k])))
     });
 }
 
-/// Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free: Lambertian surfaces.
-pub fn add_light(bound: &Bound, pixels: &mut Pixels, shaded: usize, own: &RaySet) {
-    for_each_pixel(bound, pixels, shaded, |index, g, _, throughput| {
+/// Adds the light of the pass's lamp to the hits of the shaded set, those of `seen`, whose shadow ray went free. What is not diffuse
+/// shares a direction with the rays that surfaces draw by their gloss.
+pub fn add_light(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    (seen, own): (&RaySet, &RaySet),
+    materials: &[Material],
+) {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, (throughput, _)| {
         let ray = &own.rays[index];
         if !is_traced(ray) || own.hits[index].id != NONE {
             return None;
         }
         let d = ray.direction;
         let cosine = most(dot(g.normal, d), 0.0);
+        // By which the lamp drew the direction, where the rays of the gloss may meet it.
+        let mut density = 0.0;
         let light = if bound.has(PARAM_EMITTER) {
             // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction leads from
             // the surface to the point.
             let e = emitter_of(bound, index, throughput);
             let squared = dot(d, d);
-            each(|k| e.radiance[k] * cosine * shines(e, d) / (PI * squared * squared) / e.probability)
+            let shone = shines(e, d);
+            if e.kind & EMITTER_KIND == EMITTER_TRIANGLE {
+                density = e.probability * squared * squared.sqrt() / shone;
+            }
+            each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / e.probability)
         } else if bound.has(PARAM_ENVIRONMENT) {
-            environment_sample(bound, lamp_words(bound, index, throughput)).light.map(|c| c * cosine / PI)
+            let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
+            density = drawn.density;
+            drawn.light.map(|c| c * cosine / PI)
         } else {
+            if bound.params.sun_radius > 0.0 {
+                density = sun_density(bound.params, d);
+            }
             sunlight(bound.params, g.normal)
         };
-        Some(each(|k| surface_share(bound) * g.albedo[k] * light[k]))
+        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+        let mut reflects = s.diffuse;
+        if s.is_glossy() {
+            let unit = normalize(d);
+            let mut weight = 1.0;
+            if bound.has(PARAM_GLOSSY) && !bound.has(PARAM_BOUNCE) && density > 0.0 {
+                weight = outweighs(density, s.density(unit));
+            }
+            let reflected = s.reflected(unit);
+            reflects = each(|k| reflects[k] + weight * reflected[k]);
+        }
+        Some(each(|k| surface_share(bound) * reflects[k] * light[k]))
     });
 }
 
 /// Adds the share of the sky's light that the pass's direction stands for, where its ray went free.
-pub fn add_occlusion(bound: &Bound, pixels: &mut Pixels, shaded: usize, own: &RaySet) {
+pub fn add_occlusion(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    (seen, own): (&RaySet, &RaySet),
+    materials: &[Material],
+) {
     for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
         if !is_traced(&own.rays[index]) || own.hits[index].id != NONE {
             return None;
         }
         let ambient = ambient(bound.params, g.normal);
-        Some(each(|k| surface_share(bound) * bound.params.share * g.albedo[k] * ambient[k]))
+        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+        let mirrored = s.reflected_ambient(bound);
+        Some(each(|k| surface_share(bound) * bound.params.share * (s.diffuse[k] * ambient[k] + mirrored[k])))
     });
 }
 

@@ -4,7 +4,7 @@ use super::bc7;
 use super::resolve::footprint_of;
 use super::sample::{Sampling, Texels, TileDemand, look_up};
 use super::texture::{Levels, color_at, level_at, levels_of, tile_at};
-use crate::kernel::layout::{GBUFFER_READ, GBUFFER_WAITS, GBuffer, NONE, Params, Ray, Surface};
+use crate::kernel::layout::{GBUFFER_FIRST, GBUFFER_READ, GBuffer, NONE, Params, Ray, Surface};
 use block_compression::decode::decompress_blocks_as_rgba8;
 use block_compression::{BC7Settings, CompressionVariant};
 use bricks::{Payload, SceneFile, TEXTURE_BC7, Texture};
@@ -225,7 +225,8 @@ fn a_hit_waits_for_all_of_its_tiles() {
     // On the corner of four tiles of level 0, which lie in one tile of level 1: between levels 0 and 1.
     let uv = [0.5; 2];
     let footprint = 2.0 / (512.0 * 512.0);
-    let waiting = GBuffer { albedo: [1.0; 3], state: GBUFFER_WAITS, uv, footprint, ..GBuffer::default() };
+    let waiting =
+        GBuffer { albedo: [1.0; 3], state: GBUFFER_READ | 1 << GBUFFER_FIRST, uv, footprint, ..GBuffer::default() };
     let all: Vec<&[u32]> = whole.iter().map(|words| &words[..]).collect();
     let asked = |g: &mut GBuffer, tiles: &[&[u32]]| -> Vec<(usize, u32, u32, u32)> {
         let demand: Vec<TileDemand> = tiles.iter().map(|_| TileDemand::default()).collect();

@@ -80,10 +80,10 @@ fn adapters(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
 }
 
-/// Storage buffers a kernel needs besides cache pages: 7 of the scene, 5 of the rays, 8 of the tiles of rays.
+/// Storage buffers a kernel needs besides cache pages: 7 of the scene, 5 of the rays, 8 of the tiles of rays or of shading.
 const FIXED_STORAGE_BUFFERS: u32 = 20;
 /// Storage buffers of the lamps, in place of pages of the cache.
-const LAMP_STORAGE_BUFFERS: usize = 3;
+const LAMP_STORAGE_BUFFERS: usize = 4;
 
 /// Those that texture lookups need besides cache and texel pages: 7 of the scene, 5 of the rays, 5 of their own.
 const SAMPLING_STORAGE_BUFFERS: usize = 17;

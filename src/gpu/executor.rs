@@ -17,7 +17,8 @@ use crate::kernel::dispatch::{
 };
 use crate::kernel::layout::{self, Params};
 use crate::kernel::{
-    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
+    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, reflectance, report,
+    textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
@@ -69,7 +70,9 @@ impl GpuExecutor {
     ) -> Result<Self, ExecutorError> {
         // A cache of nothing has a page, too.
         let texels = Texels::page_count(&gpu, &scene);
-        let pages = Pages { cache: page_sizes.len().max(1), texels, opacity: opacity::is_needed(scene.resident()) };
+        let resident = scene.resident();
+        let (opacity, gloss) = (opacity::is_needed(resident), reflectance::is_needed(resident));
+        let pages = Pages { cache: page_sizes.len().max(1), texels, opacity, gloss };
         let most_pages = gpu.max_cache_pages(pages);
         if pages.cache > most_pages {
             let text = format!(
@@ -106,7 +109,7 @@ impl GpuExecutor {
             scene: SceneBuffers::new(&gpu, &scene)?,
             cache: CachePages::new(&gpu, page_sizes),
             texels: Texels::new(&gpu, &scene)?,
-            lamps: LampBuffers::new(&gpu),
+            lamps: LampBuffers::new(&gpu, kernels.pages.gloss),
             sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
             pixels: PixelBuffers::new(&gpu, extent.rays(), 0),
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),

@@ -74,6 +74,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("generate_around", "generate_occlusion", Groups::Shading, &[("LIMITED", 1.0)]),
     ("generate_around", "generate_diffuse", Groups::Shading, &[("LIMITED", 0.0)]),
     ("generate_mirror", "generate_mirror", Groups::Shading, &[]),
+    ("generate_glossy", "generate_glossy", Groups::Shading, &[]),
     ("start_hits", "start_hits", Groups::Tiles, &[]),
     ("clear_gbuffer", "clear_gbuffer", Groups::Shading, &[]),
     ("hit_demand", "hit_demand", Groups::Tiles, &[]),
@@ -145,10 +146,10 @@ impl Kernels {
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write]);
         let cache = layout(device, "cache", &vec![Read; pages.cache]);
         let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write, Read]);
-        let shading = layout(device, "shading", &[Read, Write, Write, Write, Write, Write, Write]);
+        let shading = layout(device, "shading", &[Read, Write, Write, Write, Write, Write, Write, Write]);
         let fixed = [Read, Read, Read, Write, Write];
         let sampling = layout(device, "sampling", &[&fixed[..], &vec![Read; pages.texels]].concat());
-        let lamps = layout(device, "lamps", &[Read; 3]);
+        let lamps = layout(device, "lamps", &[Read; 4]);
         let none = layout(device, "none", &[]);
         let mut pipelines = HashMap::new();
         let mut layouts = HashMap::new();
@@ -228,7 +229,7 @@ mod tests {
     #[test]
     fn as_many_pages_as_are_promised_can_be_bound() {
         let gpu = Gpu::open(None).unwrap();
-        let pages = |cache| Pages { cache, texels: 1, opacity: true };
+        let pages = |cache| Pages { cache, texels: 1, opacity: true, gloss: true };
         let cache = gpu.max_cache_pages(pages(0));
         assert!(cache > 1, "{cache} pages");
         Kernels::new(&gpu, pages(cache), false);

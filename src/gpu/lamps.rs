@@ -3,6 +3,7 @@
 use super::device::Gpu;
 use super::rays::storage;
 use crate::kernel::frame::Frame;
+use crate::kernel::reflectance::REFLECTANCES;
 use crate::kernel::{Lamps, layout};
 use crate::schedule::ExecutorError;
 use std::sync::Arc;
@@ -12,20 +13,24 @@ pub struct LampBuffers {
     texels: wgpu::Buffer,
     table: wgpu::Buffer,
     emitters: wgpu::Buffer,
+    reflectances: wgpu::Buffer,
     lamps: Arc<Lamps>,
     frame: Option<Frame>,
 }
 
 impl LampBuffers {
-    /// Of nothing.
-    pub fn new(gpu: &Gpu) -> Self {
+    /// Of nothing. `gloss`: with the table of reflectances.
+    pub fn new(gpu: &Gpu, gloss: bool) -> Self {
         let [texels, table, emitters] = allocate(gpu, 0, 0);
-        Self { texels, table, emitters, lamps: Arc::default(), frame: None }
+        let entries: &[[f32; 2]] = if gloss { &REFLECTANCES } else { &[] };
+        let reflectances = storage(gpu, "reflectances", entries.len(), 8);
+        gpu.queue.write_buffer(&reflectances, 0, bytemuck::cast_slice(entries));
+        Self { texels, table, emitters, reflectances, lamps: Arc::default(), frame: None }
     }
 
     /// All of them, in the order of their bindings.
-    pub fn buffers(&self) -> [&wgpu::Buffer; 3] {
-        [&self.texels, &self.table, &self.emitters]
+    pub fn buffers(&self) -> [&wgpu::Buffer; 4] {
+        [&self.texels, &self.table, &self.emitters, &self.reflectances]
     }
 
     /// Takes `lamps`, unless they are those that it has; whether the buffers are new ones.

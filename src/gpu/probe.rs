@@ -131,7 +131,7 @@ pub fn source() -> String {
         _ => None,
     };
     // All files are embedded, so that assembly cannot fail.
-    wgsl::assemble("probe.wgsl", Pages { cache: 1, texels: 1, opacity: false }, &file).unwrap_or_default()
+    wgsl::assemble("probe.wgsl", Pages { cache: 1, texels: 1, opacity: false, gloss: false }, &file).unwrap_or_default()
 }
 
 /// [`run`] with another text of the kernels.

@@ -49,6 +49,8 @@ pub struct PixelBuffers {
     pub radiance: wgpu::Buffer,
     /// Share of the light that the rays of set 1 bring.
     pub throughput: wgpu::Buffer,
+    /// By which their directions were drawn.
+    pub densities: wgpu::Buffer,
 }
 
 /// A storage buffer of `count` elements that can be written from and copied to the host.
@@ -111,6 +113,7 @@ impl PixelBuffers {
             gbuffers: [gbuffer(rays), gbuffer(bounces)],
             radiance: storage(gpu, "radiance", rays, 16),
             throughput: storage(gpu, "throughput", bounces, 16),
+            densities: storage(gpu, "densities", bounces, 4),
         }
     }
 }

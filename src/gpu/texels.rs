@@ -52,22 +52,9 @@ impl Texels {
         }
         let textures = storage(gpu, "textures", records.len(), size_of::<layout::Texture>());
         gpu.queue.write_buffer(&textures, 0, bytemuck::cast_slice(&records));
-        let records: Vec<layout::Material> = resident
-            .materials
-            .iter()
-            .map(|m| layout::Material {
-                base_color: m.base_color,
-                emission: m.emission,
-                metallic: m.metallic,
-                roughness: m.roughness,
-                alpha_cutoff: m.alpha_cutoff,
-                flags: m.flags,
-                base_color_texture: m.base_color_texture,
-                padding: [0; 4],
-            })
-            .collect();
+        let records: &[layout::Material] = bytemuck::cast_slice(&resident.materials);
         let materials = storage(gpu, "materials", records.len(), size_of::<layout::Material>());
-        gpu.queue.write_buffer(&materials, 0, bytemuck::cast_slice(&records));
+        gpu.queue.write_buffer(&materials, 0, bytemuck::cast_slice(records));
         let tiles = resident.tiles.len();
         Ok(Self {
             textures,

@@ -17,6 +17,8 @@ pub struct Pages {
     pub texels: usize,
     /// Whether rays may pass through triangles.
     pub opacity: bool,
+    /// Whether surfaces reflect otherwise than diffusely.
+    pub gloss: bool,
 }
 
 /// The text of kernel `name`, with includes taken from `file`. `None` if a file is missing.
@@ -42,6 +44,7 @@ fn append(
         "shared/cache.wgsl" => cache_accessors(pages.cache),
         "shared/texels.wgsl" => texel_accessors(pages.texels),
         "shared/opacity.wgsl" if !pages.opacity => OPAQUE.into(),
+        "shared/gloss.wgsl" if !pages.gloss => MATT.into(),
         _ => file(name)?,
     };
     for line in text.lines() {
@@ -60,6 +63,34 @@ fn append(
 const OPAQUE: &str = "\
 fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) -> bool {
     return false;
+}
+";
+
+/// What stands for `shared/gloss.wgsl` where all surfaces are Lambertian.
+const MATT: &str = "\
+struct Gloss {
+    diffuse: vec3<f32>,
+}
+fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
+    return Gloss(g.albedo);
+}
+fn is_glossy(s: Gloss) -> bool {
+    return false;
+}
+fn reflected(s: Gloss, d: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(0.0);
+}
+fn density_of(s: Gloss, d: vec3<f32>) -> f32 {
+    return 0.0;
+}
+fn reflected_ambient(s: Gloss) -> vec3<f32> {
+    return vec3<f32>(0.0);
+}
+fn reflected_by_diffuse_rays(s: Gloss) -> vec3<f32> {
+    return s.diffuse;
+}
+fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
+    return vec3<f32>(0.0);
 }
 ";
 

@@ -17,6 +17,8 @@ pub struct Directions {
     pub turn: f32,
     /// Every pixel has directions of its own, all over the hemisphere: what filters over pixels and frames needs.
     pub scatter: bool,
+    /// What surfaces reflect otherwise than diffusely comes by rays of its own, too.
+    pub glossy: bool,
 }
 
 impl Directions {
@@ -32,6 +34,7 @@ impl Directions {
             Pass::BounceShadow(Lamp::Environment) => (7, None),
             Pass::Occlusion(index) => (4, Some((index, self.occlusion))),
             Pass::Diffuse(index) => (5, Some((index, self.diffuse))),
+            Pass::Glossy => (8, None),
         };
         let lamp = match pass {
             Pass::Shadow(lamp) | Pass::BounceShadow(lamp) => Some(lamp),
@@ -43,7 +46,8 @@ impl Directions {
                 | flag(pass.is_any_hit(), layout::PARAM_ANY_HIT)
                 | flag(lamp == Some(Lamp::Emitter), layout::PARAM_EMITTER)
                 | flag(lamp == Some(Lamp::Environment), layout::PARAM_ENVIRONMENT)
-                | flag(pass.set() == 2, layout::PARAM_BOUNCE),
+                | flag(pass.set() == 2, layout::PARAM_BOUNCE)
+                | flag(self.glossy, layout::PARAM_GLOSSY),
             stream: params.sample.wrapping_add(stream << 24),
             length: self.occlusion_length,
             ..*params
@@ -190,6 +194,7 @@ pub fn dispatches(
                 Pass::Occlusion(_) => "generate_occlusion",
                 Pass::Diffuse(_) => "generate_diffuse",
                 Pass::Mirror => "generate_mirror",
+                Pass::Glossy => "generate_glossy",
                 Pass::Primary | Pass::Shadow(_) | Pass::BounceShadow(_) => "generate_shadow",
             };
             vec![shading(kernel, params, false)]
@@ -256,7 +261,8 @@ pub fn dispatches(
             let sky = if light.sky { layout::PARAM_SKY } else { 0 };
             let emission = if light.emission { layout::PARAM_EMISSION } else { 0 };
             let miss = if light.miss { layout::PARAM_MISS } else { 0 };
-            let flags = params.flags | sun | sky | emission | miss;
+            let environment = if light.environment { layout::PARAM_ENVIRONMENT } else { 0 };
+            let flags = params.flags | sun | sky | emission | miss | environment;
             vec![shading("shade", Params { flags, ..params }, false)]
         }
         Step::AddLight => vec![shading("add_light", params, false)],

@@ -65,6 +65,8 @@ pub fn brick_record(brick: &Brick) -> layout::Brick {
         attribute_indices: words(attributes.indices),
         opacity_of: words(geometry.opacity_of),
         opacities: words(geometry.opacities),
+        details: words(attributes.details),
+        ..Default::default()
     }
 }
 

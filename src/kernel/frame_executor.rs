@@ -38,7 +38,7 @@ pub trait FrameExecutor: Executor {
     /// The workers that read payloads.
     fn workers(&self) -> &dyn WorkerPool;
 
-    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`] and [`Pass::BounceShadow`], 160 bytes a pixel; without it
+    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160 bytes a pixel; without it
     /// they must not be run.
     fn allow_bounces(&mut self);
 

@@ -151,6 +151,8 @@ pub struct Lamps {
     /// Of each emitter, by which probability it is drawn.
     probabilities: Vec<f32>,
     table: Vec<[u32; 2]>,
+    /// [`Emitter::power`] of all.
+    power: f64,
 }
 
 impl Lamps {
@@ -165,7 +167,14 @@ impl Lamps {
         let powers: Vec<f64> = emitters.iter().map(|e| (power(e) / greatest).max(1e-30)).collect();
         let sum: f64 = powers.iter().sum();
         let table = AliasTable::new(&powers).unwrap_or_default().words();
-        Self { environment, emitters, probabilities: powers.iter().map(|p| (p / sum) as f32).collect(), table }
+        let probabilities = powers.iter().map(|p| (p / sum) as f32).collect();
+        Self { environment, emitters, probabilities, table, power: sum * greatest }
+    }
+
+    /// By which a point of a surface of luminance 1 that shines to one side is drawn, for an area of 1 in world units; 0 where surfaces are no
+    /// lamps.
+    pub fn density_of_surfaces(&self) -> f64 {
+        if self.has_surfaces() { PI / self.power } else { 0.0 }
     }
 
     /// Whether surfaces of the scene are among the emitters: what hits show of their own light is then brought by rays to them.

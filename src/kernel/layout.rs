@@ -4,8 +4,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
-pub use bricks::{BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, INSTANCE_IDENTITY, NO_NORMAL, NONE};
-pub use bricks::{TEXTURE_BC7, TEXTURE_SRGB, TILE_TEXELS};
+pub use bricks::{
+    BRICK_DETAIL, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, NO_NORMAL, NONE,
+};
+pub use bricks::{MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, TEXTURE_BC7, TEXTURE_SRGB, TILE_TEXELS};
 
 pub const PARAM_ANY_HIT: u32 = 1;
 pub const PARAM_NEEDED: u32 = 2;
@@ -20,6 +22,7 @@ pub const PARAM_NEXT: u32 = 256;
 pub const PARAM_CULLED: u32 = 512;
 pub const PARAM_EMISSION: u32 = 1024;
 pub const PARAM_MISS: u32 = 2048;
+pub const PARAM_GLOSSY: u32 = 8192;
 pub const STATE_GEOMETRY: u32 = 1;
 pub const STATE_DONE: u32 = 2;
 pub const STATE_BATCH: u32 = 4;
@@ -47,7 +50,8 @@ pub const COUNTER_TILES_CHOSEN: u32 = 19;
 pub const WORK_CHOSEN: u32 = 24;
 pub const WORK_ROOTED: u32 = 28;
 pub const GBUFFER_READ: u32 = 1;
-pub const GBUFFER_WAITS: u32 = 2;
+pub const GBUFFER_WAITS: u32 = 62;
+pub const GBUFFER_FIRST: u32 = 1;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
@@ -58,6 +62,8 @@ pub const EMITTER_SPOT: u32 = 3;
 pub const EMITTER_DISTANT: u32 = 4;
 pub const EMITTER_KIND: u32 = 7;
 pub const EMITTER_TWO_SIDED: u32 = 8;
+/// Rows and columns of the table of reflectances.
+pub const REFLECTANCE_SIZE: u32 = 32;
 /// Number of counters.
 pub const COUNTERS: usize = 24;
 /// Counters and, behind them, what indirect dispatches take: from [`WORK_CHOSEN`] and [`WORK_ROOTED`] on, four words each.
@@ -85,6 +91,7 @@ mirror! {
         share: f32, surface_share: f32, length: f32, stream: u32,
         pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
+        emitter_density: f32, padding0: u32, padding1: u32, padding2: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
@@ -108,6 +115,7 @@ mirror! {
     struct Brick {
         vertices: u32, ids: u32, indices: u32, flags: u32,
         surfaces: u32, attribute_indices: u32, opacity_of: u32, opacities: u32,
+        details: u32, padding0: u32, padding1: u32, padding2: u32,
     }
     struct Opacity {
         factor: f32, cutoff: f32, blends: u32, texels: u32, width: u32, height: u32, wrap: u32, padding: u32,
@@ -121,7 +129,12 @@ mirror! {
     struct PairDemand { rays: u32, nearest: u32 }
     struct Material {
         base_color: [f32; 4], emission: [f32; 3], metallic: f32,
-        roughness: f32, alpha_cutoff: f32, flags: u32, base_color_texture: u32, padding: [u32; 4],
+        roughness: f32, alpha_cutoff: f32, flags: u32, base_color_texture: u32,
+        opacity_map: u32, normal_texture: u32, metallic_roughness_texture: u32, occlusion_texture: u32,
+        emissive_texture: u32, normal_scale: f32, occlusion_strength: f32, clearcoat: f32,
+        specular: [f32; 3], specular_weight: f32,
+        clearcoat_roughness: f32, transmission: f32, uv_sets: u32, padding: u32,
+        uv_from_set: [[f32; 4]; 10],
     }
     struct Texture {
         width: u32, height: u32, levels: u32, wrap: u32, encoding: u32, flags: u32, first_tile: u32, tail_level: u32,
@@ -131,7 +144,8 @@ mirror! {
     struct TileDemand { rays: u32, first: u32, used: u32 }
     struct GBuffer {
         albedo: [f32; 3], state: u32, normal: [f32; 3], material: u32, emission: [f32; 3], footprint: f32,
-        weights: [f32; 2], uv: [f32; 2],
+        weights: [f32; 2], uv: [f32; 2], tangent: [f32; 3], handedness: f32,
+        uv1: [f32; 2], footprint1: f32, occlusion: f32, metallic: f32, roughness: f32, padding0: u32, padding1: u32,
     }
     struct Emitter {
         corner: [f32; 3], kind: u32, u: [f32; 3], probability: f32,

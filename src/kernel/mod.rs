@@ -10,6 +10,7 @@ mod frame_executor;
 pub mod lamps;
 pub mod layout;
 pub mod opacity;
+pub mod reflectance;
 pub mod report;
 mod setup;
 pub mod textures;

@@ -18,6 +18,9 @@ pub struct Effects {
     pub diffuse: Option<u32>,
     /// Mirrored rays: every surface is half a mirror.
     pub mirror: bool,
+    /// What surfaces reflect otherwise than diffusely, by their materials, of all that is around: one ray, drawn by the gloss of the surface, at
+    /// primary hits. Without it they reflect the lamps alone, and the sky's light unshadowed.
+    pub glossy: bool,
     /// Greatest random turn of the directions of occlusion and diffuse rays about the normal, degrees from 0 to 360; each pixel
     /// has one of its own (CHC+RT §5.3). Small turns keep neighbouring rays alike.
     pub turn_degrees: f32,
@@ -35,6 +38,6 @@ pub struct Occlusion {
 impl Effects {
     /// Whether hits of rays that start at primary hits are shaded.
     pub fn has_bounces(&self) -> bool {
-        self.diffuse.is_some() || self.mirror
+        self.diffuse.is_some() || self.mirror || self.glossy
     }
 }

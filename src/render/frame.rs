@@ -173,7 +173,7 @@ impl Renderer {
                 r.trace(frame, Pass::Primary, stats)?;
                 attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
-                let shading = Shading { sun: !effects.shadow, sky, emission: true, miss: true };
+                let shading = Shading { sun: !effects.shadow, sky, emission: true, miss: true, environment: false };
                 r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
             self.light(&mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
@@ -190,6 +190,9 @@ impl Renderer {
             }
             if effects.mirror {
                 self.bounce(&mut records, ["mirror", "mirror-shadow", "mirror-environment"], Pass::Mirror)?;
+            }
+            if effects.glossy {
+                self.bounce(&mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
             }
             if sample == 0 && self.settings.aov {
                 self.read_aovs(view.frame.unit, &mut output.pixels)?;
@@ -232,13 +235,14 @@ impl Renderer {
         records.pass(self, names[0], |r, stats| {
             r.trace(frame, pass, stats)?;
             attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
-            let (is_mirror, draws) = (pass == Pass::Mirror, r.draws_environment());
-            // What rays to lamps bring to the surface itself must not come by diffuse rays as well.
+            let (is_diffuse, draws) = (matches!(pass, Pass::Diffuse(_)), r.draws_environment());
+            // What rays to lamps bring to the surface itself must not come by diffuse rays as well; what gloss reflects is weighted.
             let shading = Shading {
                 sun: !effects.shadow,
-                sky: is_mirror && !draws,
-                emission: is_mirror || !r.light.lamps.has_surfaces(),
-                miss: is_mirror || !draws,
+                sky: !is_diffuse && !draws,
+                emission: !is_diffuse || !r.light.lamps.has_surfaces(),
+                miss: !is_diffuse || !draws,
+                environment: draws,
             };
             r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats)
         })?;

@@ -48,6 +48,7 @@ pub fn camera_view(
         ground_color: color(light.ground_color),
         jitter: [jx, jy, 0.0, 0.0],
         emitter_count: light.lamps.emitters().len() as u32,
+        emitter_density: (light.lamps.density_of_surfaces() * frame.unit * frame.unit) as f32,
         surface_share: if effects.mirror { SURFACE_SHARE } else { 1.0 },
         sample,
         seed,
@@ -65,6 +66,7 @@ pub fn camera_view(
         diffuse: effects.diffuse.unwrap_or(0),
         turn: effects.turn_degrees.to_radians(),
         scatter: false,
+        glossy: effects.glossy,
     };
     View { frame, params, directions }
 }

@@ -114,6 +114,7 @@ fn kind(pass: Pass) -> u32 {
         Pass::Diffuse(_) => 3,
         Pass::Mirror => 4,
         Pass::BounceShadow(_) => 5,
+        Pass::Glossy => 6,
     }
 }
 

@@ -30,6 +30,8 @@ pub enum Pass {
     Diffuse(u32),
     /// Mirrored camera rays from primary hits: closest hit.
     Mirror,
+    /// Rays from primary hits in a direction drawn by their gloss: closest hit.
+    Glossy,
     /// Rays from the hits of set 1 to a lamp: any hit.
     BounceShadow(Lamp),
 }
@@ -39,7 +41,7 @@ impl Pass {
     pub fn set(self) -> usize {
         match self {
             Pass::Primary => 0,
-            Pass::Shadow(_) | Pass::Occlusion(_) | Pass::Diffuse(_) | Pass::Mirror => 1,
+            Pass::Shadow(_) | Pass::Occlusion(_) | Pass::Diffuse(_) | Pass::Mirror | Pass::Glossy => 1,
             Pass::BounceShadow(_) => 2,
         }
     }
@@ -172,6 +174,8 @@ pub struct Shading {
     pub emission: bool,
     /// The background itself, where rays missed.
     pub miss: bool,
+    /// Rays to the environment bring light, too: what misses of rays drawn by gloss show is weighted against them.
+    pub environment: bool,
 }
 
 /// A query over pairs of one rectangle of rays: each with a node of the binary top-level tree.

@@ -35,7 +35,7 @@ fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<Gpu
         println!("skipped: no adapter");
         return None;
     };
-    let pages = Pages { cache: pages, texels: 1, opacity: false };
+    let pages = Pages { cache: pages, texels: 1, opacity: false, gloss: false };
     let source = |kernel: &str| change(kernel, kernels::source(kernel, pages));
     let kernels = Arc::new(Kernels::from_sources(&gpu, pages, false, &source));
     let scene = Arc::new(scene().unwrap());
