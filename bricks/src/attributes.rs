@@ -11,6 +11,9 @@
 //! | materials | 4 t | the low 30 bits of the surface words |
 //! | rotations | ⌈t / 4⌉ | their high 2 bits, four to a byte, the first in the lowest bits |
 //! | indices | 6 t or 12 t | as distances from the next new one: all lowest bytes, all second bytes, and so on |
+//! | tangents | 4 v | [`AttributeDetail::tangent`], with [`BRICK_DETAIL`] |
+//! | handedness | 4 v | [`AttributeDetail::handedness`], with [`BRICK_DETAIL`] |
+//! | second coordinates | 8 v | [`AttributeDetail::uv`], with [`BRICK_DETAIL`] |
 //!
 //! Vertices are numbered in the order of their first use, so an index is either the next new one, distance 0, or one of
 //! few before it. With h = 0 at first, an index i is stored as d = h - i, in the modulus of its 16 or 32 bits, and d = 0
@@ -18,7 +21,8 @@
 
 use crate::pack::{UnpackError, pack, unpack};
 use crate::records::{
-    AttributeLayout, AttributeVertex, BRICK_INDEX32, Brick, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT,
+    AttributeDetail, AttributeLayout, AttributeVertex, BRICK_DETAIL, BRICK_INDEX32, Brick, SURFACE_MATERIAL,
+    SURFACE_ROTATION_SHIFT,
 };
 
 /// Lengths of the columns in bytes, in their order.
@@ -29,11 +33,15 @@ struct Columns {
     materials: usize,
     rotations: usize,
     indices: usize,
+    /// Tangents, and as many bytes of handedness.
+    tangents: usize,
+    second_uvs: usize,
 }
 
 impl Columns {
     fn of(brick: &Brick) -> Self {
         let (vertices, triangles) = (brick.attribute_vertex_count as usize, brick.triangle_count as usize);
+        let details = if brick.flags & BRICK_DETAIL != 0 { vertices } else { 0 };
         Self {
             normals: vertices * 4,
             uvs: vertices * 8,
@@ -41,11 +49,14 @@ impl Columns {
             materials: triangles * 4,
             rotations: triangles.div_ceil(4),
             indices: triangles * if brick.flags & BRICK_INDEX32 != 0 { 12 } else { 6 },
+            tangents: details * 4,
+            second_uvs: details * 8,
         }
     }
 
     fn bytes(&self) -> usize {
-        self.normals + self.uvs + self.colors + self.materials + self.rotations + self.indices
+        let details = 2 * self.tangents + self.second_uvs;
+        self.normals + self.uvs + self.colors + self.materials + self.rotations + self.indices + details
     }
 }
 
@@ -60,7 +71,8 @@ pub fn encode(brick: &Brick, loaded: &[u8]) -> Vec<u8> {
     assert_eq!(loaded.len() as u64, layout.bytes, "the length of the attributes, as the counts of the brick say");
     let columns = Columns::of(brick);
     let (vertices, rest) = loaded.split_at(layout.surfaces as usize);
-    let (surfaces, indices) = rest.split_at((layout.indices - layout.surfaces) as usize);
+    let (surfaces, rest) = rest.split_at((layout.indices - layout.surfaces) as usize);
+    let (indices, details) = rest.split_at((layout.details - layout.indices) as usize);
     let vertices = &vertices.as_chunks::<{ size_of::<AttributeVertex>() }>().0[..columns.normals / 4];
     let surfaces = &surfaces.as_chunks::<4>().0[..columns.materials / 4];
 
@@ -78,6 +90,10 @@ pub fn encode(brick: &Brick, loaded: &[u8]) -> Vec<u8> {
     } else {
         encode_indices::<2>(&indices[..columns.indices], &mut bytes);
     }
+    let details = details.as_chunks::<{ size_of::<AttributeDetail>() }>().0;
+    bytes.extend(details.iter().flat_map(|detail| &detail[..4]));
+    bytes.extend(details.iter().flat_map(|detail| &detail[4..8]));
+    bytes.extend(details.iter().flat_map(|detail| &detail[8..]));
     pack(&bytes)
 }
 
@@ -106,9 +122,13 @@ pub fn decode(brick: &Brick, stored: &[u8], scratch: &mut Vec<u8>, loaded: &mut 
     let (uvs, columns) = columns.split_at(lengths.uvs);
     let (colors, columns) = columns.split_at(lengths.colors);
     let (materials, columns) = columns.split_at(lengths.materials);
-    let (rotations, distances) = columns.split_at(lengths.rotations);
+    let (rotations, columns) = columns.split_at(lengths.rotations);
+    let (distances, columns) = columns.split_at(lengths.indices);
+    let (tangents, columns) = columns.split_at(lengths.tangents);
+    let (handedness, second_uvs) = columns.split_at(lengths.tangents);
     let (vertices, rest) = loaded.split_at_mut(layout.surfaces as usize);
-    let (surfaces, indices) = rest.split_at_mut((layout.indices - layout.surfaces) as usize);
+    let (surfaces, rest) = rest.split_at_mut((layout.indices - layout.surfaces) as usize);
+    let (indices, details) = rest.split_at_mut((layout.details - layout.indices) as usize);
 
     let rows = normals.as_chunks::<4>().0.iter().zip(uvs.as_chunks::<8>().0).zip(colors.as_chunks::<4>().0);
     for (vertex, ((normal, uv), color)) in vertices.as_chunks_mut::<16>().0.iter_mut().zip(rows) {
@@ -123,6 +143,13 @@ pub fn decode(brick: &Brick, stored: &[u8], scratch: &mut Vec<u8>, loaded: &mut 
         decode_indices::<4>(distances, indices);
     } else {
         decode_indices::<2>(distances, indices);
+    }
+    let columns = tangents.as_chunks::<4>().0.iter().zip(handedness.as_chunks::<4>().0);
+    let rows = columns.zip(second_uvs.as_chunks::<8>().0);
+    for (detail, ((tangent, handedness), uv)) in details.as_chunks_mut::<16>().0.iter_mut().zip(rows) {
+        detail[..4].copy_from_slice(tangent);
+        detail[4..8].copy_from_slice(handedness);
+        detail[8..].copy_from_slice(uv);
     }
     Ok(())
 }
@@ -201,13 +228,8 @@ mod tests {
     use bytemuck::Zeroable;
     use proptest::prelude::*;
 
-    fn brick(triangles: u32, vertices: u32, wide: bool) -> Brick {
-        Brick {
-            flags: if wide { BRICK_INDEX32 } else { 0 },
-            triangle_count: triangles,
-            attribute_vertex_count: vertices,
-            ..Brick::zeroed()
-        }
+    fn brick(triangles: u32, vertices: u32, flags: u32) -> Brick {
+        Brick { flags, triangle_count: triangles, attribute_vertex_count: vertices, ..Brick::zeroed() }
     }
 
     /// Attributes of these values, each used again from the start when there are too few.
@@ -216,13 +238,15 @@ mod tests {
         let mut words = words.iter().cycle().flat_map(|word| word.to_le_bytes());
         let mut indices = indices.iter().cycle();
         let mut bytes: Vec<u8> = words.by_ref().take(layout.surfaces as usize).collect();
-        bytes.extend(words.take(brick.triangle_count as usize * 4));
+        bytes.extend(words.by_ref().take(brick.triangle_count as usize * 4));
+        let details = words;
         bytes.resize(layout.indices as usize, 0);
         let size = if brick.flags & BRICK_INDEX32 != 0 { 4 } else { 2 };
         for _ in 0..brick.triangle_count * 3 {
             bytes.extend(&indices.next().unwrap().to_le_bytes()[..size]);
         }
-        bytes.resize(layout.bytes as usize, 0);
+        bytes.resize(layout.details as usize, 0);
+        bytes.extend(details.take((layout.bytes - layout.details) as usize));
         bytes
     }
 
@@ -236,7 +260,7 @@ mod tests {
     #[test]
     fn a_smooth_mesh_takes_six_bytes_a_triangle() {
         let (triangles, vertices) = (10_000u32, 5_100);
-        let brick = brick(triangles, vertices, false);
+        let brick = brick(triangles, vertices, 0);
         let mut number = 1u32;
         let mut random = move || {
             number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -262,17 +286,23 @@ mod tests {
 
     #[test]
     fn lengths_are_those_of_the_brick() {
-        let of = brick(7, 9, false);
+        let of = brick(7, 9, 0);
         let stored = encode(&of, &loaded(&of, &[1, 2, 3], &[0, 1, 2]));
         assert!(decoded(&of, &stored).is_ok());
-        for other in [brick(8, 9, false), brick(7, 8, false), brick(7, 9, true), brick(1 << 20, 3 << 20, true)] {
+        for other in [
+            brick(8, 9, 0),
+            brick(7, 8, 0),
+            brick(7, 9, BRICK_INDEX32),
+            brick(7, 9, BRICK_DETAIL),
+            brick(1 << 20, 3 << 20, BRICK_INDEX32),
+        ] {
             assert!(decoded(&other, &stored).is_err());
         }
     }
 
     #[test]
     fn bits_without_meaning_are_zero() {
-        let brick = brick(3, 1, false);
+        let brick = brick(3, 1, 0);
         let columns = |material: u32, rotations: u8| {
             let mut columns = vec![7; 16];
             columns.extend([0, material, 0].iter().flat_map(|word| word.to_le_bytes()));
@@ -286,7 +316,7 @@ mod tests {
         }
         // The last byte of rotations, all the ways to leave bits of it without use.
         for triangles in 1..5 {
-            let brick = self::brick(triangles, 1, false);
+            let brick = self::brick(triangles, 1, 0);
             for bit in 0..8 {
                 let mut columns = vec![0; Columns::of(&brick).bytes()];
                 columns[16 + 4 * triangles as usize] = 1 << bit;
@@ -300,16 +330,20 @@ mod tests {
         prop_oneof![0u32..300, Just(u32::MAX), Just(65_535), any::<u32>()]
     }
 
+    fn flags() -> impl Strategy<Value = u32> {
+        prop::sample::select(vec![0, BRICK_INDEX32, BRICK_DETAIL, BRICK_INDEX32 | BRICK_DETAIL])
+    }
+
     proptest! {
         #[test]
         fn what_is_encoded_comes_back(
             triangles in 1u32..90,
             vertices in 1u32..200,
-            wide in any::<bool>(),
+            flags in flags(),
             words in prop::collection::vec(any::<u32>(), 1..400),
             indices in prop::collection::vec(index(), 1..300),
         ) {
-            let brick = brick(triangles, vertices, wide);
+            let brick = brick(triangles, vertices, flags);
             let loaded = loaded(&brick, &words, &indices);
             let stored = encode(&brick, &loaded);
             prop_assert_eq!(&stored, &encode(&brick, &loaded));
@@ -319,11 +353,11 @@ mod tests {
         #[test]
         fn any_columns_are_decoded_or_refused(
             triangles in 1u32..90,
-            wide in any::<bool>(),
+            flags in flags(),
             bytes in prop::collection::vec(any::<u8>(), 1..600),
             longer in 0usize..3,
         ) {
-            let brick = brick(triangles, 5, wide);
+            let brick = brick(triangles, 5, flags);
             let length = Columns::of(&brick).bytes() + longer - 1;
             let columns: Vec<u8> = bytes.iter().cycle().take(length).copied().collect();
             let result = decoded(&brick, &pack(&columns));
@@ -340,7 +374,7 @@ mod tests {
             words in prop::collection::vec(0u32..9, 1..9),
             edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..5),
         ) {
-            let brick = brick(triangles, triangles, false);
+            let brick = brick(triangles, triangles, BRICK_DETAIL);
             let mut stored = encode(&brick, &loaded(&brick, &words, &words));
             for (at, value) in edits {
                 *at.get_mut(&mut stored) = value;

@@ -99,6 +99,7 @@ impl SceneFile {
             textures: reader.section(&directory, Section::Textures)?,
             opacity_maps: reader.section(&directory, Section::OpacityMaps)?,
             tiles: reader.section(&directory, Section::Tiles)?,
+            lights: reader.section(&directory, Section::Lights)?,
             occupancy: reader.section(&directory, Section::Occupancy)?,
         };
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;

@@ -5,7 +5,9 @@
 //! the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
 
 use crate::occupancy::Occupancy;
-use crate::records::{Brick, Instance, Leaf, Material, Object, OpacityMap, Span, Texture, TopNode2, TopNode8};
+use crate::records::{
+    Brick, Instance, Leaf, Material, Object, OpacityMap, PunctualLight, Span, Texture, TopNode2, TopNode8,
+};
 use bytemuck::{Pod, Zeroable};
 use std::fmt;
 use xxhash_rust::xxh3::xxh3_64;
@@ -129,13 +131,15 @@ pub enum Section {
     Tiles = 10,
     /// [`OpacityMap`]s.
     OpacityMaps = 11,
+    /// [`PunctualLight`]s.
+    Lights = 12,
     /// [`Occupancy`] of the bricks, in their order, or nothing.
     Occupancy = 16,
 }
 
 impl Section {
     /// All sections in the order of the file.
-    pub const ALL: [Section; 12] = [
+    pub const ALL: [Section; 13] = [
         Section::Manifest,
         Section::Objects,
         Section::Instances,
@@ -147,6 +151,7 @@ impl Section {
         Section::Textures,
         Section::Tiles,
         Section::OpacityMaps,
+        Section::Lights,
         Section::Occupancy,
     ];
 
@@ -177,6 +182,7 @@ impl Section {
             Section::Textures => size_of::<Texture>(),
             Section::OpacityMaps => size_of::<OpacityMap>(),
             Section::Tiles => size_of::<Span>(),
+            Section::Lights => size_of::<PunctualLight>(),
             Section::Occupancy => size_of::<Occupancy>(),
         };
         bytes as u32
@@ -196,6 +202,7 @@ impl Section {
             Section::Textures => "textures",
             Section::OpacityMaps => "opacity maps",
             Section::Tiles => "tiles",
+            Section::Lights => "lights",
             Section::Occupancy => "occupancy",
         }
     }

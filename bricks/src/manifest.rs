@@ -25,8 +25,12 @@ pub struct Manifest {
     pub min: [f64; 3],
     /// See [`Self::min`].
     pub max: [f64; 3],
-    /// Any base colour texture.
+    /// Any texture, of any kind, of a material in use.
     pub has_textures: bool,
+    /// Any normal texture of a material in use.
+    pub has_normal_maps: bool,
+    /// Any material in use that reflects in another way than a Lambertian surface.
+    pub is_glossy: bool,
     /// What the textures are called in the source, for messages.
     pub texture_names: Vec<String>,
     /// Any MASK material in use.

@@ -287,9 +287,9 @@ pub struct Material {
     pub base_color: [f32; 4],
     /// Linear emission factor, strength included.
     pub emission: [f32; 3],
-    /// Metallic factor.
+    /// Metallic factor, 0..=1.
     pub metallic: f32,
-    /// Roughness factor.
+    /// Roughness factor, 0..=1.
     pub roughness: f32,
     /// Cutoff of MASK.
     pub alpha_cutoff: f32,
@@ -307,7 +307,7 @@ pub struct Material {
     pub occlusion_texture: u32,
     /// Emissive texture (sRGB).
     pub emissive_texture: u32,
-    /// Of x and y of the normal texture.
+    /// Of x and y of the normal texture; any finite number.
     pub normal_scale: f32,
     /// Of the occlusion texture, 0..=1: 0 is none of it.
     pub occlusion_strength: f32,
@@ -317,7 +317,7 @@ pub struct Material {
     pub specular: [f32; 3],
     /// What it reflects at grazing angles, 0..=1.
     pub specular_weight: f32,
-    /// Roughness of the clear coat.
+    /// Roughness of the clear coat, 0..=1.
     pub clearcoat_roughness: f32,
     /// Share of the light that thin walls let through (KHR_materials_transmission), 0..=1.
     pub transmission: f32,
@@ -465,12 +465,39 @@ impl OpacityMap {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct OpacityTriangle {
-    /// Texture coordinates of the vertices, in stored order.
+    /// Coordinates of the vertices in the base colour texture, in stored order: [`Material::uv_from_set`] is applied.
     pub uv: [[f32; 2]; 3],
     /// The material.
     pub material: u32,
     /// Alpha of the vertices, unorm8, in stored order, the first lowest; the high byte is zero.
     pub alphas: u32,
+}
+
+/// [`PunctualLight::kind`]: shines from a point to all sides.
+pub const LIGHT_POINT: u32 = 0;
+/// [`PunctualLight::kind`]: shines from a point into a cone.
+pub const LIGHT_SPOT: u32 = 1;
+/// [`PunctualLight::kind`]: shines from infinity.
+pub const LIGHT_DISTANT: u32 = 2;
+
+/// A light without extent (KHR_lights_punctual), placed in the world.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PunctualLight {
+    /// `LIGHT_*`.
+    pub kind: u32,
+    /// Distance at which it ends, world units; 0: nowhere.
+    pub range: f32,
+    /// Where it is, world units; of no meaning for distant lights.
+    pub position: [f64; 3],
+    /// Unit vector along the light, world space; of no meaning for points.
+    pub direction: [f64; 3],
+    /// Linear RGB: luminous intensity in candela (lm/sr) of points and spots, illuminance in lux (lm/m²) of distant lights.
+    pub color: [f32; 3],
+    /// Angles from the axis where a spot begins to fall off, and where it ends, radians, in order, 0..=π/2.
+    pub cone: [f32; 2],
+    /// Zero.
+    pub _reserved: u32,
 }
 
 /// [`AttributeVertex::normal`]: the source has no usable normal, and shading takes the geometric one. No unit vector is

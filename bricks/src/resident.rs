@@ -5,7 +5,8 @@ use crate::manifest::Manifest;
 use crate::occupancy::Occupancy;
 use crate::payload::Payload;
 use crate::records::{
-    AttributeLayout, Brick, Instance, Leaf, Material, Object, OpacityMap, Span, Texture, TopNode2, TopNode8,
+    AttributeLayout, Brick, Instance, Leaf, Material, Object, OpacityMap, PunctualLight, Span, Texture, TopNode2,
+    TopNode8,
 };
 use crate::texture::TilePlace;
 
@@ -38,6 +39,8 @@ pub struct Resident {
     pub opacity_maps: Vec<OpacityMap>,
     /// The tiles of all textures, those of one together.
     pub tiles: Vec<Span>,
+    /// Lights without extent.
+    pub lights: Vec<PunctualLight>,
     /// The occupancy of each brick, or nothing: then the scene has no proxies.
     pub occupancy: Vec<Occupancy>,
 }
@@ -57,6 +60,7 @@ impl Resident {
             Section::Textures => self.textures.len(),
             Section::OpacityMaps => self.opacity_maps.len(),
             Section::Tiles => self.tiles.len(),
+            Section::Lights => self.lights.len(),
             Section::Occupancy => self.occupancy.len(),
         }
     }

@@ -125,6 +125,7 @@ impl Verifier<'_> {
         let textures: Option<Vec<Texture>> = self.section(directory, Section::Textures);
         let opacity_maps = self.section(directory, Section::OpacityMaps);
         let tiles: Option<Vec<Span>> = self.section(directory, Section::Tiles);
+        let lights = self.section(directory, Section::Lights);
         let occupancy = self.section(directory, Section::Occupancy);
         self.advance(directory.iter().map(|entry| entry.bytes).sum());
 
@@ -139,6 +140,7 @@ impl Verifier<'_> {
             && textures.is_some()
             && opacity_maps.is_some()
             && tiles.is_some()
+            && lights.is_some()
             && occupancy.is_some();
         let resident = Resident {
             manifest: manifest.unwrap_or_default(),
@@ -152,6 +154,7 @@ impl Verifier<'_> {
             textures: textures.unwrap_or_default(),
             opacity_maps: opacity_maps.unwrap_or_default(),
             tiles: tiles.unwrap_or_default(),
+            lights: lights.unwrap_or_default(),
             occupancy: occupancy.unwrap_or_default(),
         };
         let valid = whole && self.keep_flaw(validate::resident(&resident));

@@ -338,6 +338,7 @@ fn section_bytes(resident: &Resident, section: Section) -> serde_json::Result<Co
         Section::Textures => bytemuck::cast_slice(&resident.textures),
         Section::OpacityMaps => bytemuck::cast_slice(&resident.opacity_maps),
         Section::Tiles => bytemuck::cast_slice(&resident.tiles),
+        Section::Lights => bytemuck::cast_slice(&resident.lights),
         Section::Occupancy => bytemuck::cast_slice(&resident.occupancy),
     }))
 }

@@ -130,6 +130,7 @@ fn structs() -> BTreeMap<String, Table> {
         table!(Occupancy { cell_log2, _reserved, origin, bits }),
         table!(AttributeVertex { normal, uv, color }),
         table!(AttributeDetail { tangent, handedness, uv }),
+        table!(PunctualLight { kind, range, position, direction, color, cone, _reserved }),
     ])
 }
 
@@ -215,7 +216,13 @@ fn payloads_are_those_of_the_page() {
         assert_eq!(attributes.surfaces, 9 * 16);
         assert_eq!(attributes.indices, attributes.surfaces + pad(5 * 4));
         assert_eq!(attributes.bytes, attributes.indices + pad(5 * index));
+        brick.flags |= BRICK_DETAIL;
+        let detailed = AttributeLayout::of(&brick);
+        assert_eq!((detailed.indices, detailed.details), (attributes.indices, attributes.bytes));
+        assert_eq!(detailed.bytes, detailed.details + 9 * 16);
     }
     assert_eq!((TILE_TEXELS, BLOCK_TEXELS), (128, 4));
     assert_eq!((TEXTURE_RGBA8, TEXTURE_BC7, TEXTURE_SRGB), (0, 1, 1));
+    assert_eq!((BASE_COLOR, NORMAL, METALLIC_ROUGHNESS, OCCLUSION, EMISSIVE), (0, 1, 2, 3, 4));
+    assert_eq!((LIGHT_POINT, LIGHT_SPOT, LIGHT_DISTANT, BRICK_DETAIL), (0, 1, 2, 8));
 }

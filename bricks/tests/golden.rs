@@ -7,8 +7,8 @@ use bricks::{SceneFile, verify_file};
 use std::path::Path;
 
 #[test]
-fn golden_file_of_version_3() {
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/version-3.bricks");
+fn golden_file_of_version_4() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/version-4.bricks");
     let (_folder, path, scene) = common::written();
     if std::env::var_os("BRICKS_REGENERATE_GOLDEN").is_some() {
         std::fs::copy(&path, &golden).unwrap();

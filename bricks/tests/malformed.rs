@@ -167,7 +167,7 @@ fn tiles_are_named() {
 #[test]
 fn bricks_by_themselves() {
     use Section::Bricks;
-    refused(record(Bricks, 1), "flags 0xb", |r| r.bricks[1].flags = 11);
+    refused(record(Bricks, 1), "flags 0x13", |r| r.bricks[1].flags = 19);
     refused(record(Bricks, 0), "reserved", |r| r.bricks[0]._reserved0 = 1);
     refused(record(Bricks, 0), "reserved", |r| r.bricks[0]._reserved1[2] = 1);
     refused(record(Bricks, 0), "0, 27,", |r| r.bricks[0].node_count = 0);

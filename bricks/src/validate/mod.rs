@@ -22,8 +22,8 @@ pub use payload::payload;
 use crate::error::{Flaw, Part};
 use crate::layout::{MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
 use crate::payload::Payload;
-use crate::records::{AttributeLayout, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout, LATTICE_LIMIT};
-use crate::records::{MAX_BRICK_HEIGHT, NEAR_STEPS, ORIGIN_STEPS, Span, WIDE_STEPS};
+use crate::records::{AttributeLayout, BRICK_DETAIL, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout};
+use crate::records::{LATTICE_LIMIT, MAX_BRICK_HEIGHT, NEAR_STEPS, ORIGIN_STEPS, Span, WIDE_STEPS};
 use crate::resident::Resident;
 use std::fmt::Display;
 
@@ -38,6 +38,7 @@ pub fn resident(resident: &Resident) -> Result<(), Flaw> {
     scene::materials(resident)?;
     scene::textures(resident)?;
     scene::opacity_maps(resident)?;
+    scene::lights(resident)?;
     for (index, record) in (0u32..).zip(&resident.bricks) {
         brick(index, record)?;
     }
@@ -79,9 +80,8 @@ pub fn spans(resident: &Resident, payload_end: u64) -> Result<(), Flaw> {
 /// Checks a brick's record by itself.
 fn brick(index: u32, brick: &Brick) -> Result<(), Flaw> {
     let part = Part::Record(Section::Bricks, index);
-    rule(brick.flags & !(BRICK_WIDE | BRICK_INDEX32 | BRICK_OPACITY) == 0, part, || {
-        (format!("flags {:#x}", brick.flags), "known flags")
-    })?;
+    let known = BRICK_WIDE | BRICK_INDEX32 | BRICK_OPACITY | BRICK_DETAIL;
+    rule(brick.flags & !known == 0, part, || (format!("flags {:#x}", brick.flags), "known flags"))?;
     rule(brick._reserved0 == 0 && brick._reserved1 == [0; 3], part, || ("reserved words", "zero in them"))?;
     rule(
         brick.node_count > 0 && brick.triangle_count > 0 && brick.vertex_count > 0 && brick.attribute_vertex_count > 0,

@@ -8,9 +8,9 @@ use super::{occupancy, rule};
 use crate::error::{Flaw, Part};
 use crate::payload::Payload;
 use crate::records::{
-    AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout,
+    AttributeDetail, AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout,
 };
-use crate::records::{Node, OpacityTriangle, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
+use crate::records::{NO_NORMAL, Node, OpacityTriangle, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use crate::resident::Resident;
 
 /// Checks the bytes of a payload, as it is loaded, against the resident part, which satisfies [`super::resident`]: every index that
@@ -92,7 +92,23 @@ fn attributes(part: Part, brick: &Brick, materials: u32, bytes: &[u8]) -> Result
     let rotation = max_u32(surfaces) >> SURFACE_ROTATION_SHIFT;
     rule(rotation < 3, part, || (format!("rotation {rotation}"), "0, 1 or 2"))?;
     padding(part, bytes, surfaces_end, layout.indices)?;
-    indices(part, brick, brick.attribute_vertex_count, bytes, layout.indices)
+    let (up_to_indices, details) = bytes.split_at(layout.details as usize);
+    indices(part, brick, brick.attribute_vertex_count, up_to_indices, layout.indices)?;
+    for (index, bytes) in details.as_chunks::<{ size_of::<AttributeDetail>() }>().0.iter().enumerate() {
+        let detail: AttributeDetail = bytemuck::pod_read_unaligned(bytes);
+        // A sign with a tangent, nothing without one.
+        let handed = match detail.tangent {
+            NO_NORMAL => detail.handedness.to_bits() == 0,
+            _ => detail.handedness.abs() == 1.0,
+        };
+        rule(handed && detail.uv.iter().all(|x| x.is_finite()), part, || {
+            (
+                format!("{detail:?} of vertex {index}"),
+                "a handedness of 1 or -1, of 0 without a tangent; finite coordinates",
+            )
+        })?;
+    }
+    Ok(())
 }
 
 /// Checks that the nodes are a tree: every node but the root is the child of exactly one node before it. Then a

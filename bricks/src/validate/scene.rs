@@ -1,14 +1,15 @@
-//! Checks of objects, instances, leaves, materials, textures and the manifest.
+//! Checks of objects, instances, leaves, materials, textures, lights and the manifest.
 
 use super::{length, rule};
 use crate::error::{Flaw, Part};
 use crate::layout::Section;
 use crate::payload::Payload;
+use crate::records::WRAP_MIRROR;
 use crate::records::{
-    BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED,
+    BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, LIGHT_DISTANT, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED,
 };
-use crate::records::{MATERIAL_MASK, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE, MAX_TRIANGLE_IDS, NONE};
-use crate::records::{STEP_UNIT_LOG2, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR};
+use crate::records::{MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE};
+use crate::records::{MAX_TRIANGLE_IDS, Material, NONE, STEP_UNIT_LOG2, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB};
 use crate::resident::Resident;
 
 /// Every brick belongs to one object, whose bricks are contiguous.
@@ -136,15 +137,32 @@ pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
         rule(material.flags & !known == 0 && material.flags & both != both, part, || {
             (format!("flags {:#x}", material.flags), "known flags, not both MASK and BLEND")
         })?;
-        let factors = [material.metallic, material.roughness, material.alpha_cutoff];
-        let mut values = material.base_color.iter().chain(&material.emission).chain(&factors);
-        rule(values.all(|value| value.is_finite() && *value >= 0.0), part, || {
+        let mut factors = material.base_color.iter().chain(&material.emission).chain([&material.alpha_cutoff]);
+        rule(factors.all(|value| value.is_finite() && *value >= 0.0), part, || {
             (format!("{material:?}"), "finite factors, not negative")
         })?;
-        let texture = material.base_color_texture;
-        rule(texture == NONE || (texture as usize) < resident.textures.len(), part, || {
-            (format!("texture {texture}"), format!("none or less than {}", resident.textures.len()))
+        let Material { metallic, roughness, occlusion_strength, specular_weight, .. } = *material;
+        let Material { clearcoat, clearcoat_roughness, transmission, .. } = *material;
+        let shares =
+            [metallic, roughness, occlusion_strength, specular_weight, clearcoat, clearcoat_roughness, transmission];
+        let mut shares = shares.iter().chain(&material.specular);
+        rule(shares.all(|share| (0.0..=1.0).contains(share)) && material.normal_scale.is_finite(), part, || {
+            (format!("{material:?}"), "shares from 0 to 1, a finite scale of normals")
         })?;
+        for texture in material.textures() {
+            rule(texture == NONE || (texture as usize) < resident.textures.len(), part, || {
+                (format!("texture {texture}"), format!("none or less than {}", resident.textures.len()))
+            })?;
+        }
+        rule(material.uv_sets >> MATERIAL_TEXTURES == 0, part, || {
+            (format!("sets of texture coordinates {:#x}", material.uv_sets), "a bit for each texture")
+        })?;
+        for [u, v] in material.uv_from_set.as_chunks::<2>().0 {
+            let finite = u.iter().chain(v).all(|value| value.is_finite());
+            rule(finite && u[3] >= 0.0 && v[3] == 0.0, part, || {
+                (format!("coordinates by {u:?}, {v:?}"), "finite numbers, the fourth of them a determinant and zero")
+            })?;
+        }
         let map = material.opacity_map;
         rule(map == NONE || (map as usize) < resident.opacity_maps.len(), part, || {
             (format!("opacity map {map}"), format!("none or less than {}", resident.opacity_maps.len()))
@@ -200,6 +218,28 @@ pub(super) fn opacity_maps(resident: &Resident) -> Result<(), Flaw> {
             (format!("wrap {:#x}, reserved word {}", map.wrap, map._reserved), "known ways of wrapping, and zero")
         })?;
         length(Payload::Opacity(index), map.texels, map.texel_bytes().next_multiple_of(16))?;
+    }
+    Ok(())
+}
+
+/// Lights are of known kinds, finite, along unit vectors.
+pub(super) fn lights(resident: &Resident) -> Result<(), Flaw> {
+    for (index, light) in (0u32..).zip(&resident.lights) {
+        let part = Part::Record(Section::Lights, index);
+        rule(light.kind <= LIGHT_DISTANT && light._reserved == 0, part, || {
+            (format!("kind {}, reserved word {}", light.kind, light._reserved), "a known kind, and zero")
+        })?;
+        let length = light.direction.iter().map(|x| x * x).sum::<f64>();
+        // Written as a unit vector in f64, so that the square is 1 but for a few roundings.
+        rule(light.position.iter().all(|x| x.is_finite()) && (length - 1.0).abs() < 1e-9, part, || {
+            (format!("position {:?}, direction {:?}", light.position, light.direction), "finite numbers, a unit vector")
+        })?;
+        let mut values = light.color.iter().chain([&light.range]);
+        let [inner, outer] = light.cone;
+        let cone = 0.0 <= inner && inner <= outer && outer <= std::f32::consts::FRAC_PI_2;
+        rule(values.all(|value| value.is_finite() && *value >= 0.0) && cone, part, || {
+            (format!("{light:?}"), "finite numbers, not negative, and angles in order up to a right one")
+        })?;
     }
     Ok(())
 }

@@ -165,6 +165,13 @@ pub fn brick(
     pad16(&mut attributes);
     attributes.extend_from_slice(&index_bytes(&(0..corners.len() as u32).collect::<Vec<_>>()));
     pad16(&mut attributes);
+    if flags & BRICK_DETAIL != 0 {
+        let details = (0..corners.len() as u32).map(|i| match i % 3 {
+            0 => AttributeDetail { tangent: NO_NORMAL, handedness: 0.0, uv: [i as f32 / 4.0, 2.0] },
+            side => AttributeDetail { tangent: 0x7fff - i, handedness: 3.0 - 2.0 * side as f32, uv: [-0.125; 2] },
+        });
+        attributes.extend_from_slice(bytemuck::cast_slice(&details.collect::<Vec<_>>()));
+    }
 
     let opacity_count = if flags & BRICK_OPACITY != 0 { triangles.len() as u32 / 2 } else { 0 };
     if opacity_count > 0 {
@@ -249,8 +256,8 @@ fn top_node(children: &[(Triangle, u8)], child_base: u32, leaf_base: u32) -> Top
     }
 }
 
-/// Three bricks (near, wide, of an instanced object that rays pass through), three instances, a texture, an opacity map; spans not
-/// yet known.
+/// Three bricks (near, wide, of an instanced object that rays pass through, with details), three instances, two textures, an opacity
+/// map, two lights; spans not yet known.
 pub fn scene() -> Scene {
     let object = |step_log2, unit_log2, first_brick, brick_count, triangle_ids, triangle_count| Object {
         step_log2,
@@ -269,7 +276,7 @@ pub fn scene() -> Scene {
     let built = [
         brick((0, &objects[0]), 0, [3 << 20, 0, 0], &near, &ids(0..27), 2),
         brick((0, &objects[0]), BRICK_WIDE | BRICK_INDEX32, [0; 3], &wide, &ids(37..42), 2),
-        brick((1, &objects[1]), BRICK_OPACITY, [0; 3], &small, &ids(0..10), 2),
+        brick((1, &objects[1]), BRICK_OPACITY | BRICK_DETAIL, [0; 3], &small, &ids(0..10), 2),
     ];
     let mut payloads = BTreeMap::new();
     let (mut bricks, mut occupancy) = (Vec::new(), Vec::new());
@@ -324,6 +331,22 @@ pub fn scene() -> Scene {
         opacity_map: if base_color_texture == NONE { NONE } else { 0 },
         ..Material::DIFFUSE
     };
+    // Normals from the linear texture, by the second set of coordinates turned by a right angle and doubled.
+    let mut detailed = material(0, MATERIAL_MASK | MATERIAL_DOUBLE_SIDED, [0.0; 3]);
+    (detailed.normal_texture, detailed.uv_sets, detailed.normal_scale) = (1, 1 << NORMAL, -0.5);
+    (detailed.specular, detailed.specular_weight, detailed.clearcoat) = ([0.04, 0.5, 0.25], 1.0, 0.125);
+    detailed.uv_from_set[2 * NORMAL..2 * NORMAL + 2].copy_from_slice(&[[0.0, 2.0, 0.5, 4.0], [-2.0, 0.0, 0.25, 0.0]]);
+    let light = |kind, direction, cone| PunctualLight {
+        kind,
+        range: 20.0,
+        position: [1.5, 1e6, -3.0],
+        direction,
+        color: [100.0, 50.0, 25.5],
+        cone,
+        _reserved: 0,
+    };
+    let lights =
+        vec![light(LIGHT_SPOT, [0.0, -0.6, 0.8], [0.25, 0.75]), light(LIGHT_DISTANT, [1.0, 0.0, 0.0], [0.0, 0.5])];
     let provenance = |first_id, count, node: &str| Provenance {
         first_id,
         count,
@@ -342,6 +365,8 @@ pub fn scene() -> Scene {
         min: [-1048576.0, -1.5, -2.0],
         max: [7340032.0, 8388608.0, 8388608.0],
         has_textures: true,
+        has_normal_maps: true,
+        is_glossy: true,
         texture_names: vec!["small.png".to_owned(), "long.png".to_owned()],
         has_alpha_mask: true,
         has_emission: true,
@@ -365,13 +390,11 @@ pub fn scene() -> Scene {
         instances,
         leaves: vec![leaf(0, 0), leaf(2, 2), leaf(0, 1), leaf(1, 2)],
         bricks,
-        materials: vec![
-            material(0, MATERIAL_MASK | MATERIAL_DOUBLE_SIDED, [0.0; 3]),
-            material(NONE, MATERIAL_UNLIT, [0.0, 3.0, 0.0]),
-        ],
+        materials: vec![detailed, material(NONE, MATERIAL_UNLIT, [0.0, 3.0, 0.0])],
         opacity_maps: vec![opacity_map],
         textures,
         tiles: vec![Span::default(); 2],
+        lights,
         occupancy,
         ..Resident::default()
     };

@@ -7,7 +7,7 @@ use bricks::{Payload, SceneFile};
 use crate::stream::{Destination, HostCache, Item, Kind, PayloadSource, StreamError, Workers};
 
 /// The golden file of the format's own tests.
-const SCENE: &[u8] = include_bytes!("../../../bricks/tests/golden/version-3.bricks");
+const SCENE: &[u8] = include_bytes!("../../../bricks/tests/golden/version-4.bricks");
 
 #[derive(Default)]
 struct Sink(Vec<u8>);

@@ -63,6 +63,8 @@ pub struct Outline {
     pub materials: Vec<bricks::Material>,
     /// Names of the textures, for messages; materials index them.
     pub textures: Vec<String>,
+    /// Lights without extent, in the world.
+    pub lights: Vec<bricks::PunctualLight>,
     /// Input files.
     pub sources: Vec<bricks::Source>,
     /// What was ignored or repaired, one line each.
@@ -117,6 +119,7 @@ impl From<SourceScene> for InMemory {
             placements: scene.placements,
             materials: scene.materials,
             textures: scene.textures.iter().map(|texture| texture.name.clone()).collect(),
+            lights: scene.lights,
             sources: scene.sources,
             warnings: scene.warnings,
             has_animation: scene.has_animation,
@@ -154,6 +157,8 @@ pub struct SourceScene {
     pub materials: Vec<bricks::Material>,
     /// Textures; materials index them.
     pub textures: Vec<SourceTexture>,
+    /// Lights without extent, in the world.
+    pub lights: Vec<bricks::PunctualLight>,
     /// Input files.
     pub sources: Vec<bricks::Source>,
     /// What was ignored or repaired, one line each.
@@ -178,7 +183,7 @@ impl Mesh {
     }
 }
 
-/// Triangles of one material. Per-vertex arrays, where present, have the length of `positions`.
+/// Triangles of one material. Per-vertex arrays, where present, have the length of `positions`, `tangents` that of `indices`.
 #[derive(Clone, Debug, Default)]
 pub struct Primitive {
     /// Index of the material.
@@ -189,6 +194,11 @@ pub struct Primitive {
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates of set 0.
     pub uvs: Option<Vec<[f32; 2]>>,
+    /// Texture coordinates of set 1.
+    pub uvs1: Option<Vec<[f32; 2]>>,
+    /// Of every corner, in the order of `indices`: a tangent in mesh space, not necessarily unit, and a sign, by which cross(normal,
+    /// tangent) times it is the bitangent. Wanted of materials with a normal texture.
+    pub tangents: Option<Vec<[f32; 4]>>,
     /// Linear RGBA colours in 0..=1.
     pub colors: Option<Vec<[f32; 4]>>,
     /// Three indices a triangle, below the number of positions.
@@ -219,7 +229,8 @@ pub struct SourceTexture {
     pub height: u32,
     /// `bricks::WRAP_*` of s in the low half, of t in the high half.
     pub wrap: u32,
-    /// sRGB RGBA8, rows top to bottom.
+    /// RGBA8, rows top to bottom. Red, green and blue are sRGB where a material takes it for base colour or emission, linear where it
+    /// takes it otherwise.
     pub rgba: Vec<u8>,
 }
 

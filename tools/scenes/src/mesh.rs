@@ -167,9 +167,9 @@ impl Builder {
                     material: m as u32,
                     positions: p.positions,
                     normals: self.smooth.then_some(p.normals),
-                    uvs: None,
                     colors: Some(p.colors),
                     indices: p.indices,
+                    ..Primitive::default()
                 }
             })
             .collect()

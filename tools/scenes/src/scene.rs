@@ -129,9 +129,9 @@ fn cut(whole: &Primitive, indices: &[u32]) -> Primitive {
         material: whole.material,
         positions: old.iter().map(|&k| whole.positions[k]).collect(),
         normals: whole.normals.as_ref().map(|all| old.iter().map(|&k| all[k]).collect()),
-        uvs: None,
         colors: whole.colors.as_ref().map(|all| old.iter().map(|&k| all[k]).collect()),
         indices,
+        ..Primitive::default()
     }
 }
 

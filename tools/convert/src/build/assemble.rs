@@ -11,7 +11,7 @@ use super::top_level::{self, TopLevel, world_box};
 use crate::source::Outline;
 use bricks::{
     BRICK_WIDE, Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Leaf, MATERIAL_BLEND, MATERIAL_MASK, Manifest,
-    Material, Node, Object, Resident,
+    Material, NONE, Node, Object, Resident,
 };
 use rayon::prelude::*;
 use std::time::Duration;
@@ -144,7 +144,9 @@ pub(super) fn manifest(
         dropped_non_finite: dropped.non_finite,
         min,
         max,
-        has_textures: any(&|material| material.base_color_texture != bricks::NONE),
+        has_textures: any(&|material| material.textures().iter().any(|texture| *texture != NONE)),
+        has_normal_maps: any(&|material| material.normal_texture != NONE),
+        is_glossy: any(&Material::is_glossy),
         texture_names: Vec::new(),
         has_alpha_mask: any(&|material| material.flags & MATERIAL_MASK != 0),
         has_alpha_blend: any(&|material| material.flags & MATERIAL_BLEND != 0),

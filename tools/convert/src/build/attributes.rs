@@ -1,17 +1,31 @@
-//! What shading reads of a vertex and of a triangle: normals, texture coordinates, colours, mean colours.
+//! What shading reads of a vertex and of a triangle: normals, tangents, texture coordinates, colours, mean colours.
 
 use super::intern::{Key, mix};
 use super::objects::Placed;
-use bricks::{AttributeVertex, Material, NO_NORMAL, NONE};
+use bricks::{AttributeDetail, AttributeVertex, Material, NO_NORMAL, NONE};
 
-/// An attribute vertex as 128 bits, for interning.
+/// [`AttributeVertex`] as bits.
+pub(super) type PlainBits = [u32; 4];
+
+/// [`AttributeDetail`] as bits.
+pub(super) type DetailBits = [u32; 4];
+
+/// The details of a vertex whose material needs none.
+pub(super) const NO_DETAIL: DetailBits = [NO_NORMAL, 0, 0, 0];
+
+/// An attribute vertex with its details, for interning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct VertexBits(pub [u32; 4]);
+pub(super) struct VertexBits(pub PlainBits, pub DetailBits);
 
 impl Key for VertexBits {
     fn hash(&self) -> u64 {
         let [a, b, c, d] = self.0.map(u64::from);
-        mix(mix(0xa409_3822_299f_31d0, a << 32 | b), c << 32 | d)
+        let plain = mix(mix(0xa409_3822_299f_31d0, a << 32 | b), c << 32 | d);
+        if self.1 == NO_DETAIL {
+            return plain;
+        }
+        let [a, b, c, d] = self.1.map(u64::from);
+        mix(mix(plain, a << 32 | b), c << 32 | d)
     }
 }
 
@@ -22,21 +36,51 @@ impl VertexBits {
         AttributeVertex { normal, uv: [f32::from_bits(u), f32::from_bits(v)], color }
     }
 
+    /// Its details.
+    pub fn detail(&self) -> AttributeDetail {
+        let [tangent, handedness, u, v] = self.1;
+        AttributeDetail { tangent, handedness: f32::from_bits(handedness), uv: [f32::from_bits(u), f32::from_bits(v)] }
+    }
+
     /// Colour as linear RGB in 0..=1.
     pub fn rgb(&self) -> [f32; 3] {
         std::array::from_fn(|k| (self.0[3] >> (8 * k) & 255) as f32 / 255.0)
     }
 }
 
-/// The attributes of a vertex of a placed part.
-pub(super) fn vertex(placed: &Placed, vertex: u32) -> VertexBits {
+/// The attributes of vertex `vertex` of a placed part, which is corner `corner` (of all triangles of the part one after the other);
+/// `with_detail` if its material needs details.
+pub(super) fn vertex(placed: &Placed, vertex: u32, corner: usize, with_detail: bool) -> VertexBits {
     let primitive = placed.primitive;
     let normal = source_normal(placed, vertex).unwrap_or(NO_NORMAL);
-    let uv = primitive.uvs.as_ref().map_or([0.0; 2], |uvs| uvs[vertex as usize]);
-    // Adding zero turns -0 into 0, so that equal coordinates have equal bits.
-    let [u, v] = uv.map(|x| if x.is_finite() { (x + 0.0).to_bits() } else { 0 });
+    let [u, v] = coordinates(primitive.uvs.as_deref(), vertex);
     let color = primitive.colors.as_ref().map_or(u32::MAX, |colors| unorm8(colors[vertex as usize]));
-    VertexBits([normal, u, v, color])
+    let mut detail = NO_DETAIL;
+    if with_detail {
+        [detail[2], detail[3]] = coordinates(primitive.uvs1.as_deref(), vertex);
+        if let Some((tangent, handedness)) = source_tangent(placed, corner) {
+            [detail[0], detail[1]] = [tangent, handedness.to_bits()];
+        }
+    }
+    VertexBits([normal, u, v, color], detail)
+}
+
+/// The bits of the texture coordinates of a vertex; zero where there are none that are usable.
+fn coordinates(uvs: Option<&[[f32; 2]]>, vertex: u32) -> [u32; 2] {
+    let uv = uvs.map_or([0.0; 2], |uvs| uvs[vertex as usize]);
+    // Adding zero turns -0 into 0, so that equal coordinates have equal bits.
+    uv.map(|x| if x.is_finite() { (x + 0.0).to_bits() } else { 0 })
+}
+
+/// The octahedral tangent of a corner in object space, and the handedness there; `None` if the source has none that is usable.
+/// Tangents are vectors, so the matrix itself maps them; a mirror turns the handedness, since normals keep to the outside.
+fn source_tangent(placed: &Placed, corner: usize) -> Option<(u32, f32)> {
+    let [x, y, z, sign] = placed.primitive.tangents.as_ref()?[corner];
+    let tangent = [x, y, z].map(f64::from);
+    let side = if sign < 0.0 { -1.0 } else { 1.0 };
+    let Some(baking) = &placed.part.baking else { return Some((octahedral(tangent)?, side)) };
+    let mirror = if baking.matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
+    Some((octahedral(baking.matrix.vector(tangent))?, side * mirror))
 }
 
 /// The octahedral normal of a vertex in object space; `None` if the source has none that is usable.
@@ -95,18 +139,22 @@ fn unorm8(color: [f32; 4]) -> u32 {
 pub(super) struct MeanColors {
     /// Base colour: factor times the mean of the texture.
     pub albedo: [f32; 3],
-    /// Emission.
+    /// Emission: factor times the mean of the texture.
     pub emission: [f32; 3],
 }
 
 impl MeanColors {
     /// Of a material; `texture_means` are linear RGB by texture.
     pub fn of(material: &Material, texture_means: &[[f32; 3]]) -> Self {
-        let texture = match material.base_color_texture {
+        let mean = |texture| match texture {
             NONE => [1.0; 3],
             index => texture_means[index as usize],
         };
-        Self { albedo: std::array::from_fn(|k| material.base_color[k] * texture[k]), emission: material.emission }
+        let (color, glow) = (mean(material.base_color_texture), mean(material.emissive_texture));
+        Self {
+            albedo: std::array::from_fn(|k| material.base_color[k] * color[k]),
+            emission: std::array::from_fn(|k| material.emission[k] * glow[k]),
+        }
     }
 }
 

@@ -10,8 +10,8 @@ use super::triangle::Triangle as Rounded;
 use super::voxelise::voxelise;
 use super::wide::{WideTree, collapse, collapse_levels};
 use bricks::{
-    AttributeLayout, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout, LEAF_TRIANGLES, MAX_BRICK_HEIGHT,
-    NEAR_STEPS, NONE, ORIGIN_STEPS, Occupancy, OccupancyGrid, OpacityTriangle, SURFACE_MATERIAL,
+    AttributeLayout, BRICK_DETAIL, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout, LEAF_TRIANGLES,
+    MAX_BRICK_HEIGHT, NEAR_STEPS, NONE, ORIGIN_STEPS, Occupancy, OccupancyGrid, OpacityTriangle, SURFACE_MATERIAL,
     SURFACE_ROTATION_SHIFT, Span, WIDE_HIGH_STEPS,
 };
 use bytemuck::Zeroable;
@@ -30,6 +30,8 @@ pub(super) struct BrickContext<'a> {
     pub materials: &'a [MeanColors],
     /// Opacity by material.
     pub opacity: &'a [MaterialOpacity],
+    /// Whether triangles need details, by material.
+    pub details: &'a [bool],
     /// Whether trees are built fast rather than well.
     pub is_fast: bool,
     /// Whether bricks have proxies.
@@ -81,7 +83,7 @@ fn collect(context: &BrickContext, rounded: impl Iterator<Item = Rounded>, count
     let mut triangles = Vec::with_capacity(count);
     let (mut albedo, mut emission, mut area_sum) = ([0.0f64; 3], [0.0f64; 3], 0.0f64);
     for triangle in rounded {
-        let (points, vertices) = (triangle.corners, triangle.attributes.map(VertexBits));
+        let (points, vertices) = (triangle.corners, triangle.attributes);
         let [x, y, z] = attributes::cross(&points);
         let area = (x * x + y * y + z * z).sqrt();
         area_sum += area;
@@ -184,9 +186,11 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     };
     let opacity_of: Vec<u32> = tree.items.iter().map(opacity).map(number).collect();
     let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+    let details = triangles.iter().any(|triangle| context.details[(triangle.surface & SURFACE_MATERIAL) as usize]);
+    let kind = flag(wide, BRICK_WIDE) | flag(index32, BRICK_INDEX32) | flag(details, BRICK_DETAIL);
     let record = Brick {
         object: context.index,
-        flags: flag(wide, BRICK_WIDE) | flag(index32, BRICK_INDEX32) | flag(!opacities.is_empty(), BRICK_OPACITY),
+        flags: kind | flag(!opacities.is_empty(), BRICK_OPACITY),
         opacity_count: opacities.len() as u32,
         node_count: nodes.len() as u32,
         triangle_count: triangles.len() as u32,
@@ -232,7 +236,13 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     attributes.extend(triangles.iter().flat_map(|triangle| triangle.surface.to_le_bytes()));
     attributes.resize(layout.indices as usize, 0);
     push_indices(&mut attributes, triangles.iter().map(|triangle| triangle.attributes), index32);
-    attributes.resize(layout.bytes as usize, 0);
+    attributes.resize(layout.details as usize, 0);
+    if details {
+        for &old in &attribute_vertices.old_of_new {
+            let detail = contents.attributes.values()[old as usize].detail();
+            attributes.extend_from_slice(bytemuck::bytes_of(&detail));
+        }
+    }
     let proxies = context.has_proxies.then(|| {
         let step_log2 = context.lattice.step_log2;
         let grid = OccupancyGrid::of(step_log2, bounds.min, bounds.max);

@@ -17,8 +17,9 @@ use super::objects::Plan;
 use super::partition::{CANONICAL_TRIANGLES, Item};
 use super::settings::BuildSettings;
 use super::spill::BLOCK_RECORDS;
-use super::triangle::Triangle;
+use super::triangle::{Detailed, Plain};
 use crate::source::{PART_TRIANGLES, Source};
+use bricks::Material;
 
 /// The program, its stacks, and what the allocator does not give back.
 const RESERVE: u64 = 32 << 20;
@@ -26,8 +27,14 @@ const RESERVE: u64 = 32 << 20;
 /// A brick in the tables: its record and occupancy, its leaf, its nodes of both top-level trees and what builds them.
 const TABLE_BRICK_BYTES: u64 = 3 << 9;
 
-/// A triangle of a part at most: its indices and three vertices with all attributes.
+/// A triangle of a part at most: its indices and three vertices with all attributes but details.
 const PART_TRIANGLE_BYTES: u64 = 3 * (4 + 24 + 12 + 8 + 16);
+
+/// What details add to that: second coordinates and tangents.
+const PART_DETAIL_BYTES: u64 = 3 * (8 + 16);
+
+/// A triangle of a part while its tangents are made.
+const TANGENT_WORK_BYTES: u64 = 512;
 
 /// An item in memory, with its place in the order as it is cut and as it is joined.
 const ITEM_BYTES: u64 = size_of::<Item>() as u64 + 8 + 8;
@@ -38,8 +45,12 @@ const BLOCK_BYTES: u64 = (BLOCK_RECORDS * 2 * (size_of::<Item>() + size_of::<Pac
 /// A triangle of a brick in work: its vertices, hash tables, the trees over it.
 const WORK_BYTES: u64 = 1280;
 
-/// A triangle of a chunk, with its place in the order of bricks.
-const CHUNK_BYTES: u64 = size_of::<Triangle>() as u64 + 16;
+/// What details add to that, and to a triangle of encoded payloads.
+const DETAIL_WORK_BYTES: u64 = 256;
+const DETAIL_PAYLOAD_BYTES: u64 = 48;
+
+/// What the place of a triangle of a chunk in the order of bricks takes.
+const PLACE_BYTES: u64 = 16;
 
 /// A triangle of encoded payloads but for proxies.
 const PAYLOAD_BYTES: u64 = 80;
@@ -89,6 +100,8 @@ struct Needs {
     work: u64,
     /// A triangle of encoded payloads.
     payload: u64,
+    /// A triangle as it lies on the disk.
+    stored: u64,
 }
 
 impl Budget {
@@ -105,19 +118,25 @@ impl Budget {
     ) -> Result<Option<Self>, BuildError> {
         let slots: u64 = plan.objects.iter().map(|object| u64::from(object.slots)).sum();
         let parts = plan.objects.iter().flat_map(|object| &object.parts);
-        let (largest, part_bytes) = match source.is_in_memory() {
-            true => (PART_TRIANGLES, 0),
-            false => (parts.map(|part| part.triangles).max().unwrap_or(0), PART_TRIANGLE_BYTES),
+        let has_details = source.outline().materials.iter().any(Material::needs_details);
+        let detail = |bytes: u64| if has_details { bytes } else { 0 };
+        let (largest, part_bytes, making) = match source.is_in_memory() {
+            true => (PART_TRIANGLES, 0, 0),
+            false => {
+                let largest = parts.map(|part| part.triangles).max().unwrap_or(0);
+                (largest, PART_TRIANGLE_BYTES + detail(PART_DETAIL_BYTES), detail(TANGENT_WORK_BYTES))
+            }
         };
         let brick = u64::from(settings.brick_triangles);
         let (occupancy, map) = if settings.proxies { (OCCUPANCY_WORK_BYTES, MAP_BYTES) } else { (0, 0) };
         let needs = Needs {
             brick,
-            part: u64::from(largest) * part_bytes,
+            part: u64::from(largest) * (part_bytes + making),
             run: u64::from(largest.min(PART_TRIANGLES)),
             tables: 2 * slots.div_ceil(brick) * TABLE_BRICK_BYTES,
-            work: brick * WORK_BYTES + occupancy,
-            payload: PAYLOAD_BYTES + map.div_ceil(brick),
+            work: brick * (WORK_BYTES + detail(DETAIL_WORK_BYTES)) + occupancy,
+            payload: PAYLOAD_BYTES + detail(DETAIL_PAYLOAD_BYTES) + map.div_ceil(brick),
+            stored: if has_details { size_of::<Detailed>() } else { size_of::<Plain>() } as u64,
         };
         let all = needs.all_in_memory(threads as u64, slots, part_bytes);
         if all <= memory {
@@ -153,7 +172,7 @@ impl Needs {
 
     fn distributing(&self, pending: u64) -> u64 {
         // A buffer that grows may be twice as large as what is in it.
-        self.part + 2 * pending * size_of::<Triangle>() as u64
+        self.part + 2 * pending * self.stored
     }
 
     fn encoding(&self, batch: u64) -> u64 {
@@ -165,17 +184,18 @@ impl Needs {
         let items = threads * self.collecting().max(BLOCK_BYTES) + self.least_items() * ITEM_BYTES;
         let distribution = threads * self.distributing(MOST_PENDING / 8) + self.run * 4;
         // The last brick of a chunk may exceed it.
-        let encoding = threads * self.encoding(self.brick.min(MOST_BATCH)) + 4 * self.brick * CHUNK_BYTES;
+        let encoding =
+            threads * self.encoding(self.brick.min(MOST_BATCH)) + 4 * self.brick * (self.stored + PLACE_BYTES);
         items.max(distribution).max(encoding)
     }
 
     fn divide(&self, rest: u64, threads: u64) -> Budget {
         let items = rest - threads * self.collecting().max(BLOCK_BYTES);
         let per_thread = rest / (8 * threads);
-        let pending = (per_thread / (2 * size_of::<Triangle>() as u64)).clamp(MOST_PENDING / 8, MOST_PENDING);
+        let pending = (per_thread / (2 * self.stored)).clamp(MOST_PENDING / 8, MOST_PENDING);
         let window = rest - threads * self.distributing(pending).min(rest / threads);
         let batch = (per_thread / (2 * self.payload)).clamp(self.brick.min(MOST_BATCH), MOST_BATCH);
-        let chunk = rest.saturating_sub(threads * self.encoding(batch)) / (2 * CHUNK_BYTES);
+        let chunk = rest.saturating_sub(threads * self.encoding(batch)) / (2 * (self.stored + PLACE_BYTES));
         Budget {
             threads: threads as usize,
             items: (items / ITEM_BYTES).max(self.least_items()),

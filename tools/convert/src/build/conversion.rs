@@ -1,7 +1,7 @@
 //! The steps of a conversion, in memory and by way of the disk.
 
 use super::assemble::{self, Dropped};
-use super::bounded::Bounded;
+use super::bounded::{Bounded, BoundedCuts};
 use super::brick::{self, BrickContext, EncodedBrick};
 use super::budget::Budget;
 use super::cut::{self, ObjectCut};
@@ -15,7 +15,7 @@ use super::parts::Reader;
 use super::scratch::{self, Scratch};
 use super::settings::{BuildSettings, BuildSummary};
 use super::textures::{self, Textures};
-use super::triangle::Triangle;
+use super::triangle::{Detailed, Plain, Stored, Triangle};
 use crate::progress::Progress;
 use crate::source::{Outline, Source};
 use bricks::{Brick, Manifest, Occupancy, Partial, Resident, Writer};
@@ -87,8 +87,9 @@ impl Conversion<'_> {
         clock.end("partition");
         let lattices = cut::choose(plan, &outline.meshes, &cuts, settings, &mut warnings)?;
         let means = textures.material_means();
-        let opacity = opacities.of_materials(&outline.materials);
-        let contexts = encode::contexts(&lattices, &means, &opacity, settings);
+        let opacity = opacities.of_materials(&textures.materials);
+        let details = textures.details();
+        let contexts = encode::contexts(&lattices, &means, &opacity, &details, settings);
         let jobs = encode::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
         progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.len(), BATCH_TRIANGLES);
@@ -222,13 +223,17 @@ impl Conversion<'_> {
         clock.end("partition");
         let lattices = cut::choose(plan, &outline.meshes, &cuts.objects, settings, &mut warnings)?;
         let means = textures.material_means();
-        let opacity = opacities.of_materials(&outline.materials);
-        let contexts = encode::contexts(&lattices, &means, &opacity, settings);
+        let opacity = opacities.of_materials(&textures.materials);
+        let details = textures.details();
+        let contexts = encode::contexts(&lattices, &means, &opacity, &details, settings);
         let jobs = encode::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
-        let (chunks, rounded_away) = bounded.distribute(&cuts, &jobs, &lattices, journal)?;
-        clock.end("distribute");
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.objects.len(), budget.batch);
-        bounded.encode(&jobs, chunks, &contexts, &mut bricks, journal)?;
+        let by_disk = (&cuts, jobs.as_slice(), contexts.as_slice());
+        let rounded_away = if details.contains(&true) {
+            write_bricks::<Detailed>(&bounded, by_disk, &mut bricks, journal, clock)?
+        } else {
+            write_bricks::<Plain>(&bounded, by_disk, &mut bricks, journal, clock)?
+        };
         let (bricks, occupancy) = (bricks.records, bricks.occupancy);
         clock.end("bricks");
         let (cuts, used_materials) = (cuts.objects, cuts.materials);
@@ -266,6 +271,7 @@ impl Conversion<'_> {
             textures: textures.records,
             opacity_maps: opacities.records,
             tiles: textures.tiles,
+            lights: self.outline.lights.clone(),
             occupancy,
         };
         let dropped = Dropped::count(&resident, &cuts, &rounded_away);
@@ -281,6 +287,20 @@ impl Conversion<'_> {
         let bytes_file = std::fs::metadata(self.output).map_or(0, |file| file.len());
         Ok(assemble::summary(&resident, bytes_file, clock.phases))
     }
+}
+
+/// Brings triangles together on the disk as `T` and encodes them. Returns by object how many rounding leaves without area.
+fn write_bricks<T: Stored>(
+    bounded: &Bounded,
+    (cuts, jobs, contexts): (&BoundedCuts, &[Job], &[BrickContext]),
+    bricks: &mut BrickWriter,
+    journal: &mut Journal,
+    clock: &mut Clock,
+) -> Result<Vec<u32>, BuildError> {
+    let (chunks, rounded_away) = bounded.distribute::<T>(cuts, jobs, contexts, journal)?;
+    clock.end("distribute");
+    bounded.encode(jobs, chunks, contexts, bricks, journal)?;
+    Ok(rounded_away)
 }
 
 /// Encodes a brick of triangles whose geometry is in memory.
@@ -302,7 +322,8 @@ fn encode_loaded(
         // All parts in use were read.
         let Some(primitive) = reader.loaded(part) else { continue };
         let placed = Placed { part, primitive };
-        let round = |slot: &u32| Triangle::round(&placed, slot - part.first_slot, &context.lattice, 0);
+        let with_detail = context.details[primitive.material as usize];
+        let round = |slot: &u32| Triangle::round(&placed, slot - part.first_slot, &context.lattice, 0, with_detail);
         triangles.extend(own.iter().filter_map(round));
     }
     let dropped = (slots.len() - triangles.len()) as u32;

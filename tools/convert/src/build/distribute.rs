@@ -6,10 +6,9 @@ use super::budget;
 use super::encode::{BrickWriter, Job};
 use super::error::BuildError;
 use super::journal::{Journal, Step, WordReader, Words};
-use super::lattice::Lattice;
 use super::objects::{Piece, Placed};
 use super::spill::Spill;
-use super::triangle::Triangle;
+use super::triangle::{Stored, Triangle};
 use crate::source::PART_TRIANGLES;
 use bricks::{Brick, Occupancy, Span};
 use rayon::prelude::*;
@@ -21,10 +20,10 @@ use std::sync::mpsc::sync_channel;
 const NONE: u32 = u32::MAX;
 
 /// Runs of consecutive bricks, each with a file of triangles.
-pub(super) struct Chunks {
+pub(super) struct Chunks<T> {
     /// Bricks of each.
     jobs: Vec<Range<usize>>,
-    files: Vec<Spill<Triangle>>,
+    files: Vec<Spill<T>>,
 }
 
 /// A run of triangles within all objects.
@@ -39,31 +38,31 @@ struct Run<'a> {
 impl Bounded<'_> {
     /// Appends all triangles to the files of their chunks. Returns those and by object the number of triangles that
     /// rounding leaves without area.
-    pub fn distribute(
+    pub fn distribute<T: Stored>(
         &self,
         cuts: &BoundedCuts,
         jobs: &[Job],
-        lattices: &[Lattice],
+        contexts: &[BrickContext],
         journal: &mut Journal,
-    ) -> Result<(Chunks, Vec<u32>), BuildError> {
+    ) -> Result<(Chunks<T>, Vec<u32>), BuildError> {
         budget::give_back();
         let mut chunks = self.chunks(jobs);
         let chunk_of: Vec<u32> =
             (0u32..).zip(&chunks.jobs).flat_map(|(chunk, jobs)| jobs.clone().map(move |_| chunk)).collect();
         let runs = self.runs();
         self.progress.phase("distribute", runs.iter().map(|run| run.slots).sum());
-        let mut dropped = vec![0u32; lattices.len()];
+        let mut dropped = vec![0u32; contexts.len()];
         let mut rest = runs.as_slice();
         while let Some(first) = rest.first() {
             let count = rest.iter().take_while(|run| run.first + run.slots - first.first <= self.budget.window).count();
             let (window, after) = rest.split_at(count.max(1));
             rest = after;
             let words = journal.step(Step::Distribute, || {
-                let more: Vec<AtomicU32> = lattices.iter().map(|_| AtomicU32::new(0)).collect();
+                let more: Vec<AtomicU32> = contexts.iter().map(|_| AtomicU32::new(0)).collect();
                 let brick_of = self.brick_of(window, cuts, jobs)?;
                 let append = |run: &Run| -> Result<(), BuildError> {
                     let bricks = &brick_of[(run.first - first.first) as usize..][..run.slots as usize];
-                    let lost = self.distribute_run(run, bricks, &chunk_of, &lattices[run.object], &chunks)?;
+                    let lost = self.distribute_run(run, bricks, &chunk_of, &contexts[run.object], &chunks)?;
                     more[run.object].fetch_add(lost, Ordering::Relaxed);
                     Ok(())
                 };
@@ -84,12 +83,12 @@ impl Bounded<'_> {
         Ok((chunks, dropped))
     }
 
-    fn chunk_file(&self, chunk: usize, length: u64) -> Spill<Triangle> {
+    fn chunk_file<T: Stored>(&self, chunk: usize, length: u64) -> Spill<T> {
         self.scratch.spill(&format!("chunk-{chunk}"), length)
     }
 
     /// Chunks of as many bricks as the budget allows, without files yet.
-    fn chunks(&self, jobs: &[Job]) -> Chunks {
+    fn chunks<T: Stored>(&self, jobs: &[Job]) -> Chunks<T> {
         let mut chunks = Chunks { jobs: Vec::new(), files: Vec::new() };
         let (mut start, mut triangles) = (0, 0);
         for (index, job) in jobs.iter().enumerate() {
@@ -154,26 +153,27 @@ impl Bounded<'_> {
     }
 
     /// Appends the triangles of a run; `bricks` are those of its slots. Returns how many rounding leaves without area.
-    fn distribute_run(
+    fn distribute_run<T: Stored>(
         &self,
         run: &Run,
         bricks: &[u32],
         chunk_of: &[u32],
-        lattice: &Lattice,
-        chunks: &Chunks,
+        context: &BrickContext,
+        chunks: &Chunks<T>,
     ) -> Result<u32, BuildError> {
         self.progress.check()?;
-        let mut pending: Vec<Vec<Triangle>> = vec![Vec::new(); chunks.files.len()];
+        let mut pending: Vec<Vec<T>> = vec![Vec::new(); chunks.files.len()];
         let (mut count, mut dropped, mut slots) = (0, 0, bricks.iter());
         for piece in &run.pieces {
             let primitive = self.reader.get(piece)?;
             let placed = Placed { part: piece.part, primitive: &primitive };
+            let with_detail = context.details[primitive.material as usize];
             for (triangle, &brick) in (piece.first..piece.end).zip(&mut slots) {
                 if brick == NONE {
                     continue;
                 }
-                match Triangle::round(&placed, triangle, lattice, brick) {
-                    Some(triangle) => pending[chunk_of[brick as usize] as usize].push(triangle),
+                match Triangle::round(&placed, triangle, &context.lattice, brick, with_detail) {
+                    Some(triangle) => pending[chunk_of[brick as usize] as usize].push(T::of(&triangle)),
                     None => dropped += 1,
                 }
                 count += 1;
@@ -189,10 +189,10 @@ impl Bounded<'_> {
     }
 
     /// Encodes and writes the bricks of all chunks. While one is encoded the next is read.
-    pub fn encode(
+    pub fn encode<T: Stored>(
         &self,
         jobs: &[Job],
-        chunks: Chunks,
+        chunks: Chunks<T>,
         contexts: &[BrickContext],
         bricks: &mut BrickWriter,
         journal: &mut Journal,
@@ -257,19 +257,18 @@ fn take_written(words: &[u64]) -> Option<(Vec<Brick>, Vec<Occupancy>)> {
 }
 
 /// The triangles of a chunk.
-struct Loaded {
-    triangles: Vec<Triangle>,
+struct Loaded<T> {
+    triangles: Vec<T>,
     /// Brick and id of each triangle and its place, ascending.
     order: Vec<(u64, u32)>,
 }
 
-impl Loaded {
-    fn load(file: &Spill<Triangle>) -> Result<Self, BuildError> {
+impl<T: Stored> Loaded<T> {
+    fn load(file: &Spill<T>) -> Result<Self, BuildError> {
         let blocks = file.blocks()?;
         let mut triangles = Vec::with_capacity(blocks.records() as usize);
         (0..blocks.len()).try_for_each(|block| blocks.read(block, &mut triangles))?;
-        let key = |triangle: &Triangle| u64::from(triangle.brick) << 32 | u64::from(triangle.id);
-        let mut order: Vec<(u64, u32)> = triangles.iter().map(key).zip(0..).collect();
+        let mut order: Vec<(u64, u32)> = triangles.iter().map(T::key).zip(0..).collect();
         order.sort_unstable();
         Ok(Self { triangles, order })
     }
@@ -278,12 +277,12 @@ impl Loaded {
     fn brick(&self, brick: u32) -> (impl Iterator<Item = Triangle>, usize) {
         let start = |brick: u64| self.order.partition_point(|(key, _)| *key < brick << 32);
         let order = &self.order[start(u64::from(brick))..start(u64::from(brick) + 1)];
-        (order.iter().map(|&(_, place)| self.triangles[place as usize]), order.len())
+        (order.iter().map(|&(_, place)| self.triangles[place as usize].triangle()), order.len())
     }
 }
 
 /// Appends what is pending to the files of its chunks.
-fn append(pending: &mut [Vec<Triangle>], chunks: &Chunks) -> Result<(), BuildError> {
+fn append<T: Stored>(pending: &mut [Vec<T>], chunks: &Chunks<T>) -> Result<(), BuildError> {
     for (triangles, file) in pending.iter_mut().zip(&chunks.files) {
         // The memory is given back too: the next triangles may be of other chunks.
         file.append(&std::mem::take(triangles))?;

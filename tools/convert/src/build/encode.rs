@@ -124,9 +124,11 @@ pub(super) fn contexts<'a>(
     lattices: &[super::lattice::Lattice],
     materials: &'a [super::attributes::MeanColors],
     opacity: &'a [super::opacity::MaterialOpacity],
+    details: &'a [bool],
     settings: &BuildSettings,
 ) -> Vec<BrickContext<'a>> {
     let (is_fast, has_proxies) = (settings.fast, settings.proxies);
-    let context = |(index, &lattice)| BrickContext { index, lattice, materials, opacity, is_fast, has_proxies };
+    let context =
+        |(index, &lattice)| BrickContext { index, lattice, materials, opacity, details, is_fast, has_proxies };
     (0u32..).zip(lattices).map(context).collect()
 }

@@ -14,6 +14,12 @@ impl Affine {
         std::array::from_fn(|k| m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3])
     }
 
+    /// The image of a vector.
+    pub fn vector(&self, v: [f64; 3]) -> [f64; 3] {
+        let m = &self.0;
+        std::array::from_fn(|k| m[4 * k] * v[0] + m[4 * k + 1] * v[1] + m[4 * k + 2] * v[2])
+    }
+
     /// Whether every element is a finite number.
     pub fn is_finite(&self) -> bool {
         self.0.iter().all(|value| value.is_finite())

@@ -258,9 +258,11 @@ pub(super) fn check(scene: &Outline) -> Result<(), BuildError> {
         rule(source < sources, format!("node \"{}\": source", placement.name), source, format!("less than {sources}"))?;
     }
     for (index, material) in scene.materials.iter().enumerate() {
-        let (texture, textures) = (material.base_color_texture, scene.textures.len());
-        let known = texture == bricks::NONE || (texture as usize) < textures;
-        rule(known, format!("material {index}: texture"), texture as usize, format!("less than {textures}"))?;
+        let textures = scene.textures.len();
+        for texture in material.textures() {
+            let known = texture == bricks::NONE || (texture as usize) < textures;
+            rule(known, format!("material {index}: texture"), texture as usize, format!("less than {textures}"))?;
+        }
     }
     Ok(())
 }

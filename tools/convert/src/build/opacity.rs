@@ -6,7 +6,7 @@ use super::journal::{WordReader, Words};
 use super::textures::sound_wrap;
 use crate::progress::Progress;
 use crate::source::{Source, SourceTexture};
-use bricks::{MATERIAL_BLEND, MATERIAL_MASK, Material, NONE, OpacityMap, OpacityTriangle, Span, Writer};
+use bricks::{BASE_COLOR, MATERIAL_BLEND, MATERIAL_MASK, Material, NONE, OpacityMap, OpacityTriangle, Span, Writer};
 use std::collections::BTreeMap;
 
 /// The opacity of a scene.
@@ -27,6 +27,10 @@ pub(super) struct MaterialOpacity {
     enough: f32,
     /// Least alpha of factor and texture.
     least: f32,
+    /// Whether the base colour texture takes the second set of coordinates.
+    second_set: bool,
+    /// Its rows of [`Material::uv_from_set`].
+    uv_from_set: [[f32; 4]; 2],
 }
 
 impl Opacities {
@@ -79,6 +83,8 @@ impl Opacities {
                 _ => 1.0,
             },
             least: material.base_color[3] * self.least.get(map as usize).map_or(1.0, |&least| f32::from(least) / 255.0),
+            second_set: material.uv_sets >> BASE_COLOR & 1 != 0,
+            uv_from_set: [material.uv_from_set[2 * BASE_COLOR], material.uv_from_set[2 * BASE_COLOR + 1]],
         };
         materials.iter().zip(&self.map_of).map(of).collect()
     }
@@ -131,29 +137,54 @@ impl MaterialOpacity {
         if self.least * lowest >= self.enough {
             return None;
         }
-        let uv = vertices.map(|vertex| vertex.vertex().uv);
+        let uv = vertices.map(|vertex| self.coordinates(vertex));
         Some(OpacityTriangle { uv, material, alphas: alphas[0] | alphas[1] << 8 | alphas[2] << 16 })
+    }
+
+    /// Where the base colour texture is looked up at a vertex; zero where that is beyond the range of numbers.
+    fn coordinates(&self, vertex: &VertexBits) -> [f32; 2] {
+        let [s, t] = if self.second_set { vertex.detail().uv } else { vertex.vertex().uv }.map(f64::from);
+        self.uv_from_set.map(|row| {
+            let [a, b, c, _] = row.map(f64::from);
+            let x = (a * s + b * t + c) as f32;
+            if x.is_finite() { x } else { 0.0 }
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::build::attributes::NO_DETAIL;
 
     #[test]
     fn only_what_may_let_rays_through_is_asked() {
-        let white = VertexBits([0, 0, 0, u32::MAX]);
-        let thin = VertexBits([0, 1.5f32.to_bits(), 0, 0x80ff_ffff]);
-        let opaque = MaterialOpacity { enough: 0.0, least: 0.0 };
+        let white = VertexBits([0, 0, 0, u32::MAX], NO_DETAIL);
+        let thin = VertexBits([0, 1.5f32.to_bits(), 0, 0x80ff_ffff], NO_DETAIL);
+        let uv_from_set = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
+        let opaque = MaterialOpacity { enough: 0.0, least: 0.0, second_set: false, uv_from_set };
         assert_eq!(opaque.triangle(0, [&thin, &thin, &thin]), None);
-        let mask = |least| MaterialOpacity { enough: 0.5, least };
+        let mask = |least| MaterialOpacity { enough: 0.5, least, ..opaque };
         assert_eq!(mask(0.5).triangle(3, [&white, &white, &white]), None);
         assert!(mask(0.49).triangle(3, [&white, &white, &white]).is_some());
         let found = mask(0.9).triangle(3, [&white, &thin, &white]).unwrap();
         assert_eq!((found.material, found.alphas), (3, 0x00ff_80ff));
         assert_eq!(found.uv, [[0.0, 0.0], [1.5, 0.0], [0.0, 0.0]]);
-        let blend = MaterialOpacity { enough: 1.0, least: 1.0 };
+        let blend = MaterialOpacity { enough: 1.0, least: 1.0, ..opaque };
         assert_eq!(blend.triangle(0, [&white, &white, &white]), None);
         assert!(blend.triangle(0, [&white, &white, &thin]).is_some());
+    }
+
+    #[test]
+    fn coordinates_are_those_of_the_base_colour_texture() {
+        let (s, t) = (0.25f32.to_bits(), 3.0f32.to_bits());
+        let vertex = VertexBits([0, t, s, u32::MAX], [0, 0, s, t]);
+        let uv_from_set = [[2.0, 0.5, -1.0, 1.0], [0.0, 1.0, 0.25, 0.0]];
+        let first = MaterialOpacity { enough: 1.0, least: 0.5, second_set: false, uv_from_set };
+        let of = |opacity: MaterialOpacity| opacity.triangle(0, [&vertex; 3]).unwrap().uv[1];
+        assert_eq!(of(first), [5.125, 0.5]);
+        assert_eq!(of(MaterialOpacity { second_set: true, ..first }), [1.0, 3.25]);
+        let huge = [[f32::MAX, f32::MAX, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
+        assert_eq!(of(MaterialOpacity { uv_from_set: huge, ..first }), [0.0, 0.25]);
     }
 }

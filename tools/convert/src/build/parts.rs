@@ -95,17 +95,20 @@ fn check(
 ) -> Result<(), BuildError> {
     let (mesh, part) = (&outline.meshes[mesh], &outline.meshes[mesh].parts[part]);
     let what = |of: &str| format!("mesh \"{}\", primitive {}: {of}", mesh.name, part.primitive);
-    let vertices = primitive.positions.len();
+    let (vertices, corners) = (primitive.positions.len(), primitive.indices.len());
     let lengths = [
         ("normals", primitive.normals.as_ref().map(Vec::len)),
         ("texture coordinates", primitive.uvs.as_ref().map(Vec::len)),
+        ("second texture coordinates", primitive.uvs1.as_ref().map(Vec::len)),
         ("colours", primitive.colors.as_ref().map(Vec::len)),
     ];
     for (of, length) in lengths {
         let length = length.unwrap_or(vertices);
         rule(length == vertices, what(of), length, format!("{vertices}, one a vertex"))?;
     }
-    let (indices, expected) = (primitive.indices.len(), part.triangles as usize * 3);
+    let tangents = primitive.tangents.as_ref().map_or(corners, Vec::len);
+    rule(tangents == corners, what("tangents"), tangents, format!("{corners}, one a corner"))?;
+    let (indices, expected) = (corners, part.triangles as usize * 3);
     rule(indices == expected, what("indices"), indices, format!("{expected}, three a triangle"))?;
     let some = &primitive.indices[triangles.start as usize * 3..triangles.end as usize * 3];
     let largest = some.iter().max().map_or(0, |&index| index as usize);

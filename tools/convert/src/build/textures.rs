@@ -1,4 +1,4 @@
-//! Mip chains of textures, averaged in linear light, cut into tiles.
+//! Mip chains of textures, averaged by what their texels mean, cut into tiles.
 
 use super::attributes::MeanColors;
 use super::error::BuildError;
@@ -8,9 +8,10 @@ use crate::progress::Progress;
 use crate::source::{Outline, Source, SourceTexture};
 use block_compression::encode::compress_rgba8;
 use block_compression::{BC7Settings, CompressionVariant};
-use bricks::{BLOCK_TEXELS, MAX_TEXTURE_SIZE, Material, NONE, Span, TILE_TEXELS, Texture, Writer};
+use bricks::{BLOCK_TEXELS, MATERIAL_TEXTURES, MAX_TEXTURE_SIZE, Material, NONE, Span, TILE_TEXELS, Texture, Writer};
 use bricks::{TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 /// A texture with all its levels.
@@ -26,13 +27,31 @@ pub(super) struct EncodedTexture {
     pub mean: [f32; 3],
 }
 
-/// Which textures some material uses, ascending.
-pub(super) fn used(count: usize, materials: &[Material]) -> Vec<usize> {
-    let mut is_used = vec![false; count];
-    for material in materials.iter().filter(|material| material.base_color_texture != NONE) {
-        is_used[material.base_color_texture as usize] = true;
-    }
-    (0..count).filter(|&index| is_used[index]).collect()
+/// What texels mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Content {
+    /// Colour in sRGB, with alpha. Coarser levels average light.
+    Color,
+    /// Numbers. Coarser levels average them; alpha is not kept.
+    Data,
+    /// Directions. Texels of coarser levels are the directions of the means of those of the finest; alpha is not kept.
+    Normals,
+}
+
+impl Content {
+    /// Of the textures of a material, by their places.
+    const OF: [Content; MATERIAL_TEXTURES] =
+        [Content::Color, Content::Normals, Content::Data, Content::Data, Content::Color];
+
+    /// How many there are.
+    const COUNT: usize = 3;
+}
+
+/// Which textures some material uses, and for what, ascending. One that is used in two ways is stored twice.
+pub(super) fn used(materials: &[Material]) -> Vec<(u32, Content)> {
+    let textures = materials.iter().flat_map(|material| material.textures().into_iter().zip(Content::OF));
+    let used: BTreeSet<_> = textures.filter(|(texture, _)| *texture != NONE).collect();
+    used.into_iter().collect()
 }
 
 /// Materials and textures as they are stored.
@@ -50,7 +69,7 @@ pub(super) struct Textures {
     pub warnings: Vec<String>,
     /// Mean linear RGB of the textures.
     means: Vec<[f32; 3]>,
-    /// Their indices, by index in the source; [`NONE`] where it is not stored.
+    /// Their indices, by index in the source and [`Content`]; [`NONE`] where it is not stored.
     new_of_old: Vec<u32>,
 }
 
@@ -65,20 +84,28 @@ pub(super) fn write(
 ) -> Result<Textures, BuildError> {
     let Outline { textures: names, materials, warnings, .. } = source.outline();
     let mut stored =
-        Textures { new_of_old: vec![NONE; names.len()], warnings: warnings.clone(), ..Textures::default() };
-    let used = used(names.len(), materials);
+        Textures { new_of_old: vec![NONE; place(names.len() as u32, Content::Color)], ..Textures::default() };
+    stored.warnings.clone_from(warnings);
+    let used = used(materials);
     progress.phase("textures", used.len() as u64);
     for some in used.chunks(at_once) {
         progress.check()?;
-        let read = |&index: &usize| source.texture(index).map(|texture| encode(&texture, encoding));
+        let read = |&(index, content): &(u32, Content)| {
+            source.texture(index as usize).map(|texture| encode(&texture, content, encoding))
+        };
         let encoded: Vec<_> = some.par_iter().with_max_len(1).map(read).collect();
-        for (&index, texture) in some.iter().zip(encoded) {
+        for (&(index, content), texture) in some.iter().zip(encoded) {
             match texture {
                 Ok(texture) => {
-                    stored.push(index, texture?, writer)?;
-                    stored.names.push(names[index].clone());
+                    stored.push(place(index, content), texture?, writer)?;
+                    stored.names.push(names[index as usize].clone());
                 }
-                Err(error) => stored.warnings.push(format!("{error}; the texture is left out")),
+                Err(error) => {
+                    let warning = format!("{error}; the texture is left out");
+                    if !stored.warnings.contains(&warning) {
+                        stored.warnings.push(warning);
+                    }
+                }
             }
             progress.advance(1);
         }
@@ -87,9 +114,14 @@ pub(super) fn write(
     Ok(stored)
 }
 
+/// The place of a texture in [`Textures::new_of_old`].
+fn place(index: u32, content: Content) -> usize {
+    index as usize * Content::COUNT + content as usize
+}
+
 impl Textures {
-    fn push(&mut self, index: usize, texture: EncodedTexture, writer: &mut Writer) -> Result<(), BuildError> {
-        self.new_of_old[index] = self.records.len() as u32;
+    fn push(&mut self, place: usize, texture: EncodedTexture, writer: &mut Writer) -> Result<(), BuildError> {
+        self.new_of_old[place] = self.records.len() as u32;
         let first_tile = self.tiles.len() as u32;
         for tile in &texture.tiles {
             self.tiles.push(writer.write(tile)?);
@@ -101,16 +133,30 @@ impl Textures {
 
     /// Materials with the indices among the stored textures; without one where it is not stored.
     fn renumber(&self, materials: &[Material]) -> Vec<Material> {
-        let renumber = |material: &Material| match material.base_color_texture {
-            NONE => *material,
-            old => Material { base_color_texture: self.new_of_old[old as usize], ..*material },
+        let renumber = |material: &Material| {
+            let mut material = *material;
+            let mut sets = material.uv_sets;
+            for (number, (texture, content)) in material.textures_mut().into_iter().zip(Content::OF).enumerate() {
+                if *texture != NONE {
+                    *texture = self.new_of_old[place(*texture, content)];
+                }
+                if *texture == NONE {
+                    sets &= !(1 << number);
+                }
+            }
+            Material { uv_sets: sets, ..material }
         };
         materials.iter().map(renumber).collect()
     }
 
-    /// Whether a texture, by its index in the source, is stored.
+    /// Whether a texture, by its index in the source, is stored as one of base colour.
     pub fn is_stored(&self, texture: u32) -> bool {
-        self.new_of_old[texture as usize] != NONE
+        self.new_of_old[place(texture, Content::Color)] != NONE
+    }
+
+    /// Whether triangles need details, by material.
+    pub fn details(&self) -> Vec<bool> {
+        self.materials.iter().map(Material::needs_details).collect()
     }
 
     /// Mean colours by material.
@@ -154,7 +200,7 @@ impl Textures {
         };
         let (names, warnings) = (texts()?, texts()?);
         let mut stored = Self { materials: Vec::new(), records, tiles, names, warnings, means, new_of_old };
-        if stored.new_of_old.len() != outline.textures.len() {
+        if stored.new_of_old.len() != outline.textures.len() * Content::COUNT {
             return None;
         }
         stored.materials = stored.renumber(&outline.materials);
@@ -169,7 +215,13 @@ pub(super) fn sound_wrap(texture: &SourceTexture) -> u32 {
 }
 
 /// Makes the mip chain of a texture and encodes it.
-pub(super) fn encode(source: &SourceTexture, encoding: TextureEncoding) -> Result<EncodedTexture, BuildError> {
+///
+/// Normals are stored as BC7 too: see `benches/results/textures.md` for the angles that it costs.
+pub(super) fn encode(
+    source: &SourceTexture,
+    content: Content,
+    encoding: TextureEncoding,
+) -> Result<EncodedTexture, BuildError> {
     let (width, height) = (source.width, source.height);
     let rule = |ok: bool, what: &str, found: String, expected: String| {
         let what = format!("texture \"{}\": {what}", source.name);
@@ -182,23 +234,27 @@ pub(super) fn encode(source: &SourceTexture, encoding: TextureEncoding) -> Resul
     let wrap = sound_wrap(source);
 
     let levels = width.max(height).ilog2() + 1;
+    let mut texels = source.rgba.clone();
+    if content != Content::Color {
+        texels.iter_mut().skip(3).step_by(4).for_each(|alpha| *alpha = 255);
+    }
     let (encoding, grid) = match encoding {
         TextureEncoding::Raw => (TEXTURE_RGBA8, None),
         // The fastest settings: the next ones take six times as long.
-        TextureEncoding::Bc7 if source.rgba.iter().skip(3).step_by(4).all(|&alpha| alpha == 255) => {
+        TextureEncoding::Bc7 if texels.iter().skip(3).step_by(4).all(|&alpha| alpha == 255) => {
             (TEXTURE_BC7, Some(BC7Settings::opaque_ultra_fast()))
         }
         TextureEncoding::Bc7 => (TEXTURE_BC7, Some(BC7Settings::alpha_ultrafast())),
     };
-    let mut record = Texture { width, height, levels, wrap, encoding, flags: TEXTURE_SRGB, ..Texture::default() };
+    let flags = if content == Content::Color { TEXTURE_SRGB } else { 0 };
+    let mut record = Texture { width, height, levels, wrap, encoding, flags, ..Texture::default() };
     let (mut tiles, mut tail) = (Vec::new(), Vec::new());
-    let mut level = Image { width: width as usize, height: height as usize, texels: decode(&source.rgba) };
-    let mut texels = source.rgba.clone();
+    let mut level = Image { width: width as usize, height: height as usize, texels: content.decode(&texels) };
     for number in 0..levels {
         if number > 0 {
             level = level.halve();
             texels.clear();
-            encode_level(&level, &mut texels);
+            content.encode(&level, &mut texels);
         }
         let size = record.size(number);
         if number < record.tail_level() {
@@ -243,7 +299,7 @@ fn encode_grid(rgba: Vec<u8>, width: u32, settings: Option<BC7Settings>) -> Vec<
     blocks
 }
 
-/// Linear RGBA.
+/// Texels as they are averaged.
 struct Image {
     width: usize,
     height: usize,
@@ -329,19 +385,42 @@ fn srgb(linear: f32) -> u8 {
     value
 }
 
-fn decode(rgba: &[u8]) -> Vec<[f32; 4]> {
-    let table = &*LINEAR_OF_SRGB;
-    let (texels, _) = rgba.as_chunks::<4>();
-    texels
-        .par_iter()
-        .with_min_len(1 << 14)
-        .map(|&[r, g, b, a]| [table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0])
-        .collect()
+impl Content {
+    /// What RGBA8 stands for: linear RGBA. Directions are numbers like others: their mean is that of the vectors, which lie in a cube
+    /// twice as large about its middle.
+    fn decode(self, rgba: &[u8]) -> Vec<[f32; 4]> {
+        let table = &*LINEAR_OF_SRGB;
+        let (texels, _) = rgba.as_chunks::<4>();
+        let unorm = |byte: u8| f32::from(byte) / 255.0;
+        let texels = texels.par_iter().with_min_len(1 << 14);
+        match self {
+            Self::Color => texels
+                .map(|&[r, g, b, a]| [table[r as usize], table[g as usize], table[b as usize], unorm(a)])
+                .collect(),
+            Self::Data | Self::Normals => texels.map(|texel| texel.map(unorm)).collect(),
+        }
+    }
+
+    /// The inverse, rounded.
+    fn encode(self, level: &Image, out: &mut Vec<u8>) {
+        let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let texels = level.texels.iter();
+        match self {
+            Self::Color => out.extend(texels.flat_map(|&[r, g, b, a]| [srgb(r), srgb(g), srgb(b), byte(a)])),
+            Self::Data => out.extend(texels.flat_map(|texel| texel.map(byte))),
+            Self::Normals => out.extend(texels.flat_map(|&[r, g, b, _]| {
+                let [x, y, z] = direction([r, g, b]).map(|c| byte(0.5 * c + 0.5));
+                [x, y, z, 255]
+            })),
+        }
+    }
 }
 
-fn encode_level(level: &Image, out: &mut Vec<u8>) {
-    let alpha = |a: f32| (a.clamp(0.0, 1.0) * 255.0).round() as u8;
-    out.extend(level.texels.iter().flat_map(|&[r, g, b, a]| [srgb(r), srgb(g), srgb(b), alpha(a)]));
+/// The unit vector of a mean texel of normals; along the surface's normal where the vectors cancel out.
+fn direction(rgb: [f32; 3]) -> [f32; 3] {
+    let v = rgb.map(|c| 2.0 * c - 1.0);
+    let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
+    if length > 1e-6 { v.map(|c| c / length) } else { [0.0, 0.0, 1.0] }
 }
 
 #[cfg(test)]
@@ -370,38 +449,67 @@ mod tests {
     fn means_are_those_of_linear_light_for_odd_sizes_too() {
         for (width, height) in [(1, 1), (2, 2), (5, 3), (7, 1), (1, 6), (13, 11), (64, 3)] {
             let source = texture(width, height, |x, y| [(x * 19 % 256) as u8, (y * 83 % 256) as u8, 255, 128]);
-            let encoded = encode(&source, TextureEncoding::Raw).unwrap();
+            let encoded = encode(&source, Content::Color, TextureEncoding::Raw).unwrap();
             assert_eq!(encoded.record.levels, width.max(height).ilog2() + 1);
             assert_eq!(encoded.tail.len() as u64, encoded.record.tail_bytes());
-            let linear = decode(&source.rgba);
+            let linear = Content::Color.decode(&source.rgba);
             for k in 0..3 {
                 let mean = linear.iter().map(|texel| f64::from(texel[k])).sum::<f64>() / linear.len() as f64;
                 assert!((f64::from(encoded.mean[k]) - mean).abs() < 1e-5, "{width} by {height}, channel {k}");
             }
         }
         // Half black, half white is lighter than the mean of the codes.
-        let encoded = encode(&texture(2, 1, |x, _| [(x * 255) as u8; 4]), TextureEncoding::Raw).unwrap();
+        let encoded =
+            encode(&texture(2, 1, |x, _| [(x * 255) as u8; 4]), Content::Color, TextureEncoding::Raw).unwrap();
         let level_1 = encoded.record.tail_offset(1) as usize;
         assert_eq!(encoded.tail[level_1..level_1 + 4], [188, 188, 188, 128]);
     }
 
     #[test]
+    fn numbers_and_directions_are_averaged_as_such() {
+        let level_1 = |content, texel: fn(u32) -> [u8; 4]| {
+            let encoded = encode(&texture(2, 1, |x, _| texel(x)), content, TextureEncoding::Raw).unwrap();
+            assert_eq!(encoded.record.flags, 0);
+            let at = encoded.record.tail_offset(1) as usize;
+            <[u8; 4]>::try_from(&encoded.tail[at..at + 4]).unwrap()
+        };
+        assert_eq!(level_1(Content::Data, |x| [x as u8 * 255, 10, 20 + 2 * x as u8, 7]), [128, 10, 21, 255]);
+        // Two directions at 45 degrees to both sides of z: their mean is z, and as long as it was.
+        let tilted = |x: u32| if x == 0 { [218, 128, 218, 255] } else { [37, 128, 218, 255] };
+        assert_eq!(level_1(Content::Normals, tilted), [128, 128, 255, 255]);
+        assert_eq!(level_1(Content::Normals, |x| if x == 0 { [255; 4] } else { [0, 0, 0, 255] }), [128, 128, 255, 255]);
+    }
+
+    #[test]
     fn unused_textures_are_left_out() {
         let material = |texture| Material { base_color_texture: texture, ..Material::DIFFUSE };
-        let materials = [material(3), material(NONE), material(1), material(3), material(2)];
-        assert_eq!(used(5, &materials), [1, 2, 3]);
+        let mut materials = [material(3), material(NONE), material(1), material(3), material(2)];
+        // A texture of two kinds, and two uses of one kind.
+        (materials[0].normal_texture, materials[1].occlusion_texture) = (1, 4);
+        (materials[1].metallic_roughness_texture, materials[2].emissive_texture) = (4, 3);
+        materials.iter_mut().for_each(|material| material.uv_sets = 0b1_1111);
+        use Content::{Color, Data, Normals};
+        assert_eq!(used(&materials), [(1, Color), (1, Normals), (2, Color), (3, Color), (4, Data)]);
+        let mut stored = Textures { new_of_old: vec![NONE; 15], ..Textures::default() };
         // Texture 2 could not be read.
-        let stored = Textures { new_of_old: vec![NONE, 0, NONE, 1, NONE], ..Textures::default() };
+        for (new, (old, content)) in (0..).zip([(1, Color), (1, Normals), (3, Color), (4, Data)]) {
+            stored.new_of_old[place(old, content)] = new;
+        }
         let renumbered = stored.renumber(&materials);
-        let indices: Vec<u32> = renumbered.iter().map(|material| material.base_color_texture).collect();
-        assert_eq!(indices, [1, NONE, 0, 1, NONE]);
+        let indices: Vec<_> = renumbered.iter().map(Material::textures).collect();
+        assert_eq!(indices[0], [2, 1, NONE, NONE, NONE]);
+        assert_eq!(indices[1], [NONE, NONE, 3, 3, NONE]);
+        assert_eq!(indices[2], [0, NONE, NONE, NONE, 2]);
+        assert_eq!(indices[3..], [[2, NONE, NONE, NONE, NONE], [NONE; 5]]);
+        let sets: Vec<u32> = renumbered.iter().map(|material| material.uv_sets).collect();
+        assert_eq!(sets, [0b11, 0b1100, 0b1_0001, 1, 0], "sets of textures alone");
     }
 
     #[test]
     fn wrong_lengths_are_errors() {
         let mut source = texture(3, 3, |_, _| [0; 4]);
-        assert!(encode(&source, TextureEncoding::Raw).is_ok());
+        assert!(encode(&source, Content::Color, TextureEncoding::Raw).is_ok());
         source.rgba.pop();
-        assert!(matches!(encode(&source, TextureEncoding::Raw), Err(BuildError::Inconsistent { .. })));
+        assert!(matches!(encode(&source, Content::Color, TextureEncoding::Raw), Err(BuildError::Inconsistent { .. })));
     }
 }

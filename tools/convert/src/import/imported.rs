@@ -29,8 +29,8 @@ impl Imported {
         let meshes = whole.meshes.len();
         let (materials, textures) = (whole.materials.len() as u32, whole.textures.len());
         for material in &mut part.materials {
-            if material.base_color_texture != bricks::NONE {
-                material.base_color_texture += textures as u32;
+            for texture in material.textures_mut().into_iter().filter(|texture| **texture != bricks::NONE) {
+                *texture += textures as u32;
             }
         }
         for placement in &mut part.placements {

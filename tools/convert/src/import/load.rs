@@ -47,12 +47,15 @@ pub fn load_all(source: &dyn Source) -> Result<SourceScene, SourceError> {
     }
     let mut materials = outline.materials.clone();
     for material in &mut materials {
-        if let Some(&texture) = renumbered.get(material.base_color_texture as usize) {
-            material.base_color_texture = texture;
+        for texture in material.textures_mut() {
+            if let Some(&renumbered) = renumbered.get(*texture as usize) {
+                *texture = renumbered;
+            }
         }
     }
     let (placements, sources) = (outline.placements.clone(), outline.sources.clone());
-    Ok(SourceScene { meshes, placements, materials, textures, sources, warnings, has_animation: outline.has_animation })
+    let (lights, has_animation) = (outline.lights.clone(), outline.has_animation);
+    Ok(SourceScene { meshes, placements, materials, textures, lights, sources, warnings, has_animation })
 }
 
 /// Appends `next`, a part of the same primitive and so with the same attributes.
@@ -64,6 +67,12 @@ fn join(primitive: &mut Primitive, next: Primitive) {
         all.extend(next);
     }
     if let (Some(all), Some(next)) = (&mut primitive.uvs, next.uvs) {
+        all.extend(next);
+    }
+    if let (Some(all), Some(next)) = (&mut primitive.uvs1, next.uvs1) {
+        all.extend(next);
+    }
+    if let (Some(all), Some(next)) = (&mut primitive.tangents, next.tangents) {
         all.extend(next);
     }
     if let (Some(all), Some(next)) = (&mut primitive.colors, next.colors) {

@@ -84,11 +84,11 @@ impl Source for Computed {
     }
 }
 
-fn bounded(threads: usize, memory: u64) -> BuildSettings {
+pub fn bounded(threads: usize, memory: u64) -> BuildSettings {
     BuildSettings { threads: Some(threads), memory_bytes: Some(memory << 20), ..settings(500) }
 }
 
-fn bytes(source: &dyn Source, settings: &BuildSettings) -> Vec<u8> {
+pub fn bytes(source: &dyn Source, settings: &BuildSettings) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.bricks");
     let summary = build_source(source, settings, &path, &Progress::hidden()).unwrap();

@@ -1,6 +1,9 @@
 //! Reads a scene file back into integers.
 
-use bricks::{AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Node, Object};
+use bricks::{
+    AttributeDetail, AttributeLayout, AttributeVertex, BRICK_DETAIL, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout,
+    Node, Object,
+};
 use bricks::{Payload, Resident, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT, SceneFile, WIDE_HIGH_STEPS};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,6 +18,8 @@ pub struct DecodedBrick {
     pub ids: Vec<u32>,
     pub indices: Vec<[u32; 3]>,
     pub attributes: Vec<AttributeVertex>,
+    /// None without the flag.
+    pub details: Vec<AttributeDetail>,
     pub materials: Vec<u32>,
     pub rotations: Vec<u32>,
     pub attribute_indices: Vec<[u32; 3]>,
@@ -98,6 +103,10 @@ fn brick(record: &Brick, object: &Object, geometry: &[u8], attributes: &[u8]) ->
         ids: pods(geometry, layout.ids, triangles),
         indices: triples(geometry, layout.indices, record),
         attributes: pods(attributes, 0, record.attribute_vertex_count as usize),
+        details: match record.flags & BRICK_DETAIL {
+            0 => Vec::new(),
+            _ => pods(attributes, surfaces.details, record.attribute_vertex_count as usize),
+        },
         materials: words.iter().map(|word| word & SURFACE_MATERIAL).collect(),
         rotations: words.iter().map(|word| word >> SURFACE_ROTATION_SHIFT).collect(),
         attribute_indices: triples(attributes, surfaces.indices, record),

@@ -3,6 +3,7 @@
 mod bounded;
 mod decode;
 mod degenerate;
+mod details;
 mod errors;
 mod invariance;
 mod placement;

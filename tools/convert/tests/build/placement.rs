@@ -11,7 +11,7 @@ fn apply(m: &[f64; 12], p: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3])
 }
 
-fn octahedral(bits: u32) -> [f64; 3] {
+pub fn octahedral(bits: u32) -> [f64; 3] {
     let [x, y] = [bits as u16 as i16, (bits >> 16) as u16 as i16].map(|x| f64::from(x) / 32767.0);
     let z = 1.0 - x.abs() - y.abs();
     let t = (-z).max(0.0);

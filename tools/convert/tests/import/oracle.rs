@@ -30,6 +30,7 @@ fn read(path: &Path) -> Vec<Option<Primitive>> {
             uvs: reader.read_tex_coords(0).map(|uvs| uvs.into_f32().collect()),
             colors: reader.read_colors(0).map(|colors| colors.into_rgba_f32().collect()),
             indices,
+            ..Primitive::default()
         }));
     }
     primitives

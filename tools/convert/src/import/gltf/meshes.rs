@@ -271,7 +271,8 @@ impl Checked {
             };
             colors.into_iter().map(color).collect()
         });
-        Ok(Read { primitive: Primitive { material, positions, normals, uvs, colors, indices }, repairs })
+        let primitive = Primitive { material, positions, normals, uvs, colors, indices, ..Primitive::default() };
+        Ok(Read { primitive, repairs })
     }
 }
 

@@ -129,6 +129,7 @@ pub(super) fn open_within(
         placements: place(&file, &uses, &numbers)?,
         materials,
         textures: textures.iter().map(|(name, _)| name.clone()).collect(),
+        lights: Vec::new(),
         sources: vec![file.source],
         warnings: warnings.into_lines(),
         has_animation,

@@ -226,6 +226,7 @@ impl Obj {
             uvs: if run.has_uvs { Some(optional(&self.uvs, used.iter().map(|v| v[1]))?) } else { None },
             colors,
             indices,
+            ..Primitive::default()
         })
     }
 }

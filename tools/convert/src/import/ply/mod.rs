@@ -250,6 +250,7 @@ impl Parts for Ply {
                 uvs: vertices.uvs.as_ref().map(|table| floats::<2>(table, &used)).transpose()?,
                 colors: vertices.colors.as_ref().map(|table| floats::<4>(table, &used)).transpose()?,
                 indices,
+                ..Primitive::default()
             })
         };
         let mut primitive = read().map_err(|e| SourceError(format!("{}: cannot be read again: {e}", self.label)))?;
