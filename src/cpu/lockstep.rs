@@ -90,10 +90,13 @@ impl Findings {
     }
 
     fn gbuffers(&mut self, context: &str, bound: f32, gpu: &[GBuffer], cpu: &[GBuffer]) {
-        let numbers = |g: &GBuffer| [&g.albedo[..], &g.normal, &g.emission, &g.weights].concat();
+        let numbers = |g: &GBuffer| {
+            let others = [g.handedness, g.occlusion, g.metallic, g.roughness];
+            [&g.albedo[..], &g.normal, &g.emission, &g.weights, &g.tangent, &others].concat()
+        };
         let whole = |g: &GBuffer| [g.state, g.material];
         // Which tiles are read depends on these.
-        let exact = |g: &GBuffer| [g.footprint.to_bits(), g.uv[0].to_bits(), g.uv[1].to_bits()];
+        let exact = |g: &GBuffer| [g.footprint, g.uv[0], g.uv[1], g.footprint1, g.uv1[0], g.uv1[1]].map(f32::to_bits);
         for (g, c) in gpu.iter().zip(cpu) {
             self.numbers("attributes", context, bound, &numbers(g), &numbers(c));
             self.words("materials", context, &[whole(g)], &[whole(c)]);

@@ -53,6 +53,7 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
     let mut primitive = |material: u32, count: u32| {
         let mut part = Primitive { material, ..Primitive::default() };
         let (mut normals, mut uvs, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut uvs1, mut tangents) = (Vec::new(), Vec::new());
         for corner in 0..3 * count {
             let near = if corner % 3 == 0 { 0.0 } else { 1.0 };
             let around = *part.positions.last().filter(|_| near > 0.0).unwrap_or(&[
@@ -66,9 +67,14 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
             let beside = uvs.last().filter(|_| tiled && near > 0.0);
             uvs.push(beside.map_or(anywhere, |uv: &[f32; 2]| [0, 1].map(|k| uv[k] + 0.001 * anywhere[k])));
             colors.push([0; 4].map(|_| random() as f32));
+            let beside = uvs1.last().filter(|_| tiled && near > 0.0);
+            uvs1.push(beside.map_or(anywhere, |uv: &[f32; 2]| [0, 1].map(|k| uv[k] + 0.002 * anywhere[k])));
+            let sign = if corner / 3 % 2 == 0 { 1.0 } else { -1.0 };
+            tangents.push([random() as f32 - 0.5, random() as f32 - 0.5, random() as f32, sign]);
         }
         part.indices = (0..3 * count).collect();
         (part.normals, part.uvs, part.colors) = (Some(normals), Some(uvs), Some(colors));
+        (part.uvs1, part.tangents) = (Some(uvs1), Some(tangents));
         part
     };
     let texture = |i: u32| SourceTexture {
@@ -97,6 +103,16 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
         occlusion_texture: [2, bricks::NONE, 0, 1][i as usize],
         emissive_texture: [bricks::NONE, 0, 1, bricks::NONE][i as usize],
         occlusion_strength: 0.7,
+        normal_texture: [bricks::NONE, 1, 2, 0][i as usize],
+        normal_scale: 0.8,
+        // The second set for occlusion, and for the normals of some; base colours, which have maps of opacity, by the first.
+        uv_sets: [8, 2, 0, 10][i as usize],
+        uv_from_set: {
+            let mut rows = bricks::Material::SAME_UV;
+            (rows[2], rows[3]) = ([0.8, 0.6, 0.25, 2.0], [-1.2, 1.6, 0.5, 0.0]);
+            (rows[6], rows[7]) = ([0.5, 0.0, 0.25, 0.25], [0.0, 0.5, -0.25, 0.0]);
+            rows
+        },
         ..bricks::Material::DIFFUSE
     };
     let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
