@@ -2,20 +2,33 @@
 """Compares converged pictures with Mitsuba 3, an independent path tracer, on the same geometry with diffuse materials.
 
     pip install mitsuba numpy
-    tools/mitsuba.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR [--spp 1024]
+    tools/mitsuba.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR
 
 The scene is Sponza with a colour a material and neither textures nor normals, so that both shade the same surfaces. Cases: the
-sun alone, an environment alone, ambient occlusion, sun and environment with one bounce; three views of paths/. Every picture is kept in
-DIR and not made twice, so that a run that was interrupted is gone on with. The table says, picture by picture: the relative error of the
-mean, of the mean of the worst tile of 20 x 20 pixels, of pixels on the average, and HDR-FLIP (`brickwalk compare`); all but the first have
-the noise of both pictures in them.
+sun alone, an environment alone, ambient occlusion, sun and environment with one bounce; three views of paths/. Pictures are kept in
+DIR and not made twice; Mitsuba's are kept 64 samples after 64 samples. A run that was interrupted is gone on with by the same command. One
+DIR is for one build of brickwalk: a new build needs a new DIR, or one without the folders CASE-VIEW-SPP.
+
+The table says, picture by picture: the relative difference of the means, and one standard error of Mitsuba's mean; that of the
+channel that differs most; of the mean of the worst tile of 20 x 20 pixels; of pixels on the average; HDR-FLIP (`brickwalk compare`); the
+seconds that each took. Tiles, pixels and FLIP have the noise of both pictures in them. The exit status is 1 where means differ by more
+than 1 %, and with --control where they do not.
+
+The variant llvm_ad_rgb needs a libLLVM.so of version 15 or later, found by the system or named in DRJIT_LIBLLVM_PATH, and is 10 to 30
+times as fast as scalar_rgb. With LLVM 15 and 16 it failed ("Cannot select"), with 19 (Debian's libllvm19) it works.
 """
 
 import argparse
+import functools
 import json
+import os
 import pathlib
 import subprocess
 import sys
+import time
+
+# The folder of this file comes first, and `import mitsuba` would be this file.
+sys.path = [path for path in sys.path if pathlib.Path(path or ".").resolve() != pathlib.Path(__file__).resolve().parent]
 
 import numpy as np
 
@@ -26,6 +39,16 @@ SUN = np.array([0.4, 0.8, 0.45])
 # What a white surface that faces the sun reflects of it at intensity 1 (src/render/light.rs).
 SUN_COLOR = np.array([0.60, 0.56, 0.48])
 SUN_INTENSITY = 2.4
+# Samples a pixel that Mitsuba takes before its picture is kept.
+BATCH = 64
+# What means may differ by.
+BOUND = 0.01
+# What Mitsuba is told wrongly with --control, and in which cases that shows.
+CONTROLS = {
+    "albedo": ("every albedo 2 % higher", ("sun", "environment", "ao", "bounce")),
+    "sun": ("the sun turned by 2 degrees about the vertical", ("sun", "bounce")),
+    "environment": ("the environment turned by 20 degrees about the vertical", ("environment", "bounce")),
+}
 COMPONENT = {5126: np.float32, 5125: np.uint32, 5123: np.uint16}
 
 
@@ -110,21 +133,20 @@ def meshes(document, data):
 
 
 class Reference:
-    """Mitsuba's pictures."""
+    """Mitsuba's pictures, of a scene that is wrong by `control`."""
 
-    def __init__(self, document, data):
+    def __init__(self, document, data, control):
         import mitsuba
 
-        mitsuba.set_variant("scalar_rgb")
         self.mi = mitsuba
+        self.control = control
         self.shapes = {}
+        factor = 1.02 if control == "albedo" else 1.0
         for number, (positions, indices, material) in enumerate(meshes(document, data)):
             properties = mitsuba.Properties()
+            reflectance = [factor * c for c in colour(material)]
             properties["bsdf"] = mitsuba.load_dict(
-                {
-                    "type": "twosided",
-                    "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": colour(material)}},
-                }
+                {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": reflectance}}}
             )
             mesh = mitsuba.Mesh(f"part {number}", len(positions), len(indices), props=properties)
             parameters = mitsuba.traverse(mesh)
@@ -152,33 +174,60 @@ class Reference:
             "sampler": {"type": "independent"},
         }
 
-    def render(self, case, view, environment, spp):
+    def scene(self, case, view, environment):
         mi = self.mi
         scene = {"type": "scene", "sensor": self.sensor(view), **self.shapes}
+        about_y = mi.ScalarTransform4f().rotate
         if case in ("sun", "bounce"):
-            irradiance = (np.pi * SUN_INTENSITY * SUN_COLOR).tolist()
+            toward = about_y([0, 1, 0], 2 if self.control == "sun" else 0).matrix
             scene["sun"] = {
                 "type": "directional",
-                "direction": (-SUN).tolist(),
-                "irradiance": {"type": "rgb", "value": irradiance},
+                "direction": (np.array(toward)[:3, :3] @ -SUN).tolist(),
+                "irradiance": {"type": "rgb", "value": (np.pi * SUN_INTENSITY * SUN_COLOR).tolist()},
             }
         if case in ("environment", "bounce"):
             # Both look at an image's middle along -Z (this program) and +Z turned by half (Mitsuba).
-            turn = mi.ScalarTransform4f().rotate([0, 1, 0], 180)
+            turn = about_y([0, 1, 0], 180 + (20 if self.control == "environment" else 0))
             scene["environment"] = {"type": "envmap", "filename": str(environment), "to_world": turn}
         if case == "ao":
             scene["environment"] = {"type": "constant", "radiance": 1.0}
         depth = {"sun": 2, "environment": 2, "ao": 2, "bounce": 3}[case]
         scene["integrator"] = {"type": "path", "max_depth": depth, "rr_depth": 1000}
-        scene = mi.load_dict(scene)
-        total = np.zeros((SIZE[1], SIZE[0], 3))
-        batch = 64
-        for first in range(0, spp, batch):
-            picture = np.array(mi.render(scene, spp=batch, seed=1 + first))
-            total += picture.astype(np.float64) * batch
-            print(f"\rMitsuba, {case}: {first + batch} of {spp}", end="", file=sys.stderr)
+        return mi.load_dict(scene)
+
+    def render(self, scene, number):
+        """The picture of batch `number` of BATCH samples."""
+        return np.array(self.mi.render(scene, spp=BATCH, seed=number)).astype(np.float64)
+
+
+def complete(path, write):
+    """Has `path` written elsewhere first, so that it is there whole or not at all."""
+    unfinished = path.with_name(f"unfinished-{path.name}")
+    write(unfinished)
+    os.replace(unfinished, path)
+
+
+def theirs(make_reference, case, view, environment, spp, base):
+    """The mean picture of `spp` samples, the means of its batches, and seconds; goes on from what `base`.npz holds, and keeps it there."""
+    kept = base.with_name(f"{base.name}.npz")
+    pictures, total, means, seconds = None, np.zeros((SIZE[1], SIZE[0], 3)), [], 0.0
+    if kept.exists():
+        with np.load(kept) as state:
+            total, means, seconds = state["total"], list(state["means"]), float(state["seconds"])
+    for number in range(len(means), spp // BATCH):
+        if pictures is None:
+            reference = make_reference()
+            pictures = reference.scene(case, view, environment)
+        start = time.monotonic()
+        picture = reference.render(pictures, number)
+        seconds += time.monotonic() - start
+        total += picture
+        means.append(picture.mean())
+        complete(kept, lambda path: np.savez(path, total=total, means=means, seconds=seconds))
+        print(f"\rMitsuba, {base.name}: {BATCH * len(means)} of {spp}", end="", file=sys.stderr)
+    if pictures is not None:
         print(file=sys.stderr)
-        return (total / spp).astype(np.float32)
+    return total / len(means), np.array(means), seconds
 
 
 LIGHT = {
@@ -191,67 +240,113 @@ LIGHT = {
 
 
 def ours(binary, bricks, case, view, environment, white, spp, folder):
-    """The picture of `brickwalk walk`."""
-    words = [binary, "walk", bricks, "-o", folder, "--path", view, "--frames", "1", "--size", f"{SIZE[0]}x{SIZE[1]}"]
-    words += ["--spp", str(spp), "--aov", "--cache", "100%", *LIGHT[case]]
-    if case in ("environment", "bounce"):
-        words += ["--environment", environment]
-    if case == "ao":
-        words += ["--environment", white]
-    subprocess.run([str(word) for word in words], check=True)
-    return folder / "frames" / "0000.exr"
+    """The picture of `brickwalk walk`, and the seconds that it took; made if `folder` has none."""
+    picture, took = folder / "frames" / "0000.exr", folder / "seconds"
+    if not took.exists():
+        words = [binary, "walk", bricks, "-o", folder, "--path", view, "--frames", "1", "--size", f"{SIZE[0]}x{SIZE[1]}"]
+        words += ["--spp", str(spp), "--aov", "--cache", "100%", *LIGHT[case]]
+        if case in ("environment", "bounce"):
+            words += ["--environment", environment]
+        if case == "ao":
+            words += ["--environment", white]
+        start = time.monotonic()
+        subprocess.run([str(word) for word in words], check=True, stdout=sys.stderr)
+        complete(took, lambda path: path.write_text(f"{time.monotonic() - start:.1f}\n"))
+    return picture, float(took.read_text())
+
+
+def read(mitsuba, path):
+    # Of layers the first is the radiance.
+    return np.array(mitsuba.Bitmap(str(path)).split()[0][1])[..., :3].astype(np.float64)
+
+
+def row(options, mine, reference, means):
+    """The columns of the table from the picture files of this program and of Mitsuba, and the difference that is bounded."""
+    import mitsuba
+
+    a, b = (read(mitsuba, path) for path in (mine, reference))
+    tiles = [x.reshape(9, 20, 16, 20, 3).mean(axis=(1, 3, 4)) for x in (a, b)]
+    # Tiles that are all but black would divide by noise.
+    bright = tiles[1] > 0.05 * b.mean()
+    worst = np.abs(tiles[0] / np.maximum(tiles[1], 1e-9) - 1)[bright].max()
+    words = [str(options.brickwalk), "compare", str(mine), str(reference), "--json"]
+    flip = json.loads(subprocess.run(words, check=True, capture_output=True).stdout)["flip"]
+    mean, pixels = a.mean() / b.mean() - 1, np.abs(a - b).mean() / b.mean()
+    channels = a.mean(axis=(0, 1)) / b.mean(axis=(0, 1)) - 1
+    channel = channels[np.abs(channels).argmax()]
+    error = means.std(ddof=1) / len(means) ** 0.5 / means.mean() if len(means) > 1 else float("nan")
+    columns = [f"{100 * mean:+.2f} ± {100 * error:.2f} %", f"{100 * channel:+.2f} %", f"{100 * worst:.1f} %", f"{100 * pixels:.1f} %"]
+    return [*columns, f"{flip:.4f}"], mean
+
+
+def parse():
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--scenes", type=pathlib.Path, required=True, help="folder with sponza/ and env/")
+    arguments.add_argument(
+        "--brickwalk", type=pathlib.Path, default=pathlib.Path("target/release/brickwalk"), help="default target/release/brickwalk"
+    )
+    arguments.add_argument("--paths", type=pathlib.Path, default=pathlib.Path("paths"), help="folder of the views (default paths)")
+    arguments.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder for pictures, made if missing")
+    arguments.add_argument("--spp", type=int, default=1024, help="samples a pixel of this program (default 1024)")
+    arguments.add_argument("--reference-spp", type=int, help="samples a pixel of Mitsuba, a multiple of 64 (default as --spp)")
+    arguments.add_argument("--cases", default="sun,environment,ao,bounce", help="of these (default all)")
+    arguments.add_argument("--views", default="1,3,5", help="numbers of paths/sponza_N.json (default 1,3,5)")
+    arguments.add_argument("--variant", choices=["scalar_rgb", "llvm_ad_rgb"], default="scalar_rgb", help="of Mitsuba (default scalar_rgb)")
+    control = "; ".join(f"{name}: {what} (cases {', '.join(cases)})" for name, (what, cases) in CONTROLS.items())
+    arguments.add_argument(
+        "--control",
+        choices=list(CONTROLS),
+        help=f"tell Mitsuba something wrong, which all means must show. {control.replace('%', '%%')} (default: nothing)",
+    )
+    options = arguments.parse_args()
+    options.reference_spp = options.reference_spp or options.spp
+    options.cases, options.views = options.cases.split(","), options.views.split(",")
+    if options.reference_spp % BATCH:
+        arguments.error(f"--reference-spp must be a multiple of {BATCH}")
+    unknown = set(options.cases) - set(LIGHT)
+    if unknown:
+        arguments.error(f"--cases: no case is named {', '.join(sorted(unknown))}")
+    if options.control:
+        options.cases = [case for case in options.cases if case in CONTROLS[options.control][1]]
+    return options
 
 
 def main():
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--scenes", type=pathlib.Path, required=True, help="folder with sponza/ and env/")
-    arguments.add_argument("--brickwalk", type=pathlib.Path, default=pathlib.Path("target/release/brickwalk"))
-    arguments.add_argument("--paths", type=pathlib.Path, default=pathlib.Path("paths"))
-    arguments.add_argument("-o", "--output", type=pathlib.Path, required=True)
-    arguments.add_argument("--spp", type=int, default=1024, help="samples a pixel, a multiple of 16 (default 1024)")
-    arguments.add_argument("--cases", default="sun,environment,ao,bounce", help="of these (default all)")
-    arguments.add_argument("--views", default="1,3,5", help="numbers of paths/sponza_N.json (default 1,3,5)")
-    options = arguments.parse_args()
+    options = parse()
+    import mitsuba
+
+    mitsuba.set_variant(options.variant)
     out = options.output
     out.mkdir(parents=True, exist_ok=True)
     gltf, document, data = diffuse_sponza(options.scenes, out)
     bricks = out / "scene.bricks"
     if not bricks.exists():
-        subprocess.run([str(options.brickwalk), "convert", str(gltf), "-o", str(bricks)], check=True)
+        subprocess.run([str(options.brickwalk), "convert", str(gltf), "-o", str(bricks)], check=True, stdout=sys.stderr)
     environment = options.scenes / "env" / "venice_sunset_1k.hdr"
-    reference = None
-    import mitsuba
-
-    mitsuba.set_variant("scalar_rgb")
     white = out / "white.exr"
     mitsuba.Bitmap(np.ones((32, 64, 3), np.float32)).write(str(white))
-    print("| case | view | mean | worst tile | pixels | FLIP |\n| --- | --- | --- | --- | --- | --- |")
-    for case in options.cases.split(","):
-        for view in options.views.split(","):
+    make_reference = functools.cache(lambda: Reference(document, data, options.control))
+    print("| case | view | mean | channel | worst tile | pixels | FLIP | brickwalk, s | Mitsuba, s |", flush=True)
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |", flush=True)
+    failed = 0
+    for case in options.cases:
+        for view in options.views:
             path = options.paths / f"sponza_{view}.json"
-            name = f"{case}-{view}-{options.spp}"
-            theirs = out / f"{name}-mitsuba.exr"
-            if not theirs.exists():
-                reference = reference or Reference(document, data)
-                picture = reference.render(case, json.loads(path.read_text()), environment, options.spp)
-                mitsuba.Bitmap(picture).write(str(theirs))
-            folder = out / name
-            mine = folder / "frames" / "0000.exr"
-            if not mine.exists():
-                ours(options.brickwalk, bricks, case, path, environment, white, options.spp, folder)
-            # Of layers the first is the radiance.
-            a, b = (np.array(mitsuba.Bitmap(str(p)).split()[0][1])[..., :3].astype(np.float64) for p in (mine, theirs))
-            tiles = [x.reshape(9, 20, 16, 20, 3).mean(axis=(1, 3, 4)) for x in (a, b)]
-            # Tiles that are all but black would divide by noise.
-            bright = tiles[1] > 0.05 * b.mean()
-            worst = np.abs(tiles[0] / np.maximum(tiles[1], 1e-9) - 1)[bright].max()
-            compared = subprocess.run(
-                [str(options.brickwalk), "compare", str(mine), str(theirs), "--json"], check=True, capture_output=True
+            mine, seconds = ours(
+                options.brickwalk, bricks, case, path, environment, white, options.spp, out / f"{case}-{view}-{options.spp}"
             )
-            flip = json.loads(compared.stdout)["flip"]
-            mean, pixels = a.mean() / b.mean() - 1, np.abs(a - b).mean() / b.mean()
-            print(f"| {case} | {view} | {100 * mean:+.2f} % | {100 * worst:.1f} % | {100 * pixels:.1f} % | {flip:.4f} |", flush=True)
-    return 0
+            name = "-".join(filter(None, ["mitsuba", options.variant, options.control, case, view]))
+            keyframes = json.loads(path.read_text())
+            picture, means, reference_seconds = theirs(make_reference, case, keyframes, environment, options.reference_spp, out / name)
+            reference = out / f"{name}.exr"
+            mitsuba.Bitmap(picture.astype(np.float32)).write(str(reference))
+            columns, mean = row(options, mine, reference, means)
+            failed += (abs(mean) <= BOUND) == bool(options.control)
+            columns = [case, view, *columns, f"{seconds:.0f}", f"{reference_seconds:.0f}"]
+            print(f"| {' | '.join(columns)} |", flush=True)
+    expected = "more than" if options.control else "at most"
+    print(f"{failed} of {len(options.cases) * len(options.views)} means do not differ by {expected} 1 %", file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

@@ -21,6 +21,12 @@ pub struct Directions {
     pub glossy: bool,
 }
 
+/// Direction `index` about z of passes that start at hits, before it is turned or scattered.
+pub fn direction_around(index: u32) -> [f32; 3] {
+    // The first point of the sequence is a corner of the square.
+    cosine_hemisphere([halton(index + 1, 0), halton(index + 1, 1)])
+}
+
 impl Directions {
     /// The parameters of `pass`.
     fn params(&self, pass: Pass, params: &Params) -> Params {
@@ -53,8 +59,7 @@ impl Directions {
             ..*params
         };
         if let Some((index, count)) = direction {
-            // The first point of the sequence is a corner of the square.
-            let [x, y, z] = cosine_hemisphere([halton(index + 1, 0), halton(index + 1, 1)]);
+            let [x, y, z] = direction_around(index);
             params.around = [x, y, z, if self.scatter { std::f32::consts::TAU } else { self.turn }];
             params.flags |= flag(self.scatter, layout::PARAM_SCATTER);
             params.share = 1.0 / count.max(1) as f32;

@@ -1,4 +1,4 @@
-//! Point sets and maps of the unit square: Halton and Hammersley, the concentric disc, integer hashes.
+//! Point sets and maps of the unit square: Halton, Hammersley and R2, the concentric disc, integer hashes.
 
 /// Radical inverse of `index` in `base`: the digits mirrored at the point, in [0, 1). `base` is at least 2.
 ///
@@ -30,6 +30,14 @@ pub fn halton(index: u32, dimension: usize) -> f32 {
 pub fn hammersley(index: u32, count: u32) -> [f32; 2] {
     let x = (f64::from(index) + 0.5) / f64::from(count.max(1));
     [below_one(x), below_one(radical_inverse(2, index))]
+}
+
+/// Point `index` of the R2 sequence in the unit square, [0, 1): the centre moved by multiples of 1/p and 1/p², p^3 = p + 1, p the
+/// plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018). In step with any dimensions of [`halton`] it is
+/// spread evenly over the product of both, because p is irrational, while two points of the same dimensions of [`halton`] depend on one another.
+pub fn r2(index: u32) -> [f32; 2] {
+    const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    STEPS.map(|step| below_one((0.5 + f64::from(index) * step).fract()))
 }
 
 /// To f32, toward 0 where rounding would reach 1.
@@ -116,11 +124,13 @@ mod tests {
         let n = 1024;
         let hammersley: Vec<_> = (0..n).map(|i| hammersley(i, n)).collect();
         let halton: Vec<_> = (0..n).map(|i| [halton(i, 0), halton(i, 1)]).collect();
+        let r2: Vec<_> = (0..n).map(r2).collect();
         let random: Vec<_> = (0..n).map(|i| random2(i, 0, 0)).collect();
-        let (a, b, control) = (discrepancy(&hammersley), discrepancy(&halton), discrepancy(&random));
-        assert!(a < 0.005 && b < 0.01, "{a} {b}");
+        let [a, b, c, control] = [&hammersley, &halton, &r2, &random].map(|points| discrepancy(points));
+        assert!(a < 0.005 && b < 0.01 && c < 0.01, "{a} {b} {c}");
         assert!(control > 0.01, "the control must show: {control}");
-        assert!(hammersley.iter().flatten().all(|x| (0.0..1.0).contains(x)));
+        assert!(hammersley.iter().chain(&r2).flatten().all(|x| (0.0..1.0).contains(x)));
+        assert!(super::r2(u32::MAX).iter().all(|x| (0.0..1.0).contains(x)));
     }
 
     #[test]

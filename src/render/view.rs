@@ -5,18 +5,15 @@ use super::{Effects, Light};
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::Params;
 use crate::kernel::{Directions, View};
-use crate::math::sampling::halton;
+use crate::math::sampling::r2;
 use crate::scene::Camera;
 use bricks::Resident;
 use glam::DVec3;
 
-/// Jitter of sample `sample` within the pixel: its centre for sample 0 (which the AOVs come from), then the Halton sequence
-/// in bases 2 and 3.
+/// Where in its pixel sample `sample` lies: in the centre for sample 0, which the AOVs come from. Not by the Halton sequence that
+/// directions are made by: every part of a pixel would have directions of a part of the hemisphere only, however many samples there are.
 fn jitter(sample: u32) -> [f32; 2] {
-    if sample == 0 {
-        return [0.5, 0.5];
-    }
-    [halton(sample, 0), halton(sample, 1)]
+    r2(sample)
 }
 
 /// The view of `camera` for one sample of a picture of `width` x `height` pixels.
@@ -69,4 +66,45 @@ pub fn camera_view(
         glossy: effects.glossy,
     };
     View { frame, params, directions }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::dispatch::direction_around;
+    use crate::math::sampling::halton;
+
+    /// Of samples that `place` puts into a part of the pixel: how far the mean squared sine of their directions, which cosine-weighted
+    /// ones have evenly spread, is from 1/2 at worst.
+    fn dependence(place: impl Fn(u32) -> [f32; 2], samples: u32, count: u32) -> f32 {
+        let parts: [fn([f32; 2]) -> bool; 6] = [
+            |[x, _]| x < 0.5,
+            |[_, y]| y < 0.5,
+            |[x, _]| x < 0.25,
+            |[x, y]| x + y < 1.0,
+            |[x, y]| x > 0.5 && y > 0.5,
+            |[x, y]| (x - 0.5).hypot(y - 0.5) < 0.4,
+        ];
+        let mean = |part: fn([f32; 2]) -> bool| {
+            let inside = (0..samples).filter(|&sample| part(place(sample)));
+            let squared: Vec<f32> = inside
+                .flat_map(|sample| (sample * count..(sample + 1) * count).map(direction_around))
+                .map(|[x, y, _]| x * x + y * y)
+                .collect();
+            squared.iter().sum::<f32>() / squared.len() as f32
+        };
+        parts.into_iter().map(|part| (mean(part) - 0.5).abs()).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn every_part_of_a_pixel_has_directions_of_the_whole_hemisphere() {
+        for count in [1, 2, 3, 4, 16, 20] {
+            let worst = dependence(jitter, 4096, count);
+            assert!(worst < 0.005, "{count} directions a sample: {worst}");
+        }
+        let halton = |sample| [halton(sample, 0), halton(sample, 1)];
+        let control = dependence(halton, 4096, 1);
+        assert!(control > 0.1, "points that directions are made of must show: {control}");
+        assert_eq!(jitter(0), [0.5, 0.5], "AOVs come from the centre");
+    }
 }
