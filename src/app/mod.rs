@@ -11,6 +11,7 @@ pub mod device;
 pub mod info;
 mod inputs;
 pub mod interrupt;
+pub mod left_out;
 pub mod light_args;
 pub mod lighting;
 mod named;

@@ -3,7 +3,7 @@
 use super::args::{Schedule as ScheduleArg, StreamArgs};
 use super::device::Device;
 use super::sizes::{CacheSize, option_bytes};
-use crate::kernel::{Extent, FrameExecutor, Setup};
+use crate::kernel::{Extent, FrameExecutor, Keep, Setup};
 use crate::render::Schedule;
 use crate::schedule::cache::{BrickBytes, Cache, SceneBytes};
 use crate::stream::{HostCache, Policy, Residency, ResidencyError, Sizes, Trace};
@@ -94,6 +94,20 @@ impl Session {
     /// # Errors
     /// No device, a device that fails the start-up probe, a cache too small or too large.
     pub fn open(scene: Arc<SceneFile>, path: &Path, args: &StreamArgs, extent: Extent) -> Result<Self> {
+        Self::open_keeping(scene, path, args, extent, Keep::default())
+    }
+
+    /// [`Session::open`] with what `keep` says though the scene does not need it.
+    ///
+    /// # Errors
+    /// As [`Session::open`].
+    pub fn open_keeping(
+        scene: Arc<SceneFile>,
+        path: &Path,
+        args: &StreamArgs,
+        extent: Extent,
+        keep: Keep,
+    ) -> Result<Self> {
         if let Some(file) = &args.requests_out {
             // Said before the work rather than after it.
             let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -103,9 +117,11 @@ impl Session {
         }
         let device = Device::open(&args.adapter)?;
         let page_bytes = device.page_bytes();
-        Self::open_on(scene, path, args, extent, page_bytes, |needs| {
-            device.executor(needs.scene, needs.host, needs.threads, needs.page_sizes, needs.setup)
-        })
+        let mut session = Self::open_on(scene, path, args, extent, page_bytes, |needs| {
+            device.executor(needs.scene, needs.host, needs.threads, needs.page_sizes, Setup { keep, ..needs.setup })
+        })?;
+        session.cache.states.keep_asking(keep.queries);
+        Ok(session)
     }
 
     /// As [`Session::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
@@ -158,7 +174,7 @@ impl Session {
                 extent.tile
             );
         }
-        let setup = Setup { extent, threshold, count: args.count };
+        let setup = Setup { extent, threshold, count: args.count, keep: Keep::default() };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let host = HostCache::new(args.host_cache);
         let threads = (args.worker_count(), args.prefetch as usize);

@@ -4,7 +4,6 @@ use super::args::WalkArgs;
 use super::lighting::Lighting;
 use super::optimisation_args::names;
 use super::pictures::Pictures;
-use crate::kernel::opacity;
 use crate::render::denoise::Resolve;
 use crate::render::{Renderer, Schedule};
 use crate::stats::Record;
@@ -13,13 +12,14 @@ use serde_json::{Map, Value, json};
 /// Raised when a field changes its meaning.
 const FORMAT: u32 = 1;
 
-/// The summary of a walk of `frames` finished frames.
+/// The summary of a walk of `frames` finished frames, with what was left out.
 pub fn of_walk(
     args: &WalkArgs,
     renderer: &mut Renderer,
     (pictures, lighting, resolve): (&Pictures, &Lighting, &Resolve),
     records: &[Record],
     frames: u32,
+    left_out: Vec<Value>,
 ) -> Value {
     let streaming = streaming(renderer);
     let resident = renderer.scene.resident();
@@ -97,7 +97,7 @@ pub fn of_walk(
             "switches": renderer.auto.switches,
             "passes_last_by": renderer.auto.in_force().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
         })),
-        "left_out": left_out(renderer),
+        "left_out": left_out,
         "texture_bytes_resident": renderer.executor.texture_bytes(),
         "host_cache": streaming.0,
         "prefetch": streaming.1,
@@ -149,29 +149,6 @@ fn errors(records: &[Record]) -> Value {
         });
     }
     Value::Object(effects)
-}
-
-/// What rendering left out because the scene does not need it, and why.
-pub fn left_out(renderer: &Renderer) -> Vec<Value> {
-    let manifest = &renderer.scene.resident().manifest;
-    let mut out = Vec::new();
-    let mut add = |what: &str, why: &str| out.push(json!({ "what": what, "why": why }));
-    if renderer.cache.residency.budget_bytes() >= renderer.cache.bytes.sizes().sum() {
-        add("queries for missing bricks", "the cache holds every brick and tile");
-    }
-    if !manifest.has_textures {
-        add("texture lookups", "no material has a texture");
-    }
-    if !opacity::is_needed(renderer.scene.resident()) {
-        add("alpha tests in traversal", "no ray passes through a triangle");
-    }
-    if !manifest.has_instances {
-        add("instance transforms", "everything is baked into the world");
-    }
-    if !manifest.has_wide_bricks {
-        add("two-part vertices", "every brick is near");
-    }
-    out
 }
 
 /// Totals, medians and 95th percentiles of every numeric field, per pass.

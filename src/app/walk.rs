@@ -1,6 +1,7 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::args::WalkArgs;
+use super::left_out;
 use super::lighting::lighting;
 use super::output::atomic;
 use super::pictures::Pictures;
@@ -44,7 +45,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     }
     let session = Session::open(scene.clone(), &args.scene, &args.stream, extent)?;
     let mut reference =
-        if args.measure_error { Some(reference(scene, args, lighting.light.clone(), extent)?) } else { None };
+        if args.measure_error { Some(reference(scene.clone(), args, lighting.light.clone(), extent)?) } else { None };
     let frames_folder = args.output.join("frames");
     atomic::create_folder(&frames_folder)?;
     for stale in ["summary.json", "report.html"] {
@@ -105,7 +106,13 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     }
     progress.finish();
     pictures.finish(args.json)?;
-    let summary = summary::of_walk(args, &mut renderer, (&pictures, &lighting, &resolve), &records, finished);
+    let left_out = left_out::left_out(&renderer);
+    let measured = match args.measure_left_out {
+        true => left_out::measure(&left_out, &scene, args, &lighting.light, &path.frame(0, args.frames))?,
+        false => Vec::new(),
+    };
+    let left_out = left_out::listed(&left_out, &measured);
+    let summary = summary::of_walk(args, &mut renderer, (&pictures, &lighting, &resolve), &records, finished, left_out);
     finish(args, &renderer, &summary)?;
     if finished < args.frames {
         bail!("interrupted after {finished} of {} frames; {} holds what is done", args.frames, args.output.display());
@@ -127,7 +134,7 @@ pub fn renderer(session: Session, args: &WalkArgs) -> Result<Renderer> {
 }
 
 /// The same with this light.
-fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer {
+pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer {
     let Session { scene, mut executor, cache, schedule } = session;
     if args.effects.effects().has_bounces() {
         executor.allow_bounces();

@@ -61,6 +61,8 @@ pub struct CpuExecutor {
     tuning: Tuning,
     pairs_are_culled: bool,
     count: bool,
+    /// Whether textures are looked up; beside this, kernels decide as they run.
+    samples: bool,
     isa: Best,
 }
 
@@ -73,13 +75,14 @@ impl CpuExecutor {
     /// # Errors
     /// Textures that cannot be read.
     pub fn new(file: Arc<SceneFile>, workers: Workers<Shared>, setup: Setup) -> Result<Self, ExecutorError> {
-        let Setup { extent, count, .. } = setup;
+        let Setup { extent, count, keep, .. } = setup;
         let rays = extent.rays();
         let sets = [RaySet::new(rays), RaySet::new(rays), RaySet::new(0)];
         let tiles = TileLists::new(extent.tiles() as usize);
         Ok(Self {
             cache: BrickCache::new(file.sizes().rows()),
             scene: Scene::new(file.resident()),
+            samples: keep.textures || !file.resident().textures.is_empty(),
             texels: Texels::new(&file)?,
             opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
             lamps: LampTables::default(),
@@ -232,7 +235,7 @@ impl Executor for CpuExecutor {
             true => self.cache.attributes(resident, bricks)?,
             false => Vec::new(),
         };
-        let samples = steps.contains(&Step::Sample) && !self.texels.textures.is_empty();
+        let samples = steps.contains(&Step::Sample) && self.samples;
         let tiles = if samples { self.cache.tiles(bricks)? } else { Vec::new() };
         let tile_demand: Vec<TileDemand> = tiles.iter().map(|_| TileDemand::default()).collect();
         let sampling = Sampling { texels: &self.texels, tiles: &tiles };

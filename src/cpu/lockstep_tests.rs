@@ -9,7 +9,7 @@ use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernel::dispatch::INTERSECT_BINARY;
 use crate::kernel::lamps::{Emitter, Lamps, Shape};
-use crate::kernel::{Extent, FrameExecutor, Setup};
+use crate::kernel::{Extent, FrameExecutor, Keep, Setup};
 use crate::render::{
     Effects, Equirectangular, Light, Occlusion, RenderSettings, Renderer, Schedule, emissive_triangles, environment,
 };
@@ -214,7 +214,7 @@ fn render(
     let budget = if variant.everything_fits { Residency::budget_for_all(&sizes, page_bytes) } else { least };
     let residency = residency(budget).unwrap();
     let pages: Vec<u64> = residency.page_sizes().collect();
-    let setup = Setup { extent: EXTENT, threshold: variant.threshold, count: true };
+    let setup = Setup { extent: EXTENT, threshold: variant.threshold, count: true, keep: Keep::default() };
     let host = || HostCache::new(1 << 20);
     let on_gpu = GpuExecutor::with_kernels(
         gpu.clone(),

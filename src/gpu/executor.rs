@@ -71,8 +71,13 @@ impl GpuExecutor {
         // A cache of nothing has a page, too.
         let texels = Texels::page_count(&gpu, &scene);
         let resident = scene.resident();
-        let (opacity, gloss) = (opacity::is_needed(resident), reflectance::is_needed(resident));
-        let pages = Pages { cache: page_sizes.len().max(1), texels, opacity, gloss };
+        let keep = setup.keep;
+        let pages = Pages {
+            cache: page_sizes.len().max(1),
+            texels: texels.max(usize::from(keep.textures)),
+            opacity: keep.opacity || opacity::is_needed(resident),
+            gloss: keep.gloss || reflectance::is_needed(resident),
+        };
         let most_pages = gpu.max_cache_pages(pages);
         if pages.cache > most_pages {
             let text = format!(
@@ -108,7 +113,7 @@ impl GpuExecutor {
         let buffers = Buffers {
             scene: SceneBuffers::new(&gpu, &scene)?,
             cache: CachePages::new(&gpu, page_sizes),
-            texels: Texels::new(&gpu, &scene)?,
+            texels: Texels::new(&gpu, &scene, setup.keep.textures)?,
             lamps: LampBuffers::new(&gpu, kernels.pages.gloss),
             sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
             pixels: PixelBuffers::new(&gpu, extent.rays(), 0),

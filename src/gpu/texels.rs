@@ -32,13 +32,15 @@ impl Texels {
         place(scene, gpu.page_bytes()).0.len()
     }
 
-    /// Reads, verifies and uploads every tail.
+    /// Reads, verifies and uploads every tail; `keep`: with a page even if there is none.
     ///
     /// # Errors
     /// A texture that cannot be read or verified.
-    pub fn new(gpu: &Gpu, scene: &SceneFile) -> Result<Self, ExecutorError> {
+    pub fn new(gpu: &Gpu, scene: &SceneFile, keep: bool) -> Result<Self, ExecutorError> {
         let resident = scene.resident();
         let (page_sizes, places) = place(scene, gpu.page_bytes());
+        let kept = keep && page_sizes.is_empty();
+        let page_sizes = if kept { vec![16] } else { page_sizes };
         let pages: Vec<_> = page_sizes.iter().map(|&bytes| storage(gpu, "texels", bytes as usize / 16, 16)).collect();
         let mut records = Vec::with_capacity(places.len());
         let mut bytes = Vec::new();

@@ -18,7 +18,7 @@ pub mod textures;
 pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
 pub use lamps::Lamps;
-pub use setup::{Extent, Setup, Tuning, View};
+pub use setup::{Extent, Keep, Setup, Tuning, View};
 
 #[rustfmt::skip]
 mod layout_checks {

@@ -41,6 +41,21 @@ pub struct Setup {
     pub threshold: u32,
     /// Count nodes and triangles visited (slower).
     pub count: bool,
+    /// What is kept though the scene does not need it.
+    pub keep: Keep,
+}
+
+/// What is kept though a scene does not need it, to measure what leaving it out saves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Keep {
+    /// Queries for missing bricks where the cache holds all.
+    pub queries: bool,
+    /// The kernel that looks textures up.
+    pub textures: bool,
+    /// Alpha tests in traversal.
+    pub opacity: bool,
+    /// Reflections other than diffuse ones.
+    pub gloss: bool,
 }
 
 /// What of an executor may change between submissions.

@@ -1,6 +1,6 @@
 //! Attributes and textures of what was hit. Attributes are asked for once a pass and loaded in batches as large as the cache
-//! allows. Then lookups name the tiles that they need: a hit is looked up once all of its tiles are resident together, so that its
-//! colour does not depend on what else is, and waits until then.
+//! allows. Then lookups name the tiles that they need: each of a hit's textures is looked up once all of its tiles are resident together, so
+//! that what it gives does not depend on what else is, and the hit waits for the last.
 
 use super::cache::Cache;
 use super::{Executor, ExecutorError, Lamp, Pass, PassStats, Report, Step};
@@ -44,8 +44,8 @@ pub fn resolve(
 
 /// Loads the tiles that hits wait for, and looks these hits up, until none waits. `report`: of the first [`Step::Sample`].
 ///
-/// A batch takes tiles in the order of the rays that need them, resident ones as well, which then stay: all tiles of the first hit
-/// are in it, so every batch brings at least that hit to an end.
+/// A batch takes tiles in the order of the rays that need them and then of their numbers, resident ones as well, which then stay: all
+/// tiles of one texture of the first hit are in it, so every batch brings at least that lookup to an end.
 fn sample(
     executor: &mut dyn Executor,
     cache: &mut Cache,
@@ -53,7 +53,7 @@ fn sample(
     mut report: Report,
     stats: &mut PassStats,
 ) -> Result<(), ExecutorError> {
-    let mut first_before = None;
+    let mut before = None;
     loop {
         let tiles = std::mem::take(&mut report.tiles);
         stats.add(report);
@@ -64,11 +64,12 @@ fn sample(
             tiles.iter().filter(|tile| tile.rays > 0).map(|tile| (tile.first, tile.tile)).collect();
         wanted.sort_unstable();
         let Some(&(first, _)) = wanted.first() else { return Ok(()) };
-        if first_before == Some(first) {
+        let of_first = wanted.iter().filter(|wanted| wanted.0 == first).count();
+        if before.is_some_and(|(hit, tiles)| hit == first && tiles <= of_first) {
             let text = "cannot hold the tiles of one texture lookup beside each other; give a larger --cache";
             return Err(ExecutorError::Device(text.into()));
         }
-        first_before = Some(first);
+        before = Some((first, of_first));
         let items: Vec<Item> = wanted.iter().map(|&(_, tile)| Item::tile(tile)).collect();
         cache.load(executor, &items, usize::MAX, stats)?;
         report = executor.run(next, &[Step::Sample], &cache.states)?;

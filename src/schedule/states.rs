@@ -10,6 +10,7 @@ pub struct BrickStates {
     tiles: Vec<Option<Slot>>,
     done: Vec<bool>,
     batch: Vec<bool>,
+    keeps_asking: bool,
 }
 
 impl BrickStates {
@@ -21,6 +22,7 @@ impl BrickStates {
             tiles: vec![None; tiles],
             done: vec![false; bricks],
             batch: vec![false; bricks],
+            keeps_asking: false,
         }
     }
 
@@ -94,9 +96,14 @@ impl BrickStates {
         *self.slot(item) = None;
     }
 
-    /// Whether every brick's geometry is resident.
+    /// Whether every brick's geometry is resident, so that no ray has to ask.
     pub fn all_geometry_resident(&self) -> bool {
-        self.geometry.iter().all(Option::is_some)
+        !self.keeps_asking && self.geometry.iter().all(Option::is_some)
+    }
+
+    /// Whether rays ask for missing bricks even where none is missing.
+    pub fn keep_asking(&mut self, asks: bool) {
+        self.keeps_asking = asks;
     }
 
     /// Whether the slots are those of `residency`, for checks.

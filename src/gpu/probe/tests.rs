@@ -5,7 +5,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::{self, Kernels};
 use crate::kernel::frame::Frame;
-use crate::kernel::{Extent, Setup};
+use crate::kernel::{Extent, Keep, Setup};
 use crate::stream::{HostCache, Workers};
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<Gpu
     let scene = Arc::new(scene().unwrap());
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1, 0).unwrap();
     let extent = Extent { width: 8, height: 8, tile: 8 };
-    let setup = Setup { extent, threshold: 0, count: false };
+    let setup = Setup { extent, threshold: 0, count: false, keep: Keep::default() };
     Some(GpuExecutor::with_kernels(gpu, kernels, scene, workers, &[], setup).unwrap())
 }
 

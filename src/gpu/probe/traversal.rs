@@ -10,7 +10,7 @@ use super::{Check, no_results, scene};
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{Hit, NONE, Params, Ray, Surface};
-use crate::kernel::{Directions, Extent, FrameExecutor, Setup, View};
+use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Step, Tracing, chc, demand, plain};
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
@@ -124,7 +124,7 @@ fn trace(
     let mut cache = empty()?;
     let page_sizes: Vec<u64> = cache.residency.page_sizes().collect();
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1, 0)?;
-    let setup = Setup { extent: EXTENT, threshold: 0, count: false };
+    let setup = Setup { extent: EXTENT, threshold: 0, count: false, keep: Keep::default() };
     let (gpu, kernels) = (executor.gpu().clone(), executor.kernels().clone());
     let mut executor = GpuExecutor::with_kernels(gpu, kernels, scene, workers, &page_sizes, setup)?;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });

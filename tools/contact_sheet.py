@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""Renders Sponza from five viewpoints under the sun, a physical sky and each HDR environment, on one sheet.
+
+    pip install pillow
+    tools/contact_sheet.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR [--spp 256]
+
+Rows are lights, columns the views of paths/sponza_1.json to sponza_5.json. Every picture is kept in DIR and not made twice; the sheet is
+DIR/sheet.jpg. `--exposure` is fixed for each row, so that a row shows which views get how much light; with `--denoise` pictures are filtered.
+"""
+
+import argparse
+import pathlib
+import subprocess
+
+from PIL import Image, ImageDraw
+
+VIEWS = range(1, 6)
+EFFECTS = "shadow,environment,diffuse,glossy"
+
+
+def lights(scenes):
+    """Name, options."""
+    rows = [
+        ("sun and plain sky", ["--exposure", "0.7"]),
+        ("physical sky, sun at 50 degrees", ["--environment", "sky", "--sun", "0.35,0.9,0.2", "--exposure", "0.5"]),
+    ]
+    for name, exposure in (("venice_sunset_1k.hdr", "2"), ("potsdamer_platz_1k.hdr", "3"), ("city.exr", "2"), ("studio.exr", "2")):
+        rows.append((name, ["--environment", str(scenes / "env" / name), "--exposure", exposure]))
+    return rows
+
+
+def render(args, scene, name, options, view):
+    """The picture of one view in one light, made unless it is there."""
+    folder = args.output / f"{name.split('.')[0].replace(' ', '-').replace(',', '')}-{view}"
+    picture = folder / "frames" / "0000.png"
+    if not picture.exists():
+        command = [args.brickwalk, "walk", scene, "-o", folder, "--path", f"paths/sponza_{view}.json", "--frames", "1"]
+        command += ["--size", args.size, "--effects", EFFECTS, "--diffuse-rays", "1", "--rotation", "full", "--cache", "100%"]
+        command += ["--tone-map", "agx", "--spp", str(args.spp), *options] + (["--denoise"] if args.denoise else [])
+        subprocess.run([str(word) for word in command], check=True)
+    return picture
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=pathlib.Path, required=True, help="folder with sponza/ and env/")
+    parser.add_argument("--brickwalk", type=pathlib.Path, default="target/release/brickwalk", help="the program (default: %(default)s)")
+    parser.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder of all pictures")
+    parser.add_argument("--spp", type=int, default=256, help="samples a pixel (default: %(default)s)")
+    parser.add_argument("--size", default="320x180", help="pixels of a picture (default: %(default)s)")
+    parser.add_argument("--denoise", action="store_true", help="filter the pictures")
+    args = parser.parse_args()
+    args.output.mkdir(parents=True, exist_ok=True)
+    scene = args.output / "sponza.bricks"
+    if not scene.exists():
+        subprocess.run([str(args.brickwalk), "convert", str(args.scenes / "sponza" / "Sponza.gltf"), "-o", str(scene)], check=True)
+    width, height = map(int, args.size.split("x"))
+    rows = lights(args.scenes)
+    label = 18
+    sheet = Image.new("RGB", (len(VIEWS) * width, len(rows) * (height + label)), "white")
+    draw = ImageDraw.Draw(sheet)
+    for row, (name, options) in enumerate(rows):
+        top = row * (height + label)
+        draw.text((4, top + 3), name, fill="black")
+        for column, view in enumerate(VIEWS):
+            with Image.open(render(args, scene, name, options, view)) as picture:
+                sheet.paste(picture, (column * width, top + label))
+    sheet.save(args.output / "sheet.jpg", quality=88)
+    print(args.output / "sheet.jpg")
+
+
+if __name__ == "__main__":
+    main()
