@@ -239,3 +239,61 @@ fn effects_are_compared_over_all_batches() {
         assert!(one > 1e-3 && (two / one - 1.0).abs() < 0.1, "{one} of one batch, {two} of two");
     }
 }
+
+#[test]
+fn a_frame_of_many_samples_is_shown_while_it_is_made() {
+    let folder = common::folder();
+    let scene = common::city(folder.path(), "10K", "1K");
+    let output = folder.path().join("out");
+    let options = "--frames 1 --size 64x48 --cache 100% --spp 100K --progressive";
+    let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()];
+    let words = words.into_iter().chain(options.split(' ').map(std::ffi::OsStr::new));
+    let mut command =
+        std::process::Command::new(env!("CARGO_BIN_EXE_brickwalk")).args(words).spawn().expect("it starts");
+    let preview = output.join("preview.png");
+    let mut seen = Vec::new();
+    for _ in 0..600 {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        match std::fs::read(&preview) {
+            Ok(bytes) if seen.last() != Some(&bytes) => seen.push(bytes),
+            _ => {}
+        }
+        if seen.len() == 2 || command.try_wait().expect("a child").is_some() {
+            break;
+        }
+    }
+    command.kill().expect("it still runs");
+    command.wait().expect("a child");
+    assert_eq!(seen.len(), 2, "pictures that differ");
+    for bytes in seen {
+        let picture = image::load_from_memory(&bytes).expect("a whole PNG");
+        assert_eq!((picture.width(), picture.height()), (64, 48));
+    }
+    walk(&scene, &output, "--frames 1 --size 64x48 --cache 100% --spp 130 --progressive");
+    assert!(!preview.exists() && output.join("frames/0000.png").exists());
+}
+
+#[test]
+fn what_leaving_out_saves_is_measured_where_it_is_asked_for() {
+    let folder = common::folder();
+    let scene = common::city(folder.path(), "10K", "1K");
+    let listed = |options: &str| -> Vec<serde_json::Value> {
+        let output = folder.path().join("out");
+        common::walk(&scene, &output, &format!("--frames 1 --size 48x32 --cache 100% --adapter cpu {options}"));
+        let text = std::fs::read_to_string(output.join("summary.json")).expect("a summary");
+        let summary: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        summary["left_out"].as_array().expect("a list").clone()
+    };
+    let measured = listed("--measure-left-out");
+    let entry = |what: &str| measured.iter().find(|one| one["what"] == what).expect("an entry").clone();
+    for what in ["queries for missing bricks", "texture lookups"] {
+        let one = entry(what);
+        let ms = |field: &str| one[field].as_f64().expect("a time");
+        assert!(ms("ms_frame") > 0.0 && ms("ms_frame_kept") > 0.0 && one["repetitions"] == 5, "{one}");
+        assert!((ms("ms_frame_kept") - ms("ms_frame") - ms("ms_saved")).abs() < 1e-9, "{one}");
+    }
+    for what in ["instance transforms", "alpha tests in traversal"] {
+        assert!(entry(what).get("ms_saved").is_none(), "the processor's kernels decide on {what} as they run");
+    }
+    assert!(listed("").iter().all(|one| one.get("ms_frame").is_none() && one["why"].is_string()));
+}

@@ -381,6 +381,10 @@ pub struct WalkArgs {
     /// walk's times and counters leave it out
     #[arg(long)]
     pub measure_error: bool,
+    /// Show frames of more than 64 samples a pixel while they are made: DIR/preview.png is replaced after 64, 128, 256 samples and so on, and
+    /// removed at the end
+    #[arg(long)]
+    pub progressive: bool,
     /// Render the first frame six times more as it is and with each thing that was left out because the scene does not need it, turn by turn,
     /// and state under left_out in summary.json what leaving it out saves (ms_saved, of medians of five). Takes a session and a cache for each
     #[arg(long)]

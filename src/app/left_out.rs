@@ -104,11 +104,15 @@ pub fn measure(
         Ok(lit_renderer(session, &options, light.clone()))
     };
     let mut renderers = vec![open(Keep::default())?];
-    let kept: Vec<usize> = (0..all.len()).filter(|&i| all[i].keep.is_some()).collect();
-    for &i in &kept {
+    let can = renderers[0].executor.leaves_out();
+    let keep = |one: &LeftOut| {
         let mut keep = Keep::default();
-        all[i].keep.iter().for_each(|set| set(&mut keep));
-        renderers.push(open(keep)?);
+        one.keep.iter().for_each(|set| set(&mut keep));
+        keep
+    };
+    let kept: Vec<usize> = (0..all.len()).filter(|&i| all[i].keep.is_some() && keep(&all[i]).is_part_of(can)).collect();
+    for &i in &kept {
+        renderers.push(open(keep(&all[i]))?);
     }
     let mut times = vec![Vec::new(); renderers.len()];
     for repetition in 0..=REPETITIONS {

@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 /// Writes the pictures of a walk, frame by frame.
 pub struct Pictures {
     folder: PathBuf,
+    /// The frame in work, as it is so far.
+    preview: PathBuf,
     size: (u32, u32),
     aov: bool,
     exposure: Exposure,
@@ -49,6 +51,7 @@ impl Pictures {
         });
         Ok(Self {
             folder: folder.into(),
+            preview: args.output.join("preview.png"),
             size,
             aov: args.aov,
             exposure: options.exposure,
@@ -58,6 +61,18 @@ impl Pictures {
             video: video.transpose()?,
             commands,
         })
+    }
+
+    /// Shows what the samples of a frame come to so far, in the place of what was shown before; exposed as the frame before.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn preview(&self, radiance: &[[f32; 3]]) -> Result<()> {
+        let stops = match (self.stops.last(), self.exposure) {
+            (Some(&stops), _) | (None, Exposure::Fixed(stops)) => stops,
+            (None, Exposure::Auto) => Meter::new(Exposure::Auto).stops(radiance, 0.0),
+        };
+        png::write(&self.preview, self.size.0, self.size.1, &developed(radiance, stops, self.tone_map))
     }
 
     /// Writes frame number `frame`, `seconds` of the path after the one before.
@@ -95,6 +110,8 @@ impl Pictures {
     /// # Errors
     /// The video cannot be written.
     pub fn finish(&mut self, records: bool) -> Result<()> {
+        // There is one only where it was asked for.
+        let _ = std::fs::remove_file(&self.preview);
         let Some(video) = self.video.take() else { return Ok(()) };
         video.finish()?;
         let text: String = self.commands.iter().map(|command| format!("{command}\n")).collect();

@@ -9,7 +9,7 @@ use super::session::{Session, open_scene, write_requests};
 use super::summary;
 use crate::kernel::Extent;
 use crate::render::denoise::Resolve;
-use crate::render::{BATCH_SAMPLES, Captures, Light, RenderError, RenderSettings, Renderer, Schedule};
+use crate::render::{Accumulation, BATCH_SAMPLES, Captures, Light, RenderError, RenderSettings, Renderer, Schedule};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
@@ -74,10 +74,14 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         }
         let camera = path.frame(frame, args.frames);
         let mut told = 0;
-        let mut watch = |samples: u32| {
+        let mut watch = |samples: u32, so_far: &Accumulation| {
             if counts_samples {
                 progress.advance(u64::from(samples - told));
                 told = samples;
+            }
+            if args.progressive && samples < args.spp && samples.is_power_of_two() {
+                // A preview that cannot be written is no reason to end the walk.
+                let _ = pictures.preview(&so_far.mean());
             }
             samples == args.spp || !stop.load(Ordering::Relaxed)
         };

@@ -24,7 +24,7 @@ use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, are_pairs_culled, dispatches};
 use crate::kernel::layout::{self, Params};
 use crate::kernel::{
-    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
+    DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{PayloadSource, WorkerPool, Workers};
@@ -294,6 +294,10 @@ impl FrameExecutor for CpuExecutor {
 
     fn workers(&self) -> &dyn WorkerPool {
         &self.workers
+    }
+
+    fn leaves_out(&self) -> Keep {
+        Keep { queries: true, textures: true, ..Keep::default() }
     }
 
     fn allow_bounces(&mut self) {

@@ -9,7 +9,7 @@ use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
 use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
-use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Lamps, Tuning, View};
+use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
 use std::collections::{BTreeMap, BTreeSet};
@@ -349,6 +349,10 @@ impl FrameExecutor for Lockstep {
 
     fn workers(&self) -> &dyn WorkerPool {
         self.gpu.workers()
+    }
+
+    fn leaves_out(&self) -> Keep {
+        self.gpu.leaves_out()
     }
 
     fn allow_bounces(&mut self) {

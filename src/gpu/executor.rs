@@ -17,8 +17,8 @@ use crate::kernel::dispatch::{
 };
 use crate::kernel::layout::{self, Params};
 use crate::kernel::{
-    DeviceInfo, Directions, Extent, FrameExecutor, Lamps, Setup, Tuning, View, opacity, padded, reflectance, report,
-    textures,
+    DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
+    report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
@@ -354,6 +354,10 @@ impl FrameExecutor for GpuExecutor {
 
     fn page_bytes(&self) -> u64 {
         self.gpu.page_bytes()
+    }
+
+    fn leaves_out(&self) -> Keep {
+        Keep { queries: true, textures: true, opacity: true, gloss: true }
     }
 
     fn allow_bounces(&mut self) {

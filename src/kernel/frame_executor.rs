@@ -1,7 +1,7 @@
 //! What a frame needs of an executor beside steps.
 
 use super::layout::{GBuffer, Hit, Ray, Surface};
-use super::{Lamps, Tuning, View};
+use super::{Keep, Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
 use crate::stream::WorkerPool;
 use serde::Serialize;
@@ -37,6 +37,9 @@ pub trait FrameExecutor: Executor {
 
     /// The workers that read payloads.
     fn workers(&self) -> &dyn WorkerPool;
+
+    /// What it leaves out where a scene does not need it, unless it was set up to keep it. On anything else its kernels decide as they run.
+    fn leaves_out(&self) -> Keep;
 
     /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160 bytes a pixel; without it
     /// they must not be run.

@@ -58,6 +58,14 @@ pub struct Keep {
     pub gloss: bool,
 }
 
+impl Keep {
+    /// Whether `other` has all that is kept.
+    pub fn is_part_of(self, other: Self) -> bool {
+        let fields = |keep: Self| [keep.queries, keep.textures, keep.opacity, keep.gloss];
+        fields(self).into_iter().zip(fields(other)).all(|(own, other)| other || !own)
+    }
+}
+
 /// What of an executor may change between submissions.
 #[derive(Clone, Copy, Debug)]
 pub struct Tuning {

@@ -131,11 +131,11 @@ impl Renderer {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
-        self.frame_watched(frame, camera, &mut |_| true)
+        self.frame_watched(frame, camera, &mut |_, _| true)
     }
 
-    /// [`Renderer::frame`]; `watch` is told the number of finished samples after every [`BATCH_SAMPLES`] and at the end, and says
-    /// whether to go on.
+    /// [`Renderer::frame`]; `watch` is told the number of finished samples, and their sum, after every [`BATCH_SAMPLES`] and at the end,
+    /// and says whether to go on.
     ///
     /// # Errors
     /// As those of [`Renderer::frame`], or `watch` said no.
@@ -143,7 +143,7 @@ impl Renderer {
         &mut self,
         frame: u32,
         camera: &Camera,
-        watch: &mut dyn FnMut(u32) -> bool,
+        watch: &mut dyn FnMut(u32, &Accumulation) -> bool,
     ) -> Result<FrameOutput, RenderError> {
         self.executor.tuning().leaf_cache = self.settings.tracing.optimisations.leaf_cache;
         if let Some(captures) = &mut self.captures {
@@ -203,7 +203,7 @@ impl Renderer {
             let finished = sample + 1;
             if finished.is_multiple_of(BATCH_SAMPLES) || finished == self.settings.samples {
                 accumulation.add(&self.executor.read_radiance()?);
-                if !watch(finished) {
+                if !watch(finished, &accumulation) {
                     return Err(RenderError::Interrupted);
                 }
             }

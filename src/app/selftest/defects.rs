@@ -8,7 +8,7 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::wgsl::Pages;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
-use crate::kernel::{DeviceInfo, FrameExecutor, Lamps, Tuning, View};
+use crate::kernel::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
 use anyhow::{Result, bail};
@@ -242,6 +242,10 @@ impl FrameExecutor for Faulty {
 
     fn workers(&self) -> &dyn WorkerPool {
         self.inner.workers()
+    }
+
+    fn leaves_out(&self) -> Keep {
+        self.inner.leaves_out()
     }
 
     fn allow_bounces(&mut self) {
