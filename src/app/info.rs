@@ -6,13 +6,16 @@ use super::session::scene_bytes;
 use super::sizes::{human_bytes, human_count};
 use crate::stream::Residency;
 use anyhow::{Context, Result};
-use bricks::{AttributeLayout, BRICK_WIDE, Manifest, Payload, SceneFile, Texture};
+use bricks::{
+    AttributeLayout, BRICK_WIDE, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, Payload, PunctualLight, SceneFile,
+    Texture,
+};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// Raised when a field of the JSON changes its meaning.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 /// Runs `info`.
 ///
@@ -42,6 +45,8 @@ pub struct LeftOut {
 pub fn left_out(manifest: &Manifest) -> Vec<LeftOut> {
     let facts = [
         (!manifest.has_textures, "texture lookups", "no material has a texture"),
+        (!manifest.has_normal_maps, "normal maps", "no material in use has one"),
+        (!manifest.is_glossy, "glossy reflection", "every material in use is Lambertian"),
         (!manifest.has_alpha_mask && !manifest.has_alpha_blend, "alpha tests", "no material in use has alpha"),
         (!manifest.has_instances, "ray transforms of instances", "everything is placed once"),
         (!manifest.has_wide_bricks, "two-part positions", "no brick is wide"),
@@ -105,6 +110,8 @@ struct Info<'a> {
     /// How textures are stored, each encoding once: bc7, raw.
     texture_encodings: Vec<&'static str>,
     has_textures: bool,
+    has_normal_maps: bool,
+    is_glossy: bool,
     has_alpha_mask: bool,
     has_alpha_blend: bool,
     has_emission: bool,
@@ -113,6 +120,8 @@ struct Info<'a> {
     has_wide_bricks: bool,
     has_proxies: bool,
     provenance_ranges: usize,
+    /// Lights without extent.
+    lights: Vec<Light>,
     left_out: Vec<LeftOut>,
     warnings: &'a [String],
     /// Bytes of the file by what they hold.
@@ -179,6 +188,8 @@ impl<'a> Info<'a> {
                 .into_iter()
                 .collect(),
             has_textures: m.has_textures,
+            has_normal_maps: m.has_normal_maps,
+            is_glossy: m.is_glossy,
             has_alpha_mask: m.has_alpha_mask,
             has_alpha_blend: m.has_alpha_blend,
             has_emission: m.has_emission,
@@ -187,6 +198,7 @@ impl<'a> Info<'a> {
             has_wide_bricks: m.has_wide_bricks,
             has_proxies: m.has_proxies,
             provenance_ranges: m.provenance.len(),
+            lights: r.lights.iter().map(Light::of).collect(),
             left_out: left_out(m),
             warnings: &m.warnings,
             per_triangle: PerTriangle::of(r, &sections, scene.file_bytes()),
@@ -286,6 +298,12 @@ impl<'a> Info<'a> {
             ),
         };
         row("materials", format!("{}, {textures}", self.materials));
+        for light in self.lights.iter().take(MOST_LIGHTS) {
+            row("light", light.human());
+        }
+        if let Some(more) = self.lights.len().checked_sub(MOST_LIGHTS).filter(|more| *more > 0) {
+            row("light", format!("and {} more", human_count(more as u64)));
+        }
         for LeftOut { what, why } in &self.left_out {
             row("left out", format!("{what}: {why}"));
         }
@@ -293,6 +311,52 @@ impl<'a> Info<'a> {
             row("warning", warning.clone());
         }
         text
+    }
+}
+
+/// Lights that are listed for people.
+const MOST_LIGHTS: usize = 16;
+
+/// A light without extent.
+#[derive(Debug, PartialEq, Serialize)]
+struct Light {
+    /// point, spot or distant.
+    kind: &'static str,
+    /// World units.
+    position: [f64; 3],
+    /// Along the light.
+    direction: [f64; 3],
+    /// Candela, of distant lights lux.
+    color: [f32; 3],
+    /// World units; 0: nowhere.
+    range: f32,
+    /// Where a spot begins to fall off and where it ends, from its axis.
+    cone_degrees: [f32; 2],
+}
+
+impl Light {
+    fn of(light: &PunctualLight) -> Self {
+        let PunctualLight { position, direction, color, range, .. } = *light;
+        let kind = match light.kind {
+            LIGHT_POINT => "point",
+            LIGHT_SPOT => "spot",
+            LIGHT_DISTANT => "distant",
+            _ => "unknown",
+        };
+        Self { kind, position, direction, color, range, cone_degrees: light.cone.map(f32::to_degrees) }
+    }
+
+    fn human(&self) -> String {
+        let Self { kind, position, direction, color, .. } = self;
+        let range = if self.range > 0.0 { format!(", up to {}", self.range) } else { String::new() };
+        let [inner, outer] = self.cone_degrees;
+        match *kind {
+            "distant" => format!("distant, {color:?} lux along {direction:?}"),
+            "spot" => {
+                format!("spot, {color:?} cd at {position:?} along {direction:?}, {inner} to {outer} degrees{range}")
+            }
+            _ => format!("{kind}, {color:?} cd at {position:?}{range}"),
+        }
     }
 }
 
@@ -391,6 +455,8 @@ mod tests {
         assert!(bare.contains(&"texture lookups".into()) && !bare.contains(&"animation".into()), "{bare:?}");
         let full = Manifest {
             has_textures: true,
+            has_normal_maps: true,
+            is_glossy: true,
             has_alpha_mask: true,
             has_alpha_blend: true,
             has_emission: true,

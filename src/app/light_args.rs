@@ -150,6 +150,10 @@ pub struct LightArgs {
     /// Factor of the environment's radiance
     #[arg(long, value_name = "X", default_value = "1", value_parser = non_negative)]
     pub environment_intensity: f64,
+    /// Factor of the lights that the scene file brings (KHR_lights_punctual of glTF), 0 for none; 1 candela is taken as 1 W/sr, 1 lux as
+    /// 1 W/m2
+    #[arg(long, value_name = "X", default_value = "1", value_parser = non_negative)]
+    pub lights_intensity: f64,
     /// A rectangular light: a corner and the two edges U and V that start there, world space; it shines to the side of U x V and
     /// is not seen itself [default: none]
     #[arg(long, value_name = "X,Y,Z,UX,UY,UZ,VX,VY,VZ", allow_hyphen_values = true, value_parser = rectangle)]

@@ -1,14 +1,14 @@
-//! Sun, sky, environment and emitters of a walk, from the command line's options.
+//! Sun, sky, environment and emitters of a walk, from the command line's options and from the scene.
 
 use super::args::WalkArgs;
 use super::light_args::EnvironmentChoice;
 use crate::kernel::Lamps;
-use crate::kernel::lamps::Emitter;
+use crate::kernel::lamps::{Emitter, Shape};
 use crate::render::{
     EnvironmentNotes, Equirectangular, Light, MOST_TRIANGLES, SkyModel, emissive_triangles, environment,
 };
 use anyhow::{Context, Result, anyhow, bail};
-use bricks::SceneFile;
+use bricks::{LIGHT_DISTANT, LIGHT_SPOT, PunctualLight, SceneFile};
 use exr::prelude::{MetaData, ReadChannels, ReadLayers};
 use glam::DVec3;
 use image::ImageDecoder;
@@ -79,6 +79,7 @@ pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
         }
     }
     let mut emitters: Vec<Emitter> = options.rectangle().into_iter().collect();
+    emitters.extend(file.resident().lights.iter().map(|light| punctual(light, options.lights_intensity)));
     if effects.shadow {
         let found = emissive_triangles(file, MOST_TRIANGLES).with_context(|| args.scene.display().to_string())?;
         match found {
@@ -99,6 +100,20 @@ pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
     let radius = 0.5 * (DVec3::from_array(manifest.max) - DVec3::from_array(manifest.min)).length();
     light.lamps = Arc::new(Lamps::new(environment, emitters, radius));
     Ok(Lighting { light, environment: notes, warnings })
+}
+
+/// A light of the scene file, `scale` times as bright. Photometric units are taken as radiometric ones: 1 candela as 1 W/sr, 1 lux as
+/// 1 W/m², so that a white surface under 1 lux has a radiance of 1/π.
+fn punctual(light: &PunctualLight, scale: f64) -> Emitter {
+    let (position, direction) = (DVec3::from_array(light.position), DVec3::from_array(light.direction));
+    let range = light.range.into();
+    let shape = match light.kind {
+        LIGHT_DISTANT => Shape::Distant { direction },
+        LIGHT_SPOT => Shape::Spot { position, direction, range, cone: light.cone.map(f64::from) },
+        _ => Shape::Point { position, range },
+    };
+    let radiance = light.color.map(|c| (f64::from(c) * scale).min(f32::MAX.into()) as f32);
+    Emitter { shape, two_sided: false, radiance }
 }
 
 /// The sky of the sun of `light`, which takes the colour that the air leaves it. At an elevation of 45 degrees both are as bright as those

@@ -24,6 +24,8 @@ const UNSIGNED_INT: u32 = 5125;
 const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+/// Says how much dielectrics reflect.
+const SPECULAR: &str = "KHR_materials_specular";
 /// GLB header and two chunk headers (glTF 2.0, section 4.4).
 const GLB_HEADERS: u64 = 12 + 8 + 8;
 
@@ -245,6 +247,8 @@ fn encode(primitive: &Primitive, anchor: [f64; 3]) -> (Record, Vec<u8>) {
 #[serde(rename_all = "camelCase")]
 struct Document<'a> {
     asset: Value,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    extensions_used: Vec<&'static str>,
     scene: u32,
     scenes: Value,
     nodes: Vec<Node<'a>>,
@@ -336,6 +340,7 @@ fn document<'a>(source: &'a dyn Source, written: &Written, uri: Option<String>) 
         scenes: json!([{ "nodes": (0..outline.placements.len()).collect::<Vec<_>>() }]),
         nodes: nodes.collect(),
         meshes,
+        extensions_used: if outline.materials.iter().any(is_without_highlight) { vec![SPECULAR] } else { Vec::new() },
         materials: outline.materials.iter().map(material).collect(),
         accessors,
         buffer_views: views,
@@ -380,6 +385,11 @@ fn node(placement: &Placement, anchor: [f64; 3]) -> Node<'_> {
     }
 }
 
+/// Whether the dielectric part of a material reflects nothing.
+fn is_without_highlight(material: &bricks::Material) -> bool {
+    material.specular_weight == 0.0
+}
+
 /// The factors of a material.
 fn material(material: &bricks::Material) -> Value {
     let is = |flag: u32| material.flags & flag != 0;
@@ -400,6 +410,10 @@ fn material(material: &bricks::Material) -> Value {
     });
     if is(MATERIAL_MASK) {
         json["alphaCutoff"] = material.alpha_cutoff.into();
+    }
+    if is_without_highlight(material) {
+        // Without the extension glTF's materials have one.
+        json["extensions"] = json!({ (SPECULAR): { "specularFactor": 0 } });
     }
     json
 }

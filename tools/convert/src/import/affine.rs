@@ -20,6 +20,21 @@ pub(super) fn multiply(a: &Affine, b: &Affine) -> Affine {
     product
 }
 
+/// The image of a point.
+pub(super) fn point(m: &Affine, p: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3])
+}
+
+/// The unit vector along the image of a vector; `None` where that has no direction.
+pub(super) fn direction(m: &Affine, v: [f64; 3]) -> Option<[f64; 3]> {
+    let image: [f64; 3] = std::array::from_fn(|k| m[4 * k] * v[0] + m[4 * k + 1] * v[1] + m[4 * k + 2] * v[2]);
+    // Dividing by the largest component first keeps the squares in range.
+    let largest = image.iter().fold(0.0f64, |most, c| most.max(c.abs()));
+    let scaled = image.map(|c| c / largest);
+    let length = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
+    (largest > 0.0 && length.is_finite()).then(|| scaled.map(|c| c / length))
+}
+
 /// The matrix of a column-major 4x4 one, whose last row must be 0 0 0 1.
 pub(super) fn from_columns(m: &[f64; 16]) -> Result<Affine, &'static str> {
     if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {

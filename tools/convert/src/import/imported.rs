@@ -1,8 +1,9 @@
 //! Several opened files as one source.
 
-use super::affine::{Affine, multiply};
+use super::affine::{Affine, direction, multiply, point};
 use super::{Opened, Parts};
 use crate::source::{IDENTITY, Outline, Primitive, Source, SourceError, SourceTexture};
+use bricks::PunctualLight;
 use std::borrow::Cow;
 
 /// Opened inputs, one after the other; geometry and images are read when they are asked for.
@@ -49,6 +50,10 @@ impl Imported {
                 whole.placements.push(placement);
             }
         }
+        for transform in transforms {
+            let placed = part.lights.iter().map(|light| turned(light, transform));
+            whole.lights.extend(placed.collect::<Option<Vec<_>>>().ok_or("takes a light beyond the range of numbers")?);
+        }
         whole.meshes.append(&mut part.meshes);
         whole.materials.append(&mut part.materials);
         whole.textures.append(&mut part.textures);
@@ -69,6 +74,13 @@ impl Imported {
         // The first input begins at 0, so at least one begins at or before any index.
         &self.inputs[self.inputs.partition_point(|input| first(input) <= index) - 1]
     }
+}
+
+/// A light placed anew; its range and strength are those of the world. `None`: its place is not finite.
+fn turned(light: &PunctualLight, transform: &Affine) -> Option<PunctualLight> {
+    let position = point(transform, light.position);
+    let direction = direction(transform, light.direction).unwrap_or(light.direction);
+    position.iter().all(|c| c.is_finite()).then_some(PunctualLight { position, direction, ..*light })
 }
 
 impl Source for Imported {

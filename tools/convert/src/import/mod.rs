@@ -18,6 +18,7 @@ mod ply;
 mod repairs;
 mod stl;
 mod table;
+mod tangents;
 mod text;
 mod tiles;
 mod transform;

@@ -311,7 +311,7 @@ fn material_factors() {
     assert_eq!((first.metallic, first.roughness, first.alpha_cutoff), (0.5, 0.125, 0.25));
     assert_eq!(first.flags, bricks::MATERIAL_MASK | bricks::MATERIAL_DOUBLE_SIDED);
     assert_eq!((second.flags, second.alpha_cutoff), (bricks::MATERIAL_BLEND | bricks::MATERIAL_UNLIT, 0.5));
-    assert_eq!(third.emission, [0.0; 3]);
+    assert_eq!((third.emission, third.emissive_texture), ([1.0; 3], bricks::NONE), "its texture is not there");
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
 }
 
@@ -372,15 +372,20 @@ fn the_set_of_texture_coordinates_is_that_of_the_material() {
     assert_eq!(only(&file.scene()).uvs.as_deref(), Some(&set0[..]));
     let path = "/materials/0/pbrMetallicRoughness/baseColorTexture";
     file.root.pointer_mut(path).unwrap()["texCoord"] = json!(1);
-    assert_eq!(only(&file.scene()).uvs.as_deref(), Some(&set1[..]));
-    // KHR_texture_transform overrides the set, and is applied.
+    let scene = file.scene();
+    assert_eq!(only(&scene).uvs1.as_deref(), Some(&set1[..]));
+    assert_eq!(scene.materials[0].uv_sets, 1 << bricks::BASE_COLOR);
+    // KHR_texture_transform overrides the set; coordinates stay those of the file.
     file.root.pointer_mut(path).unwrap()["extensions"] =
         json!({"KHR_texture_transform": {"texCoord": 0, "scale": [2, 4], "offset": [0.5, 0.25]}});
-    assert_eq!(only(&file.scene()).uvs.as_deref(), Some(&[[0.5, 0.25], [2.5, 0.25], [0.5, 4.25]][..]));
+    let scene = file.scene();
+    assert_eq!((only(&scene).uvs.as_deref(), only(&scene).uvs1.as_deref()), (Some(&set0[..]), None));
+    assert_eq!(scene.materials[0].uv_sets, 0);
+    assert_eq!(scene.materials[0].uv_from_set[..2], [[2.0, 0.0, 0.5, 8.0], [0.0, 4.0, 0.25, 0.0]]);
     file.root.pointer_mut(path).unwrap()["texCoord"] = json!(7);
     file.root.pointer_mut(path).unwrap()["extensions"] = json!({});
     let scene = file.scene();
-    assert!(only(&scene).uvs.is_none());
+    assert_eq!(scene.materials[0].base_color_texture, bricks::NONE);
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
 }
 
@@ -502,11 +507,11 @@ fn what_moves_is_taken_at_rest() {
 #[test]
 fn extensions_that_leave_geometry_alone_only_warn() {
     let mut file = Writer::triangle();
-    file.root["extensionsUsed"] = json!(["KHR_lights_punctual", "VENDOR_anything", "KHR_materials_unlit"]);
-    file.root["extensionsRequired"] = json!(["KHR_lights_punctual", "KHR_texture_other", "KHR_materials_unlit"]);
+    file.root["extensionsUsed"] = json!(["KHR_lights_other", "VENDOR_anything", "KHR_materials_unlit"]);
+    file.root["extensionsRequired"] = json!(["KHR_lights_other", "KHR_texture_other", "KHR_materials_unlit"]);
     let scene = file.scene();
     assert_eq!(scene.warnings.len(), 1);
-    assert!(scene.warnings[0].ends_with("extensions ignored: KHR_lights_punctual, VENDOR_anything, KHR_texture_other"));
+    assert!(scene.warnings[0].ends_with("extensions ignored: KHR_lights_other, VENDOR_anything, KHR_texture_other"));
 }
 
 #[test]

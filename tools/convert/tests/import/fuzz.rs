@@ -97,6 +97,9 @@ fn judge(result: Result<SourceScene, String>, bytes: &[u8]) {
                 let vertices = primitive.positions.len();
                 assert!(primitive.indices.iter().all(|&i| (i as usize) < vertices));
                 assert!(primitive.uvs.as_ref().is_none_or(|uvs| uvs.len() == vertices));
+                assert!(primitive.uvs1.as_ref().is_none_or(|uvs| uvs.len() == vertices));
+                let corners = primitive.indices.len();
+                assert!(primitive.tangents.as_ref().is_none_or(|tangents| tangents.len() == corners));
                 assert!(primitive.colors.as_ref().is_none_or(|colors| colors.len() == vertices));
                 assert!((primitive.material as usize) < scene.materials.len());
             }

@@ -6,5 +6,6 @@ mod formats;
 mod fuzz;
 mod oracle;
 mod scenes;
+mod surfaces;
 mod tiles;
 mod writer;

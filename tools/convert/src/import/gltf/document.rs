@@ -100,6 +100,35 @@ pub(super) struct Document {
 pub(super) struct DocumentExtensions {
     #[serde(rename = "CESIUM_RTC")]
     pub rtc: Option<Rtc>,
+    #[serde(rename = "KHR_lights_punctual", default)]
+    pub lights: Lights,
+}
+
+/// KHR_lights_punctual.
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Lights {
+    #[serde(default)]
+    pub lights: Vec<Lenient<Light>>,
+}
+
+/// A light of KHR_lights_punctual.
+#[derive(Debug, Deserialize)]
+pub(super) struct Light {
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub color: Option<[f64; 3]>,
+    pub intensity: Option<f64>,
+    pub range: Option<f64>,
+    #[serde(default)]
+    pub spot: Spot,
+}
+
+/// The cone of a spot.
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Spot {
+    pub inner_cone_angle: Option<f64>,
+    pub outer_cone_angle: Option<f64>,
 }
 
 /// CESIUM_RTC: the point that all coordinates are relative to.
@@ -149,6 +178,14 @@ pub(super) struct Node {
 pub(super) struct NodeExtensions {
     #[serde(rename = "EXT_mesh_gpu_instancing")]
     pub instancing: Option<Instancing>,
+    #[serde(rename = "KHR_lights_punctual")]
+    pub light: Option<Lenient<LightOfNode>>,
+}
+
+/// The light of a node.
+#[derive(Debug, Deserialize)]
+pub(super) struct LightOfNode {
+    pub light: Index,
 }
 
 /// EXT_mesh_gpu_instancing: accessors of one transformation an instance.
@@ -287,7 +324,9 @@ pub(super) struct Material {
     pub pbr_metallic_roughness: MetallicRoughness,
     #[serde(default)]
     pub emissive_factor: [f64; 3],
-    pub emissive_texture: Option<IgnoredAny>,
+    pub normal_texture: Option<TextureInfo>,
+    pub occlusion_texture: Option<TextureInfo>,
+    pub emissive_texture: Option<TextureInfo>,
     pub alpha_mode: Option<String>,
     pub alpha_cutoff: Option<f64>,
     #[serde(default)]
@@ -303,6 +342,7 @@ pub(super) struct MetallicRoughness {
     pub base_color_texture: Option<TextureInfo>,
     pub metallic_factor: Option<f64>,
     pub roughness_factor: Option<f64>,
+    pub metallic_roughness_texture: Option<TextureInfo>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -311,6 +351,16 @@ pub(super) struct MaterialExtensions {
     pub unlit: Option<IgnoredAny>,
     #[serde(rename = "KHR_materials_emissive_strength")]
     pub emissive_strength: Option<EmissiveStrength>,
+    #[serde(rename = "KHR_materials_ior")]
+    pub ior: Option<Ior>,
+    #[serde(rename = "KHR_materials_specular")]
+    pub specular: Option<Specular>,
+    #[serde(rename = "KHR_materials_clearcoat")]
+    pub clearcoat: Option<Clearcoat>,
+    #[serde(rename = "KHR_materials_transmission")]
+    pub transmission: Option<Transmission>,
+    #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
+    pub specular_glossiness: Option<SpecularGlossiness>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -319,12 +369,62 @@ pub(super) struct EmissiveStrength {
     pub emissive_strength: Option<f64>,
 }
 
+/// KHR_materials_ior.
+#[derive(Debug, Deserialize)]
+pub(super) struct Ior {
+    pub ior: Option<f64>,
+}
+
+/// KHR_materials_specular.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Specular {
+    pub specular_factor: Option<f64>,
+    pub specular_texture: Option<IgnoredAny>,
+    pub specular_color_factor: Option<[f64; 3]>,
+    pub specular_color_texture: Option<IgnoredAny>,
+}
+
+/// KHR_materials_clearcoat.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Clearcoat {
+    pub clearcoat_factor: Option<f64>,
+    pub clearcoat_texture: Option<IgnoredAny>,
+    pub clearcoat_roughness_factor: Option<f64>,
+    pub clearcoat_roughness_texture: Option<IgnoredAny>,
+    pub clearcoat_normal_texture: Option<IgnoredAny>,
+}
+
+/// KHR_materials_transmission.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Transmission {
+    pub transmission_factor: Option<f64>,
+    pub transmission_texture: Option<IgnoredAny>,
+}
+
+/// KHR_materials_pbrSpecularGlossiness.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SpecularGlossiness {
+    pub diffuse_factor: Option<[f64; 4]>,
+    pub diffuse_texture: Option<TextureInfo>,
+    pub specular_factor: Option<[f64; 3]>,
+    pub glossiness_factor: Option<f64>,
+    pub specular_glossiness_texture: Option<IgnoredAny>,
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct TextureInfo {
     pub index: Index,
     #[serde(default)]
     pub tex_coord: Uint,
+    /// Of a normal texture.
+    pub scale: Option<f64>,
+    /// Of an occlusion texture.
+    pub strength: Option<f64>,
     #[serde(default)]
     pub extensions: TextureInfoExtensions,
 }
@@ -380,4 +480,5 @@ pub(super) struct Image {
 pub(super) struct Sampler {
     pub wrap_s: Option<Uint>,
     pub wrap_t: Option<Uint>,
+    pub mag_filter: Option<Uint>,
 }

@@ -1,12 +1,20 @@
-//! Materials and the textures of their base colours (glTF 2.0, sections 3.8 and 3.9).
+//! Materials and their textures (glTF 2.0, sections 3.8 and 3.9, and the extensions KHR_materials_clearcoat, _emissive_strength, _ior,
+//! _pbrSpecularGlossiness, _specular, _transmission, _unlit and KHR_texture_transform).
+//!
+//! Filters of samplers are not kept: textures are averaged over what a pixel covers, whatever the sampler asks for.
 
-use super::document::{Document, Index, Lenient, Material as Json, TextureTransform, Uint};
+use super::document::{Document, Index, Lenient, Material as Json, TextureInfo, TextureTransform};
 use super::file::{File, Problem, item};
 use super::label;
 use crate::import::warnings::Warnings;
-use bricks::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT, Material};
+use bricks::{
+    MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, Material, NORMAL,
+};
 use bricks::{WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT};
 use std::collections::BTreeMap;
+
+/// Sets of texture coordinates that are read.
+const SETS: u64 = 2;
 
 /// An image with the way it is repeated.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,18 +25,69 @@ pub(super) struct Texture {
     pub wrap: u32,
 }
 
-/// Set of texture coordinates of the base colour texture, and their transformation. `None`: no texture.
-pub(super) fn base_color_set(material: &Json) -> Option<(Uint, Option<&TextureTransform>)> {
-    let info = material.pbr_metallic_roughness.base_color_texture.as_ref()?;
+/// The coordinates that the textures of a material are looked up at.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Coordinates {
+    /// Whether each set is used.
+    pub sets: [bool; SETS as usize],
+    /// Set and rows of the normal texture.
+    pub normal: Option<(usize, [[f32; 4]; 2])>,
+}
+
+impl Coordinates {
+    /// Of a material.
+    pub fn of(material: &Json) -> Self {
+        let mut coordinates = Self::default();
+        for (place, info) in infos(material).into_iter().enumerate() {
+            let Some((info, set)) = info.and_then(|info| Some((info, set(info)?))) else { continue };
+            coordinates.sets[set] = true;
+            if place == NORMAL {
+                coordinates.normal = Some((set, rows(info).unwrap_or(SAME)));
+            }
+        }
+        coordinates
+    }
+}
+
+/// Rows that leave coordinates as they are.
+const SAME: [[f32; 4]; 2] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
+
+/// The textures of a material in their places.
+fn infos(material: &Json) -> [Option<&TextureInfo>; MATERIAL_TEXTURES] {
+    let pbr = &material.pbr_metallic_roughness;
+    let (color, gloss) = match &material.extensions.specular_glossiness {
+        Some(extension) => (&extension.diffuse_texture, &None),
+        None => (&pbr.base_color_texture, &pbr.metallic_roughness_texture),
+    };
+    [color, &material.normal_texture, gloss, &material.occlusion_texture, &material.emissive_texture]
+        .map(Option::as_ref)
+}
+
+/// The set of coordinates of a texture; `None`: it is not read.
+fn set(info: &TextureInfo) -> Option<usize> {
     let transform = info.extensions.transform.as_ref();
-    let set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
-    Some((set, transform))
+    let set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord).0;
+    (set < SETS).then_some(set as usize)
+}
+
+/// The rows of [`Material::uv_from_set`] of a texture (KHR_texture_transform: translation * rotation * scale; a positive angle turns
+/// counter-clockwise in an image whose v points down). `None`: they are beyond the range of numbers.
+fn rows(info: &TextureInfo) -> Option<[[f32; 4]; 2]> {
+    let Some(TextureTransform { offset, rotation, scale, .. }) = &info.extensions.transform else { return Some(SAME) };
+    let (sin, cos) = rotation.unwrap_or(0.0).sin_cos();
+    let ([x, y], [sx, sy]) = (offset.unwrap_or([0.0; 2]), scale.unwrap_or([1.0; 2]));
+    let rows = [[cos * sx, sin * sy, x, (sx * sy).abs()], [-sin * sx, cos * sy, y, 0.0]];
+    let rows = rows.map(|row| row.map(|value| value as f32));
+    rows.as_flattened().iter().all(|value| value.is_finite()).then_some(rows)
 }
 
 /// The material of primitives that name none (glTF 2.0, section 3.9.5).
 pub(super) fn default_material() -> Material {
-    Material { metallic: 1.0, specular: [0.04; 3], specular_weight: 1.0, ..Material::DIFFUSE }
+    Material { metallic: 1.0, specular: [DIELECTRIC as f32; 3], specular_weight: 1.0, ..Material::DIFFUSE }
 }
+
+/// What a dielectric of index 1.5 reflects along the normal.
+const DIELECTRIC: f64 = 0.04;
 
 /// Every material of the file, in order, and the textures of those that `is_used` marks, in order of first use.
 pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (Vec<Material>, Vec<Texture>) {
@@ -49,18 +108,35 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
         };
         let place = || label("material", index, json.name.as_deref());
         let mut material = convert(json, warnings, &place);
-        if let Some(info) = &json.pbr_metallic_roughness.base_color_texture {
-            match texture(document, info.index, warnings, &place) {
-                Ok(texture) if is_used[index] => {
-                    material.base_color_texture = *known.entry(texture).or_insert_with_key(|texture| {
-                        textures.push(texture.clone());
-                        textures.len() as u32 - 1
+        for (number, info) in infos(json).into_iter().enumerate() {
+            let Some(info) = info else { continue };
+            let found = match texture(document, info.index, warnings, &place) {
+                Ok(texture) => texture,
+                Err(problem) => {
+                    warnings.add("its texture cannot be used, white takes its place", || {
+                        format!("{} ({})", place(), problem.what)
                     });
+                    continue;
                 }
-                Ok(_) => {}
-                Err(problem) => warnings.add("its texture cannot be used, white takes its place", || {
-                    format!("{} ({})", place(), problem.what)
-                }),
+            };
+            if !is_used[index] {
+                continue;
+            }
+            let Some(set) = set(info) else {
+                warnings
+                    .add("sets of texture coordinates beyond the second are not read; its texture is left out", place);
+                continue;
+            };
+            *material.textures_mut()[number] = *known.entry(found).or_insert_with_key(|texture| {
+                textures.push(texture.clone());
+                textures.len() as u32 - 1
+            });
+            material.uv_sets |= (set as u32) << number;
+            match rows(info) {
+                Some(rows) => material.uv_from_set[2 * number..2 * number + 2].copy_from_slice(&rows),
+                None => {
+                    warnings.add("the transformation of its texture is beyond the range of numbers; left out", place)
+                }
             }
         }
         materials.push(material);
@@ -71,7 +147,6 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
 /// The factors and flags of a material.
 fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> Material {
     let pbr = &json.pbr_metallic_roughness;
-    let unit = |x: f64| x.clamp(0.0, 1.0) as f32;
     let mut flags = match json.alpha_mode.as_deref() {
         None | Some("OPAQUE") => 0,
         Some("MASK") => MATERIAL_MASK,
@@ -88,20 +163,119 @@ fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> 
         flags |= MATERIAL_UNLIT;
     }
     let strength = json.extensions.emissive_strength.as_ref().and_then(|e| e.emissive_strength).unwrap_or(1.0);
-    let mut emission = json.emissive_factor.map(|c| (c * strength).clamp(0.0, f32::MAX as f64) as f32);
-    if json.emissive_texture.is_some() && emission != [0.0; 3] {
-        // The factor alone would make all of the surface glow.
-        warnings.add("emissive textures are not read; it does not emit", place);
-        emission = [0.0; 3];
-    }
-    Material {
+    let mut material = Material {
         base_color: pbr.base_color_factor.unwrap_or([1.0; 4]).map(unit),
-        emission,
+        emission: json.emissive_factor.map(|c| (c * strength).clamp(0.0, f32::MAX as f64) as f32),
         metallic: unit(pbr.metallic_factor.unwrap_or(1.0)),
         roughness: unit(pbr.roughness_factor.unwrap_or(1.0)),
         alpha_cutoff: json.alpha_cutoff.unwrap_or(0.5).clamp(0.0, f32::MAX as f64) as f32,
         flags,
         ..default_material()
+    };
+    if let Some(scale) = json.normal_texture.as_ref().and_then(|info| info.scale) {
+        material.normal_scale = scale.clamp(f32::MIN as f64, f32::MAX as f64) as f32;
+    }
+    if let Some(strength) = json.occlusion_texture.as_ref().and_then(|info| info.strength) {
+        material.occlusion_strength = unit(strength);
+    }
+    reflect(json, &mut material, warnings, place);
+    coat(json, &mut material, warnings, place);
+    transmit(json, &mut material, warnings, place);
+    material
+}
+
+fn unit(x: f64) -> f32 {
+    x.clamp(0.0, 1.0) as f32
+}
+
+/// What the dielectric part reflects (KHR_materials_ior, _specular, _pbrSpecularGlossiness).
+fn reflect(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
+    let extensions = &json.extensions;
+    if let Some(extension) = &extensions.specular_glossiness {
+        // Its specular colour stands for metals too.
+        material.base_color = extension.diffuse_factor.unwrap_or([1.0; 4]).map(unit);
+        material.metallic = 0.0;
+        material.roughness = unit(1.0 - extension.glossiness_factor.unwrap_or(1.0));
+        material.specular = extension.specular_factor.unwrap_or([1.0; 3]).map(unit);
+        material.specular_weight = if material.specular == [0.0; 3] { 0.0 } else { 1.0 };
+        if extension.specular_glossiness_texture.is_some() {
+            warnings.add("textures of specular colour and glossiness are not read; its factors alone are used", place);
+        }
+        return;
+    }
+    let mut along_normal = DIELECTRIC;
+    if let Some(index) = extensions.ior.as_ref().and_then(|extension| extension.ior) {
+        // An index of 0 stands for infinity.
+        along_normal = if index > 0.0 { ((index - 1.0) / (index + 1.0)).powi(2) } else { 1.0 };
+        if index != 0.0 && index < 1.0 {
+            warnings.add("its index of refraction is below 1, which no material has", place);
+        }
+    }
+    let (mut color, mut weight) = ([1.0; 3], 1.0);
+    if let Some(extension) = &extensions.specular {
+        color = extension.specular_color_factor.unwrap_or([1.0; 3]);
+        weight = extension.specular_factor.unwrap_or(1.0).clamp(0.0, 1.0);
+        if extension.specular_texture.is_some() || extension.specular_color_texture.is_some() {
+            warnings.add("textures of KHR_materials_specular are not read; its factors alone are used", place);
+        }
+    }
+    material.specular = color.map(|c| unit((along_normal * c).clamp(0.0, 1.0) * weight));
+    material.specular_weight = unit(weight);
+}
+
+/// KHR_materials_clearcoat.
+fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
+    let Some(extension) = &json.extensions.clearcoat else { return };
+    material.clearcoat = unit(extension.clearcoat_factor.unwrap_or(0.0));
+    material.clearcoat_roughness = unit(extension.clearcoat_roughness_factor.unwrap_or(0.0));
+    let textures =
+        [&extension.clearcoat_texture, &extension.clearcoat_roughness_texture, &extension.clearcoat_normal_texture];
+    if material.clearcoat > 0.0 && textures.into_iter().any(Option::is_some) {
+        warnings.add("textures of the clear coat are not read; its factors alone are used", place);
+    }
+}
+
+/// KHR_materials_transmission, of thin walls: rays pass straight through, whatever the roughness, and each is either let through or
+/// shaded.
+///
+/// Let t be the share transmitted, c the greatest component of the base colour, F the greatest of what is reflected along the normal.
+/// A share 1 - a = t c (1 - F) of the rays passes: alpha is multiplied by a, and what is shaded, seen by the share a, is made
+/// brighter so that along the normal it is as bright as it was: specular / a, and of the base colour the share that is not transmitted,
+/// (1 - t) / (1 - t c). Then surfaces reflect and transmit no more than they receive. What is lost is the tint of what is seen through.
+fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
+    let Some(extension) = &json.extensions.transmission else { return };
+    let transmission = unit(extension.transmission_factor.unwrap_or(0.0));
+    if transmission == 0.0
+        || material.metallic == 1.0 && json.pbr_metallic_roughness.metallic_roughness_texture.is_none()
+    {
+        // Metal lets nothing through.
+        return;
+    }
+    if material.flags & MATERIAL_MASK != 0 {
+        warnings.add("transmission beside alpha MASK is not read", place);
+        return;
+    }
+    if extension.transmission_texture.is_some() {
+        warnings.add("textures of transmission are not read; its factor alone is used", place);
+    }
+    let [r, g, b, _] = material.base_color;
+    if r != g || g != b {
+        warnings.add("what is seen through it is not tinted by its colour", place);
+    }
+    let passing = transmission * (1.0 - material.metallic) * r.max(g).max(b);
+    let most = material.specular.into_iter().fold(0.0, f32::max);
+    let alpha = 1.0 - passing * (1.0 - most);
+    let rest = if passing < 1.0 { (1.0 - transmission) / (1.0 - passing) } else { 0.0 };
+    material.transmission = transmission;
+    if material.flags & MATERIAL_BLEND == 0 {
+        // Opaque materials have no alpha of their own.
+        material.base_color[3] = 1.0;
+        material.flags |= MATERIAL_BLEND;
+    }
+    material.base_color[..3].iter_mut().for_each(|c| *c *= rest);
+    material.base_color[3] *= alpha;
+    if alpha > 0.0 {
+        material.specular = material.specular.map(|c| (c / alpha).min(1.0));
     }
 }
 
@@ -128,6 +302,9 @@ fn texture(
                 }
             };
         }
+        if sampler.mag_filter.is_some_and(|code| code.0 == 9728) {
+            warnings.add("its texture asks for the nearest texel; textures are always interpolated", place);
+        }
     }
     // What extensions name comes first: the plain image is for readers that do not know them.
     let extensions = [&texture.extensions.basisu, &texture.extensions.webp];
@@ -141,5 +318,23 @@ fn texture(
     match found.into_iter().find_map(Result::err) {
         Some(problem) if images.is_empty() => Err(problem),
         _ => Ok(Texture { images, wrap: wrap[0] | wrap[1] << 16 }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_transform_of_the_specification() {
+        // The specification's matrix for rotation: [cos sin; -sin cos], offset last.
+        let info: TextureInfo =
+            serde_json::from_value(serde_json::json!({"index": 0, "extensions": {"KHR_texture_transform": {
+            "offset": [0.5, 0.25], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2.0, -3.0], "texCoord": 1}}}))
+            .unwrap();
+        let rows = rows(&info).unwrap();
+        let [u, v] = rows.map(|[a, b, c, _]| a * 0.25 + b * 0.5 + c);
+        assert!((u - (-1.5 + 0.5)).abs() < 1e-6 && (v - (-0.5 + 0.25)).abs() < 1e-6, "{u} {v}");
+        assert_eq!((rows[0][3], rows[1][3], set(&info)), (6.0, 0.0, Some(1)));
     }
 }

@@ -1,11 +1,12 @@
 //! Meshes (glTF 2.0, section 3.7): primitives are checked first, which gives their triangle counts, then read in parts.
 
 use super::accessor::{Accessor, Component, Shape};
-use super::document::{Document, Primitive as Json, TextureTransform};
+use super::document::{Document, Primitive as Json};
 use super::draco;
 use super::file::{File, Problem, item};
 use super::label;
-use super::materials::base_color_set;
+use super::materials::Coordinates;
+use crate::import::tangents;
 use crate::import::vertices::Vertices;
 use crate::import::warnings::Warnings;
 use crate::source::Primitive;
@@ -62,7 +63,10 @@ struct Geometry {
     positions: Accessor,
     normals: Option<Accessor>,
     uvs: Option<Accessor>,
-    transform: Option<UvTransform>,
+    uvs1: Option<Accessor>,
+    tangents: Option<Accessor>,
+    /// Set and rows of the normal texture's coordinates; `None`: no tangents are wanted.
+    normal_coordinates: Option<(usize, [[f32; 4]; 2])>,
     colors: Option<Accessor>,
     indices: Option<Accessor>,
 }
@@ -75,6 +79,7 @@ const NORMAL: Shape = Shape {
     components: &[Component::F32, Component::I8, Component::I16],
     always_normalized: true,
 };
+const TANGENT: Shape = Shape { kinds: &[("VEC4", 4)], ..NORMAL };
 const TEXCOORD: Shape = Shape { kinds: &[("VEC2", 2)], components: FLOAT_OR_QUANTIZED, always_normalized: false };
 const COLOR: Shape = Shape {
     kinds: &[("VEC3", 3), ("VEC4", 4)],
@@ -161,13 +166,20 @@ pub(super) fn check(
     };
     let normals = attribute("NORMAL", &NORMAL)?;
     let colors = attribute("COLOR_0", &COLOR)?;
-    let texture = material.and_then(|m| base_color_set(file.document.materials[m].0.as_ref().ok()?));
-    let (set, transform) = texture.unwrap_or_default();
-    let uvs = attribute(&format!("TEXCOORD_{set}"), &TEXCOORD)?;
-    if uvs.is_none() && texture.is_some() {
+    let looks = material.and_then(|m| file.document.materials[m].0.as_ref().ok());
+    let Coordinates { sets, normal } = looks.map(Coordinates::of).unwrap_or_default();
+    let uvs = attribute("TEXCOORD_0", &TEXCOORD)?;
+    let uvs1 = if sets[1] { attribute("TEXCOORD_1", &TEXCOORD)? } else { None };
+    let is_there = [uvs.is_some(), uvs1.is_some()];
+    if (0..2).any(|set| sets[set] && !is_there[set]) {
         warnings.add("textured, but without texture coordinates", place);
     }
-    for (name, other) in [("NORMAL", &normals), ("COLOR_0", &colors), ("TEXCOORD", &uvs)] {
+    let normal_coordinates = normal.filter(|(set, _)| is_there[*set]);
+    // Tangents without normals mean nothing (glTF 2.0, section 3.7.2.1).
+    let has_frame = normal_coordinates.is_some() && normals.is_some();
+    let tangents = if has_frame { attribute("TANGENT", &TANGENT)? } else { None };
+    let others = [("NORMAL", &normals), ("COLOR_0", &colors), ("TEXCOORD_0", &uvs), ("TEXCOORD_1", &uvs1)];
+    for (name, other) in others.into_iter().chain([("TANGENT", &tangents)]) {
         if let Some(other) = other.as_ref().filter(|other| other.count != positions.count) {
             return Err(Problem::new(format!("{name} has {} elements, POSITION {}", other.count, positions.count)));
         }
@@ -188,8 +200,8 @@ pub(super) fn check(
         warnings.add("ends within a triangle, which is left out", place);
     }
     let triangles = topology.triangles(elements);
-    let transform = transform.map(UvTransform::of);
-    let geometry = Geometry { topology, triangles, positions, normals, uvs, transform, colors, indices };
+    let geometry =
+        Geometry { topology, triangles, positions, normals, uvs, uvs1, tangents, normal_coordinates, colors, indices };
     Ok(Checked { material, geometry: Some(geometry) })
 }
 
@@ -250,14 +262,28 @@ impl Checked {
             };
             normals.into_iter().map(normal).collect()
         });
-        let uvs = geometry.uvs.as_ref().map(|uvs| uvs.gather::<2>(&used)).transpose();
-        let uvs = uvs.map_err(unreadable)?.map(|uvs| {
+        let mut coordinates = |uvs: &Option<Accessor>| {
+            let uvs = uvs.as_ref().map(|uvs| uvs.gather::<2>(&used)).transpose().map_err(unreadable)?;
             let uv = |uv: [f64; 2]| {
-                let mut uv = geometry.transform.as_ref().map_or(uv, |t| t.apply(uv)).map(|c| c as f32);
+                let mut uv = uv.map(|c| c as f32);
                 uv.iter_mut().for_each(|c| repair(c, 0.0, "texture coordinates that are not finite are set to zero"));
                 uv
             };
-            uvs.into_iter().map(uv).collect()
+            Ok::<_, Problem>(uvs.map(|uvs| uvs.into_iter().map(uv).collect::<Vec<_>>()))
+        };
+        let (uvs, uvs1) = (coordinates(&geometry.uvs)?, coordinates(&geometry.uvs1)?);
+        let tangents = geometry.tangents.as_ref().map(|tangents| tangents.gather::<4>(&used)).transpose();
+        let tangents = tangents.map_err(unreadable)?.map(|tangents| {
+            let tangent = |tangent: &[f64; 4]| {
+                let mut tangent = tangent.map(|c| c as f32);
+                if tangent.iter().any(|c| !c.is_finite()) {
+                    tangent.iter_mut().for_each(|c| repair(c, 0.0, "tangents that are not finite are left out"));
+                    tangent = [0.0; 4];
+                }
+                tangent
+            };
+            let tangents: Vec<[f32; 4]> = tangents.iter().map(tangent).collect();
+            indices.iter().map(|&index| tangents[index as usize]).collect()
         });
         let colors = geometry.colors.as_ref().map(|colors| Ok((colors.width, colors.gather::<4>(&used)?))).transpose();
         let colors = colors.map_err(unreadable)?.map(|(width, colors)| {
@@ -271,7 +297,10 @@ impl Checked {
             };
             colors.into_iter().map(color).collect()
         });
-        let primitive = Primitive { material, positions, normals, uvs, colors, indices, ..Primitive::default() };
+        let mut primitive = Primitive { material, positions, normals, uvs, uvs1, tangents, colors, indices };
+        if let (None, Some((set, rows))) = (&primitive.tangents, &geometry.normal_coordinates) {
+            primitive.tangents = tangents::make(&primitive, *set, rows);
+        }
         Ok(Read { primitive, repairs })
     }
 }
@@ -306,28 +335,6 @@ impl Geometry {
     }
 }
 
-/// KHR_texture_transform, applied to the texture coordinates themselves: a primitive has one material and only its base
-/// colour texture is used.
-struct UvTransform {
-    offset: [f64; 2],
-    sin: f64,
-    cos: f64,
-    scale: [f64; 2],
-}
-
-impl UvTransform {
-    fn of(json: &TextureTransform) -> Self {
-        let (sin, cos) = json.rotation.unwrap_or(0.0).sin_cos();
-        Self { offset: json.offset.unwrap_or([0.0; 2]), sin, cos, scale: json.scale.unwrap_or([1.0; 2]) }
-    }
-
-    /// Translation * rotation * scale; a positive angle turns counter-clockwise in an image whose v points down.
-    fn apply(&self, uv: [f64; 2]) -> [f64; 2] {
-        let [u, v] = [uv[0] * self.scale[0], uv[1] * self.scale[1]];
-        [self.cos * u + self.sin * v + self.offset[0], -self.sin * u + self.cos * v + self.offset[1]]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -350,18 +357,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn texture_transform_of_the_specification() {
-        // The specification's matrix for rotation: [cos sin; -sin cos], offset last.
-        let json = TextureTransform {
-            offset: Some([0.5, 0.25]),
-            rotation: Some(std::f64::consts::FRAC_PI_2),
-            scale: Some([2.0, 3.0]),
-            tex_coord: None,
-        };
-        let [u, v] = UvTransform::of(&json).apply([0.25, 0.5]);
-        assert!((u - (1.5 + 0.5)).abs() < 1e-15 && (v - (-0.5 + 0.25)).abs() < 1e-15, "{u} {v}");
     }
 }

@@ -12,6 +12,7 @@ mod document;
 mod draco;
 mod file;
 mod glb;
+mod lights;
 mod materials;
 mod meshes;
 mod meshopt;
@@ -101,7 +102,7 @@ pub(super) fn open_within(
     }
     meshopt::decode_views(&mut file)?;
     let document = &file.document;
-    let uses = nodes::uses(&file, scene, &placing, &mut warnings)?;
+    let nodes::Placed { uses, lights } = nodes::uses(&file, scene, &placing, &mut warnings)?;
     let mut is_used = vec![false; document.meshes.len()];
     uses.iter().for_each(|one| is_used[one.mesh] = true);
     let (meshes, numbers) = check_meshes(&file, &is_used, &mut warnings)?;
@@ -129,7 +130,7 @@ pub(super) fn open_within(
         placements: place(&file, &uses, &numbers)?,
         materials,
         textures: textures.iter().map(|(name, _)| name.clone()).collect(),
-        lights: Vec::new(),
+        lights,
         sources: vec![file.source],
         warnings: warnings.into_lines(),
         has_animation,

@@ -3,10 +3,11 @@
 use super::accessor::{Accessor, Component, Shape};
 use super::document::{Document, Index, Uint};
 use super::file::{File, Problem, item};
-use super::label;
+use super::{label, lights};
 use crate::import::affine::{Affine, from_columns, from_parts, multiply};
 use crate::import::error::{ImportError, one_line};
 use crate::import::warnings::Warnings;
+use bricks::PunctualLight;
 use std::io;
 
 /// A node with a mesh, placed in the world.
@@ -49,20 +50,29 @@ pub(super) fn node_place(document: &Document, node: usize) -> String {
     label("node", node, document.nodes.get(node).and_then(|n| n.name.as_deref()))
 }
 
-/// Every use of a mesh in the scene that is asked for (else the default scene, else scene 0, else all root nodes), depth
+/// What nodes place.
+#[derive(Default)]
+pub(super) struct Placed {
+    /// Meshes.
+    pub uses: Vec<Use>,
+    /// Lights.
+    pub lights: Vec<PunctualLight>,
+}
+
+/// Every use of a mesh and of a light in the scene that is asked for (else the default scene, else scene 0, else all root nodes), depth
 /// first; `placing` takes the scene to the world.
 pub(super) fn uses(
     file: &File,
     asked: Option<&str>,
     placing: &Affine,
     warnings: &mut Warnings,
-) -> Result<Vec<Use>, ImportError> {
+) -> Result<Placed, ImportError> {
     let document = &file.document;
     let parents = parents(file)?;
     check_acyclic(file, &parents)?;
     let roots = roots(file, asked, &parents)?;
 
-    let mut uses = Vec::new();
+    let Placed { mut uses, mut lights } = Placed::default();
     let mut visited = 0;
     let mut stack: Vec<(usize, Affine)> = roots.iter().rev().map(|&root| (root, *placing)).collect();
     while let Some((index, parent)) = stack.pop() {
@@ -85,6 +95,9 @@ pub(super) fn uses(
             // In range: `parents` checked it.
             uses.push(Use { node: index, mesh: mesh.0 as usize, world, instances });
         }
+        if let Some(light) = &node.extensions.light {
+            lights.extend(lights::place(document, light, &world, warnings, &|| node_place(document, index)));
+        }
         // In range: `parents` checked them.
         stack.extend(node.children.iter().rev().map(|&child| (child.0 as usize, world)));
     }
@@ -95,7 +108,7 @@ pub(super) fn uses(
     if uses.is_empty() && !document.meshes.is_empty() {
         warnings.add("no node of the scene has a mesh", String::new);
     }
-    Ok(uses)
+    Ok(Placed { uses, lights })
 }
 
 /// The parent of every node; also checks every index that nodes hold.

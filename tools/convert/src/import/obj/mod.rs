@@ -12,6 +12,7 @@ use super::image::decode_texture;
 use super::plain::{self, doubles, fault, floats, unreadable};
 use super::repairs::Repairs;
 use super::table::Table;
+use super::tangents;
 use super::text::Lines;
 use super::vertices::Vertices;
 use super::warnings::Warnings;
@@ -23,6 +24,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::io;
 use std::path::Path;
 use xxhash_rust::xxh3::Xxh3;
+
+/// Texture coordinates are taken as they are.
+const SAME_UV: [[f32; 4]; 2] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
 
 /// Largest file of materials.
 const MAX_MATERIALS_BYTES: u64 = 256 << 20;
@@ -39,14 +43,24 @@ struct Obj {
     /// Parts of each mesh: run and first triangle.
     parts: Vec<Vec<(Run, u64)>>,
     textures: Vec<Texture>,
+    /// Whether tangents are wanted, by material.
+    wants_tangents: Vec<bool>,
     repairs: Repairs,
 }
 
-/// A picture.
+/// A texture.
 struct Texture {
     name: String,
     wrap: u32,
-    bytes: Result<Bytes, String>,
+    picture: Picture,
+}
+
+/// What a texture shows.
+enum Picture {
+    /// A picture.
+    Whole(Result<Bytes, String>),
+    /// The grey pictures of roughness, which goes to green, and of being metal, which goes to blue; white where there is none.
+    Grey([Option<Result<Bytes, String>>; 2]),
 }
 
 /// Opens one .obj file.
@@ -89,6 +103,7 @@ pub(super) fn open(
             }
         }
     }
+    let wants_tangents = materials.iter().map(|material| material.normal_texture != NONE).collect();
     let outline = Outline {
         materials,
         textures: textures.iter().map(|texture| texture.name.clone()).collect(),
@@ -98,7 +113,18 @@ pub(super) fn open(
     let repairs = Repairs::new(label.clone());
     Ok(Opened {
         outline,
-        parts: Box::new(Obj { label, positions, colors, uvs, normals, triangles, parts, textures, repairs }),
+        parts: Box::new(Obj {
+            label,
+            positions,
+            colors,
+            uvs,
+            normals,
+            triangles,
+            parts,
+            textures,
+            wants_tangents,
+            repairs,
+        }),
     })
 }
 
@@ -138,15 +164,32 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
             continue;
         };
         let mut material = definition.material;
-        if let Some((file, wrap)) = &definition.texture {
-            material.base_color_texture = *numbers.entry((file, *wrap)).or_insert_with(|| {
-                let bytes = beside(folder, file).and_then(|path| Bytes::of_file(&path));
-                textures.push(Texture { name: one_line(file), wrap: *wrap, bytes });
+        let open = |file: &String| beside(folder, file).and_then(|path| Bytes::of_file(&path));
+        let mut add = |key: [Option<&mtl::Map>; 3], make: &dyn Fn() -> Texture| {
+            *numbers.entry(key.map(|map| map.cloned())).or_insert_with(|| {
+                textures.push(make());
                 textures.len() as u32 - 1
-            });
+            })
+        };
+        let maps = [
+            (&mut material.base_color_texture, &definition.color),
+            (&mut material.normal_texture, &definition.normals),
+            (&mut material.emissive_texture, &definition.emission),
+        ];
+        for (texture, map) in maps {
+            let Some((file, wrap)) = map else { continue };
+            let whole = || Texture { name: one_line(file), wrap: *wrap, picture: Picture::Whole(open(file)) };
+            *texture = add([map.as_ref(), None, None], &whole);
         }
-        if definition.has_other_maps {
-            warnings.add("maps other than map_Kd are not read", place);
+        let grey = [definition.roughness.as_ref(), definition.metallic.as_ref()];
+        if let Some((_, wrap)) = grey[0].or(grey[1]) {
+            let names: Vec<String> = grey.into_iter().flatten().map(|(file, _)| one_line(file)).collect();
+            let pictures = || grey.map(|map| map.map(|(file, _)| open(file)));
+            let combined = || Texture { name: names.join(" and "), wrap: *wrap, picture: Picture::Grey(pictures()) };
+            material.metallic_roughness_texture = add([None, grey[0], grey[1]], &combined);
+        }
+        for warning in &definition.warnings {
+            warnings.add(*warning, place);
         }
         materials.push(material);
     }
@@ -184,8 +227,17 @@ impl Parts for Obj {
     }
 
     fn texture(&self, index: usize) -> Result<SourceTexture, SourceError> {
-        let Texture { name, wrap, bytes } = &self.textures[index];
-        let decoded = bytes.as_ref().map_err(String::clone).and_then(|b| decode_texture(b, name.clone(), *wrap));
+        let Texture { name, wrap, picture } = &self.textures[index];
+        let decode = |bytes: &Result<Bytes, String>| {
+            bytes.as_ref().map_err(String::clone).and_then(|b| decode_texture(b, name.clone(), *wrap))
+        };
+        let decoded = match picture {
+            Picture::Whole(bytes) => decode(bytes),
+            Picture::Grey(pictures) => {
+                let channel = |bytes: &Option<_>| bytes.as_ref().map(decode).transpose();
+                channel(&pictures[0]).and_then(|roughness| Ok(combine(roughness, channel(&pictures[1])?)))
+            }
+        };
         decoded.map_err(|problem| {
             let file = &self.label;
             SourceError(format!("{file}: image {name}: the image cannot be used ({problem})"))
@@ -219,7 +271,7 @@ impl Obj {
         let Vertices { used, indices } = self.vertices(mesh, part)?;
         let positions: Vec<u64> = used.iter().map(|[position, ..]| u64::from(*position)).collect();
         let colors = self.colors.as_ref().map(|colors| floats::<4>(colors, &positions)).transpose()?;
-        Ok(Primitive {
+        let mut primitive = Primitive {
             material: run.material,
             positions: doubles(&self.positions, &positions)?,
             normals: if run.has_normals { Some(optional(&self.normals, used.iter().map(|v| v[2]))?) } else { None },
@@ -227,8 +279,31 @@ impl Obj {
             colors,
             indices,
             ..Primitive::default()
-        })
+        };
+        if self.wants_tangents[run.material as usize] {
+            primitive.tangents = tangents::make(&primitive, 0, &SAME_UV);
+        }
+        Ok(primitive)
     }
+}
+
+/// The red of one picture as green and that of another as blue, white where there is none, in the size of the larger of them each way: the
+/// nearest texels are taken.
+fn combine(roughness: Option<SourceTexture>, metallic: Option<SourceTexture>) -> SourceTexture {
+    let channels = [roughness, metallic];
+    let size = |of: fn(&SourceTexture) -> u32| channels.iter().flatten().map(of).max().unwrap_or(1);
+    let (width, height) = (size(|texture| texture.width), size(|texture| texture.height));
+    let texel = |channel: &Option<SourceTexture>, x: u32, y: u32| {
+        channel.as_ref().map_or(255, |texture| {
+            let nearest = |at: u32, of: u32, side: u32| (u64::from(at) * u64::from(side) / u64::from(of)) as usize;
+            let (x, y) = (nearest(x, width, texture.width), nearest(y, height, texture.height));
+            texture.rgba[4 * (y * texture.width as usize + x)]
+        })
+    };
+    let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let rgba = texels.flat_map(|(x, y)| [255, texel(&channels[0], x, y), texel(&channels[1], x, y), 255]).collect();
+    let first = channels.into_iter().flatten().next().unwrap_or_default();
+    SourceTexture { width, height, rgba, ..first }
 }
 
 /// The floats of the rows `wanted`, in any order; zero for `NONE` and for those that are not there.
