@@ -1,5 +1,5 @@
-// Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free. What is not diffuse shares a
-// direction with the rays that surfaces draw by their gloss.
+// Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free. The environment shares a
+// direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their gloss.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -45,6 +45,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let s = gloss_of(g, -seen_rays[index].direction);
     var reflects = s.diffuse;
+    if (params.flags & (PARAM_ENVIRONMENT | PARAM_BOUNCE)) == PARAM_ENVIRONMENT && params.diffuse_count > 0.0 {
+        reflects *= outweighs(density, params.diffuse_count * max(dot(g.normal, d), 0.0) / PI);
+    }
     if is_glossy(s) {
         let unit_d = normalize(d);
         var weight = 1.0;

@@ -52,7 +52,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     rays[index] = ray;
     if !LIMITED {
         throughput[index] = vec4<f32>(carried, f32(params.direction));
-        densities[index] = 0.0;
+        densities[index] = params.diffuse_count * max(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
     }
     start_hit(index, ray.t_max, seen_hits[index].id);
 }

@@ -1,6 +1,6 @@
 // What the hits of the shaded set show by themselves, unless passes of their own bring it: the background on a miss, else their emission
 // and the light of the sun and of the background, unshadowed. Where rays were drawn by the gloss of surfaces, what rays to lamps bring as
-// well is weighted. The first shading of a sample counts it.
+// well is weighted; so is the environment where diffuse rays meet it. The first shading of a sample counts it.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -17,9 +17,9 @@ fn seen_background(d: vec3<f32>, density: f32) -> vec3<f32> {
         if (params.flags & PARAM_ENVIRONMENT) != 0u && params.environment_width != 0u {
             light *= outweighs(density, environment_density(n));
         }
-        // The sun's disc, unless its light is without shadows.
+        // The sun's disc is met by rays of gloss alone, unless its light is without shadows.
         let along = dot(n, params.sun.xyz);
-        if (params.flags & PARAM_SUN) == 0u && params.sun_radius > 0.0 && along > 0.0 {
+        if (params.flags & (PARAM_SUN | PARAM_EMITTER)) == PARAM_EMITTER && params.sun_radius > 0.0 && along > 0.0 {
             let across = cross(n, params.sun.xyz);
             if dot(across, across) <= params.sun_radius * params.sun_radius * along * along {
                 let of_sun = sun_density(n / along);

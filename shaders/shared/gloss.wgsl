@@ -140,9 +140,10 @@ fn reflected_ambient(s: Gloss) -> vec3<f32> {
     return reflected_around(s) * ambient(reflect(-s.view, s.normal));
 }
 
-// Of light from around, what diffuse rays stand for: the diffuse part, and the rest where it has no rays of its own.
+// Of light from around, what diffuse rays stand for: the diffuse part, and the rest where it has no rays of its own and diffuse rays share
+// nothing with rays to the environment.
 fn reflected_by_diffuse_rays(s: Gloss) -> vec3<f32> {
-    if s.alpha == 0.0 || (params.flags & PARAM_GLOSSY) != 0u {
+    if s.alpha == 0.0 || (params.flags & PARAM_GLOSSY) != 0u || params.diffuse_count > 0.0 {
         return s.diffuse;
     }
     return s.diffuse + reflected_around(s);

@@ -40,9 +40,9 @@ struct Params {
     environment_width: u32,  // texels of a row of the environment; 0: the sky is the background
     environment_height: u32,
     emitter_density: f32, // of points of surfaces that shine, by the luminance of their radiance, an area of 1: how rays to them are drawn
+    diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
     padding0: u32,
     padding1: u32,
-    padding2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }

@@ -15,8 +15,8 @@ use std::str::FromStr;
 pub struct EffectArgs {
     /// What to trace, separated by commas: primary, shadow (of the sun, the rectangular light and surfaces that emit, which light
     /// others by it), ao (ambient occlusion of the sky's light), diffuse (one bounce between surfaces, the sky's light with it),
-    /// environment (the light of the environment, or of the sky, with shadows: rays in directions drawn by its brightness; ao and the
-    /// sky's share of diffuse are left out beside it), glossy (what metals and polished surfaces mirror: one ray in a direction drawn by
+    /// environment (the light of the environment, or of the sky, with shadows: rays in directions drawn by its brightness; ao is
+    /// left out beside it, and diffuse rays share the light with them), glossy (what metals and polished surfaces mirror: one ray in a direction drawn by
     /// their roughness, whose hits are lit), mirror (every surface is half a mirror, for tests); all include primary
     #[arg(long, value_name = "LIST", default_value = "primary,shadow")]
     pub effects: EffectList,

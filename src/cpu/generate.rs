@@ -179,11 +179,12 @@ pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: 
     for_each_leaving(own, seen, |index, surface| {
         leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
     });
-    densities.fill(0.0);
     let number = bound.params.direction as f32;
-    throughput.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, carried)| {
+    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut());
+    carried.enumerate().with_min_len(1024).for_each(|(index, (carried, density))| {
         let ray = &own.rays[index];
         *carried = [0.0, 0.0, 0.0, number];
+        *density = bound.params.diffuse_count * most(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
         if ray.t_min <= ray.t_max {
             let g = &gbuffer[index];
             let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));

@@ -164,9 +164,10 @@ impl Gloss {
         each(|k| around[k] * light[k])
     }
 
-    /// Of light from around, what diffuse rays stand for: the diffuse part, and the rest where it has no rays of its own.
+    /// Of light from around, what diffuse rays stand for: the diffuse part, and the rest where it has no rays of its own and diffuse rays
+    /// share nothing with rays to the environment.
     pub fn reflected_by_diffuse_rays(&self, bound: &Bound) -> Vec3 {
-        if self.alpha == 0.0 || bound.has(PARAM_GLOSSY) {
+        if self.alpha == 0.0 || bound.has(PARAM_GLOSSY) || bound.params.diffuse_count > 0.0 {
             return self.diffuse;
         }
         let around = self.around();

@@ -98,10 +98,10 @@ fn seen_background(bound: &Bound, d: Vec3, density: f32) -> Vec3 {
             let weight = outweighs(density, environment_density(bound, n));
             light = light.map(|c| c * weight);
         }
-        // The sun's disc, unless its light is without shadows.
+        // The sun's disc is met by rays of gloss alone, unless its light is without shadows.
         let sun = xyz(params.sun);
         let along = dot(n, sun);
-        if !bound.has(PARAM_SUN) && params.sun_radius > 0.0 && along > 0.0 {
+        if bound.has(PARAM_EMITTER) && !bound.has(PARAM_SUN) && params.sun_radius > 0.0 && along > 0.0 {
             let across = cross(n, sun);
             if dot(across, across) <= params.sun_radius * params.sun_radius * along * along {
                 let of_sun = sun_density(params, n.map(|x| x / along));
@@ -138,7 +138,7 @@ fn seen_emission(bound: &Bound, g: &GBuffer, m: &Material, seen: &RaySet, index:
 
 /// What the hits of the shaded set show by themselves, unless passes of their own bring it: the background on a miss, else their
 /// emission and the light of the sun and of the background, unshadowed. Where rays were drawn by the gloss of surfaces, what rays to
-/// lamps bring as well is weighted. The first shading of a sample counts it.
+/// lamps bring as well is weighted; so is the environment where diffuse rays meet it. The first shading of a sample counts it.
 pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, materials: &[Material]) {
     let params = bound.params;
     for_each_pixel(bound, pixels, shaded, |index, g, radiance, (_, densities)| {
@@ -173,8 +173,8 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
     });
 }
 
-/// Adds the light of the pass's lamp to the hits of the shaded set, those of `seen`, whose shadow ray went free. What is not diffuse
-/// shares a direction with the rays that surfaces draw by their gloss.
+/// Adds the light of the pass's lamp to the hits of the shaded set, those of `seen`, whose shadow ray went free. The environment
+/// shares a direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their gloss.
 pub fn add_light(
     bound: &Bound,
     pixels: &mut Pixels,
@@ -213,6 +213,10 @@ pub fn add_light(
         };
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
         let mut reflects = s.diffuse;
+        if bound.has(PARAM_ENVIRONMENT) && !bound.has(PARAM_BOUNCE) && bound.params.diffuse_count > 0.0 {
+            let share = outweighs(density, bound.params.diffuse_count * cosine / PI);
+            reflects = reflects.map(|c| c * share);
+        }
         if s.is_glossy() {
             let unit = normalize(d);
             let mut weight = 1.0;

@@ -19,6 +19,8 @@ pub struct Directions {
     pub scatter: bool,
     /// What surfaces reflect otherwise than diffusely comes by rays of its own, too.
     pub glossy: bool,
+    /// Diffuse rays bring the environment's light as well as rays to it.
+    pub shares: bool,
 }
 
 /// Direction `index` about z of passes that start at hits, before it is turned or scattered.
@@ -58,6 +60,9 @@ impl Directions {
             length: self.occlusion_length,
             ..*params
         };
+        if self.shares {
+            params.diffuse_count = self.diffuse as f32;
+        }
         if let Some((index, count)) = direction {
             let [x, y, z] = direction_around(index);
             params.around = [x, y, z, if self.scatter { std::f32::consts::TAU } else { self.turn }];
@@ -267,7 +272,8 @@ pub fn dispatches(
             let emission = if light.emission { layout::PARAM_EMISSION } else { 0 };
             let miss = if light.miss { layout::PARAM_MISS } else { 0 };
             let environment = if light.environment { layout::PARAM_ENVIRONMENT } else { 0 };
-            let flags = params.flags | sun | sky | emission | miss | environment;
+            let gloss = if light.gloss { layout::PARAM_EMITTER } else { 0 };
+            let flags = params.flags | sun | sky | emission | miss | environment | gloss;
             vec![shading("shade", Params { flags, ..params }, false)]
         }
         Step::AddLight => vec![shading("add_light", params, false)],

@@ -91,7 +91,7 @@ mirror! {
         share: f32, surface_share: f32, length: f32, stream: u32,
         pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
-        emitter_density: f32, padding0: u32, padding1: u32, padding2: u32,
+        emitter_density: f32, diffuse_count: f32, padding0: u32, padding1: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

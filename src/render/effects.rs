@@ -9,7 +9,7 @@ pub struct Effects {
     /// Shadows of the sun and of emitters, at primary hits and at the hits of diffuse and mirrored rays.
     pub shadow: bool,
     /// The light of the environment, shadowed, at the same hits: a direction of each is drawn by its radiance. Diffuse rays that
-    /// miss bring nothing then.
+    /// miss share it with them.
     pub environment: bool,
     /// Ambient occlusion, of the sky's light.
     pub occlusion: Option<Occlusion>,

@@ -173,7 +173,8 @@ impl Renderer {
                 r.trace(frame, Pass::Primary, stats)?;
                 attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
-                let shading = Shading { sun: !effects.shadow, sky, emission: true, miss: true, environment: false };
+                let shading =
+                    Shading { sun: !effects.shadow, sky, emission: true, miss: true, environment: false, gloss: false };
                 r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
             self.light(&mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
@@ -236,13 +237,14 @@ impl Renderer {
             r.trace(frame, pass, stats)?;
             attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
             let (is_diffuse, draws) = (matches!(pass, Pass::Diffuse(_)), r.draws_environment());
-            // What rays to lamps bring to the surface itself must not come by diffuse rays as well; what gloss reflects is weighted.
+            // What rays to lamps bring to the surface itself must not come by diffuse rays as well, or be weighted.
             let shading = Shading {
                 sun: !effects.shadow,
                 sky: !is_diffuse && !draws,
                 emission: !is_diffuse || !r.light.lamps.has_surfaces(),
-                miss: !is_diffuse || !draws,
+                miss: true,
                 environment: draws,
+                gloss: pass == Pass::Glossy,
             };
             r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats)
         })?;

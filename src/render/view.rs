@@ -64,6 +64,7 @@ pub fn camera_view(
         turn: effects.turn_degrees.to_radians(),
         scatter: false,
         glossy: effects.glossy,
+        shares: effects.environment && light.lamps.environment.is_some() && effects.diffuse.is_some(),
     };
     View { frame, params, directions }
 }

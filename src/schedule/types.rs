@@ -174,8 +174,11 @@ pub struct Shading {
     pub emission: bool,
     /// The background itself, where rays missed.
     pub miss: bool,
-    /// Rays to the environment bring light, too: what misses of rays drawn by gloss show is weighted against them.
+    /// Rays to the environment bring light, too: what misses show is weighted against them.
     pub environment: bool,
+    /// The rays were drawn by gloss: they meet the sun's disc, and what they meet of it and of surfaces that shine is weighted against rays
+    /// to these.
+    pub gloss: bool,
 }
 
 /// A query over pairs of one rectangle of rays: each with a node of the binary top-level tree.

@@ -36,7 +36,8 @@ fn add_samples(renderer: &mut Renderer, camera: &Camera, first: u32, count: u32)
     let states = &renderer.cache.states;
     renderer.executor.run(pass, &[Step::ClearAttributes, Step::Resolve], states)?;
     let shade =
-        [Step::Shade(Shading { sun: true, sky: true, emission: true, miss: true, environment: false }); STEPS as usize];
+        [Step::Shade(Shading { sun: true, sky: true, emission: true, miss: true, environment: false, gloss: false });
+            STEPS as usize];
     for _ in 0..count / STEPS {
         renderer.executor.run(pass, &shade, states)?;
     }
