@@ -17,6 +17,9 @@ fn refused(section: Section, index: u32, found: &str, spoil: impl FnOnce(&mut Re
     assert!(flaw.found.contains(found), "{flaw} does not say {found}");
 }
 
+/// A field from 0 to 1.
+type Share = fn(&mut Material) -> &mut f32;
+
 #[test]
 fn materials() {
     let material = |found: &str, spoil: fn(&mut Material)| {
@@ -27,7 +30,7 @@ fn materials() {
     material("texture 2", |m| m.occlusion_texture = 2);
     material("texture 4294967294", |m| m.emissive_texture = NONE - 1);
     material("alpha_cutoff: -1", |m| m.alpha_cutoff = -1.0);
-    let shares: [(&str, fn(&mut Material) -> &mut f32); 10] = [
+    let shares: [(&str, Share); 10] = [
         ("metallic", |m| &mut m.metallic),
         ("roughness", |m| &mut m.roughness),
         ("occlusion_strength", |m| &mut m.occlusion_strength),

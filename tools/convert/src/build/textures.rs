@@ -426,6 +426,11 @@ fn direction(rgb: [f32; 3]) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use block_compression::decode::decompress_blocks_as_rgba8;
+
+    /// Normal textures of Sponza, and above what they lose, degrees: two smooth ones and the roughest.
+    const SPONZA_NORMALS: [(&str, f64); 3] =
+        [("8773302468495022225.jpg", 2.0), ("14267839433702832875.jpg", 3.0), ("14118779221266351425.jpg", 12.0)];
 
     fn texture(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> SourceTexture {
         let rgba = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
@@ -503,6 +508,55 @@ mod tests {
         assert_eq!(indices[3..], [[2, NONE, NONE, NONE, NONE], [NONE; 5]]);
         let sets: Vec<u32> = renumbered.iter().map(|material| material.uv_sets).collect();
         assert_eq!(sets, [0b11, 0b1100, 0b1_0001, 1, 0], "sets of textures alone");
+    }
+
+    /// Angles between directions and what BC7 makes of them, in degrees: mean and greatest; and the PSNR of red, green and blue.
+    fn loss(texture: &SourceTexture, settings: BC7Settings) -> [f64; 3] {
+        let size = [texture.width, texture.height];
+        let blocks = encode_grid(texture.rgba.clone(), texture.width, Some(settings));
+        let mut found = vec![0; texture.rgba.len()];
+        decompress_blocks_as_rgba8(CompressionVariant::BC7(settings), size[0], size[1], &blocks, &mut found);
+        let (mut sum, mut most, mut error) = (0.0, 0.0f64, 0.0);
+        for (a, b) in texture.rgba.chunks(4).zip(found.chunks(4)) {
+            let [a, b] = [a, b].map(|texel| [0, 1, 2].map(|k| f64::from(texel[k])));
+            error += (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>() / 3.0;
+            let [a, b] = [a, b].map(|rgb| direction(rgb.map(|c| c as f32 / 255.0)).map(f64::from));
+            let angle = (0..3).map(|k| a[k] * b[k]).sum::<f64>().min(1.0).acos().to_degrees();
+            (sum, most) = (sum + angle, most.max(angle));
+        }
+        let count = (found.len() / 4) as f64;
+        [sum / count, most, 10.0 * (255.0 * 255.0 * count / error).log10()]
+    }
+
+    /// By the settings that are used. What they lose of Sponza's is in `benches/results/textures.md`.
+    #[test]
+    fn directions_lose_little_as_bc7() {
+        let settings = BC7Settings::opaque_ultra_fast;
+        // Waves of 80 and 40 texels, up to 35 degrees steep.
+        let waves = texture(256, 256, |x, y| {
+            let slope = |at: u32| 0.5 * (f64::from(at) * 0.0785).sin();
+            let v = [slope(x + y / 3), slope(2 * y), 1.0];
+            let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let [r, g, b] = v.map(|c| (127.5 * (c / length + 1.0)).round() as u8);
+            [r, g, b, 255]
+        });
+        let [mean, most, psnr] = loss(&waves, settings());
+        println!("waves: {mean:.2} degrees in the mean, {most:.1} at most, {psnr:.1} dB");
+        assert!(mean < 2.0 && psnr > 36.0, "{mean} degrees, {psnr} dB");
+        let noise = texture(128, 128, |x, y| [(x * 97 + y * 57) as u8, (x * 31 + y * y * 77) as u8, 200, 255]);
+        assert!(loss(&noise, settings())[0] > 4.0, "noise is lost");
+        let Some(folder) = std::env::var_os("BRICKWALK_SCENES") else {
+            println!("skipped: BRICKWALK_SCENES is not set");
+            return;
+        };
+        for (name, limit) in SPONZA_NORMALS {
+            let image = image::open(std::path::Path::new(&folder).join("sponza").join(name)).unwrap().into_rgba8();
+            let (width, height) = image.dimensions();
+            let texture = SourceTexture { name: name.into(), width, height, wrap: 0, rgba: image.into_raw() };
+            let [mean, most, psnr] = loss(&texture, settings());
+            println!("{name} {width} x {height}: {mean:.2} degrees in the mean, {most:.1} at most, {psnr:.1} dB");
+            assert!(mean < limit, "{mean} degrees");
+        }
     }
 
     #[test]

@@ -158,7 +158,7 @@ impl Source for Detailed {
         primitive.uvs1 = Some((0..vertices).map(|_| [random.next() as f32, 0.5]).collect());
         let mut tangent = |i: usize| {
             let [x, y, z] = random.point(1.0).map(|c| c as f32);
-            [x, y, z, if (i % 3 == 0) == self.turned { 1.0 } else { -1.0 }]
+            [x, y, z, if i.is_multiple_of(3) == self.turned { 1.0 } else { -1.0 }]
         };
         primitive.tangents = Some((0..primitive.indices.len()).map(&mut tangent).collect());
         Ok(Cow::Owned(primitive))

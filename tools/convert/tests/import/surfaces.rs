@@ -48,7 +48,7 @@ fn all_textures_with_their_sets_and_transformations() {
         },
         "normalTexture": {"index": 2, "scale": -0.5, "extensions": {"KHR_texture_transform": {"scale": [2, 4], "offset": [0.5, 0.25]}}},
         "occlusionTexture": {"index": 1, "strength": 0.25},
-        "emissiveTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1, "rotation": 1.5707963267948966}}},
+        "emissiveTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1, "rotation": std::f64::consts::FRAC_PI_2}}},
         "emissiveFactor": [1, 0.5, 0],
         "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}
     }))

@@ -93,11 +93,9 @@ impl Definition {
             "illum" => self.illumination = first.or(self.illumination),
             "d" => set_opacity(material, first),
             "Tr" => set_opacity(material, first.map(|transparency| 1.0 - transparency)),
-            "Tf" => {
-                // Exporters write white and black of opaque materials too.
-                if values().zip(values().skip(1)).any(|(a, b)| a != b) {
-                    self.warn("the tint of what is seen through it (Tf) is not read");
-                }
+            // Exporters write white and black of opaque materials too.
+            "Tf" if values().zip(values().skip(1)).any(|(a, b)| a != b) => {
+                self.warn("the tint of what is seen through it (Tf) is not read");
             }
             "Pr" => (material.roughness, self.has_roughness) = (first.map_or(material.roughness, unit), true),
             "Pm" => (material.metallic, self.has_metallic) = (first.map_or(material.metallic, unit), true),
