@@ -133,14 +133,15 @@ fn white_objects_vanish_in_a_uniform_environment_whatever_their_gloss() {
         let ways = [
             ("glossy,diffuse --diffuse-rays 1 --rotation full --spp 256", 0.005),
             ("environment,glossy --spp 512", 0.005),
+            ("environment,diffuse,glossy --diffuse-rays 2 --rotation full --spp 256", 0.005),
         ];
         for (effects, within) in ways {
             let found = seen(&scene, &format!("--effects {effects}"));
             println!("{what}: {found} by {effects}");
             assert!((found - 1.0).abs() < within, "{what}: {found} by {effects}");
         }
-        if roughness >= 0.7 {
-            // Up to a few times as noisy.
+        // Sharper lobes are seldom met that way.
+        if roughness >= 0.7 && coat == 0.0 {
             let found = seen(&scene, "--effects environment --spp 512");
             assert!((found - 1.0).abs() < 0.012, "{what}: {found} by rays to the environment alone");
         }
