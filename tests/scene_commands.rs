@@ -60,7 +60,7 @@ fn a_generated_scene_is_described_and_verified() {
     assert!(found.iter().all(|name| name.starts_with("city.")), "no temporary is left: {found:?}");
 
     let info: serde_json::Value = serde_json::from_str(&done(folder, "info city.bricks --json")).unwrap();
-    assert_eq!(info["format"], 3);
+    assert_eq!(info["format"], 4);
     let triangles = info["triangles_stored"].as_u64().unwrap();
     assert!((11_000..=12_000).contains(&triangles), "{triangles}");
     assert!(info["bricks"].as_u64().unwrap() >= triangles / 1000);

@@ -325,8 +325,8 @@ pub struct Material {
     pub uv_sets: u32,
     /// Zero.
     pub _reserved: u32,
-    /// Two rows a texture: coordinate = row[0] s + row[1] t + row[2] of the set's coordinates (s, t). The fourth of the first row is
-    /// the absolute determinant, by which areas grow; of the second row it is zero.
+    /// Two rows a texture: of the set's coordinates (s, t) the coordinate is a s + b t + c by a row (a, b, c, d). The fourth of the first
+    /// row is the absolute determinant, by which areas grow; of the second row it is zero.
     pub uv_from_set: [[f32; 4]; 2 * MATERIAL_TEXTURES],
 }
 
