@@ -84,7 +84,7 @@ pub fn listed(all: &[LeftOut], measured: &[Map<String, Value>]) -> Vec<Value> {
 }
 
 /// What a frame of `camera` takes as it is rendered and with each of `all` kept, turn by turn: medians of the milliseconds of
-/// [`REPETITIONS`] frames each, after one that is not counted. Nothing is stated of what kernels decide as they run.
+/// five frames each, after one that is not counted. Nothing is stated of what kernels decide as they run.
 ///
 /// # Errors
 /// The device's.
