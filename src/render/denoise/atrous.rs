@@ -17,12 +17,14 @@ pub struct Lit {
     pub color: [f32; 3],
     /// Variance of its luminance, of the estimate as it stands.
     pub variance: f32,
+    /// Whether samples are too few to tell it: then luminance tells nothing apart.
+    pub is_young: bool,
 }
 
-/// Weight of normals: cos^128 of the angle between them.
+/// Weight of normals: cos^32 of the angle between them.
 fn of_normals(a: &Seen, b: &Seen) -> f32 {
     let mut cosine = a.normal.dot(b.normal).max(0.0);
-    for _ in 0..7 {
+    for _ in 0..5 {
         cosine *= cosine;
     }
     cosine
@@ -40,7 +42,7 @@ fn smooth_variance(grid: &Grid, seen: &[Seen], lit: &[Lit], pixel: usize) -> f32
     sum / weights
 }
 
-/// One level. Pixels without variance around them stay as they are. `tolerance`: standard deviations of luminance that count as alike.
+/// One level. Pixels without variance around them stay as they are, but for young ones. `tolerance`: standard deviations of luminance that count as alike.
 pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32) -> Vec<Lit> {
     let step = 1i32 << level;
     grid.map(|pixel| {
@@ -49,10 +51,10 @@ pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32
             return own;
         }
         let variance = smooth_variance(grid, seen, lit, pixel);
-        if variance <= 0.0 {
+        if variance <= 0.0 && !own.is_young {
             return own;
         }
-        let per_luminance = 1.0 / (tolerance * variance.sqrt() + 1e-12);
+        let per_luminance = if own.is_young { 0.0 } else { 1.0 / (tolerance * variance.sqrt() + 1e-12) };
         let centre = luminance(own.color);
         let (x, y) = grid.position(pixel);
         let mut sum = [0.0f32; 3];
@@ -76,6 +78,7 @@ pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32
             weights += weight;
         }
         // The pixel itself has a weight of 9/64.
-        Lit { color: sum.map(|x| x / weights), variance: variances / (weights * weights) }
+        let (color, variance) = (sum.map(|x| x / weights), variances / (weights * weights));
+        Lit { color, variance, is_young: own.is_young }
     })
 }

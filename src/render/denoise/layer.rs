@@ -10,26 +10,31 @@ use super::{Moments, Seen, firefly, is_finite, lerp, luminance};
 const LONG: f32 = 12.0;
 /// Frames of the short average.
 const SHORT: f32 = 4.0;
+/// With fewer frames the variance of a lamp's light is that of the neighbourhood.
+const FEW: f32 = 2.0;
+/// Fewer free samples of a neighbourhood do not tell the variance of sparse light.
+const LEAST_FREEDOM: f64 = 40.0;
+/// What a frame leaves of the luminance that counted as brightest before it.
+const FADE: f32 = 0.8;
 
 /// How a kind of light is filtered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kind {
-    /// With fewer frames the variance is that of the neighbourhood.
-    few: f32,
-    /// The neighbourhood for that, pixels to each side.
+    /// The neighbourhood from which variance is taken where it is not of the pixel alone, pixels to each side.
     variance_radius: i32,
     /// Standard deviations of luminance that the filter takes as alike (σ_l of the paper).
     tolerance: f32,
-    /// Whether single pixels may be far brighter than what they stand for.
-    has_fireflies: bool,
+    /// Whether most of a pixel's samples may find nothing and a few much: then single pixels may be far brighter than what they stand for,
+    /// and those that are black are not for that certain to be. The neighbourhood's samples tell the variance of each.
+    is_sparse: bool,
 }
 
 impl Kind {
     /// The light of lamps: most of its variance in a neighbourhood is that of the edges of shadows, which are to stay, so that the
     /// variance over frames is taken as soon as there is one. Its samples are bounded by what shines: there are no fireflies.
-    pub const LAMPS: Self = Self { few: 2.0, variance_radius: 1, tolerance: 1.0, has_fireflies: false };
+    pub const LAMPS: Self = Self { variance_radius: 1, tolerance: 1.0, is_sparse: false };
     /// All other light.
-    pub const OTHER: Self = Self { few: 4.0, variance_radius: 3, tolerance: 4.0, has_fireflies: true };
+    pub const OTHER: Self = Self { variance_radius: 3, tolerance: 4.0, is_sparse: true };
 }
 
 /// What is kept of a pixel from frame to frame.
@@ -39,14 +44,16 @@ pub struct Past {
     pub averages: Averages,
     /// Of the luminance of single frames.
     pub moments: Moments,
+    /// The brightest luminance of single frames, uncut; it fades.
+    pub brightest: f32,
     /// Frames that the long average has, 0 where there is none.
     pub length: f32,
 }
 
 impl Past {
     fn is_finite(&self) -> bool {
-        let Self { averages, moments, length } = self;
-        let sum = moments.mean + moments.spread + moments.squares;
+        let Self { averages, moments, brightest, length } = self;
+        let sum = moments.mean + moments.spread + moments.squares + f64::from(*brightest);
         is_finite(&averages.long) && is_finite(&averages.short) && sum.is_finite() && length.is_finite()
     }
 }
@@ -91,6 +98,7 @@ fn recall(past: &[Past], taps: Option<&Taps>) -> Past {
         sum.averages.long = lerp(sum.averages.long, old.averages.long, share);
         sum.averages.short = lerp(sum.averages.short, old.averages.short, share);
         sum.length += share * (old.length - sum.length);
+        sum.brightest = sum.brightest.max(old.brightest);
         let rest = 1.0 - f64::from(share);
         let mut moments = Moments::default();
         moments.add(&sum.moments, rest);
@@ -125,6 +133,33 @@ fn variance_around(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, radi
     if count < 2 { 0.0 } else { squares.max(0.0) / (count - 1) as f32 }
 }
 
+/// Variance of the mean of a pixel whose single samples have the variance that those around it have, each about its own mean: a pixel
+/// that has seen nothing yet among others that have is not certain to be black. `None` where they are too few.
+fn variance_pooled(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, radius: i32) -> Option<f32> {
+    let (mut sum, mut freedom) = (0.0f64, 0.0f64);
+    for other in grid.around(pixel, radius).filter(|&other| seen[pixel].is_same_surface(&seen[other])) {
+        let moments = &past[other].moments;
+        if let Some(variance) = moments.variance() {
+            // Of n samples alike n - 1 are free, the share 1 - 1/n of them.
+            let free = 1.0 / moments.squares - 1.0;
+            sum += free * variance;
+            freedom += free;
+        }
+    }
+    (freedom >= LEAST_FREEDOM).then(|| (sum / freedom * past[pixel].moments.squares) as f32)
+}
+
+/// The variance of a pixel's average, and whether samples are too few to tell it.
+fn variance(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, kind: Kind) -> (f32, bool) {
+    let Past { moments, length, .. } = &past[pixel];
+    let of_time = match kind.is_sparse {
+        true => variance_pooled(grid, seen, past, pixel, kind.variance_radius),
+        false => moments.variance_of_mean().filter(|_| *length >= FEW).map(|variance| variance as f32),
+    };
+    let of_space = || variance_around(grid, seen, past, pixel, kind.variance_radius);
+    (of_time.unwrap_or_else(of_space), kind.is_sparse && of_time.is_none())
+}
+
 impl Layer {
     /// Takes the light of a frame, in which `taps` say where surfaces were before, and filters it.
     pub fn frame(
@@ -137,10 +172,14 @@ impl Layer {
     ) -> (Vec<[f32; 3]>, LayerReport) {
         let non_finite = self.past.iter().filter(|past| !past.is_finite()).count() as u64;
         let mut report = LayerReport { non_finite, ..LayerReport::default() };
-        let light = if kind.has_fireflies { cut(grid, seen, light, &mut report) } else { light };
-        let past = &self.past;
+        let mut known = grid.map(|pixel| recall(&self.past, taps[pixel].as_ref()));
+        let brightest: Vec<f32> = known.iter().map(|past| past.brightest).collect();
+        for (past, light) in known.iter_mut().zip(&light) {
+            past.brightest = (FADE * past.brightest).max(light.map_or(0.0, luminance));
+        }
+        let light = if kind.is_sparse { cut(grid, seen, light, &brightest, &mut report) } else { light };
         let mut now = grid.map(|pixel| match seen[pixel].is_hit() {
-            true => advanced(recall(past, taps[pixel].as_ref()), light[pixel]),
+            true => advanced(known[pixel], light[pixel]),
             false => Past::default(),
         });
         let averages: Vec<Averages> = now.iter().map(|past| past.averages).collect();
@@ -156,10 +195,8 @@ impl Layer {
         });
         now = steady;
         let lit = grid.map(|pixel| {
-            let Past { averages, moments, length } = now[pixel];
-            let of_time = moments.variance_of_mean().filter(|_| length >= kind.few).map(|variance| variance as f32);
-            let variance = of_time.unwrap_or_else(|| variance_around(grid, seen, &now, pixel, kind.variance_radius));
-            Lit { color: averages.long, variance }
+            let (variance, is_young) = variance(grid, seen, &now, pixel, kind);
+            Lit { color: now[pixel].averages.long, variance, is_young }
         });
         let mut filtered = atrous::level(grid, seen, &lit, 0, kind.tolerance);
         for (past, lit) in now.iter_mut().zip(&filtered) {
@@ -174,8 +211,14 @@ impl Layer {
 }
 
 /// Light without fireflies.
-fn cut(grid: &Grid, seen: &[Seen], light: Vec<Option<[f32; 3]>>, report: &mut LayerReport) -> Vec<Option<[f32; 3]>> {
-    let limits = grid.map(|pixel| firefly::limit(grid, seen, &light, pixel));
+fn cut(
+    grid: &Grid,
+    seen: &[Seen],
+    light: Vec<Option<[f32; 3]>>,
+    brightest: &[f32],
+    report: &mut LayerReport,
+) -> Vec<Option<[f32; 3]>> {
+    let limits = grid.map(|pixel| firefly::limit(grid, seen, &light, brightest, pixel));
     let mut cut = light;
     for ((light, limit), seen) in cut.iter_mut().zip(limits).zip(seen) {
         let Some(color) = light else { continue };

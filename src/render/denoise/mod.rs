@@ -10,6 +10,9 @@
 //! Welford's, weighted (West 1979), and it is that of the mean, which falls as samples come in, so that the filter narrows. The
 //! long average gives way to the short one as far as their difference over a neighbourhood is more than chance; differences in pairs
 //! leave out what the signal itself does there. Fireflies are cut at what their neighbours allow, and the energy cut off is reported.
+//! Light that comes by a bounce may be *sparse*: most samples of a pixel find none. So its variance is that of the samples of a
+//! neighbourhood, where they are too few to tell it geometry alone weights neighbours, and a bright sample is no firefly if
+//! there was another around it in the last frames.
 //!
 //! *Practice.* The filter runs on the host: one code for every device, with the same result for any number of threads. Around it go the
 //! sky, emission, and light on albedos below [`demodulate::LEAST_ALBEDO`], black among them. The order of a frame is that of
