@@ -48,7 +48,7 @@ BOUND = 0.01
 CONTROLS = {
     "albedo": ("every albedo 2 % higher", ("sun", "environment", "ao", "bounce")),
     "sun": ("the sun turned by 2 degrees about the vertical", ("sun", "bounce")),
-    "environment": ("the environment turned by 20 degrees about the vertical", ("environment", "bounce")),
+    "environment": ("the environment turned by 90 degrees about the vertical", ("environment", "bounce")),
 }
 COMPONENT = {5126: np.float32, 5125: np.uint32, 5123: np.uint16}
 
@@ -188,7 +188,7 @@ class Reference:
             }
         if case in ("environment", "bounce"):
             # Both look at an image's middle along -Z (this program) and +Z turned by half (Mitsuba).
-            turn = about_y([0, 1, 0], 180 + (20 if self.control == "environment" else 0))
+            turn = about_y([0, 1, 0], 180 + (90 if self.control == "environment" else 0))
             scene["environment"] = {"type": "envmap", "filename": str(environment), "to_world": turn}
         if case == "ao":
             scene["environment"] = {"type": "constant", "radiance": 1.0}
