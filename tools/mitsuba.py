@@ -7,15 +7,15 @@
 The scene is Sponza with a colour a material and neither textures nor normals, so that both shade the same surfaces. Cases: the
 sun alone, an environment alone, ambient occlusion, sun and environment with one bounce; three views of paths/. Pictures are kept in
 DIR and not made twice; Mitsuba's are kept 64 samples after 64 samples. A run that was interrupted is gone on with by the same command. One
-DIR is for one build of brickwalk: a new build needs a new DIR, or one without the folders CASE-VIEW-SPP.
+DIR is for one build of brickwalk: a new one needs a new DIR, or one without the folders CASE-VIEW-SPP.
 
 The table says, picture by picture: the relative difference of the means, and one standard error of Mitsuba's mean; that of the
 channel that differs most; of the mean of the worst tile of 20 x 20 pixels; of pixels on the average; HDR-FLIP (`brickwalk compare`); the
-seconds that each took. Tiles, pixels and FLIP have the noise of both pictures in them. The exit status is 1 where means differ by more
+seconds of processor time that each took. Tiles, pixels and FLIP have the noise of both pictures in them. The exit status is 1 where means differ by more
 than 1 %, and with --control where they do not.
 
-The variant llvm_ad_rgb needs a libLLVM.so of version 15 or later, found by the system or named in DRJIT_LIBLLVM_PATH, and is 10 to 30
-times as fast as scalar_rgb. With LLVM 15 and 16 it failed ("Cannot select"), with 19 (Debian's libllvm19) it works.
+The variant llvm_ad_rgb is 10 to 30 times as fast as scalar_rgb. It needs a libLLVM.so, which the system finds or DRJIT_LIBLLVM_PATH names: 15
+and 16 fail ("Cannot select"), 19.1 (Debian's libllvm19) works.
 """
 
 import argparse
@@ -23,6 +23,7 @@ import functools
 import json
 import os
 import pathlib
+import resource
 import subprocess
 import sys
 import time
@@ -47,7 +48,7 @@ BOUND = 0.01
 CONTROLS = {
     "albedo": ("every albedo 2 % higher", ("sun", "environment", "ao", "bounce")),
     "sun": ("the sun turned by 2 degrees about the vertical", ("sun", "bounce")),
-    "environment": ("the environment turned by 20 degrees about the vertical", ("environment", "bounce")),
+    "environment": ("the environment turned by 90 degrees about the vertical", ("environment", "bounce")),
 }
 COMPONENT = {5126: np.float32, 5125: np.uint32, 5123: np.uint16}
 
@@ -187,7 +188,7 @@ class Reference:
             }
         if case in ("environment", "bounce"):
             # Both look at an image's middle along -Z (this program) and +Z turned by half (Mitsuba).
-            turn = about_y([0, 1, 0], 180 + (20 if self.control == "environment" else 0))
+            turn = about_y([0, 1, 0], 180 + (90 if self.control == "environment" else 0))
             scene["environment"] = {"type": "envmap", "filename": str(environment), "to_world": turn}
         if case == "ao":
             scene["environment"] = {"type": "constant", "radiance": 1.0}
@@ -218,9 +219,9 @@ def theirs(make_reference, case, view, environment, spp, base):
         if pictures is None:
             reference = make_reference()
             pictures = reference.scene(case, view, environment)
-        start = time.monotonic()
+        start = time.process_time()
         picture = reference.render(pictures, number)
-        seconds += time.monotonic() - start
+        seconds += time.process_time() - start
         total += picture
         means.append(picture.mean())
         complete(kept, lambda path: np.savez(path, total=total, means=means, seconds=seconds))
@@ -239,6 +240,12 @@ LIGHT = {
 }
 
 
+def processor_time():
+    """Seconds of processor time that programs started from here took."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def ours(binary, bricks, case, view, environment, white, spp, folder):
     """The picture of `brickwalk walk`, and the seconds that it took; made if `folder` has none."""
     picture, took = folder / "frames" / "0000.exr", folder / "seconds"
@@ -249,9 +256,9 @@ def ours(binary, bricks, case, view, environment, white, spp, folder):
             words += ["--environment", environment]
         if case == "ao":
             words += ["--environment", white]
-        start = time.monotonic()
+        start = processor_time()
         subprocess.run([str(word) for word in words], check=True, stdout=sys.stderr)
-        complete(took, lambda path: path.write_text(f"{time.monotonic() - start:.1f}\n"))
+        complete(took, lambda path: path.write_text(f"{processor_time() - start:.1f}\n"))
     return picture, float(took.read_text())
 
 
@@ -344,10 +351,13 @@ def main():
             failed += (abs(mean) <= BOUND) == bool(options.control)
             columns = [case, view, *columns, f"{seconds:.0f}", f"{reference_seconds:.0f}"]
             print(f"| {' | '.join(columns)} |", flush=True)
-    expected = "more than" if options.control else "at most"
-    print(f"{failed} of {len(options.cases) * len(options.views)} means do not differ by {expected} 1 %", file=sys.stderr)
+    count = len(options.cases) * len(options.views)
+    print(f"{count - failed} of {count} means differ by {'more than' if options.control else 'at most'} 1 %", file=sys.stderr)
     return 1 if failed else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the same command goes on")
