@@ -7,6 +7,7 @@
 #include "shared/texels.wgsl"
 #include "shared/sampling.wgsl"
 #include "shared/bc7.wgsl"
+#include "shared/bc5.wgsl"
 #include "shared/texture.wgsl"
 #include "shared/material.wgsl"
 

@@ -9,7 +9,7 @@ use brickwalk::app::session::{Session, open_scene};
 use brickwalk::app::walk::renderer;
 use brickwalk::kernel::Extent;
 use brickwalk::scene::Camera;
-use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::build::{BuildSettings, TextureEncoding, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene, SourceTexture};
 use clap::Parser;
@@ -39,6 +39,11 @@ struct Sheet {
 
 /// The red radiance of a picture straight down, or up, on the point x, 0, 0.
 fn seen(sheet: &Sheet, x: f64, from_below: bool, options: &str) -> Vec<f32> {
+    seen_as(TextureEncoding::Raw, sheet, x, from_below, options)
+}
+
+/// The same with textures stored in some way.
+fn seen_as(textures: TextureEncoding, sheet: &Sheet, x: f64, from_below: bool, options: &str) -> Vec<f32> {
     let primitive = Primitive {
         material: 0,
         positions: vec![[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]],
@@ -61,11 +66,7 @@ fn seen(sheet: &Sheet, x: f64, from_below: bool, options: &str) -> Vec<f32> {
     };
     let folder = common::folder();
     let path = folder.path().join("scene.bricks");
-    let settings = BuildSettings {
-        instance_min_triangles: 1,
-        textures: brickwalk_convert::build::TextureEncoding::Raw,
-        ..BuildSettings::default()
-    };
+    let settings = BuildSettings { instance_min_triangles: 1, textures, ..BuildSettings::default() };
     build(source, &settings, &path, &Progress::hidden()).expect("a scene");
     let words = format!("brickwalk walk s -o o --size {SIDE}x{SIDE} --adapter cpu --cache 100% --frames 1 {options}");
     let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
@@ -129,6 +130,29 @@ fn normals_are_turned_by_their_texture_on_either_side_and_on_mirrored_things() {
     let truth = straight * normal.dot(DVec3::from_array(SUN));
     let found = mean(&seen(&scaled, 0.0, false, &sun(1.0)));
     assert!((found - truth).abs() < 2e-4 && (truth / straight - SUN[1]).abs() > 0.01, "{found} instead of {truth}");
+}
+
+/// As blocks, normals lose their length and half a step of 1 / 127.5 in x and y, and z follows: within 0.01 along any direction here.
+#[test]
+fn normals_of_blocks_are_those_of_their_texels() {
+    let plain = sheet(WHITE, texture([255; 3], [255; 3]));
+    let options = format!("{BY_SUN} --sun {},{},{}", SUN[0], SUN[1], SUN[2]);
+    let straight = mean(&seen(&plain, 0.0, false, &options)) / SUN[1];
+    // Of a length of 1, 0.8 and 1.2, and with z below zero, which is taken without its sign.
+    for texel in [[171u8, 90, 240], [162, 98, 212], [180, 82, 255], [171, 90, 15]] {
+        let n = texel.map(|c| f64::from(c) / 255.0 * 2.0 - 1.0);
+        let n = DVec3::new(n[0], n[1], n[2].abs()).normalize();
+        let one = sheet(Material { normal_texture: 0, ..WHITE }, texture(texel, texel));
+        let found = mean(&seen_as(TextureEncoding::Bc7, &one, 0.0, false, &options)) / straight;
+        // Tangent along x, bitangent along z.
+        let along = |[x, y, z]: [f64; 3]| DVec3::new(x, z, y).dot(DVec3::from_array(SUN));
+        let truth = along(n.to_array());
+        assert!((found - truth).abs() < 0.01, "{texel:?}: {found} instead of {truth}");
+        // Controls: x and y exchanged, and z left out.
+        for other in [[n.y, n.x, n.z], [n.x, n.y, 0.0]] {
+            assert!((found - along(other)).abs() > 0.03, "{texel:?}: {found}, {other:?}");
+        }
+    }
 }
 
 #[test]

@@ -408,6 +408,8 @@ pub const WRAP_MIRROR: u32 = 2;
 pub const TEXTURE_RGBA8: u32 = 0;
 /// [`Texture::encoding`]: BC7 blocks of 4 x 4 texels, 16 bytes each.
 pub const TEXTURE_BC7: u32 = 1;
+/// [`Texture::encoding`]: BC5 blocks of 4 x 4 texels, 16 bytes each: x and y of unit vectors whose z is not negative.
+pub const TEXTURE_BC5: u32 = 2;
 
 /// [`Texture::flags`]: red, green and blue are sRGB; else they are linear. Alpha always is.
 pub const TEXTURE_SRGB: u32 = 1;
@@ -424,9 +426,9 @@ pub struct Texture {
     pub levels: u32,
     /// `WRAP_*` of s in the low half, of t in the high half.
     pub wrap: u32,
-    /// `TEXTURE_RGBA8` or `TEXTURE_BC7`.
+    /// `TEXTURE_RGBA8`, `TEXTURE_BC7` or `TEXTURE_BC5`.
     pub encoding: u32,
-    /// `TEXTURE_SRGB` or 0.
+    /// `TEXTURE_SRGB` or 0; 0 with `TEXTURE_BC5`.
     pub flags: u32,
     /// First tile of level 0; the tiles of a texture are contiguous.
     pub first_tile: u32,

@@ -6,9 +6,9 @@
 //! ([`crate::Payload::Texture`]) that is meant to stay resident: whatever tiles are missing, there is a coarsest answer.
 //!
 //! Texels of a tile, and of a level of the tail, lie on a grid of whole blocks of [`BLOCK_TEXELS`] each way: [`crate::TEXTURE_RGBA8`]
-//! row by row, [`TEXTURE_BC7`] block row by block row.
+//! row by row, [`TEXTURE_BC7`] and [`TEXTURE_BC5`] block row by block row.
 
-use crate::records::{TEXTURE_BC7, Texture};
+use crate::records::{TEXTURE_BC5, TEXTURE_BC7, Texture};
 
 /// Side of a tile in texels.
 pub const TILE_TEXELS: u32 = 128;
@@ -19,7 +19,7 @@ pub const BLOCK_TEXELS: u32 = 4;
 /// Bytes of `width` by `height` texels, multiples of [`BLOCK_TEXELS`].
 fn grid_bytes(encoding: u32, width: u32, height: u32) -> u64 {
     let texels = u64::from(width) * u64::from(height);
-    if encoding == TEXTURE_BC7 { texels } else { 4 * texels }
+    if [TEXTURE_BC7, TEXTURE_BC5].contains(&encoding) { texels } else { 4 * texels }
 }
 
 /// Which part of its texture a tile is.
@@ -92,7 +92,11 @@ impl Texture {
 
     /// The name of the encoding.
     pub fn encoding_name(&self) -> &'static str {
-        if self.encoding == TEXTURE_BC7 { "bc7" } else { "raw" }
+        match self.encoding {
+            TEXTURE_BC7 => "bc7",
+            TEXTURE_BC5 => "bc5",
+            _ => "raw",
+        }
     }
 }
 
@@ -125,7 +129,8 @@ mod tests {
         // Levels of 5 by 3, 2 by 1 and 1 by 1 on grids of 8 by 4 and twice 4 by 4.
         assert_eq!(texture(5, 3, TEXTURE_RGBA8).tail_bytes(), 4 * (32 + 16 + 16));
         assert_eq!(texture(5, 3, TEXTURE_BC7).tail_bytes(), 32 + 16 + 16);
-        assert_eq!(texture(5, 3, TEXTURE_RGBA8).tile_bytes(), 65536);
-        assert_eq!(texture(5, 3, TEXTURE_BC7).tile_bytes(), 16384);
+        assert_eq!(texture(5, 3, TEXTURE_BC5).tail_bytes(), 32 + 16 + 16);
+        let bytes = [TEXTURE_RGBA8, TEXTURE_BC7, TEXTURE_BC5].map(|encoding| texture(5, 3, encoding).tile_bytes());
+        assert_eq!(bytes, [65536, 16384, 16384]);
     }
 }

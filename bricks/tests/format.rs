@@ -222,7 +222,7 @@ fn payloads_are_those_of_the_page() {
         assert_eq!(detailed.bytes, detailed.details + 9 * 16);
     }
     assert_eq!((TILE_TEXELS, BLOCK_TEXELS), (128, 4));
-    assert_eq!((TEXTURE_RGBA8, TEXTURE_BC7, TEXTURE_SRGB), (0, 1, 1));
+    assert_eq!((TEXTURE_RGBA8, TEXTURE_BC7, TEXTURE_BC5, TEXTURE_SRGB), (0, 1, 2, 1));
     assert_eq!((BASE_COLOR, NORMAL, METALLIC_ROUGHNESS, OCCLUSION, EMISSIVE), (0, 1, 2, 3, 4));
     assert_eq!((LIGHT_POINT, LIGHT_SPOT, LIGHT_DISTANT, BRICK_DETAIL), (0, 1, 2, 8));
 }

@@ -130,6 +130,8 @@ fn tiles() {
     refused(Part::Section(Tiles), "3 tiles", |r| r.tiles.push(r.tiles[0]));
     refused(Part::Payload(Payload::Tile(1)), "16400 bytes", |r| r.tiles[1].bytes += 16);
     refused(Part::Payload(Payload::Texture(1)), "544 bytes", |r| r.textures[1].encoding = TEXTURE_RGBA8);
+    refused(record(Textures, 0), "sRGB in BC5", |r| r.textures[0].encoding = TEXTURE_BC5);
+    refused(record(Textures, 1), "encoding 3", |r| r.textures[1].encoding = 3);
     refused(Part::Section(Manifest), "1 names of textures", |r| r.manifest.texture_names.truncate(1));
 }
 

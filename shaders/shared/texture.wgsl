@@ -92,7 +92,7 @@ fn level_at(t: Texture, number: u32, uv: vec2<f32>) -> Level {
     level.offset = t.tail_offset;
     for (var l = t.tail_level; l < number; l++) {
         let padded = (size_of(t, l) + 3u) & vec2<u32>(0xfffffffcu);
-        level.offset += select(padded.x * padded.y, padded.x * padded.y / 4u, t.encoding == TEXTURE_BC7);
+        level.offset += select(padded.x * padded.y / 4u, padded.x * padded.y, t.encoding == TEXTURE_RGBA8);
     }
     level.pitch = (size.x + 3u) & 0xfffffffcu;
     return level;
@@ -129,8 +129,8 @@ fn texel_at(t: Texture, level: Level, k: u32) -> vec4<f32> {
         start = slot.offset;
         page = slot.page;
     }
-    let is_bc7 = t.encoding == TEXTURE_BC7;
-    let at = start + select((y * pitch + x) / 4u, (y / 4u) * (pitch / 4u) + x / 4u, is_bc7);
+    let is_raw = t.encoding == TEXTURE_RGBA8;
+    let at = start + select((y / 4u) * (pitch / 4u) + x / 4u, (y * pitch + x) / 4u, is_raw);
     var four: vec4<u32>;
     if is_tiled {
         four = cache_vec4(page, at);
@@ -138,8 +138,10 @@ fn texel_at(t: Texture, level: Level, k: u32) -> vec4<f32> {
         four = texel_vec4(page, at);
     }
     var word = four[x & 3u];
-    if is_bc7 {
+    if t.encoding == TEXTURE_BC7 {
         word = bc7_texel(four, (x & 3u) + 4u * (y & 3u));
+    } else if t.encoding == TEXTURE_BC5 {
+        word = bc5_texel(four, (x & 3u) + 4u * (y & 3u));
     }
     let c = unpack4x8unorm(word);
     return vec4<f32>(select(c.rgb, linear_from_srgb(c.rgb), (t.flags & TEXTURE_SRGB) != 0u), c.a);

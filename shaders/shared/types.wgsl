@@ -235,7 +235,7 @@ struct Texture {
     height: u32,
     levels: u32,
     wrap: u32,            // WRAP_* of s in the low half, of t in the high half
-    encoding: u32,        // TEXTURE_RGBA8 or TEXTURE_BC7
+    encoding: u32,        // TEXTURE_RGBA8, TEXTURE_BC7 or TEXTURE_BC5
     flags: u32,           // TEXTURE_SRGB
     first_tile: u32,      // of level 0; the tiles of a level follow each other row by row, and so do levels
     tail_level: u32,      // the first of the levels that are resident throughout
@@ -316,7 +316,9 @@ const OCCLUSION: u32 = 3u;
 const EMISSIVE: u32 = 4u;
 const MATERIAL_TEXTURES: u32 = 5u;
 const REFLECTANCE_SIZE: u32 = 32u; // rows and columns of the table of reflectances
-const TEXTURE_BC7: u32 = 1u;       // encoding: blocks; else RGBA8
+const TEXTURE_RGBA8: u32 = 0u;     // encoding: texels; else blocks
+const TEXTURE_BC7: u32 = 1u;
+const TEXTURE_BC5: u32 = 2u;       // x and y of directions
 const TEXTURE_SRGB: u32 = 1u;      // flags: red, green and blue are sRGB, else linear
 const TILE_TEXELS: u32 = 128u;     // side of a tile
 const BINARY_LEAF: u32 = 0x80000000u;

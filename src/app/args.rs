@@ -114,7 +114,7 @@ pub struct ConvertArgs {
     /// How to cut and round.
     #[command(flatten)]
     pub build: BuildArgs,
-    /// How textures are stored: bc7 (blocks, a byte a texel, the loss measured in benches/results/textures.md) or raw (RGBA8, four bytes)
+    /// How textures are stored: bc7 (blocks, a byte a texel, of BC5 for normals, the loss measured in benches/results/textures.md) or raw (RGBA8, four bytes)
     #[arg(long, value_name = "ENCODING", value_enum, default_value = "bc7")]
     pub textures: Textures,
     /// What becomes of triangles and meshes.

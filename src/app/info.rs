@@ -107,7 +107,7 @@ struct Info<'a> {
     textures: usize,
     /// Tiles of their levels that are streamed.
     texture_tiles: usize,
-    /// How textures are stored, each encoding once: bc7, raw.
+    /// How textures are stored, each encoding once: bc5, bc7, raw.
     texture_encodings: Vec<&'static str>,
     has_textures: bool,
     has_normal_maps: bool,

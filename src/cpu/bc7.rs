@@ -57,7 +57,7 @@ const WEIGHTS: [u32; 7] = [
 
 /// `count` <= 8 bits from bit `at` < 128 on.
 #[inline(always)]
-fn bits(block: u128, at: u32, count: u32) -> u32 {
+pub fn bits(block: u128, at: u32, count: u32) -> u32 {
     (block >> at) as u32 & ((1 << count) - 1)
 }
 

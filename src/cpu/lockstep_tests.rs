@@ -140,6 +140,8 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
     assert!(scene.resident().manifest.has_textures && scene.resident().instances.len() == 3);
     assert_eq!(scene.resident().opacity_maps.len(), 2);
     assert_eq!(scene.resident().tiles.len() > 50, tiled);
+    let has = |encoding| scene.resident().textures.iter().any(|texture| texture.encoding == encoding);
+    assert!(has(bricks::TEXTURE_BC5) && has(bricks::TEXTURE_BC7));
     Arc::new(scene)
 }
 

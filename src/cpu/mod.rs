@@ -11,6 +11,7 @@
 //! Geometry and attributes of resident bricks are the verified bytes that a worker read, shared with the host cache: a brick
 //! is traversed where it lies. Slots only say what the budget holds.
 
+mod bc5;
 mod bc7;
 pub mod brick;
 pub mod cache;

@@ -1,10 +1,10 @@
 //! Lookups in textures that are cut into tiles: twin of `shaders/shared/texture.wgsl`.
 
-use super::bc7;
 use super::resolve::unpack4x8unorm;
 use super::sample::Sampling;
 use super::vector::mix;
-use crate::kernel::layout::{NONE, TEXTURE_BC7, TEXTURE_SRGB, TILE_TEXELS, Texture};
+use super::{bc5, bc7};
+use crate::kernel::layout::{NONE, TEXTURE_BC5, TEXTURE_RGBA8, TEXTURE_SRGB, TILE_TEXELS, Texture};
 use std::sync::LazyLock;
 
 /// One level of a texture around a lookup.
@@ -108,7 +108,7 @@ pub fn level_at(t: &Texture, number: u32, uv: [f32; 2]) -> Level {
     level.offset = t.tail_offset;
     for l in t.tail_level..number {
         let [width, height] = size_of(t, l).map(|side| side.next_multiple_of(4));
-        level.offset += if t.encoding == TEXTURE_BC7 { width * height / 4 } else { width * height };
+        level.offset += if t.encoding == TEXTURE_RGBA8 { width * height } else { width * height / 4 };
     }
     level.pitch = size[0].next_multiple_of(4);
     level
@@ -140,12 +140,13 @@ fn texel_at(t: &Texture, level: &Level, k: usize, from: Sampling) -> [f32; 4] {
     } else {
         (&from.texels.tails[level.page as usize][level.offset as usize..], level.pitch)
     };
-    let word = if t.encoding == TEXTURE_BC7 {
+    let word = if t.encoding == TEXTURE_RGBA8 {
+        words[(y * pitch + x) as usize]
+    } else {
         let block = ((y / 4) * (pitch / 4) + x / 4) as usize;
         let four = &words[4 * block..4 * block + 4];
-        bc7::texel([four[0], four[1], four[2], four[3]], (x & 3) + 4 * (y & 3))
-    } else {
-        words[(y * pitch + x) as usize]
+        let decode = if t.encoding == TEXTURE_BC5 { bc5::texel } else { bc7::texel };
+        decode([four[0], four[1], four[2], four[3]], (x & 3) + 4 * (y & 3))
     };
     let mut color = unpack4x8unorm(word);
     if t.flags & TEXTURE_SRGB != 0 {

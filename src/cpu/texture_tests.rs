@@ -1,9 +1,9 @@
-//! Texture lookups against the BC7 decoder of another library, naive bilinear lookups in f64, and heavily supersampled pictures.
+//! Texture lookups against the decoder of another library, naive bilinear lookups in f64, and heavily supersampled pictures.
 
-use super::bc7;
 use super::resolve::footprint_of;
 use super::sample::{Sampling, Texels, TileDemand, look_up};
 use super::texture::{Levels, color_at, level_at, levels_of, tile_at};
+use super::{bc5, bc7};
 use crate::kernel::layout::{GBUFFER_FIRST, GBUFFER_READ, GBuffer, NONE, Params, Ray, Surface};
 use block_compression::decode::decompress_blocks_as_rgba8;
 use block_compression::{BC7Settings, CompressionVariant};
@@ -16,8 +16,11 @@ use std::f64::consts::TAU;
 
 /// Blocks in rows of `width` texels by the other library.
 fn decoded(blocks: &[u8], width: u32, height: u32) -> Vec<u8> {
+    decoded_as(CompressionVariant::BC7(BC7Settings::opaque_ultra_fast()), blocks, width, height)
+}
+
+fn decoded_as(variant: CompressionVariant, blocks: &[u8], width: u32, height: u32) -> Vec<u8> {
     let mut rgba = vec![0; (4 * width * height) as usize];
-    let variant = CompressionVariant::BC7(BC7Settings::opaque_ultra_fast());
     decompress_blocks_as_rgba8(variant, width, height, blocks, &mut rgba);
     rgba
 }
@@ -49,6 +52,62 @@ fn blocks_of_all_modes_decode_as_another_library_does() {
         }
     }
     assert!(other > 500, "{other}");
+}
+
+/// Texels of a block of BC5 in f64 by the words of its specification and of `bricks/FORMAT.md`.
+fn direction_of(block: &[u8; 16], texel: usize) -> [u8; 4] {
+    let channel = |half: &[u8]| {
+        let [e0, e1] = [half[0], half[1]].map(f64::from);
+        let bit = |i: usize| usize::from(half[2 + i / 8] >> (i % 8) & 1);
+        let index = bit(3 * texel) + 2 * bit(3 * texel + 1) + 4 * bit(3 * texel + 2);
+        let values = if e0 > e1 {
+            [7.0, 0.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0].map(|w| (w * e0 + (7.0 - w) * e1) / 7.0)
+        } else {
+            let [a, b, c, d] = [4.0, 3.0, 2.0, 1.0].map(|w| (w * e0 + (5.0 - w) * e1) / 5.0);
+            [e0, e1, a, b, c, d, 0.0, 255.0]
+        };
+        values[index].round()
+    };
+    let [x, y] = [channel(&block[..8]), channel(&block[8..])];
+    let rest = 1.0 - (x / 127.5 - 1.0).powi(2) - (y / 127.5 - 1.0).powi(2);
+    // Nothing lies close to the middle of two bytes but what lies there, where z is 0.
+    let z = (127.5 + 127.5 * rest.max(0.0).sqrt() + 1e-6).round();
+    [x as u8, y as u8, z as u8, 255]
+}
+
+#[test]
+fn blocks_of_directions_decode_as_their_definition_says() {
+    let mut rng = Rng::new(43, &[]);
+    let (mut exchanged, mut apart) = (0, 0);
+    for number in 0..2000 {
+        let mut block: [u8; 16] = std::array::from_fn(|_| rng.int(0, 255) as u8);
+        if number % 50 == 0 {
+            block[1] = block[0];
+        }
+        let words =
+            |block: &[u8; 16]| [0, 1, 2, 3].map(|w| u32::from_le_bytes(block[4 * w..4 * w + 4].try_into().unwrap()));
+        let mut other = block;
+        other.swap(0, 1);
+        let found = decoded_as(CompressionVariant::BC5, &block, 4, 4);
+        for texel in 0..16 {
+            let own = bc5::texel(words(&block), texel as u32).to_le_bytes();
+            let expected = direction_of(&block, texel);
+            assert_eq!(own, expected, "block {block:02x?}, texel {texel}");
+            // The other library rounds down.
+            let steps = [0, 1].map(|k| own[k].wrapping_sub(found[4 * texel + k]));
+            assert!(steps.iter().all(|&step| step <= 1), "block {block:02x?}, texel {texel}: {steps:?}");
+            // Control: endpoints the other way round are noticed, and so is rounding down.
+            exchanged += u32::from(bc5::texel(words(&other), texel as u32).to_le_bytes() != expected);
+            apart += u32::from(steps != [0; 2]);
+        }
+    }
+    assert!(exchanged > 25_000 && apart > 8000, "{exchanged} {apart}");
+    // Every direction: of all bytes of x and y.
+    for (x, y) in (0..=255u8).flat_map(|y| (0..=255).map(move |x| (x, y))) {
+        let block: [u8; 16] = std::array::from_fn(|i| [x, x, 0, 0, 0, 0, 0, 0, y, y, 0, 0, 0, 0, 0, 0][i]);
+        let words = [u32::from(x) * 0x101, 0, u32::from(y) * 0x101, 0];
+        assert_eq!(bc5::texel(words, 7).to_le_bytes(), direction_of(&block, 7), "{x}, {y}");
+    }
 }
 
 /// A scene of one triangle with textures of sizes and ways to wrap of their own.

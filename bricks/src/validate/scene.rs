@@ -9,7 +9,9 @@ use crate::records::{
     BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, LIGHT_DISTANT, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED,
 };
 use crate::records::{MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE};
-use crate::records::{MAX_TRIANGLE_IDS, Material, NONE, STEP_UNIT_LOG2, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB};
+use crate::records::{
+    MAX_TRIANGLE_IDS, Material, NONE, STEP_UNIT_LOG2, TEXTURE_BC5, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB,
+};
 use crate::resident::Resident;
 
 /// Every brick belongs to one object, whose bricks are contiguous.
@@ -186,10 +188,13 @@ pub(super) fn textures(resident: &Resident) -> Result<(), Flaw> {
         rule(texture.wrap & 0xffff <= WRAP_MIRROR && texture.wrap >> 16 <= WRAP_MIRROR, part, || {
             (format!("wrap {:#x}", texture.wrap), "known ways of wrapping")
         })?;
-        rule([TEXTURE_RGBA8, TEXTURE_BC7].contains(&texture.encoding), part, || {
+        rule([TEXTURE_RGBA8, TEXTURE_BC7, TEXTURE_BC5].contains(&texture.encoding), part, || {
             (format!("encoding {}", texture.encoding), "a known one")
         })?;
         rule(texture.flags & !TEXTURE_SRGB == 0, part, || (format!("flags {:#x}", texture.flags), "known flags"))?;
+        rule(texture.encoding != TEXTURE_BC5 || texture.flags & TEXTURE_SRGB == 0, part, || {
+            ("sRGB in BC5".to_owned(), "BC5 of directions, which are linear")
+        })?;
         let own = (u64::from(texture.first_tile), u64::from(texture.tile_count));
         rule(own == (tiles, texture.expected_tiles()), part, || {
             let expected = format!("{} from {tiles} on, as its size says", texture.expected_tiles());

@@ -10,7 +10,7 @@ const LARGEST_BRICK: u32 = 1 << 20;
 /// How textures are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TextureEncoding {
-    /// As blocks of BC7, a byte a texel.
+    /// As blocks of BC7, normals as blocks of BC5, a byte a texel.
     #[default]
     Bc7,
     /// As they are, four bytes a texel.

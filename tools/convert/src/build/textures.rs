@@ -9,7 +9,7 @@ use crate::source::{Outline, Source, SourceTexture};
 use block_compression::encode::compress_rgba8;
 use block_compression::{BC7Settings, CompressionVariant};
 use bricks::{BLOCK_TEXELS, MATERIAL_TEXTURES, MAX_TEXTURE_SIZE, Material, NONE, Span, TILE_TEXELS, Texture, Writer};
-use bricks::{TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
+use bricks::{TEXTURE_BC5, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -216,7 +216,7 @@ pub(super) fn sound_wrap(texture: &SourceTexture) -> u32 {
 
 /// Makes the mip chain of a texture and encodes it.
 ///
-/// Normals are stored as BC7 too: see `benches/results/textures.md` for the angles that it costs.
+/// As blocks, normals are BC5: unit vectors without the sign of z. See `benches/results/textures.md` for the angles that it costs.
 pub(super) fn encode(
     source: &SourceTexture,
     content: Content,
@@ -240,16 +240,22 @@ pub(super) fn encode(
     }
     let (encoding, grid) = match encoding {
         TextureEncoding::Raw => (TEXTURE_RGBA8, None),
+        TextureEncoding::Bc7 if content == Content::Normals => (TEXTURE_BC5, Some(CompressionVariant::BC5)),
         // The fastest settings: the next ones take six times as long.
         TextureEncoding::Bc7 if texels.iter().skip(3).step_by(4).all(|&alpha| alpha == 255) => {
-            (TEXTURE_BC7, Some(BC7Settings::opaque_ultra_fast()))
+            (TEXTURE_BC7, Some(CompressionVariant::BC7(BC7Settings::opaque_ultra_fast())))
         }
-        TextureEncoding::Bc7 => (TEXTURE_BC7, Some(BC7Settings::alpha_ultrafast())),
+        TextureEncoding::Bc7 => (TEXTURE_BC7, Some(CompressionVariant::BC7(BC7Settings::alpha_ultrafast()))),
     };
     let flags = if content == Content::Color { TEXTURE_SRGB } else { 0 };
     let mut record = Texture { width, height, levels, wrap, encoding, flags, ..Texture::default() };
     let (mut tiles, mut tail) = (Vec::new(), Vec::new());
     let mut level = Image { width: width as usize, height: height as usize, texels: content.decode(&texels) };
+    if encoding == TEXTURE_BC5 {
+        // Unit vectors.
+        texels.clear();
+        content.encode(&level, &mut texels);
+    }
     for number in 0..levels {
         if number > 0 {
             level = level.halve();
@@ -290,12 +296,12 @@ fn cut(rgba: &[u8], size: [u32; 2], corner: [u32; 2], to: [u32; 2]) -> Vec<u8> {
     out
 }
 
-/// Texels in rows of `width`, as blocks if there are settings for them.
-fn encode_grid(rgba: Vec<u8>, width: u32, settings: Option<BC7Settings>) -> Vec<u8> {
-    let Some(settings) = settings else { return rgba };
+/// Texels in rows of `width`, as blocks if there is a kind of them.
+fn encode_grid(rgba: Vec<u8>, width: u32, blocks_of: Option<CompressionVariant>) -> Vec<u8> {
+    let Some(variant) = blocks_of else { return rgba };
     let mut blocks = vec![0; rgba.len() / 4];
     let height = (rgba.len() / 4) as u32 / width;
-    compress_rgba8(CompressionVariant::BC7(settings), &rgba, &mut blocks, width, height, 4 * width);
+    compress_rgba8(variant, &rgba, &mut blocks, width, height, 4 * width);
     blocks
 }
 
@@ -428,9 +434,9 @@ mod tests {
     use super::*;
     use block_compression::decode::decompress_blocks_as_rgba8;
 
-    /// Normal textures of Sponza, and above what they lose, degrees: two smooth ones and the roughest.
+    /// Normal textures of Sponza, and what they lose less than as BC5, degrees: two smooth ones and the roughest.
     const SPONZA_NORMALS: [(&str, f64); 3] =
-        [("8773302468495022225.jpg", 2.0), ("14267839433702832875.jpg", 3.0), ("14118779221266351425.jpg", 12.0)];
+        [("8773302468495022225.jpg", 1.0), ("14267839433702832875.jpg", 2.0), ("14118779221266351425.jpg", 5.0)];
 
     fn texture(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> SourceTexture {
         let rgba = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
@@ -510,12 +516,52 @@ mod tests {
         assert_eq!(sets, [0b11, 0b1100, 0b1_0001, 1, 0], "sets of textures alone");
     }
 
-    /// Angles between directions and what BC7 makes of them, in degrees: mean and greatest; and the PSNR of red, green and blue.
-    fn loss(texture: &SourceTexture, settings: BC7Settings) -> [f64; 3] {
+    const BC7: fn() -> CompressionVariant = || CompressionVariant::BC7(BC7Settings::opaque_ultra_fast());
+
+    /// RGBA8 of a texture of whole blocks that is encoded at once.
+    fn decoded(blocks: &[u8], width: u32, variant: CompressionVariant) -> Vec<u8> {
+        let mut rgba = vec![0; 4 * blocks.len()];
+        let height = blocks.len() as u32 / width;
+        if variant != CompressionVariant::BC5 {
+            decompress_blocks_as_rgba8(variant, width, height, blocks, &mut rgba);
+            return rgba;
+        }
+        // As `bricks/FORMAT.md` says, in f64.
+        for (number, block) in (0..).zip(blocks.as_chunks::<16>().0) {
+            let bits = u128::from_le_bytes(*block);
+            for texel in 0..16 {
+                let [x, y] = [0, 64].map(|at| {
+                    let [first, last] = [at, at + 8].map(|at| f64::from((bits >> at) as u8));
+                    let index = (bits >> (at + 16 + 3 * texel)) as u32 & 7;
+                    let share = f64::from([0, 7].get(index as usize).copied().unwrap_or(index.wrapping_sub(1)));
+                    assert!(first > last || index < 2, "the encoder leaves the other kind of blocks out");
+                    (first + share / 7.0 * (last - first)).round()
+                });
+                let length = (x / 127.5 - 1.0).powi(2) + (y / 127.5 - 1.0).powi(2);
+                let z = (127.5 + 127.5 * (1.0 - length).max(0.0).sqrt()).round();
+                let [column, row] = [number % (width / 4), number / (width / 4)];
+                let at = (4 * row + texel as u32 / 4) * width + 4 * column + texel as u32 % 4;
+                rgba[4 * at as usize..][..4].copy_from_slice(&[x as u8, y as u8, z as u8, 255]);
+            }
+        }
+        rgba
+    }
+
+    /// Angles between directions and what blocks make of them, in degrees: mean and greatest; the PSNR of red, green and blue;
+    /// milliseconds to encode.
+    fn loss(texture: &SourceTexture, variant: CompressionVariant) -> [f64; 4] {
         let size = [texture.width, texture.height];
-        let blocks = encode_grid(texture.rgba.clone(), texture.width, Some(settings));
-        let mut found = vec![0; texture.rgba.len()];
-        decompress_blocks_as_rgba8(CompressionVariant::BC7(settings), size[0], size[1], &blocks, &mut found);
+        let mut texels = texture.rgba.clone();
+        let start = std::time::Instant::now();
+        if variant == CompressionVariant::BC5 {
+            let [width, height] = size.map(|side| side as usize);
+            texels.clear();
+            let level = Image { width, height, texels: Content::Normals.decode(&texture.rgba) };
+            Content::Normals.encode(&level, &mut texels);
+        }
+        let blocks = encode_grid(texels, size[0], Some(variant));
+        let milliseconds = 1e3 * start.elapsed().as_secs_f64();
+        let found = decoded(&blocks, size[0], variant);
         let (mut sum, mut most, mut error) = (0.0, 0.0f64, 0.0);
         for (a, b) in texture.rgba.chunks(4).zip(found.chunks(4)) {
             let [a, b] = [a, b].map(|texel| [0, 1, 2].map(|k| f64::from(texel[k])));
@@ -525,13 +571,12 @@ mod tests {
             (sum, most) = (sum + angle, most.max(angle));
         }
         let count = (found.len() / 4) as f64;
-        [sum / count, most, 10.0 * (255.0 * 255.0 * count / error).log10()]
+        [sum / count, most, 10.0 * (255.0 * 255.0 * count / error).log10(), milliseconds]
     }
 
-    /// By the settings that are used. What they lose of Sponza's is in `benches/results/textures.md`.
+    /// What is lost of Sponza's is in `benches/results/textures.md`.
     #[test]
-    fn directions_lose_little_as_bc7() {
-        let settings = BC7Settings::opaque_ultra_fast;
+    fn directions_lose_little_as_bc5_and_less_than_as_bc7() {
         // Waves of 80 and 40 texels, up to 35 degrees steep.
         let waves = texture(256, 256, |x, y| {
             let slope = |at: u32| 0.5 * (f64::from(at) * 0.0785).sin();
@@ -540,11 +585,14 @@ mod tests {
             let [r, g, b] = v.map(|c| (127.5 * (c / length + 1.0)).round() as u8);
             [r, g, b, 255]
         });
-        let [mean, most, psnr] = loss(&waves, settings());
-        println!("waves: {mean:.2} degrees in the mean, {most:.1} at most, {psnr:.1} dB");
-        assert!(mean < 2.0 && psnr > 36.0, "{mean} degrees, {psnr} dB");
+        let [bc5, bc7] = [CompressionVariant::BC5, BC7()].map(|variant| loss(&waves, variant));
+        println!(
+            "waves, bc5: {:.2} degrees in the mean, {:.1} at most; bc7: {:.2}, {:.1}",
+            bc5[0], bc5[1], bc7[0], bc7[1]
+        );
+        assert!(bc5[0] < 0.5 && bc5[0] < bc7[0], "{bc5:?} {bc7:?}");
         let noise = texture(128, 128, |x, y| [(x * 97 + y * 57) as u8, (x * 31 + y * y * 77) as u8, 200, 255]);
-        assert!(loss(&noise, settings())[0] > 4.0, "noise is lost");
+        assert!(loss(&noise, CompressionVariant::BC5)[0] > 1.0, "noise is lost");
         let Some(folder) = std::env::var_os("BRICKWALK_SCENES") else {
             println!("skipped: BRICKWALK_SCENES is not set");
             return;
@@ -553,9 +601,35 @@ mod tests {
             let image = image::open(std::path::Path::new(&folder).join("sponza").join(name)).unwrap().into_rgba8();
             let (width, height) = image.dimensions();
             let texture = SourceTexture { name: name.into(), width, height, wrap: 0, rgba: image.into_raw() };
-            let [mean, most, psnr] = loss(&texture, settings());
-            println!("{name} {width} x {height}: {mean:.2} degrees in the mean, {most:.1} at most, {psnr:.1} dB");
-            assert!(mean < limit, "{mean} degrees");
+            let [bc5, bc7] = [CompressionVariant::BC5, BC7()].map(|variant| {
+                let [mean, most, psnr, milliseconds] = loss(&texture, variant);
+                let kind = if variant == CompressionVariant::BC5 { "bc5" } else { "bc7" };
+                println!(
+                    "{name}, {kind}: {mean:.2} degrees in the mean, {most:.1} at most, {psnr:.1} dB, {milliseconds:.0} ms"
+                );
+                mean
+            });
+            assert!(bc5 < limit && bc5 < bc7, "{name}: {bc5} degrees, {bc7} as BC7");
+        }
+    }
+
+    #[test]
+    fn normals_are_unit_vectors_as_bc5() {
+        // Directions of other lengths, one of them with z below zero.
+        let v = [[255, 128, 255], [191, 128, 191], [218, 218, 37], [128, 128, 128]];
+        let source = texture(16, 4, |x, _| [v[x as usize / 4][0], v[x as usize / 4][1], v[x as usize / 4][2], 9]);
+        let encoded = encode(&source, Content::Normals, TextureEncoding::Bc7).unwrap();
+        assert_eq!((encoded.record.encoding, encoded.record.flags), (TEXTURE_BC5, 0));
+        assert_eq!(encoded.tail.len() as u64, encoded.record.tail_bytes());
+        let found = decoded(&encoded.tail[..64], 16, CompressionVariant::BC5);
+        let first: Vec<&[u8]> = found.chunks(4).step_by(4).take(4).collect();
+        let ends = [[218, 128, 218, 255], [218, 128, 218, 255], [201, 201, 201, 255], [201, 201, 201, 255]];
+        for (texel, expected) in first.iter().zip(ends) {
+            assert!(texel.iter().zip(expected).all(|(a, b): (&u8, u8)| a.abs_diff(b) <= 1), "{texel:?}, {expected:?}");
+        }
+        // Of other contents nothing is BC5.
+        for content in [Content::Color, Content::Data] {
+            assert_eq!(encode(&source, content, TextureEncoding::Bc7).unwrap().record.encoding, TEXTURE_BC7);
         }
     }
 

@@ -123,6 +123,8 @@ fn textures_used_in_two_ways_are_stored_twice() {
     assert_eq!(found.textures(), [0, 1, 3, 3, 2]);
     let flags: Vec<u32> = scene.resident.textures.iter().map(|texture| texture.flags).collect();
     assert_eq!(flags, [bricks::TEXTURE_SRGB, 0, bricks::TEXTURE_SRGB, 0]);
+    let encodings: Vec<&str> = scene.resident.textures.iter().map(bricks::Texture::encoding_name).collect();
+    assert_eq!(encodings, ["bc7", "bc5", "bc7", "bc7"], "normals apart");
     assert_eq!(scene.resident.manifest.texture_names, ["normals", "normals", "glow", "rough"]);
     let mean = scene.bricks[0].record.mean_emission;
     let expected = [2.0, 4.0 * 0.5028865, 0.0];
