@@ -15,7 +15,7 @@ fn sponza_converts_streams_and_verifies() {
     succeed(["verify".as_ref(), scene.as_os_str()]);
     let info = succeed(["info".as_ref(), scene.as_os_str(), "--json".as_ref()]);
     let info: serde_json::Value = serde_json::from_str(&info).expect("JSON");
-    assert_eq!(info["format"], 3);
+    assert_eq!(info["format"], 4);
 
     let (small, all) = (folder.path().join("small"), folder.path().join("all"));
     let view = "--frames 2 --size 160x90 --aov";
@@ -33,7 +33,7 @@ fn sponza_converts_streams_and_verifies() {
     // Through a cache smaller than its textures: close enough to see tiles of many, it shows the same in core.
     let tiles: u64 = bricks::SceneFile::open(&scene).expect("the scene").resident().tiles.iter().map(|t| t.bytes).sum();
     assert!(tiles > 8 << 20, "{tiles} bytes of tiles");
-    let close = "--adapter cpu --frames 3 --size 96x54 --aov --effects shadow,diffuse --diffuse-rays 1 --fov 5";
+    let close = "--adapter cpu --frames 3 --size 96x54 --aov --effects shadow,diffuse,glossy --diffuse-rays 1 --fov 5";
     let least = info["least_cache_bytes"].as_u64().expect("a size").to_string();
     let [few, whole] = [&least[..], "100%"].map(|cache| {
         let output = folder.path().join(format!("close-{cache}"));
