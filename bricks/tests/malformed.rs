@@ -112,7 +112,6 @@ fn materials_and_textures() {
     }
     refused(record(Textures, 0), "wrap 0x3", |r| r.textures[0].wrap = 3);
     refused(record(Textures, 0), "wrap 0x30000", |r| r.textures[0].wrap = 3 << 16);
-    refused(record(Textures, 0), "encoding 2", |r| r.textures[0].encoding = 2);
     refused(record(Textures, 0), "flags 0x2", |r| r.textures[0].flags = 2);
     refused(Part::Payload(Payload::Texture(1)), "544 bytes", |r| r.textures[1].width = 200);
     refused(Part::Payload(Payload::Texture(0)), "64 bytes", |r| r.textures[0].tail.bytes = 64);
