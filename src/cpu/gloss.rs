@@ -218,20 +218,23 @@ mod tests {
         Gloss::of(&g, m, view.map(|x| 3.0 * x))
     }
 
-    /// What the distribution function itself reflects of light from everywhere, by a grid of directions in f64.
-    fn integrated(s: &Gloss) -> f64 {
-        let (rows, columns) = (2000, 300);
+    /// The integral of `f` over the directions of the hemisphere and their cosines, by a grid in f64.
+    fn over_hemisphere(rows: u32, columns: u32, f: impl Fn(Vec3, f64) -> f64) -> f64 {
         let mut sum = 0.0;
         for i in 0..rows {
             let c = (f64::from(i) + 0.5) / f64::from(rows);
             for j in 0..columns {
                 let phi = f64::from(TAU) * (f64::from(j) + 0.5) / f64::from(columns);
                 let level = (1.0 - c * c).sqrt();
-                let d = [level * phi.cos(), level * phi.sin(), c].map(|x| x as f32);
-                sum += 2.0 * c * f64::from(s.reflected(d)[0]) / f64::from(rows * columns);
+                sum += f([level * phi.cos(), level * phi.sin(), c].map(|x| x as f32), c);
             }
         }
-        sum
+        sum * f64::from(TAU) / f64::from(rows * columns)
+    }
+
+    /// What the distribution function itself reflects of light from everywhere.
+    fn integrated(s: &Gloss) -> f64 {
+        over_hemisphere(2000, 300, |d, c| c * f64::from(s.reflected(d)[0]) / f64::from(PI))
     }
 
     /// White metals, and white dielectrics with and without a clear coat, lose and gain nothing, whatever their roughness.
@@ -291,19 +294,7 @@ mod tests {
         let cap = |d: Vec3| d[2] > 0.8 && d[0] < 0.0;
         let count = 400_000;
         let drawn = (0..count).filter(|&i| cap(s.direction(random4(i, 5, 9)))).count() as f64 / f64::from(count);
-        let (rows, columns) = (800, 800);
-        let mut expected = 0.0;
-        for i in 0..rows {
-            let c = (f64::from(i) + 0.5) / f64::from(rows);
-            for j in 0..columns {
-                let phi = f64::from(TAU) * (f64::from(j) + 0.5) / f64::from(columns);
-                let level = (1.0 - c * c).sqrt();
-                let d = [level * phi.cos(), level * phi.sin(), c].map(|x| x as f32);
-                if cap(d) {
-                    expected += f64::from(s.density(d)) * f64::from(TAU) / f64::from(rows * columns);
-                }
-            }
-        }
+        let expected = over_hemisphere(800, 800, |d, _| if cap(d) { f64::from(s.density(d)) } else { 0.0 });
         assert!((drawn - expected).abs() < 4e-3 && expected > 0.05, "{drawn} instead of {expected}");
     }
 
