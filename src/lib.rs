@@ -1,6 +1,6 @@
 //! brickwalk walks by ray tracing through scenes that do not fit in GPU memory.
 //!
-//! See `ARCHITECTURE.md` for the house: math → scene → stream → schedule → kernel → cpu, gpu → render → app.
+//! See `ARCHITECTURE.md` for the house: math → scene → stream → visibility → schedule → kernel → cpu, gpu → render → app.
 
 pub mod app;
 pub mod cpu;
@@ -14,3 +14,4 @@ pub mod scene;
 pub mod schedule;
 pub mod stats;
 pub mod stream;
+pub mod visibility;

@@ -1,0 +1,71 @@
+//! Base occupancy maps (Zeng et al., ROMA, §4.1): which cells of a cube something may be in, one bit a cell.
+
+use bricks::Resident;
+
+/// A cube of cells of the world: a cell that a triangle touches is occupied, one that none touches may be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bom {
+    cells: u32,
+    /// log2 of the side of a cell, world units.
+    pub cell_log2: i32,
+    /// Cell (0, 0, 0), in cells from the world's origin.
+    pub first: [i64; 3],
+    words: Vec<u32>,
+}
+
+impl Bom {
+    /// An empty map of `cells` on each axis, a multiple of 32 up to 256.
+    pub fn new(cells: u32, cell_log2: i32, first: [i64; 3]) -> Self {
+        debug_assert!(cells.is_multiple_of(32) && (32..=256).contains(&cells));
+        Self { cells, cell_log2, first, words: vec![0; (cells * cells * (cells / 32)) as usize] }
+    }
+
+    /// Cells on each axis.
+    pub fn cells(&self) -> u32 {
+        self.cells
+    }
+
+    /// The bits: cell (x, y, z) is bit z % 32 of word (x + cells y) cells / 32 + z / 32, the lowest first.
+    pub fn words(&self) -> &[u32] {
+        &self.words
+    }
+
+    /// The bits, to be set.
+    pub fn words_mut(&mut self) -> &mut [u32] {
+        &mut self.words
+    }
+
+    fn bit(&self, [x, y, z]: [u32; 3]) -> (usize, u32) {
+        (((x + self.cells * y) * (self.cells / 32) + z / 32) as usize, 1 << (z % 32))
+    }
+
+    /// Whether a cell is occupied; none outside of the cube is.
+    pub fn is_occupied(&self, cell: [i64; 3]) -> bool {
+        if !cell.iter().all(|&x| (0..i64::from(self.cells)).contains(&x)) {
+            return false;
+        }
+        let (word, bit) = self.bit(cell.map(|x| x as u32));
+        self.words[word] & bit != 0
+    }
+
+    /// Marks a cell of the cube as occupied.
+    pub fn occupy(&mut self, cell: [u32; 3]) {
+        let (word, bit) = self.bit(cell);
+        self.words[word] |= bit;
+    }
+}
+
+/// Maps around the camera, each with cells twice as large as the one before, which lies in its middle.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Cascades {
+    /// The finest first.
+    pub levels: Vec<Bom>,
+}
+
+/// The side of the scene's bounds, world units: the longest edge of its box; 0 of an empty scene.
+pub fn extent(resident: &Resident) -> f64 {
+    let step = f64::from(resident.objects[0].step_log2).exp2();
+    resident.top2.first().map_or(0.0, |root| {
+        (0..3).map(|k| (root.max[k] - root.min[k]) as f64 * step).fold(0.0, f64::max)
+    })
+}
