@@ -104,6 +104,8 @@ fn layout_checks(module: &naga::Module) -> String {
         "TileDemand",
         "GBuffer",
         "Emitter",
+        "RomaLevel",
+        "RomaMap",
     ];
     let mut s = String::new();
     for name in mirrored {
@@ -139,6 +141,7 @@ fn layout_checks(module: &naga::Module) -> String {
             "MATERIAL_DOUBLE",
             "MATERIAL_UNLIT",
             "REFLECTANCE_",
+            "ROMA_",
             "NONE",
         ];
         if prefixes.iter().any(|p| name.starts_with(p))

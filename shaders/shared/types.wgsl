@@ -41,8 +41,12 @@ struct Params {
     environment_height: u32,
     emitter_density: f32, // of points of surfaces that shine, by the luminance of their radiance, an area of 1: how rays to them are drawn
     diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
-    padding0: u32,
-    padding1: u32,
+    roma_k: u32,          // square root of the number of maps of a level
+    roma_size: u32,       // texels of a map on both axes, and cells of a column
+    roma_cells: u32,      // cells of a base map on each axis
+    roma_levels: u32,     // base maps
+    roma_samples: u32,    // look-ups of the base map a cell
+    roma_steps: u32,      // columns that a ray passes before it is finished snapped; 0: it is snapped
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -276,6 +280,21 @@ struct GBuffer {          // what shading reads of a primary hit
     padding1: u32,
 }
 
+struct RomaLevel {        // a base map in the frame: point p lies at scale * p + first, in its cells
+    first: vec3<f32>,
+    scale: f32,
+    lift: f32,            // by which rays start off their surface, device units: 1.5 cells of a map
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
+}
+
+struct RomaMap {          // a ray-aligned map; columns run along its z
+    cell_from_point: array<vec4<f32>, 3>, // rows: cells of the map from points of the frame
+    base_from_cell: array<vec4<f32>, 3>,  // rows: cells of the base map from those of the map
+    direction: vec4<f32>, // unit vector along the columns, world space
+}
+
 struct Emitter {          // in the frame, device units; one of them is drawn by an alias table over their power
     corner: vec3<f32>,    // a corner, or where the light is
     kind: u32,            // EMITTER_*, with EMITTER_TWO_SIDED
@@ -321,6 +340,7 @@ const TEXTURE_BC7: u32 = 1u;
 const TEXTURE_BC5: u32 = 2u;       // x and y of directions
 const TEXTURE_SRGB: u32 = 1u;      // flags: red, green and blue are sRGB, else linear
 const TILE_TEXELS: u32 = 128u;     // side of a tile
+const ROMA_HIT: u32 = 0xfffffffeu;   // id of what ROMA meets, which is no triangle
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
@@ -346,5 +366,6 @@ const COUNTER_LEAF_GROUPS: u32 = 16u;
 const COUNTER_TIGHTENED: u32 = 17u;
 const COUNTER_TILES_FROM_ROOT: u32 = 18u;
 const COUNTER_TILES_CHOSEN: u32 = 19u;
+const COUNTER_ROMA_CAPPED: u32 = 20u;
 const WORK_CHOSEN: u32 = 24u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 28u;      // the same over tiles whose rays walk from the root

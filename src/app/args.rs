@@ -8,6 +8,7 @@ use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
 use super::optimisation_args::OptimisationArgs;
 use super::picture_args::PictureArgs;
+use super::roma_args::RomaArgs;
 use super::scene_kind::{SceneKind, scene_help};
 use super::selftest::args::SelftestArgs;
 use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
@@ -358,9 +359,13 @@ pub struct WalkArgs {
     /// What is traced.
     #[command(flatten)]
     pub effects: EffectArgs,
-    /// How secondary rays are answered: exact
+    /// How secondary rays are answered: exact (all are traced), roma (those of ao and shadow by maps of what cells are occupied, with a
+    /// bias of a cell or so, and without a brick loaded for them; others are traced)
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
+    /// Occupancy maps.
+    #[command(flatten)]
+    pub roma: RomaArgs,
     /// Samples per pixel, 1 to 1M; beyond 64 they are summed in f64, so that no number of them makes the sum drift
     #[arg(long, value_name = "N", default_value = "1", value_parser = samples)]
     pub spp: u32,
@@ -521,7 +526,9 @@ named_values! {
     Secondary {
         /// By tracing them.
         Exact = "exact",
-    } later &["roma", "df", "dvf", "displacement", "auto"]
+        /// Those that occupancy maps can answer by these.
+        Roma = "roma",
+    } later &["df", "dvf", "displacement", "auto"]
 }
 
 /// Accepts the values of a list.

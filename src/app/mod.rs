@@ -22,6 +22,7 @@ mod pictures;
 pub mod quality;
 pub mod repair;
 pub mod replay;
+pub mod roma_args;
 pub mod scene;
 pub mod scene_kind;
 pub mod selftest;

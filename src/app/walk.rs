@@ -1,6 +1,6 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
-use super::args::WalkArgs;
+use super::args::{Secondary, WalkArgs};
 use super::left_out;
 use super::lighting::lighting;
 use super::output::atomic;
@@ -9,7 +9,9 @@ use super::session::{Session, open_scene, write_requests};
 use super::summary;
 use crate::kernel::Extent;
 use crate::render::denoise::Resolve;
-use crate::render::{Accumulation, BATCH_SAMPLES, Captures, Light, RenderError, RenderSettings, Renderer, Schedule};
+use crate::render::{
+    Accumulation, BATCH_SAMPLES, Captures, Light, RenderError, RenderSettings, Renderer, Roma, Schedule,
+};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
@@ -31,6 +33,11 @@ use std::sync::atomic::Ordering;
 pub fn run(args: &WalkArgs) -> Result<()> {
     let scene = open_scene(&args.scene)?;
     let manifest = &scene.resident().manifest;
+    let has_occupancy = scene.resident().bricks.is_empty() || !scene.resident().occupancy.is_empty();
+    if args.secondary == Secondary::Roma && !has_occupancy {
+        let name = args.scene.display();
+        bail!("{name}: --secondary roma needs the occupancy of bricks; convert the scene again without --no-proxies");
+    }
     let mut path = match &args.path {
         Some(file) => CameraPath::read(file)?,
         None => path_from_bounds(manifest.min, manifest.max),
@@ -89,6 +96,9 @@ pub fn run(args: &WalkArgs) -> Result<()> {
             Err(RenderError::Interrupted) => break,
             output => output.with_context(|| args.scene.display().to_string())?,
         };
+        if frame == 0 {
+            warn_of_short_rays(&renderer);
+        }
         if let Some(reference) = &mut reference {
             reference.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
             note_errors(&mut output.records, &renderer, reference);
@@ -157,7 +167,21 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         fronts,
         auto: Auto::default(),
         captures: None,
+        roma: Roma::default(),
         host_seen: HostCacheStats::default(),
+    }
+}
+
+/// Says that rays of ao are too short for the cells that they are to meet.
+fn warn_of_short_rays(renderer: &Renderer) {
+    const LEAST_CELLS: f64 = 3.0;
+    let length = renderer.settings.effects.occlusion.map_or(f64::INFINITY, |occlusion| occlusion.length);
+    if let Some(cell) = renderer.roma.finest_cell().filter(|cell| length < LEAST_CELLS * cell) {
+        let _ = writeln!(
+            std::io::stderr(),
+            "brickwalk: warning: --ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has here: \
+             ao is coarse; make it longer, or use --secondary exact"
+        );
     }
 }
 
@@ -167,6 +191,7 @@ fn reference(scene: Arc<SceneFile>, args: &WalkArgs, light: Light, extent: Exten
     args.stream.query_threshold = 0;
     args.stream.prefetch = 0;
     args.stream.requests_out = None;
+    args.secondary = Secondary::Exact;
     args.measure_needed = false;
     args.aov = false;
     let session = Session::open(scene, &args.scene, &args.stream, extent)?;
@@ -199,6 +224,7 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         aov: args.aov,
         guides: args.pictures.denoise || args.pictures.taa,
         taa: args.pictures.taa,
+        roma: (args.secondary == Secondary::Roma).then(|| args.roma.settings()),
     }
 }
 

@@ -15,19 +15,24 @@ use super::query_all::{count_pairs, query_all};
 use super::query_pairs::query_pairs;
 use super::rays::{RaySet, Work};
 use super::resolve::{AttributeView, resolve};
+use super::roma::{RomaTables, roma_rotate, roma_trace};
 use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
 use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
 use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
-use crate::kernel::dispatch::{COUNT_PAIRS, Dispatch, INTERSECT_BINARY, are_pairs_culled, dispatches};
+use crate::kernel::dispatch::{
+    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE, are_pairs_culled, dispatches,
+};
 use crate::kernel::layout::{self, Params};
+use crate::kernel::roma::RomaMaps;
 use crate::kernel::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{PayloadSource, WorkerPool, Workers};
+use crate::visibility::bom::Cascades;
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -41,6 +46,7 @@ struct Buffers {
     sets: [RaySet; 3],
     pixels: Pixels,
     tiles: TileLists,
+    roma: RomaTables,
 }
 
 /// Renders one scene on the processor.
@@ -86,7 +92,7 @@ impl CpuExecutor {
             texels: Texels::new(&file)?,
             opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
             lamps: LampTables::default(),
-            buffers: Buffers { sets, pixels: Pixels::new(rays), tiles },
+            buffers: Buffers { sets, pixels: Pixels::new(rays), tiles, roma: RomaTables::default() },
             binary: None,
             extent,
             view: Params::default(),
@@ -103,7 +109,7 @@ impl CpuExecutor {
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
         let extent = self.extent;
-        Params {
+        self.buffers.roma.maps.params(Params {
             zero: 0,
             width: extent.width,
             height: extent.height,
@@ -118,13 +124,19 @@ impl CpuExecutor {
             top_count: self.scene.top2.len() as u32,
             instance_pad: self.scene.instance_pad,
             ..self.view
-        }
+        })
     }
 
     /// The G-buffer of the hits of a set, for tests.
     #[cfg(test)]
     pub(super) fn gbuffer_of(&mut self, set: usize) -> &mut Vec<layout::GBuffer> {
         &mut self.buffers.pixels.gbuffers[set]
+    }
+
+    /// The columns of the ray-aligned maps that were made last, for tests.
+    #[cfg(test)]
+    pub(super) fn columns(&self) -> &[u32] {
+        &self.buffers.roma.columns
     }
 
     /// The tiles and their lists, for tests.
@@ -144,7 +156,7 @@ fn run_kernel(
     (sampling, tile_demand): (Sampling, &[TileDemand]),
     binary: Option<&BinaryTrees>,
 ) -> Result<(), ExecutorError> {
-    let Buffers { sets, pixels, tiles } = buffers;
+    let Buffers { sets, pixels, tiles, roma } = buffers;
     // The set of the pass, and the one before it, whose hits are shaded.
     let shaded = pass.set().saturating_sub(1);
     let (before, from) = sets.split_at_mut(pass.set());
@@ -193,6 +205,8 @@ fn run_kernel(
         "intersect_from_root_all" => intersect_all::<false>(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
         "intersect_selected" => intersect_all::<true>(bound, own, Work::All, &tiles.pair_counts),
         "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
+        ROMA_ROTATE => roma_rotate(bound, roma),
+        ROMA_TRACE => roma_trace(bound, roma, own, seen),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),
             None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
@@ -316,6 +330,16 @@ impl FrameExecutor for CpuExecutor {
 
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
         self.lamps.set(lamps);
+        Ok(())
+    }
+
+    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
+        self.buffers.roma.cascades = cascades.clone();
+        Ok(())
+    }
+
+    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
+        self.buffers.roma.maps = maps.clone();
         Ok(())
     }
 

@@ -9,9 +9,11 @@ use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
 use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
+use crate::kernel::roma::RomaMaps;
 use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
+use crate::visibility::bom::Cascades;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
@@ -39,6 +41,8 @@ pub enum Defect {
     Light,
     /// Textures are looked up a quarter of their width aside.
     Lookups,
+    /// Ray-aligned maps lie a hundredth of a cell aside.
+    Maps,
 }
 
 /// Both executors.
@@ -127,6 +131,7 @@ impl Findings {
                 counted(r.triangles),
                 r.non_finite,
                 r.queries_tightened,
+                r.rays_capped,
             ]
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
@@ -245,6 +250,9 @@ impl Lockstep {
                     findings.words("selections", context, &selection[range.clone()], &own.selection[range]);
                 }
             }
+        }
+        if steps.contains(&Step::RomaRotate) {
+            findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
         }
         let shades = |step: &Step| {
             matches!(step, Step::Resolve | Step::Sample | Step::Shade(_) | Step::AddLight | Step::AddOcclusion)
@@ -372,6 +380,20 @@ impl FrameExecutor for Lockstep {
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
         self.gpu.set_lamps(lamps)?;
         self.cpu.set_lamps(lamps)
+    }
+
+    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
+        self.gpu.set_cascades(cascades)?;
+        self.cpu.set_cascades(cascades)
+    }
+
+    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_roma(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::Maps) {
+            own.maps.iter_mut().for_each(|map| map.base_from_cell[0][3] += 0.01);
+        }
+        self.cpu.set_roma(&own)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -7,11 +7,12 @@ use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
-use crate::kernel::dispatch::INTERSECT_BINARY;
+use crate::kernel::dispatch::{INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::{Extent, FrameExecutor, Keep, Setup};
 use crate::render::{
-    Effects, Equirectangular, Light, Occlusion, RenderSettings, Renderer, Schedule, emissive_triangles, environment,
+    Effects, Equirectangular, Light, Occlusion, RenderSettings, Renderer, Roma, Schedule, emissive_triangles,
+    environment,
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
@@ -19,6 +20,7 @@ use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::fronts::Fronts;
 use crate::schedule::{Optimisation, Tracing};
 use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
+use crate::visibility::roma::{Grid, RomaSettings};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -155,6 +157,8 @@ struct Variant {
     list_most: u32,
     without: &'static [Optimisation],
     with: &'static [Optimisation],
+    /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped.
+    roma: Option<u32>,
 }
 
 const VARIANT: Variant = Variant {
@@ -165,6 +169,7 @@ const VARIANT: Variant = Variant {
     list_most: u32::MAX,
     without: &[],
     with: &[],
+    roma: None,
 };
 
 fn effects() -> Effects {
@@ -196,6 +201,12 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
     let surfaces = emissive_triangles(scene, 1 << 20).unwrap().unwrap();
     emitters.extend(surfaces.iter().enumerate().map(|(i, e)| Emitter { two_sided: i % 2 == 0, ..*e }));
     Lamps::new(Some(environment(image, 1.0, 40.0).0), emitters, 10.0)
+}
+
+/// Small maps, of both numbers of directions.
+fn roma(steps: u32) -> RomaSettings {
+    let grid = |k, size| Grid { k, size, samples: 0 };
+    RomaSettings { occlusion: grid(4, 32), occlusion_steps: steps, shadow: grid(8, 32), shadow_steps: steps }
 }
 
 /// Renders two frames in lockstep.
@@ -255,6 +266,7 @@ fn render(
             tracing,
             guides: false,
             taa: false,
+            roma: variant.roma.map(roma),
             aov: false,
         },
         light,
@@ -263,6 +275,7 @@ fn render(
         fronts: variant.fronts.then(Fronts::default),
         auto: Auto::default(),
         captures: None,
+        roma: Roma::default(),
         host_seen: HostCacheStats::default(),
     };
     let path = path_from_bounds(manifest.min, manifest.max);
@@ -292,6 +305,8 @@ fn twins_agree_with_their_kernels() {
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
         Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
+        Variant { roma: Some(0), ..VARIANT },
+        Variant { roma: Some(3), ..VARIANT },
         Variant { fronts: true, ..VARIANT },
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
@@ -310,7 +325,7 @@ fn twins_agree_with_their_kernels() {
     }
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
-    let all = kernels::names().chain([INTERSECT_BINARY]);
+    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE]);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
     assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
@@ -328,10 +343,12 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::Seed, &plain, "hits"),
         (Defect::Light, &plain, "radiance"),
         (Defect::Lookups, &tiled, "tiles"),
+        (Defect::Maps, &plain, "columns of maps"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
-        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, ..VARIANT };
+        let roma = (defect == Defect::Maps).then_some(0);
+        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();
         assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);

@@ -41,6 +41,7 @@ mod query_pairs;
 mod random;
 mod rays;
 mod resolve;
+mod roma;
 mod sample;
 mod scene;
 mod shade;

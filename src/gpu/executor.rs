@@ -8,6 +8,7 @@ use super::lamps::LampBuffers;
 use super::pages::{CachePages, MappedRange};
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
 use super::readback::Readback;
+use super::roma::Roma;
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
@@ -16,12 +17,14 @@ use crate::kernel::dispatch::{
     COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Third, Workgroups, are_pairs_culled, dispatches,
 };
 use crate::kernel::layout::{self, Params};
+use crate::kernel::roma::RomaMaps;
 use crate::kernel::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
     report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
+use crate::visibility::bom::Cascades;
 use bricks::SceneFile;
 use std::sync::Arc;
 
@@ -45,6 +48,7 @@ pub struct GpuExecutor {
     buffers: Buffers,
     groups: Groups,
     binary: Option<BinaryTrees>,
+    roma: Option<Roma>,
     extent: Extent,
     readback: Readback,
     timing: Timing,
@@ -146,6 +150,7 @@ impl GpuExecutor {
             buffers,
             groups,
             binary: None,
+            roma: None,
             extent,
             readback,
             timing,
@@ -185,6 +190,15 @@ impl GpuExecutor {
         self.read(|s| &s.buffers.pixels.gbuffers[set])
     }
 
+    /// The columns of the ray-aligned maps that were made last, for tests.
+    #[cfg(test)]
+    pub(crate) fn read_columns(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        let Some(Roma { columns, maps, .. }) = &self.roma else { return Ok(Vec::new()) };
+        let bytes = self.readback.read(&self.gpu, columns)?;
+        let columns: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(columns[..maps.words() as usize].to_vec())
+    }
+
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
@@ -197,7 +211,7 @@ impl GpuExecutor {
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
         let extent = self.extent;
-        Params {
+        let params = Params {
             zero: 0,
             width: extent.width,
             height: extent.height,
@@ -211,7 +225,8 @@ impl GpuExecutor {
             top_count: self.scene.resident().top2.len() as u32,
             instance_pad: self.buffers.scene.instance_pad,
             ..self.view
-        }
+        };
+        self.roma.as_ref().map_or(params, |roma| roma.maps.params(params))
     }
 
     /// One submission: all steps, then counters and demand read back.
@@ -266,18 +281,21 @@ impl GpuExecutor {
                 timestamp_writes: self.timing.writes(i as u32),
             });
             let binary = self.binary.as_ref().filter(|_| dispatch.kernel == INTERSECT_BINARY);
-            compute.set_pipeline(binary.map_or_else(|| self.kernels.pipeline(dispatch.kernel), |b| &b.pipeline));
+            let roma = self.roma.as_ref().and_then(|roma| Some((roma.pipeline(dispatch.kernel)?, roma)));
+            let own = binary.map(|b| &b.pipeline).or(roma.map(|(pipeline, _)| pipeline));
+            compute.set_pipeline(own.unwrap_or_else(|| self.kernels.pipeline(dispatch.kernel)));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
             let second = match (dispatch.cache, dispatch.third) {
                 (true, _) => &self.groups.cache,
                 (false, Third::Shading) => &self.groups.lamps,
+                (false, Third::Roma) => roma.map_or(&self.groups.empty, |(_, roma)| &roma.group),
                 _ => &self.groups.empty,
             };
             compute.set_bind_group(2, second, &[]);
             let shaded = pass.set().saturating_sub(1);
             let third = match (dispatch.third, &self.groups.sampling) {
-                (Third::Shading, _) => &self.groups.shading[shaded],
+                (Third::Shading | Third::Roma, _) => &self.groups.shading[shaded],
                 (Third::Sampling, Some(sampling)) => &sampling[shaded],
                 _ => &self.groups.tiles,
             };
@@ -389,6 +407,16 @@ impl FrameExecutor for GpuExecutor {
             self.rebind();
         }
         Ok(())
+    }
+
+    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
+        let Self { gpu, kernels, roma, .. } = self;
+        roma.get_or_insert_with(|| Roma::new(gpu, kernels)).set_cascades(gpu, cascades)
+    }
+
+    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
+        let Self { gpu, kernels, roma, .. } = self;
+        roma.get_or_insert_with(|| Roma::new(gpu, kernels)).set_maps(gpu, maps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -215,6 +215,11 @@ fn layout(device: &wgpu::Device, label: &str, bindings: &[Bound]) -> wgpu::BindG
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
+/// The layout of group 2 of kernels over occupancy maps.
+pub(super) fn roma_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    layout(device, "roma", &[Bound::Read, Bound::Read, Bound::Read, Bound::Write])
+}
+
 /// The layout of a group of `count` storage buffers that are read.
 pub(super) fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
     layout(device, label, &vec![Bound::Read; count])

@@ -10,6 +10,7 @@ pub mod pages;
 pub mod probe;
 pub mod rays;
 pub mod readback;
+pub mod roma;
 pub mod scene;
 pub mod texels;
 pub mod timing;

@@ -94,6 +94,8 @@ pub enum Third {
     Shading,
     /// What texture lookups for the set before the pass's need.
     Sampling,
+    /// What shading the set before the pass's needs, with group 2 the occupancy maps.
+    Roma,
 }
 
 /// One dispatch of a kernel.
@@ -104,7 +106,7 @@ pub struct Dispatch {
     pub params: Params,
     /// Its workgroups.
     pub groups: Workgroups,
-    /// Whether group 2 is the cache; else it is the lamps of kernels that shade, and nothing of others.
+    /// Whether group 2 is the cache; else it is the lamps of kernels that shade, the maps of those over occupancy maps, and nothing of others.
     pub cache: bool,
     /// What group 3 is.
     pub third: Third,
@@ -133,6 +135,11 @@ pub fn are_pairs_culled(step: Step, before: bool, threshold: u32) -> bool {
 
 /// The kernel that traverses binary trees.
 pub const INTERSECT_BINARY: &str = "intersect_binary";
+
+/// The kernel that makes ray-aligned occupancy maps.
+pub const ROMA_ROTATE: &str = "roma_rotate";
+/// The kernel that traces them.
+pub const ROMA_TRACE: &str = "roma_trace";
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -165,6 +172,10 @@ pub fn dispatches(
     let shading = |kernel, params, cache| {
         let groups = Workgroups::Fixed(per_ray);
         Dispatch { kernel, params, groups, cache, third: Third::Shading, phase: None }
+    };
+    let roma = |kernel, params, groups, phase| {
+        let groups = Workgroups::Fixed(groups);
+        Dispatch { kernel, params, groups, cache: false, third: Third::Roma, phase: Some(phase) }
     };
     let list = |params, phase| {
         let name = if leaf_cache { "intersect_list_cached" } else { "intersect_list" };
@@ -278,5 +289,12 @@ pub fn dispatches(
         }
         Step::AddLight => vec![shading("add_light", params, false)],
         Step::AddOcclusion => vec![shading("add_occlusion", params, false)],
+        Step::RomaRotate => {
+            let columns = params.roma_levels * params.roma_k * params.roma_k * params.roma_size * params.roma_size;
+            vec![roma(ROMA_ROTATE, params, across(columns.div_ceil(64)), 0)]
+        }
+        Step::RomaTrace { steps } => {
+            vec![roma(ROMA_TRACE, Params { roma_steps: steps, ..params }, per_ray, 2)]
+        }
     }
 }

@@ -1,9 +1,11 @@
 //! What a frame needs of an executor beside steps.
 
 use super::layout::{GBuffer, Hit, Ray, Surface};
+use super::roma::RomaMaps;
 use super::{Keep, Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
 use crate::stream::WorkerPool;
+use crate::visibility::bom::Cascades;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -59,6 +61,19 @@ pub trait FrameExecutor: Executor {
     /// # Errors
     /// More emitters, or a larger environment, than the device holds in one buffer, with how many it does.
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError>;
+
+    /// Takes base occupancy maps, and makes what [`crate::schedule::Step::RomaRotate`] and [`crate::schedule::Step::RomaTrace`] need;
+    /// without it these must not be run. The same maps again cost nothing.
+    ///
+    /// # Errors
+    /// More than the device holds in one buffer, with how much it does.
+    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError>;
+
+    /// Places the ray-aligned maps that [`crate::schedule::Step::RomaRotate`] makes of these next, in the frame that has begun.
+    ///
+    /// # Errors
+    /// As of [`FrameExecutor::set_cascades`].
+    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError>;
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

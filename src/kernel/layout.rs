@@ -48,11 +48,13 @@ pub const COUNTER_LEAF_GROUPS: u32 = 16;
 pub const COUNTER_TIGHTENED: u32 = 17;
 pub const COUNTER_TILES_FROM_ROOT: u32 = 18;
 pub const COUNTER_TILES_CHOSEN: u32 = 19;
+pub const COUNTER_ROMA_CAPPED: u32 = 20;
 pub const WORK_CHOSEN: u32 = 24;
 pub const WORK_ROOTED: u32 = 28;
 pub const GBUFFER_READ: u32 = 1;
 pub const GBUFFER_WAITS: u32 = 62;
 pub const GBUFFER_FIRST: u32 = 1;
+pub const ROMA_HIT: u32 = 0xffff_fffe;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
@@ -92,7 +94,8 @@ mirror! {
         share: f32, surface_share: f32, length: f32, stream: u32,
         pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
-        emitter_density: f32, diffuse_count: f32, padding0: u32, padding1: u32,
+        emitter_density: f32, diffuse_count: f32, roma_k: u32, roma_size: u32,
+        roma_cells: u32, roma_levels: u32, roma_samples: u32, roma_steps: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
@@ -148,6 +151,8 @@ mirror! {
         weights: [f32; 2], uv: [f32; 2], tangent: [f32; 3], handedness: f32,
         uv1: [f32; 2], footprint1: f32, occlusion: f32, metallic: f32, roughness: f32, padding0: u32, padding1: u32,
     }
+    struct RomaLevel { first: [f32; 3], scale: f32, lift: f32, padding0: u32, padding1: u32, padding2: u32 }
+    struct RomaMap { cell_from_point: [[f32; 4]; 3], base_from_cell: [[f32; 4]; 3], direction: [f32; 4] }
     struct Emitter {
         corner: [f32; 3], kind: u32, u: [f32; 3], probability: f32,
         v: [f32; 3], threshold: u32, radiance: [f32; 3], other: u32,

@@ -12,6 +12,7 @@ pub mod layout;
 pub mod opacity;
 pub mod reflectance;
 pub mod report;
+pub mod roma;
 mod setup;
 pub mod textures;
 

@@ -63,6 +63,14 @@ pub fn cosine_hemisphere(square: [f32; 2]) -> [f32; 3] {
     [x, y, (1.0 - x * x - y * y).max(0.0).sqrt()]
 }
 
+/// A direction of the upper hemisphere about z, evenly over solid angle, from the disc: z = 1 - r².
+pub fn uniform_hemisphere(square: [f32; 2]) -> [f32; 3] {
+    let [x, y] = concentric_disc(square);
+    let z = (1.0 - x * x - y * y).max(0.0);
+    let across = (1.0 + z).sqrt();
+    [x * across, y * across, z]
+}
+
 /// 32 random bits from 32: the output function of PCG on one step of its generator (O'Neill 2014; Jarzynski, Olano 2020).
 /// The kernels' `pcg` in `shaders/shared/random.wgsl`.
 pub fn pcg(x: u32) -> u32 {

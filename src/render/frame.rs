@@ -2,7 +2,7 @@
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Light, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Light, Roma, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -12,6 +12,7 @@ use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain};
 use crate::stats::Record;
 use crate::stream::HostCacheStats;
+use crate::visibility::roma::RomaSettings;
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -51,6 +52,8 @@ pub struct RenderSettings {
     pub guides: bool,
     /// Samples lie at other points of their pixels in every frame.
     pub taa: bool,
+    /// Occlusion rays and those to the sun and emitters are answered by occupancy maps; none of them asks for bricks.
+    pub roma: Option<RomaSettings>,
 }
 
 /// Why a frame could not be rendered.
@@ -121,12 +124,14 @@ pub struct Renderer {
     pub auto: Auto,
     /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
     pub captures: Option<Captures>,
+    /// The occupancy maps, where settings ask for them.
+    pub roma: Roma,
     /// The host cache's statistics at the end of the pass before.
     pub host_seen: HostCacheStats,
 }
 
 impl Renderer {
-    /// Renders one frame. Exact: pixels depend on scene, camera, lights and settings alone.
+    /// Renders one frame. Without ROMA it is exact; with it, too, pixels depend on scene, camera, lights and settings alone.
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.
@@ -169,6 +174,7 @@ impl Renderer {
                 view.params.jitter = [x, y, 0.0, 0.0];
             }
             self.executor.begin_frame(&view);
+            self.roma.begin(camera.position, &view);
             records.pass(self, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, stats)?;
                 attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
@@ -283,8 +289,17 @@ impl Renderer {
 
     /// Traces any-hit rays, notes the bricks that were hit, and adds the light that comes through.
     fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
-        self.trace(frame, pass, stats)?;
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
+        if let Some((grid, columns)) = self.settings.roma.and_then(|settings| Roma::grid_of(&settings, pass)) {
+            let rotate = self.roma.prepare(&mut *self.executor, self.scene.resident(), grid)?;
+            let steps: Vec<Step> = std::iter::once(Step::Generate)
+                .chain(rotate)
+                .chain([Step::RomaTrace { steps: columns }, add])
+                .collect();
+            stats.add(self.executor.run(pass, &steps, &self.cache.states)?);
+            return Ok(());
+        }
+        self.trace(frame, pass, stats)?;
         let report = self.executor.run(pass, &[Step::QueryHits, add], &self.cache.states)?;
         stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
         stats.add(report);

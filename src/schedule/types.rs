@@ -134,6 +134,13 @@ pub enum Step {
     AddLight,
     /// Add the share of the sky's light that the pass's direction stands for, where its ray went free.
     AddOcclusion,
+    /// Make the ray-aligned maps that the executor was given last: phase 1.
+    RomaRotate,
+    /// Answer the pass's rays by them, and count them: phase 3.
+    RomaTrace {
+        /// Columns that a ray passes before it is finished along the map's direction; 0: it takes that direction from the start.
+        steps: u32,
+    },
 }
 
 /// Whom rays ask, and for what.
@@ -269,7 +276,9 @@ pub struct Report {
     pub tile_batch_leaves: u64,
     /// Groups of triangles that rays postponed.
     pub leaf_groups_postponed: u64,
-    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`] and [`Step::CountRays`].
+    /// Rays that [`Step::RomaTrace`] finished along their map's direction because they had passed as many columns as they may.
+    pub rays_capped: u64,
+    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`] and [`Step::RomaTrace`].
     pub rays: u64,
     /// Nodes visited, when the executor counts.
     pub nodes: u64,
@@ -413,6 +422,7 @@ impl PassStats {
         sum.tile_batch_leaves += r.tile_batch_leaves;
         sum.leaf_groups_postponed += r.leaf_groups_postponed;
         sum.queries_tightened += r.queries_tightened;
+        sum.rays_capped += r.rays_capped;
         sum.rays += r.rays;
         sum.nodes += r.nodes;
         sum.triangles += r.triangles;

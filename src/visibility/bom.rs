@@ -65,7 +65,8 @@ pub struct Cascades {
 /// The side of the scene's bounds, world units: the longest edge of its box; 0 of an empty scene.
 pub fn extent(resident: &Resident) -> f64 {
     let step = f64::from(resident.objects[0].step_log2).exp2();
-    resident.top2.first().map_or(0.0, |root| {
-        (0..3).map(|k| (root.max[k] - root.min[k]) as f64 * step).fold(0.0, f64::max)
-    })
+    resident
+        .top2
+        .first()
+        .map_or(0.0, |root| (0..3).map(|k| (root.max[k] - root.min[k]) as f64 * step).fold(0.0, f64::max))
 }

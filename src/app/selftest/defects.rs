@@ -8,9 +8,11 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::wgsl::Pages;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
+use crate::kernel::roma::RomaMaps;
 use crate::kernel::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
+use crate::visibility::bom::Cascades;
 use anyhow::{Result, bail};
 use bricks::SceneFile;
 use glam::DVec3;
@@ -262,6 +264,14 @@ impl FrameExecutor for Faulty {
 
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
         self.inner.set_lamps(lamps)
+    }
+
+    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
+        self.inner.set_cascades(cascades)
+    }
+
+    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
+        self.inner.set_roma(maps)
     }
 
     fn begin_frame(&mut self, view: &View) {

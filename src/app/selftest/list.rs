@@ -3,7 +3,7 @@
 use super::case::Source::{Analytic, Exact, Paths, Reference, Unit};
 use super::case::{Case, Checks, Source};
 use super::lab::Lab;
-use super::{boxes, histories, lights, maps, meshes, samples, shapes, streaming, surfaces, views};
+use super::{boxes, histories, lights, maps, meshes, roma, samples, shapes, streaming, surfaces, views};
 use anyhow::Result;
 
 const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab) -> Result<Checks>) -> Case {
@@ -56,8 +56,8 @@ pub const CASES: &[Case] = &[
     case(38, "empty scene, one triangle, one brick", Analytic, shapes::least_scenes),
     case(39, "occupancy: planes on borders of cells", Exact, maps::on_borders),
     case(40, "occupancy: planes along an axis", Exact, maps::along_axes),
-    later(41, "ROMA: t = 0, 31, 32, where words join", Reference),
-    later(42, "ROMA: origin outside, ray that leaves", Reference),
+    case(41, "ROMA: t = 0, 31, 32, where words join", Reference, roma::bits),
+    case(42, "ROMA: origin outside, ray that leaves", Reference, roma::leaving),
     case(43, "flat scene", Unit, shapes::flat_scene),
     case(44, "concentric map: centre, diagonals, border", Analytic, maps::concentric),
     case(45, "octahedral map: seams, zeros of either sign", Analytic, maps::octahedral),

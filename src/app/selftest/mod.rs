@@ -19,6 +19,7 @@ mod list;
 mod maps;
 mod meshes;
 mod rays;
+mod roma;
 mod samples;
 mod shapes;
 mod streaming;

@@ -6,7 +6,9 @@ use super::meshes::{aimed, note, step_of};
 use super::rays::{Aim, Targets, lattice_point, ray};
 use crate::kernel::layout::Ray;
 use crate::scene::path::path_from_bounds;
-use anyhow::Result;
+use crate::visibility::bom::Bom;
+use crate::visibility::bom_resident::assemble;
+use anyhow::{Context, Result};
 use bricks::MAX_BRICK_HEIGHT;
 use brickwalk_convert::source::{Primitive, SourceScene};
 use brickwalk_scenes::{Stiff, one_mesh, stiff};
@@ -231,5 +233,12 @@ pub fn flat_scene(lab: &mut Lab) -> Result<Checks> {
     let (tally, hits) = stage.judge(&truth, &frame, &rays)?;
     note(&mut checks, "rays at it and along it", &tally);
     checks.at_least("hits", count as u64 - misses(&hits), count as u64 / 4);
+    let levels = assemble(stage.file.resident(), DVec3::new(1.0, 2.0, -1.0), 32).levels;
+    let points = (-16..=16).flat_map(|x| (-16..=16).map(move |z| DVec3::new(f64::from(x), 0.0, f64::from(z)) / 4.0));
+    let cell_of = |bom: &Bom, p: DVec3| (p / f64::from(bom.cell_log2).exp2()).floor().to_array().map(|x| x as i64);
+    let coarsest = levels.last().context("the scene has occupancy")?;
+    let (empty, of) =
+        points.fold((0, 0), |(empty, of), p| (empty + u64::from(!coarsest.is_occupied(cell_of(coarsest, p))), of + 1));
+    checks.none("points of it in empty cells of the occupancy around it", empty, of);
     Ok(checks)
 }

@@ -13,7 +13,7 @@ const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 const NONE: &str = "–";
 
 /// What a field of the records means, with its unit. Fields that are not listed are shown without.
-const MEANINGS: [(&str, &str); 46] = [
+const MEANINGS: [(&str, &str); 47] = [
     ("rays", "rays traced"),
     ("ms", "wall time from submission to fence, ms"),
     ("ms_phase1", "device time of phase 1: what was known and resident, ms"),
@@ -44,6 +44,7 @@ const MEANINGS: [(&str, &str); 46] = [
     ("bricks_evicted", "payloads evicted"),
     ("bricks_resident_start", "payloads resident at the start"),
     ("bricks_resident_end", "payloads resident at the end"),
+    ("rays_capped", "rays that ROMA finished along their map's direction, after as many columns as they may pass"),
     ("load_batches", "batches of loads"),
     ("bytes_needed", "bytes of BVH and geometry of the needed bricks, where measured"),
     ("bytes_needed_missing", "of these, bytes not resident when the pass began"),

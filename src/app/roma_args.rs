@@ -1,0 +1,66 @@
+//! Options of `--secondary roma`.
+
+use super::args::ranged;
+use super::named::named_values;
+use crate::visibility::roma::{Grid, MOST_STEPS, RomaSettings};
+use clap::Args;
+
+/// Options of ray-aligned occupancy maps.
+#[derive(Clone, Debug, Args)]
+pub struct RomaArgs {
+    /// With --secondary roma: maps of ao are made for N x N directions, 4 or 8, drawn anew for every frame and sample
+    #[arg(long, value_name = "N", default_value = "4", value_parser = |s: &str| of(s, &[4, 8]))]
+    pub roma_k: u32,
+    /// With --secondary roma: the same of shadow, 4 or 8
+    #[arg(long, value_name = "N", default_value = "8", value_parser = |s: &str| of(s, &[4, 8]))]
+    pub roma_shadow_k: u32,
+    /// With --secondary roma: cells of a map on each axis: 32, 64, 128 or 256; of 128, 16 maps take 4 MiB for each of up to six sizes of cells
+    #[arg(long, value_name = "CELLS", default_value = "128", value_parser = |s: &str| of(s, &[32, 64, 128, 256]))]
+    pub roma_size: u32,
+    /// With --secondary roma: how often a cell of a map looks into the scene's cells along the ray: 1, 2 or 4 [default: as often as leaves
+    /// none out, which is 2]
+    #[arg(long, value_name = "N", value_parser = |s: &str| of(s, &[1, 2, 4]))]
+    pub roma_samples: Option<u32>,
+    /// With --secondary roma: which rays keep their direction rather than to take that of the nearest map: none, shadow, ao, all
+    #[arg(long, value_name = "RAYS", default_value = "shadow")]
+    pub roma_unsnapped: Unsnapped,
+    /// With --secondary roma: columns of cells, 1 to 64, that a ray with a direction of its own passes before it goes on in that of its map;
+    /// rays_capped counts such rays
+    #[arg(long, value_name = "N", default_value = "8", value_parser = |s: &str| ranged(s, 1, MOST_STEPS.into()))]
+    pub roma_steps: u32,
+}
+
+named_values! {
+    /// Rays that keep their direction.
+    Unsnapped {
+        /// No others.
+        None = "none",
+        /// Those of shadow.
+        Shadow = "shadow",
+        /// Those of ao.
+        Ao = "ao",
+        /// Both.
+        All = "all",
+    } later &[]
+}
+
+impl RomaArgs {
+    /// How rays are answered.
+    pub fn settings(&self) -> RomaSettings {
+        let grid = |k| Grid { k, size: self.roma_size, samples: self.roma_samples.unwrap_or(0) };
+        let steps = |is_unsnapped| if is_unsnapped { self.roma_steps } else { 0 };
+        RomaSettings {
+            occlusion: grid(self.roma_k),
+            occlusion_steps: steps(matches!(self.roma_unsnapped, Unsnapped::Ao | Unsnapped::All)),
+            shadow: grid(self.roma_shadow_k),
+            shadow_steps: steps(matches!(self.roma_unsnapped, Unsnapped::Shadow | Unsnapped::All)),
+        }
+    }
+}
+
+/// Parses one of a few numbers.
+fn of(text: &str, known: &[u32]) -> Result<u32, String> {
+    let names: Vec<String> = known.iter().map(u32::to_string).collect();
+    let found = text.parse().ok().filter(|n| known.contains(n));
+    found.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
+}

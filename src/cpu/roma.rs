@@ -1,0 +1,275 @@
+//! Ray-aligned occupancy maps: twins of `shaders/roma_rotate.wgsl` and `roma_trace.wgsl`.
+
+use super::rays::RaySet;
+use super::scene::{Bound, Tally};
+use super::vector::{Vec3, each, least, most};
+use crate::kernel::layout::{
+    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, Params, ROMA_HIT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+};
+use crate::kernel::roma::RomaMaps;
+use crate::math::exact::{barrier, divide, square_root};
+use crate::math::sampling::random2;
+use crate::visibility::bom::Cascades;
+use crate::visibility::roma::bits::{cells_between, first_cell};
+use crate::visibility::roma::directions::stratum_of;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Steps of a column along an axis of the base map that are too short to bound it by.
+const LEAST_STEP: f32 = 1.0 / 1024.0;
+
+/// A level ends before its sides, ray by ray, by up to this share of them.
+const BLEND: f32 = 1.0 / 16.0;
+
+/// Columns that a ray passes at most which would be snapped to below its surface and is not.
+const GRAZING_STEPS: u32 = 64;
+
+/// Slower than this, in cells a unit of t, a ray stays where it is.
+const LEAST_SPEED: f32 = f32::from_bits((127 - 60) << 23);
+
+/// Rays that a task traces in a row.
+const RUN: usize = 256;
+
+/// The maps.
+#[derive(Default)]
+pub struct RomaTables {
+    /// The base maps.
+    pub cascades: Arc<Cascades>,
+    /// How the maps are placed.
+    pub maps: RomaMaps,
+    /// The words of all columns.
+    pub columns: Vec<u32>,
+}
+
+fn linear(row: &[f32; 4], v: Vec3) -> f32 {
+    row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
+}
+
+fn affine(row: &[f32; 4], p: Vec3) -> f32 {
+    linear(row, p) + row[3]
+}
+
+/// The part of the range of depths in which a column lies between 0 and the base map's side on one axis, a cell more at both ends.
+fn bounded(cells: u32, range: [f32; 2], start: f32, step: f32) -> [f32; 2] {
+    if step.abs() < LEAST_STEP {
+        return range;
+    }
+    let a = -start / step;
+    let b = (cells as f32 - start) / step;
+    [most(range[0], least(a, b) - 1.0), least(range[1], most(a, b) + 1.0)]
+}
+
+/// Makes the ray-aligned maps of all levels from their base maps (Zeng et al., Algorithm 1): a cell is occupied where one of its look-ups,
+/// evenly spaced along the column, finds an occupied cell of the base map.
+pub fn roma_rotate(bound: &Bound, tables: &mut RomaTables) {
+    let p = bound.params;
+    let RomaTables { cascades, maps, columns } = tables;
+    let words = p.roma_size / 32;
+    columns.resize(maps.words() as usize, 0);
+    let row = (p.roma_size * words) as usize;
+    columns.par_chunks_mut(row.max(1)).enumerate().for_each(|(number, row)| {
+        let (map, y) = (number as u32 / p.roma_size, number as u32 % p.roma_size);
+        let level = map / (p.roma_k * p.roma_k);
+        let bom = cascades.levels[level as usize].words();
+        let rows = &maps.maps[map as usize].base_from_cell;
+        for (x, column) in row.chunks_mut(words as usize).enumerate() {
+            rotate_column(p, bom, rows, [x as f32 + 0.5, y as f32 + 0.5, 0.0], column);
+        }
+    });
+}
+
+fn is_occupied(n: u32, bom: &[u32], base: Vec3) -> bool {
+    let c = base.map(|x| x.floor() as i32 as u32);
+    if c.iter().any(|&x| x >= n) {
+        return false;
+    }
+    let word = (c[0] + n * c[1]) * (n / 32) + c[2] / 32;
+    bom[word as usize] >> (c[2] % 32) & 1 != 0
+}
+
+fn rotate_column(p: &Params, bom: &[u32], rows: &[[f32; 4]; 3], foot: Vec3, column: &mut [u32]) {
+    let start = each(|k| affine(&rows[k], foot));
+    let step = each(|k| rows[k][2]);
+    let whole = [0.0, p.roma_size as f32];
+    let range = (0..3).fold(whole, |range, k| bounded(p.roma_cells, range, start[k], step[k]));
+    let part = 1.0 / p.roma_samples as f32;
+    for (w, word) in column.iter_mut().enumerate() {
+        let mut bits = 0;
+        for i in 0..32 {
+            let depth = (32 * w as u32 + i) as f32;
+            if depth + 1.0 < range[0] || depth > range[1] {
+                continue;
+            }
+            let finds = |s: u32| {
+                let at = depth + (s as f32 + 0.5) * part;
+                is_occupied(p.roma_cells, bom, each(|k| start[k] + at * step[k]))
+            };
+            bits |= u32::from((0..p.roma_samples).any(finds)) << (31 - i);
+        }
+        *word = bits;
+    }
+}
+
+/// What a ray finds in a level.
+struct Found {
+    /// Where it meets something; below 0: nothing.
+    t: f32,
+    /// It passed as many columns as it may, and was finished snapped.
+    is_capped: bool,
+}
+
+/// The part of the range of t in which a coordinate lies between `low` and `high`.
+fn clipped(range: [f32; 2], at: f32, speed: f32, low: f32, high: f32) -> [f32; 2] {
+    if speed.abs() < LEAST_SPEED {
+        return if at >= low && at <= high { range } else { [1.0, 0.0] };
+    }
+    let inverse = divide(1.0, speed);
+    let a = barrier((low - at) * inverse);
+    let b = barrier((high - at) * inverse);
+    [most(range[0], least(a, b)), least(range[1], most(a, b))]
+}
+
+/// Position at t.
+fn along(at: f32, speed: f32, t: f32) -> f32 {
+    at + t * speed
+}
+
+/// t at which a ray meets the next border of cell `cell`.
+fn border(at: f32, speed: f32, cell: i32) -> f32 {
+    if speed.abs() < LEAST_SPEED {
+        return T_INFINITE;
+    }
+    let side = (cell + i32::from(speed > 0.0)) as f32;
+    (side - at) * divide(1.0, speed)
+}
+
+/// What rays are traced against.
+struct Maps<'a> {
+    params: &'a Params,
+    levels: &'a [RomaLevel],
+    maps: &'a [RomaMap],
+    columns: &'a [u32],
+}
+
+impl Maps<'_> {
+    /// First word of column (x, y) of a map.
+    fn first_word(&self, map: u32, x: i32, y: i32) -> u32 {
+        let n = self.params.roma_size;
+        ((map * n + y as u32) * n + x as u32) * (n / 32)
+    }
+
+    /// The first cell of a column that a ray at height `at` with vertical `speed` meets in a range of t; below 0: none.
+    fn met(&self, column: u32, at: f32, speed: f32, [from, to]: [f32; 2]) -> f32 {
+        let cells = cells_between(along(at, speed, from), along(at, speed, to), self.params.roma_size);
+        let word = |w: u32| self.columns[(column + w) as usize];
+        let Some(depth) = cells.and_then(|cells| first_cell(word, cells, speed >= 0.0)) else { return -1.0 };
+        if speed.abs() < LEAST_SPEED {
+            return from;
+        }
+        least(most(divide(depth - at, speed), from), to)
+    }
+
+    /// Through a map: `at` and `speed` in its cells, `range` within it. With no `steps` the ray is along the columns.
+    fn through(&self, map: u32, at: Vec3, speed: Vec3, range: [f32; 2], steps: u32) -> Found {
+        let last = self.params.roma_size as i32 - 1;
+        let mut x = (along(at[0], speed[0], range[0]).floor() as i32).clamp(0, last);
+        let mut y = (along(at[1], speed[1], range[0]).floor() as i32).clamp(0, last);
+        let mut t = range[0];
+        for _ in 0..steps {
+            let to_x = border(at[0], speed[0], x);
+            let to_y = border(at[1], speed[1], y);
+            let end = most(t, least(range[1], least(to_x, to_y)));
+            let hit = self.met(self.first_word(map, x, y), at[2], speed[2], [t, end]);
+            if hit >= 0.0 || end >= range[1] {
+                return Found { t: hit, is_capped: false };
+            }
+            if to_x <= to_y {
+                x += if speed[0] > 0.0 { 1 } else { -1 };
+            } else {
+                y += if speed[1] > 0.0 { 1 } else { -1 };
+            }
+            if x.min(y) < 0 || x.max(y) > last {
+                return Found { t: -1.0, is_capped: false };
+            }
+            t = end;
+        }
+        let hit = self.met(self.first_word(map, x, y), at[2], speed[2], [t, range[1]]);
+        Found { t: hit, is_capped: steps > 0 }
+    }
+
+    /// Where a ray meets something, below 0 nowhere; whether it was capped in some level.
+    fn trace(&self, index: u32, ray: &Ray, normal: Vec3) -> Found {
+        let p = self.params;
+        let maps = p.roma_k * p.roma_k;
+        let (stratum, is_upper) = stratum_of(ray.direction, p.roma_k);
+        let mut direction = ray.direction;
+        let mut steps = p.roma_steps;
+        if steps == 0 {
+            let d = ray.direction;
+            let length = square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            let signed = if is_upper { length } else { -length };
+            let snapped = each(|k| signed * self.maps[stratum as usize].direction[k]);
+            let above = snapped[0] * normal[0] + snapped[1] * normal[1] + snapped[2] * normal[2];
+            if above >= 0.0 {
+                direction = snapped;
+            } else {
+                steps = GRAZING_STEPS;
+            }
+        }
+        let side = p.roma_cells as f32;
+        let margin = BLEND * (side * random2(index, !p.stream, p.seed)[0]);
+        let start = |level: &RomaLevel| each(|k| ray.origin[k] + level.lift * normal[k]);
+        let at = |level: &RomaLevel| {
+            let start = start(level);
+            each(|k| start[k] * level.scale + level.first[k])
+        };
+        let holds = |level: &RomaLevel| at(level).iter().all(|&x| x >= margin && x <= side - margin);
+        let start_level = self.levels.iter().position(holds).unwrap_or(self.levels.len() - 1);
+        let mut t = ray.t_min;
+        let mut is_capped = false;
+        for (l, level) in self.levels.iter().enumerate().skip(start_level) {
+            let (start, at) = (start(level), at(level));
+            let speed = direction.map(|x| x * level.scale);
+            let low = if l + 1 == self.levels.len() { 0.0 } else { margin };
+            let high = side - low;
+            let range = (0..3).fold([t, ray.t_max], |range, k| clipped(range, at[k], speed[k], low, high));
+            if range[0] <= range[1] {
+                let map = l as u32 * maps + stratum;
+                let rows = &self.maps[map as usize].cell_from_point;
+                let cell = each(|k| affine(&rows[k], start));
+                let cells = each(|k| linear(&rows[k], direction));
+                let found = self.through(map, cell, cells, range, steps);
+                is_capped |= found.is_capped;
+                if found.t >= 0.0 || range[1] >= ray.t_max {
+                    return Found { is_capped, ..found };
+                }
+                t = range[1];
+            }
+        }
+        Found { t: -1.0, is_capped }
+    }
+}
+
+/// Answers the pass's rays by ray-aligned maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the next where
+/// the ray leaves one. What is met is written as a hit of no triangle.
+pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
+    let RomaMaps { levels, maps, .. } = &tables.maps;
+    let of = Maps { params: bound.params, levels, maps, columns: &tables.columns };
+    let normal = |index: usize| seen.surfaces.get(index).map_or([0.0; 3], |surface: &Surface| surface.normal);
+    own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
+        let mut tally = Tally::default();
+        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+            let index = run * RUN + i;
+            tally.add(COUNTER_RAYS, 1);
+            if levels.is_empty() {
+                continue;
+            }
+            let found = of.trace(index as u32, ray, normal(index));
+            tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
+            if found.t >= 0.0 {
+                *hit = Hit { t: found.t, id: ROMA_HIT, u: 0.0, v: 0.0 };
+            }
+        }
+        bound.counters.add(&tally);
+    });
+}

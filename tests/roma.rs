@@ -1,0 +1,266 @@
+//! `walk --secondary roma`: pictures against closed forms, what it loads and records, that it is the same again and again.
+
+mod common;
+
+use brickwalk::app::args::{Cli, Command as AppCommand};
+use brickwalk::app::session::{Session, open_scene};
+use brickwalk::app::walk;
+use brickwalk::kernel::Extent;
+use brickwalk::reference::Truth;
+use brickwalk::render::Renderer;
+use brickwalk::scene::Camera;
+use brickwalk::visibility::bom_resident::assemble;
+use clap::Parser;
+use common::{city, folder, frames};
+use glam::DVec3;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const SIZE: usize = 48;
+
+/// A sheet of squares of side `side`: its corner, its two edges, and how many squares along them.
+fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3; 2], squares: [usize; 2]) {
+    for j in 0..=squares[1] {
+        for i in 0..=squares[0] {
+            let p = corner + edges[0] * (i as f64 / squares[0] as f64) + edges[1] * (j as f64 / squares[1] as f64);
+            *text += &format!("v {} {} {}\n", p.x, p.y, p.z);
+        }
+    }
+    let row = squares[0] + 1;
+    for (i, j) in (0..squares[0]).flat_map(|i| (0..squares[1]).map(move |j| (i, j))) {
+        let p = *count + 1 + i + j * row;
+        *text += &format!("f {p} {} {}\nf {p} {} {}\n", p + 1, p + row + 1, p + row + 1, p + row);
+    }
+    *count += row * (squares[1] + 1);
+}
+
+/// A floor of 8 m by 8 m and, 2 m high, a wall along its middle, all in squares of 1/4 m; bricks of 64 triangles have resident cells of 1/8 m.
+fn scene(folder: &Path, wall: bool) -> PathBuf {
+    let (mut text, mut count) = (String::new(), 0);
+    sheet(&mut text, &mut count, DVec3::new(-4.0, 0.0, -4.0), [DVec3::X * 8.0, DVec3::Z * 8.0], [32, 32]);
+    if wall {
+        sheet(&mut text, &mut count, DVec3::new(-4.0, 0.0, 0.0), [DVec3::X * 8.0, DVec3::Y * HEIGHT], [32, 8]);
+    }
+    let input = folder.join("scene.obj");
+    std::fs::write(&input, text).expect("a shape");
+    let scene = folder.join("scene.bricks");
+    let words = ["--brick-triangles", "64"].map(AsRef::as_ref);
+    common::succeed(["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()].into_iter().chain(words));
+    scene
+}
+
+const HEIGHT: f64 = 2.0;
+
+fn renderer(scene: &Path, options: &str) -> Renderer {
+    let words = format!(
+        "brickwalk walk {} -o o --size {SIZE}x{SIZE} --tile 16 --cache 100% --schedule plain --adapter cpu --aov \
+         --sun-intensity 0 --ao-length 100 --ao-rays 16 --rotation full {options}",
+        scene.display()
+    );
+    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
+        panic!("a walk")
+    };
+    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
+    walk::renderer(session, &args).expect("lamps")
+}
+
+/// Above the floor, looking down on the part of it before the wall.
+fn eye() -> Camera {
+    Camera {
+        position: DVec3::new(0.0, 3.5, 1.7),
+        target: DVec3::new(0.0, 0.0, 1.7),
+        up: -DVec3::Z,
+        fov_y: 52f64.to_radians(),
+    }
+}
+
+/// Distance from the wall of the point of the floor that a pixel shows.
+fn before_wall(pixel: usize) -> f64 {
+    let row = (pixel / SIZE) as f64 + 0.5;
+    1.7 + (row / SIZE as f64 - 0.5) * 2.0 * 3.5 * 26f64.to_radians().tan()
+}
+
+/// Occlusion, 0 to 1, of the pixels that show the floor, by their distance from the wall: unoccluded light by the picture without.
+fn openness(folder: &Path, wall: bool, options: &str) -> Vec<(f64, f64)> {
+    let scene = scene(folder, wall);
+    let bare = renderer(&scene, "--effects primary").frame(0, &eye()).expect("a frame");
+    let output = renderer(&scene, &format!("--effects ao {options}")).frame(0, &eye()).expect("a frame");
+    assert!(output.pixels.radiance.iter().flatten().all(|x| x.is_finite()));
+    let of = |i: usize| f64::from(output.pixels.radiance[i][1]) / f64::from(bare.pixels.radiance[i][1]);
+    let floor = (0..SIZE * SIZE).filter(|&i| output.pixels.normal[i][1] > 0.9);
+    floor.map(|i| (before_wall(i), of(i))).collect()
+}
+
+/// What a point `d` before the middle of a wall of height `h` and width 8 sees of the sky: the form factors of the halves of the wall (Howell,
+/// "A Catalog of Radiation Heat Transfer Configuration Factors", B-4).
+fn truth(d: f64, h: f64) -> f64 {
+    let half = 4.0;
+    let (x, y) = (h / half, d / half);
+    let r = (x * x + y * y).sqrt();
+    1.0 - 2.0 / std::f64::consts::TAU * ((1.0 / y).atan() - y / r * (1.0 / r).atan())
+}
+
+#[test]
+fn occlusion_before_a_wall_is_that_of_the_closed_form_but_for_cells() {
+    let folder = folder();
+    let cell = 1.0 / 8.0;
+    let mean = |pixels: &[(f64, f64)], d: f64| {
+        let near: Vec<f64> = pixels.iter().filter(|p| (p.0 - d).abs() < 0.1).map(|p| p.1).collect();
+        assert!(near.len() > 40, "{} pixels at {d}", near.len());
+        near.iter().sum::<f64>() / near.len() as f64
+    };
+    let exact = openness(folder.path(), true, "--spp 2");
+    let roma = openness(folder.path(), true, "--secondary roma --spp 4");
+    let unsnapped = openness(folder.path(), true, "--secondary roma --spp 4 --roma-unsnapped all --roma-steps 64");
+    for d in [0.6, 1.0, 1.5, 2.0, 3.0] {
+        let expected = truth(d, HEIGHT);
+        let [exact, roma, unsnapped] = [&exact, &roma, &unsnapped].map(|pixels| mean(pixels, d));
+        println!(
+            "{d} m before the wall: closed form {expected:.4}, exact {exact:.4}, roma {roma:.4}, unsnapped {unsnapped:.4}"
+        );
+        assert!((exact - expected).abs() < 0.02, "{exact} instead of {expected}");
+        // Cells mark what is up to one of theirs aside, maps see them up to one of their own, 1.75 as long, aside, and rays start 1.5 of these
+        // above the floor, which hides as much of the wall.
+        let darkest = truth(d - 2.75 * cell, HEIGHT + 2.75 * cell);
+        let brightest = truth(d + 1.75 * cell, HEIGHT - (1.5 + 1.0) * 1.75 * cell);
+        for found in [roma, unsnapped] {
+            assert!(found > darkest - 0.02 && found < brightest + 0.02, "{found} is not in {darkest} to {brightest}");
+        }
+    }
+    // Control: it is the wall that is seen.
+    assert!(mean(&roma, 0.6) < 0.85 && mean(&roma, 3.0) > mean(&roma, 0.6) + 0.1);
+}
+
+#[test]
+fn a_plane_does_not_occlude_itself() {
+    let folder = folder();
+    for options in
+        ["--secondary roma", "--secondary roma --roma-unsnapped all", "--secondary roma --roma-size 32 --roma-k 8"]
+    {
+        let pixels = openness(folder.path(), false, &format!("{options} --spp 2"));
+        assert_eq!(pixels.len(), SIZE * SIZE);
+        let least = pixels.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+        assert!((1.0 - least).abs() < 1e-4, "{options}: {least}");
+    }
+    // Control: a wall does.
+    let pixels = openness(folder.path(), true, "--secondary roma");
+    assert!(pixels.iter().any(|p| p.1 < 0.9));
+}
+
+const VIEW: &str = "--frames 2 --size 64x48 --tile 16 --effects shadow,ao --ao-rays 4 --ao-length 8";
+
+fn walk_of(scene: &Path, output: &Path, options: &str, threads: &str) -> Vec<Value> {
+    let path = scene.with_extension("near.json");
+    let options = format!("{VIEW} {options} --path {}", path.display());
+    let status = Command::new(env!("CARGO_BIN_EXE_brickwalk"))
+        .env("RAYON_NUM_THREADS", threads)
+        .args(["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()])
+        .args(options.split_whitespace())
+        .status();
+    assert!(status.expect("the command starts").success(), "{options}");
+    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
+    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
+}
+
+fn sum(records: &[Value], pass: &str, field: &str) -> f64 {
+    records.iter().filter(|r| r["pass"] == pass).map(|r| r[field].as_f64().expect("a number")).sum()
+}
+
+#[test]
+fn no_brick_is_loaded_for_its_rays() {
+    let folder = folder();
+    let scene = city(folder.path(), "40K", "1K");
+    let of = |options: &str| {
+        walk_of(&scene, &folder.path().join("out"), &format!("--adapter cpu --cache 30% {options}"), "2")
+    };
+    let (exact, roma) = (of("--secondary exact"), of("--secondary roma"));
+    for pass in ["shadow", "ao"] {
+        for field in ["bricks_loaded", "bricks_needed", "bytes_bvh", "bytes_geometry", "queries", "load_batches"] {
+            assert_eq!(sum(&roma, pass, field), 0.0, "{pass} {field}");
+        }
+        // The same rays, answered otherwise; maps and rays have times of their own.
+        assert_eq!(sum(&roma, pass, "rays"), sum(&exact, pass, "rays"));
+        assert!(sum(&roma, pass, "ms_phase1") > 0.0 && sum(&roma, pass, "ms_phase3") > 0.0);
+        assert_eq!(sum(&roma, pass, "ms_phase2"), 0.0);
+    }
+    assert_eq!(sum(&roma, "ao", "round_trips"), 2.0 * 4.0);
+    assert_eq!(sum(&roma, "shadow", "round_trips"), 2.0);
+    assert!(sum(&roma, "primary", "bricks_loaded") > 0.0);
+    assert!(sum(&exact, "ao", "bricks_needed") > 0.0, "the control needs some");
+}
+
+#[test]
+fn it_is_the_same_whatever_the_threads_and_the_cache() {
+    let folder = folder();
+    let scene = city(folder.path(), "40K", "1K");
+    let picture = |options: &str, threads: &str| {
+        let output = folder.path().join("out");
+        walk_of(&scene, &output, &format!("--adapter cpu --secondary roma {options}"), threads);
+        let all = frames(&output);
+        std::fs::remove_dir_all(&output).expect("a folder");
+        all
+    };
+    let one = picture("--cache 100%", "1");
+    assert_eq!(one.len(), 2);
+    for (options, threads) in [("--cache 100%", "3"), ("--cache 20%", "2"), ("--cache 30% --schedule demand", "2")] {
+        assert!(picture(options, threads) == one, "{options}, {threads} threads");
+    }
+    for other in ["--seed 1", "--roma-k 8", "--roma-size 64", "--roma-samples 1", "--roma-unsnapped all"] {
+        assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
+    }
+}
+
+/// Points of all triangles that lie in a level's cube and in an empty cell of it, of so many, and the share of cells that are occupied.
+fn unmarked(scene: &Path, camera: DVec3) -> (usize, usize, f64) {
+    let file = open_scene(scene).expect("a scene");
+    let truth = Truth::load(&file).expect("triangles");
+    let (mut empty, mut of, mut occupied, mut cells) = (0, 0, 0u64, 0u64);
+    for bom in assemble(file.resident(), camera, 64).levels {
+        let side = f64::from(bom.cell_log2).exp2();
+        for [a, b, c] in truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(DVec3::from)) {
+            for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.3), (0.5, 0.5), (0.1, 0.6)] {
+                let cell = ((a + u * (b - a) + v * (c - a)) / side).floor().to_array().map(|x| x as i64);
+                if (0..3).all(|k| (0..64).contains(&(cell[k] - bom.first[k]))) {
+                    of += 1;
+                    empty += usize::from(!bom.is_occupied(cell));
+                }
+            }
+        }
+        occupied += bom.words().iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
+        cells += 64 * 64 * 64;
+    }
+    (empty, of, occupied as f64 / cells as f64)
+}
+
+#[test]
+fn what_is_resident_marks_all_that_is_there() {
+    let folder = folder();
+    for options in [&["--instanced"][..], &[]] {
+        let scene = folder.path().join("city.bricks");
+        let words = ["scene", "city", "--triangles", "40K", "--brick-triangles", "1K", "-o"].map(AsRef::as_ref);
+        let options = options.iter().map(AsRef::as_ref);
+        common::succeed(words.into_iter().chain([scene.as_os_str()]).chain(options));
+        for camera in [DVec3::new(2.0, 1.7, 1.0), DVec3::new(-30.3, 9.0, 12.0), DVec3::new(400.0, 50.0, 0.0)] {
+            let (empty, of, share) = unmarked(&scene, camera);
+            assert!(empty == 0 && of > 10_000, "{empty} of {of}");
+            assert!(share > 1e-4 && share < 0.5, "{share} of all cells");
+        }
+    }
+}
+
+#[test]
+fn scenes_without_occupancy_are_refused() {
+    let folder = folder();
+    let scene = folder.path().join("bare.bricks");
+    let words = ["scene", "city", "--triangles", "20K", "--no-proxies", "-o"].map(AsRef::as_ref);
+    common::succeed(words.into_iter().chain([scene.as_os_str()]));
+    let out = folder.path().join("out");
+    let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), out.as_os_str()];
+    let options = ["--secondary", "roma", "--adapter", "cpu", "--frames", "1", "--size", "32x24"].map(AsRef::as_ref);
+    let output = common::brickwalk(words.into_iter().chain(options));
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains("bare.bricks") && text.contains("without --no-proxies"), "{text}");
+}
