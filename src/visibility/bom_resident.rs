@@ -1,7 +1,7 @@
-//! Base occupancy maps from what is always resident of bricks: the 16³ level of their occupancy.
+//! Base occupancy maps from what is always resident of bricks: the 16³ level of their occupancy, and the boxes of their roots' children.
 
 use super::bom::{Bom, Cascades, extent};
-use bricks::{INSTANCE_IDENTITY, Instance, Occupancy, RESIDENT_LEVEL, Resident};
+use bricks::{Brick, INSTANCE_IDENTITY, Instance, Object, Occupancy, RESIDENT_LEVEL, Resident};
 use glam::{DMat3, DVec3};
 
 /// Cells of the resident level on each axis.
@@ -12,6 +12,8 @@ const MOST_LEVELS: i32 = 6;
 const STRIDE: i64 = 8;
 /// By how much of their size and place the boxes of turned cells grow, for roundings.
 const MARGIN: f64 = 1e-9;
+/// By how much of their place the boxes of children grow, for the rounding of a sum.
+const SUM_ULPS: f64 = 2.0 * f64::EPSILON;
 
 /// Maps of `cells` on each axis (a multiple of 32 from 32 to 256) around `camera`, a point of the world. The coarsest holds the scene. The
 /// finest has cells as large as those of half of the bricks; finer ones would repeat cells. No maps of a scene without proxies or triangles.
@@ -36,10 +38,10 @@ pub fn assemble(resident: &Resident, camera: DVec3, cells: u32) -> Cascades {
     let finest = finest.max(coarsest + 1 - MOST_LEVELS);
     let mut levels: Vec<Bom> = (finest..=coarsest).map(|log2| empty(camera, cells, log2)).collect();
     for leaf in &resident.leaves {
-        let (instance, record) =
-            (&resident.instances[leaf.instance as usize], &resident.occupancy[leaf.brick as usize]);
+        let instance = &resident.instances[leaf.instance as usize];
+        let (object, brick) = (&resident.objects[instance.object as usize], &resident.bricks[leaf.brick as usize]);
         for level in &mut levels {
-            enter(level, instance, record);
+            enter(level, object, brick, instance, &resident.occupancy[leaf.brick as usize]);
         }
     }
     Cascades { levels }
@@ -60,45 +62,73 @@ fn empty(camera: DVec3, cells: u32, cell_log2: i32) -> Bom {
     Bom::new(cells, cell_log2, camera.to_array().map(first))
 }
 
-/// Enters what a brick of `instance` occupies.
-fn enter(bom: &mut Bom, instance: &Instance, record: &Occupancy) {
-    let cells = (0..CELLS).flat_map(|y| (0..CELLS).flat_map(move |x| (0..CELLS).map(move |z| [x, y, z])));
-    let is_occupied = |&[x, y, z]: &[i64; 3]| {
-        let bit = (z + CELLS * (x + CELLS * y)) as usize;
-        record.bits[bit / 8] >> (bit % 8) & 1 != 0
-    };
-    // In cells of the finest level, from the object's origin.
-    let bounds = |cell: [i64; 3], count: i64| -> [[i64; 3]; 2] {
-        let first: [i64; 3] = std::array::from_fn(|k| record.origin[k] + (cell[k] << RESIDENT_LEVEL));
-        [first, first.map(|x| x + (count << RESIDENT_LEVEL))]
-    };
-    if instance.flags & INSTANCE_IDENTITY != 0 {
-        let shift = bom.cell_log2 - record.cell_log2;
-        // A fine cell is cut into several of finer maps, or is a part of one.
-        let first = |x: i64| if shift < 0 { x << -shift.max(-30) } else { x >> shift.min(63) };
-        let last = |x: i64| if shift < 0 { first(x) - 1 } else { first(x - 1) };
-        let placed = |[low, high]: [[i64; 3]; 2]| [low.map(first), high.map(last)];
-        if overlaps(bom, placed(bounds([0; 3], CELLS))) {
-            cells.filter(is_occupied).for_each(|cell| fill(bom, placed(bounds(cell, 1))));
+/// Boxes that hold the triangles of a brick, in units of its object: those of its root's children.
+fn boxes(object: &Object, brick: &Brick) -> impl Iterator<Item = [DVec3; 2]> {
+    let (unit, step) = (f64::from(object.unit_log2).exp2(), f64::from(object.step_log2).exp2());
+    let root = brick.root;
+    let origin = DVec3::from_array(brick.origin.map(|x| x as f64)) * step;
+    (0..8).filter(move |&child| root.meta[child] != 0).map(move |child| {
+        // Exact but for the sum, of numbers of unlike sizes.
+        let side = |steps: &[[u8; 8]; 3], outward: f64| {
+            let along = |k: usize| {
+                let grid = f64::from(i32::from(root.exponent[k]) - 127).exp2();
+                let x = origin[k] + (f64::from(root.origin[k]) + f64::from(steps[k][child]) * grid) * unit;
+                x + outward * SUM_ULPS * x.abs()
+            };
+            DVec3::new(along(0), along(1), along(2))
+        };
+        [side(&root.lo, -1.0), side(&root.hi, 1.0)]
+    })
+}
+
+/// Enters what a brick of `instance` occupies: its cells, as far as they lie in the boxes of its root's children, which are thin where it is
+/// flat and its cells are not.
+fn enter(bom: &mut Bom, object: &Object, brick: &Brick, instance: &Instance, record: &Occupancy) {
+    let own = f64::from(record.cell_log2 + RESIDENT_LEVEL as i32).exp2();
+    let first = DVec3::from_array(record.origin.map(|x| x as f64)) * f64::from(record.cell_log2).exp2();
+    for of_child in boxes(object, brick) {
+        if !overlaps(bom, placed(bom, instance, of_child, [false; 3])) {
+            continue;
         }
-        return;
+        let [low, high] =
+            of_child.map(|p| ((p - first) / own).floor().to_array().map(|x| (x as i64).clamp(0, CELLS - 1)));
+        for (x, y, z) in (low[0]..=high[0])
+            .flat_map(|x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| (x, y, z))))
+        {
+            let bit = (z + CELLS * (x + CELLS * y)) as usize;
+            if record.bits[bit / 8] >> (bit % 8) & 1 == 0 {
+                continue;
+            }
+            let low = first + own * DVec3::new(x as f64, y as f64, z as f64);
+            let high = low + DVec3::splat(own);
+            // Where the cell ends and not the box, what begins there belongs to the next cell.
+            let is_open = [0, 1, 2].map(|k| high[k] <= of_child[1][k]);
+            fill(bom, placed(bom, instance, [low.max(of_child[0]), high.min(of_child[1])], is_open));
+        }
+    }
+}
+
+/// First and last cell, from the world's origin, of those that a box of an object meets; where it is open it does not meet what begins at its
+/// upper side.
+fn placed(bom: &Bom, instance: &Instance, [low, high]: [DVec3; 2], is_open: [bool; 3]) -> [[i64; 3]; 2] {
+    let side = f64::from(bom.cell_log2).exp2();
+    if instance.flags & INSTANCE_IDENTITY != 0 {
+        let first = low.to_array().map(|x| (x / side).floor() as i64);
+        let last = |k: usize| {
+            let x = high[k] / side;
+            let last = if is_open[k] { x.ceil() as i64 - 1 } else { x.floor() as i64 };
+            last.max(first[k])
+        };
+        return [first, [last(0), last(1), last(2)]];
     }
     let m = &instance.world_from_object;
     let linear = DMat3::from_cols_array(&[m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]]);
     let translation = DVec3::new(m[3], m[7], m[11]);
     let size = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
-    let fine = f64::from(record.cell_log2).exp2();
-    let side = f64::from(bom.cell_log2).exp2();
-    let placed = |[low, high]: [[i64; 3]; 2]| {
-        let [low, high] = [low, high].map(|b| DVec3::from_array(b.map(|x| x as f64)) * fine);
-        let middle = linear * ((low + high) / 2.0) + translation;
-        let half = size * ((high - low) / 2.0);
-        let half = half + (half + middle.abs() + translation.abs()) * MARGIN;
-        [(middle - half) / side, (middle + half) / side].map(|p| p.floor().to_array().map(|x| x as i64))
-    };
-    if overlaps(bom, placed(bounds([0; 3], CELLS))) {
-        cells.filter(is_occupied).for_each(|cell| fill(bom, placed(bounds(cell, 1))));
-    }
+    let middle = linear * ((low + high) / 2.0) + translation;
+    let half = size * ((high - low) / 2.0);
+    let half = half + (half + middle.abs() + translation.abs()) * MARGIN;
+    [(middle - half) / side, (middle + half) / side].map(|p| p.floor().to_array().map(|x| x as i64))
 }
 
 /// The part of cells `low` to `high`, of the world's origin, that lies in the map, in its own cells.
