@@ -208,7 +208,7 @@ fn direction_count(text: &str) -> Result<u32, String> {
     super::args::ranged(text, 1, 1024)
 }
 
-fn ray_length(text: &str) -> Result<f64, String> {
+pub(super) fn ray_length(text: &str) -> Result<f64, String> {
     let length = text.parse().map_err(|_| "it must be a number")?;
     if (1e-6..=1e9).contains(&length) { Ok(length) } else { Err("it must be from 1e-6 to 1e9".into()) }
 }

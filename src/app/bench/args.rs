@@ -1,6 +1,7 @@
 //! Options of `bench`.
 
 use super::plan::Stage;
+use super::roma::args::RomaBenchArgs;
 use crate::app::args::{UNITS, ranged};
 use crate::app::device::Adapter;
 use crate::app::sizes::{ImageSize, positive_count};
@@ -22,6 +23,8 @@ pub enum Experiments {
     Chc(Box<ChcArgs>),
     /// The same frames on every device that is present: rates, and how far pictures differ from those of the first device
     Executors(Box<ExecutorsArgs>),
+    /// The experiments of the ROMA paper: times of ray-aligned occupancy maps, and how far pictures by them are from exact ones
+    Roma(Box<RomaBenchArgs>),
 }
 
 /// Options of `bench executors`.
@@ -156,7 +159,7 @@ fn three_counts(text: &str) -> Result<Counts, String> {
     Ok(Counts(three))
 }
 
-fn minutes(text: &str) -> Result<f64, String> {
+pub(super) fn minutes(text: &str) -> Result<f64, String> {
     let minutes: f64 = text.parse().map_err(|_| "it must be a number of minutes")?;
     if (0.0..=100_000.0).contains(&minutes) { Ok(minutes) } else { Err("it must be from 0 to 100000".into()) }
 }
@@ -165,7 +168,7 @@ fn frames(text: &str) -> Result<u32, String> {
     ranged(text, 1, 300)
 }
 
-fn repetitions(text: &str) -> Result<u32, String> {
+pub(super) fn repetitions(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1000)
 }
 

@@ -1,9 +1,10 @@
-//! `cells.jsonl`: what has been measured, a line a walk, and the line of settings before them. It grows while the bench runs and
-//! is where a later start goes on.
+//! What has been measured, a line each, and the line of settings before them: it grows while a bench runs and is where a later
+//! start goes on. `cells.jsonl` has a line a walk.
 
 use super::plan::{Case, Effect};
 use crate::app::output::atomic::JsonLines;
 use anyhow::{Context, Result, bail, ensure};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -53,23 +54,20 @@ pub struct PictureError {
     pub worst_tile: f64,
 }
 
-/// What has been measured so far.
-pub struct Cells {
+/// A file of measurements.
+pub struct Journal<T> {
     header: Header,
-    cells: Vec<Cell>,
-    /// The number of this start.
-    run: u32,
+    entries: Vec<T>,
     lines: JsonLines,
     file: PathBuf,
 }
 
-impl Cells {
-    /// Opens the measurements of `folder`, or begins them.
+impl<T: Serialize + DeserializeOwned> Journal<T> {
+    /// Opens the measurements of `file`, or begins them.
     ///
     /// # Errors
     /// The file is none of measurements, or of others than `header` says; it cannot be read or written.
-    pub fn open(folder: &Path, header: Header, must_exist: bool) -> Result<Self> {
-        let file = folder.join("cells.jsonl");
+    pub fn open(file: PathBuf, header: Header, must_exist: bool) -> Result<Self> {
         let name = file.display();
         let text = match std::fs::read_to_string(&file) {
             Ok(text) => text,
@@ -84,27 +82,26 @@ impl Cells {
         let Some(first) = lines.next() else {
             let mut lines = JsonLines::create(&file)?;
             lines.push(&header)?;
-            return Ok(Self { header, cells: Vec::new(), run: 0, lines, file });
+            return Ok(Self { header, entries: Vec::new(), lines, file });
         };
         let found: Header =
-            serde_json::from_str(first).ok().filter(|found: &Header| found.format == FORMAT).with_context(|| {
-                format!("{name}: line 1 holds no settings of this version; choose another folder with -o")
-            })?;
+            serde_json::from_str(first).ok().filter(|found: &Header| found.format == header.format).with_context(
+                || format!("{name}: line 1 holds no settings of this version; choose another folder with -o"),
+            )?;
         if found != header {
             bail!(
                 "{name}: measured with {}; choose another folder with -o, or the same settings",
                 difference(&found, &header)
             );
         }
-        let mut cells = Vec::new();
+        let mut entries = Vec::new();
         for (number, line) in lines.enumerate() {
-            let cell = serde_json::from_str(line)
+            let entry = serde_json::from_str(line)
                 .with_context(|| format!("{name}: line {}: no measurement; remove the line", number + 2))?;
-            cells.push(cell);
+            entries.push(entry);
         }
-        let run = cells.iter().map(|cell: &Cell| cell.run + 1).max().unwrap_or(0);
         let lines = JsonLines::append(&file, whole.len() as u64)?;
-        Ok(Self { header, cells, run, lines, file })
+        Ok(Self { header, entries, lines, file })
     }
 
     /// The settings.
@@ -113,20 +110,59 @@ impl Cells {
     }
 
     /// All of them.
+    pub fn all(&self) -> &[T] {
+        &self.entries
+    }
+
+    /// Appends one.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn push(&mut self, entry: T) -> Result<()> {
+        self.lines.push(&entry)?;
+        self.entries.push(entry);
+        Ok(())
+    }
+}
+
+/// Finished walks.
+pub struct Cells {
+    journal: Journal<Cell>,
+    /// The number of this start.
+    run: u32,
+}
+
+impl Cells {
+    /// Opens the measurements of `folder`, or begins them.
+    ///
+    /// # Errors
+    /// As those of [`Journal::open`].
+    pub fn open(folder: &Path, header: Header, must_exist: bool) -> Result<Self> {
+        let journal = Journal::open(folder.join("cells.jsonl"), header, must_exist)?;
+        let run = journal.all().iter().map(|cell: &Cell| cell.run + 1).max().unwrap_or(0);
+        Ok(Self { journal, run })
+    }
+
+    /// The settings.
+    pub fn header(&self) -> &Header {
+        self.journal.header()
+    }
+
+    /// All of them.
     pub fn all(&self) -> &[Cell] {
-        &self.cells
+        self.journal.all()
     }
 
     /// Number of starts of the bench in which something was measured.
     pub fn runs(&self) -> usize {
-        let runs: std::collections::BTreeSet<u32> = self.cells.iter().map(|cell| cell.run).collect();
+        let runs: std::collections::BTreeSet<u32> = self.all().iter().map(|cell| cell.run).collect();
         runs.len()
     }
 
     /// Whether a walk is finished.
     pub fn has(&self, case: &Case, repetition: u32) -> bool {
         let name = case.to_string();
-        self.cells.iter().any(|cell| cell.case == name && cell.repetition == repetition)
+        self.all().iter().any(|cell| cell.case == name && cell.repetition == repetition)
     }
 
     /// Appends a finished walk.
@@ -135,11 +171,13 @@ impl Cells {
     /// The file cannot be written; a value is not finite.
     pub fn push(&mut self, case: &Case, repetition: u32, passes: Passes, error: Option<PictureError>) -> Result<()> {
         let mut values = passes.values().flat_map(BTreeMap::values).flatten();
-        ensure!(values.all(|value| value.is_finite()), "{}: {case} has a value that is no number", self.file.display());
+        ensure!(
+            values.all(|value| value.is_finite()),
+            "{}: {case} has a value that is no number",
+            self.journal.file.display()
+        );
         let cell = Cell { case: case.to_string(), repetition, run: self.run, passes, error };
-        self.lines.push(&cell)?;
-        self.cells.push(cell);
-        Ok(())
+        self.journal.push(cell)
     }
 }
 

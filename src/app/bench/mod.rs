@@ -1,4 +1,4 @@
-//! `brickwalk bench executors` (`executors.rs`), and `brickwalk bench chc`: the experiments of Mattausch et al. 2015 on the generated scenes, each ratio beside the paper's.
+//! `brickwalk bench executors` (`executors.rs`), `brickwalk bench roma` (`roma/`), and `brickwalk bench chc`: the experiments of Mattausch et al. 2015 on the generated scenes, each ratio beside the paper's.
 //!
 //! Everything runs in this process: a renderer a scene, cache and size of tiles, in which the cases of a group take turns. Each
 //! finished walk is a line of `cells.jsonl`; tables, plots and pages are made from these lines alone.
@@ -11,6 +11,7 @@ mod output;
 mod paper;
 mod plan;
 mod plots;
+mod roma;
 mod scenes;
 mod tables;
 
@@ -37,6 +38,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let args = match &args.experiments {
         Experiments::Chc(args) => args,
         Experiments::Executors(args) => return executors::run(args),
+        Experiments::Roma(args) => return roma::run(args),
     };
     let settings = args.settings();
     if settings.frames <= settings.skip {

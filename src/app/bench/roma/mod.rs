@@ -1,0 +1,160 @@
+//! `brickwalk bench roma`: the experiments of Zeng et al. 2023 on the generated scenes: times of making and tracing ray-aligned occupancy
+//! maps, and how far pictures by them are from exact ones.
+//!
+//! A *view* is a scene, a light and a cache with one renderer, in which the ways to answer rays take turns. Each finished measurement
+//! is a line of `rows.jsonl`, from which alone tables, plots and pages are made.
+
+pub mod args;
+mod output;
+mod plan;
+mod rows;
+mod view;
+
+use super::cells::Header;
+use super::scenes;
+use crate::app::device::Device;
+use crate::app::interrupt;
+use crate::app::output::atomic;
+use crate::kernel::DeviceInfo;
+use anyhow::{Result, bail};
+use args::{RomaBenchArgs, Settings};
+use brickwalk_convert::progress::Progress;
+use plan::{Job, Way};
+use rows::{Row, Rows};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+use view::{Picture, View};
+
+/// Runs the command.
+///
+/// # Errors
+/// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
+pub fn run(args: &RomaBenchArgs) -> Result<()> {
+    let settings = args.settings();
+    let jobs: Vec<Job> = plan::jobs(&settings, args.sponza.is_some())
+        .into_iter()
+        .filter(|job| args.stages.is_empty() || args.stages.contains(&job.stage))
+        .collect();
+    atomic::create_folder(&args.output)?;
+    let mut rows = Rows::open(&args.output, header(args, &settings)?)?;
+    let deadline = args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
+    let progress = Progress::new();
+    let planned: u64 = jobs.iter().map(|job| job.ways.len() as u64).sum();
+    progress.phase("measurements", planned);
+    let mut ended = "";
+    for job in &jobs {
+        let missing: Vec<&Way> = job.ways.iter().filter(|way| !rows.has(&job.key(way))).collect();
+        progress.advance((job.ways.len() - missing.len()) as u64);
+        if missing.is_empty() {
+            continue;
+        }
+        if interrupt::flag().load(Ordering::Relaxed) {
+            ended = "Interrupted: the same command goes on where this one stopped.\n";
+            break;
+        }
+        if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+            ended = "Out of time: the same command goes on where this one stopped.\n";
+            break;
+        }
+        // Ways are compared with each other, so that all of a job are measured together.
+        for (way, values) in measure(job, args, &settings)? {
+            let key = job.key(&way);
+            if !rows.has(&key) {
+                rows.push(Row { key, values })?;
+                progress.advance(1);
+            }
+        }
+    }
+    progress.finish();
+    let text = output::write(&args.output, &settings, &rows, planned as usize)?;
+    crate::app::print(&text)?;
+    if ended.starts_with("Interrupted") {
+        bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display());
+    }
+    crate::app::print(ended)
+}
+
+fn header(args: &RomaBenchArgs, settings: &Settings) -> Result<Header> {
+    let DeviceInfo { name, driver, driver_info, backend, .. } = Device::open(&args.adapter)?.info();
+    Ok(Header {
+        format: rows::FORMAT,
+        settings: json!({
+            "triangles": settings.triangles,
+            "size": settings.size.to_string(),
+            "repetitions": settings.repeat,
+            "samples": settings.samples,
+            "ao_length": settings.ao_length,
+            "sponza": args.sponza.as_ref().map(|file| file.file_name().map(|name| name.to_string_lossy().into_owned())),
+        }),
+        adapter: json!({ "name": name, "driver": driver, "driver_info": driver_info, "backend": backend }),
+        commit: env!("BRICKWALK_COMMIT").into(),
+    })
+}
+
+type Values = BTreeMap<String, f64>;
+
+/// Everything that is measured of the ways of a job.
+fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings) -> Result<Vec<(Way, Values)>> {
+    let folder = args.scenes.clone().unwrap_or_else(|| args.output.join("scenes"));
+    let place = scenes::place(job.scene, &folder, &settings.of_scenes(), args.sponza.as_deref())?;
+    let mut all: Vec<(Way, Values)> = job.ways.iter().map(|way| (*way, Values::new())).collect();
+    let mut view = View::open(job, &place, settings, &args.adapter)?;
+    if job.times {
+        // In turns: a drift of the machine meets all ways alike. What the first turn brings in is not counted.
+        let mut turns: Vec<Vec<Values>> = vec![Vec::new(); all.len()];
+        for turn in 0..=settings.repeat {
+            for (k, (way, _)) in all.iter().enumerate() {
+                let picture = view.picture(way, 1, turn)?;
+                if turn > 0 || job.is_cold {
+                    turns[k].push(picture.values);
+                }
+            }
+        }
+        for ((_, values), turns) in all.iter_mut().zip(turns) {
+            values.extend(medians(&turns));
+        }
+    }
+    if job.errors {
+        let exact = view.picture(&Way::Exact, settings.samples, 0)?;
+        // What the reference's own noise is: another one, of other samples.
+        let other = view.picture(&Way::Exact, settings.samples, 1)?;
+        for (way, values) in &mut all {
+            if let Way::Exact = way {
+                values.extend(view.errors("converged", &other, &exact)?);
+                continue;
+            }
+            let converged: Picture = view.picture(way, settings.samples, 0)?;
+            values.extend(view.errors("converged", &converged, &exact)?);
+            let single = view.picture(way, 1, 0)?;
+            values.extend(view.errors("single", &single, &exact)?);
+        }
+    }
+    Ok(all)
+}
+
+/// The median of every value over the turns.
+fn medians(turns: &[Values]) -> Values {
+    let names: std::collections::BTreeSet<&String> = turns.iter().flat_map(BTreeMap::keys).collect();
+    let of =
+        |name: &String| super::cells::median(turns.iter().filter_map(|values| values.get(name).copied()).collect());
+    names.into_iter().filter_map(|name| Some((name.clone(), of(name)?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_are_taken_value_by_value() {
+        let turn = |a: f64, b: Option<f64>| {
+            let mut values = Values::from([("a".to_string(), a)]);
+            values.extend(b.map(|b| ("b".to_string(), b)));
+            values
+        };
+        let all = medians(&[turn(3.0, None), turn(1.0, Some(7.0)), turn(2.0, None)]);
+        assert_eq!(all, turn(2.0, Some(7.0)));
+        assert!(medians(&[]).is_empty());
+    }
+}

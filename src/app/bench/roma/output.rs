@@ -1,0 +1,232 @@
+//! What the bench writes: one JSON file, a CSV a table, Markdown and an offline page, all of the same tables.
+
+use super::args::Settings;
+use super::plan::{Job, Stage, USUAL, Way, jobs};
+use super::rows::{FORMAT, Rows};
+use crate::app::output::atomic;
+use crate::app::sizes::human_count;
+use anyhow::Result;
+use brickwalk_report::{Graph, GraphShape, Section, Sheet, Table, Unit, Value, write_sheet};
+use serde_json::json;
+use std::fmt::Write;
+use std::path::Path;
+
+const TITLE: &str = "The experiments of ROMA";
+const READING: &str = "Times are medians over turns of one frame, in which all ways take turns in one process. Errors are those of linear \
+                       radiance: bias and RMSE relative to the exact picture's mean, FLIP at 67 pixels per degree. The noise of the \
+                       exact picture is that of another one of as many samples. Paper: Zeng et al. 2023, 1920 x 1080, one ray a pixel.";
+
+/// What the paper's table 2 has, ms: generation and tracing, by resolution and number of directions.
+const PAPER: [(u32, u32, f64, f64); 6] = [
+    (32, 4, 0.14, 0.16),
+    (32, 8, 0.18, 0.16),
+    (64, 4, 0.20, 0.16),
+    (64, 8, 0.31, 0.16),
+    (128, 4, 0.30, 0.16),
+    (128, 8, 0.69, 0.16),
+];
+
+/// Writes the results; returns what to print.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn write(folder: &Path, settings: &Settings, rows: &Rows, planned: usize) -> Result<String> {
+    let all = jobs(settings, true);
+    let tables: Vec<(Stage, Table)> = Stage::ALL
+        .into_iter()
+        .filter_map(|stage| {
+            let of_stage: Vec<&Job> = all.iter().filter(|job| job.stage == stage).collect();
+            let table = if stage == Stage::Speed { speed(&of_stage, rows) } else { errors(stage, &of_stage, rows) };
+            (!table.rows.is_empty()).then_some((stage, table))
+        })
+        .collect();
+    let header = rows.header();
+    let json = json!({
+        "format": FORMAT,
+        "version": env!("CARGO_PKG_VERSION"),
+        "commit": header.commit,
+        "adapter": header.adapter,
+        "settings": header.settings,
+        "measured": rows.all().len(),
+        "tables": tables.iter().map(|(_, table)| table).collect::<Vec<_>>(),
+        "rows": rows.all(),
+    });
+    atomic::write(&folder.join("roma.json"), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
+    for (_, table) in &tables {
+        atomic::write(&folder.join(format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
+    }
+    let facts = facts(settings, rows);
+    let mut text = format!("# {TITLE}\n\n{READING}\n\n");
+    // Writing to a string does not fail.
+    for (name, value) in &facts {
+        let _ = writeln!(text, "- {name}: {value}");
+    }
+    for (stage, table) in &tables {
+        let _ = write!(text, "\n## {}\n\n{}\n\n{}", title(*stage), table.caption, table.to_markdown());
+    }
+    atomic::write(&folder.join("roma.md"), text.as_bytes())?;
+    let mut sections: Vec<Section> = tables
+        .into_iter()
+        .map(|(stage, table)| Section {
+            title: title(stage).into(),
+            tables: vec![table],
+            plots: plots(stage, &all, rows),
+            ..Section::default()
+        })
+        .collect();
+    if let Some(first) = sections.first_mut() {
+        first.reading = READING.into();
+    }
+    let done = rows.all().len();
+    let verdict = if done < planned {
+        format!("{done} measurements; {planned} were asked for")
+    } else {
+        format!("{done} measurements")
+    };
+    let verdicts = vec![(verdict, done < planned)];
+    write_sheet(
+        folder,
+        &Sheet { kicker: "brickwalk · bench roma".into(), title: TITLE.into(), verdicts, facts, sections },
+    )?;
+    Ok(text)
+}
+
+fn title(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Speed => "Times, table 2",
+        Stage::Ao => "Ambient occlusion by scenes, figure 5",
+        Stage::Resolution => "Resolutions and numbers of directions, figure 9",
+        Stage::Radius => "Lengths of rays: where it fails",
+        Stage::Shadows => "Soft shadows, figures 7 and 8",
+        Stage::OutOfCore => "Out of core",
+    }
+}
+
+fn facts(settings: &Settings, rows: &Rows) -> Vec<(String, String)> {
+    let header = rows.header();
+    let text = |value: &serde_json::Value| value.as_str().unwrap_or("unknown").to_string();
+    let driver = format!("{} {}", text(&header.adapter["driver"]), text(&header.adapter["driver_info"]));
+    [
+        ("Adapter", format!("{} ({})", text(&header.adapter["name"]), text(&header.adapter["backend"]))),
+        ("Driver", driver.trim().to_string()),
+        ("Commit", header.commit.clone()),
+        ("Triangles of generated scenes", human_count(settings.triangles)),
+        ("Resolution", settings.size.to_string()),
+        ("Occlusion rays", format!("one a pixel and sample, {} long", settings.ao_length)),
+        ("Turns", settings.repeat.to_string()),
+        ("Samples of converged pictures", settings.samples.to_string()),
+    ]
+    .map(|(name, value)| (name.to_string(), value))
+    .to_vec()
+}
+
+/// `a` over `b`, where both are above zero.
+fn ratio(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.zip(b).filter(|(a, b)| *a > 0.0 && *b > 0.0).map(|(a, b)| a / b)
+}
+
+fn speed(jobs: &[&Job], rows: &Rows) -> Table {
+    let columns = [
+        "scene",
+        "way",
+        "generation, ms",
+        "tracing, ms",
+        "ns a ray",
+        "exact ÷ tracing",
+        "generation, paper",
+        "tracing, paper",
+    ];
+    let mut lines = Vec::new();
+    for job in jobs {
+        let value = |way: &Way, name: &str| rows.value(&job.key(way), name);
+        for way in job.ways.iter().filter(|way| rows.has(&job.key(way))) {
+            let paper =
+                PAPER.iter().find(|(size, k, ..)| *way == Way::Roma { k: *k, size: *size, is_unsnapped: false });
+            let per_ray = |way: &Way| ratio(value(way, "ms_trace").map(|ms| 1e6 * ms), value(way, "rays"));
+            lines.push(vec![
+                Value::Text(job.scene.name().into()),
+                Value::Text(way.to_string()),
+                Value::number(value(way, "ms_generation").filter(|_| *way != Way::Exact)),
+                Value::number(value(way, "ms_trace")),
+                Value::number(per_ray(way)),
+                Value::ratio(ratio(per_ray(&Way::Exact), per_ray(way))),
+                Value::number(paper.map(|paper| paper.2)),
+                Value::number(paper.map(|paper| paper.3)),
+            ]);
+        }
+    }
+    let caption = "Making the maps of a frame (generation) and answering its rays (tracing), device time; of exact rays the wall time of the \
+                   pass.";
+    Table { name: "speed".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: lines }
+}
+
+fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
+    let columns = [
+        "scene",
+        "view",
+        "way",
+        "FLIP",
+        "bias, %",
+        "RMSE, %",
+        "FLIP, one sample",
+        "ns a ray",
+        "exact ÷ this",
+        "bricks loaded",
+        "capped, %",
+    ];
+    let mut lines = Vec::new();
+    for job in jobs {
+        let value = |way: &Way, name: &str| rows.value(&job.key(way), name);
+        let per_ray = |way: &Way| ratio(value(way, "ms_trace").map(|ms| 1e6 * ms), value(way, "rays"));
+        for way in job.ways.iter().filter(|way| rows.has(&job.key(way))) {
+            let percent = |name: &str| Value::number(value(way, name).map(|x| 100.0 * x));
+            lines.push(vec![
+                Value::Text(job.scene.name().into()),
+                Value::Text(job.variant.clone()),
+                Value::Text(if *way == Way::Exact { "exact (noise)".into() } else { way.to_string() }),
+                Value::number(value(way, "flip_converged")),
+                percent("bias_converged"),
+                percent("rmse_converged"),
+                Value::number(value(way, "flip_single")),
+                Value::number(per_ray(way)),
+                Value::ratio(ratio(per_ray(&Way::Exact), per_ray(way)).filter(|_| *way != Way::Exact)),
+                Value::number(value(way, "bricks_loaded")),
+                Value::number(ratio(value(way, "rays_capped"), value(way, "rays")).map(|x| 100.0 * x)),
+            ]);
+        }
+    }
+    let caption = "How far pictures are from exact ones: converged, and with one sample a pixel. Times are those of tracing, without the \
+                   making of maps; bricks are those that the pass loaded.";
+    Table {
+        name: stage.name().into(),
+        caption: caption.into(),
+        columns: columns.map(String::from).to_vec(),
+        rows: lines,
+    }
+}
+
+fn plots(stage: Stage, all: &[Job], rows: &Rows) -> Vec<Graph> {
+    if stage != Stage::Radius {
+        return Vec::new();
+    }
+    let length = |job: &Job| job.variant.rsplit(' ').next().and_then(|word| word.parse::<f64>().ok());
+    let line = |way: &Way| {
+        let mut points: Vec<(f64, f64)> = all
+            .iter()
+            .filter(|job| job.stage == stage)
+            .filter_map(|job| Some((length(job)?, rows.value(&job.key(way), "flip_converged")?)))
+            .map(|(length, flip)| (length, 100.0 * flip))
+            .collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        (if *way == Way::Exact { "noise of the exact picture".into() } else { way.to_string() }, points)
+    };
+    vec![Graph {
+        title: "FLIP over the length of occlusion rays, world units".into(),
+        reading: "Hundredths of FLIP. Rays shorter than a few cells are not answered by cells.".into(),
+        shape: GraphShape::Lines {
+            across: "length",
+            unit: Unit::Percent,
+            lines: vec![line(&USUAL), line(&Way::Exact)],
+        },
+    }]
+}

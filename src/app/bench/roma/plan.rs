@@ -1,0 +1,214 @@
+//! What is measured.
+
+use super::args::Settings;
+use crate::app::bench::plan::SceneId;
+use std::fmt;
+
+/// A part of the measurements that can be asked for alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Times over resolutions and numbers of directions (the paper's table 2).
+    Speed,
+    /// Errors by scenes (its figure 5).
+    Ao,
+    /// Errors by resolutions and numbers of directions (its figure 9).
+    Resolution,
+    /// Errors by the length of rays: where the method fails.
+    Radius,
+    /// Snapped and unsnapped shadow rays (its figures 7 and 8).
+    Shadows,
+    /// A cache that holds 15 % of the scene.
+    OutOfCore,
+}
+
+impl Stage {
+    /// All of them, in their order.
+    pub const ALL: [Self; 6] = [Self::Speed, Self::Ao, Self::Resolution, Self::Radius, Self::Shadows, Self::OutOfCore];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Ao => "ao",
+            Self::Resolution => "resolution",
+            Self::Radius => "radius",
+            Self::Shadows => "shadows",
+            Self::OutOfCore => "out-of-core",
+        }
+    }
+}
+
+impl std::str::FromStr for Stage {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = Self::ALL.map(Self::name);
+        let found = Self::ALL.into_iter().find(|stage| stage.name() == text.trim());
+        found.ok_or_else(|| crate::app::named::unknown(text, &names, &[]))
+    }
+}
+
+/// How rays are answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// By tracing them.
+    Exact,
+    /// By ray-aligned occupancy maps.
+    Roma {
+        /// Square root of the number of directions.
+        k: u32,
+        /// Cells of a map on each axis.
+        size: u32,
+        /// Whether rays keep their direction.
+        is_unsnapped: bool,
+    },
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Exact => f.write_str("exact"),
+            Self::Roma { k, size, is_unsnapped } => {
+                write!(f, "roma {size} K={k}{}", if *is_unsnapped { " unsnapped" } else { "" })
+            }
+        }
+    }
+}
+
+impl Way {
+    /// The options of `walk` for it.
+    pub fn options(&self) -> String {
+        match self {
+            Self::Exact => "--secondary exact".into(),
+            Self::Roma { k, size, is_unsnapped } => {
+                let unsnapped = if *is_unsnapped { "all" } else { "none" };
+                format!(
+                    "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
+                )
+            }
+        }
+    }
+}
+
+/// Snapped rays.
+const fn snapped(size: u32, k: u32) -> Way {
+    Way::Roma { k, size, is_unsnapped: false }
+}
+
+/// What the paper recommends for occlusion.
+pub const USUAL: Way = snapped(128, 4);
+
+/// Ways to answer the rays of one effect in one view, compared with each other.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// What it is a part of.
+    pub stage: Stage,
+    /// The scene.
+    pub scene: SceneId,
+    /// What is varied beside ways and scenes.
+    pub variant: String,
+    /// The pass that is measured.
+    pub effect: &'static str,
+    /// The options of `walk` for effect and light.
+    pub options: String,
+    /// Share of the scene that the cache holds, per cent.
+    pub cache: u32,
+    /// Whether times are measured.
+    pub times: bool,
+    /// Whether every picture starts with an empty cache.
+    pub is_cold: bool,
+    /// Whether pictures are compared.
+    pub errors: bool,
+    /// The ways.
+    pub ways: Vec<Way>,
+}
+
+impl Job {
+    /// Names a measurement.
+    pub fn key(&self, way: &Way) -> String {
+        [self.stage.name(), self.scene.name(), &self.variant, &way.to_string()].join("/")
+    }
+}
+
+/// Occlusion alone, of a sky of one brightness.
+fn occlusion(length: f64) -> String {
+    format!("--effects ao --ao-rays 1 --ao-length {length} --sun-intensity 0 --rotation full")
+}
+
+/// All jobs, in their order.
+pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
+    let sizes = [32, 64, 128];
+    let all: Vec<Way> = sizes.iter().flat_map(|&size| [snapped(size, 4), snapped(size, 8)]).collect();
+    let with_exact = |ways: &[Way]| [&[Way::Exact], ways].concat();
+    let job = |stage, scene, variant: String, length, ways: Vec<Way>| Job {
+        stage,
+        scene,
+        variant,
+        effect: "ao",
+        options: occlusion(length),
+        cache: 100,
+        times: false,
+        is_cold: false,
+        errors: true,
+        ways,
+    };
+    let length = settings.ao_length;
+    let mut scenes = vec![SceneId::City, SceneId::Pipes];
+    scenes.extend(has_sponza.then_some(SceneId::Sponza));
+    let mut jobs = Vec::new();
+    for &scene in &scenes {
+        let own = job(Stage::Speed, scene, "all resident".into(), length, with_exact(&all));
+        jobs.push(Job { times: true, errors: false, ..own });
+    }
+    for &scene in &scenes {
+        let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
+        let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped]);
+        jobs.push(job(Stage::Ao, scene, format!("rays of {length}"), length, ways));
+    }
+    jobs.push(job(Stage::Resolution, SceneId::City, format!("rays of {length}"), length, with_exact(&all)));
+    for halvings in 0..6 {
+        let length = length / f64::from(1 << halvings);
+        jobs.push(job(Stage::Radius, SceneId::City, format!("rays of {length}"), length, with_exact(&[USUAL])));
+    }
+    let shadows: Vec<Way> = [false, true]
+        .iter()
+        .flat_map(|&is_unsnapped| [4, 8].map(|k| Way::Roma { k, size: 128, is_unsnapped }))
+        .collect();
+    for (light, options) in [("sun of 0.5 degrees", ""), ("sun of 10 degrees", " --sun-angle 10")] {
+        let own = job(Stage::Shadows, SceneId::City, light.into(), length, with_exact(&shadows));
+        let options = format!("--effects shadow --sky-intensity 0{options}");
+        jobs.push(Job { effect: "shadow", options, times: true, ..own });
+    }
+    let own = job(Stage::OutOfCore, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
+    jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
+    jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
+    jobs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::sizes::ImageSize;
+
+    #[test]
+    fn measurements_have_names_of_their_own() {
+        let settings = Settings {
+            triangles: 1000,
+            size: ImageSize { width: 16, height: 9 },
+            repeat: 1,
+            samples: 2,
+            ao_length: 16.0,
+            tile: 16,
+        };
+        for has_sponza in [false, true] {
+            let jobs = jobs(&settings, has_sponza);
+            let mut keys: Vec<String> = jobs.iter().flat_map(|job| job.ways.iter().map(|way| job.key(way))).collect();
+            let count = keys.len();
+            keys.sort();
+            keys.dedup();
+            assert_eq!(keys.len(), count);
+            assert!(Stage::ALL.iter().all(|stage| jobs.iter().any(|job| job.stage == *stage)));
+            assert!(jobs.iter().all(|job| job.ways.contains(&Way::Exact)), "all are compared with exact rays");
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Pictures of a view, by one renderer, with what their passes took and how far they are from each other.
+
+use super::args::Settings;
+use super::plan::{Job, Way};
+use crate::app::bench::measure::walk_args;
+use crate::app::bench::plan::View as Path;
+use crate::app::bench::scenes::Place;
+use crate::app::device::Adapter;
+use crate::app::session::{Session, open_scene};
+use crate::app::walk;
+use crate::kernel::Extent;
+use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
+use crate::render::{Renderer, Schedule};
+use crate::scene::Camera;
+use crate::schedule::cache::Cache;
+use crate::stream::Residency;
+use anyhow::{Context, Result, bail};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A frame of the near path that is measured, of thirty.
+const FRAME: u32 = 10;
+
+/// A scene, a light, a cache and a camera.
+pub struct View<'a> {
+    job: &'a Job,
+    scene: PathBuf,
+    renderer: Renderer,
+    camera: Camera,
+    settings: &'a Settings,
+    adapter: &'a Adapter,
+}
+
+/// A picture and what its pass took.
+pub struct Picture {
+    image: Image,
+    /// Of the pass, by name.
+    pub values: BTreeMap<String, f64>,
+}
+
+impl<'a> View<'a> {
+    /// Opens the view of a job.
+    ///
+    /// # Errors
+    /// The scene's, the device's.
+    pub fn open(job: &'a Job, place: &Place, settings: &'a Settings, adapter: &'a Adapter) -> Result<Self> {
+        let scene = place.scene.clone();
+        let line = line(job, &Way::Exact, settings, 1, 0);
+        let args = walk_args(&line, &scene, adapter)?;
+        let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
+        let session = Session::open(open_scene(&scene)?, &scene, &args.stream, extent)?;
+        let renderer = walk::renderer(session, &args)?;
+        let camera = place.path(Path::Near)?.frame(FRAME, 30);
+        Ok(Self { job, scene, renderer, camera, settings, adapter })
+    }
+
+    /// A picture of `samples` a pixel with the seed `seed`.
+    ///
+    /// # Errors
+    /// A brick that cannot be read, the device's, pixels that are not finite.
+    pub fn picture(&mut self, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
+        let args = walk_args(&line(self.job, way, self.settings, samples, seed), &self.scene, self.adapter)?;
+        let renderer = &mut self.renderer;
+        renderer.settings = walk::settings(&args, Schedule::Chc);
+        if self.job.is_cold {
+            let old = &renderer.cache;
+            let sizes = old.bytes.sizes();
+            let page_bytes = renderer.executor.page_bytes();
+            let residency = Residency::new(&sizes, old.residency.budget_bytes(), page_bytes, old.residency.policy())?;
+            renderer.cache = Cache::new(residency, old.bytes.clone(), None);
+        }
+        let output = renderer.frame(0, &self.camera).with_context(|| self.scene.display().to_string())?;
+        let record = output.records.iter().find(|record| record.pass == self.job.effect);
+        let record = record.with_context(|| format!("no rays of {} were traced", self.job.effect))?;
+        if output.records.iter().any(|record| record.non_finite > 0) {
+            bail!("{}: {way}: pixels were not finite; this is a defect", self.scene.display());
+        }
+        let values = [
+            ("rays", record.rays as f64),
+            ("ms", record.ms),
+            ("ms_generation", if matches!(way, Way::Exact) { 0.0 } else { record.ms_phase1 }),
+            ("ms_trace", if matches!(way, Way::Exact) { record.ms } else { record.ms_phase3 }),
+            ("bricks_loaded", record.bricks_loaded as f64),
+            ("bytes_loaded", (record.bytes_bvh + record.bytes_geometry) as f64),
+            ("rays_capped", record.rays_capped as f64),
+        ];
+        let (width, height) = (renderer.size.0 as usize, renderer.size.1 as usize);
+        let image = Image { width, height, rgb: output.pixels.radiance };
+        Ok(Picture { image, values: values.map(|(name, value)| (name.to_string(), value)).into() })
+    }
+
+    /// Errors of a picture against another, named after what it is.
+    ///
+    /// # Errors
+    /// None of pictures of this view.
+    pub fn errors(&self, name: &str, one: &Picture, reference: &Picture) -> Result<Vec<(String, f64)>> {
+        let errors = pixel_errors(&one.image, &reference.image)?;
+        let flip = flip_ldr(&one.image, &reference.image, PIXELS_PER_DEGREE)?;
+        let mean = reference.image.rgb.as_flattened().iter().map(|x| f64::from(*x)).sum::<f64>();
+        let mean = mean / reference.image.rgb.as_flattened().len().max(1) as f64;
+        let relative = |x: f64| if mean > 0.0 { x / mean } else { 0.0 };
+        Ok(vec![
+            (format!("flip_{name}"), flip.mean()),
+            (format!("bias_{name}"), relative(errors.bias)),
+            (format!("rmse_{name}"), relative(errors.rmse)),
+        ])
+    }
+}
+
+/// The options of the walk that a user would type.
+fn line(job: &Job, way: &Way, settings: &Settings, samples: u32, seed: u32) -> String {
+    let Job { options, cache, .. } = job;
+    let Settings { tile, size, .. } = settings;
+    let way = way.options();
+    format!("{options} {way} --cache {cache}% --schedule chc --tile {tile} --size {size} --spp {samples} --seed {seed}")
+}
