@@ -221,8 +221,9 @@ fn unmarked(scene: &Path, camera: DVec3) -> (usize, usize, f64) {
         let side = f64::from(bom.cell_log2).exp2();
         for [a, b, c] in truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(DVec3::from)) {
             for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.3), (0.5, 0.5), (0.1, 0.6)] {
-                let cell = ((a + u * (b - a) + v * (c - a)) / side).floor().to_array().map(|x| x as i64);
-                if (0..3).all(|k| (0..64).contains(&(cell[k] - bom.first[k]))) {
+                let at = ((a + u * (b - a) + v * (c - a)) / side).floor();
+                let cell = [0, 1, 2].map(|k| at[k] as i64 - bom.first[k]);
+                if cell.iter().all(|x| (0..64).contains(x)) {
                     of += 1;
                     empty += usize::from(!bom.is_occupied(cell));
                 }
