@@ -83,7 +83,7 @@ fn patterns(words: u32) -> Vec<Pattern> {
     let mut all: Vec<Pattern> = (0..words).flat_map(|w| [32 * w, 32 * w + 31]).map(single).collect();
     all.push(Box::new(|_| true));
     all.push(Box::new(|z| pcg(z) & 1 != 0));
-    all.push(Box::new(|z| pcg(z ^ 0x55) % 19 == 0));
+    all.push(Box::new(|z| pcg(z ^ 0x55).is_multiple_of(19)));
     all
 }
 
@@ -187,13 +187,15 @@ fn within(ray: &Ray, [low, high]: [DVec3; 2], grown: f64) -> Option<[f64; 2]> {
 fn is_right(ray: &Ray, hit: &Hit, boxes: &[[DVec3; 2]]) -> bool {
     let t = f64::from(hit.t);
     let slack = CLOSE / DVec3::from(ray.direction.map(f64::from)).length();
-    let is_in_one =
-        || boxes.iter().filter_map(|b| within(ray, *b, CLOSE)).any(|[a, b]| a - slack <= t && t <= b + slack);
-    let certain = boxes.iter().filter_map(|b| within(ray, *b, -CLOSE));
+    // Of the cells that it may meet, when it is there, and whether it meets them for certain.
+    let met = |b: &[DVec3; 2]| Some((within(ray, *b, CLOSE)?, within(ray, *b, -CLOSE).is_some()));
+    let met: Vec<([f64; 2], bool)> = boxes.iter().filter_map(met).collect();
+    let is_in_one = || met.iter().any(|([from, to], _)| from - slack <= t && t <= to + slack);
+    // It may not have passed through another.
+    let is_past = || met.iter().any(|([_, to], is_certain)| *is_certain && to + slack < t);
     match hit.id {
-        NONE => certain.count() == 0,
-        // It may not have passed through another.
-        ROMA_HIT => is_in_one() && certain.into_iter().all(|[_, end]| end + slack >= t),
+        NONE => met.iter().all(|(_, is_certain)| !is_certain),
+        ROMA_HIT => is_in_one() && !is_past(),
         _ => false,
     }
 }
@@ -203,13 +205,13 @@ fn anywhere(rng: &mut Rng, count: usize, starts: [f64; 2]) -> Vec<Ray> {
     let ray = |i: usize| {
         let mut from = DVec3::from([0; 3].map(|_| rng.range(starts[0], starts[1])));
         let mut direction = rng.direction();
-        if i % 4 == 0 {
+        if i.is_multiple_of(4) {
             // Aligned, and on a border of cells.
             let axis = i / 4 % 3;
-            direction = [DVec3::X, DVec3::Y, DVec3::Z][axis] * if i % 8 == 0 { 1.0 } else { -1.0 };
+            direction = [DVec3::X, DVec3::Y, DVec3::Z][axis] * if i.is_multiple_of(8) { 1.0 } else { -1.0 };
             from[(axis + 1) % 3] = from[(axis + 1) % 3].round() + if i % 16 < 8 { 0.5 } else { 0.0 };
         }
-        let length = rng.range(0.0, if i % 3 == 0 { 8.0 } else { 80.0 });
+        let length = rng.range(0.0, if i.is_multiple_of(3) { 8.0 } else { 80.0 });
         let speed = 2f64.powi(i as i32 % 7 - 3);
         let direction = (direction * speed).as_vec3().to_array();
         Ray { origin: from.as_vec3().to_array(), t_min: 0.0, direction, t_max: (length / speed) as f32 }
