@@ -16,8 +16,8 @@ use brickwalk_scenes::{Rng, one_mesh};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Of the coordinates of rays through 48 cells: what a walk in f64 may decide otherwise than one in f32, of numbers up to 64 with ten roundings.
-const CLOSE: f64 = 64.0 * 10.0 / 16_777_216.0;
+/// What a walk in f64 may decide otherwise than one in f32, of coordinates up to 128 with ten roundings.
+const CLOSE: f64 = 128.0 * 10.0 / 16_777_216.0;
 
 /// Maps whose columns run along an axis of the base maps, cell on cell; `levels`: cells a unit of length, and where the origin lies.
 fn aligned(cells: u32, levels: &[(f32, f32)], axis: usize) -> RomaMaps {
@@ -83,7 +83,7 @@ fn patterns(words: u32) -> Vec<Pattern> {
     let mut all: Vec<Pattern> = (0..words).flat_map(|w| [32 * w, 32 * w + 31]).map(single).collect();
     all.push(Box::new(|_| true));
     all.push(Box::new(|z| pcg(z) & 1 != 0));
-    all.push(Box::new(|z| pcg(z ^ 0x55) % 19 == 0));
+    all.push(Box::new(|z| pcg(z ^ 0x55).is_multiple_of(19)));
     all
 }
 
@@ -186,13 +186,16 @@ fn within(ray: &Ray, [low, high]: [DVec3; 2], grown: f64) -> Option<[f64; 2]> {
 /// either way.
 fn is_right(ray: &Ray, hit: &Hit, boxes: &[[DVec3; 2]]) -> bool {
     let t = f64::from(hit.t);
-    let is_in_one =
-        || boxes.iter().filter_map(|b| within(ray, *b, CLOSE)).any(|[a, b]| a - CLOSE <= t && t <= b + CLOSE);
-    let certain = boxes.iter().filter_map(|b| within(ray, *b, -CLOSE));
+    let slack = CLOSE / DVec3::from(ray.direction.map(f64::from)).length();
+    // Of the cells that it may meet, when it is there, and whether it meets them for certain.
+    let met = |b: &[DVec3; 2]| Some((within(ray, *b, CLOSE)?, within(ray, *b, -CLOSE).is_some()));
+    let met: Vec<([f64; 2], bool)> = boxes.iter().filter_map(met).collect();
+    let is_in_one = || met.iter().any(|([from, to], _)| from - slack <= t && t <= to + slack);
+    // It may not have passed through another.
+    let is_past = || met.iter().any(|([_, to], is_certain)| *is_certain && to + slack < t);
     match hit.id {
-        NONE => certain.count() == 0,
-        // It may not have passed through another.
-        ROMA_HIT => is_in_one() && certain.into_iter().all(|[_, end]| end + CLOSE >= t),
+        NONE => met.iter().all(|(_, is_certain)| !is_certain),
+        ROMA_HIT => is_in_one() && !is_past(),
         _ => false,
     }
 }
@@ -202,13 +205,13 @@ fn anywhere(rng: &mut Rng, count: usize, starts: [f64; 2]) -> Vec<Ray> {
     let ray = |i: usize| {
         let mut from = DVec3::from([0; 3].map(|_| rng.range(starts[0], starts[1])));
         let mut direction = rng.direction();
-        if i % 4 == 0 {
+        if i.is_multiple_of(4) {
             // Aligned, and on a border of cells.
             let axis = i / 4 % 3;
-            direction = [DVec3::X, DVec3::Y, DVec3::Z][axis] * if i % 8 == 0 { 1.0 } else { -1.0 };
+            direction = [DVec3::X, DVec3::Y, DVec3::Z][axis] * if i.is_multiple_of(8) { 1.0 } else { -1.0 };
             from[(axis + 1) % 3] = from[(axis + 1) % 3].round() + if i % 16 < 8 { 0.5 } else { 0.0 };
         }
-        let length = rng.range(0.0, if i % 3 == 0 { 10.0 } else { 120.0 });
+        let length = rng.range(0.0, if i.is_multiple_of(3) { 8.0 } else { 80.0 });
         let speed = 2f64.powi(i as i32 % 7 - 3);
         let direction = (direction * speed).as_vec3().to_array();
         Ray { origin: from.as_vec3().to_array(), t_min: 0.0, direction, t_max: (length / speed) as f32 }
@@ -225,11 +228,11 @@ pub fn leaving(lab: &mut Lab) -> Result<Checks> {
     let cells = 32u32;
     for axis in 0..3 {
         let mut bom = Bom::new(cells, 0, [0; 3]);
-        let occupied: Vec<[u32; 3]> = (0..300).map(|_| [0; 3].map(|_| rng.range(0.0, 32.0) as u32)).collect();
+        let occupied: Vec<[u32; 3]> = (0..800).map(|_| [0; 3].map(|_| rng.range(0.0, 32.0) as u32)).collect();
         occupied.iter().for_each(|&cell| bom.occupy(cell));
         make(&mut stage, vec![bom], &aligned(cells, &[(1.0, 0.0)], axis))?;
         let boxes: Vec<[DVec3; 2]> = occupied.iter().map(|c| of_cell(c.map(f64::from), 1.0)).collect();
-        let rays = anywhere(&mut rng, count, [-20.0, 52.0]);
+        let rays = anywhere(&mut rng, count, [-8.0, 40.0]);
         let hits = answers(&mut stage, &rays, MOST_STEPS)?;
         let wrong =
             |boxes: &[[DVec3; 2]]| rays.iter().zip(&hits).filter(|(r, h)| !is_right(r, h, boxes)).count() as u64;
@@ -243,7 +246,7 @@ pub fn leaving(lab: &mut Lab) -> Result<Checks> {
     // before them, is empty.
     let mut levels = vec![Bom::new(cells, 0, [0; 3]), Bom::new(cells, 1, [-8; 3])];
     let mut boxes = Vec::new();
-    for _ in 0..150 {
+    for _ in 0..400 {
         let cell = [0; 3].map(|_| rng.range(2.0, 30.0) as u32);
         levels[0].occupy(cell);
         boxes.push(of_cell(cell.map(f64::from), 1.0));

@@ -235,7 +235,10 @@ pub fn flat_scene(lab: &mut Lab) -> Result<Checks> {
     checks.at_least("hits", count as u64 - misses(&hits), count as u64 / 4);
     let levels = assemble(stage.file.resident(), DVec3::new(1.0, 2.0, -1.0), 32).levels;
     let points = (-16..=16).flat_map(|x| (-16..=16).map(move |z| DVec3::new(f64::from(x), 0.0, f64::from(z)) / 4.0));
-    let cell_of = |bom: &Bom, p: DVec3| (p / f64::from(bom.cell_log2).exp2()).floor().to_array().map(|x| x as i64);
+    let cell_of = |bom: &Bom, p: DVec3| -> [i64; 3] {
+        let cell = (p / f64::from(bom.cell_log2).exp2()).floor();
+        std::array::from_fn(|k| cell[k] as i64 - bom.first[k])
+    };
     let coarsest = levels.last().context("the scene has occupancy")?;
     let (empty, of) =
         points.fold((0, 0), |(empty, of), p| (empty + u64::from(!coarsest.is_occupied(cell_of(coarsest, p))), of + 1));
