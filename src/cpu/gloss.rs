@@ -152,6 +152,12 @@ impl Gloss {
         self.share.map(|c| c * self.under + self.coat_share)
     }
 
+    /// Share of light of one radiance from everywhere that the surface reflects.
+    pub fn albedo(&self) -> Vec3 {
+        let around = self.around();
+        each(|k| self.diffuse[k] + around[k])
+    }
+
     /// What the surface reflects otherwise than diffusely of the background, unshadowed, where rays of its own do not bring it.
     pub fn reflected_ambient(&self, bound: &Bound) -> Vec3 {
         if self.alpha == 0.0 || (bound.has(PARAM_GLOSSY) && !bound.has(PARAM_BOUNCE)) {
@@ -170,8 +176,7 @@ impl Gloss {
         if self.alpha == 0.0 || bound.has(PARAM_GLOSSY) || bound.params.diffuse_count > 0.0 {
             return self.diffuse;
         }
-        let around = self.around();
-        each(|k| self.diffuse[k] + around[k])
+        self.albedo()
     }
 
     /// A direction drawn by the facets that are seen (Dupuy, Benyoub 2023, "Sampling visible GGX normals with spherical caps"), a unit

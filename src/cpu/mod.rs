@@ -63,6 +63,7 @@ mod packet_tests;
 mod texture_tests;
 
 pub use executor::CpuExecutor;
+pub use gloss::Gloss;
 
 use crate::kernel::DeviceInfo;
 

@@ -205,7 +205,12 @@ impl Renderer {
                 self.read_aovs(view.frame.unit, &mut output.pixels)?;
             }
             if let Some(guides) = &mut guides {
-                guides.sample(&mut *self.executor, &view, (sample, self.settings.samples))?;
+                guides.sample(
+                    &mut *self.executor,
+                    &self.scene.resident().materials,
+                    &view,
+                    (sample, self.settings.samples),
+                )?;
             }
             let finished = sample + 1;
             if finished.is_multiple_of(BATCH_SAMPLES) || finished == self.settings.samples {

@@ -10,6 +10,11 @@ const SPLINE: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 /// The Gaussian of 3 x 3 pixels that smooths variances, by distance.
 const GAUSS: [f32; 2] = [0.5, 0.25];
 
+/// Widths of a pixel that a point may be off a plane, for each pixel between them, and count as on it: of the first frame...
+const PLANE_FIRST: f32 = 0.25;
+/// ... and the least. The more frames an average has, the less it needs of what lies around, and edges stay sharp.
+const PLANE_LEAST: f32 = 0.06;
+
 /// Light and the variance of its luminance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lit {
@@ -19,6 +24,8 @@ pub struct Lit {
     pub variance: f32,
     /// Whether samples are too few to tell it: then luminance tells nothing apart.
     pub is_young: bool,
+    /// Frames in the average, at least 1.
+    pub length: f32,
 }
 
 /// Weight of normals: cos^32 of the angle between them.
@@ -56,6 +63,7 @@ pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32
         }
         let per_luminance = if own.is_young { 0.0 } else { 1.0 / (tolerance * variance.sqrt() + 1e-12) };
         let centre = luminance(own.color);
+        let plane = (PLANE_FIRST / own.length).max(PLANE_LEAST);
         let (x, y) = grid.position(pixel);
         let mut sum = [0.0f32; 3];
         let (mut variances, mut weights) = (0.0f32, 0.0f32);
@@ -66,8 +74,7 @@ pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32
             let mut weight = SPLINE[dx.unsigned_abs() as usize] * SPLINE[dy.unsigned_abs() as usize];
             if other != pixel {
                 let distance = dx.abs().max(dy.abs()) as f32 * step as f32;
-                // A plane is the same within half a pixel for each pixel of distance.
-                let off = surface.off_plane(&seen[other]) / (0.5 * distance);
+                let off = surface.off_plane(&seen[other]) / (plane * distance);
                 let apart = (luminance(lit[other].color) - centre).abs() * per_luminance;
                 weight *= of_normals(surface, &seen[other]) * (-off - apart).exp();
             }
@@ -79,6 +86,6 @@ pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32
         }
         // The pixel itself has a weight of 9/64.
         let (color, variance) = (sum.map(|x| x / weights), variances / (weights * weights));
-        Lit { color, variance, is_young: own.is_young }
+        Lit { color, variance, ..own }
     })
 }

@@ -4,9 +4,9 @@ use super::{Guides, is_finite};
 use rayon::prelude::*;
 
 /// Channels of an albedo below this are not divided by: their light goes around the filter, so that black stays black and nothing
-/// is divided by zero. The least colour of an 8-bit sRGB texture but black is 1/3295: dyes of one bright channel have others of little
-/// more, which a long exposure shows. What is left noisy is less than 1/4096 of the light.
-pub const LEAST_ALBEDO: f32 = 1.0 / 4096.0;
+/// is divided by zero. What is left noisy there is less than 1/1024 of the light; dyes with one bright channel have others of little more,
+/// which a long exposure shows.
+pub const LEAST_ALBEDO: f32 = 1.0 / 1024.0;
 
 /// A frame taken apart.
 pub struct Parts {

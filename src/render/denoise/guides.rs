@@ -1,10 +1,12 @@
 //! What a frame saw, to guide the filter.
 
 use super::Projection;
+use crate::cpu::Gloss;
 use crate::kernel::layout::{BATCH_SAMPLES, GBuffer, Hit, NONE, Ray, Surface};
 use crate::kernel::{FrameExecutor, View};
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Pass};
+use bricks::Material;
 use glam::{DVec3, Vec3};
 
 /// What a pixel's first sample saw.
@@ -20,7 +22,7 @@ pub struct Seen {
     pub id: u32,
     /// Width of the pixel at the hit, world units.
     pub footprint: f32,
-    /// Linear base colour.
+    /// Share of light from everywhere that it reflects, diffusely and otherwise, linear.
     pub albedo: [f32; 3],
     /// Linear radiance that it shows by itself, as much of it as is in the picture.
     pub emission: [f32; 3],
@@ -74,6 +76,12 @@ pub struct GuideReader {
     samples: u32,
 }
 
+/// What the surface of a hit reflects of light from everywhere.
+fn albedo(g: &GBuffer, materials: &[Material], ray: &Ray) -> [f32; 3] {
+    let of = |material: &Material| Gloss::of(g, material, ray.direction.map(|x| -x)).albedo();
+    materials.get(g.material as usize).map_or(g.albedo, of)
+}
+
 impl GuideReader {
     /// Of a frame of `width` x `height` pixels.
     pub fn new(camera: &Camera, size: (u32, u32)) -> Self {
@@ -107,19 +115,20 @@ impl GuideReader {
         Ok(())
     }
 
-    /// Ends sample `sample` of `samples`, seen as `view` says.
+    /// Ends sample `sample` of `samples`, seen as `view` says; `materials` are those of the scene.
     ///
     /// # Errors
     /// The device's.
     pub fn sample(
         &mut self,
         executor: &mut dyn FrameExecutor,
+        materials: &[Material],
         view: &View,
         (sample, samples): (u32, u32),
     ) -> Result<(), ExecutorError> {
         if sample == 0 {
             self.jitter = [0, 1].map(|k| f64::from(view.params.jitter[k]));
-            self.read(executor, view)?;
+            self.read(executor, materials, view)?;
         }
         if sample + 1 < samples {
             self.before = executor.read_radiance()?;
@@ -127,7 +136,12 @@ impl GuideReader {
         Ok(())
     }
 
-    fn read(&mut self, executor: &mut dyn FrameExecutor, view: &View) -> Result<(), ExecutorError> {
+    fn read(
+        &mut self,
+        executor: &mut dyn FrameExecutor,
+        materials: &[Material],
+        view: &View,
+    ) -> Result<(), ExecutorError> {
         let rays: Vec<Ray> = executor.read_rays(Pass::Primary)?;
         let hits: Vec<Hit> = executor.read_hits(Pass::Primary)?;
         let surfaces: Vec<Surface> = executor.read_surfaces(Pass::Primary)?;
@@ -147,7 +161,7 @@ impl GuideReader {
                     normal: Vec3::from_array(g.normal),
                     id: hit.id,
                     footprint: if is_hit { self.projection.footprint(point) as f32 } else { 0.0 },
-                    albedo: if is_hit { g.albedo } else { [0.0; 3] },
+                    albedo: if is_hit { albedo(g, materials, ray) } else { [0.0; 3] },
                     emission: if is_hit { g.emission.map(|x| share * x) } else { [0.0; 3] },
                 }
             })
@@ -161,5 +175,32 @@ impl GuideReader {
         let direct = self.direct.iter().map(|sum| sum.map(|x| (x / count) as f32)).collect();
         let Self { size, projection, jitter, seen, .. } = self;
         Guides { size, projection, jitter, seen, direct }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Light is divided by all that a surface reflects: a dye that is black in a channel still shines by its surface, and light
+    /// there divided by the base colour alone would be far too bright for its neighbours.
+    #[test]
+    fn albedos_have_what_is_reflected_otherwise_than_diffusely() {
+        let ray = Ray { direction: [0.6, 0.0, -0.8], ..Ray::default() };
+        let g = |metallic| GBuffer {
+            albedo: [0.0, 0.25, 1.0],
+            normal: [0.0, 0.0, 1.0],
+            roughness: 0.5,
+            metallic,
+            ..GBuffer::default()
+        };
+        let glossy = Material { specular: [0.04; 3], specular_weight: 1.0, ..Material::DIFFUSE };
+        assert_eq!(albedo(&g(0.0), &[Material::DIFFUSE], &ray), [0.0, 0.25, 1.0]);
+        let [black, grey, white] = albedo(&g(0.0), &[glossy], &ray);
+        assert!((0.03..0.08).contains(&black), "{black}");
+        assert!((0.26..0.32).contains(&grey), "{grey}");
+        assert!((white - 1.0).abs() < 0.005, "{white}");
+        let metal = albedo(&g(1.0), &[glossy], &ray);
+        assert!(metal[0] < 0.04 && (metal[1] - 0.25).abs() < 0.05 && (metal[2] - 1.0).abs() < 0.005, "{metal:?}");
     }
 }

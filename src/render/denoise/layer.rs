@@ -12,8 +12,8 @@ const LONG: f32 = 12.0;
 const SHORT: f32 = 4.0;
 /// With fewer frames the variance of a lamp's light is that of the neighbourhood.
 const FEW: f32 = 2.0;
-/// Fewer free samples of a neighbourhood do not tell the variance of sparse light.
-const LEAST_FREEDOM: f64 = 40.0;
+/// The variance of sparse light is not told by a neighbourhood with fewer samples that found light.
+const LEAST_FOUND: f64 = 10.0;
 /// What a frame leaves of the luminance that counted as brightest before it.
 const FADE: f32 = 0.8;
 
@@ -134,19 +134,24 @@ fn variance_around(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, radi
 }
 
 /// Variance of the mean of a pixel whose single samples have the variance that those around it have, each about its own mean: a pixel
-/// that has seen nothing yet among others that have is not certain to be black. `None` where they are too few.
+/// that has seen nothing yet among others that have is not certain to be black. `None` where too few found light: a share p of samples
+/// that find the same have the relative variance 1/p - 1, so that n of them have found n / (1 + variance / mean²) times.
 fn variance_pooled(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, radius: i32) -> Option<f32> {
-    let (mut sum, mut freedom) = (0.0f64, 0.0f64);
+    let (mut sum, mut mean, mut freedom) = (0.0f64, 0.0f64, 0.0f64);
     for other in grid.around(pixel, radius).filter(|&other| seen[pixel].is_same_surface(&seen[other])) {
         let moments = &past[other].moments;
         if let Some(variance) = moments.variance() {
             // Of n samples alike n - 1 are free, the share 1 - 1/n of them.
             let free = 1.0 / moments.squares - 1.0;
             sum += free * variance;
+            mean += free * moments.mean;
             freedom += free;
         }
     }
-    (freedom >= LEAST_FREEDOM).then(|| (sum / freedom * past[pixel].moments.squares) as f32)
+    let squared = (mean / freedom).powi(2);
+    // Of no samples, or of none that found light, it is no number.
+    let found = freedom * squared / (squared + sum / freedom);
+    (found >= LEAST_FOUND).then(|| (sum / freedom * past[pixel].moments.squares) as f32)
 }
 
 /// The variance of a pixel's average, and whether samples are too few to tell it.
@@ -196,7 +201,7 @@ impl Layer {
         now = steady;
         let lit = grid.map(|pixel| {
             let (variance, is_young) = variance(grid, seen, &now, pixel, kind);
-            Lit { color: now[pixel].averages.long, variance, is_young }
+            Lit { color: now[pixel].averages.long, variance, is_young, length: now[pixel].length.max(1.0) }
         });
         let mut filtered = atrous::level(grid, seen, &lit, 0, kind.tolerance);
         for (past, lit) in now.iter_mut().zip(&filtered) {
