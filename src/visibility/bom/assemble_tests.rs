@@ -1,7 +1,7 @@
 //! Maps of a frame against brute force, and against each other.
 
 use super::voxelise::touched;
-use super::{Assembler, Bom, Cascades, Detail, Settings, assemble};
+use super::{Assembler, Bom, BomError, Cascades, Detail, Settings, assemble};
 use crate::reference::Truth;
 use bricks::{Resident, SceneFile, TOP_LEAF};
 use brickwalk_convert::build::{BuildSettings, build};
@@ -332,4 +332,17 @@ fn moving_maps_takes_less_work_than_making_them() {
         whole.1 / moved.1,
     );
     assert!(cells[0] * 4 < cells[1]);
+}
+
+#[test]
+fn scenes_without_maps_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bare.bricks");
+    let settings = BuildSettings { proxies: false, ..BuildSettings::default() };
+    build(soup(SoupKind::Uniform, 100, 1), &settings, &path, &Progress::hidden()).unwrap();
+    let file = Arc::new(SceneFile::open(&path).unwrap());
+    let error = assemble(&file, &Settings::default(), DVec3::ZERO).unwrap_err();
+    assert!(matches!(error, BomError::NoProxies { .. }));
+    let text = error.to_string();
+    assert!(text.contains("bare.bricks") && text.contains("--no-proxies"), "{text}");
 }

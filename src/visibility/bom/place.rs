@@ -280,3 +280,114 @@ fn enter_turned(
     }
     entered
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bricks::OccupancyGrid;
+    use brickwalk_scenes::Rng;
+
+    /// A brick's map with cells at random.
+    fn random_map(rng: &mut Rng, count: u32) -> OccupancyMap {
+        let mut columns = [0; 4096];
+        (0..count).for_each(|_| columns[rng.int(0, 4095) as usize] |= 1 << rng.int(0, 63));
+        OccupancyMap::of_finest(&columns)
+    }
+
+    fn cells_of(count: u32) -> impl Iterator<Item = [u32; 3]> {
+        (0..count).flat_map(move |x| (0..count).flat_map(move |y| (0..count).map(move |z| [x, y, z])))
+    }
+
+    /// A region inside of a map of 64³ cells, or all of it.
+    fn region(rng: &mut Rng) -> Region {
+        let mut region = Region::whole(64);
+        if rng.chance(0.7) {
+            for k in 0..3 {
+                region.lo[k] = rng.int(0, 40) as u32;
+                region.hi[k] = rng.int(i64::from(region.lo[k]) + 1, 64) as u32;
+            }
+        }
+        region
+    }
+
+    #[test]
+    fn cells_on_the_lattice_are_those_that_overlap() {
+        let mut rng = Rng::new(5, &[1]);
+        let (mut set, mut kept_out) = (0, 0);
+        for shift in -2..=7 {
+            for level in 0..=RESIDENT_LEVEL {
+                let (brick, region) = (random_map(&mut rng, 400), region(&mut rng));
+                let origin = [(); 3].map(|()| rng.int(-300, 300));
+                let start = |k: usize| if shift < 0 { origin[k] << -shift } else { origin[k] >> shift };
+                let first = std::array::from_fn(|k| start(k) - rng.int(0, 30));
+                let mut map = Bom::new(64, shift - 3, first);
+                let place = Place::Aligned { cell_log2: -3, origin };
+                let repeated = place.enter(&mut map, &region, &Cells::of(&brick, level));
+                // In units of an eighth of the finest cell, which divides all.
+                let mut expected = Bom::new(64, shift - 3, first);
+                for cell in cells_of(64 >> level).filter(|&cell| brick.is_occupied(level, cell)) {
+                    let from = |k: usize| (origin[k] + (i64::from(cell[k]) << level)) << 3;
+                    let side = 1i64 << (shift + 3);
+                    let lo: [i64; 3] = std::array::from_fn(|k| from(k).div_euclid(side));
+                    let hi: [i64; 3] = std::array::from_fn(|k| (from(k) + (8 << level) - 1).div_euclid(side) + 1);
+                    if let Some(found) = Region::within(&expected, lo, hi) {
+                        match found.and(&region) {
+                            Some(found) => expected.fill(&found),
+                            None => kept_out += 1,
+                        }
+                    }
+                }
+                assert_eq!(map, expected, "shift {shift}, level {level}");
+                assert_eq!(repeated > 0, shift < level as i32 && map.occupied() > 0);
+                set += map.occupied();
+            }
+        }
+        assert!(set > 10_000 && kept_out > 100, "{set} {kept_out}");
+    }
+
+    #[test]
+    fn points_of_turned_cells_are_in_occupied_ones() {
+        let mut rng = Rng::new(5, &[2]);
+        let (mut points, mut elsewhere) = (0, 0);
+        for far in [0.0, 1e3, 1e9] {
+            for _ in 0..6 {
+                let brick = random_map(&mut rng, 60);
+                let grid = OccupancyGrid { cell_log2: -5, origin: [(); 3].map(|()| rng.int(-4000, 4000)) };
+                let mut matrix = [0.0; 12];
+                for k in 0..3 {
+                    (0..3).for_each(|j| matrix[4 * k + j] = rng.range(-1.5, 1.5));
+                    matrix[4 * k + 3] = rng.range(-far, far);
+                }
+                let instance = Instance { world_from_object: matrix, ..bytemuck::Zeroable::zeroed() };
+                let record = brick.record(&grid);
+                let place = Place::of(&instance, &record);
+                assert!(matches!(place, Place::Turned { .. }));
+                let at = |p: [f64; 3]| -> [f64; 3] {
+                    std::array::from_fn(|k| (0..3).map(|j| matrix[4 * k + j] * p[j]).sum::<f64>() + matrix[4 * k + 3])
+                };
+                let side = 2f64.powi(-5);
+                let middle = at(grid.origin.map(|x| (x + 32) as f64 * side));
+                for cell_log2 in -4..0 {
+                    let cell = 2f64.powi(cell_log2);
+                    let mut map = Bom::new(64, cell_log2, middle.map(|x| (x / cell) as i64 - 32));
+                    let level = place.level(cell_log2);
+                    place.enter(&mut map, &Region::whole(64), &Cells::of(&brick, level));
+                    for cell in cells_of(64).filter(|&cell| brick.is_occupied(0, cell)) {
+                        let p = std::array::from_fn(|k| {
+                            ((grid.origin[k] + i64::from(cell[k])) as f64
+                                + [0.0, 1.0, rng.unit()][rng.int(0, 2) as usize])
+                                * side
+                        });
+                        let found = map.cell_at(at(p));
+                        if found.iter().all(|x| (0..64).contains(x)) {
+                            points += 1;
+                            assert!(map.is_occupied(found), "{p:?} at {found:?} of 2^{cell_log2}");
+                            elsewhere += u32::from(!map.is_occupied([found[1], found[2], found[0]]));
+                        }
+                    }
+                }
+            }
+        }
+        assert!(points > 1500 && elsewhere * 2 > points, "{points} {elsewhere}");
+    }
+}
