@@ -55,8 +55,14 @@ impl DistanceField {
             .collect();
         let half = halved(&finest, cells);
         let quarter = halved(&half, cells / 2);
-        let has_seed = finest.first().is_some_and(|distance| distance.is_finite());
-        Self { cells, side: map.side(), first: map.first, levels: [finest, half, quarter], has_seed }
+        Self::of_levels(map, [finest, half, quarter])
+    }
+
+    /// The field of a map with the distances of its levels as of [`level`](Self::level).
+    pub fn of_levels(map: &Bom, levels: [Vec<f16>; LEVELS]) -> Self {
+        debug_assert!((0..LEVELS).all(|level| levels[level].len() == (map.cells() >> level).pow(3) as usize));
+        let has_seed = levels[0].first().is_some_and(|distance| distance.is_finite());
+        Self { cells: map.cells(), side: map.side(), first: map.first, levels, has_seed }
     }
 
     /// The side of a cell of the finest level, world units.
