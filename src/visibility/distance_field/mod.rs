@@ -15,4 +15,4 @@ mod trace;
 
 pub use field::{DistanceField, LEVELS, distance_f16};
 pub use flood::{NO_SEED, jump_flood};
-pub use trace::{Traced, Tracing};
+pub use trace::{LocalRay, LocalTraced, Traced, Tracing};

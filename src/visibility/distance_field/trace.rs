@@ -31,36 +31,60 @@ pub struct Traced {
     pub is_capped: bool,
 }
 
+/// A ray in cells of the finest level, from the first.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct LocalRay {
+    /// Where it starts.
+    pub origin: [f32; 3],
+    /// Where its interval starts, in lengths of `direction`.
+    pub t_min: f32,
+    /// Of length 1.
+    pub direction: [f32; 3],
+    /// Where its interval ends.
+    pub t_max: f32,
+}
+
+/// What a ray met, in cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalTraced {
+    /// Where it hit.
+    pub t: Option<f32>,
+    /// As of [`Traced`].
+    pub iterations: u32,
+    /// As of [`Traced`].
+    pub is_capped: bool,
+}
+
 impl DistanceField {
     /// Traces the ray from `origin`, world units, along `direction`, which has length 1, from `t_min` to `t_max`, world units. Outside of the field
     /// there is nothing.
     pub fn trace(&self, tracing: &Tracing, origin: [f64; 3], direction: [f64; 3], t_min: f64, t_max: f64) -> Traced {
-        let missed = |iterations| Traced { t: None, iterations, is_capped: false };
-        let start = self.local(origin);
-        let along = direction.map(|x| x as f32);
-        let per_cell = self.side();
-        let (mut t, mut end) = ((t_min / per_cell) as f32, (t_max / per_cell) as f32);
+        let [t_min, t_max] = [t_min, t_max].map(|t| (t / self.side()) as f32);
+        let ray = LocalRay { origin: self.local(origin), t_min, direction: direction.map(|x| x as f32), t_max };
+        let LocalTraced { t, iterations, is_capped } = self.trace_local(tracing, &ray);
+        Traced { t: t.map(|t| f64::from(t) * self.side()), iterations, is_capped }
+    }
+
+    /// [`Self::trace`] in f32: the twin of `shaders/trace_field.wgsl`.
+    pub fn trace_local(&self, tracing: &Tracing, ray: &LocalRay) -> LocalTraced {
         let size = self.cells(0) as f32;
+        let (mut t, mut end) = (ray.t_min, ray.t_max);
+        let mut is_in = self.has_seed();
         for k in 0..3 {
-            let [a, b] = [0.0, size].map(|face| (face - start[k]) / along[k]);
-            if along[k] == 0.0 {
-                if !(0.0..=size).contains(&start[k]) {
-                    return missed(0);
-                }
+            let (origin, along) = (ray.origin[k], ray.direction[k]);
+            if along == 0.0 {
+                is_in &= (0.0..=size).contains(&origin);
             } else {
+                let [a, b] = [-origin / along, (size - origin) / along];
                 (t, end) = (t.max(a.min(b)), end.min(a.max(b)));
             }
         }
-        if !self.has_seed() {
-            return missed(0);
-        }
         let mut level = LEVELS - 1;
-        for iteration in 0..tracing.iterations {
-            let is_within = t <= end;
-            if !is_within {
-                return missed(iteration);
-            }
-            let distance = self.distance(level, std::array::from_fn(|k| start[k] + t * along[k]));
+        let (mut found, mut iterations) = (None, 0);
+        while is_in && iterations < tracing.iterations && t <= end {
+            let distance = self.distance(level, std::array::from_fn(|k| ray.origin[k] + t * ray.direction[k]));
+            iterations += 1;
             // Within two of its cells a level says little.
             let width = (1 << level) as f32;
             if level > 0 && distance < 2.0 * width {
@@ -68,14 +92,16 @@ impl DistanceField {
                 continue;
             }
             if distance <= tracing.hit {
-                return Traced { t: Some(f64::from(t) * per_cell), iterations: iteration + 1, is_capped: false };
+                found = Some(t);
+                break;
             }
             t += distance.max(tracing.least_step);
             if level + 1 < LEVELS && distance >= 4.0 * width {
                 level += 1;
             }
         }
-        Traced { t: None, iterations: tracing.iterations, is_capped: t <= end }
+        let is_capped = is_in && found.is_none() && iterations == tracing.iterations && t <= end;
+        LocalTraced { t: found, iterations, is_capped }
     }
 
     /// Whether anything is hit; as [`Self::trace`].
