@@ -2,6 +2,7 @@
 
 pub mod binary;
 pub mod device;
+pub mod distance_field;
 pub mod executor;
 pub mod groups;
 pub mod kernels;

@@ -1,15 +1,18 @@
-//! Occupancy maps, and mappings of the square and the sphere (cases 39, 40, 44 to 46).
+//! Occupancy maps, distances to their cells, and mappings of the square and the sphere (cases 39, 40, 44 to 46, 56, 57).
 
 use super::case::Checks;
 use super::lab::{Lab, settings};
 use crate::math::octahedral::{octahedral_decode, octahedral_encode};
 use crate::math::sampling::{concentric_disc, cosine_hemisphere, hammersley};
 use crate::reference::Truth;
+use crate::visibility::bom::Bom;
+use crate::visibility::distance_field::{DistanceField, LEVELS, Tracing, distance_f16};
 use anyhow::Result;
 use bricks::OCCUPANCY_LEVELS;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::one_mesh;
 use glam::DVec3;
+use half::f16;
 
 /// A sheet of 12 x 12 squares of side 1/8: its corner, and what one square more in either direction adds.
 fn sheet(corner: DVec3, [u, v]: [DVec3; 2]) -> Primitive {
@@ -176,5 +179,60 @@ pub fn hammersley_ends(_: &mut Lab) -> Result<Checks> {
     }
     checks.none("points outside of [0, 1)", outside, points);
     checks.none("heights that are negative or no number", below, points);
+    Ok(checks)
+}
+
+/// Case 56: distances between the middles of cells, as f16.
+pub fn distances(lab: &mut Lab) -> Result<Checks> {
+    let mut checks = Checks::default();
+    // All that there are in the largest map.
+    let (mut above, mut loose, mut of) = (0, 0, 0);
+    for squared in 0..=3 * 255u32.pow(2) {
+        let root = distance_f16(squared);
+        let [low, next] = [root, f16::from_bits(root.to_bits() + 1)].map(|x| x.to_f64() * x.to_f64());
+        above += u64::from(low > f64::from(squared));
+        loose += u64::from(next <= f64::from(squared));
+        of += 1;
+    }
+    checks.none("roots above what they stand for", above, of);
+    checks.none("roots below the largest f16 that is not above", loose, of);
+    let mut rng = lab.random(&[56]);
+    let mut map = Bom::new(32, 3, [-16; 3]);
+    let seeds: Vec<[u32; 3]> = (0..40).map(|_| [(); 3].map(|()| rng.int(0, 31) as u32)).collect();
+    seeds.iter().for_each(|&seed| map.occupy(seed));
+    let field = DistanceField::new(&map);
+    let (mut longest, mut short) = (0.0f64, 0);
+    for (index, distance) in (0..32u32.pow(3)).zip(field.level(0)) {
+        let cell = [index / 1024, index / 32 % 32, index % 32];
+        let apart = |seed: &[u32; 3]| (0..3).map(|k| cell[k].abs_diff(seed[k]).pow(2)).sum::<u32>();
+        let exact = seeds.iter().map(apart).min().unwrap_or(u32::MAX);
+        short += u64::from(*distance < distance_f16(exact));
+        longest = longest.max(distance.to_f64() - f64::from(exact).sqrt());
+    }
+    checks.none("flooded distances that are too short", short, 32u64.pow(3));
+    // No bound is known; the largest of many maps was 1.3.
+    checks.at_most("flooded distance beyond the exact one, cells", longest, 2.0);
+    Ok(checks)
+}
+
+/// Case 57: the field of a map without occupied cells, and of one with a single one.
+pub fn no_seed(_: &mut Lab) -> Result<Checks> {
+    let mut checks = Checks::default();
+    let mut map = Bom::new(64, -2, [0; 3]);
+    let middle = 7.625;
+    let traced = |field: &DistanceField| {
+        let origin = [-1.0, middle, middle];
+        field.trace(&Tracing::default(), origin, [1.0, 0.0, 0.0], 0.0, f64::INFINITY)
+    };
+    let empty = DistanceField::new(&map);
+    let finite: usize = (0..LEVELS).map(|level| empty.level(level).iter().filter(|d| d.is_finite()).count()).sum();
+    checks.equal("distances that are finite", finite, 0);
+    checks.holds("between them as well", empty.distance(0, [3.25, 9.5, 11.0]) == f32::INFINITY);
+    let result = traced(&empty);
+    checks.holds("a ray hits nothing, and ends", result.t.is_none() && !result.is_capped);
+    map.occupy([40, 30, 30]);
+    let t = traced(&DistanceField::new(&map)).t.unwrap_or(f64::NAN);
+    // From the least distance that hits to the middle of the cell, which is at 10.125.
+    checks.at_most("hit of a single cell, cells from its middle", (t - 11.125).abs() * 4.0, 1.0);
     Ok(checks)
 }

@@ -1,8 +1,33 @@
 //! Base occupancy maps (Zeng et al., ROMA, §4.1): which cells of a cube something may be in, one bit a cell.
+//!
+//! The paper rasterises the scene from three sides into one map a frame. Here every brick has a map of its own, made exactly at
+//! conversion, and a frame brings those around the camera together: no geometry is read, so rays are answered where no brick is
+//! resident. Cells of all maps are powers of two on one lattice, so that a brick that is placed without turning is brought in by
+//! shifting and OR; the cells of others are entered as boxes around their images, rounded outward. What is far is held in maps with
+//! larger cells: [`Cascades`].
+//!
+//! A cell holds its lower faces and not its upper ones. Every point of a triangle within a map lies in an occupied cell; a cell
+//! without one may be occupied too: where it is smaller than a brick's, where a brick was turned, where only the 16³ level of a brick's
+//! map was at hand. So maps hide too much, never too little. [`voxelise`](voxelise()) has the paper's own form beside it, which does leak.
+
+mod assemble;
+#[cfg(test)]
+mod assemble_tests;
+#[cfg(test)]
+mod leak_tests;
+mod maps;
+mod place;
+mod plan;
+mod region;
+mod voxelise;
+
+pub use assemble::{Assembler, Assembly, BomError, assemble};
+pub use plan::{Detail, MAX_LEVELS, SNAP_CELLS, Settings};
+pub use voxelise::{Voxelisation, voxelise};
 
 use bricks::Resident;
 
-/// A cube of cells of the world: a cell that a triangle touches is occupied, one that none touches may be.
+/// A cube of cells of the world: a cell that a triangle has a point in is occupied, one that none has may be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bom {
     cells: u32,
@@ -25,6 +50,11 @@ impl Bom {
         self.cells
     }
 
+    /// The side of a cell, world units.
+    pub fn side(&self) -> f64 {
+        f64::from(self.cell_log2).exp2()
+    }
+
     /// The bits: cell (x, y, z) is bit z % 32 of word (x + cells y) cells / 32 + z / 32, the lowest first.
     pub fn words(&self) -> &[u32] {
         &self.words
@@ -33,6 +63,11 @@ impl Bom {
     /// The bits, to be set.
     pub fn words_mut(&mut self) -> &mut [u32] {
         &mut self.words
+    }
+
+    /// The number of occupied cells.
+    pub fn occupied(&self) -> u64 {
+        self.words.iter().map(|word| u64::from(word.count_ones())).sum()
     }
 
     fn bit(&self, [x, y, z]: [u32; 3]) -> (usize, u32) {
@@ -52,6 +87,11 @@ impl Bom {
     pub fn occupy(&mut self, cell: [u32; 3]) {
         let (word, bit) = self.bit(cell);
         self.words[word] |= bit;
+    }
+
+    /// The cell that a point of the world lies in, which may be outside of the cube.
+    pub fn cell_at(&self, point: [f64; 3]) -> [i64; 3] {
+        std::array::from_fn(|k| ((point[k] / self.side()).floor() as i64).saturating_sub(self.first[k]))
     }
 }
 

@@ -1,0 +1,74 @@
+//! Jump flooding in three dimensions.
+
+use crate::visibility::bom::Bom;
+use rayon::prelude::*;
+
+/// The cell that is nearest to one where there is none.
+pub const NO_SEED: u32 = u32::MAX;
+
+/// A cell's coordinates in 10 bits each, the first lowest.
+fn pack([x, y, z]: [u32; 3]) -> u32 {
+    x | y << 10 | z << 20
+}
+
+/// Squared distance of a cell to a packed one, cells.
+pub(super) fn squared([x, y, z]: [u32; 3], seed: u32) -> u32 {
+    let of = |a: u32, b: u32| a.abs_diff(b & 1023).pow(2);
+    of(x, seed) + of(y, seed >> 10) + of(z, seed >> 20)
+}
+
+/// For each cell of a map an occupied one that is the nearest or little farther, in 10 bits an axis, or [`NO_SEED`] if there is none: cell
+/// (x, y, z) is element (x cells + y) cells + z. Of equally far ones it is the one with the lowest number.
+pub fn jump_flood(map: &Bom) -> Vec<u32> {
+    let cells = map.cells();
+    let plane = (cells * cells) as usize;
+    let mut nearest: Vec<u32> = (0..cells)
+        .into_par_iter()
+        .flat_map_iter(|x| {
+            (0..cells).flat_map(move |y| {
+                (0..cells).map(move |z| {
+                    let is_seed = map.is_occupied([x, y, z].map(i64::from));
+                    if is_seed { pack([x, y, z]) } else { NO_SEED }
+                })
+            })
+        })
+        .collect();
+    if nearest.iter().all(|&seed| seed == NO_SEED) {
+        return nearest;
+    }
+    let mut next = nearest.clone();
+    let mut step = cells.next_power_of_two() / 2;
+    while step > 0 {
+        next.par_chunks_mut(plane).zip(0..cells).for_each(|(out, x)| flood_plane(&nearest, cells, x, step, out));
+        std::mem::swap(&mut nearest, &mut next);
+        step /= 2;
+    }
+    nearest
+}
+
+/// The cells of one x: of their own nearest and those of the 26 neighbours `step` away, the nearest to them.
+fn flood_plane(nearest: &[u32], cells: u32, x: u32, step: u32, out: &mut [u32]) {
+    let around = |at: u32| [at.checked_sub(step), Some(at), Some(at + step).filter(|&at| at < cells)];
+    for y in 0..cells {
+        let mut rows = [0; 9];
+        let mut count = 0;
+        for nx in around(x).into_iter().flatten() {
+            for ny in around(y).into_iter().flatten() {
+                rows[count] = ((nx * cells + ny) * cells) as usize;
+                count += 1;
+            }
+        }
+        for z in 0..cells {
+            let mut best = (u32::MAX, NO_SEED);
+            for nz in around(z).into_iter().flatten() {
+                for row in &rows[..count] {
+                    let seed = nearest[row + nz as usize];
+                    if seed != NO_SEED {
+                        best = best.min((squared([x, y, z], seed), seed));
+                    }
+                }
+            }
+            out[(y * cells + z) as usize] = best.1;
+        }
+    }
+}
