@@ -9,7 +9,7 @@ use brickwalk::kernel::Extent;
 use brickwalk::reference::Truth;
 use brickwalk::render::Renderer;
 use brickwalk::scene::Camera;
-use brickwalk::visibility::bom_resident::assemble;
+use brickwalk::visibility::bom::{Settings, assemble};
 use clap::Parser;
 use common::{city, folder, frames};
 use glam::DVec3;
@@ -220,7 +220,8 @@ fn unmarked(scene: &Path, camera: DVec3) -> (usize, usize, f64) {
     let file = open_scene(scene).expect("a scene");
     let truth = Truth::load(&file).expect("triangles");
     let (mut empty, mut of, mut occupied, mut cells) = (0, 0, 0u64, 0u64);
-    for bom in assemble(file.resident(), camera, 64).levels {
+    let settings = Settings { cells: 64, ..Settings::default() };
+    for bom in assemble(&file, &settings, camera).expect("occupancy").0.levels {
         let side = f64::from(bom.cell_log2).exp2();
         for [a, b, c] in truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(DVec3::from)) {
             for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.3), (0.5, 0.5), (0.1, 0.6)] {

@@ -296,7 +296,7 @@ impl Renderer {
     fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
         if let Some((grid, columns)) = self.settings.roma.and_then(|settings| Roma::grid_of(&settings, pass)) {
-            let rotate = self.roma.prepare(&mut *self.executor, self.scene.resident(), grid)?;
+            let rotate = self.roma.prepare(&mut *self.executor, &self.scene, grid)?;
             let steps: Vec<Step> = std::iter::once(Step::Generate)
                 .chain(rotate)
                 .chain([Step::RomaTrace { steps: columns }, add])

@@ -4,16 +4,17 @@ use crate::kernel::frame::Frame;
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
-use crate::visibility::bom::Cascades;
-use crate::visibility::bom_resident;
-use crate::visibility::roma::{Grid, RomaSettings};
-use bricks::Resident;
+use crate::visibility::bom::{Assembler, BomError, Cascades, Settings};
+use crate::visibility::roma::{Grid, MOST_LEVELS, RomaSettings};
+use bricks::SceneFile;
 use glam::DVec3;
 use std::sync::Arc;
 
 /// The occupancy maps of the present frame and sample.
 #[derive(Default)]
 pub struct Roma {
+    /// What makes the base maps, of so many cells on each axis.
+    assembler: Option<(u32, Assembler)>,
     cascades: Arc<Cascades>,
     view: Option<RomaView>,
     /// Whether the base maps are those of the present camera.
@@ -55,20 +56,30 @@ impl Roma {
     pub fn prepare(
         &mut self,
         executor: &mut dyn FrameExecutor,
-        resident: &Resident,
+        scene: &Arc<SceneFile>,
         grid: Grid,
     ) -> Result<Option<Step>, ExecutorError> {
         let Some(RomaView { frame, camera, sample, seed }) = &self.view else { return Ok(None) };
         if self.made == Some(grid) {
             return Ok(None);
         }
+        let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
+        let (cells, mut assembler) = match self.assembler.take() {
+            Some((cells, assembler)) if cells == grid.size => (cells, assembler),
+            _ => {
+                self.is_assembled = false;
+                let settings = Settings { cells: grid.size, levels: MOST_LEVELS, ..Settings::default() };
+                (grid.size, Assembler::new(scene.clone(), settings).map_err(failed)?)
+            }
+        };
         if !self.is_assembled {
-            let cascades = bom_resident::assemble(resident, *camera, grid.size);
-            if *self.cascades != cascades {
-                self.cascades = Arc::new(cascades);
+            assembler.advance(scene.resident(), *camera).map_err(failed)?;
+            if *self.cascades != *assembler.cascades() {
+                self.cascades = Arc::new(assembler.cascades().clone());
             }
             self.is_assembled = true;
         }
+        self.assembler = Some((cells, assembler));
         executor.set_cascades(&self.cascades)?;
         executor.set_roma(&RomaMaps::new(&self.cascades, frame, grid, *sample, *seed))?;
         self.made = Some(grid);

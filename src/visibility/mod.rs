@@ -4,6 +4,5 @@
 //! [`roma`] answers rays by it. [`distance_field`] is the baseline: distances to occupied cells, and rays that go on by them.
 
 pub mod bom;
-pub mod bom_resident;
 pub mod distance_field;
 pub mod roma;

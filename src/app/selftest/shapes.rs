@@ -7,7 +7,7 @@ use super::rays::{Aim, Targets, lattice_point, ray};
 use crate::kernel::layout::Ray;
 use crate::scene::path::path_from_bounds;
 use crate::visibility::bom::Bom;
-use crate::visibility::bom_resident::assemble;
+use crate::visibility::bom::{Settings, assemble};
 use anyhow::{Context, Result};
 use bricks::MAX_BRICK_HEIGHT;
 use brickwalk_convert::source::{Primitive, SourceScene};
@@ -233,7 +233,8 @@ pub fn flat_scene(lab: &mut Lab) -> Result<Checks> {
     let (tally, hits) = stage.judge(&truth, &frame, &rays)?;
     note(&mut checks, "rays at it and along it", &tally);
     checks.at_least("hits", count as u64 - misses(&hits), count as u64 / 4);
-    let levels = assemble(stage.file.resident(), DVec3::new(1.0, 2.0, -1.0), 32).levels;
+    let settings = Settings { cells: 32, ..Settings::default() };
+    let levels = assemble(&stage.file, &settings, DVec3::new(1.0, 2.0, -1.0))?.0.levels;
     let points = (-16..=16).flat_map(|x| (-16..=16).map(move |z| DVec3::new(f64::from(x), 0.0, f64::from(z)) / 4.0));
     let cell_of = |bom: &Bom, p: DVec3| -> [i64; 3] {
         let cell = (p / f64::from(bom.cell_log2).exp2()).floor();

@@ -61,6 +61,9 @@ pub struct RomaSettings {
     pub shadow_steps: u32,
 }
 
+/// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.
+pub const MOST_LEVELS: u32 = 6;
+
 /// Most columns that a ray may be given.
 pub const MOST_STEPS: u32 = 64;
 
