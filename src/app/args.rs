@@ -360,7 +360,7 @@ pub struct WalkArgs {
     #[command(flatten)]
     pub effects: EffectArgs,
     /// How secondary rays are answered: exact (all are traced), roma (those of ao and shadow by maps of what cells are occupied, with a
-    /// bias of a cell or so, and without a brick loaded for them; others are traced)
+    /// bias of a few cells, and without a brick loaded for them; others are traced)
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
     /// Occupancy maps.

@@ -17,8 +17,8 @@ pub struct RomaArgs {
     /// With --secondary roma: cells of a map on each axis: 32, 64, 128 or 256; of 128, 16 maps take 4 MiB for each of up to six sizes of cells
     #[arg(long, value_name = "CELLS", default_value = "128", value_parser = |s: &str| of(s, &[32, 64, 128, 256]))]
     pub roma_size: u32,
-    /// With --secondary roma: how often a cell of a map looks into the scene's cells along the ray: 1, 2 or 4 [default: as often as leaves
-    /// none out, which is 2]
+    /// With --secondary roma: how often a cell of a map looks into the scene's cells along the ray: 1, 2 or 4 [default: as often as keeps
+    /// it from passing over one, which is 2]
     #[arg(long, value_name = "N", value_parser = |s: &str| of(s, &[1, 2, 4]))]
     pub roma_samples: Option<u32>,
     /// With --secondary roma: which rays keep their direction rather than to take that of the nearest map: none, shadow, ao, all

@@ -138,7 +138,7 @@ fn check(gpu: &Gpu, bytes: u64) -> Result<(), ExecutorError> {
         return Ok(());
     }
     Err(ExecutorError::Device(format!(
-        "{:?} holds occupancy maps of at most {most} bytes, these have {bytes}; give a smaller --roma-size or --roma-k",
+        "{:?} holds occupancy maps of at most {most} bytes, these have {bytes}; give a smaller --roma-size, --roma-k or --roma-shadow-k",
         gpu.info.name
     )))
 }
