@@ -317,7 +317,8 @@ fn twins_agree_with_their_kernels() {
         (textured(false), &variants),
         (textured(true), &variants[2..9]),
     ] {
-        for (i, variant) in variants.iter().enumerate() {
+        let has_occupancy = !scene.resident().occupancy.is_empty();
+        for (i, variant) in variants.iter().enumerate().filter(|(_, v)| has_occupancy || v.roma.is_none()) {
             render(&device, &scene, variant, None, &findings);
             let found = findings.lock().unwrap();
             assert_eq!(found.differences, Vec::<String>::new(), "variant {i} of {}", scene.path().display());

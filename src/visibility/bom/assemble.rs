@@ -1,5 +1,6 @@
 //! The maps of a frame, brought together from those of bricks, anew or from those of the frame before.
 
+use super::boxes::{boxes, region};
 use super::maps::{Maps, Reads};
 use super::place::{Cells, Place};
 use super::plan::{Detail, Settings, maps};
@@ -321,7 +322,13 @@ impl Level {
                 Some(map) => Cells::of(map, place.level(self.map.cell_log2)),
                 None => Cells::resident(record),
             };
-            repeated += place.enter(&mut self.map, &job.region, &cells);
+            let instance = &resident.instances[leaf.instance as usize];
+            let object = &resident.objects[instance.object as usize];
+            // Cells of a wide, flat brick reach far beside it; the boxes of its root's children do not.
+            for of_child in boxes(object, &resident.bricks[leaf.brick as usize]) {
+                let within = region(&self.map, instance, of_child).and_then(|region| region.and(&job.region));
+                repeated += within.map_or(0, |within| place.enter(&mut self.map, &within, &cells));
+            }
         }
         repeated
     }

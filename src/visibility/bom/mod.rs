@@ -13,6 +13,7 @@
 mod assemble;
 #[cfg(test)]
 mod assemble_tests;
+mod boxes;
 #[cfg(test)]
 mod leak_tests;
 mod maps;
