@@ -1,5 +1,5 @@
-//! `bench chc` as a user runs it, on tiny scenes: its files agree with each other and with what was measured, and a run that was
-//! bounded is gone on with.
+//! `bench chc` and `bench roma` as a user runs them, on tiny scenes: their files agree with each other and with what was measured, and a
+//! run that was bounded is gone on with.
 
 mod common;
 
@@ -191,4 +191,40 @@ fn executors_render_the_same_frames() {
         ["pixels_compared", "other_ids", "depth_ulps", "radiance_rmse"].map(|field| number(&second[field]));
     assert_eq!((pixels, ids, ulps, rmse), (64.0 * 36.0, 0.0, 0.0, 0.0), "the same pictures");
     assert!(printed.ends_with(&std::fs::read_to_string(output.join("executors.md")).unwrap()), "{printed}");
+}
+
+#[test]
+fn occupancy_maps_are_measured_beside_exact_rays() {
+    let folder = folder();
+    let output = folder.path().join("out");
+    let run = |options: &str| {
+        let first = ["bench".as_ref(), "roma".as_ref(), "-o".as_ref(), output.as_os_str()];
+        let tiny = "--triangles 10K --size 32x18 --samples 4 --repeat 1 --adapter cpu";
+        let rest = tiny.split_whitespace().chain(options.split_whitespace()).map(std::ffi::OsStr::new);
+        succeed(first.into_iter().chain(rest))
+    };
+    let results = || -> Value {
+        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON")
+    };
+    run("--stages out-of-core --minutes 0");
+    assert_eq!(results()["measured"], 0);
+    run("--stages out-of-core");
+    let json = results();
+    // Exact rays and maps, with an empty cache and with a filled one.
+    assert_eq!(json["measured"], 4);
+    let own = table(&json, "out-of-core");
+    let empty = |way: &str, name: &str| number(&entry(own, &["city", "cache 15 %, empty", way], name));
+    assert_eq!(empty("roma 128 K=4", "bricks loaded"), 0.0, "maps need no bricks");
+    assert!(empty("exact (noise)", "bricks loaded") > 0.0, "exact rays do");
+    assert!(empty("roma 128 K=4", "FLIP") > empty("exact (noise)", "FLIP"), "maps are an approximation");
+    let key = "out-of-core/city/cache 15 %, empty/roma 128 K=4";
+    let row = json["rows"].as_array().unwrap().iter().find(|row| row["key"] == key).expect("the row").clone();
+    let nanoseconds = 1e6 * number(&row["values"]["ms_trace"]) / number(&row["values"]["rays"]);
+    assert_eq!(empty("roma 128 K=4", "ns a ray"), nanoseconds);
+    for file in ["roma.md", "report.html", "out-of-core.csv"] {
+        assert!(output.join(file).exists(), "{file}");
+    }
+    // What is measured is not measured again.
+    run("--stages out-of-core");
+    assert_eq!(results()["rows"], json["rows"]);
 }
