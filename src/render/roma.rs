@@ -6,7 +6,7 @@ use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
 use crate::visibility::bom::{Assembler, BomError, Cascades, Settings};
 use crate::visibility::roma::{Grid, MOST_LEVELS, RomaSettings};
-use bricks::SceneFile;
+use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -28,6 +28,18 @@ struct RomaView {
     camera: DVec3,
     sample: u32,
     seed: u32,
+}
+
+/// log2 of the side of cells, world units, than which those of three bricks in four are no larger. Finer base maps would repeat cells of
+/// bricks, and rays would start within those: a street was dark around its trees.
+fn usual_cell_log2(resident: &Resident) -> Option<i32> {
+    let side = |leaf: &Leaf| {
+        let scale = resident.instances[leaf.instance as usize].determinant().abs().cbrt();
+        Some(resident.occupancy.get(leaf.brick as usize)?.cell_log2 + scale.log2().ceil() as i32)
+    };
+    let mut sides: Vec<i32> = resident.leaves.iter().filter_map(side).collect();
+    let at = sides.len() * 3 / 4;
+    (at < sides.len()).then(|| *sides.select_nth_unstable(at).1)
 }
 
 impl Roma {
@@ -68,7 +80,8 @@ impl Roma {
             Some((cells, assembler)) if cells == grid.size => (cells, assembler),
             _ => {
                 self.is_assembled = false;
-                let settings = Settings { cells: grid.size, levels: MOST_LEVELS, ..Settings::default() };
+                let finest_log2 = usual_cell_log2(scene.resident());
+                let settings = Settings { cells: grid.size, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
                 (grid.size, Assembler::new(scene.clone(), settings).map_err(failed)?)
             }
         };
