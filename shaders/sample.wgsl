@@ -1,5 +1,5 @@
 // Looks up the textures of hits, one by one: each whose tiles are resident together; of the others all tiles are asked for, and the
-// hit waits.
+// hit waits. With PARAM_COARSER none waits: the next coarser level that is resident stands for what is missing.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/exact.wgsl"
@@ -33,6 +33,16 @@ fn turned_normal(g: GBuffer, texel: vec3<f32>, scale: f32) -> vec3<f32> {
     return select(g.normal, turned * inverseSqrt(max(length, 1.0e-30)), size > 1.0e-30 && length > 1.0e-12);
 }
 
+fn is_resident(level: Level) -> bool {
+    for (var k = 0u; k < 4u; k++) {
+        let tile = tile_at(level, k);
+        if tile != NONE && tile_slots[tile].page == NONE {
+            return false;
+        }
+    }
+    return true;
+}
+
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
@@ -45,6 +55,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let m = materials[g.material];
+    let takes_coarser = (params.flags & PARAM_COARSER) != 0u;
+    var is_coarser = false;
     for (var which = 0u; which < MATERIAL_TEXTURES; which++) {
         let bit = 1u << (GBUFFER_FIRST + which);
         if (g.state & bit) == 0u {
@@ -54,17 +66,22 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let second = ((m.uv_sets >> which) & 1u) != 0u;
         let u = materials[g.material].uv_from_set[2u * which];
         let uv = coordinates(g, u, materials[g.material].uv_from_set[2u * which + 1u], second);
-        let levels = levels_of(t, barrier(select(g.footprint, g.footprint1, second) * u.w));
+        var levels = levels_of(t, barrier(select(g.footprint, g.footprint1, second) * u.w));
         var around: array<Level, 2>;
         var is_missing = false;
         for (var n = 0u; n < levels.count; n++) {
             around[n] = level_at(t, levels.finer + n, uv);
-            for (var k = 0u; k < 4u; k++) {
-                let tile = tile_at(around[n], k);
-                if tile != NONE {
-                    is_missing |= tile_slots[tile].page == NONE;
-                }
+            is_missing |= !is_resident(around[n]);
+        }
+        if is_missing && takes_coarser {
+            // The tail ends this: it is resident throughout.
+            levels.count = 1u;
+            while !is_resident(around[0]) {
+                levels.finer += 1u;
+                around[0] = level_at(t, levels.finer, uv);
             }
+            is_missing = false;
+            is_coarser = true;
         }
         for (var i = 0u; i < 4u * levels.count; i++) {
             let tile = tile_at(around[i / 4u], i & 3u);
@@ -99,6 +116,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     if (g.state & GBUFFER_WAITS) == 0u {
         g = settled(g, m.flags);
+    }
+    if is_coarser {
+        atomicAdd(&counters[COUNTER_UNRESOLVED], 1u);
     }
     gbuffer[index] = g;
 }

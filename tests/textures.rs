@@ -125,6 +125,69 @@ fn pictures_do_not_depend_on_the_tiles_that_fit() {
 }
 
 #[test]
+fn a_bounded_frame_takes_coarser_levels_and_a_resting_camera_gets_the_exact_picture() {
+    let folder = folder();
+    let scene = convert(&floor(folder.path()), "f.bricks", "");
+    let path = folder.path().join("still.json");
+    let text = r#"{"fov_y_degrees": 50, "keyframes": [{"time": 0, "position": [3, 4, 3], "target": [20, 0, 20]}]}"#;
+    std::fs::write(&path, text).expect("a path");
+    let frames_of_walk = 8;
+    let view = format!(
+        "--adapter cpu --frames {frames_of_walk} --size 320x240 --aov --cache 100% --effects shadow,mirror --path {}",
+        path.display()
+    );
+    let run = |name: &str, options: &str| {
+        let output = folder.path().join(name);
+        walk(&scene, &output, &format!("{view} {options}"));
+        (frames(&output), records(&output), output)
+    };
+    let of_frame = |records: &[Value], frame: u32, field: &str| {
+        total(&records.iter().filter(|r| r["frame"] == frame).cloned().collect::<Vec<_>>(), field)
+    };
+    let (exact, records, output) = run("exact", "");
+    assert_eq!(total(&records, "unresolved_pixels"), 0);
+    let needed = of_frame(&records, 0, "bytes_textures");
+    assert!(needed > 15 * 16_384, "{needed}");
+    // A fifth of what is needed: a frame loads no more, and after five at most everything is there.
+    let bytes = needed / 5 + 16_384;
+    let (bounded, records, bounded_output) = run("bounded", &format!("--interactive {bytes} --measure-error"));
+    let unresolved: Vec<u64> = (0..frames_of_walk).map(|k| of_frame(&records, k, "unresolved_pixels")).collect();
+    let loaded: Vec<u64> = (0..frames_of_walk).map(|k| of_frame(&records, k, "bytes_textures")).collect();
+    assert!(loaded.iter().all(|&loaded| loaded <= bytes) && loaded[0] > 0, "{loaded:?}");
+    assert!(unresolved[0] > 1000 && unresolved[0] <= 2 * 320 * 240, "{unresolved:?}");
+    assert!(unresolved.windows(2).all(|two| two[1] < two[0] || two == [0, 0]), "{unresolved:?}");
+    assert_eq!(unresolved[5..], [0, 0, 0], "it ends");
+    assert_eq!(loaded.iter().sum::<u64>(), needed, "nothing is loaded twice");
+    let differs: Vec<bool> = exact.iter().zip(&bounded).map(|(a, b)| a != b).collect();
+    // Of every frame PNG and EXR.
+    assert_eq!(exact.len(), 2 * frames_of_walk as usize);
+    assert!(differs[..2].iter().all(|&differs| differs), "control: the first frame is another picture");
+    assert!(differs[10..].iter().all(|&differs| !differs), "the last are the exact ones");
+    // Coarse, not wrong: noise is blurred, and the mean stays.
+    let mean = |output: &Path| {
+        let picture = image::open(output.join("frames/0000.png")).expect("a PNG").to_rgb8();
+        picture.iter().map(|&c| f64::from(c)).sum::<f64>() / picture.len() as f64
+    };
+    assert!((mean(&output) - mean(&bounded_output)).abs() < 4.0, "{} {}", mean(&output), mean(&bounded_output));
+    assert!(records[0]["error_mean"].as_f64() > Some(1e-3), "the error of a bounded frame is measured");
+    // Less than a tile a frame still comes to an end.
+    let (_, records, _) = run("least", "--interactive 1");
+    let loaded: Vec<u64> = (0..frames_of_walk).map(|k| of_frame(&records, k, "bytes_textures")).collect();
+    assert_eq!(loaded, [16_384; 8]);
+    // Geometry is waited for: what is hit is what is hit exactly.
+    let ids = |output: &Path| {
+        brickwalk([
+            "compare".as_ref(),
+            output.join("frames/0000.exr").as_os_str(),
+            folder.path().join("exact/frames/0000.exr").as_os_str(),
+            "--json".as_ref(),
+        ])
+    };
+    let compared: Value = serde_json::from_slice(&ids(&bounded_output).stdout).expect("JSON");
+    assert_eq!(compared["ids_differing"], 0, "{compared}");
+}
+
+#[test]
 fn blocks_look_like_texels_and_damage_is_named() {
     let folder = folder();
     let input = floor(folder.path());

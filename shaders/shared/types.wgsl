@@ -65,6 +65,7 @@ const PARAM_CULLED: u32 = 512u;   // pairs of a tile and a leaf that no more ray
 const PARAM_EMISSION: u32 = 1024u; // shade: with the hits' emission
 const PARAM_MISS: u32 = 2048u;    // shade: with the background, where rays missed
 
+const PARAM_COARSER: u32 = 16384u; // coarser levels of textures stand for what is not resident
 const PARAM_GLOSSY: u32 = 8192u;   // what surfaces reflect otherwise than diffusely comes by rays of its own, too
 
 const BATCH_SAMPLES: u32 = 64u;   // samples that are summed before the radiance is emptied
@@ -367,5 +368,6 @@ const COUNTER_TIGHTENED: u32 = 17u;
 const COUNTER_TILES_FROM_ROOT: u32 = 18u;
 const COUNTER_TILES_CHOSEN: u32 = 19u;
 const COUNTER_ROMA_CAPPED: u32 = 20u;
+const COUNTER_UNRESOLVED: u32 = 21u;
 const WORK_CHOSEN: u32 = 24u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 28u;      // the same over tiles whose rays walk from the root

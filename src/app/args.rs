@@ -378,6 +378,11 @@ pub struct WalkArgs {
     /// Pictures.
     #[command(flatten)]
     pub pictures: PictureArgs,
+    /// Interactive: a frame loads at most SIZE of texture tiles, those first that most hits ask for, and one at least; the next coarser level
+    /// that is resident stands for the others. unresolved_pixels in the records counts such hits. While the camera rests, frames become
+    /// the exact ones, if the cache holds what they need. Bricks are waited for [default: off, tiles are waited for as well]
+    #[arg(long, value_name = "SIZE", value_parser = size_bytes)]
+    pub interactive: Option<u64>,
     /// Ask after every pass which bricks it needed (bricks_needed in the records); takes a traversal more a pass
     #[arg(long)]
     pub measure_needed: bool,

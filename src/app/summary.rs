@@ -68,6 +68,7 @@ pub fn of_walk(
             "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
             "host_cache_bytes": args.stream.host_cache,
             "prefetch": args.stream.prefetch,
+            "interactive_bytes": args.interactive,
             "secondary": args.secondary.name(),
             "roma": renderer.settings.roma.map(|roma| json!({
                 "k": roma.occlusion.k,

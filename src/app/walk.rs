@@ -192,6 +192,7 @@ fn reference(scene: Arc<SceneFile>, args: &WalkArgs, light: Light, extent: Exten
     args.stream.prefetch = 0;
     args.stream.requests_out = None;
     args.secondary = Secondary::Exact;
+    args.interactive = None;
     args.measure_needed = false;
     args.aov = false;
     let session = Session::open(scene, &args.scene, &args.stream, extent)?;
@@ -224,6 +225,7 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         aov: args.aov,
         guides: args.pictures.denoise || args.pictures.taa,
         taa: args.pictures.taa,
+        tile_bytes: args.interactive,
         roma: (args.secondary == Secondary::Roma).then(|| args.roma.settings()),
     }
 }

@@ -249,7 +249,7 @@ impl Executor for CpuExecutor {
             true => self.cache.attributes(resident, bricks)?,
             false => Vec::new(),
         };
-        let samples = steps.contains(&Step::Sample) && self.samples;
+        let samples = steps.iter().any(|step| step.is_sampling()) && self.samples;
         let tiles = if samples { self.cache.tiles(bricks)? } else { Vec::new() };
         let tile_demand: Vec<TileDemand> = tiles.iter().map(|_| TileDemand::default()).collect();
         let sampling = Sampling { texels: &self.texels, tiles: &tiles };
@@ -258,7 +258,7 @@ impl Executor for CpuExecutor {
         let counters = Counters::default();
         let mut ms_phases = [0.0; 3];
         let everything = bricks.all_geometry_resident();
-        for &step in steps.iter().filter(|step| samples || **step != Step::Sample) {
+        for &step in steps.iter().filter(|step| samples || !step.is_sampling()) {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };

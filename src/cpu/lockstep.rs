@@ -130,6 +130,7 @@ impl Findings {
                 counted(r.nodes),
                 counted(r.triangles),
                 r.non_finite,
+                r.unresolved,
                 r.queries_tightened,
                 r.rays_capped,
             ]
@@ -255,7 +256,15 @@ impl Lockstep {
             findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
         }
         let shades = |step: &Step| {
-            matches!(step, Step::Resolve | Step::Sample | Step::Shade(_) | Step::AddLight | Step::AddOcclusion)
+            matches!(
+                step,
+                Step::Resolve
+                    | Step::Sample
+                    | Step::SampleCoarser
+                    | Step::Shade(_)
+                    | Step::AddLight
+                    | Step::AddOcclusion
+            )
         };
         if steps.iter().any(shades) {
             let radiance = (self.gpu.read_radiance()?, self.cpu.read_radiance()?);
@@ -326,7 +335,7 @@ impl Executor for Lockstep {
             }
             all => all,
         };
-        let Some((before, [Step::Sample])) = rest.split_last_chunk::<1>() else {
+        let Some((before, &[last @ (Step::Sample | Step::SampleCoarser)])) = rest.split_last_chunk::<1>() else {
             return self.both(&context, pass, rest, bricks);
         };
         let mut report = match before {
@@ -334,8 +343,8 @@ impl Executor for Lockstep {
             before => self.both(&context, pass, before, bricks)?,
         };
         self.align(&context, pass)?;
-        let Report { round_trips, tiles, .. } = self.both(&context, pass, &[Step::Sample], bricks)?;
-        report.tiles = tiles;
+        let Report { round_trips, tiles, unresolved, .. } = self.both(&context, pass, &[last], bricks)?;
+        (report.tiles, report.unresolved) = (tiles, unresolved);
         report.round_trips = report.round_trips.max(round_trips);
         Ok(report)
     }

@@ -159,6 +159,8 @@ struct Variant {
     with: &'static [Optimisation],
     /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped.
     roma: Option<u32>,
+    /// Bytes of tiles that a frame may load.
+    tile_bytes: Option<u64>,
 }
 
 const VARIANT: Variant = Variant {
@@ -170,6 +172,7 @@ const VARIANT: Variant = Variant {
     without: &[],
     with: &[],
     roma: None,
+    tile_bytes: None,
 };
 
 fn effects() -> Effects {
@@ -259,6 +262,7 @@ fn render(
         executor: Box::new(executor),
         cache: Cache::new(residency, SceneBytes::from(&sizes), None),
         settings: RenderSettings {
+            tile_bytes: variant.tile_bytes,
             schedule: variant.schedule,
             effects: effects(),
             samples: 1,
@@ -300,6 +304,8 @@ fn twins_agree_with_their_kernels() {
         Variant { list_most: 3, ..VARIANT },
         Variant { list_most: 3, threshold: 4, ..VARIANT },
         Variant { list_most: 0, threshold: 2, ..VARIANT },
+        // Coarser levels stand for most tiles.
+        Variant { tile_bytes: Some(0), ..VARIANT },
         Variant { schedule: Schedule::Demand, ..VARIANT },
         Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
@@ -315,7 +321,7 @@ fn twins_agree_with_their_kernels() {
     for (scene, variants) in [
         (Arc::new(probe::scene().unwrap()), &variants[..]),
         (textured(false), &variants),
-        (textured(true), &variants[2..9]),
+        (textured(true), &variants[2..10]),
     ] {
         let has_occupancy = !scene.resident().occupancy.is_empty();
         for (i, variant) in variants.iter().enumerate().filter(|(_, v)| has_occupancy || v.roma.is_none()) {

@@ -1,10 +1,12 @@
 //! Looks up the textures of hits, one by one: each whose tiles are resident together; of the others all tiles are asked for, and the hit
-//! waits. Twin of `shaders/sample.wgsl`.
+//! waits. With `PARAM_COARSER` none waits: the next coarser level that is resident stands for what is missing. Twin of `shaders/sample.wgsl`.
 
-use super::scene::Bound;
+use super::scene::{Bound, Tally};
 use super::texture::{Level, color_at, level_at, levels_of, tile_at};
 use super::vector::{Vec3, cross, dot, each, mix, most};
-use crate::kernel::layout::{self, GBUFFER_FIRST, GBUFFER_WAITS, GBuffer, MATERIAL_UNLIT, NONE};
+use crate::kernel::layout::{
+    self, COUNTER_UNRESOLVED, GBUFFER_FIRST, GBUFFER_WAITS, GBuffer, MATERIAL_UNLIT, NONE, PARAM_COARSER,
+};
 use crate::kernel::textures::{UNASKED, record};
 use crate::schedule::ExecutorError;
 use bricks::{BASE_COLOR, METALLIC_ROUGHNESS, Material, NORMAL, OCCLUSION, Payload, SceneFile};
@@ -81,10 +83,14 @@ impl TileDemand {
 /// Of all hits of the shaded set that wait for it.
 pub fn sample(bound: &Bound, gbuffer: &mut [GBuffer], from: Sampling, demand: &[TileDemand]) {
     let width = bound.params.width as usize;
+    let takes_coarser = bound.has(PARAM_COARSER);
     gbuffer.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, gbuffer)| {
+        let mut tally = Tally::default();
         for (x, g) in gbuffer.iter_mut().enumerate().filter(|(_, g)| g.state & GBUFFER_WAITS != 0) {
-            look_up(g, (row * width + x) as u32, from, demand);
+            let is_coarser = look_up(g, (row * width + x) as u32, from, demand, takes_coarser);
+            tally.add(COUNTER_UNRESOLVED, is_coarser.into());
         }
+        bound.counters.add(&tally);
     });
 }
 
@@ -116,9 +122,15 @@ fn turned_normal(g: &GBuffer, texel: Vec3, scale: f32) -> Vec3 {
     g.normal
 }
 
-/// Of one hit, that of ray `index`.
-pub(super) fn look_up(g: &mut GBuffer, index: u32, from: Sampling, demand: &[TileDemand]) {
+fn tiles_of(level: &Level) -> impl Iterator<Item = u32> {
+    (0..4).map(|k| tile_at(level, k)).filter(|&tile| tile != NONE)
+}
+
+/// Of one hit, that of ray `index`; whether a coarser level stands for one that is missing.
+pub(super) fn look_up(g: &mut GBuffer, index: u32, from: Sampling, demand: &[TileDemand], takes_coarser: bool) -> bool {
     let m = &from.texels.materials[g.material as usize];
+    let mut is_coarser = false;
+    let is_resident = |level: &Level| tiles_of(level).all(|tile| !from.tiles[tile as usize].is_empty());
     for (which, texture) in m.textures().into_iter().enumerate() {
         let bit = 1 << (GBUFFER_FIRST + which as u32);
         if g.state & bit == 0 {
@@ -129,13 +141,21 @@ pub(super) fn look_up(g: &mut GBuffer, index: u32, from: Sampling, demand: &[Til
         let (set, footprint) = if is_second { (g.uv1, g.footprint1) } else { (g.uv, g.footprint) };
         let [u, v] = [m.uv_from_set[2 * which], m.uv_from_set[2 * which + 1]];
         let uv = [u, v].map(|row| row[0] * set[0] + row[1] * set[1] + row[2]);
-        let levels = levels_of(t, footprint * u[3]);
-        let around =
+        let mut levels = levels_of(t, footprint * u[3]);
+        let mut around =
             [0, 1].map(|n| if n < levels.count { level_at(t, levels.finer + n, uv) } else { Level::default() });
+        let mut is_missing = !around[..levels.count as usize].iter().all(is_resident);
+        if is_missing && takes_coarser {
+            levels.count = 1;
+            // The tail ends this: it is resident throughout.
+            while !is_resident(&around[0]) {
+                levels.finer += 1;
+                around[0] = level_at(t, levels.finer, uv);
+            }
+            (is_missing, is_coarser) = (false, true);
+        }
         let around = &around[..levels.count as usize];
-        let tiles = || around.iter().flat_map(|level| (0..4).map(|k| tile_at(level, k))).filter(|&tile| tile != NONE);
-        let is_missing = tiles().any(|tile| from.tiles[tile as usize].is_empty());
-        for tile in tiles() {
+        for tile in around.iter().flat_map(tiles_of) {
             let asked = &demand[tile as usize];
             if is_missing {
                 asked.rays.fetch_add(1, Ordering::Relaxed);
@@ -167,4 +187,5 @@ pub(super) fn look_up(g: &mut GBuffer, index: u32, from: Sampling, demand: &[Til
     if g.state & GBUFFER_WAITS == 0 {
         settle(g, m.flags);
     }
+    is_coarser
 }

@@ -289,7 +289,7 @@ fn a_hit_waits_for_all_of_its_tiles() {
     let all: Vec<&[u32]> = whole.iter().map(|words| &words[..]).collect();
     let asked = |g: &mut GBuffer, tiles: &[&[u32]]| -> Vec<(usize, u32, u32, u32)> {
         let demand: Vec<TileDemand> = tiles.iter().map(|_| TileDemand::default()).collect();
-        look_up(g, 77, Sampling { texels: &texels, tiles }, &demand);
+        look_up(g, 77, Sampling { texels: &texels, tiles }, &demand, false);
         let demand = demand.iter().map(TileDemand::get).enumerate();
         demand.filter(|(_, d)| d.rays + d.used > 0).map(|(i, d)| (i, d.rays, d.first, d.used)).collect()
     };
@@ -308,6 +308,44 @@ fn a_hit_waits_for_all_of_its_tiles() {
     }
     assert_eq!(asked(&mut g, &held), used);
     assert_eq!(g, with_all, "what else is resident does not show");
+}
+
+#[test]
+fn the_next_resident_level_stands_for_missing_tiles() {
+    let scene = scene(TextureEncoding::Raw, vec![noise([512, 512], 0, false)]);
+    let texels = Texels::new(&scene).unwrap();
+    let whole = tiles(&scene);
+    let uv = [0.5; 2];
+    let footprint = 2.0 / (512.0 * 512.0);
+    let waiting =
+        GBuffer { albedo: [1.0; 3], state: GBUFFER_READ | 1 << GBUFFER_FIRST, uv, footprint, ..GBuffer::default() };
+    let held: Vec<&[u32]> = vec![&[]; whole.len()];
+    let t = &texels.textures[0];
+    assert_eq!((t.levels, t.tail_level, whole.len()), (10, 2, 20));
+    let look = |held: &[&[u32]]| {
+        let from = Sampling { texels: &texels, tiles: held };
+        let demand: Vec<TileDemand> = held.iter().map(|_| TileDemand::default()).collect();
+        let mut g = waiting;
+        let is_coarser = look_up(&mut g, 77, from, &demand, true);
+        assert!(g.state == GBUFFER_READ && demand.iter().all(|d| d.get().rays == 0), "no hit waits");
+        let used = demand.iter().filter(|d| d.get().used > 0).count();
+        (is_coarser, used, g.albedo)
+    };
+    let all: Vec<&[u32]> = whole.iter().map(|words| &words[..]).collect();
+    let of_level = |level| {
+        let [r, g, b, _] = color_at(t, &level_at(t, level, uv), Sampling { texels: &texels, tiles: &all });
+        [r, g, b]
+    };
+    // Nothing but the tail, then level 1, then level 0 alone, which is finer than the lookup asks for, then all.
+    let steps: [(std::ops::Range<usize>, u32, usize); 3] = [(0..0, 2, 0), (16..20, 1, 4), (0..16, 0, 4)];
+    for (tiles, level, read) in steps {
+        let mut held = held.clone();
+        tiles.for_each(|tile| held[tile] = &whole[tile]);
+        assert_eq!(look(&held), (true, read, of_level(level)), "level {level}");
+    }
+    let (is_coarser, used, albedo) = look(&all);
+    assert!(!is_coarser && used == 8);
+    assert!((0..3).all(|level| albedo != of_level(level)), "control: it lies between two levels");
 }
 
 #[test]

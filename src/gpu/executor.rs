@@ -234,7 +234,7 @@ impl GpuExecutor {
         self.gpu.queue.write_buffer(&self.buffers.scene.slots, 0, bytemuck::cast_slice(&report::slots(bricks)));
         let params = self.params();
         let everything = bricks.all_geometry_resident();
-        let samples = steps.contains(&Step::Sample) && self.groups.sampling.is_some();
+        let samples = steps.iter().any(|step| step.is_sampling()) && self.groups.sampling.is_some();
         if samples {
             let Texels { tile_slots, tile_demand, tiles, .. } = &self.buffers.texels;
             self.gpu.queue.write_buffer(tile_slots, 0, bytemuck::cast_slice(&textures::slots(bricks)));
@@ -242,7 +242,7 @@ impl GpuExecutor {
             self.gpu.queue.write_buffer(tile_demand, 0, bytemuck::cast_slice(&unasked));
         }
         let mut list: Vec<Dispatch> = Vec::new();
-        for &step in steps.iter().filter(|step| samples || **step != Step::Sample) {
+        for &step in steps.iter().filter(|step| samples || !step.is_sampling()) {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };

@@ -276,7 +276,11 @@ pub fn dispatches(
         Step::ClearAttributes => vec![shading("clear_gbuffer", params, false)],
         Step::QueryHits => vec![kernel("hit_demand", params, per_ray, None)],
         Step::Resolve => vec![shading("resolve", params, true)],
-        Step::Sample => vec![Dispatch { third: Third::Sampling, ..shading("sample", params, true) }],
+        Step::Sample | Step::SampleCoarser => {
+            let coarser = if step == Step::SampleCoarser { layout::PARAM_COARSER } else { 0 };
+            let params = Params { flags: params.flags | coarser, ..params };
+            vec![Dispatch { third: Third::Sampling, ..shading("sample", params, true) }]
+        }
         Step::Shade(light) => {
             let sun = if light.sun { layout::PARAM_SUN } else { 0 };
             let sky = if light.sky { layout::PARAM_SKY } else { 0 };

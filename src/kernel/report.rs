@@ -73,6 +73,7 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
         nodes: count(layout::COUNTER_NODES),
         triangles: count(layout::COUNTER_TRIANGLES),
         non_finite: count(layout::COUNTER_NON_FINITE),
+        unresolved: count(layout::COUNTER_UNRESOLVED),
         ms_phases: [0.0; 3],
         pair_rays: Vec::new(),
         queries_tightened: count(layout::COUNTER_TIGHTENED),

@@ -52,6 +52,9 @@ pub struct RenderSettings {
     pub guides: bool,
     /// Samples lie at other points of their pixels in every frame.
     pub taa: bool,
+    /// Interactive: bytes of tiles of textures that a frame may load. Coarser levels stand for the others, and the frame is exact only where
+    /// `unresolved_pixels` says 0.
+    pub tile_bytes: Option<u64>,
     /// Occlusion rays and those to the sun and emitters are answered by occupancy maps; none of them asks for bricks.
     pub roma: Option<RomaSettings>,
 }
@@ -131,7 +134,8 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Renders one frame. Without ROMA it is exact; with it, too, pixels depend on scene, camera, lights and settings alone.
+    /// Renders one frame. Without ROMA it is exact; with it, too, pixels depend on scene, camera, lights and settings alone, unless
+    /// [`RenderSettings::tile_bytes`] bounds what is loaded.
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.
@@ -154,6 +158,7 @@ impl Renderer {
         if let Some(captures) = &mut self.captures {
             captures.clear();
         }
+        self.cache.begin_frame(self.settings.tile_bytes);
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
         let effects = self.settings.effects;

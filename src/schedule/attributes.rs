@@ -1,10 +1,12 @@
 //! Attributes and textures of what was hit. Attributes are asked for once a pass and loaded in batches as large as the cache
 //! allows. Then lookups name the tiles that they need: each of a hit's textures is looked up once all of its tiles are resident together, so
-//! that what it gives does not depend on what else is, and the hit waits for the last.
+//! that what it gives does not depend on what else is, and the hit waits for the last. Where a frame may load so many bytes of tiles only,
+//! coarser levels stand for the tiles that it does not load.
 
 use super::cache::Cache;
-use super::{Executor, ExecutorError, Lamp, Pass, PassStats, Report, Step};
+use super::{Executor, ExecutorError, Lamp, Pass, PassStats, Report, Step, TileDemand};
 use crate::stream::Item;
+use std::cmp::Reverse;
 
 /// Reads the attributes of all hits of `pass`, a pass of set 0 or 1, and looks their textures up.
 ///
@@ -37,7 +39,10 @@ pub fn resolve(
         rest = &rest[count..];
         report = executor.run(next, last(rest), &cache.states)?;
     }
-    sample(executor, cache, next, report, stats)?;
+    match cache.tile_allowance {
+        None => sample(executor, cache, next, report, stats)?,
+        Some(allowance) => sample_within(allowance, executor, cache, next, report, stats)?,
+    }
     stats.bricks_hit.get_or_insert_default().extend(hit);
     Ok(())
 }
@@ -55,11 +60,7 @@ fn sample(
 ) -> Result<(), ExecutorError> {
     let mut before = None;
     loop {
-        let tiles = std::mem::take(&mut report.tiles);
-        stats.add(report);
-        for tile in tiles.iter().filter(|tile| tile.is_used) {
-            cache.touch(Item::tile(tile.tile));
-        }
+        let tiles = note(report, cache, stats);
         let mut wanted: Vec<_> =
             tiles.iter().filter(|tile| tile.rays > 0).map(|tile| (tile.first, tile.tile)).collect();
         wanted.sort_unstable();
@@ -74,4 +75,55 @@ fn sample(
         cache.load(executor, &items, usize::MAX, stats)?;
         report = executor.run(next, &[Step::Sample], &cache.states)?;
     }
+}
+
+/// Loads the tiles that most hits wait for, as many as `allowance` bytes are, and has coarser levels stand for the others. What was not
+/// used of it is left to the passes that follow. `report`: of the first [`Step::Sample`].
+fn sample_within(
+    allowance: u64,
+    executor: &mut dyn Executor,
+    cache: &mut Cache,
+    next: Pass,
+    mut report: Report,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
+    let mut left = allowance;
+    loop {
+        let mut tiles = note(report, cache, stats);
+        tiles.retain(|tile| tile.rays > 0);
+        if tiles.is_empty() {
+            break;
+        }
+        tiles.sort_unstable_by_key(|tile| (Reverse(tile.rays), tile.tile));
+        let mut bytes = 0;
+        // What is resident costs nothing, and is to stay.
+        let items: Vec<Item> = (tiles.iter().map(|tile| Item::tile(tile.tile)))
+            .take_while(|&item| {
+                bytes += if cache.residency.slot(item).is_some() { 0 } else { cache.residency.bytes(item) };
+                bytes <= left
+            })
+            .collect();
+        let before = stats.bytes_textures;
+        cache.load(executor, &items, usize::MAX, stats)?;
+        let loaded = stats.bytes_textures - before;
+        left -= loaded;
+        if loaded == 0 {
+            let report = executor.run(next, &[Step::SampleCoarser], &cache.states)?;
+            note(report, cache, stats);
+            break;
+        }
+        report = executor.run(next, &[Step::Sample], &cache.states)?;
+    }
+    cache.tile_allowance = Some(left);
+    Ok(())
+}
+
+/// Notes the use of tiles that were read; what lookups ask of tiles.
+fn note(mut report: Report, cache: &mut Cache, stats: &mut PassStats) -> Vec<TileDemand> {
+    let tiles = std::mem::take(&mut report.tiles);
+    stats.add(report);
+    for tile in tiles.iter().filter(|tile| tile.is_used) {
+        cache.touch(Item::tile(tile.tile));
+    }
+    tiles
 }

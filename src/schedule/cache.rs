@@ -56,6 +56,8 @@ pub struct Cache {
     pub bytes: SceneBytes,
     /// Requests in order, when they are recorded.
     pub trace: Option<Trace>,
+    /// Bytes of tiles that may still be loaded in this frame; `None` where every tile is waited for.
+    pub tile_allowance: Option<u64>,
     /// The frame, from 1, and per item the frame that loaded it last.
     frame: u32,
     loaded_in: Vec<u32>,
@@ -66,7 +68,7 @@ impl Cache {
     pub fn new(residency: Residency, bytes: SceneBytes, trace: Option<Trace>) -> Self {
         let states = BrickStates::new(bytes.bricks.len(), bytes.tiles.len());
         let loaded_in = vec![0; bytes.sizes().rows()];
-        Self { residency, states, bytes, trace, frame: 0, loaded_in }
+        Self { residency, states, bytes, trace, tile_allowance: None, frame: 0, loaded_in }
     }
 
     /// Starts a pass: nothing is done, nothing is pinned.
@@ -78,6 +80,12 @@ impl Cache {
         if let Some(trace) = &mut self.trace {
             trace.begin_pass(frame, name);
         }
+    }
+
+    /// Starts a frame that may load `tile_bytes` of tiles, one of them at least; with `None` it waits for every tile.
+    pub fn begin_frame(&mut self, tile_bytes: Option<u64>) {
+        let largest = || self.bytes.tiles.iter().copied().max().unwrap_or(0);
+        self.tile_allowance = tile_bytes.map(|bytes| bytes.max(largest()));
     }
 
     /// Which bricks' geometry is resident.

@@ -128,6 +128,8 @@ pub enum Step {
     /// Look up the textures of the hits of the set before whose tiles are resident; the report says which tiles the others ask for.
     /// In scenes without textures nothing is done.
     Sample,
+    /// The same, and the next coarser level that is resident stands for what is missing: no hit waits, those concerned are counted.
+    SampleCoarser,
     /// Add what the hits of the set before show by themselves, and the background where they missed.
     Shade(Shading),
     /// Add the light of the pass's lamp where its shadow ray went free.
@@ -155,6 +157,11 @@ pub struct Query {
 }
 
 impl Step {
+    /// Whether textures are looked up in it.
+    pub fn is_sampling(self) -> bool {
+        matches!(self, Step::Sample | Step::SampleCoarser)
+    }
+
     /// Whether rays meet bricks in it.
     pub fn is_intersection(self) -> bool {
         matches!(
@@ -286,6 +293,8 @@ pub struct Report {
     pub triangles: u64,
     /// Pixels whose radiance was not finite.
     pub non_finite: u64,
+    /// Hits with a texture of which [`Step::SampleCoarser`] took a coarser level than they ask for.
+    pub unresolved: u64,
     /// Rays that see each node, after [`Step::QueryPairs`].
     pub pair_rays: Vec<u32>,
     /// Nodes that no ray sees although one enters the node's own box.
@@ -427,6 +436,7 @@ impl PassStats {
         sum.nodes += r.nodes;
         sum.triangles += r.triangles;
         sum.non_finite += r.non_finite;
+        sum.unresolved += r.unresolved;
         for (total, ms) in sum.ms_phases.iter_mut().zip(r.ms_phases) {
             *total += ms;
         }

@@ -125,7 +125,7 @@ pub struct Record {
     /// Pixels of which a ray of the effect hit something else than in the exact rendering: another triangle, for shadows and
     /// occlusion something rather than nothing or the other way round.
     pub error_pixels: u64,
-    /// Pixels that are not final.
+    /// Pixels, of every sample and direction, whose textures were looked up in coarser levels than they ask for (`--interactive`).
     pub unresolved_pixels: u64,
     /// Pixels whose radiance was not finite.
     pub non_finite: u64,
@@ -184,6 +184,7 @@ impl Record {
             bytes_textures: stats.bytes_textures,
             nodes_visited: r.nodes,
             triangles_tested: r.triangles,
+            unresolved_pixels: r.unresolved,
             non_finite: r.non_finite,
             ..Self::default()
         }
