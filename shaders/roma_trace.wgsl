@@ -1,15 +1,14 @@
 // Answers the pass's rays by ray-aligned occupancy maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the
-// next where the ray leaves one. Rays start off their surface by the level's lift, so that no level meets what they leave. What is
-// met is written as a hit of no triangle.
+// next where the ray leaves one. Rays are off their surface by the level's lift where they enter it, so that no level meets what they
+// leave. With params.roma_near those alone go on that have met nothing before. What is met is written as a hit of no triangle.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/random.wgsl"
 #include "shared/roma.wgsl"
+#include "shared/roma_start.wgsl"
 
-// A level ends before its sides, ray by ray, by up to this share of them, so that no edge between levels shows.
-const BLEND: f32 = 1.0 / 16.0;
 // Columns that a ray passes at most which would be snapped to below its surface and is not.
 const GRAZING_STEPS: u32 = 64u;
 // Slower than this, in cells a unit of t, a ray stays where it is.
@@ -104,22 +103,17 @@ fn trace(index: u32, ray: Ray) -> bool {
         }
     }
     let side = f32(params.roma_cells);
-    let margin = barrier(BLEND * barrier(side * random2(index, ~params.stream, params.seed).x));
-    var start_level = params.roma_levels - 1u;
-    for (var l = 0u; l < params.roma_levels; l++) {
-        let level = roma_levels[l];
-        let start = barrier3(ray.origin + barrier3(level.lift * normal));
-        let at = barrier3(barrier3(start * level.scale) + level.first);
-        if all(at >= vec3<f32>(margin)) && all(at <= vec3<f32>(side - margin)) {
-            start_level = l;
-            break;
-        }
-    }
+    let margin = margin_of(index);
+    let start_level = start_level_of(ray.origin, normal, margin);
+    let rise = barrier(barrier(barrier(direction.x * normal.x) + barrier(direction.y * normal.y)) + barrier(direction.z * normal.z));
     var t = ray.t_min;
+    if params.roma_near > 0u {
+        t = max(t, hits[index].t);
+    }
     var is_capped = false;
     for (var l = start_level; l < params.roma_levels; l++) {
         let level = roma_levels[l];
-        let start = barrier3(ray.origin + barrier3(level.lift * normal));
+        let start = lifted(level, ray.origin, normal, barrier(t * rise));
         let at = barrier3(barrier3(start * level.scale) + level.first);
         let speed = barrier3(direction * level.scale);
         let low = select(margin, 0.0, l + 1u == params.roma_levels);
@@ -156,7 +150,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
     if global.x < params.width && global.y < params.height {
         let index = global.y * params.width + global.x;
         let ray = rays[index];
-        if ray.t_min <= ray.t_max {
+        // What has met something is not asked again, nor what was traced to its end.
+        let is_open = params.roma_near == 0u || (hits[index].id == NONE && hits[index].t < ray.t_max);
+        if ray.t_min <= ray.t_max && is_open {
             atomicAdd(&counted, select(1u, 65537u, trace(index, ray)));
         }
     }

@@ -2,7 +2,7 @@
 
 use super::args::ranged;
 use super::named::named_values;
-use crate::visibility::roma::{Grid, MOST_STEPS, RomaSettings};
+use crate::visibility::roma::{Grid, MOST_NEAR, MOST_STEPS, RomaSettings};
 use clap::Args;
 
 /// Options of ray-aligned occupancy maps.
@@ -28,6 +28,13 @@ pub struct RomaArgs {
     /// rays_capped counts such rays
     #[arg(long, value_name = "N", default_value = "8", value_parser = |s: &str| ranged(s, 1, MOST_STEPS.into()))]
     pub roma_steps: u32,
+    /// With --secondary roma: rays of ao are traced exactly up to so many cells (of the map that holds their start) from their start, 0 to
+    /// 256, and answered by maps from there on
+    #[arg(long, value_name = "CELLS", default_value = "0", value_parser = |s: &str| ranged(s, 0, MOST_NEAR.into()))]
+    pub roma_near: u32,
+    /// With --secondary roma: the same of rays of shadow
+    #[arg(long, value_name = "CELLS", default_value = "0", value_parser = |s: &str| ranged(s, 0, MOST_NEAR.into()))]
+    pub roma_shadow_near: u32,
 }
 
 named_values! {
@@ -52,8 +59,10 @@ impl RomaArgs {
         RomaSettings {
             occlusion: grid(self.roma_k),
             occlusion_steps: steps(matches!(self.roma_unsnapped, Unsnapped::Ao | Unsnapped::All)),
+            occlusion_near: self.roma_near,
             shadow: grid(self.roma_shadow_k),
             shadow_steps: steps(matches!(self.roma_unsnapped, Unsnapped::Shadow | Unsnapped::All)),
+            shadow_near: self.roma_shadow_near,
         }
     }
 }

@@ -77,6 +77,8 @@ pub fn of_walk(
                 "samples": roma.occlusion.samples(roma.occlusion.size),
                 "steps": roma.occlusion_steps,
                 "shadow_steps": roma.shadow_steps,
+                "near": roma.occlusion_near,
+                "shadow_near": roma.shadow_near,
                 "finest_cell": renderer.roma.finest_cell(),
             })),
             "spp": args.spp,

@@ -15,7 +15,7 @@ use super::query_all::{count_pairs, query_all};
 use super::query_pairs::query_pairs;
 use super::rays::{RaySet, Work};
 use super::resolve::{AttributeView, resolve};
-use super::roma::{RomaTables, roma_rotate, roma_trace};
+use super::roma::{RomaTables, roma_near, roma_rotate, roma_trace};
 use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
 use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
@@ -23,7 +23,7 @@ use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE, are_pairs_culled, dispatches,
+    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, are_pairs_culled, dispatches,
 };
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
@@ -206,6 +206,7 @@ fn run_kernel(
         "intersect_selected" => intersect_all::<true>(bound, own, Work::All, &tiles.pair_counts),
         "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
         ROMA_ROTATE => roma_rotate(bound, roma),
+        ROMA_NEAR => roma_near(bound, roma, own, seen),
         ROMA_TRACE => roma_trace(bound, roma, own, seen),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),

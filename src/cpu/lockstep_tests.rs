@@ -7,7 +7,7 @@ use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
-use crate::kernel::dispatch::{INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::dispatch::{INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::{Extent, FrameExecutor, Keep, Setup};
 use crate::render::{
@@ -157,8 +157,8 @@ struct Variant {
     list_most: u32,
     without: &'static [Optimisation],
     with: &'static [Optimisation],
-    /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped.
-    roma: Option<u32>,
+    /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped. Cells of these up to which they are traced exactly.
+    roma: Option<(u32, u32)>,
     /// Bytes of tiles that a frame may load.
     tile_bytes: Option<u64>,
 }
@@ -207,9 +207,16 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 }
 
 /// Small maps, of both numbers of directions.
-fn roma(steps: u32) -> RomaSettings {
+fn roma((steps, near): (u32, u32)) -> RomaSettings {
     let grid = |k, size| Grid { k, size, samples: 0 };
-    RomaSettings { occlusion: grid(4, 32), occlusion_steps: steps, shadow: grid(8, 32), shadow_steps: steps }
+    RomaSettings {
+        occlusion: grid(4, 32),
+        occlusion_steps: steps,
+        occlusion_near: near,
+        shadow: grid(8, 32),
+        shadow_steps: steps,
+        shadow_near: 2 * near,
+    }
 }
 
 /// Renders two frames in lockstep.
@@ -311,8 +318,10 @@ fn twins_agree_with_their_kernels() {
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
         Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
-        Variant { roma: Some(0), ..VARIANT },
-        Variant { roma: Some(3), ..VARIANT },
+        Variant { roma: Some((0, 0)), ..VARIANT },
+        Variant { roma: Some((3, 0)), ..VARIANT },
+        Variant { roma: Some((0, 2)), ..VARIANT },
+        Variant { roma: Some((3, 1)), schedule: Schedule::Demand, ..VARIANT },
         Variant { fronts: true, ..VARIANT },
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
@@ -332,7 +341,7 @@ fn twins_agree_with_their_kernels() {
     }
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
-    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE]);
+    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE]);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
     assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
@@ -354,7 +363,7 @@ fn a_twin_that_differs_is_noticed() {
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
-        let roma = (defect == Defect::Maps).then_some(0);
+        let roma = (defect == Defect::Maps).then_some((0, 0));
         let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();

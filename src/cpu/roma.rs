@@ -4,7 +4,7 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
-    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, Params, ROMA_HIT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, NONE, Params, ROMA_HIT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -143,6 +143,32 @@ fn border(at: f32, speed: f32, cell: i32) -> f32 {
     (side - at) * divide(1.0, speed)
 }
 
+/// Cells before its sides at which a level ends for ray `index`.
+fn margin_of(p: &Params, index: u32) -> f32 {
+    BLEND * (p.roma_cells as f32 * random2(index, !p.stream, p.seed)[0])
+}
+
+/// A ray's start, off its surface by the level's lift, of which it may be `height` off already.
+fn lifted(level: &RomaLevel, origin: Vec3, normal: Vec3, height: f32) -> Vec3 {
+    let lift = least(most(level.lift - height, 0.0), level.lift);
+    each(|k| origin[k] + lift * normal[k])
+}
+
+/// The finest level that holds the start.
+fn start_level_of(p: &Params, levels: &[RomaLevel], origin: Vec3, normal: Vec3, margin: f32) -> usize {
+    let side = p.roma_cells as f32;
+    let holds = |level: &RomaLevel| {
+        let start = lifted(level, origin, normal, 0.0);
+        let at = each(|k| start[k] * level.scale + level.first[k]);
+        at.iter().all(|&x| x >= margin && x <= side - margin)
+    };
+    levels.iter().position(holds).unwrap_or(levels.len() - 1)
+}
+
+fn normal_of(seen: &RaySet, index: usize) -> Vec3 {
+    seen.surfaces.get(index).map_or([0.0; 3], |surface: &Surface| surface.normal)
+}
+
 /// What rays are traced against.
 struct Maps<'a> {
     params: &'a Params,
@@ -197,8 +223,8 @@ impl Maps<'_> {
         Found { t: hit, is_capped: steps > 0 }
     }
 
-    /// Where a ray meets something, below 0 nowhere; whether it was capped in some level.
-    fn trace(&self, index: u32, ray: &Ray, normal: Vec3) -> Found {
+    /// Where a ray meets something at or beyond t = `from`, below 0 nowhere; whether it was capped in some level.
+    fn trace(&self, index: u32, ray: &Ray, normal: Vec3, from: f32) -> Found {
         let p = self.params;
         let maps = p.roma_k * p.roma_k;
         let (stratum, is_upper) = stratum_of(ray.direction, p.roma_k);
@@ -217,18 +243,14 @@ impl Maps<'_> {
             }
         }
         let side = p.roma_cells as f32;
-        let margin = BLEND * (side * random2(index, !p.stream, p.seed)[0]);
-        let start = |level: &RomaLevel| each(|k| ray.origin[k] + level.lift * normal[k]);
-        let at = |level: &RomaLevel| {
-            let start = start(level);
-            each(|k| start[k] * level.scale + level.first[k])
-        };
-        let holds = |level: &RomaLevel| at(level).iter().all(|&x| x >= margin && x <= side - margin);
-        let start_level = self.levels.iter().position(holds).unwrap_or(self.levels.len() - 1);
-        let mut t = ray.t_min;
+        let margin = margin_of(p, index);
+        let start_level = start_level_of(p, self.levels, ray.origin, normal, margin);
+        let rise = direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2];
+        let mut t = most(ray.t_min, from);
         let mut is_capped = false;
         for (l, level) in self.levels.iter().enumerate().skip(start_level) {
-            let (start, at) = (start(level), at(level));
+            let start = lifted(level, ray.origin, normal, t * rise);
+            let at = each(|k| start[k] * level.scale + level.first[k]);
             let speed = direction.map(|x| x * level.scale);
             let low = if l + 1 == self.levels.len() { 0.0 } else { margin };
             let high = side - low;
@@ -250,21 +272,43 @@ impl Maps<'_> {
     }
 }
 
+/// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it.
+pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
+    let (p, levels) = (bound.params, &tables.maps.levels);
+    if levels.is_empty() {
+        return;
+    }
+    own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
+        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+            let index = run * RUN + i;
+            let d = ray.direction;
+            let length = square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            let margin = margin_of(p, index as u32);
+            let level = &levels[start_level_of(p, levels, ray.origin, normal_of(seen, index), margin)];
+            hit.t = least(ray.t_max, divide(p.roma_near as f32, level.scale * length));
+        }
+    });
+}
+
 /// Answers the pass's rays by ray-aligned maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the next where
 /// the ray leaves one. What is met is written as a hit of no triangle.
 pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let RomaMaps { levels, maps, .. } = &tables.maps;
     let of = Maps { params: bound.params, levels, maps, columns: &tables.columns };
-    let normal = |index: usize| seen.surfaces.get(index).map_or([0.0; 3], |surface: &Surface| surface.normal);
+    let is_far = bound.params.roma_near > 0;
     own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
         let mut tally = Tally::default();
         for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+            // What has met something is not asked again, nor what was traced to its end.
+            if is_far && (hit.id != NONE || hit.t >= ray.t_max) {
+                continue;
+            }
             let index = run * RUN + i;
             tally.add(COUNTER_RAYS, 1);
             if levels.is_empty() {
                 continue;
             }
-            let found = of.trace(index as u32, ray, normal(index));
+            let found = of.trace(index as u32, ray, normal_of(seen, index), if is_far { hit.t } else { ray.t_min });
             tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
             if found.t >= 0.0 {
                 *hit = Hit { t: found.t, id: ROMA_HIT, u: 0.0, v: 0.0 };

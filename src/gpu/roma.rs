@@ -4,7 +4,7 @@ use super::device::Gpu;
 use super::groups::numbered;
 use super::kernels::{self, Kernels};
 use super::rays::storage;
-use crate::kernel::dispatch::{ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::dispatch::{ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernel::layout::{RomaLevel, RomaMap};
 use crate::kernel::roma::RomaMaps;
 use crate::schedule::ExecutorError;
@@ -15,6 +15,7 @@ use std::sync::Arc;
 pub struct Roma {
     layout: wgpu::BindGroupLayout,
     rotate: wgpu::ComputePipeline,
+    near: wgpu::ComputePipeline,
     trace: wgpu::ComputePipeline,
     levels: wgpu::Buffer,
     map_records: wgpu::Buffer,
@@ -56,15 +57,16 @@ impl Roma {
             [("roma levels", size_of::<RomaLevel>()), ("roma maps", size_of::<RomaMap>()), ("boms", 4), ("columns", 4)]
                 .map(|(label, stride)| storage(gpu, label, 1, stride));
         let group = group(gpu, &layout, [&levels, &map_records, &boms, &columns]);
-        let (rotate, trace) = (pipeline(ROMA_ROTATE), pipeline(ROMA_TRACE));
+        let [rotate, near, trace] = [ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE].map(pipeline);
         let (cascades, maps) = (Arc::default(), RomaMaps::default());
-        Self { layout, rotate, trace, levels, map_records, boms, columns, cascades, maps, group }
+        Self { layout, rotate, near, trace, levels, map_records, boms, columns, cascades, maps, group }
     }
 
     /// The pipeline of a kernel, if it is one of these.
     pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
         match name {
             ROMA_ROTATE => Some(&self.rotate),
+            ROMA_NEAR => Some(&self.near),
             ROMA_TRACE => Some(&self.trace),
             _ => None,
         }

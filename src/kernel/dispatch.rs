@@ -138,6 +138,8 @@ pub const INTERSECT_BINARY: &str = "intersect_binary";
 
 /// The kernel that makes ray-aligned occupancy maps.
 pub const ROMA_ROTATE: &str = "roma_rotate";
+/// The kernel that ends rays before they are traced exactly.
+pub const ROMA_NEAR: &str = "roma_near";
 /// The kernel that traces them.
 pub const ROMA_TRACE: &str = "roma_trace";
 
@@ -297,8 +299,10 @@ pub fn dispatches(
             let columns = params.roma_levels * params.roma_k * params.roma_k * params.roma_size * params.roma_size;
             vec![roma(ROMA_ROTATE, params, across(columns.div_ceil(64)), 0)]
         }
-        Step::RomaTrace { steps } => {
-            vec![roma(ROMA_TRACE, Params { roma_steps: steps, ..params }, per_ray, 2)]
+        Step::RomaNear { cells } => vec![roma(ROMA_NEAR, Params { roma_near: cells, ..params }, per_ray, 0)],
+        Step::RomaTrace { steps, is_far } => {
+            let params = Params { roma_steps: steps, roma_near: is_far.into(), ..params };
+            vec![roma(ROMA_TRACE, params, per_ray, 2)]
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain};
 use crate::stats::Record;
 use crate::stream::HostCacheStats;
-use crate::visibility::roma::RomaSettings;
+use crate::visibility::roma::{RomaPass, RomaSettings};
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -181,7 +181,7 @@ impl Renderer {
             self.executor.begin_frame(&view);
             self.roma.begin(camera.position, &view);
             records.pass(self, "primary", |r, stats| {
-                r.trace(frame, Pass::Primary, stats)?;
+                r.trace(frame, Pass::Primary, &[Step::Generate], stats)?;
                 attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
                 let shading =
@@ -250,7 +250,7 @@ impl Renderer {
     ) -> Result<(), ExecutorError> {
         let (frame, effects) = (records.frame(), self.settings.effects);
         records.pass(self, names[0], |r, stats| {
-            r.trace(frame, pass, stats)?;
+            r.trace(frame, pass, &[Step::Generate], stats)?;
             attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
             let (is_diffuse, draws) = (matches!(pass, Pass::Diffuse(_)), r.draws_environment());
             // What rays to lamps bring to the surface itself must not come by diffuse rays as well, or be weighted.
@@ -300,17 +300,21 @@ impl Renderer {
     /// Traces any-hit rays, notes the bricks that were hit, and adds the light that comes through.
     fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
-        if let Some((grid, columns)) = self.settings.roma.and_then(|settings| Roma::grid_of(&settings, pass)) {
-            let rotate = self.roma.prepare(&mut *self.executor, &self.scene, grid)?;
-            let steps: Vec<Step> = std::iter::once(Step::Generate)
-                .chain(rotate)
-                .chain([Step::RomaTrace { steps: columns }, add])
-                .collect();
-            stats.add(self.executor.run(pass, &steps, &self.cache.states)?);
-            return Ok(());
+        let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
+        let mut first = vec![Step::Generate];
+        if let Some(RomaPass { grid, steps, near }) = roma {
+            first.extend(self.roma.prepare(&mut *self.executor, &self.scene, grid)?);
+            if near == 0 {
+                first.extend([Step::RomaTrace { steps, is_far: false }, add]);
+                stats.add(self.executor.run(pass, &first, &self.cache.states)?);
+                return Ok(());
+            }
+            first.push(Step::RomaNear { cells: near });
         }
-        self.trace(frame, pass, stats)?;
-        let report = self.executor.run(pass, &[Step::QueryHits, add], &self.cache.states)?;
+        self.trace(frame, pass, &first, stats)?;
+        let far = roma.map(|RomaPass { steps, .. }| Step::RomaTrace { steps, is_far: true });
+        let last: Vec<Step> = [Step::QueryHits].into_iter().chain(far).chain([add]).collect();
+        let report = self.executor.run(pass, &last, &self.cache.states)?;
         stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
         stats.add(report);
         Ok(())
@@ -322,16 +326,15 @@ impl Renderer {
         Ok(())
     }
 
-    /// Traces the generated rays of a pass by the schedule in force.
-    fn trace(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
+    /// Traces the rays of a pass, which the steps in `first` make, by the schedule in force.
+    fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut PassStats) -> Result<(), ExecutorError> {
         let fixed = match self.settings.schedule {
             Schedule::Chc => Fixed::Chc,
             Schedule::Demand => Fixed::Demand,
             Schedule::Plain => Fixed::Plain,
             Schedule::PlainBinary => {
                 let tracing = &self.settings.tracing;
-                let first = [Step::Generate];
-                return plain::trace_binary(&mut *self.executor, &mut self.cache, pass, &first, tracing, stats);
+                return plain::trace_binary(&mut *self.executor, &mut self.cache, pass, first, tracing, stats);
             }
             Schedule::Auto => {
                 let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
@@ -339,13 +342,13 @@ impl Renderer {
                 // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the schedule.
                 let besides = stats.ms_stream - stats.ms;
                 let rays = stats.report.rays;
-                self.trace_by(chosen, frame, pass, stats)?;
+                self.trace_by(chosen, frame, pass, first, stats)?;
                 let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
                 self.auto.note(pass, ms, stats.report.rays - rays);
                 return Ok(());
             }
         };
-        self.trace_by(fixed, frame, pass, stats)
+        self.trace_by(fixed, frame, pass, first, stats)
     }
 
     fn trace_by(
@@ -353,20 +356,20 @@ impl Renderer {
         schedule: Fixed,
         frame: u32,
         pass: Pass,
+        first: &[Step],
         stats: &mut PassStats,
     ) -> Result<(), ExecutorError> {
         let tracing = &self.settings.tracing;
-        let first = [Step::Generate];
         let (executor, cache) = (&mut *self.executor, &mut self.cache);
         match (schedule, &mut self.fronts) {
-            (Fixed::Plain, _) => plain::trace(executor, cache, pass, &first, tracing, stats),
-            (Fixed::Demand, _) => demand::trace(executor, cache, pass, &first, tracing, stats),
-            (Fixed::Chc, None) => chc::trace(executor, cache, pass, &first, tracing, stats),
+            (Fixed::Plain, _) => plain::trace(executor, cache, pass, first, tracing, stats),
+            (Fixed::Demand, _) => demand::trace(executor, cache, pass, first, tracing, stats),
+            (Fixed::Chc, None) => chc::trace(executor, cache, pass, first, tracing, stats),
             (Fixed::Chc, Some(fronts)) => {
                 let resident = self.scene.resident();
                 let extent = (self.size.0, self.size.1, self.tile);
                 let setup = FrontPass { resident, extent, frame, pass, tracing };
-                fronts.trace(executor, cache, &setup, &first, stats)
+                fronts.trace(executor, cache, &setup, first, stats)
             }
         }
     }

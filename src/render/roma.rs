@@ -5,7 +5,7 @@ use crate::kernel::roma::RomaMaps;
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
 use crate::visibility::bom::{Assembler, BomError, Cascades, Settings};
-use crate::visibility::roma::{Grid, MOST_LEVELS, RomaSettings};
+use crate::visibility::roma::{Grid, MOST_LEVELS, RomaPass, RomaSettings};
 use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
 use std::sync::Arc;
@@ -50,12 +50,13 @@ impl Roma {
         self.made = None;
     }
 
-    /// The maps of `pass` and how many columns its rays pass; `None` where rays are traced.
-    pub fn grid_of(settings: &RomaSettings, pass: Pass) -> Option<(Grid, u32)> {
+    /// How the rays of `pass` are answered; `None` where they are traced.
+    pub fn pass_of(settings: &RomaSettings, pass: Pass) -> Option<RomaPass> {
+        let RomaSettings { occlusion, occlusion_steps, occlusion_near, shadow, shadow_steps, shadow_near } = *settings;
         match pass {
-            Pass::Occlusion(_) => Some((settings.occlusion, settings.occlusion_steps)),
+            Pass::Occlusion(_) => Some(RomaPass { grid: occlusion, steps: occlusion_steps, near: occlusion_near }),
             Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
-                Some((settings.shadow, settings.shadow_steps))
+                Some(RomaPass { grid: shadow, steps: shadow_steps, near: shadow_near })
             }
             _ => None,
         }

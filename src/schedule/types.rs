@@ -138,10 +138,18 @@ pub enum Step {
     AddOcclusion,
     /// Make the ray-aligned maps that the executor was given last: phase 1.
     RomaRotate,
+    /// End the pass's rays, not traced yet, this many cells of the base map that holds their start from it: what they meet up to there is
+    /// for bricks to tell.
+    RomaNear {
+        /// Cells.
+        cells: u32,
+    },
     /// Answer the pass's rays by them, and count them: phase 3.
     RomaTrace {
         /// Columns that a ray passes before it is finished along the map's direction; 0: it takes that direction from the start.
         steps: u32,
+        /// Rays that have met nothing where [`Step::RomaNear`] ended them are answered from there on; else all, from their start.
+        is_far: bool,
     },
 }
 

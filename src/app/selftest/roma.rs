@@ -68,7 +68,11 @@ fn answers(stage: &mut Stage, rays: &[Ray], steps: u32) -> Result<Vec<Hit>> {
     let mut hits = Vec::with_capacity(rays.len());
     for chunk in rays.chunks(EXTENT.rays()) {
         executor.set_rays(pass, chunk);
-        executor.run(pass, &[Step::StartHits, Step::RomaTrace { steps }], &stage.session.cache.states)?;
+        executor.run(
+            pass,
+            &[Step::StartHits, Step::RomaTrace { steps, is_far: false }],
+            &stage.session.cache.states,
+        )?;
         hits.extend_from_slice(&executor.read_hits(pass)?[..chunk.len()]);
     }
     Ok(hits)

@@ -59,10 +59,28 @@ pub struct RomaSettings {
     pub shadow: Grid,
     /// Columns of shadow rays.
     pub shadow_steps: u32,
+    /// Cells of the base map that holds its start up to which an occlusion ray is traced exactly; 0: nowhere.
+    pub occlusion_near: u32,
+    /// The same of shadow rays.
+    pub shadow_near: u32,
+}
+
+/// How the rays of a pass are answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RomaPass {
+    /// Their maps.
+    pub grid: Grid,
+    /// Columns that a ray passes before it is finished snapped; 0: it is snapped.
+    pub steps: u32,
+    /// Cells of the base map that holds its start up to which a ray is traced exactly; 0: nowhere.
+    pub near: u32,
 }
 
 /// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.
 pub const MOST_LEVELS: u32 = 6;
+
+/// Most cells up to which a ray may be traced exactly.
+pub const MOST_NEAR: u32 = 256;
 
 /// Most columns that a ray may be given.
 pub const MOST_STEPS: u32 = 64;

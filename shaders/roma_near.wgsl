@@ -1,0 +1,24 @@
+// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/shading.wgsl"
+#include "shared/exact.wgsl"
+#include "shared/random.wgsl"
+#include "shared/roma.wgsl"
+#include "shared/roma_start.wgsl"
+
+// One thread a ray.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height || params.roma_levels == 0u {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let ray = rays[index];
+    if ray.t_min <= ray.t_max {
+        let d = ray.direction;
+        let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
+        let level = roma_levels[start_level_of(ray.origin, seen_surfaces[index].normal, margin_of(index))];
+        hits[index].t = min(ray.t_max, divide(f32(params.roma_near), barrier(level.scale * length)));
+    }
+}

@@ -1,0 +1,29 @@
+// Where a ray starts in base maps, which overlap. Twin: src/cpu/roma.rs.
+
+// A level ends before its sides, ray by ray, by up to this share of them, so that no edge between levels shows.
+const BLEND: f32 = 1.0 / 16.0;
+
+// Cells before its sides at which a level ends for ray `index`.
+fn margin_of(index: u32) -> f32 {
+    let side = f32(params.roma_cells);
+    return barrier(BLEND * barrier(side * random2(index, ~params.stream, params.seed).x));
+}
+
+// A ray's start, off its surface by the level's lift, of which it may be `height` off already.
+fn lifted(level: RomaLevel, origin: vec3<f32>, normal: vec3<f32>, height: f32) -> vec3<f32> {
+    let lift = clamp(level.lift - height, 0.0, level.lift);
+    return barrier3(origin + barrier3(lift * normal));
+}
+
+// The finest level that holds the start.
+fn start_level_of(origin: vec3<f32>, normal: vec3<f32>, margin: f32) -> u32 {
+    let side = f32(params.roma_cells);
+    for (var l = 0u; l < params.roma_levels; l++) {
+        let level = roma_levels[l];
+        let at = barrier3(barrier3(lifted(level, origin, normal, 0.0) * level.scale) + level.first);
+        if all(at >= vec3<f32>(margin)) && all(at <= vec3<f32>(side - margin)) {
+            return l;
+        }
+    }
+    return params.roma_levels - 1u;
+}
