@@ -1,4 +1,5 @@
-// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it.
+// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those that no base map holds are
+// traced whole.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -18,7 +19,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if ray.t_min <= ray.t_max {
         let d = ray.direction;
         let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
-        let level = roma_levels[start_level_of(ray.origin, seen_surfaces[index].normal, margin_of(index))];
-        hits[index].t = min(ray.t_max, divide(f32(params.roma_near), barrier(level.scale * length)));
+        let l = start_level_of(ray.origin, seen_surfaces[index].normal, margin_of(index));
+        if l < params.roma_levels {
+            hits[index].t = min(ray.t_max, divide(f32(params.roma_near), barrier(roma_levels[l].scale * length)));
+        }
     }
 }

@@ -8,14 +8,27 @@
 // Steps of a column along an axis of the base map that are too short to bound it by.
 const LEAST_STEP: f32 = 1.0 / 1024.0;
 
-fn is_occupied(level: u32, cell: vec3<i32>) -> bool {
+// Cells of a block on each axis.
+const BLOCK_CELLS: u32 = 4u;
+
+fn is_within(c: vec3<u32>) -> bool {
+    return all(c < vec3<u32>(params.roma_cells));
+}
+
+fn is_occupied(level: u32, c: vec3<u32>) -> bool {
     let n = params.roma_cells;
-    let c = vec3<u32>(cell);
-    if any(c >= vec3<u32>(n)) {
-        return false;
-    }
     let word = (level * n * n + c.x + n * c.y) * (n / 32u) + c.z / 32u;
     return ((boms[word] >> (c.z % 32u)) & 1u) != 0u;
+}
+
+// Cells around one, on every axis, that are empty as it is.
+fn empty_around(level: u32, c: vec3<u32>) -> u32 {
+    let n = params.roma_cells;
+    let side = n / BLOCK_CELLS;
+    let b = c / BLOCK_CELLS;
+    let at = ((level * side + b.x) * side + b.y) * side + b.z;
+    let distance = (boms[params.roma_levels * n * n * (n / 32u) + at / 4u] >> (8u * (at % 4u))) & 255u;
+    return BLOCK_CELLS * (max(distance, 1u) - 1u);
 }
 
 // The part of the range of depths in which a column lies between 0 and the base map's side on one axis, a cell more at both ends.
@@ -50,18 +63,30 @@ fn main(
     var range = vec2<f32>(0.0, f32(n));
     range = bounded(bounded(bounded(range, start.x, step.x), start.y, step.y), start.z, step.z);
     let part = 1.0 / f32(params.roma_samples);
+    let per_cell = 1.0 / max(max(abs(step.x), abs(step.y)), abs(step.z));
+    var next = 0u;
     for (var w = 0u; w < words(); w++) {
         var bits = 0u;
-        for (var i = 0u; i < 32u; i++) {
-            let depth = f32(32u * w + i);
+        for (; next < 32u * w + 32u; next++) {
+            let depth = f32(next);
             if depth + 1.0 < range.x || depth > range.y {
                 continue;
             }
+            let i = next - 32u * w;
             for (var s = 0u; s < params.roma_samples; s++) {
                 let at = depth + (f32(s) + 0.5) * part;
-                let base = barrier3(start + barrier3(at * step));
-                if is_occupied(level, vec3<i32>(floor(base))) {
+                let cell = vec3<u32>(vec3<i32>(floor(barrier3(start + barrier3(at * step)))));
+                if !is_within(cell) {
+                    continue;
+                }
+                if is_occupied(level, cell) {
                     bits |= 1u << (31u - i);
+                    break;
+                }
+                let passed = u32(f32(empty_around(level, cell)) * per_cell);
+                if passed > 0u {
+                    // All look-ups before the cell that is `passed` ahead lie in what is empty, by half a step more than roundings take.
+                    next += passed - 1u;
                     break;
                 }
             }

@@ -116,7 +116,7 @@ fn trace(index: u32, ray: Ray) -> bool {
         let start = lifted(level, ray.origin, normal, barrier(t * rise));
         let at = barrier3(barrier3(start * level.scale) + level.first);
         let speed = barrier3(direction * level.scale);
-        let low = select(margin, 0.0, l + 1u == params.roma_levels);
+        let low = select(margin, 0.0, l + 1u == params.roma_levels && params.roma_is_part == 0u);
         let high = side - low;
         var range = vec2<f32>(t, ray.t_max);
         range = clipped(range, at.x, speed.x, low, high);

@@ -15,7 +15,7 @@ fn lifted(level: RomaLevel, origin: vec3<f32>, normal: vec3<f32>, height: f32) -
     return barrier3(origin + barrier3(lift * normal));
 }
 
-// The finest level that holds the start.
+// The finest level that holds the start; the number of levels where none does.
 fn start_level_of(origin: vec3<f32>, normal: vec3<f32>, margin: f32) -> u32 {
     let side = f32(params.roma_cells);
     for (var l = 0u; l < params.roma_levels; l++) {
@@ -25,5 +25,5 @@ fn start_level_of(origin: vec3<f32>, normal: vec3<f32>, margin: f32) -> u32 {
             return l;
         }
     }
-    return params.roma_levels - 1u;
+    return params.roma_levels - select(1u, 0u, params.roma_is_part != 0u);
 }

@@ -48,9 +48,9 @@ struct Params {
     roma_samples: u32,    // look-ups of the base map a cell
     roma_steps: u32,      // columns that a ray passes before it is finished snapped; 0: it is snapped
     roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced exactly
+    roma_is_part: u32,    // 1: rays that leave the coarsest base map are no longer asked about, 0: it holds the scene
     padding0: u32,
     padding1: u32,
-    padding2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }

@@ -32,8 +32,9 @@ use crate::kernel::{
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{PayloadSource, WorkerPool, Workers};
-use crate::visibility::bom::Cascades;
+use crate::visibility::bom::{Cascades, clearance};
 use bricks::SceneFile;
+use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -335,7 +336,11 @@ impl FrameExecutor for CpuExecutor {
     }
 
     fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
-        self.buffers.roma.cascades = cascades.clone();
+        let roma = &mut self.buffers.roma;
+        if !Arc::ptr_eq(&roma.cascades, cascades) {
+            roma.cascades = cascades.clone();
+            roma.clearances = cascades.levels.par_iter().map(clearance).collect();
+        }
         Ok(())
     }
 

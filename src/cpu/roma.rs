@@ -9,7 +9,7 @@ use crate::kernel::layout::{
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
 use crate::math::sampling::random2;
-use crate::visibility::bom::Cascades;
+use crate::visibility::bom::{BLOCK_CELLS, Cascades};
 use crate::visibility::roma::bits::{cells_between, first_cell};
 use crate::visibility::roma::directions::stratum_of;
 use rayon::prelude::*;
@@ -35,6 +35,8 @@ const RUN: usize = 256;
 pub struct RomaTables {
     /// The base maps.
     pub cascades: Arc<Cascades>,
+    /// What is empty in them, level by level.
+    pub clearances: Vec<Vec<u8>>,
     /// How the maps are placed.
     pub maps: RomaMaps,
     /// The words of all columns.
@@ -63,50 +65,82 @@ fn bounded(cells: u32, range: [f32; 2], start: f32, step: f32) -> [f32; 2] {
 /// evenly spaced along the column, finds an occupied cell of the base map.
 pub fn roma_rotate(bound: &Bound, tables: &mut RomaTables) {
     let p = bound.params;
-    let RomaTables { cascades, maps, columns } = tables;
+    let RomaTables { cascades, clearances, maps, columns } = tables;
     let words = p.roma_size / 32;
     columns.resize(maps.words() as usize, 0);
     let row = (p.roma_size * words) as usize;
     columns.par_chunks_mut(row.max(1)).enumerate().for_each(|(number, row)| {
         let (map, y) = (number as u32 / p.roma_size, number as u32 % p.roma_size);
         let level = map / (p.roma_k * p.roma_k);
-        let bom = cascades.levels[level as usize].words();
+        let base = BaseMap {
+            cells: p.roma_cells,
+            words: cascades.levels[level as usize].words(),
+            clearance: &clearances[level as usize],
+        };
         let rows = &maps.maps[map as usize].base_from_cell;
         for (x, column) in row.chunks_mut(words as usize).enumerate() {
-            rotate_column(p, bom, rows, [x as f32 + 0.5, y as f32 + 0.5, 0.0], column);
+            rotate_column(p, &base, rows, [x as f32 + 0.5, y as f32 + 0.5, 0.0], column);
         }
     });
 }
 
-fn is_occupied(n: u32, bom: &[u32], base: Vec3) -> bool {
-    let c = base.map(|x| x.floor() as i32 as u32);
-    if c.iter().any(|&x| x >= n) {
-        return false;
-    }
-    let word = (c[0] + n * c[1]) * (n / 32) + c[2] / 32;
-    bom[word as usize] >> (c[2] % 32) & 1 != 0
+/// A base map in cells of its own.
+struct BaseMap<'a> {
+    cells: u32,
+    words: &'a [u32],
+    clearance: &'a [u8],
 }
 
-fn rotate_column(p: &Params, bom: &[u32], rows: &[[f32; 4]; 3], foot: Vec3, column: &mut [u32]) {
+impl BaseMap<'_> {
+    /// The cell that a point lies in; `None` outside.
+    fn cell(&self, point: Vec3) -> Option<[u32; 3]> {
+        let c = point.map(|x| x.floor() as i32 as u32);
+        c.iter().all(|&x| x < self.cells).then_some(c)
+    }
+
+    fn is_occupied(&self, c: [u32; 3]) -> bool {
+        let word = (c[0] + self.cells * c[1]) * (self.cells / 32) + c[2] / 32;
+        self.words[word as usize] >> (c[2] % 32) & 1 != 0
+    }
+
+    /// Cells around one, on every axis, that are empty as it is.
+    fn empty_around(&self, c: [u32; 3]) -> u32 {
+        let side = self.cells / BLOCK_CELLS;
+        let [x, y, z] = c.map(|x| x / BLOCK_CELLS);
+        let distance = self.clearance[((x * side + y) * side + z) as usize];
+        BLOCK_CELLS * u32::from(distance.saturating_sub(1))
+    }
+}
+
+fn rotate_column(p: &Params, base: &BaseMap, rows: &[[f32; 4]; 3], foot: Vec3, column: &mut [u32]) {
     let start = each(|k| affine(&rows[k], foot));
     let step = each(|k| rows[k][2]);
     let whole = [0.0, p.roma_size as f32];
     let range = (0..3).fold(whole, |range, k| bounded(p.roma_cells, range, start[k], step[k]));
     let part = 1.0 / p.roma_samples as f32;
-    for (w, word) in column.iter_mut().enumerate() {
-        let mut bits = 0;
-        for i in 0..32 {
-            let depth = (32 * w as u32 + i) as f32;
-            if depth + 1.0 < range[0] || depth > range[1] {
-                continue;
-            }
-            let finds = |s: u32| {
-                let at = depth + (s as f32 + 0.5) * part;
-                is_occupied(p.roma_cells, bom, each(|k| start[k] + at * step[k]))
-            };
-            bits |= u32::from((0..p.roma_samples).any(finds)) << (31 - i);
+    let per_cell = 1.0 / step.iter().fold(0.0, |greatest, &x| most(greatest, x.abs()));
+    column.fill(0);
+    let mut i = 0;
+    while i < p.roma_size {
+        let depth = i as f32;
+        i += 1;
+        if depth + 1.0 < range[0] || depth > range[1] {
+            continue;
         }
-        *word = bits;
+        for s in 0..p.roma_samples {
+            let at = depth + (s as f32 + 0.5) * part;
+            let Some(cell) = base.cell(each(|k| start[k] + at * step[k])) else { continue };
+            if base.is_occupied(cell) {
+                column[((i - 1) / 32) as usize] |= 1 << (31 - (i - 1) % 32);
+                break;
+            }
+            let passed = (base.empty_around(cell) as f32 * per_cell) as u32;
+            if passed > 0 {
+                // All look-ups before the cell that is `passed` ahead lie in what is empty, by half a step more than roundings take.
+                i += passed - 1;
+                break;
+            }
+        }
     }
 }
 
@@ -154,7 +188,7 @@ fn lifted(level: &RomaLevel, origin: Vec3, normal: Vec3, height: f32) -> Vec3 {
     each(|k| origin[k] + lift * normal[k])
 }
 
-/// The finest level that holds the start.
+/// The finest level that holds the start; the number of levels where none does.
 fn start_level_of(p: &Params, levels: &[RomaLevel], origin: Vec3, normal: Vec3, margin: f32) -> usize {
     let side = p.roma_cells as f32;
     let holds = |level: &RomaLevel| {
@@ -162,7 +196,7 @@ fn start_level_of(p: &Params, levels: &[RomaLevel], origin: Vec3, normal: Vec3, 
         let at = each(|k| start[k] * level.scale + level.first[k]);
         at.iter().all(|&x| x >= margin && x <= side - margin)
     };
-    levels.iter().position(holds).unwrap_or(levels.len() - 1)
+    levels.iter().position(holds).unwrap_or(levels.len() - usize::from(p.roma_is_part == 0))
 }
 
 fn normal_of(seen: &RaySet, index: usize) -> Vec3 {
@@ -252,7 +286,7 @@ impl Maps<'_> {
             let start = lifted(level, ray.origin, normal, t * rise);
             let at = each(|k| start[k] * level.scale + level.first[k]);
             let speed = direction.map(|x| x * level.scale);
-            let low = if l + 1 == self.levels.len() { 0.0 } else { margin };
+            let low = if l + 1 == self.levels.len() && p.roma_is_part == 0 { 0.0 } else { margin };
             let high = side - low;
             let range = (0..3).fold([t, ray.t_max], |range, k| clipped(range, at[k], speed[k], low, high));
             if range[0] <= range[1] {
@@ -272,7 +306,8 @@ impl Maps<'_> {
     }
 }
 
-/// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it.
+/// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those that no base map holds are
+/// traced whole.
 pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let (p, levels) = (bound.params, &tables.maps.levels);
     if levels.is_empty() {
@@ -284,8 +319,10 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
             let d = ray.direction;
             let length = square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
             let margin = margin_of(p, index as u32);
-            let level = &levels[start_level_of(p, levels, ray.origin, normal_of(seen, index), margin)];
-            hit.t = least(ray.t_max, divide(p.roma_near as f32, level.scale * length));
+            let level = levels.get(start_level_of(p, levels, ray.origin, normal_of(seen, index), margin));
+            if let Some(level) = level {
+                hit.t = least(ray.t_max, divide(p.roma_near as f32, level.scale * length));
+            }
         }
     });
 }

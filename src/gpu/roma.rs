@@ -8,7 +8,8 @@ use crate::kernel::dispatch::{ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernel::layout::{RomaLevel, RomaMap};
 use crate::kernel::roma::RomaMaps;
 use crate::schedule::ExecutorError;
-use crate::visibility::bom::{Bom, Cascades};
+use crate::visibility::bom::{Bom, Cascades, clearance};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Pipelines and buffers.
@@ -80,8 +81,11 @@ impl Roma {
         if Arc::ptr_eq(&self.cascades, cascades) {
             return Ok(());
         }
-        let words: usize = cascades.levels.iter().map(|bom| bom.words().len()).sum();
-        check(gpu, 4 * words as u64)?;
+        let clearances: Vec<Vec<u8>> = cascades.levels.par_iter().map(clearance).collect();
+        let bytes = cascades.levels.iter().map(|bom| size_of_val(bom.words())).sum::<usize>()
+            + clearances.iter().map(Vec::len).sum::<usize>();
+        let words = bytes / 4;
+        check(gpu, bytes as u64)?;
         if grow(gpu, &mut self.boms, "boms", words, 4) {
             self.rebind(gpu);
         }
@@ -89,6 +93,10 @@ impl Roma {
         for words in cascades.levels.iter().map(Bom::words) {
             gpu.queue.write_buffer(&self.boms, at, bytemuck::cast_slice(words));
             at += size_of_val(words) as u64;
+        }
+        for clearance in &clearances {
+            gpu.queue.write_buffer(&self.boms, at, clearance);
+            at += clearance.len() as u64;
         }
         self.cascades = cascades.clone();
         Ok(())

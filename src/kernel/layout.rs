@@ -98,7 +98,7 @@ mirror! {
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
         emitter_density: f32, diffuse_count: f32, roma_k: u32, roma_size: u32,
         roma_cells: u32, roma_levels: u32, roma_samples: u32, roma_steps: u32,
-        roma_near: u32, padding0: u32, padding1: u32, padding2: u32,
+        roma_near: u32, roma_is_part: u32, padding0: u32, padding1: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 /// Cells of a map by which rays start off their surface (Zeng et al., §6). What marks a plane reaches one cell of a base map above it, 0.58 of
 /// a map of as many cells, and is found from up to 1.03 cells of the map away: half a diagonal across the column, three quarters along it. So a
 /// plane hardly occludes itself, where the worst of both come together.
-const LIFT_CELLS: f64 = 1.5;
+pub const LIFT_CELLS: f64 = 1.5;
 
 /// What is drawn for ROMA takes random numbers of its own.
 const STREAM: u32 = 9 << 24;
@@ -27,6 +27,8 @@ pub struct RomaMaps {
     pub cells: u32,
     /// Look-ups of the base map a cell.
     pub samples: u32,
+    /// Whether coarser base maps were left out, so that these do not hold the scene.
+    pub is_part: bool,
     /// Base maps, the finest first.
     pub levels: Vec<RomaLevel>,
     /// Maps of the finest level, by their strata, then those of the next.
@@ -34,8 +36,8 @@ pub struct RomaMaps {
 }
 
 impl RomaMaps {
-    /// Those of `cascades` by `grid`, in directions drawn for sample `sample`.
-    pub fn new(cascades: &Cascades, frame: &Frame, grid: Grid, sample: u32, seed: u32) -> Self {
+    /// Those of the finest `count` levels of `cascades` by `grid`, in directions drawn for sample `sample`.
+    pub fn new(cascades: &Cascades, count: usize, frame: &Frame, grid: Grid, (sample, seed): (u32, u32)) -> Self {
         let cells = cascades.levels.first().map_or(0, Bom::cells);
         let drawn = draw(grid.k, sample.wrapping_add(STREAM), seed);
         let level = |bom: &Bom| {
@@ -44,7 +46,7 @@ impl RomaMaps {
             (first, frame.unit / side)
         };
         let scale = if cells == 0 { 0.0 } else { grid.scale(cells) };
-        let levels: Vec<(DVec3, f64)> = cascades.levels.iter().map(level).collect();
+        let levels: Vec<(DVec3, f64)> = cascades.levels.iter().take(count).map(level).collect();
         let record = |&(first, per_unit): &(DVec3, f64)| RomaLevel {
             first: first.as_vec3().to_array(),
             scale: per_unit as f32,
@@ -72,6 +74,7 @@ impl RomaMaps {
             size: grid.size,
             cells,
             samples: grid.samples(cells.max(1)),
+            is_part: levels.len() < cascades.levels.len(),
             levels: levels.iter().map(record).collect(),
             maps,
         }
@@ -85,6 +88,7 @@ impl RomaMaps {
             roma_cells: self.cells,
             roma_levels: self.levels.len() as u32,
             roma_samples: self.samples,
+            roma_is_part: self.is_part.into(),
             ..params
         }
     }
@@ -119,7 +123,7 @@ mod tests {
             let cascades =
                 Cascades { levels: vec![Bom::new(cells, -2, [-4, -20, 1]), Bom::new(cells, -1, [-10, -18, -7])] };
             for sample in 0..4 {
-                let maps = RomaMaps::new(&cascades, &frame, Grid { k: 4, size: 64, samples: 0 }, sample, 3);
+                let maps = RomaMaps::new(&cascades, 2, &frame, Grid { k: 4, size: 64, samples: 0 }, (sample, 3));
                 assert_eq!((maps.levels.len(), maps.maps.len()), (2, 32));
                 for (i, map) in maps.maps.iter().enumerate() {
                     let level = &cascades.levels[i / 16];
@@ -143,6 +147,9 @@ mod tests {
                 }
             }
         }
-        assert_eq!(RomaMaps::new(&Cascades::default(), &frame, Grid { k: 4, size: 32, samples: 0 }, 0, 0).words(), 0);
+        assert_eq!(
+            RomaMaps::new(&Cascades::default(), 1, &frame, Grid { k: 4, size: 32, samples: 0 }, (0, 0)).words(),
+            0
+        );
     }
 }

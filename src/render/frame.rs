@@ -302,8 +302,13 @@ impl Renderer {
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
         let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
         let mut first = vec![Step::Generate];
-        if let Some(RomaPass { grid, steps, near }) = roma {
-            first.extend(self.roma.prepare(&mut *self.executor, &self.scene, grid)?);
+        if let Some(roma) = roma {
+            let RomaPass { steps, near, .. } = roma;
+            let length = match (pass, self.settings.effects.occlusion) {
+                (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
+                _ => f64::INFINITY,
+            };
+            first.extend(self.roma.prepare(&mut *self.executor, &self.scene, roma, length)?);
             if near == 0 {
                 first.extend([Step::RomaTrace { steps, is_far: false }, add]);
                 stats.add(self.executor.run(pass, &first, &self.cache.states)?);

@@ -1,10 +1,10 @@
 //! Occlusion and shadow rays that occupancy maps answer: which maps, and when they are made.
 
 use crate::kernel::frame::Frame;
-use crate::kernel::roma::RomaMaps;
+use crate::kernel::roma::{LIFT_CELLS, RomaMaps};
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
-use crate::visibility::bom::{Assembler, BomError, Cascades, Settings};
+use crate::visibility::bom::{Assembler, Bom, BomError, Cascades, Settings};
 use crate::visibility::roma::{Grid, MOST_LEVELS, RomaPass, RomaSettings};
 use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
@@ -20,7 +20,7 @@ pub struct Roma {
     /// Whether the base maps are those of the present camera.
     is_assembled: bool,
     /// The ray-aligned maps that the executor has of the present sample.
-    made: Option<Grid>,
+    made: Option<(Grid, usize)>,
 }
 
 struct RomaView {
@@ -62,7 +62,8 @@ impl Roma {
         }
     }
 
-    /// Has the executor take the maps of `grid`, unless it has them; the step that then makes them.
+    /// Has the executor take the maps of `pass` for rays that are `length` world units long at most, unless it has them; the step that then
+    /// makes them. Levels are left out that such rays end in before they are off their surface, or before they are answered by maps.
     ///
     /// # Errors
     /// The executor's.
@@ -70,12 +71,10 @@ impl Roma {
         &mut self,
         executor: &mut dyn FrameExecutor,
         scene: &Arc<SceneFile>,
-        grid: Grid,
+        RomaPass { grid, near, .. }: RomaPass,
+        length: f64,
     ) -> Result<Option<Step>, ExecutorError> {
         let Some(RomaView { frame, camera, sample, seed }) = &self.view else { return Ok(None) };
-        if self.made == Some(grid) {
-            return Ok(None);
-        }
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
         let (cells, mut assembler) = match self.assembler.take() {
             Some((cells, assembler)) if cells == grid.size => (cells, assembler),
@@ -94,9 +93,15 @@ impl Roma {
             self.is_assembled = true;
         }
         self.assembler = Some((cells, assembler));
+        let first = LIFT_CELLS / grid.scale(grid.size);
+        let is_of_use = |bom: &&Bom| first.max(f64::from(near)) * bom.side() < length;
+        let levels = self.cascades.levels.iter().take_while(is_of_use).count();
+        if self.made == Some((grid, levels)) {
+            return Ok(None);
+        }
         executor.set_cascades(&self.cascades)?;
-        executor.set_roma(&RomaMaps::new(&self.cascades, frame, grid, *sample, *seed))?;
-        self.made = Some(grid);
+        executor.set_roma(&RomaMaps::new(&self.cascades, levels, frame, grid, (*sample, *seed)))?;
+        self.made = Some((grid, levels));
         Ok(Some(Step::RomaRotate))
     }
 

@@ -38,6 +38,7 @@ fn aligned(cells: u32, levels: &[(f32, f32)], axis: usize) -> RomaMaps {
         size: cells,
         cells,
         samples: 1,
+        is_part: false,
         levels: levels.iter().map(level).collect(),
         maps: levels.iter().map(map).collect(),
     }

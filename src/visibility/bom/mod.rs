@@ -14,6 +14,7 @@ mod assemble;
 #[cfg(test)]
 mod assemble_tests;
 mod boxes;
+mod clearance;
 #[cfg(test)]
 mod leak_tests;
 mod maps;
@@ -23,6 +24,7 @@ mod region;
 mod voxelise;
 
 pub use assemble::{Assembler, Assembly, BomError, assemble};
+pub use clearance::{BLOCK_CELLS, clearance};
 pub use plan::{Detail, MAX_LEVELS, SNAP_CELLS, Settings};
 pub use voxelise::{Voxelisation, voxelise};
 
