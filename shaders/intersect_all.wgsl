@@ -41,7 +41,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
         return;
     }
     let ray = rays[index];
-    if !(ray.t_min <= ray.t_max) || params.top_count == 0u {
+    if !is_traced(index, ray) || params.top_count == 0u {
         return;
     }
     let any_hit = (params.flags & PARAM_ANY_HIT) != 0u;

@@ -30,7 +30,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
         return;
     }
     let ray = rays[index];
-    if !(ray.t_min <= ray.t_max) {
+    if !is_traced(index, ray) {
         return;
     }
     let any_hit = (params.flags & PARAM_ANY_HIT) != 0u;

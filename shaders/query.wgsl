@@ -18,7 +18,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     }
     let entry = tile_lists[work.tile];
     let ray = rays[index];
-    if !(ray.t_min <= ray.t_max) {
+    if !is_traced(index, ray) {
         return;
     }
     let hit = hits[index];

@@ -47,7 +47,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     if !COUNT {
         surfaces[index].pending = 0u;
     }
-    if !(ray.t_min <= ray.t_max) || params.top_count == 0u || occluded {
+    if !is_traced(index, ray) || params.top_count == 0u || occluded {
         return;
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);

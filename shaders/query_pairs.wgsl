@@ -62,7 +62,7 @@ fn ask(pair: Pair, lane: u32, each: bool) {
         let ray = rays[at];
         let hit = hits[at];
         let occluded = (params.flags & PARAM_ANY_HIT) != 0u && hit.id != NONE;
-        if ray.t_min > ray.t_max || occluded {
+        if !is_traced(at, ray) || occluded {
             continue;
         }
         let world = framed_ray(ray.origin, ray.direction, ray.t_min);

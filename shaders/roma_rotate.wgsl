@@ -11,13 +11,20 @@ const LEAST_STEP: f32 = 1.0 / 1024.0;
 // Cells of a block on each axis.
 const BLOCK_CELLS: u32 = 4u;
 
+// Words of a level: a bit a cell, a byte a block.
+fn words_of_level() -> u32 {
+    let n = params.roma_cells;
+    let side = n / BLOCK_CELLS;
+    return n * n * (n / 32u) + side * side * side / 4u;
+}
+
 fn is_within(c: vec3<u32>) -> bool {
     return all(c < vec3<u32>(params.roma_cells));
 }
 
 fn is_occupied(level: u32, c: vec3<u32>) -> bool {
     let n = params.roma_cells;
-    let word = (level * n * n + c.x + n * c.y) * (n / 32u) + c.z / 32u;
+    let word = level * words_of_level() + (c.x + n * c.y) * (n / 32u) + c.z / 32u;
     return ((boms[word] >> (c.z % 32u)) & 1u) != 0u;
 }
 
@@ -26,8 +33,9 @@ fn empty_around(level: u32, c: vec3<u32>) -> u32 {
     let n = params.roma_cells;
     let side = n / BLOCK_CELLS;
     let b = c / BLOCK_CELLS;
-    let at = ((level * side + b.x) * side + b.y) * side + b.z;
-    let distance = (boms[params.roma_levels * n * n * (n / 32u) + at / 4u] >> (8u * (at % 4u))) & 255u;
+    let at = (b.x * side + b.y) * side + b.z;
+    let word = level * words_of_level() + n * n * (n / 32u) + at / 4u;
+    let distance = (boms[word] >> (8u * (at % 4u))) & 255u;
     return BLOCK_CELLS * (max(distance, 1u) - 1u);
 }
 

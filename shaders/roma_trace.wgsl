@@ -1,6 +1,6 @@
 // Answers the pass's rays by ray-aligned occupancy maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the
 // next where the ray leaves one. Rays are off their surface by the level's lift where they enter it, so that no level meets what they
-// leave. With params.roma_near those alone go on that have met nothing before. What is met is written as a hit of no triangle.
+// leave. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing are ended.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -84,6 +84,13 @@ fn through(map: u32, at: vec3<f32>, speed: vec3<f32>, range: vec2<f32>, steps: u
     return Found(met(first_word(map, u32(x), u32(y)), at.z, speed.z, vec2<f32>(t, range.y)), steps > 0u);
 }
 
+// Whether a ray in doubt is traced: of the directions of a pixel one in so many, evenly, the first at random. Rays of a workgroup go together.
+fn is_chosen(index: u32) -> bool {
+    let workgroup = index / params.width / 8u * params.width + index % params.width / 8u;
+    let first = u32(random2(workgroup, ~params.stream, params.seed).y * f32(params.roma_one_in));
+    return (first + params.direction) % params.roma_one_in == 0u;
+}
+
 // Answers a ray; whether it was capped in some level.
 fn trace(index: u32, ray: Ray) -> bool {
     let normal = seen_surfaces[index].normal;
@@ -107,7 +114,7 @@ fn trace(index: u32, ray: Ray) -> bool {
     let start_level = start_level_of(ray.origin, normal, margin);
     let rise = barrier(barrier(barrier(direction.x * normal.x) + barrier(direction.y * normal.y)) + barrier(direction.z * normal.z));
     var t = ray.t_min;
-    if params.roma_near > 0u {
+    if params.roma_part == ROMA_FAR {
         t = max(t, hits[index].t);
     }
     var is_capped = false;
@@ -130,14 +137,24 @@ fn trace(index: u32, ray: Ray) -> bool {
             let found = through(map, cell, cells, range, steps);
             is_capped = is_capped || found.is_capped;
             if found.t >= 0.0 {
-                hits[index] = Hit(found.t, ROMA_HIT, 0.0, 0.0);
-                return is_capped;
-            }
-            if range.y >= ray.t_max {
+                if params.roma_part == ROMA_SIFT && is_chosen(index) {
+                    // What it brings counts for those that are not, too.
+                    hits[index].u = f32(params.roma_one_in - 1u);
+                } else {
+                    // A ray that was sifted is not traced.
+                    hits[index] = Hit(select(found.t, -1.0, params.roma_part == ROMA_SIFT), ROMA_HIT, 0.0, 0.0);
+                }
                 return is_capped;
             }
             t = range.y;
+            if t >= ray.t_max {
+                break;
+            }
         }
+    }
+    if params.roma_part == ROMA_SIFT && (params.roma_is_part == 0u || t >= ray.t_max) {
+        // All of it lies in the levels, and it is not traced.
+        hits[index].t = -1.0;
     }
     return is_capped;
 }
@@ -151,7 +168,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
         let index = global.y * params.width + global.x;
         let ray = rays[index];
         // What has met something is not asked again, nor what was traced to its end.
-        let is_open = params.roma_near == 0u || (hits[index].id == NONE && hits[index].t < ray.t_max);
+        let is_open = params.roma_part != ROMA_FAR || (hits[index].id == NONE && hits[index].t < ray.t_max);
         if ray.t_min <= ray.t_max && is_open {
             atomicAdd(&counted, select(1u, 65537u, trace(index, ray)));
         }

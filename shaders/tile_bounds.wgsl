@@ -28,7 +28,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
         for (var i = lane; i < w * h; i += 64u) {
             let index = (y0 + i / w) * params.width + x0 + i % w;
             let ray = rays[index];
-            if ray.t_min <= ray.t_max {
+            if is_traced(index, ray) {
                 o0 = min(o0, ray.origin);
                 o1 = max(o1, ray.origin);
                 d0 = min(d0, ray.direction);

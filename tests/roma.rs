@@ -133,6 +133,54 @@ fn occlusion_before_a_wall_is_that_of_the_closed_form_but_for_cells() {
     assert!(mean(&roma, 0.6) < 0.85 && mean(&roma, 3.0) > mean(&roma, 0.6) + 0.1);
 }
 
+/// Root mean square difference of what pixels see of the sky.
+fn apart(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    (a.iter().zip(b).map(|(a, b)| (a.1 - b.1) * (a.1 - b.1)).sum::<f64>() / a.len() as f64).sqrt()
+}
+
+#[test]
+fn traced_near_its_start_a_ray_is_nearer_to_the_exact_one() {
+    let folder = folder();
+    let of = |options: &str| openness(folder.path(), true, &format!("--spp 8 {options}"));
+    let exact = of("");
+    let handed_over = [0, 4, 8].map(|cells| of(&format!("--secondary roma --roma-near {cells}")));
+    let errors: Vec<f64> = handed_over.iter().map(|pixels| apart(pixels, &exact)).collect();
+    println!("traced up to 0, 4, 8 cells: {errors:?}");
+    assert!(errors[0] > 0.05, "control: maps alone err");
+    assert!(errors.windows(2).all(|two| two[1] < two[0]) && errors[2] < 0.7 * errors[0], "{errors:?}");
+    // Traced beyond everything that is there: the same rays, the same picture.
+    assert_eq!(apart(&of("--secondary roma --roma-near 256"), &exact), 0.0);
+}
+
+#[test]
+fn rays_that_maps_find_free_are_not_traced() {
+    let folder = folder();
+    let scene = scene(folder.path(), true);
+    let of = |options: &str| openness(folder.path(), true, &format!("--spp 16 {options}"));
+    let (exact, roma, auto, fewer) =
+        (of(""), of("--secondary roma"), of("--secondary auto --auto-one-in 1"), of("--secondary auto"));
+    let mean = |pixels: &[(f64, f64)]| pixels.iter().map(|p| p.1).sum::<f64>() / pixels.len() as f64;
+    let bias = |pixels: &[(f64, f64)]| mean(pixels) - mean(&exact);
+    let (error_of_maps, error) = (apart(&roma, &exact), apart(&auto, &exact));
+    println!("maps alone {error_of_maps:.4}, all in doubt traced {error:.4}, of four one {:.4}", apart(&fewer, &exact));
+    assert!(error < 0.5 * error_of_maps, "{error} is not half of {error_of_maps}");
+    // What is left out by chance is noise, no bias.
+    println!("bias: {:.5}, {:.5}, {:.5}", bias(&roma), bias(&auto), bias(&fewer));
+    assert!((bias(&fewer) - bias(&auto)).abs() < 0.004 && apart(&fewer, &exact) > error);
+    // What is counted: rays that maps were asked about, and those that were traced after that.
+    let rays = |options: &str| -> u64 {
+        let output = renderer(&scene, &format!("--effects ao {options}")).frame(0, &eye()).expect("a frame");
+        output.records.iter().filter(|r| r.pass == "ao").map(|r| r.rays).sum()
+    };
+    let [all, doubt, some] = ["", "--secondary auto --auto-one-in 1", "--secondary auto"].map(rays);
+    assert_eq!(all, (SIZE * SIZE * 16) as u64);
+    let share = |rays: u64| (rays - all) as f64 / all as f64;
+    println!("traced: {:.3}, of those in doubt one in four {:.3}", share(doubt), share(some));
+    assert!(share(doubt) > 0.1 && share(doubt) < 0.8, "{}", share(doubt));
+    assert!((share(some) / share(doubt) - 0.25).abs() < 0.02, "{} of {}", share(some), share(doubt));
+}
+
 #[test]
 fn a_plane_hardly_occludes_itself() {
     let folder = folder();
@@ -200,7 +248,8 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     let scene = city(folder.path(), "40K", "1K");
     let picture = |options: &str, threads: &str| {
         let output = folder.path().join("out");
-        walk_of(&scene, &output, &format!("--adapter cpu --secondary roma {options}"), threads);
+        let method = if options.contains("--secondary") { "" } else { "--secondary roma" };
+        walk_of(&scene, &output, &format!("--adapter cpu {method} {options}"), threads);
         let all = frames(&output);
         std::fs::remove_dir_all(&output).expect("a folder");
         all
@@ -210,6 +259,10 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     for (options, threads) in [("--cache 100%", "3"), ("--cache 20%", "2"), ("--cache 30% --schedule demand", "2")] {
         assert!(picture(options, threads) == one, "{options}, {threads} threads");
     }
+    let hybrid = picture("--cache 100% --secondary auto", "1");
+    assert!(hybrid != one && picture("--cache 20% --secondary auto --schedule demand", "3") == hybrid);
+    let near = picture("--cache 100% --roma-near 2", "1");
+    assert!(near != one && near != hybrid && picture("--cache 20% --roma-near 2", "3") == near);
     for other in ["--seed 1", "--roma-k 8", "--roma-size 64", "--roma-samples 1", "--roma-unsnapped all"] {
         assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
     }

@@ -24,3 +24,13 @@ fn start_hit(ray: u32, t_max: f32, source: u32) {
     hits[ray] = Hit(t_max, NONE, 0.0, 0.0);
     surfaces[ray] = Surface(vec3<f32>(0.0), NONE, vec3<f32>(0.0), 0u, 0.0, source, 1u, 0u);
 }
+
+// Whether a ray is traced: it has a range, and nothing has answered it before.
+fn is_traced(index: u32, ray: Ray) -> bool {
+    return ray.t_min <= ray.t_max && ray.t_min <= hits[index].t;
+}
+
+// For how many rays one that met nothing counts: those beside it were not traced (roma_trace.wgsl).
+fn weight_of(index: u32) -> f32 {
+    return 1.0 + hits[index].u;
+}

@@ -3,8 +3,8 @@
 
 @group(2) @binding(0) var<storage, read> roma_levels: array<RomaLevel>;
 @group(2) @binding(1) var<storage, read> roma_maps: array<RomaMap>;  // of the finest level, by their strata, then of the next
-@group(2) @binding(2) var<storage, read> boms: array<u32>;           // of all levels: cell (x, y, z) is bit z % 32 of a word; then what is empty in
-                                                                     // them, a byte a block (src/visibility/bom/clearance.rs)
+@group(2) @binding(2) var<storage, read> boms: array<u32>;           // of each level: cell (x, y, z) is bit z % 32 of a word; then what is empty, a
+                                                                     // byte a block (src/visibility/bom/clearance.rs)
 @group(2) @binding(3) var<storage, read_write> columns: array<u32>;  // of all maps, row by row, the words of a column together
 
 const TAN_8: f32 = 0.41421356; // tan(pi / 8)

@@ -47,10 +47,10 @@ struct Params {
     roma_levels: u32,     // base maps
     roma_samples: u32,    // look-ups of the base map a cell
     roma_steps: u32,      // columns that a ray passes before it is finished snapped; 0: it is snapped
-    roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced exactly
-    roma_is_part: u32,    // 1: rays that leave the coarsest base map are no longer asked about, 0: it holds the scene
-    padding0: u32,
-    padding1: u32,
+    roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced
+    roma_part: u32,       // which part of rays roma_trace answers, ROMA_*
+    roma_is_part: u32,    // 1: rays that leave the coarsest base map are not answered, 0: it holds the scene
+    roma_one_in: u32,     // of rays that roma_trace sifts and does not find free one in so many is traced
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -346,6 +346,9 @@ const TEXTURE_BC5: u32 = 2u;       // x and y of directions
 const TEXTURE_SRGB: u32 = 1u;      // flags: red, green and blue are sRGB, else linear
 const TILE_TEXELS: u32 = 128u;     // side of a tile
 const ROMA_HIT: u32 = 0xfffffffeu;   // id of what ROMA meets, which is no triangle
+const ROMA_WHOLE: u32 = 0u; // all of them
+const ROMA_FAR: u32 = 1u;   // from where they have been traced to
+const ROMA_SIFT: u32 = 2u;  // those alone that meet nothing
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass

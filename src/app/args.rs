@@ -360,7 +360,8 @@ pub struct WalkArgs {
     #[command(flatten)]
     pub effects: EffectArgs,
     /// How secondary rays are answered: exact (all are traced), roma (those of ao and shadow by maps of what cells are occupied, with a
-    /// bias of a few cells, and without a brick loaded for them; others are traced)
+    /// bias of a few cells, and without a brick loaded for them; others are traced), auto (those of ao and shadow that these maps find free are not
+    /// traced: an error of the nearest cell alone)
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
     /// Occupancy maps.
@@ -533,7 +534,9 @@ named_values! {
         Exact = "exact",
         /// Those that occupancy maps can answer by these.
         Roma = "roma",
-    } later &["df", "dvf", "displacement", "auto"]
+        /// Those that occupancy maps find free by these, others by tracing them.
+        Auto = "auto",
+    } later &["df", "dvf", "displacement"]
 }
 
 /// Accepts the values of a list.

@@ -78,7 +78,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--schedule fastest", "known: chc, demand, plain, plain-bvh2, auto"),
         ("--effects glitter", "no 'glitter'"),
         ("--effects=", "known: primary, shadow"),
-        ("--secondary dvf", "dvf is not in this version; it has: exact, roma"),
+        ("--secondary dvf", "dvf is not in this version; it has: exact, roma, auto"),
         ("--roma-k 5", "one of 4, 8"),
         ("--roma-size 100", "32, 64, 128, 256"),
         ("--roma-samples 3", "1, 2, 4"),

@@ -1,8 +1,8 @@
-//! Options of `--secondary roma`.
+//! Options of `--secondary roma` and `auto`.
 
 use super::args::ranged;
 use super::named::named_values;
-use crate::visibility::roma::{Grid, MOST_NEAR, MOST_STEPS, RomaSettings};
+use crate::visibility::roma::{Grid, MOST_NEAR, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings};
 use clap::Args;
 
 /// Options of ray-aligned occupancy maps.
@@ -35,6 +35,10 @@ pub struct RomaArgs {
     /// With --secondary roma: the same of rays of shadow
     #[arg(long, value_name = "CELLS", default_value = "0", value_parser = |s: &str| ranged(s, 0, MOST_NEAR.into()))]
     pub roma_shadow_near: u32,
+    /// With --secondary auto: of N rays of ao that maps do not find free one is traced, and counts for all of them, 1 to 16: more take less time and
+    /// are noisier; the mean is the same
+    #[arg(long, value_name = "N", default_value = "4", value_parser = |s: &str| ranged(s, 1, MOST_ONE_IN.into()))]
+    pub auto_one_in: u32,
 }
 
 named_values! {
@@ -52,17 +56,27 @@ named_values! {
 }
 
 impl RomaArgs {
-    /// How rays are answered.
-    pub fn settings(&self) -> RomaSettings {
-        let grid = |k| Grid { k, size: self.roma_size, samples: self.roma_samples.unwrap_or(0) };
-        let steps = |is_unsnapped| if is_unsnapped { self.roma_steps } else { 0 };
+    /// How rays are answered; with `is_auto` all that maps do not find free are traced, or of those of ao some.
+    pub fn settings(&self, is_auto: bool) -> RomaSettings {
+        let pass = |k, is_unsnapped, near, one_in| {
+            let role = match near {
+                _ if is_auto => Role::Sift(one_in),
+                0 => Role::Answer,
+                cells => Role::Far(cells),
+            };
+            let steps = if is_auto { MOST_STEPS } else { self.roma_steps };
+            RomaPass {
+                grid: Grid { k, size: self.roma_size, samples: self.roma_samples.unwrap_or(0) },
+                steps: if is_unsnapped || is_auto { steps } else { 0 },
+                role,
+            }
+        };
+        let unsnapped = self.roma_unsnapped;
+        let (ao, shadow) = (matches!(unsnapped, Unsnapped::Ao), matches!(unsnapped, Unsnapped::Shadow));
+        let both = matches!(unsnapped, Unsnapped::All);
         RomaSettings {
-            occlusion: grid(self.roma_k),
-            occlusion_steps: steps(matches!(self.roma_unsnapped, Unsnapped::Ao | Unsnapped::All)),
-            occlusion_near: self.roma_near,
-            shadow: grid(self.roma_shadow_k),
-            shadow_steps: steps(matches!(self.roma_unsnapped, Unsnapped::Shadow | Unsnapped::All)),
-            shadow_near: self.roma_shadow_near,
+            occlusion: pass(self.roma_k, ao || both, self.roma_near, self.auto_one_in),
+            shadow: pass(self.roma_shadow_k, shadow || both, self.roma_shadow_near, 1),
         }
     }
 }

@@ -7,6 +7,7 @@ use super::pictures::Pictures;
 use crate::render::denoise::Resolve;
 use crate::render::{Renderer, Schedule};
 use crate::stats::Record;
+use crate::visibility::roma::Role;
 use serde_json::{Map, Value, json};
 
 /// Raised when a field changes its meaning.
@@ -71,14 +72,15 @@ pub fn of_walk(
             "interactive_bytes": args.interactive,
             "secondary": args.secondary.name(),
             "roma": renderer.settings.roma.map(|roma| json!({
-                "k": roma.occlusion.k,
-                "shadow_k": roma.shadow.k,
-                "size": roma.occlusion.size,
-                "samples": roma.occlusion.samples(roma.occlusion.size),
-                "steps": roma.occlusion_steps,
-                "shadow_steps": roma.shadow_steps,
-                "near": roma.occlusion_near,
-                "shadow_near": roma.shadow_near,
+                "k": roma.occlusion.grid.k,
+                "shadow_k": roma.shadow.grid.k,
+                "size": roma.occlusion.grid.size,
+                "samples": roma.occlusion.grid.samples(roma.occlusion.grid.size),
+                "steps": roma.occlusion.steps,
+                "shadow_steps": roma.shadow.steps,
+                "near": near(roma.occlusion.role),
+                "one_in": if let Role::Sift(one_in) = roma.occlusion.role { one_in } else { 1 },
+                "shadow_near": near(roma.shadow.role),
                 "finest_cell": renderer.roma.finest_cell(),
             })),
             "spp": args.spp,
@@ -119,6 +121,11 @@ pub fn of_walk(
         "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
         "non_finite": records.iter().map(|r| r.non_finite).sum::<u64>(),
     })
+}
+
+/// Cells up to which rays are traced that maps answer from there on.
+fn near(role: Role) -> u32 {
+    if let Role::Far(cells) = role { cells } else { 0 }
 }
 
 /// What the host cache did, and what came of prefetching: payloads brought ahead of need, those that a load then found

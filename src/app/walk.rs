@@ -34,7 +34,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     let scene = open_scene(&args.scene)?;
     let manifest = &scene.resident().manifest;
     let has_occupancy = scene.resident().bricks.is_empty() || !scene.resident().occupancy.is_empty();
-    if args.secondary == Secondary::Roma && !has_occupancy {
+    if args.secondary != Secondary::Exact && !has_occupancy {
         let name = args.scene.display();
         bail!("{name}: --secondary roma needs the occupancy of bricks; convert the scene again without --no-proxies");
     }
@@ -226,7 +226,7 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         guides: args.pictures.denoise || args.pictures.taa,
         taa: args.pictures.taa,
         tile_bytes: args.interactive,
-        roma: (args.secondary == Secondary::Roma).then(|| args.roma.settings()),
+        roma: (args.secondary != Secondary::Exact).then(|| args.roma.settings(args.secondary == Secondary::Auto)),
     }
 }
 

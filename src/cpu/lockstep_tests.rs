@@ -20,7 +20,7 @@ use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::fronts::Fronts;
 use crate::schedule::{Optimisation, Tracing};
 use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
-use crate::visibility::roma::{Grid, RomaSettings};
+use crate::visibility::roma::{Grid, Role, RomaPass, RomaSettings};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -157,8 +157,8 @@ struct Variant {
     list_most: u32,
     without: &'static [Optimisation],
     with: &'static [Optimisation],
-    /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped. Cells of these up to which they are traced exactly.
-    roma: Option<(u32, u32)>,
+    /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped; what these do for them.
+    roma: Option<(u32, Role)>,
     /// Bytes of tiles that a frame may load.
     tile_bytes: Option<u64>,
 }
@@ -207,16 +207,9 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 }
 
 /// Small maps, of both numbers of directions.
-fn roma((steps, near): (u32, u32)) -> RomaSettings {
-    let grid = |k, size| Grid { k, size, samples: 0 };
-    RomaSettings {
-        occlusion: grid(4, 32),
-        occlusion_steps: steps,
-        occlusion_near: near,
-        shadow: grid(8, 32),
-        shadow_steps: steps,
-        shadow_near: 2 * near,
-    }
+fn roma((steps, role): (u32, Role)) -> RomaSettings {
+    let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 0 }, steps, role };
+    RomaSettings { occlusion: pass(4), shadow: pass(8) }
 }
 
 /// Renders two frames in lockstep.
@@ -318,10 +311,11 @@ fn twins_agree_with_their_kernels() {
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
         Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
-        Variant { roma: Some((0, 0)), ..VARIANT },
-        Variant { roma: Some((3, 0)), ..VARIANT },
-        Variant { roma: Some((0, 2)), ..VARIANT },
-        Variant { roma: Some((3, 1)), schedule: Schedule::Demand, ..VARIANT },
+        Variant { roma: Some((0, Role::Answer)), ..VARIANT },
+        Variant { roma: Some((3, Role::Answer)), ..VARIANT },
+        Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
+        Variant { roma: Some((64, Role::Sift(1))), ..VARIANT },
+        Variant { roma: Some((3, Role::Sift(3))), schedule: Schedule::Demand, ..VARIANT },
         Variant { fronts: true, ..VARIANT },
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
@@ -363,7 +357,7 @@ fn a_twin_that_differs_is_noticed() {
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
-        let roma = (defect == Defect::Maps).then_some((0, 0));
+        let roma = (defect == Defect::Maps).then_some((0, Role::Answer));
         let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();

@@ -4,7 +4,7 @@
 
 use super::leaf::BrickRay;
 use super::node::{FramedRay, UNIT, framed_ray, node_hits, traversal_mask};
-use super::rays::RaySet;
+use super::rays::{RaySet, is_traced};
 use super::scene::{Bound, Tally};
 use super::tile_lists::TileLists;
 use super::vector::{each, least, most, most3};
@@ -74,7 +74,7 @@ fn ask(bound: &Bound, set: &RaySet, pair: &Pair, nodes: &[u32], each: bool, out:
             let at = (y * bound.params.width + x) as usize;
             let (ray, hit) = (&set.rays[at], &set.hits[at]);
             let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
-            if ray.t_min > ray.t_max || occluded {
+            if !is_traced(ray, hit) || occluded {
                 continue;
             }
             let world = framed_ray(ray.origin, ray.direction, ray.t_min);

@@ -51,8 +51,14 @@ impl Slot<'_> {
     /// Whether the ray is traced.
     #[inline(always)]
     pub fn is_traced(&self) -> bool {
-        self.ray.t_min <= self.ray.t_max
+        is_traced(self.ray, self.hit)
     }
+}
+
+/// Whether a ray is traced: it has a range, and nothing has answered it before.
+#[inline(always)]
+pub fn is_traced(ray: &Ray, hit: &Hit) -> bool {
+    ray.t_min <= ray.t_max && ray.t_min <= hit.t
 }
 
 /// Whose rays a kernel runs over.

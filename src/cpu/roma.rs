@@ -4,7 +4,8 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
-    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, NONE, Params, ROMA_HIT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, NONE, Params, ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap,
+    Surface, T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -150,6 +151,8 @@ struct Found {
     t: f32,
     /// It passed as many columns as it may, and was finished snapped.
     is_capped: bool,
+    /// All of it lies in the levels.
+    is_known: bool,
 }
 
 /// The part of the range of t in which a coordinate lies between `low` and `high`.
@@ -180,6 +183,13 @@ fn border(at: f32, speed: f32, cell: i32) -> f32 {
 /// Cells before its sides at which a level ends for ray `index`.
 fn margin_of(p: &Params, index: u32) -> f32 {
     BLEND * (p.roma_cells as f32 * random2(index, !p.stream, p.seed)[0])
+}
+
+/// Whether a ray in doubt is traced: of the directions of a pixel one in so many, evenly, the first at random. Rays of a workgroup go together.
+fn is_chosen(p: &Params, index: u32) -> bool {
+    let workgroup = index / p.width / 8 * p.width + index % p.width / 8;
+    let first = (random2(workgroup, !p.stream, p.seed)[1] * p.roma_one_in as f32) as u32;
+    (first + p.direction).is_multiple_of(p.roma_one_in)
 }
 
 /// A ray's start, off its surface by the level's lift, of which it may be `height` off already.
@@ -241,7 +251,7 @@ impl Maps<'_> {
             let end = most(t, least(range[1], least(to_x, to_y)));
             let hit = self.met(self.first_word(map, x, y), at[2], speed[2], [t, end]);
             if hit >= 0.0 || end >= range[1] {
-                return Found { t: hit, is_capped: false };
+                return Found { t: hit, is_capped: false, is_known: true };
             }
             if to_x <= to_y {
                 x += if speed[0] > 0.0 { 1 } else { -1 };
@@ -249,12 +259,12 @@ impl Maps<'_> {
                 y += if speed[1] > 0.0 { 1 } else { -1 };
             }
             if x.min(y) < 0 || x.max(y) > last {
-                return Found { t: -1.0, is_capped: false };
+                return Found { t: -1.0, is_capped: false, is_known: true };
             }
             t = end;
         }
         let hit = self.met(self.first_word(map, x, y), at[2], speed[2], [t, range[1]]);
-        Found { t: hit, is_capped: steps > 0 }
+        Found { t: hit, is_capped: steps > 0, is_known: true }
     }
 
     /// Where a ray meets something at or beyond t = `from`, below 0 nowhere; whether it was capped in some level.
@@ -296,13 +306,16 @@ impl Maps<'_> {
                 let cells = each(|k| linear(&rows[k], direction));
                 let found = self.through(map, cell, cells, range, steps);
                 is_capped |= found.is_capped;
-                if found.t >= 0.0 || range[1] >= ray.t_max {
+                if found.t >= 0.0 {
                     return Found { is_capped, ..found };
                 }
                 t = range[1];
+                if t >= ray.t_max {
+                    break;
+                }
             }
         }
-        Found { t: -1.0, is_capped }
+        Found { t: -1.0, is_capped, is_known: p.roma_is_part == 0 || t >= ray.t_max }
     }
 }
 
@@ -332,12 +345,12 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
 pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let RomaMaps { levels, maps, .. } = &tables.maps;
     let of = Maps { params: bound.params, levels, maps, columns: &tables.columns };
-    let is_far = bound.params.roma_near > 0;
+    let part = bound.params.roma_part;
     own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
         let mut tally = Tally::default();
         for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
             // What has met something is not asked again, nor what was traced to its end.
-            if is_far && (hit.id != NONE || hit.t >= ray.t_max) {
+            if part == ROMA_FAR && (hit.id != NONE || hit.t >= ray.t_max) {
                 continue;
             }
             let index = run * RUN + i;
@@ -345,10 +358,18 @@ pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &R
             if levels.is_empty() {
                 continue;
             }
-            let found = of.trace(index as u32, ray, normal_of(seen, index), if is_far { hit.t } else { ray.t_min });
+            let found =
+                of.trace(index as u32, ray, normal_of(seen, index), if part == ROMA_FAR { hit.t } else { ray.t_min });
             tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
-            if found.t >= 0.0 {
-                *hit = Hit { t: found.t, id: ROMA_HIT, u: 0.0, v: 0.0 };
+            match part {
+                // It is not traced.
+                ROMA_SIFT if found.t < 0.0 && found.is_known => hit.t = -1.0,
+                ROMA_SIFT if found.t < 0.0 => {}
+                // What it brings counts for those that are not, too.
+                ROMA_SIFT if is_chosen(bound.params, index as u32) => hit.u = (bound.params.roma_one_in - 1) as f32,
+                ROMA_SIFT => *hit = Hit { t: -1.0, id: ROMA_HIT, u: 0.0, v: 0.0 },
+                _ if found.t >= 0.0 => *hit = Hit { t: found.t, id: ROMA_HIT, u: 0.0, v: 0.0 },
+                _ => {}
             }
         }
         bound.counters.add(&tally);

@@ -8,8 +8,9 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, cross, dot, each, most, normalize, xyz};
 use crate::kernel::layout::{
-    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, PARAM_BOUNCE,
-    PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_SKY, PARAM_SUN, Ray,
+    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE,
+    PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_SKY, PARAM_SUN,
+    Ray,
 };
 use bricks::Material;
 use rayon::prelude::*;
@@ -82,6 +83,11 @@ fn for_each_pixel(
         }
         bound.counters.add(&tally);
     });
+}
+
+/// For how many rays one that met nothing counts: those beside it were not traced ([`super::roma`]).
+fn weight_of(hit: &Hit) -> f32 {
+    1.0 + hit.u
 }
 
 fn is_traced(ray: &Ray) -> bool {
@@ -226,7 +232,7 @@ pub fn add_light(
             let reflected = s.reflected(unit);
             reflects = each(|k| reflects[k] + weight * reflected[k]);
         }
-        Some(each(|k| surface_share(bound) * reflects[k] * light[k]))
+        Some(each(|k| weight_of(&own.hits[index]) * surface_share(bound) * reflects[k] * light[k]))
     });
 }
 
@@ -245,7 +251,8 @@ pub fn add_occlusion(
         let ambient = ambient(bound.params, g.normal);
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
         let mirrored = s.reflected_ambient(bound);
-        Some(each(|k| surface_share(bound) * bound.params.share * (s.diffuse[k] * ambient[k] + mirrored[k])))
+        let share = weight_of(&own.hits[index]) * surface_share(bound) * bound.params.share;
+        Some(each(|k| share * (s.diffuse[k] * ambient[k] + mirrored[k])))
     });
 }
 

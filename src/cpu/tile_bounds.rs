@@ -1,7 +1,7 @@
 //! Bounds of the rays of each tile: twin of `shaders/tile_bounds.wgsl`. Origins, directions, and the range of distances in which they
 //! can still hit.
 
-use super::rays::RaySet;
+use super::rays::{RaySet, is_traced};
 use super::scene::{Bound, Tally};
 use super::vector::{each, least, most};
 use crate::kernel::layout::{COUNTER_RAYS, T_INFINITE, TileBounds};
@@ -35,7 +35,7 @@ fn bounds_of(bound: &Bound, set: &RaySet, tile: u32) -> TileBounds {
         for x in x0..x1 {
             let at = (y * p.width + x) as usize;
             let ray = &set.rays[at];
-            if ray.t_min <= ray.t_max {
+            if is_traced(ray, &set.hits[at]) {
                 b.origin_min = each(|k| least(b.origin_min[k], ray.origin[k]));
                 b.origin_max = each(|k| most(b.origin_max[k], ray.origin[k]));
                 b.direction_min = each(|k| least(b.direction_min[k], ray.direction[k]));

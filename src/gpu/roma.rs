@@ -8,7 +8,7 @@ use crate::kernel::dispatch::{ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernel::layout::{RomaLevel, RomaMap};
 use crate::kernel::roma::RomaMaps;
 use crate::schedule::ExecutorError;
-use crate::visibility::bom::{Bom, Cascades, clearance};
+use crate::visibility::bom::{Cascades, clearance};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -90,13 +90,11 @@ impl Roma {
             self.rebind(gpu);
         }
         let mut at = 0;
-        for words in cascades.levels.iter().map(Bom::words) {
-            gpu.queue.write_buffer(&self.boms, at, bytemuck::cast_slice(words));
-            at += size_of_val(words) as u64;
-        }
-        for clearance in &clearances {
-            gpu.queue.write_buffer(&self.boms, at, clearance);
-            at += clearance.len() as u64;
+        for (bom, clearance) in cascades.levels.iter().zip(&clearances) {
+            for bytes in [bytemuck::cast_slice(bom.words()), clearance] {
+                gpu.queue.write_buffer(&self.boms, at, bytes);
+                at += bytes.len() as u64;
+            }
         }
         self.cascades = cascades.clone();
         Ok(())

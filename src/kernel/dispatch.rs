@@ -2,7 +2,7 @@
 
 use super::layout::{self, Params};
 use crate::math::sampling::{cosine_hemisphere, halton};
-use crate::schedule::{Lamp, Pass, Query, Step};
+use crate::schedule::{Lamp, Pass, Query, RomaPart, Step};
 
 /// The directions of the passes that start at hits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -300,9 +300,18 @@ pub fn dispatches(
             vec![roma(ROMA_ROTATE, params, across(columns.div_ceil(64)), 0)]
         }
         Step::RomaNear { cells } => vec![roma(ROMA_NEAR, Params { roma_near: cells, ..params }, per_ray, 0)],
-        Step::RomaTrace { steps, is_far } => {
-            let params = Params { roma_steps: steps, roma_near: is_far.into(), ..params };
-            vec![roma(ROMA_TRACE, params, per_ray, 2)]
+        Step::RomaTrace { steps, part } => {
+            let (part, one_in) = match part {
+                RomaPart::Whole => (layout::ROMA_WHOLE, 1),
+                RomaPart::Far => (layout::ROMA_FAR, 1),
+                RomaPart::Sift { one_in } => (layout::ROMA_SIFT, one_in),
+            };
+            vec![roma(
+                ROMA_TRACE,
+                Params { roma_steps: steps, roma_part: part, roma_one_in: one_in, ..params },
+                per_ray,
+                2,
+            )]
         }
     }
 }

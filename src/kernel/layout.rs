@@ -57,6 +57,9 @@ pub const GBUFFER_READ: u32 = 1;
 pub const GBUFFER_WAITS: u32 = 62;
 pub const GBUFFER_FIRST: u32 = 1;
 pub const ROMA_HIT: u32 = 0xffff_fffe;
+pub const ROMA_WHOLE: u32 = 0;
+pub const ROMA_FAR: u32 = 1;
+pub const ROMA_SIFT: u32 = 2;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
@@ -98,7 +101,7 @@ mirror! {
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
         emitter_density: f32, diffuse_count: f32, roma_k: u32, roma_size: u32,
         roma_cells: u32, roma_levels: u32, roma_samples: u32, roma_steps: u32,
-        roma_near: u32, roma_is_part: u32, padding0: u32, padding1: u32,
+        roma_near: u32, roma_part: u32, roma_is_part: u32, roma_one_in: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

@@ -3,15 +3,10 @@
 use super::frame::Frame;
 use super::layout::{Params, RomaLevel, RomaMap};
 use crate::visibility::bom::{Bom, Cascades};
-use crate::visibility::roma::Grid;
+use crate::visibility::roma::RomaPass;
 use crate::visibility::roma::directions::{Drawn, draw};
 use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
-
-/// Cells of a map by which rays start off their surface (Zeng et al., §6). What marks a plane reaches one cell of a base map above it, 0.58 of
-/// a map of as many cells, and is found from up to 1.03 cells of the map away: half a diagonal across the column, three quarters along it. So a
-/// plane hardly occludes itself, where the worst of both come together.
-pub const LIFT_CELLS: f64 = 1.5;
 
 /// What is drawn for ROMA takes random numbers of its own.
 const STREAM: u32 = 9 << 24;
@@ -36,8 +31,14 @@ pub struct RomaMaps {
 }
 
 impl RomaMaps {
-    /// Those of the finest `count` levels of `cascades` by `grid`, in directions drawn for sample `sample`.
-    pub fn new(cascades: &Cascades, count: usize, frame: &Frame, grid: Grid, (sample, seed): (u32, u32)) -> Self {
+    /// Those of the finest `count` levels of `cascades` for `pass`, in directions drawn for sample `sample`.
+    pub fn new(
+        cascades: &Cascades,
+        count: usize,
+        frame: &Frame,
+        RomaPass { grid, role, .. }: RomaPass,
+        (sample, seed): (u32, u32),
+    ) -> Self {
         let cells = cascades.levels.first().map_or(0, Bom::cells);
         let drawn = draw(grid.k, sample.wrapping_add(STREAM), seed);
         let level = |bom: &Bom| {
@@ -50,7 +51,7 @@ impl RomaMaps {
         let record = |&(first, per_unit): &(DVec3, f64)| RomaLevel {
             first: first.as_vec3().to_array(),
             scale: per_unit as f32,
-            lift: (LIFT_CELLS / (scale * per_unit)) as f32,
+            lift: (role.lift() / (scale * per_unit)) as f32,
             ..RomaLevel::default()
         };
         let middle = DVec3::splat(f64::from(cells) / 2.0);
@@ -110,6 +111,11 @@ fn axes(drawn: &Drawn) -> DMat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::visibility::roma::{Grid, Role};
+
+    fn pass(size: u32) -> RomaPass {
+        RomaPass { grid: Grid { k: 4, size, samples: 0 }, steps: 0, role: Role::Answer }
+    }
 
     fn apply(rows: &[[f32; 4]; 3], p: DVec3) -> DVec3 {
         let row = |r: &[f32; 4]| DVec3::new(r[0].into(), r[1].into(), r[2].into()).dot(p) + f64::from(r[3]);
@@ -123,7 +129,7 @@ mod tests {
             let cascades =
                 Cascades { levels: vec![Bom::new(cells, -2, [-4, -20, 1]), Bom::new(cells, -1, [-10, -18, -7])] };
             for sample in 0..4 {
-                let maps = RomaMaps::new(&cascades, 2, &frame, Grid { k: 4, size: 64, samples: 0 }, (sample, 3));
+                let maps = RomaMaps::new(&cascades, 2, &frame, pass(64), (sample, 3));
                 assert_eq!((maps.levels.len(), maps.maps.len()), (2, 32));
                 for (i, map) in maps.maps.iter().enumerate() {
                     let level = &cascades.levels[i / 16];
@@ -147,9 +153,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(
-            RomaMaps::new(&Cascades::default(), 1, &frame, Grid { k: 4, size: 32, samples: 0 }, (0, 0)).words(),
-            0
-        );
+        assert_eq!(RomaMaps::new(&Cascades::default(), 1, &frame, pass(32), (0, 0)).words(), 0);
     }
 }

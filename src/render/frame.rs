@@ -9,10 +9,12 @@ use crate::scene::Camera;
 use crate::schedule::auto::{Auto, Fixed};
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain};
+use crate::schedule::{
+    ExecutorError, Lamp, Pass, PassStats, RomaPart, Shading, Step, Tracing, attributes, chc, demand, plain,
+};
 use crate::stats::Record;
 use crate::stream::HostCacheStats;
-use crate::visibility::roma::{RomaPass, RomaSettings};
+use crate::visibility::roma::{Role, RomaPass, RomaSettings};
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -301,24 +303,30 @@ impl Renderer {
     fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
         let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
-        let mut first = vec![Step::Generate];
+        let (mut first, mut last) = (vec![Step::Generate], vec![Step::QueryHits]);
         if let Some(roma) = roma {
-            let RomaPass { steps, near, .. } = roma;
+            let RomaPass { steps, role, .. } = roma;
             let length = match (pass, self.settings.effects.occlusion) {
                 (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
                 _ => f64::INFINITY,
             };
             first.extend(self.roma.prepare(&mut *self.executor, &self.scene, roma, length)?);
-            if near == 0 {
-                first.extend([Step::RomaTrace { steps, is_far: false }, add]);
-                stats.add(self.executor.run(pass, &first, &self.cache.states)?);
-                return Ok(());
+            let trace = |part| Step::RomaTrace { steps, part };
+            match role {
+                Role::Answer => {
+                    first.extend([trace(RomaPart::Whole), add]);
+                    stats.add(self.executor.run(pass, &first, &self.cache.states)?);
+                    return Ok(());
+                }
+                Role::Far(cells) => {
+                    first.push(Step::RomaNear { cells });
+                    last.push(trace(RomaPart::Far));
+                }
+                Role::Sift(one_in) => first.push(trace(RomaPart::Sift { one_in })),
             }
-            first.push(Step::RomaNear { cells: near });
         }
         self.trace(frame, pass, &first, stats)?;
-        let far = roma.map(|RomaPass { steps, .. }| Step::RomaTrace { steps, is_far: true });
-        let last: Vec<Step> = [Step::QueryHits].into_iter().chain(far).chain([add]).collect();
+        last.push(add);
         let report = self.executor.run(pass, &last, &self.cache.states)?;
         stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
         stats.add(report);

@@ -1,11 +1,11 @@
 //! Occlusion and shadow rays that occupancy maps answer: which maps, and when they are made.
 
 use crate::kernel::frame::Frame;
-use crate::kernel::roma::{LIFT_CELLS, RomaMaps};
+use crate::kernel::roma::RomaMaps;
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
 use crate::visibility::bom::{Assembler, Bom, BomError, Cascades, Settings};
-use crate::visibility::roma::{Grid, MOST_LEVELS, RomaPass, RomaSettings};
+use crate::visibility::roma::{Grid, MOST_LEVELS, Role, RomaPass, RomaSettings};
 use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ pub struct Roma {
     /// Whether the base maps are those of the present camera.
     is_assembled: bool,
     /// The ray-aligned maps that the executor has of the present sample.
-    made: Option<(Grid, usize)>,
+    made: Option<(Grid, Role, usize)>,
 }
 
 struct RomaView {
@@ -52,11 +52,10 @@ impl Roma {
 
     /// How the rays of `pass` are answered; `None` where they are traced.
     pub fn pass_of(settings: &RomaSettings, pass: Pass) -> Option<RomaPass> {
-        let RomaSettings { occlusion, occlusion_steps, occlusion_near, shadow, shadow_steps, shadow_near } = *settings;
         match pass {
-            Pass::Occlusion(_) => Some(RomaPass { grid: occlusion, steps: occlusion_steps, near: occlusion_near }),
+            Pass::Occlusion(_) => Some(settings.occlusion),
             Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
-                Some(RomaPass { grid: shadow, steps: shadow_steps, near: shadow_near })
+                Some(settings.shadow)
             }
             _ => None,
         }
@@ -71,10 +70,11 @@ impl Roma {
         &mut self,
         executor: &mut dyn FrameExecutor,
         scene: &Arc<SceneFile>,
-        RomaPass { grid, near, .. }: RomaPass,
+        pass: RomaPass,
         length: f64,
     ) -> Result<Option<Step>, ExecutorError> {
         let Some(RomaView { frame, camera, sample, seed }) = &self.view else { return Ok(None) };
+        let RomaPass { grid, role, .. } = pass;
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
         let (cells, mut assembler) = match self.assembler.take() {
             Some((cells, assembler)) if cells == grid.size => (cells, assembler),
@@ -93,15 +93,16 @@ impl Roma {
             self.is_assembled = true;
         }
         self.assembler = Some((cells, assembler));
-        let first = LIFT_CELLS / grid.scale(grid.size);
-        let is_of_use = |bom: &&Bom| first.max(f64::from(near)) * bom.side() < length;
+        let before = role.lift() / grid.scale(grid.size);
+        let before = if let Role::Far(cells) = role { before.max(cells.into()) } else { before };
+        let is_of_use = |bom: &&Bom| before * bom.side() < length;
         let levels = self.cascades.levels.iter().take_while(is_of_use).count();
-        if self.made == Some((grid, levels)) {
+        if self.made == Some((grid, role, levels)) {
             return Ok(None);
         }
         executor.set_cascades(&self.cascades)?;
-        executor.set_roma(&RomaMaps::new(&self.cascades, levels, frame, grid, (*sample, *seed)))?;
-        self.made = Some((grid, levels));
+        executor.set_roma(&RomaMaps::new(&self.cascades, levels, frame, pass, (*sample, *seed)))?;
+        self.made = Some((grid, role, levels));
         Ok(Some(Step::RomaRotate))
     }
 

@@ -148,8 +148,8 @@ pub enum Step {
     RomaTrace {
         /// Columns that a ray passes before it is finished along the map's direction; 0: it takes that direction from the start.
         steps: u32,
-        /// Rays that have met nothing where [`Step::RomaNear`] ended them are answered from there on; else all, from their start.
-        is_far: bool,
+        /// Which part of them.
+        part: RomaPart,
     },
 }
 
@@ -162,6 +162,21 @@ pub struct Query {
     pub undone: bool,
     /// Each ray up to the first that it enters of those it asks for; else for all that it enters before its hit.
     pub up_to_next: bool,
+}
+
+/// Which part of rays occupancy maps answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RomaPart {
+    /// All of them.
+    Whole,
+    /// Of those that have met nothing where [`Step::RomaNear`] ended them, what lies beyond: they have been traced.
+    Far,
+    /// Whether they meet anything. Those that do not are answered; of the others one in so many is still to be traced and counts for them
+    /// all, and the rest are taken for occluded.
+    Sift {
+        /// How many.
+        one_in: u32,
+    },
 }
 
 impl Step {

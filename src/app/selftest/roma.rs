@@ -7,7 +7,7 @@ use crate::kernel::layout::{Hit, NONE, Params, ROMA_HIT, Ray, RomaLevel, RomaMap
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::{Directions, View};
 use crate::math::sampling::pcg;
-use crate::schedule::{Lamp, Pass, Step};
+use crate::schedule::{Lamp, Pass, RomaPart, Step};
 use crate::visibility::bom::{Bom, Cascades};
 use crate::visibility::roma::MOST_STEPS;
 use anyhow::Result;
@@ -71,7 +71,7 @@ fn answers(stage: &mut Stage, rays: &[Ray], steps: u32) -> Result<Vec<Hit>> {
         executor.set_rays(pass, chunk);
         executor.run(
             pass,
-            &[Step::StartHits, Step::RomaTrace { steps, is_far: false }],
+            &[Step::StartHits, Step::RomaTrace { steps, part: RomaPart::Whole }],
             &stage.session.cache.states,
         )?;
         hits.extend_from_slice(&executor.read_hits(pass)?[..chunk.len()]);

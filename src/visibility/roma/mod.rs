@@ -48,21 +48,25 @@ impl Grid {
     }
 }
 
-/// How ROMA answers the rays of walks.
+/// What maps do for the rays of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RomaSettings {
-    /// The maps of occlusion rays.
-    pub occlusion: Grid,
-    /// Columns that an occlusion ray passes before it is finished snapped; 0: it is snapped.
-    pub occlusion_steps: u32,
-    /// The maps of shadow rays.
-    pub shadow: Grid,
-    /// Columns of shadow rays.
-    pub shadow_steps: u32,
-    /// Cells of the base map that holds its start up to which an occlusion ray is traced exactly; 0: nowhere.
-    pub occlusion_near: u32,
-    /// The same of shadow rays.
-    pub shadow_near: u32,
+pub enum Role {
+    /// They answer them.
+    Answer,
+    /// They answer what lies beyond so many cells of the base map that holds a ray's start from it; up to there rays are traced.
+    Far(u32),
+    /// They say which rays meet nothing. Of the others, one in so many is traced and counts for them all (Russian roulette).
+    Sift(u32),
+}
+
+impl Role {
+    /// Cells of a map by which rays start off their surface. What marks a plane reaches one cell of a base map above it, 0.58 of a map of as many
+    /// cells, and is found from up to 1.03 cells of the map away: half a diagonal across the column, three quarters along it. So with the 1.5 of
+    /// Zeng et al. (§6) a plane hardly occludes itself, where the worst of both come together. Rays that are sifted start lower: what is taken
+    /// for something costs time only, and what lies below their start is overlooked.
+    pub fn lift(self) -> f64 {
+        if matches!(self, Self::Sift(_)) { 0.75 } else { 1.5 }
+    }
 }
 
 /// How the rays of a pass are answered.
@@ -72,12 +76,24 @@ pub struct RomaPass {
     pub grid: Grid,
     /// Columns that a ray passes before it is finished snapped; 0: it is snapped.
     pub steps: u32,
-    /// Cells of the base map that holds its start up to which a ray is traced exactly; 0: nowhere.
-    pub near: u32,
+    /// What the maps do for them.
+    pub role: Role,
+}
+
+/// How ROMA answers the rays of walks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RomaSettings {
+    /// Occlusion rays.
+    pub occlusion: RomaPass,
+    /// Rays to the sun and to emitters.
+    pub shadow: RomaPass,
 }
 
 /// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.
 pub const MOST_LEVELS: u32 = 6;
+
+/// Most rays of which one is traced.
+pub const MOST_ONE_IN: u32 = 16;
 
 /// Most cells up to which a ray may be traced exactly.
 pub const MOST_NEAR: u32 = 256;
