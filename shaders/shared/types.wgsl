@@ -47,6 +47,14 @@ struct Params {
     roma_levels: u32,     // base maps
     roma_samples: u32,    // look-ups of the base map a cell
     roma_steps: u32,      // columns that a ray passes before it is finished snapped; 0: it is snapped
+    field_cells: u32,     // cells of a distance field's base map on each axis
+    field_levels: u32,    // distance fields, one a base map
+    field_level: u32,     // which of them is made
+    field_mip: u32,       // and which of its levels: cells are 2^mip of the base map's
+    field_step: u32,      // cells on each axis that jump flooding looks away
+    field_half: u32,      // which half of the nearest cells is read
+    field_steps: u32,     // look-ups of a ray at most
+    field_hit: f32,       // a ray meets what it is no farther from, cells
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -341,6 +349,7 @@ const TEXTURE_BC5: u32 = 2u;       // x and y of directions
 const TEXTURE_SRGB: u32 = 1u;      // flags: red, green and blue are sRGB, else linear
 const TILE_TEXELS: u32 = 128u;     // side of a tile
 const ROMA_HIT: u32 = 0xfffffffeu;   // id of what ROMA meets, which is no triangle
+const FIELD_HIT: u32 = 0xfffffffdu;  // id of what is met in a distance field, which is no triangle
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
@@ -367,5 +376,6 @@ const COUNTER_TIGHTENED: u32 = 17u;
 const COUNTER_TILES_FROM_ROOT: u32 = 18u;
 const COUNTER_TILES_CHOSEN: u32 = 19u;
 const COUNTER_ROMA_CAPPED: u32 = 20u;
+const COUNTER_FIELD_CAPPED: u32 = 23u;
 const WORK_CHOSEN: u32 = 24u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 28u;      // the same over tiles whose rays walk from the root

@@ -3,6 +3,7 @@
 
 use super::bench::args::BenchArgs;
 use super::device::Adapter;
+use super::field_args::FieldArgs;
 use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
@@ -360,12 +361,16 @@ pub struct WalkArgs {
     #[command(flatten)]
     pub effects: EffectArgs,
     /// How secondary rays are answered: exact (all are traced), roma (those of ao and shadow by maps of what cells are occupied, with a
-    /// bias of a few cells, and without a brick loaded for them; others are traced)
+    /// bias of a few cells, and without a brick loaded for them; others are traced), df (the same rays by distances to such cells: the
+    /// baseline that roma is compared with)
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
     /// Occupancy maps.
     #[command(flatten)]
     pub roma: RomaArgs,
+    /// Distance fields.
+    #[command(flatten)]
+    pub df: FieldArgs,
     /// Samples per pixel, 1 to 1M; beyond 64 they are summed in f64, so that no number of them makes the sum drift
     #[arg(long, value_name = "N", default_value = "1", value_parser = samples)]
     pub spp: u32,
@@ -528,7 +533,9 @@ named_values! {
         Exact = "exact",
         /// Those that occupancy maps can answer by these.
         Roma = "roma",
-    } later &["df", "dvf", "displacement", "auto"]
+        /// The same by distance fields.
+        Df = "df",
+    } later &["dvf", "displacement", "auto"]
 }
 
 /// Accepts the values of a list.

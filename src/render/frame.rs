@@ -2,7 +2,7 @@
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Light, Roma, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Roma, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -12,6 +12,7 @@ use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Shading, Step, Tracing, attributes, chc, demand, plain};
 use crate::stats::Record;
 use crate::stream::HostCacheStats;
+use crate::visibility::distance_field::FieldSettings;
 use crate::visibility::roma::RomaSettings;
 use bricks::SceneFile;
 use std::sync::Arc;
@@ -54,6 +55,8 @@ pub struct RenderSettings {
     pub taa: bool,
     /// Occlusion rays and those to the sun and emitters are answered by occupancy maps; none of them asks for bricks.
     pub roma: Option<RomaSettings>,
+    /// The same rays are answered by distance fields.
+    pub field: Option<FieldSettings>,
 }
 
 /// Why a frame could not be rendered.
@@ -124,14 +127,16 @@ pub struct Renderer {
     pub auto: Auto,
     /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
     pub captures: Option<Captures>,
-    /// The occupancy maps, where settings ask for them.
+    /// The occupancy maps, where settings ask for them or for distance fields.
     pub roma: Roma,
+    /// The distance fields, where settings ask for them.
+    pub field: Field,
     /// The host cache's statistics at the end of the pass before.
     pub host_seen: HostCacheStats,
 }
 
 impl Renderer {
-    /// Renders one frame. Without ROMA it is exact; with it, too, pixels depend on scene, camera, lights and settings alone.
+    /// Renders one frame. Without ROMA and distance fields it is exact; with them, too, pixels depend on scene, camera, lights and settings alone.
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.
@@ -302,6 +307,9 @@ impl Renderer {
                 .chain([Step::RomaTrace { steps: columns }, add])
                 .collect();
             stats.add(self.executor.run(pass, &steps, &self.cache.states)?);
+            return Ok(());
+        }
+        if self.add_by_field(pass, add, stats)? {
             return Ok(());
         }
         self.trace(frame, pass, stats)?;
