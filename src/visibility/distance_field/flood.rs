@@ -13,8 +13,8 @@ fn pack([x, y, z]: [u32; 3]) -> u32 {
 
 /// Squared distance of a cell to a packed one, cells.
 pub(super) fn squared([x, y, z]: [u32; 3], seed: u32) -> u32 {
-    let of = |a: u32, b: u32| a.abs_diff(b & 1023).pow(2);
-    of(x, seed) + of(y, seed >> 10) + of(z, seed >> 20)
+    let of = |a: u32, b: u32| a.wrapping_sub(b & 1023).wrapping_mul(a.wrapping_sub(b & 1023));
+    of(x, seed).wrapping_add(of(y, seed >> 10)).wrapping_add(of(z, seed >> 20))
 }
 
 /// Begins flooding: the nearest occupied cell to one that is occupied is itself, to others none is known. Twin of `shaders/flood_seeds.wgsl`.
@@ -62,27 +62,25 @@ pub fn jump_flood(map: &Bom) -> Vec<u32> {
 
 /// The cells of one x: of their own nearest and those of the 26 neighbours `step` away, the nearest to them.
 fn flood_plane(nearest: &[u32], cells: u32, x: u32, step: u32, out: &mut [u32]) {
-    let around = |at: u32| [at.checked_sub(step), Some(at), Some(at + step).filter(|&at| at < cells)];
-    for y in 0..cells {
-        let mut rows = [0; 9];
-        let mut count = 0;
-        for nx in around(x).into_iter().flatten() {
-            for ny in around(y).into_iter().flatten() {
-                rows[count] = ((nx * cells + ny) * cells) as usize;
-                count += 1;
-            }
-        }
-        for z in 0..cells {
-            let mut best = (u32::MAX, NO_SEED);
-            for nz in around(z).into_iter().flatten() {
-                for row in &rows[..count] {
-                    let seed = nearest[row + nz as usize];
-                    if seed != NO_SEED {
-                        best = best.min((squared([x, y, z], seed), seed));
-                    }
+    let around =
+        |at: u32| [at.checked_sub(step), Some(at), Some(at + step).filter(|&at| at < cells)].into_iter().flatten();
+    let (row, step) = (cells as usize, step as usize);
+    // Squared distances, and below them the cells, whose order decides between equal ones.
+    let mut best = vec![u64::MAX; row];
+    for (y, out) in (0..cells).zip(out.chunks_mut(row)) {
+        best.fill(u64::MAX);
+        for first in around(x).flat_map(|nx| around(y).map(move |ny| ((nx * cells + ny) * cells) as usize)) {
+            let given = &nearest[first..first + row];
+            let mut ask = |low: usize, seeds: &[u32]| {
+                for (z, (best, &seed)) in (low as u32..).zip(best[low..].iter_mut().zip(seeds)) {
+                    let found = u64::from(squared([x, y, z], seed)) << 32 | u64::from(seed);
+                    *best = (*best).min(if seed == NO_SEED { u64::MAX } else { found });
                 }
-            }
-            out[(y * cells + z) as usize] = best.1;
+            };
+            ask(0, given);
+            ask(step, &given[..row - step]);
+            ask(0, &given[step..]);
         }
+        out.iter_mut().zip(&best).for_each(|(out, best)| *out = *best as u32);
     }
 }
