@@ -19,12 +19,13 @@ pub struct FieldArgs {
     /// [default: 64 for ao, 16 for shadow]
     #[arg(long, value_name = "N", value_parser = |s: &str| ranged(s, 1, 1024))]
     pub df_steps: Option<u32>,
-    /// With --secondary df: cells, 0 to 8, by which rays start off their surface; below 1.62 plus what --df-hit is above 0.75 some
-    /// surfaces shade themselves
-    #[arg(long, value_name = "CELLS", default_value = "1.75", value_parser = |s: &str| cells(s, 0.0))]
+    /// With --secondary df: cells, 0 to 8, by which rays start off their surface; less than 0.87 more than --df-hit, and some surfaces shade
+    /// themselves
+    #[arg(long, value_name = "CELLS", default_value = "1.5", value_parser = |s: &str| cells(s, 0.0))]
     pub df_lift: f64,
-    /// With --secondary df: cells, 0.01 to 8, between a ray and the middle of an occupied cell within which it hits
-    #[arg(long, value_name = "CELLS", default_value = "0.75", value_parser = |s: &str| cells(s, 0.01))]
+    /// With --secondary df: cells, 0.01 to 8, between a ray and the middle of an occupied cell within which it hits; 0.5 is the
+    /// face of a cell in a layer of them, more is darker
+    #[arg(long, value_name = "CELLS", default_value = "0.5", value_parser = |s: &str| cells(s, 0.01))]
     pub df_hit: f64,
 }
 
