@@ -142,6 +142,7 @@ fn layout_checks(module: &naga::Module) -> String {
             "MATERIAL_UNLIT",
             "REFLECTANCE_",
             "ROMA_",
+            "FIELD_HIT",
             "NONE",
         ];
         if prefixes.iter().any(|p| name.starts_with(p))

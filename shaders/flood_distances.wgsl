@@ -1,5 +1,7 @@
 // Distances from cells to the nearest occupied one, as f16 rounded toward zero, two in a word, the first lowest.
-#include "shared/flood.wgsl"
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/field.wgsl"
 
 // The bits of the largest f16 whose square is not above a whole number less than 2^18. An f16 has 11 bits: its square has 22, and is exact in f32.
 fn root_toward_zero(squared: u32) -> u32 {
@@ -20,19 +22,26 @@ fn root_toward_zero(squared: u32) -> u32 {
 }
 
 fn distance_bits(cell: vec3<u32>) -> u32 {
-    let seed = given[element(cell, params.x)];
-    if seed == params.z {
-        return 0x7c00u; // infinite
+    let seed = nearest[half_of(params.field_half) + element(cell, params.field_cells)];
+    if seed == NO_SEED {
+        return INFINITE;
     }
     return root_toward_zero(squared_distance(cell, seed));
 }
 
-// One thread two cells along z. Given: the nearest occupied cells.
-@compute @workgroup_size(32, 2)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let cell = vec3<u32>(id.zy, 2u * id.x);
-    if any(cell >= vec3<u32>(params.x)) {
+// One thread two cells along z.
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let n = params.field_cells;
+    let number = (group.x + group.y * groups.x) * 64u + lane;
+    let cell = cell_of(2u * number, n);
+    if cell.x >= n {
         return;
     }
-    results[element(cell, params.x) / 2u] = distance_bits(cell) | distance_bits(cell + vec3<u32>(0u, 0u, 1u)) << 16u;
+    let word = distance_bits(cell) | distance_bits(cell + vec3<u32>(0u, 0u, 1u)) << 16u;
+    distances[first_distance(params.field_level, 0u) + number] = word;
 }

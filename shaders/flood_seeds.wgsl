@@ -1,15 +1,22 @@
-// Begins jump flooding: the nearest occupied cell to one that is occupied is itself, to others none is known.
-#include "shared/flood.wgsl"
+// Begins jump flooding of a field: the nearest occupied cell to one that is occupied is itself, to others none is known.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/field.wgsl"
 
-// One thread a cell. Given: the words of an occupancy map.
-@compute @workgroup_size(32, 2)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let cells = params.x;
-    let cell = id.zyx;
-    if any(cell >= vec3<u32>(cells)) {
+// One thread a cell.
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let n = params.field_cells;
+    let number = (group.x + group.y * groups.x) * 64u + lane;
+    let cell = cell_of(number, n);
+    if cell.x >= n {
         return;
     }
-    let word = given[(cell.x + cells * cell.y) * (cells / 32u) + cell.z / 32u];
+    let word = boms[(params.field_level * n * n + cell.x + n * cell.y) * (n / 32u) + cell.z / 32u];
     let is_seed = (word >> (cell.z % 32u) & 1u) != 0u;
-    results[element(cell, cells)] = select(params.z, pack_cell(cell), is_seed);
+    nearest[number] = select(NO_SEED, pack_cell(cell), is_seed);
 }

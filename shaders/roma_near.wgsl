@@ -6,6 +6,7 @@
 #include "shared/exact.wgsl"
 #include "shared/random.wgsl"
 #include "shared/roma.wgsl"
+#include "shared/levels.wgsl"
 #include "shared/roma_start.wgsl"
 
 // One thread a ray.

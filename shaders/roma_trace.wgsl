@@ -7,33 +7,16 @@
 #include "shared/exact.wgsl"
 #include "shared/random.wgsl"
 #include "shared/roma.wgsl"
+#include "shared/levels.wgsl"
 #include "shared/roma_start.wgsl"
 
 // Columns that a ray passes at most which would be snapped to below its surface and is not.
 const GRAZING_STEPS: u32 = 64u;
-// Slower than this, in cells a unit of t, a ray stays where it is.
-const LEAST_SPEED: f32 = 0x1p-60;
 
 // What a ray finds in a level.
 struct Found {
     t: f32,          // where it meets something; below 0: nothing
     is_capped: bool, // it passed as many columns as it may, and was finished snapped
-}
-
-// The part of the range of t in which a coordinate lies between `low` and `high`.
-fn clipped(range: vec2<f32>, at: f32, speed: f32, low: f32, high: f32) -> vec2<f32> {
-    if abs(speed) < LEAST_SPEED {
-        return select(vec2<f32>(1.0, 0.0), range, at >= low && at <= high);
-    }
-    let inverse = divide(1.0, speed);
-    let a = barrier(barrier(low - at) * inverse);
-    let b = barrier(barrier(high - at) * inverse);
-    return vec2<f32>(max(range.x, min(a, b)), min(range.y, max(a, b)));
-}
-
-// Position at t.
-fn along(at: f32, speed: f32, t: f32) -> f32 {
-    return barrier(at + barrier(t * speed));
 }
 
 // t at which a ray meets the next border of cell `cell`.

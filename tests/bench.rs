@@ -228,3 +228,39 @@ fn occupancy_maps_are_measured_beside_exact_rays() {
     run("--stages out-of-core");
     assert_eq!(results()["rows"], json["rows"]);
 }
+
+#[test]
+fn distance_fields_are_measured_beside_occupancy_maps() {
+    let folder = folder();
+    let output = folder.path().join("out");
+    let tiny = "bench roma --triangles 10K --size 32x18 --samples 4 --repeat 1 --adapter cpu --stages shadows -o";
+    succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
+    let json: Value =
+        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON");
+    // Exact rays, four kinds of maps and a field, of two lights.
+    assert_eq!(json["measured"], 12);
+    let own = table(&json, "shadows");
+    let of = |way: &str, name: &str| entry(own, &["city", "sun of 10 degrees", way], name);
+    let value = |way: &str, name: &str| {
+        let key = format!("shadows/city/sun of 10 degrees/{way}");
+        let row = json["rows"].as_array().unwrap().iter().find(|row| row["key"] == *key).expect("the row");
+        number(&row["values"][name])
+    };
+    let roma = "roma 128 K=8 unsnapped";
+    assert_eq!(number(&of("df 128", "bricks loaded")), 0.0, "fields need no bricks");
+    assert!(number(&of("df 128", "generation, ms")) > 0.0, "a field is made for every picture");
+    for (column, field, paper) in [
+        ("df ÷ generation", "ms_generation", 3.6),
+        ("df ÷ tracing", "ms_trace", 1.7),
+        ("FLIP ÷ df", "flip_converged", f64::NAN),
+    ] {
+        let [own, beside] = [value(roma, field), value("df 128", field)];
+        let expected = if paper.is_nan() { own / beside } else { beside / own };
+        assert_eq!(number(&of(roma, column)), expected, "{column}");
+        if !paper.is_nan() {
+            assert_eq!(number(&of(roma, &format!("{column}, paper"))), paper);
+            // The paper has no others.
+            assert_eq!(of("roma 128 K=4", &format!("{column}, paper")), Value::Null);
+        }
+    }
+}

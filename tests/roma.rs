@@ -1,4 +1,4 @@
-//! `walk --secondary roma`: pictures against closed forms, what it loads and records, that it is the same again and again.
+//! `walk --secondary roma` and `--secondary df`, the baseline: pictures against closed forms, what it loads and records, that it is the same again and again.
 
 mod common;
 
@@ -316,9 +316,102 @@ fn scenes_without_occupancy_are_refused() {
     common::succeed(words.into_iter().chain([scene.as_os_str()]));
     let out = folder.path().join("out");
     let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), out.as_os_str()];
-    let options = ["--secondary", "roma", "--adapter", "cpu", "--frames", "1", "--size", "32x24"].map(AsRef::as_ref);
-    let output = common::brickwalk(words.into_iter().chain(options));
-    assert_eq!(output.status.code(), Some(1));
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(text.contains("bare.bricks") && text.contains("without --no-proxies"), "{text}");
+    for secondary in ["roma", "df"] {
+        let options =
+            ["--secondary", secondary, "--adapter", "cpu", "--frames", "1", "--size", "32x24"].map(AsRef::as_ref);
+        let output = common::brickwalk(words.into_iter().chain(options));
+        assert_eq!(output.status.code(), Some(1));
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let is_named = text.contains(&format!("--secondary {secondary}"));
+        assert!(is_named && text.contains("bare.bricks") && text.contains("without --no-proxies"), "{text}");
+    }
+}
+
+#[test]
+fn occlusion_by_distance_fields_is_that_of_the_closed_form_but_for_cells() {
+    let folder = folder();
+    let cell = 1.0 / 8.0;
+    let pixels = openness(folder.path(), true, "--secondary df --spp 4");
+    let mean = |d: f64| {
+        let near: Vec<f64> = pixels.iter().filter(|p| (p.0 - d).abs() < 0.1).map(|p| p.1).collect();
+        assert!(near.len() > 40, "{} pixels at {d}", near.len());
+        near.iter().sum::<f64>() / near.len() as f64
+    };
+    for d in [0.6, 1.0, 1.5, 2.0, 3.0] {
+        let (expected, found) = (truth(d, HEIGHT), mean(d));
+        println!("{d} m before the wall: closed form {expected:.4}, df {found:.4}");
+        // The middle of a cell that is marked is at most one aside or above, and is hit from half of one away; rays start 3/2 above the floor,
+        // which hides as much of the wall.
+        let darkest = truth(d - 1.5 * cell, HEIGHT + 1.5 * cell);
+        let brightest = truth(d, HEIGHT - 1.5 * cell);
+        assert!(found > darkest - 0.02 && found < brightest + 0.02, "{found} is not in {darkest} to {brightest}");
+    }
+    // Control: it is the wall that is seen.
+    assert!(mean(0.6) < 0.85 && mean(3.0) > mean(0.6) + 0.1);
+}
+
+#[test]
+fn a_plane_hardly_occludes_itself_in_distance_fields() {
+    let folder = folder();
+    let mean = |options: &str| {
+        let pixels = openness(folder.path(), false, &format!("--secondary df {options}"));
+        assert_eq!(pixels.len(), SIZE * SIZE);
+        pixels.iter().map(|p| p.1).sum::<f64>() / pixels.len() as f64
+    };
+    for options in ["", "--df-size 32", "--df-steps 16"] {
+        let open = mean(options);
+        println!("{options}: mean {open:.5}");
+        assert!((0.999..1.0001).contains(&open), "{options}: mean {open}");
+    }
+    // Control: rays that start within cells are stopped there.
+    assert!(mean("--df-lift 0.25") < 0.01);
+}
+
+#[test]
+fn distance_fields_are_made_once_and_load_no_brick() {
+    let folder = folder();
+    let scene = city(folder.path(), "40K", "1K");
+    let of = |options: &str| {
+        walk_of(&scene, &folder.path().join("out"), &format!("--adapter cpu --cache 30% {options}"), "2")
+    };
+    let (exact, field, few) =
+        (of("--secondary exact"), of("--secondary df --df-size 64"), of("--secondary df --df-size 64 --df-steps 2"));
+    for pass in ["shadow", "ao"] {
+        for name in ["bricks_loaded", "bricks_needed", "bytes_bvh", "bytes_geometry", "queries", "load_batches"] {
+            assert_eq!(sum(&field, pass, name), 0.0, "{pass} {name}");
+        }
+        assert_eq!(sum(&field, pass, "rays"), sum(&exact, pass, "rays"));
+        assert!(sum(&field, pass, "ms_phase3") > 0.0);
+        assert_eq!(sum(&field, pass, "ms_phase2"), 0.0);
+        // Rays that may look up but twice hardly end by then.
+        assert!(sum(&few, pass, "rays_capped") > sum(&field, pass, "rays_capped").max(100.0), "{pass}");
+    }
+    // What the first pass of a frame has made serves the others.
+    assert!(sum(&field, "shadow", "ms_phase1") > 0.0);
+    assert_eq!(sum(&field, "ao", "ms_phase1"), 0.0);
+    assert_eq!(sum(&field, "ao", "round_trips"), 2.0 * 4.0);
+    assert!(sum(&field, "primary", "bricks_loaded") > 0.0);
+    assert!(sum(&exact, "ao", "bricks_needed") > 0.0, "the control needs some");
+}
+
+#[test]
+fn distance_fields_are_the_same_whatever_the_threads_and_the_cache() {
+    let folder = folder();
+    let scene = city(folder.path(), "40K", "1K");
+    let picture = |options: &str, threads: &str| {
+        let output = folder.path().join("out");
+        walk_of(&scene, &output, &format!("--adapter cpu --secondary df {options}"), threads);
+        let all = frames(&output);
+        std::fs::remove_dir_all(&output).expect("a folder");
+        all
+    };
+    let one = picture("--cache 100% --df-size 64", "1");
+    assert_eq!(one.len(), 2);
+    for (options, threads) in [("--cache 20%", "3"), ("--cache 30% --schedule demand", "2")] {
+        assert!(picture(&format!("{options} --df-size 64"), threads) == one, "{options}, {threads} threads");
+    }
+    for other in ["--df-size 32", "--df-size 64 --df-steps 3", "--df-size 64 --df-lift 3", "--df-size 64 --df-hit 0.75"]
+    {
+        assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
+    }
 }

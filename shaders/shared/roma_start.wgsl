@@ -1,8 +1,5 @@
 // Where a ray starts in base maps, which overlap. Twin: src/cpu/roma.rs.
 
-// A level ends before its sides, ray by ray, by up to this share of them, so that no edge between levels shows.
-const BLEND: f32 = 1.0 / 16.0;
-
 // Cells before its sides at which a level ends for ray `index`.
 fn margin_of(index: u32) -> f32 {
     let side = f32(params.roma_cells);

@@ -51,6 +51,14 @@ struct Params {
     roma_part: u32,       // which part of rays roma_trace answers, ROMA_*
     roma_is_part: u32,    // 1: rays that leave the coarsest base map are not answered, 0: it holds the scene
     roma_one_in: u32,     // of rays that roma_trace sifts and does not find free one in so many is traced
+    field_cells: u32,     // cells of a distance field's base map on each axis
+    field_levels: u32,    // distance fields, one a base map
+    field_level: u32,     // which of them is made
+    field_mip: u32,       // and which of its levels: cells are 2^mip of the base map's
+    field_step: u32,      // cells on each axis that jump flooding looks away
+    field_half: u32,      // which half of the nearest cells is read
+    field_steps: u32,     // look-ups of a ray at most
+    field_hit: f32,       // a ray meets what it is no farther from, cells
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -349,6 +357,7 @@ const ROMA_HIT: u32 = 0xfffffffeu;   // id of what ROMA meets, which is no trian
 const ROMA_WHOLE: u32 = 0u; // all of them
 const ROMA_FAR: u32 = 1u;   // from where they have been traced to
 const ROMA_SIFT: u32 = 2u;  // those alone that meet nothing
+const FIELD_HIT: u32 = 0xfffffffdu;  // id of what is met in a distance field, which is no triangle
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
@@ -376,5 +385,6 @@ const COUNTER_TILES_FROM_ROOT: u32 = 18u;
 const COUNTER_TILES_CHOSEN: u32 = 19u;
 const COUNTER_ROMA_CAPPED: u32 = 20u;
 const COUNTER_UNRESOLVED: u32 = 21u;
+const COUNTER_FIELD_CAPPED: u32 = 23u;
 const WORK_CHOSEN: u32 = 24u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 28u;      // the same over tiles whose rays walk from the root

@@ -3,6 +3,7 @@
 
 use super::bench::args::BenchArgs;
 use super::device::Adapter;
+use super::field_args::FieldArgs;
 use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
 use super::named::{named_values, unknown};
@@ -361,12 +362,15 @@ pub struct WalkArgs {
     pub effects: EffectArgs,
     /// How secondary rays are answered: exact (all are traced), roma (those of ao and shadow by maps of what cells are occupied, with a
     /// bias of a few cells, and without a brick loaded for them; others are traced), auto (those of ao and shadow that these maps find free are not
-    /// traced: an error of the nearest cell alone)
+    /// traced: an error of the nearest cell alone), df (the rays of roma by distances to occupied cells: the baseline that it is compared with)
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
     /// Occupancy maps.
     #[command(flatten)]
     pub roma: RomaArgs,
+    /// Distance fields.
+    #[command(flatten)]
+    pub df: FieldArgs,
     /// Samples per pixel, 1 to 1M; beyond 64 they are summed in f64, so that no number of them makes the sum drift
     #[arg(long, value_name = "N", default_value = "1", value_parser = samples)]
     pub spp: u32,
@@ -536,7 +540,9 @@ named_values! {
         Roma = "roma",
         /// Those that occupancy maps find free by these, others by tracing them.
         Auto = "auto",
-    } later &["df", "dvf", "displacement"]
+        /// Those that occupancy maps can answer by distance fields.
+        Df = "df",
+    } later &["dvf", "displacement"]
 }
 
 /// Accepts the values of a list.

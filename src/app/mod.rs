@@ -8,6 +8,7 @@ pub mod compare;
 pub mod convert;
 pub mod demo;
 pub mod device;
+pub mod field_args;
 pub mod info;
 mod inputs;
 pub mod interrupt;

@@ -82,7 +82,7 @@ impl RomaArgs {
 }
 
 /// Parses one of a few numbers.
-fn of(text: &str, known: &[u32]) -> Result<u32, String> {
+pub(super) fn of(text: &str, known: &[u32]) -> Result<u32, String> {
     let names: Vec<String> = known.iter().map(u32::to_string).collect();
     let found = text.parse().ok().filter(|n| known.contains(n));
     found.ok_or_else(|| format!("it must be one of {}", names.join(", ")))

@@ -10,7 +10,7 @@ use super::summary;
 use crate::kernel::Extent;
 use crate::render::denoise::Resolve;
 use crate::render::{
-    Accumulation, BATCH_SAMPLES, Captures, Light, RenderError, RenderSettings, Renderer, Roma, Schedule,
+    Accumulation, BATCH_SAMPLES, Captures, Field, Light, RenderError, RenderSettings, Renderer, Roma, Schedule,
 };
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
@@ -35,8 +35,10 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     let manifest = &scene.resident().manifest;
     let has_occupancy = scene.resident().bricks.is_empty() || !scene.resident().occupancy.is_empty();
     if args.secondary != Secondary::Exact && !has_occupancy {
-        let name = args.scene.display();
-        bail!("{name}: --secondary roma needs the occupancy of bricks; convert the scene again without --no-proxies");
+        let (name, secondary) = (args.scene.display(), args.secondary.name());
+        bail!(
+            "{name}: --secondary {secondary} needs the occupancy of bricks; convert the scene again without --no-proxies"
+        );
     }
     let mut path = match &args.path {
         Some(file) => CameraPath::read(file)?,
@@ -168,6 +170,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         auto: Auto::default(),
         captures: None,
         roma: Roma::default(),
+        field: Field::default(),
         host_seen: HostCacheStats::default(),
     }
 }
@@ -226,7 +229,9 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         guides: args.pictures.denoise || args.pictures.taa,
         taa: args.pictures.taa,
         tile_bytes: args.interactive,
-        roma: (args.secondary != Secondary::Exact).then(|| args.roma.settings(args.secondary == Secondary::Auto)),
+        roma: matches!(args.secondary, Secondary::Roma | Secondary::Auto)
+            .then(|| args.roma.settings(args.secondary == Secondary::Auto)),
+        field: (args.secondary == Secondary::Df).then(|| args.df.settings()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! The CPU executor: runs the kernels that a step consists of one after the other, each over all rays or tiles in parallel.
 
 use super::cache::{BrickCache, Shared};
+use super::field::{FieldTables, field_trace, make_field};
 use super::generate::{
     generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
     start_hits,
@@ -23,8 +24,10 @@ use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, are_pairs_culled, dispatches,
+    COUNT_PAIRS, Dispatch, FIELD_KERNELS, FIELD_TRACE, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE,
+    are_pairs_culled, dispatches,
 };
+use crate::kernel::field::FieldMaps;
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::{
@@ -33,6 +36,8 @@ use crate::kernel::{
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::{PayloadSource, WorkerPool, Workers};
 use crate::visibility::bom::{Cascades, clearance};
+#[cfg(test)]
+use crate::visibility::distance_field::DistanceField;
 use bricks::SceneFile;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -48,6 +53,7 @@ struct Buffers {
     pixels: Pixels,
     tiles: TileLists,
     roma: RomaTables,
+    field: FieldTables,
 }
 
 /// Renders one scene on the processor.
@@ -93,7 +99,13 @@ impl CpuExecutor {
             texels: Texels::new(&file)?,
             opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
             lamps: LampTables::default(),
-            buffers: Buffers { sets, pixels: Pixels::new(rays), tiles, roma: RomaTables::default() },
+            buffers: Buffers {
+                sets,
+                pixels: Pixels::new(rays),
+                tiles,
+                roma: RomaTables::default(),
+                field: FieldTables::default(),
+            },
             binary: None,
             extent,
             view: Params::default(),
@@ -110,7 +122,7 @@ impl CpuExecutor {
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
         let extent = self.extent;
-        self.buffers.roma.maps.params(Params {
+        self.buffers.field.maps.params(self.buffers.roma.maps.params(Params {
             zero: 0,
             width: extent.width,
             height: extent.height,
@@ -125,7 +137,7 @@ impl CpuExecutor {
             top_count: self.scene.top2.len() as u32,
             instance_pad: self.scene.instance_pad,
             ..self.view
-        })
+        }))
     }
 
     /// The G-buffer of the hits of a set, for tests.
@@ -138,6 +150,12 @@ impl CpuExecutor {
     #[cfg(test)]
     pub(super) fn columns(&self) -> &[u32] {
         &self.buffers.roma.columns
+    }
+
+    /// The distance fields that were made last, for tests.
+    #[cfg(test)]
+    pub(super) fn fields(&self) -> &[DistanceField] {
+        &self.buffers.field.fields
     }
 
     /// The tiles and their lists, for tests.
@@ -157,7 +175,7 @@ fn run_kernel(
     (sampling, tile_demand): (Sampling, &[TileDemand]),
     binary: Option<&BinaryTrees>,
 ) -> Result<(), ExecutorError> {
-    let Buffers { sets, pixels, tiles, roma } = buffers;
+    let Buffers { sets, pixels, tiles, roma, field } = buffers;
     // The set of the pass, and the one before it, whose hits are shaded.
     let shaded = pass.set().saturating_sub(1);
     let (before, from) = sets.split_at_mut(pass.set());
@@ -209,6 +227,8 @@ fn run_kernel(
         ROMA_ROTATE => roma_rotate(bound, roma),
         ROMA_NEAR => roma_near(bound, roma, own, seen),
         ROMA_TRACE => roma_trace(bound, roma, own, seen),
+        FIELD_TRACE => field_trace(bound, field, own, seen),
+        making if FIELD_KERNELS.contains(&making) => make_field(making, bound, field),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),
             None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
@@ -346,6 +366,11 @@ impl FrameExecutor for CpuExecutor {
 
     fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
         self.buffers.roma.maps = maps.clone();
+        Ok(())
+    }
+
+    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
+        self.buffers.field.maps = field.clone();
         Ok(())
     }
 

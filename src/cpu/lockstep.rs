@@ -8,12 +8,14 @@
 use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
+use crate::kernel::field::FieldMaps;
 use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
 use crate::visibility::bom::Cascades;
+use crate::visibility::distance_field::{DistanceField, LEVELS};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
@@ -43,6 +45,8 @@ pub enum Defect {
     Lookups,
     /// Ray-aligned maps lie a hundredth of a cell aside.
     Maps,
+    /// Base maps of distance fields have a cell more.
+    Fields,
 }
 
 /// Both executors.
@@ -149,6 +153,13 @@ impl Findings {
     }
 }
 
+/// The distances of fields as the device keeps them.
+fn words_of(fields: &[DistanceField]) -> Vec<u32> {
+    let levels = fields.iter().flat_map(|field| (0..LEVELS).map(|level| field.level(level)));
+    let pairs = levels.flat_map(|level| level.as_chunks::<2>().0);
+    pairs.map(|[low, high]| u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16).collect()
+}
+
 impl Lockstep {
     /// Of both, over the same scene and with the same extent. `bound`: of differences where they are allowed.
     pub fn new(gpu: GpuExecutor, mut cpu: CpuExecutor, bound: f32, findings: Arc<Mutex<Findings>>) -> Self {
@@ -160,6 +171,11 @@ impl Lockstep {
     pub fn with_defect(mut self, defect: Defect) -> Self {
         self.defect = Some(defect);
         self
+    }
+
+    /// The distance fields that the processor has made.
+    pub fn fields(&self) -> &[DistanceField] {
+        self.cpu.fields()
     }
 
     /// Rays that have been made alike on both sides.
@@ -255,6 +271,9 @@ impl Lockstep {
         if steps.contains(&Step::RomaRotate) {
             findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
         }
+        if steps.contains(&Step::FieldMake) {
+            findings.words("distances of fields", context, &self.gpu.read_distances()?, &words_of(self.cpu.fields()));
+        }
         let shades = |step: &Step| {
             matches!(
                 step,
@@ -319,6 +338,7 @@ impl Executor for Lockstep {
         let Tuning { threshold, leaf_cache: has_leaf_cache, .. } = self.tuning;
         (*self.gpu.tuning(), *self.cpu.tuning()) = (self.tuning, self.tuning);
         let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, threshold, ..Params::default() };
+        let params = Params { field_cells: 32, field_levels: 1, ..params };
         for &step in steps {
             let everything = bricks.all_geometry_resident();
             for leaf_cache in [false, true] {
@@ -403,6 +423,15 @@ impl FrameExecutor for Lockstep {
             own.maps.iter_mut().for_each(|map| map.base_from_cell[0][3] += 0.01);
         }
         self.cpu.set_roma(&own)
+    }
+
+    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_field(field)?;
+        let mut own = field.clone();
+        if self.defect == Some(Defect::Fields) {
+            Arc::make_mut(&mut own.cascades).levels.iter_mut().for_each(|bom| bom.occupy([3, 5, 7]));
+        }
+        self.cpu.set_field(&own)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -7,19 +7,24 @@ use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
-use crate::kernel::dispatch::{INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::dispatch::{FIELD_KERNELS, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::field::FieldMaps;
+use crate::kernel::frame::Frame;
 use crate::kernel::lamps::{Emitter, Lamps, Shape};
-use crate::kernel::{Extent, FrameExecutor, Keep, Setup};
+use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
+use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Effects, Equirectangular, Light, Occlusion, RenderSettings, Renderer, Roma, Schedule, emissive_triangles,
+    Effects, Equirectangular, Field, Light, Occlusion, RenderSettings, Renderer, Roma, Schedule, emissive_triangles,
     environment,
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::fronts::Fronts;
-use crate::schedule::{Optimisation, Tracing};
+use crate::schedule::{Executor, Lamp, Optimisation, Pass, Step, Tracing};
 use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
+use crate::visibility::bom::{Bom, Cascades};
+use crate::visibility::distance_field::{DistanceField, FieldSettings};
 use crate::visibility::roma::{Grid, Role, RomaPass, RomaSettings};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
@@ -161,6 +166,8 @@ struct Variant {
     roma: Option<(u32, Role)>,
     /// Bytes of tiles that a frame may load.
     tile_bytes: Option<u64>,
+    /// Look-ups of rays answered by distance fields, if they are.
+    field: Option<u32>,
 }
 
 const VARIANT: Variant = Variant {
@@ -173,6 +180,7 @@ const VARIANT: Variant = Variant {
     with: &[],
     roma: None,
     tile_bytes: None,
+    field: None,
 };
 
 fn effects() -> Effects {
@@ -212,16 +220,43 @@ fn roma((steps, role): (u32, Role)) -> RomaSettings {
     RomaSettings { occlusion: pass(4), shadow: pass(8) }
 }
 
+/// Small fields.
+fn field(steps: u32) -> FieldSettings {
+    FieldSettings { size: 32, occlusion_steps: steps, shadow_steps: steps, lift: 1.75, hit: 0.75 }
+}
+
+/// Both executors with pages of these sizes.
+fn lockstep(
+    (gpu, kernels): &(Gpu, Arc<Kernels>),
+    scene: &Arc<SceneFile>,
+    pages: &[u64],
+    threshold: u32,
+    findings: &Arc<Mutex<Findings>>,
+) -> Lockstep {
+    let setup = Setup { extent: EXTENT, threshold, count: true, keep: Keep::default() };
+    let host = || HostCache::new(1 << 20);
+    let on_gpu = GpuExecutor::with_kernels(
+        gpu.clone(),
+        kernels.clone(),
+        scene.clone(),
+        Workers::new(scene.clone(), host(), 1, 0).unwrap(),
+        pages,
+        setup,
+    );
+    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1, 0).unwrap(), setup);
+    Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone())
+}
+
 /// Renders two frames in lockstep.
 fn render(
-    (gpu, kernels): &(Gpu, Arc<Kernels>),
+    device: &(Gpu, Arc<Kernels>),
     scene: &Arc<SceneFile>,
     variant: &Variant,
     defect: Option<Defect>,
     findings: &Arc<Mutex<Findings>>,
 ) {
     let sizes = scene.sizes();
-    let page_bytes = gpu.page_bytes();
+    let page_bytes = device.0.page_bytes();
     let residency = |budget| Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin);
     let least = match residency(16) {
         Err(ResidencyError::CacheTooSmall { needed, .. }) => needed,
@@ -230,18 +265,7 @@ fn render(
     let budget = if variant.everything_fits { Residency::budget_for_all(&sizes, page_bytes) } else { least };
     let residency = residency(budget).unwrap();
     let pages: Vec<u64> = residency.page_sizes().collect();
-    let setup = Setup { extent: EXTENT, threshold: variant.threshold, count: true, keep: Keep::default() };
-    let host = || HostCache::new(1 << 20);
-    let on_gpu = GpuExecutor::with_kernels(
-        gpu.clone(),
-        kernels.clone(),
-        scene.clone(),
-        Workers::new(scene.clone(), host(), 1, 0).unwrap(),
-        &pages,
-        setup,
-    );
-    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1, 0).unwrap(), setup);
-    let mut executor = Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone());
+    let mut executor = lockstep(device, scene, &pages, variant.threshold, findings);
     if let Some(defect) = defect {
         executor = executor.with_defect(defect);
     }
@@ -271,6 +295,7 @@ fn render(
             guides: false,
             taa: false,
             roma: variant.roma.map(roma),
+            field: variant.field.map(field),
             aov: false,
         },
         light,
@@ -280,6 +305,7 @@ fn render(
         auto: Auto::default(),
         captures: None,
         roma: Roma::default(),
+        field: Field::default(),
         host_seen: HostCacheStats::default(),
     };
     let path = path_from_bounds(manifest.min, manifest.max);
@@ -316,6 +342,8 @@ fn twins_agree_with_their_kernels() {
         Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
         Variant { roma: Some((64, Role::Sift(1))), ..VARIANT },
         Variant { roma: Some((3, Role::Sift(3))), schedule: Schedule::Demand, ..VARIANT },
+        Variant { field: Some(64), ..VARIANT },
+        Variant { field: Some(3), ..VARIANT },
         Variant { fronts: true, ..VARIANT },
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
@@ -327,7 +355,9 @@ fn twins_agree_with_their_kernels() {
         (textured(true), &variants[2..10]),
     ] {
         let has_occupancy = !scene.resident().occupancy.is_empty();
-        for (i, variant) in variants.iter().enumerate().filter(|(_, v)| has_occupancy || v.roma.is_none()) {
+        for (i, variant) in
+            variants.iter().enumerate().filter(|(_, v)| has_occupancy || (v.roma.is_none() && v.field.is_none()))
+        {
             render(&device, &scene, variant, None, &findings);
             let found = findings.lock().unwrap();
             assert_eq!(found.differences, Vec::<String>::new(), "variant {i} of {}", scene.path().display());
@@ -335,7 +365,7 @@ fn twins_agree_with_their_kernels() {
     }
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
-    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE]);
+    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE]).chain(FIELD_KERNELS);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
     assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
@@ -354,13 +384,98 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::Light, &plain, "radiance"),
         (Defect::Lookups, &tiled, "tiles"),
         (Defect::Maps, &plain, "columns of maps"),
+        (Defect::Fields, &plain, "distances of fields"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
         let roma = (defect == Defect::Maps).then_some((0, Role::Answer));
-        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, ..VARIANT };
+        let field = (defect == Defect::Fields).then_some(64);
+        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();
         assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);
+    }
+}
+
+/// Two levels of base maps with every n-th cell or so occupied; of no n none.
+fn base_maps(cells: u32, every: Option<u32>) -> Arc<Cascades> {
+    let mut state = 0x2545_f491u32;
+    let mut level = |cell_log2: i32, first: i64| {
+        let mut map = Bom::new(cells, cell_log2, [first; 3]);
+        let count = every.map_or(0, |every| cells.pow(3) / every);
+        for _ in 0..count {
+            let mut next = || {
+                state ^= state << 13;
+                state ^= state >> 17;
+                state ^= state << 5;
+                (state >> 8) % cells
+            };
+            map.occupy([next(), next(), next()]);
+        }
+        map
+    };
+    Arc::new(Cascades { levels: vec![level(0, 0), level(1, -i64::from(cells) / 4)] })
+}
+
+/// Rays from inside and outside of such maps, some along axes, of lengths of direction of their own.
+fn rays(cells: u32) -> Vec<Ray> {
+    let mut state = 77u32;
+    let mut unit = || {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        (state >> 8) as f32 / (1 << 24) as f32
+    };
+    let ray = |number: u32| {
+        let origin = [(); 3].map(|()| (unit() * 2.6 - 0.8) * cells as f32);
+        let d = [(); 3].map(|()| unit() - 0.5);
+        let direction = if number.is_multiple_of(16) { [0.0, -1.0, 0.0] } else { d };
+        let t_max = if number.is_multiple_of(5) { 12.0 } else { f32::MAX };
+        Ray { origin, t_min: 0.0, direction, t_max }
+    };
+    (0..EXTENT.width * EXTENT.height).map(ray).collect()
+}
+
+#[test]
+fn distance_fields_of_all_sizes_are_those_of_their_twins() {
+    let Some(device) = device() else { return };
+    let scene = Arc::new(probe::scene().unwrap());
+    let sizes = scene.sizes();
+    let page_bytes = device.0.page_bytes();
+    let budget = Residency::budget_for_all(&sizes, page_bytes);
+    let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin).unwrap();
+    let pages: Vec<u64> = residency.page_sizes().collect();
+    let cache = Cache::new(residency, SceneBytes::from(&sizes), None);
+    let frame = Frame { reference: [0; 3], unit: 1.0, origin: DVec3::ZERO };
+    let pass = Pass::Shadow(Lamp::Sun);
+    for (cells, every) in [(32, None), (32, Some(32_768)), (32, Some(20)), (64, Some(50)), (96, Some(100))] {
+        for defect in [None, Some(Defect::Fields)] {
+            let findings = Arc::new(Mutex::new(Findings::default()));
+            let mut executor = lockstep(&device, &scene, &pages, 0, &findings);
+            if let Some(defect) = defect {
+                executor = executor.with_defect(defect);
+            }
+            executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
+            let maps = base_maps(cells, every);
+            let own: Vec<DistanceField> = maps.levels.iter().map(DistanceField::new).collect();
+            executor.set_field(&FieldMaps::new(&maps, &frame, &field(64))).unwrap();
+            executor.run(pass, &[Step::FieldMake], &cache.states).unwrap();
+            assert_eq!(executor.fields() == own, defect.is_none(), "{cells}, {every:?}");
+            executor.set_rays(pass, &rays(cells));
+            let mut hits = 0;
+            for steps in [64, 16] {
+                executor.run(pass, &[Step::StartHits, Step::FieldTrace { steps }], &cache.states).unwrap();
+                let met = executor.read_hits(pass).unwrap();
+                assert!(met.iter().all(|hit| hit.id == FIELD_HIT || hit.id == NONE));
+                hits += met.iter().filter(|hit| hit.id == FIELD_HIT).count();
+            }
+            let found = findings.lock().unwrap();
+            if defect.is_none() {
+                println!("{cells}³, one in {every:?}: {hits} hits");
+                assert_eq!(found.differences, Vec::<String>::new(), "{cells}, {every:?}");
+                let is_dense = every.is_some_and(|every| every < 10_000);
+                assert!(if is_dense { hits > 200 } else { every.is_some() || hits == 0 }, "{cells}, {every:?}: {hits}");
+            } else {
+                assert!(found.differences[0].contains("distances of fields"), "{:?}", found.differences);
+            }
+        }
     }
 }

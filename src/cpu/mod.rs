@@ -16,6 +16,7 @@ mod bc7;
 pub mod brick;
 pub mod cache;
 pub mod executor;
+mod field;
 mod generate;
 mod gloss;
 mod indices;

@@ -20,7 +20,7 @@ use std::sync::Arc;
 const LEAST_STEP: f32 = 1.0 / 1024.0;
 
 /// A level ends before its sides, ray by ray, by up to this share of them.
-const BLEND: f32 = 1.0 / 16.0;
+pub(super) const BLEND: f32 = 1.0 / 16.0;
 
 /// Columns that a ray passes at most which would be snapped to below its surface and is not.
 const GRAZING_STEPS: u32 = 64;
@@ -156,7 +156,7 @@ struct Found {
 }
 
 /// The part of the range of t in which a coordinate lies between `low` and `high`.
-fn clipped(range: [f32; 2], at: f32, speed: f32, low: f32, high: f32) -> [f32; 2] {
+pub(super) fn clipped(range: [f32; 2], at: f32, speed: f32, low: f32, high: f32) -> [f32; 2] {
     if speed.abs() < LEAST_SPEED {
         return if at >= low && at <= high { range } else { [1.0, 0.0] };
     }

@@ -2,6 +2,7 @@
 
 use super::binary::BinaryTrees;
 use super::device::Gpu;
+use super::field::Field;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
 use super::lamps::LampBuffers;
@@ -16,6 +17,7 @@ use super::wgsl::Pages;
 use crate::kernel::dispatch::{
     COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Third, Workgroups, are_pairs_culled, dispatches,
 };
+use crate::kernel::field::FieldMaps;
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::{
@@ -29,7 +31,7 @@ use bricks::SceneFile;
 use std::sync::Arc;
 
 /// Most dispatches of one submission.
-const MOST_DISPATCHES: usize = 32;
+const MOST_DISPATCHES: usize = 96;
 /// Bytes of the numbers of workgroups in x, y and z.
 const INDIRECT_BYTES: u64 = 12;
 /// Entries per tile that the lists start with.
@@ -49,6 +51,7 @@ pub struct GpuExecutor {
     groups: Groups,
     binary: Option<BinaryTrees>,
     roma: Option<Roma>,
+    field: Option<Field>,
     extent: Extent,
     readback: Readback,
     timing: Timing,
@@ -151,6 +154,7 @@ impl GpuExecutor {
             groups,
             binary: None,
             roma: None,
+            field: None,
             extent,
             readback,
             timing,
@@ -199,6 +203,15 @@ impl GpuExecutor {
         Ok(columns[..maps.words() as usize].to_vec())
     }
 
+    /// The words of the distance fields that were made last, for tests.
+    #[cfg(test)]
+    pub(crate) fn read_distances(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        let Some(Field { distances, maps, .. }) = &self.field else { return Ok(Vec::new()) };
+        let bytes = self.readback.read(&self.gpu, distances)?;
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(words[..maps.distance_words() as usize].to_vec())
+    }
+
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
@@ -226,7 +239,8 @@ impl GpuExecutor {
             instance_pad: self.buffers.scene.instance_pad,
             ..self.view
         };
-        self.roma.as_ref().map_or(params, |roma| roma.maps.params(params))
+        let params = self.roma.as_ref().map_or(params, |roma| roma.maps.params(params));
+        self.field.as_ref().map_or(params, |field| field.maps.params(params))
     }
 
     /// One submission: all steps, then counters and demand read back.
@@ -282,7 +296,9 @@ impl GpuExecutor {
             });
             let binary = self.binary.as_ref().filter(|_| dispatch.kernel == INTERSECT_BINARY);
             let roma = self.roma.as_ref().and_then(|roma| Some((roma.pipeline(dispatch.kernel)?, roma)));
-            let own = binary.map(|b| &b.pipeline).or(roma.map(|(pipeline, _)| pipeline));
+            let field = self.field.as_ref().and_then(|field| Some((field.pipeline(dispatch.kernel)?, field)));
+            let over_cells = roma.map(|(pipeline, _)| pipeline).or(field.map(|(pipeline, _)| pipeline));
+            let own = binary.map(|b| &b.pipeline).or(over_cells);
             compute.set_pipeline(own.unwrap_or_else(|| self.kernels.pipeline(dispatch.kernel)));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
@@ -290,12 +306,13 @@ impl GpuExecutor {
                 (true, _) => &self.groups.cache,
                 (false, Third::Shading) => &self.groups.lamps,
                 (false, Third::Roma) => roma.map_or(&self.groups.empty, |(_, roma)| &roma.group),
+                (false, Third::Field) => field.map_or(&self.groups.empty, |(_, field)| &field.group),
                 _ => &self.groups.empty,
             };
             compute.set_bind_group(2, second, &[]);
             let shaded = pass.set().saturating_sub(1);
             let third = match (dispatch.third, &self.groups.sampling) {
-                (Third::Shading | Third::Roma, _) => &self.groups.shading[shaded],
+                (Third::Shading | Third::Roma | Third::Field, _) => &self.groups.shading[shaded],
                 (Third::Sampling, Some(sampling)) => &sampling[shaded],
                 _ => &self.groups.tiles,
             };
@@ -417,6 +434,11 @@ impl FrameExecutor for GpuExecutor {
     fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
         let Self { gpu, kernels, roma, .. } = self;
         roma.get_or_insert_with(|| Roma::new(gpu, kernels)).set_maps(gpu, maps)
+    }
+
+    fn set_field(&mut self, maps: &FieldMaps) -> Result<(), ExecutorError> {
+        let Self { gpu, kernels, field, .. } = self;
+        field.get_or_insert_with(|| Field::new(gpu, kernels)).set(gpu, maps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -220,6 +220,11 @@ pub(super) fn roma_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "roma", &[Bound::Read, Bound::Read, Bound::Read, Bound::Write])
 }
 
+/// The layout of group 2 of kernels over distance fields.
+pub(super) fn field_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    layout(device, "field", &[Bound::Read, Bound::Read, Bound::Write, Bound::Write])
+}
+
 /// The layout of a group of `count` storage buffers that are read.
 pub(super) fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
     layout(device, label, &vec![Bound::Read; count])

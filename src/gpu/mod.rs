@@ -2,8 +2,8 @@
 
 pub mod binary;
 pub mod device;
-pub mod distance_field;
 pub mod executor;
+pub mod field;
 pub mod groups;
 pub mod kernels;
 pub mod lamps;

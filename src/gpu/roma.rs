@@ -126,7 +126,7 @@ impl Roma {
 }
 
 /// Makes room for `count` elements; whether the buffer is a new one.
-fn grow(gpu: &Gpu, buffer: &mut wgpu::Buffer, label: &str, count: usize, stride: usize) -> bool {
+pub(super) fn grow(gpu: &Gpu, buffer: &mut wgpu::Buffer, label: &str, count: usize, stride: usize) -> bool {
     let grows = buffer.size() < (count * stride) as u64;
     if grows {
         *buffer = storage(gpu, label, count, stride);

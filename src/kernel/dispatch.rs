@@ -3,6 +3,7 @@
 use super::layout::{self, Params};
 use crate::math::sampling::{cosine_hemisphere, halton};
 use crate::schedule::{Lamp, Pass, Query, RomaPart, Step};
+use crate::visibility::distance_field::{LEVELS, flood_steps};
 
 /// The directions of the passes that start at hits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,6 +97,8 @@ pub enum Third {
     Sampling,
     /// What shading the set before the pass's needs, with group 2 the occupancy maps.
     Roma,
+    /// The same with group 2 the distance fields.
+    Field,
 }
 
 /// One dispatch of a kernel.
@@ -106,7 +109,7 @@ pub struct Dispatch {
     pub params: Params,
     /// Its workgroups.
     pub groups: Workgroups,
-    /// Whether group 2 is the cache; else it is the lamps of kernels that shade, the maps of those over occupancy maps, and nothing of others.
+    /// Whether group 2 is the cache; else it is the lamps of kernels that shade, the maps or fields of those over such, and nothing of others.
     pub cache: bool,
     /// What group 3 is.
     pub third: Third,
@@ -142,6 +145,19 @@ pub const ROMA_ROTATE: &str = "roma_rotate";
 pub const ROMA_NEAR: &str = "roma_near";
 /// The kernel that traces them.
 pub const ROMA_TRACE: &str = "roma_trace";
+
+/// The kernel that finds the occupied cells of a distance field.
+pub const FLOOD_SEEDS: &str = "flood_seeds";
+/// The kernel that finds the nearest of them.
+pub const JUMP_FLOOD: &str = "jump_flood";
+/// The kernel that makes distances of these.
+pub const FLOOD_DISTANCES: &str = "flood_distances";
+/// The kernel that makes a level of half as many cells.
+pub const HALVE_DISTANCES: &str = "halve_distances";
+/// The kernel that traces distance fields.
+pub const FIELD_TRACE: &str = "field_trace";
+/// All kernels over distance fields.
+pub const FIELD_KERNELS: [&str; 5] = [FLOOD_SEEDS, JUMP_FLOOD, FLOOD_DISTANCES, HALVE_DISTANCES, FIELD_TRACE];
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -313,5 +329,35 @@ pub fn dispatches(
                 2,
             )]
         }
+        Step::FieldMake => (0..params.field_levels).flat_map(|level| make_field(&params, level)).collect(),
+        Step::FieldTrace { steps } => {
+            vec![field(FIELD_TRACE, Params { field_steps: steps, ..params }, per_ray, 2)]
+        }
     }
+}
+
+/// A dispatch of a kernel over distance fields.
+fn field(kernel: &'static str, params: Params, groups: [u32; 2], phase: usize) -> Dispatch {
+    let groups = Workgroups::Fixed(groups);
+    Dispatch { kernel, params, groups, cache: false, third: Third::Field, phase: Some(phase) }
+}
+
+/// The dispatches that make field `level`.
+fn make_field(params: &Params, level: u32) -> Vec<Dispatch> {
+    let params = Params { field_level: level, ..*params };
+    let cells = |mip: u32| (params.field_cells >> mip).pow(3);
+    // A thread a cell, or two cells.
+    let each = |count: u32| across(count.div_ceil(64));
+    let mut all = vec![field(FLOOD_SEEDS, params, each(cells(0)), 0)];
+    let mut half = 0;
+    for step in flood_steps(params.field_cells) {
+        let params = Params { field_step: step, field_half: half, ..params };
+        all.push(field(JUMP_FLOOD, params, each(cells(0)), 0));
+        half = 1 - half;
+    }
+    all.push(field(FLOOD_DISTANCES, Params { field_half: half, ..params }, each(cells(0) / 2), 0));
+    for mip in 1..LEVELS as u32 {
+        all.push(field(HALVE_DISTANCES, Params { field_mip: mip, ..params }, each(cells(mip) / 2), 0));
+    }
+    all
 }

@@ -1,5 +1,6 @@
 //! What a frame needs of an executor beside steps.
 
+use super::field::FieldMaps;
 use super::layout::{GBuffer, Hit, Ray, Surface};
 use super::roma::RomaMaps;
 use super::{Keep, Lamps, Tuning, View};
@@ -74,6 +75,13 @@ pub trait FrameExecutor: Executor {
     /// # Errors
     /// As of [`FrameExecutor::set_cascades`].
     fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError>;
+
+    /// Takes base maps and where their distance fields lie in the frame that has begun, and makes what [`crate::schedule::Step::FieldMake`] and
+    /// [`crate::schedule::Step::FieldTrace`] need; without it these must not be run. The fields that were made last stay as long as their maps do.
+    ///
+    /// # Errors
+    /// As of [`FrameExecutor::set_cascades`].
+    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError>;
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

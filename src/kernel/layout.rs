@@ -51,6 +51,7 @@ pub const COUNTER_TILES_FROM_ROOT: u32 = 18;
 pub const COUNTER_TILES_CHOSEN: u32 = 19;
 pub const COUNTER_ROMA_CAPPED: u32 = 20;
 pub const COUNTER_UNRESOLVED: u32 = 21;
+pub const COUNTER_FIELD_CAPPED: u32 = 23;
 pub const WORK_CHOSEN: u32 = 24;
 pub const WORK_ROOTED: u32 = 28;
 pub const GBUFFER_READ: u32 = 1;
@@ -60,6 +61,7 @@ pub const ROMA_HIT: u32 = 0xffff_fffe;
 pub const ROMA_WHOLE: u32 = 0;
 pub const ROMA_FAR: u32 = 1;
 pub const ROMA_SIFT: u32 = 2;
+pub const FIELD_HIT: u32 = 0xffff_fffd;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
@@ -102,6 +104,8 @@ mirror! {
         emitter_density: f32, diffuse_count: f32, roma_k: u32, roma_size: u32,
         roma_cells: u32, roma_levels: u32, roma_samples: u32, roma_steps: u32,
         roma_near: u32, roma_part: u32, roma_is_part: u32, roma_one_in: u32,
+        field_cells: u32, field_levels: u32, field_level: u32, field_mip: u32,
+        field_step: u32, field_half: u32, field_steps: u32, field_hit: f32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

@@ -5,6 +5,7 @@
 
 pub mod binary_tree;
 pub mod dispatch;
+pub mod field;
 pub mod frame;
 mod frame_executor;
 pub mod lamps;

@@ -53,7 +53,7 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
     };
     Ok(Report {
         round_trips: 1,
-        rays_capped: count(layout::COUNTER_ROMA_CAPPED),
+        rays_capped: count(layout::COUNTER_ROMA_CAPPED) + count(layout::COUNTER_FIELD_CAPPED),
         demand: wanted.map(asked).collect(),
         tiles: Vec::new(),
         used: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Light, Roma, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Roma, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -14,6 +14,7 @@ use crate::schedule::{
 };
 use crate::stats::Record;
 use crate::stream::HostCacheStats;
+use crate::visibility::distance_field::FieldSettings;
 use crate::visibility::roma::{Role, RomaPass, RomaSettings};
 use bricks::SceneFile;
 use std::sync::Arc;
@@ -59,6 +60,8 @@ pub struct RenderSettings {
     pub tile_bytes: Option<u64>,
     /// Occlusion rays and those to the sun and emitters are answered by occupancy maps; none of them asks for bricks.
     pub roma: Option<RomaSettings>,
+    /// The same rays are answered by distance fields.
+    pub field: Option<FieldSettings>,
 }
 
 /// Why a frame could not be rendered.
@@ -129,15 +132,17 @@ pub struct Renderer {
     pub auto: Auto,
     /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
     pub captures: Option<Captures>,
-    /// The occupancy maps, where settings ask for them.
+    /// The occupancy maps, where settings ask for them or for distance fields.
     pub roma: Roma,
+    /// The distance fields, where settings ask for them.
+    pub field: Field,
     /// The host cache's statistics at the end of the pass before.
     pub host_seen: HostCacheStats,
 }
 
 impl Renderer {
-    /// Renders one frame. Without ROMA it is exact; with it, too, pixels depend on scene, camera, lights and settings alone, unless
-    /// [`RenderSettings::tile_bytes`] bounds what is loaded.
+    /// Renders one frame. Without ROMA and distance fields it is exact; with them, too, pixels depend on scene, camera, lights and settings
+    /// alone, unless [`RenderSettings::tile_bytes`] bounds what is loaded.
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.
@@ -324,6 +329,9 @@ impl Renderer {
                 }
                 Role::Sift(one_in) => first.push(trace(RomaPart::Sift { one_in })),
             }
+        }
+        if self.add_by_field(pass, add, stats)? {
+            return Ok(());
         }
         self.trace(frame, pass, &first, stats)?;
         last.push(add);

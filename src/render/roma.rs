@@ -73,16 +73,48 @@ impl Roma {
         pass: RomaPass,
         length: f64,
     ) -> Result<Option<Step>, ExecutorError> {
-        let Some(RomaView { frame, camera, sample, seed }) = &self.view else { return Ok(None) };
+        if self.view.is_none() {
+            return Ok(None);
+        }
         let RomaPass { grid, role, .. } = pass;
+        self.assemble(scene, grid.size)?;
+        let before = role.lift() / grid.scale(grid.size);
+        let before = if let Role::Far(cells) = role { before.max(cells.into()) } else { before };
+        let is_of_use = |bom: &&Bom| before * bom.side() < length;
+        let levels = self.cascades.levels.iter().take_while(is_of_use).count();
+        if self.made == Some((grid, role, levels)) {
+            return Ok(None);
+        }
+        let Some(RomaView { frame, sample, seed, .. }) = &self.view else { return Ok(None) };
+        executor.set_cascades(&self.cascades)?;
+        executor.set_roma(&RomaMaps::new(&self.cascades, levels, frame, pass, (*sample, *seed)))?;
+        self.made = Some((grid, role, levels));
+        Ok(Some(Step::RomaRotate))
+    }
+
+    /// The base maps of `cells` on each axis around the present camera, and the frame; the same ones as long as nothing changes in them.
+    ///
+    /// # Errors
+    /// A brick's occupancy that cannot be read.
+    pub(super) fn base_maps(
+        &mut self,
+        scene: &Arc<SceneFile>,
+        cells: u32,
+    ) -> Result<Option<(Arc<Cascades>, Frame)>, ExecutorError> {
+        self.assemble(scene, cells)?;
+        Ok(self.view.as_ref().map(|view| (self.cascades.clone(), view.frame)))
+    }
+
+    fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32) -> Result<(), ExecutorError> {
+        let Some(RomaView { camera, .. }) = &self.view else { return Ok(()) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
         let (cells, mut assembler) = match self.assembler.take() {
-            Some((cells, assembler)) if cells == grid.size => (cells, assembler),
+            Some((cells, assembler)) if cells == size => (cells, assembler),
             _ => {
                 self.is_assembled = false;
                 let finest_log2 = usual_cell_log2(scene.resident());
-                let settings = Settings { cells: grid.size, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
-                (grid.size, Assembler::new(scene.clone(), settings).map_err(failed)?)
+                let settings = Settings { cells: size, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
+                (size, Assembler::new(scene.clone(), settings).map_err(failed)?)
             }
         };
         if !self.is_assembled {
@@ -93,17 +125,7 @@ impl Roma {
             self.is_assembled = true;
         }
         self.assembler = Some((cells, assembler));
-        let before = role.lift() / grid.scale(grid.size);
-        let before = if let Role::Far(cells) = role { before.max(cells.into()) } else { before };
-        let is_of_use = |bom: &&Bom| before * bom.side() < length;
-        let levels = self.cascades.levels.iter().take_while(is_of_use).count();
-        if self.made == Some((grid, role, levels)) {
-            return Ok(None);
-        }
-        executor.set_cascades(&self.cascades)?;
-        executor.set_roma(&RomaMaps::new(&self.cascades, levels, frame, pass, (*sample, *seed)))?;
-        self.made = Some((grid, role, levels));
-        Ok(Some(Step::RomaRotate))
+        Ok(())
     }
 
     /// Side of the cells of the finest maps that were made, world units.

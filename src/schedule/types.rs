@@ -151,6 +151,13 @@ pub enum Step {
         /// Which part of them.
         part: RomaPart,
     },
+    /// Make the distance fields of the base maps that the executor was given last: phase 1.
+    FieldMake,
+    /// Answer the pass's rays by them, and count them: phase 3.
+    FieldTrace {
+        /// Look-ups of a ray at most; one that has made them goes free.
+        steps: u32,
+    },
 }
 
 /// Whom rays ask, and for what.
@@ -306,9 +313,11 @@ pub struct Report {
     pub tile_batch_leaves: u64,
     /// Groups of triangles that rays postponed.
     pub leaf_groups_postponed: u64,
-    /// Rays that [`Step::RomaTrace`] finished along their map's direction because they had passed as many columns as they may.
+    /// Rays that [`Step::RomaTrace`] finished along their map's direction because they had passed as many columns as they may, and those that
+    /// [`Step::FieldTrace`] let go free because they had made as many look-ups as they may.
     pub rays_capped: u64,
-    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`] and [`Step::RomaTrace`].
+    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`], [`Step::RomaTrace`] and
+    /// [`Step::FieldTrace`].
     pub rays: u64,
     /// Nodes visited, when the executor counts.
     pub nodes: u64,

@@ -16,11 +16,11 @@ pub struct Record {
     pub rays: u64,
     /// Wall time from first submission to last fence, ms.
     pub ms: f64,
-    /// Device time of intersecting what was resident, ms; with ROMA, of making its maps.
+    /// Device time of intersecting what was resident, ms; with ROMA and distance fields, of making these.
     pub ms_phase1: f64,
     /// Device time of queries and lists, ms.
     pub ms_phase2: f64,
-    /// Device time of intersecting what was loaded or found visible, ms; with ROMA, of tracing its maps.
+    /// Device time of intersecting what was loaded or found visible, ms; with ROMA and distance fields, of tracing these.
     pub ms_phase3: f64,
     /// Wall time of loading, ms.
     pub ms_stream: f64,
@@ -58,7 +58,8 @@ pub struct Record {
     pub tile_batch_leaves: u64,
     /// With leaf-cache: groups of triangles that rays postponed.
     pub leaf_groups_postponed: u64,
-    /// With ROMA: rays that had passed as many columns of cells as they may, and went on along their map's direction.
+    /// With ROMA: rays that had passed as many columns of cells as they may, and went on along their map's direction;
+    /// with distance fields, that had made as many look-ups as they may, and went free.
     pub rays_capped: u64,
     /// With nearest-first: bricks of batches that were taken before a wanted one with a lower number.
     pub bricks_nearest_first: u64,

@@ -6,6 +6,7 @@
 use crate::gpu::device::Gpu;
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::wgsl::Pages;
+use crate::kernel::field::FieldMaps;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
 use crate::kernel::roma::RomaMaps;
@@ -272,6 +273,10 @@ impl FrameExecutor for Faulty {
 
     fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
         self.inner.set_roma(maps)
+    }
+
+    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
+        self.inner.set_field(field)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -34,35 +34,54 @@ pub struct DistanceField {
     has_seed: bool,
 }
 
+/// Distances of cells from the nearest occupied ones, as of [`jump_flood`]. Twin of `shaders/flood_distances.wgsl`.
+pub fn distances(nearest: &[u32], cells: u32, distances: &mut [f16]) {
+    // Of all squared distances that there are.
+    let roots: Vec<f16> = (0..=3 * (cells - 1).pow(2)).into_par_iter().map(distance_f16).collect();
+    distances.par_iter_mut().zip(nearest).zip(0..cells.pow(3)).for_each(|((distance, &seed), index)| {
+        let cell = [index / (cells * cells), index / cells % cells, index % cells];
+        *distance = if seed == NO_SEED { f16::INFINITY } else { roots[squared(cell, seed) as usize] };
+    });
+}
+
+/// The level after `fine`, which has `cells` on each axis: the least of each eight. Twin of `shaders/halve_distances.wgsl`.
+pub fn halve(fine: &[f16], cells: u32, coarse: &mut [f16]) {
+    let (cells, half) = (cells as usize, cells as usize / 2);
+    coarse.par_iter_mut().enumerate().for_each(|(index, least)| {
+        let [x, y, z] = [index / (half * half), index / half % half, index % half].map(|at| 2 * at);
+        let at =
+            |corner: usize| fine[((x + (corner >> 2 & 1)) * cells + y + (corner >> 1 & 1)) * cells + z + (corner & 1)];
+        *least = (0..8).map(at).fold(f16::INFINITY, f16::min);
+    });
+}
+
 impl DistanceField {
     /// The field of a map by jump flooding.
     pub fn new(map: &Bom) -> Self {
-        Self::of_nearest(map, &jump_flood(map))
+        let mut field = Self::unfilled(map);
+        field.fill(&jump_flood(map));
+        for level in 1..LEVELS {
+            field.halve(level);
+        }
+        field
     }
 
-    /// The field of a map with the nearest occupied cell of each as of [`jump_flood`].
-    pub fn of_nearest(map: &Bom, nearest: &[u32]) -> Self {
+    /// The field of a map whose distances are not known yet.
+    pub fn unfilled(map: &Bom) -> Self {
         let cells = map.cells();
-        // Of all squared distances that there are.
-        let roots: Vec<f16> = (0..=3 * (cells - 1).pow(2)).into_par_iter().map(distance_f16).collect();
-        let finest: Vec<f16> = nearest
-            .par_iter()
-            .zip(0..cells.pow(3))
-            .map(|(&seed, index)| {
-                let cell = [index / (cells * cells), index / cells % cells, index % cells];
-                if seed == NO_SEED { f16::INFINITY } else { roots[squared(cell, seed) as usize] }
-            })
-            .collect();
-        let half = halved(&finest, cells);
-        let quarter = halved(&half, cells / 2);
-        Self::of_levels(map, [finest, half, quarter])
+        let levels = std::array::from_fn(|level| vec![f16::INFINITY; (cells >> level).pow(3) as usize]);
+        Self { cells, side: map.side(), first: map.first, levels, has_seed: map.occupied() > 0 }
     }
 
-    /// The field of a map with the distances of its levels as of [`level`](Self::level).
-    pub fn of_levels(map: &Bom, levels: [Vec<f16>; LEVELS]) -> Self {
-        debug_assert!((0..LEVELS).all(|level| levels[level].len() == (map.cells() >> level).pow(3) as usize));
-        let has_seed = levels[0].first().is_some_and(|distance| distance.is_finite());
-        Self { cells: map.cells(), side: map.side(), first: map.first, levels, has_seed }
+    /// Makes the finest level from the nearest occupied cells of its own, as of [`jump_flood`].
+    pub fn fill(&mut self, nearest: &[u32]) {
+        distances(nearest, self.cells, &mut self.levels[0]);
+    }
+
+    /// Makes a level, 1 or above, from the one before.
+    pub fn halve(&mut self, level: usize) {
+        let (fine, coarse) = self.levels.split_at_mut(level);
+        halve(&fine[level - 1], self.cells >> (level - 1), &mut coarse[0]);
     }
 
     /// The side of a cell of the finest level, world units.
@@ -97,8 +116,8 @@ impl DistanceField {
             return f32::INFINITY;
         }
         let count = self.cells(level);
-        let width = (1 << level) as f32;
-        let at = point.map(|x| (x / width - 0.5).clamp(0.0, (count - 1) as f32));
+        let per_cell = 1.0 / (1 << level) as f32;
+        let at = point.map(|x| (x * per_cell - 0.5).clamp(0.0, (count - 1) as f32));
         let low = at.map(|x| (x as u32).min(count - 2));
         let [u, v, w]: [f32; 3] = std::array::from_fn(|k| at[k] - low[k] as f32);
         let get = |x: u32, y: u32, z: u32| {
@@ -110,19 +129,4 @@ impl DistanceField {
         let face = |x: u32| mix(row(x, 0), row(x, 1), v);
         mix(face(0), face(1), u)
     }
-}
-
-/// The level after one of `cells` on each axis: the least of each eight.
-fn halved(fine: &[f16], cells: u32) -> Vec<f16> {
-    let (cells, half) = (cells as usize, cells as usize / 2);
-    (0..half.pow(3))
-        .into_par_iter()
-        .map(|index| {
-            let [x, y, z] = [index / (half * half), index / half % half, index % half].map(|at| 2 * at);
-            let at = |corner: usize| {
-                fine[((x + (corner >> 2 & 1)) * cells + y + (corner >> 1 & 1)) * cells + z + (corner & 1)]
-            };
-            (0..8).map(at).fold(f16::INFINITY, f16::min)
-        })
-        .collect()
 }

@@ -1,6 +1,10 @@
 //! Sphere tracing.
 
 use super::field::{DistanceField, LEVELS};
+use crate::math::exact::{divide, most, square_root};
+
+/// Least way between two look-ups, cells.
+pub const LEAST_STEP: f32 = 0.5;
 
 /// How rays go through a field. Lengths are in cells of the finest level.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +20,7 @@ pub struct Tracing {
 
 impl Default for Tracing {
     fn default() -> Self {
-        Self { iterations: 64, hit: 0.75, least_step: 0.5 }
+        Self { iterations: 64, hit: 0.75, least_step: LEAST_STEP }
     }
 }
 
@@ -32,8 +36,7 @@ pub struct Traced {
 }
 
 /// A ray in cells of the finest level, from the first.
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalRay {
     /// Where it starts.
     pub origin: [f32; 3],
@@ -43,6 +46,15 @@ pub struct LocalRay {
     pub direction: [f32; 3],
     /// Where its interval ends.
     pub t_max: f32,
+}
+
+/// How a ray goes on from one look-up to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Way {
+    /// The level that it reads.
+    pub level: usize,
+    /// Look-ups that it made.
+    pub look_ups: u32,
 }
 
 /// What a ray met, in cells.
@@ -66,11 +78,11 @@ impl DistanceField {
         Traced { t: t.map(|t| f64::from(t) * self.side()), iterations, is_capped }
     }
 
-    /// [`Self::trace`] in f32: the twin of `shaders/trace_field.wgsl`.
+    /// [`Self::trace`] in f32.
     pub fn trace_local(&self, tracing: &Tracing, ray: &LocalRay) -> LocalTraced {
         let size = self.cells(0) as f32;
         let (mut t, mut end) = (ray.t_min, ray.t_max);
-        let mut is_in = self.has_seed();
+        let mut is_in = true;
         for k in 0..3 {
             let (origin, along) = (ray.origin[k], ray.direction[k]);
             if along == 0.0 {
@@ -80,28 +92,46 @@ impl DistanceField {
                 (t, end) = (t.max(a.min(b)), end.min(a.max(b)));
             }
         }
-        let mut level = LEVELS - 1;
-        let (mut found, mut iterations) = (None, 0);
-        while is_in && iterations < tracing.iterations && t <= end {
-            let distance = self.distance(level, std::array::from_fn(|k| ray.origin[k] + t * ray.direction[k]));
-            iterations += 1;
+        let mut way = Way { level: LEVELS - 1, look_ups: 0 };
+        let found = is_in.then(|| self.through(tracing, ray.origin, ray.direction, [t, end], &mut way));
+        let (t, is_capped) = found.unwrap_or_default();
+        LocalTraced { t, iterations: way.look_ups, is_capped }
+    }
+
+    /// Where a ray meets something, and whether it made as many look-ups as it may and was not at its end: `at` and `speed` in cells of the
+    /// finest level, `range` of t within the field. Twin of `through` in `shaders/field_trace.wgsl`.
+    pub fn through(
+        &self,
+        tracing: &Tracing,
+        at: [f32; 3],
+        speed: [f32; 3],
+        range: [f32; 2],
+        way: &mut Way,
+    ) -> (Option<f32>, bool) {
+        if !self.has_seed() {
+            return (None, false);
+        }
+        let squares = speed[0] * speed[0] + speed[1] * speed[1] + speed[2] * speed[2];
+        let per_cell = divide(1.0, square_root(squares));
+        let mut t = range[0];
+        while way.look_ups < tracing.iterations && t <= range[1] {
+            let distance = self.distance(way.level, std::array::from_fn(|k| at[k] + t * speed[k]));
+            way.look_ups += 1;
             // Within two of its cells a level says little.
-            let width = (1 << level) as f32;
-            if level > 0 && distance < 2.0 * width {
-                level -= 1;
+            let width = (1 << way.level) as f32;
+            if way.level > 0 && distance < 2.0 * width {
+                way.level -= 1;
                 continue;
             }
             if distance <= tracing.hit {
-                found = Some(t);
-                break;
+                return (Some(t), false);
             }
-            t += distance.max(tracing.least_step);
-            if level + 1 < LEVELS && distance >= 4.0 * width {
-                level += 1;
+            t += most(distance, tracing.least_step) * per_cell;
+            if way.level + 1 < LEVELS && distance >= 4.0 * width {
+                way.level += 1;
             }
         }
-        let is_capped = is_in && found.is_none() && iterations == tracing.iterations && t <= end;
-        LocalTraced { t: found, iterations, is_capped }
+        (None, t <= range[1])
     }
 
     /// Whether anything is hit; as [`Self::trace`].

@@ -1,5 +1,5 @@
 //! `brickwalk bench roma`: the experiments of Zeng et al. 2023 on the generated scenes: times of making and tracing ray-aligned occupancy
-//! maps, and how far pictures by them are from exact ones.
+//! maps, and distance fields beside them, and how far pictures by them are from exact ones.
 //!
 //! A *view* is a scene, a light and a cache with one renderer, in which the ways to answer rays take turns. Each finished measurement
 //! is a line of `rows.jsonl`, from which alone tables, plots and pages are made.

@@ -62,6 +62,11 @@ pub enum Way {
         /// Whether rays keep their direction.
         is_unsnapped: bool,
     },
+    /// By a distance field, the paper's baseline.
+    Field {
+        /// Cells on each axis.
+        size: u32,
+    },
 }
 
 impl fmt::Display for Way {
@@ -71,6 +76,7 @@ impl fmt::Display for Way {
             Self::Roma { k, size, is_unsnapped } => {
                 write!(f, "roma {size} K={k}{}", if *is_unsnapped { " unsnapped" } else { "" })
             }
+            Self::Field { size } => write!(f, "df {size}"),
         }
     }
 }
@@ -86,6 +92,15 @@ impl Way {
                     "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
                 )
             }
+            Self::Field { size } => format!("--secondary df --df-size {size}"),
+        }
+    }
+
+    /// The distance field of as many cells on each axis, which with K = 4 takes as much memory as the maps.
+    pub fn field(&self) -> Option<Self> {
+        match self {
+            Self::Roma { size, .. } => Some(Self::Field { size: *size }),
+            _ => None,
         }
     }
 }
@@ -94,6 +109,9 @@ impl Way {
 const fn snapped(size: u32, k: u32) -> Way {
     Way::Roma { k, size, is_unsnapped: false }
 }
+
+/// The baseline of as much memory as [`USUAL`].
+pub const FIELD: Way = Way::Field { size: 128 };
 
 /// What the paper recommends for occlusion.
 pub const USUAL: Way = snapped(128, 4);
@@ -138,7 +156,8 @@ fn occlusion(length: f64) -> String {
 /// All jobs, in their order.
 pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     let sizes = [32, 64, 128];
-    let all: Vec<Way> = sizes.iter().flat_map(|&size| [snapped(size, 4), snapped(size, 8)]).collect();
+    let all: Vec<Way> =
+        sizes.iter().flat_map(|&size| [snapped(size, 4), snapped(size, 8), Way::Field { size }]).collect();
     let with_exact = |ways: &[Way]| [&[Way::Exact], ways].concat();
     let job = |stage, scene, variant: String, length, ways: Vec<Way>| Job {
         stage,
@@ -162,17 +181,18 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     }
     for &scene in &scenes {
         let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
-        let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped]);
+        let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped, FIELD]);
         jobs.push(job(Stage::Ao, scene, format!("rays of {length}"), length, ways));
     }
     jobs.push(job(Stage::Resolution, SceneId::City, format!("rays of {length}"), length, with_exact(&all)));
     for halvings in 0..6 {
         let length = length / f64::from(1 << halvings);
-        jobs.push(job(Stage::Radius, SceneId::City, format!("rays of {length}"), length, with_exact(&[USUAL])));
+        jobs.push(job(Stage::Radius, SceneId::City, format!("rays of {length}"), length, with_exact(&[USUAL, FIELD])));
     }
     let shadows: Vec<Way> = [false, true]
         .iter()
         .flat_map(|&is_unsnapped| [4, 8].map(|k| Way::Roma { k, size: 128, is_unsnapped }))
+        .chain([FIELD])
         .collect();
     for (light, options) in [("sun of 0.5 degrees", ""), ("sun of 10 degrees", " --sun-angle 10")] {
         let own = job(Stage::Shadows, SceneId::City, light.into(), length, with_exact(&shadows));
@@ -209,6 +229,10 @@ mod tests {
             assert_eq!(keys.len(), count);
             assert!(Stage::ALL.iter().all(|stage| jobs.iter().any(|job| job.stage == *stage)));
             assert!(jobs.iter().all(|job| job.ways.contains(&Way::Exact)), "all are compared with exact rays");
+            // Beside every array of maps is the field of as many cells, but for the cache's sake.
+            let with_fields = jobs.iter().filter(|job| job.stage != Stage::OutOfCore);
+            let has_field = |job: &Job| job.ways.iter().filter_map(Way::field).all(|field| job.ways.contains(&field));
+            assert!(with_fields.clone().count() > 8 && with_fields.clone().all(has_field));
         }
     }
 }

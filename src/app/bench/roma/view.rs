@@ -10,7 +10,7 @@ use crate::app::session::{Session, open_scene};
 use crate::app::walk;
 use crate::kernel::Extent;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
-use crate::render::{Renderer, Schedule};
+use crate::render::{Field, Renderer, Schedule};
 use crate::scene::Camera;
 use crate::schedule::cache::Cache;
 use crate::stream::Residency;
@@ -62,6 +62,8 @@ impl<'a> View<'a> {
         let args = walk_args(&line(self.job, way, self.settings, samples, seed), &self.scene, self.adapter)?;
         let renderer = &mut self.renderer;
         renderer.settings = walk::settings(&args, Schedule::Chc);
+        // A field stays as long as the camera does: its making is measured.
+        renderer.field = Field::default();
         if self.job.is_cold {
             let old = &renderer.cache;
             let sizes = old.bytes.sizes();
