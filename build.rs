@@ -106,6 +106,8 @@ fn layout_checks(module: &naga::Module) -> String {
         "Emitter",
         "RomaLevel",
         "RomaMap",
+        "RsmMap",
+        "RsmTexel",
     ];
     let mut s = String::new();
     for name in mirrored {
@@ -142,6 +144,7 @@ fn layout_checks(module: &naga::Module) -> String {
             "MATERIAL_UNLIT",
             "REFLECTANCE_",
             "ROMA_",
+            "RSM_",
             "NONE",
         ];
         if prefixes.iter().any(|p| name.starts_with(p))

@@ -16,6 +16,7 @@ use super::query_pairs::query_pairs;
 use super::rays::{RaySet, Work};
 use super::resolve::{AttributeView, resolve};
 use super::roma::{RomaTables, roma_rotate, roma_trace};
+use super::rsm::{RsmTables, rsm_light, rsm_write};
 use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
 use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
@@ -23,10 +24,12 @@ use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE, are_pairs_culled, dispatches,
+    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE, are_pairs_culled,
+    dispatches,
 };
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
@@ -47,6 +50,7 @@ struct Buffers {
     pixels: Pixels,
     tiles: TileLists,
     roma: RomaTables,
+    rsm: RsmTables,
 }
 
 /// Renders one scene on the processor.
@@ -92,7 +96,13 @@ impl CpuExecutor {
             texels: Texels::new(&file)?,
             opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
             lamps: LampTables::default(),
-            buffers: Buffers { sets, pixels: Pixels::new(rays), tiles, roma: RomaTables::default() },
+            buffers: Buffers {
+                sets,
+                pixels: Pixels::new(rays),
+                tiles,
+                roma: RomaTables::default(),
+                rsm: RsmTables::default(),
+            },
             binary: None,
             extent,
             view: Params::default(),
@@ -109,7 +119,7 @@ impl CpuExecutor {
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
         let extent = self.extent;
-        self.buffers.roma.maps.params(Params {
+        let params = self.buffers.roma.maps.params(Params {
             zero: 0,
             width: extent.width,
             height: extent.height,
@@ -124,7 +134,8 @@ impl CpuExecutor {
             top_count: self.scene.top2.len() as u32,
             instance_pad: self.scene.instance_pad,
             ..self.view
-        })
+        });
+        Params { rsm_maps: self.buffers.rsm.maps.maps.len() as u32, ..params }
     }
 
     /// The G-buffer of the hits of a set, for tests.
@@ -137,6 +148,12 @@ impl CpuExecutor {
     #[cfg(test)]
     pub(super) fn columns(&self) -> &[u32] {
         &self.buffers.roma.columns
+    }
+
+    /// The texels of reflective shadow maps, for tests.
+    #[cfg(test)]
+    pub(super) fn rsm_texels(&mut self) -> &mut Vec<layout::RsmTexel> {
+        &mut self.buffers.rsm.texels
     }
 
     /// The tiles and their lists, for tests.
@@ -156,7 +173,7 @@ fn run_kernel(
     (sampling, tile_demand): (Sampling, &[TileDemand]),
     binary: Option<&BinaryTrees>,
 ) -> Result<(), ExecutorError> {
-    let Buffers { sets, pixels, tiles, roma } = buffers;
+    let Buffers { sets, pixels, tiles, roma, rsm } = buffers;
     // The set of the pass, and the one before it, whose hits are shaded.
     let shaded = pass.set().saturating_sub(1);
     let (before, from) = sets.split_at_mut(pass.set());
@@ -207,6 +224,8 @@ fn run_kernel(
         "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
         ROMA_ROTATE => roma_rotate(bound, roma),
         ROMA_TRACE => roma_trace(bound, roma, own, seen),
+        RSM_WRITE => rsm_write(bound, rsm, pixels, seen, materials),
+        RSM_LIGHT => rsm_light(bound, rsm, pixels, seen),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),
             None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
@@ -340,6 +359,11 @@ impl FrameExecutor for CpuExecutor {
 
     fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
         self.buffers.roma.maps = maps.clone();
+        Ok(())
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        self.buffers.rsm.set(maps);
         Ok(())
     }
 

@@ -8,8 +8,9 @@
 use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
-use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
+use crate::kernel::layout::{GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
@@ -43,6 +44,8 @@ pub enum Defect {
     Lookups,
     /// Ray-aligned maps lie a hundredth of a cell aside.
     Maps,
+    /// What lamps see is looked up a texel aside.
+    LampMaps,
 }
 
 /// Both executors.
@@ -254,8 +257,21 @@ impl Lockstep {
         if steps.contains(&Step::RomaRotate) {
             findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
         }
+        if steps.iter().any(|step| matches!(step, Step::RsmWrite { .. })) {
+            let (texels, own) = (self.gpu.read_rsm_texels()?, self.cpu.rsm_texels());
+            let light: [Vec<f32>; 2] = [&texels, &*own].map(|all| all.iter().flat_map(|texel| texel.flux).collect());
+            findings.numbers("light of shadow maps", context, self.bound, &light[0], &light[1]);
+            let place =
+                |t: &RsmTexel| [[t.depth, t.facing].map(f32::to_bits), [t.normal[0], t.normal[1]].map(f32::to_bits)];
+            let places: [Vec<_>; 2] = [&texels, &*own].map(|all| all.iter().map(place).collect());
+            findings.words("texels of shadow maps", context, &places[0], &places[1]);
+            *own = texels;
+        }
         let shades = |step: &Step| {
-            matches!(step, Step::Resolve | Step::Sample | Step::Shade(_) | Step::AddLight | Step::AddOcclusion)
+            matches!(
+                step,
+                Step::Resolve | Step::Sample | Step::Shade(_) | Step::AddLight | Step::AddOcclusion | Step::RsmLight
+            )
         };
         if steps.iter().any(shades) {
             let radiance = (self.gpu.read_radiance()?, self.cpu.read_radiance()?);
@@ -394,6 +410,15 @@ impl FrameExecutor for Lockstep {
             own.maps.iter_mut().for_each(|map| map.base_from_cell[0][3] += 0.01);
         }
         self.cpu.set_roma(&own)
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_rsm(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::LampMaps) {
+            own.maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
+        }
+        self.cpu.set_rsm(&own)
     }
 
     fn begin_frame(&mut self, view: &View) {

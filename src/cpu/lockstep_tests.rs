@@ -7,11 +7,11 @@ use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
-use crate::kernel::dispatch::{INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::dispatch::{INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE};
 use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::{Extent, FrameExecutor, Keep, Setup};
 use crate::render::{
-    Effects, Equirectangular, Light, Occlusion, RenderSettings, Renderer, Roma, Schedule, emissive_triangles,
+    Effects, Equirectangular, Light, Occlusion, RenderSettings, Renderer, Roma, Rsm, Schedule, emissive_triangles,
     environment,
 };
 use crate::scene::path::path_from_bounds;
@@ -21,6 +21,7 @@ use crate::schedule::fronts::Fronts;
 use crate::schedule::{Optimisation, Tracing};
 use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use crate::visibility::roma::{Grid, RomaSettings};
+use crate::visibility::rsm::RsmSettings;
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -206,7 +207,15 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 /// Small maps, of both numbers of directions.
 fn roma(steps: u32) -> RomaSettings {
     let grid = |k, size| Grid { k, size, samples: 0 };
-    RomaSettings { occlusion: grid(4, 32), occlusion_steps: steps, shadow: grid(8, 32), shadow_steps: steps }
+    RomaSettings {
+        occlusion: grid(4, 32),
+        occlusion_steps: steps,
+        shadow: grid(8, 32),
+        shadow_steps: steps,
+        diffuse: grid(4, 32),
+        diffuse_steps: steps,
+        rsm: RsmSettings { size: 48, lamps: 8 },
+    }
 }
 
 /// Renders two frames in lockstep.
@@ -276,6 +285,7 @@ fn render(
         auto: Auto::default(),
         captures: None,
         roma: Roma::default(),
+        rsm: Rsm::default(),
         host_seen: HostCacheStats::default(),
     };
     let path = path_from_bounds(manifest.min, manifest.max);
@@ -326,7 +336,7 @@ fn twins_agree_with_their_kernels() {
     }
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
-    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE]);
+    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_TRACE, RSM_WRITE, RSM_LIGHT]);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
     assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
@@ -345,10 +355,11 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::Light, &plain, "radiance"),
         (Defect::Lookups, &tiled, "tiles"),
         (Defect::Maps, &plain, "columns of maps"),
+        (Defect::LampMaps, &plain, "radiance"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
-        let roma = (defect == Defect::Maps).then_some(0);
+        let roma = matches!(defect, Defect::Maps | Defect::LampMaps).then_some(0);
         let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();

@@ -42,6 +42,7 @@ mod random;
 mod rays;
 mod resolve;
 mod roma;
+mod rsm;
 mod sample;
 mod scene;
 mod shade;

@@ -4,7 +4,8 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
-    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, Params, ROMA_HIT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, PARAM_ANY_HIT, Params, ROMA_HIT, Ray, RomaLevel, RomaMap, Surface,
+    T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -118,6 +119,16 @@ struct Found {
     is_capped: bool,
 }
 
+/// A hit of a ray, known to a cell.
+struct Met {
+    t: f32,
+    point: Vec3,
+    /// The direction that was travelled.
+    direction: Vec3,
+    /// Of the level.
+    lift: f32,
+}
+
 /// The part of the range of t in which a coordinate lies between `low` and `high`.
 fn clipped(range: [f32; 2], at: f32, speed: f32, low: f32, high: f32) -> [f32; 2] {
     if speed.abs() < LEAST_SPEED {
@@ -197,8 +208,8 @@ impl Maps<'_> {
         Found { t: hit, is_capped: steps > 0 }
     }
 
-    /// Where a ray meets something, below 0 nowhere; whether it was capped in some level.
-    fn trace(&self, index: u32, ray: &Ray, normal: Vec3) -> Found {
+    /// What a ray meets; whether it was capped in some level.
+    fn trace(&self, index: u32, ray: &Ray, normal: Vec3) -> (Option<Met>, bool) {
         let p = self.params;
         let maps = p.roma_k * p.roma_k;
         let (stratum, is_upper) = stratum_of(ray.direction, p.roma_k);
@@ -240,34 +251,43 @@ impl Maps<'_> {
                 let cells = each(|k| linear(&rows[k], direction));
                 let found = self.through(map, cell, cells, range, steps);
                 is_capped |= found.is_capped;
-                if found.t >= 0.0 || range[1] >= ray.t_max {
-                    return Found { is_capped, ..found };
+                if found.t >= 0.0 {
+                    let point = each(|k| start[k] + found.t * direction[k]);
+                    return (Some(Met { t: found.t, point, direction, lift: level.lift }), is_capped);
+                }
+                if range[1] >= ray.t_max {
+                    return (None, is_capped);
                 }
                 t = range[1];
             }
         }
-        Found { t: -1.0, is_capped }
+        (None, is_capped)
     }
 }
 
 /// Answers the pass's rays by ray-aligned maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the next where
-/// the ray leaves one. What is met is written as a hit of no triangle.
+/// the ray leaves one. What is met is written as a hit of no triangle; where the closest is asked for, with what is known of its surface.
 pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let RomaMaps { levels, maps, .. } = &tables.maps;
     let of = Maps { params: bound.params, levels, maps, columns: &tables.columns };
     let normal = |index: usize| seen.surfaces.get(index).map_or([0.0; 3], |surface: &Surface| surface.normal);
-    own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
+    let RaySet { rays, hits, surfaces } = own;
+    let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
+    all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();
-        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+        for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
             let index = run * RUN + i;
             tally.add(COUNTER_RAYS, 1);
             if levels.is_empty() {
                 continue;
             }
-            let found = of.trace(index as u32, ray, normal(index));
-            tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
-            if found.t >= 0.0 {
-                *hit = Hit { t: found.t, id: ROMA_HIT, u: 0.0, v: 0.0 };
+            let (met, is_capped) = of.trace(index as u32, ray, normal(index));
+            tally.add(COUNTER_ROMA_CAPPED, u32::from(is_capped));
+            let Some(Met { t, point, direction, lift }) = met else { continue };
+            hits[i] = Hit { t, id: ROMA_HIT, u: 0.0, v: 0.0 };
+            if !bound.has(PARAM_ANY_HIT) {
+                let surface = &mut surfaces[i];
+                (surface.point, surface.normal, surface.area) = (point, direction.map(|x| -x), lift);
             }
         }
         bound.counters.add(&tally);

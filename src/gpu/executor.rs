@@ -9,6 +9,7 @@ use super::pages::{CachePages, MappedRange};
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
 use super::readback::Readback;
 use super::roma::Roma;
+use super::rsm::Rsm;
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
@@ -18,6 +19,7 @@ use crate::kernel::dispatch::{
 };
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
     report, textures,
@@ -49,6 +51,7 @@ pub struct GpuExecutor {
     groups: Groups,
     binary: Option<BinaryTrees>,
     roma: Option<Roma>,
+    rsm: Option<Rsm>,
     extent: Extent,
     readback: Readback,
     timing: Timing,
@@ -151,6 +154,7 @@ impl GpuExecutor {
             groups,
             binary: None,
             roma: None,
+            rsm: None,
             extent,
             readback,
             timing,
@@ -199,6 +203,14 @@ impl GpuExecutor {
         Ok(columns[..maps.words() as usize].to_vec())
     }
 
+    /// The texels of reflective shadow maps, for tests.
+    #[cfg(test)]
+    pub(crate) fn read_rsm_texels(&mut self) -> Result<Vec<layout::RsmTexel>, ExecutorError> {
+        let Some(rsm) = &self.rsm else { return Ok(Vec::new()) };
+        let bytes = self.readback.read(&self.gpu, &rsm.texels)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
@@ -226,7 +238,8 @@ impl GpuExecutor {
             instance_pad: self.buffers.scene.instance_pad,
             ..self.view
         };
-        self.roma.as_ref().map_or(params, |roma| roma.maps.params(params))
+        let params = self.roma.as_ref().map_or(params, |roma| roma.maps.params(params));
+        Params { rsm_maps: self.rsm.as_ref().map_or(0, |rsm| rsm.maps), ..params }
     }
 
     /// One submission: all steps, then counters and demand read back.
@@ -282,7 +295,9 @@ impl GpuExecutor {
             });
             let binary = self.binary.as_ref().filter(|_| dispatch.kernel == INTERSECT_BINARY);
             let roma = self.roma.as_ref().and_then(|roma| Some((roma.pipeline(dispatch.kernel)?, roma)));
-            let own = binary.map(|b| &b.pipeline).or(roma.map(|(pipeline, _)| pipeline));
+            let rsm = self.rsm.as_ref().and_then(|rsm| Some((rsm.pipeline(dispatch.kernel)?, rsm)));
+            let of_maps = roma.map(|(pipeline, _)| pipeline).or(rsm.map(|(pipeline, _)| pipeline));
+            let own = binary.map(|b| &b.pipeline).or(of_maps);
             compute.set_pipeline(own.unwrap_or_else(|| self.kernels.pipeline(dispatch.kernel)));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
@@ -290,12 +305,13 @@ impl GpuExecutor {
                 (true, _) => &self.groups.cache,
                 (false, Third::Shading) => &self.groups.lamps,
                 (false, Third::Roma) => roma.map_or(&self.groups.empty, |(_, roma)| &roma.group),
+                (false, Third::Rsm) => rsm.map_or(&self.groups.empty, |(_, rsm)| &rsm.group),
                 _ => &self.groups.empty,
             };
             compute.set_bind_group(2, second, &[]);
             let shaded = pass.set().saturating_sub(1);
             let third = match (dispatch.third, &self.groups.sampling) {
-                (Third::Shading | Third::Roma, _) => &self.groups.shading[shaded],
+                (Third::Shading | Third::Roma | Third::Rsm, _) => &self.groups.shading[shaded],
                 (Third::Sampling, Some(sampling)) => &sampling[shaded],
                 _ => &self.groups.tiles,
             };
@@ -405,6 +421,9 @@ impl FrameExecutor for GpuExecutor {
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
         if self.buffers.lamps.set(&self.gpu, lamps)? {
             self.rebind();
+            if let Some(rsm) = &mut self.rsm {
+                rsm.rebind(&self.gpu, &self.buffers.lamps);
+            }
         }
         Ok(())
     }
@@ -417,6 +436,15 @@ impl FrameExecutor for GpuExecutor {
     fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
         let Self { gpu, kernels, roma, .. } = self;
         roma.get_or_insert_with(|| Roma::new(gpu, kernels)).set_maps(gpu, maps)
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        let Self { gpu, kernels, rsm, buffers, .. } = self;
+        let rsm = match rsm {
+            Some(rsm) => rsm,
+            none => none.insert(Rsm::new(gpu, kernels, &buffers.lamps)?),
+        };
+        rsm.set(gpu, &buffers.lamps, maps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -96,6 +96,8 @@ pub enum Third {
     Sampling,
     /// What shading the set before the pass's needs, with group 2 the occupancy maps.
     Roma,
+    /// What shading the set before the pass's needs, with group 2 the lamps and the reflective shadow maps.
+    Rsm,
 }
 
 /// One dispatch of a kernel.
@@ -140,6 +142,13 @@ pub const INTERSECT_BINARY: &str = "intersect_binary";
 pub const ROMA_ROTATE: &str = "roma_rotate";
 /// The kernel that traces them.
 pub const ROMA_TRACE: &str = "roma_trace";
+/// The kernel that writes reflective shadow maps.
+pub const RSM_WRITE: &str = "rsm_write";
+/// The kernel that lights what ROMA met by them.
+pub const RSM_LIGHT: &str = "rsm_light";
+
+/// Which random numbers the look-ups of reflective shadow maps take.
+const RSM_STREAM: u32 = 10 << 24;
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -295,6 +304,14 @@ pub fn dispatches(
         }
         Step::RomaTrace { steps } => {
             vec![roma(ROMA_TRACE, Params { roma_steps: steps, ..params }, per_ray, 2)]
+        }
+        Step::RsmWrite { map, corner: [x, y] } => {
+            let params = Params { rsm_map: map, rsm_x: x, rsm_y: y, ..params };
+            vec![Dispatch { third: Third::Rsm, ..shading(RSM_WRITE, params, false) }]
+        }
+        Step::RsmLight => {
+            let params = Params { stream: params.sample.wrapping_add(RSM_STREAM), ..params };
+            vec![Dispatch { third: Third::Rsm, phase: Some(2), ..shading(RSM_LIGHT, params, false) }]
         }
     }
 }

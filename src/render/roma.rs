@@ -54,6 +54,7 @@ impl Roma {
     pub fn grid_of(settings: &RomaSettings, pass: Pass) -> Option<(Grid, u32)> {
         match pass {
             Pass::Occlusion(_) => Some((settings.occlusion, settings.occlusion_steps)),
+            Pass::Diffuse(_) => Some((settings.diffuse, settings.diffuse_steps)),
             Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
                 Some((settings.shadow, settings.shadow_steps))
             }
@@ -71,10 +72,23 @@ impl Roma {
         scene: &Arc<SceneFile>,
         grid: Grid,
     ) -> Result<Option<Step>, ExecutorError> {
-        let Some(RomaView { frame, camera, sample, seed }) = &self.view else { return Ok(None) };
         if self.made == Some(grid) {
             return Ok(None);
         }
+        self.assemble(scene, grid)?;
+        let Some(RomaView { frame, sample, seed, .. }) = &self.view else { return Ok(None) };
+        executor.set_cascades(&self.cascades)?;
+        executor.set_roma(&RomaMaps::new(&self.cascades, frame, grid, *sample, *seed))?;
+        self.made = Some(grid);
+        Ok(Some(Step::RomaRotate))
+    }
+
+    /// The base maps around the camera for the maps of `grid`.
+    ///
+    /// # Errors
+    /// Occupancy that cannot be read.
+    pub fn assemble(&mut self, scene: &Arc<SceneFile>, grid: Grid) -> Result<&Arc<Cascades>, ExecutorError> {
+        let Some(RomaView { camera, .. }) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
         let (cells, mut assembler) = match self.assembler.take() {
             Some((cells, assembler)) if cells == grid.size => (cells, assembler),
@@ -93,10 +107,7 @@ impl Roma {
             self.is_assembled = true;
         }
         self.assembler = Some((cells, assembler));
-        executor.set_cascades(&self.cascades)?;
-        executor.set_roma(&RomaMaps::new(&self.cascades, frame, grid, *sample, *seed))?;
-        self.made = Some(grid);
-        Ok(Some(Step::RomaRotate))
+        Ok(&self.cascades)
     }
 
     /// Side of the cells of the finest maps that were made, world units.

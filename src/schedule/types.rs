@@ -141,6 +141,15 @@ pub enum Step {
         /// Columns that a ray passes before it is finished along the map's direction; 0: it takes that direction from the start.
         steps: u32,
     },
+    /// Write a block of texels of a reflective shadow map from the hits of the set before, whose attributes are read.
+    RsmWrite {
+        /// The map.
+        map: u32,
+        /// The texel that ray 0 is for.
+        corner: [u32; 2],
+    },
+    /// Add what the hits of the set before that [`Step::RomaTrace`] gave reflect of the lamps, by their reflective shadow maps: phase 3.
+    RsmLight,
 }
 
 /// Whom rays ask, and for what.

@@ -9,6 +9,7 @@ use crate::gpu::wgsl::Pages;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
@@ -272,6 +273,10 @@ impl FrameExecutor for Faulty {
 
     fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
         self.inner.set_roma(maps)
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        self.inner.set_rsm(maps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -16,6 +16,8 @@
 pub mod bits;
 pub mod directions;
 
+use super::rsm::RsmSettings;
+
 /// How the maps of an array are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grid {
@@ -59,6 +61,12 @@ pub struct RomaSettings {
     pub shadow: Grid,
     /// Columns of shadow rays.
     pub shadow_steps: u32,
+    /// The maps of diffuse rays.
+    pub diffuse: Grid,
+    /// Columns of diffuse rays.
+    pub diffuse_steps: u32,
+    /// What lights the hits of diffuse rays.
+    pub rsm: RsmSettings,
 }
 
 /// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.

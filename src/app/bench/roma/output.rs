@@ -98,6 +98,7 @@ fn title(stage: Stage) -> &'static str {
         Stage::Resolution => "Resolutions and numbers of directions, figure 9",
         Stage::Radius => "Lengths of rays: where it fails",
         Stage::Shadows => "Soft shadows, figures 7 and 8",
+        Stage::Diffuse => "One-bounce diffuse light, figure 6",
         Stage::OutOfCore => "Out of core",
     }
 }
@@ -173,14 +174,17 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
         "exact ÷ this",
         "bricks loaded",
         "capped, %",
+        "lamps' maps, ms",
     ];
+    let has_lamps = stage == Stage::Diffuse;
+    let columns = &columns[..columns.len() - usize::from(!has_lamps)];
     let mut lines = Vec::new();
     for job in jobs {
         let value = |way: &Way, name: &str| rows.value(&job.key(way), name);
         let per_ray = |way: &Way| ratio(value(way, "ms_trace").map(|ms| 1e6 * ms), value(way, "rays"));
         for way in job.ways.iter().filter(|way| rows.has(&job.key(way))) {
             let percent = |name: &str| Value::number(value(way, name).map(|x| 100.0 * x));
-            lines.push(vec![
+            let mut line = vec![
                 Value::Text(job.scene.name().into()),
                 Value::Text(job.variant.clone()),
                 Value::Text(if *way == Way::Exact { "exact (noise)".into() } else { way.to_string() }),
@@ -192,7 +196,11 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
                 Value::ratio(ratio(per_ray(&Way::Exact), per_ray(way)).filter(|_| *way != Way::Exact)),
                 Value::number(value(way, "bricks_loaded")),
                 Value::number(ratio(value(way, "rays_capped"), value(way, "rays")).map(|x| 100.0 * x)),
-            ]);
+            ];
+            if has_lamps {
+                line.push(Value::number(value(way, "ms_lamps").filter(|_| *way != Way::Exact)));
+            }
+            lines.push(line);
         }
     }
     let caption = "How far pictures are from exact ones: converged, and with one sample a pixel. Times are those of tracing, without the \
@@ -200,7 +208,7 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
     Table {
         name: stage.name().into(),
         caption: caption.into(),
-        columns: columns.map(String::from).to_vec(),
+        columns: columns.iter().copied().map(String::from).collect(),
         rows: lines,
     }
 }

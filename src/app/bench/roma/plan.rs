@@ -17,13 +17,16 @@ pub enum Stage {
     Radius,
     /// Snapped and unsnapped shadow rays (its figures 7 and 8).
     Shadows,
+    /// One-bounce diffuse light of the sun by reflective shadow maps (its figure 6).
+    Diffuse,
     /// A cache that holds 15 % of the scene.
     OutOfCore,
 }
 
 impl Stage {
     /// All of them, in their order.
-    pub const ALL: [Self; 6] = [Self::Speed, Self::Ao, Self::Resolution, Self::Radius, Self::Shadows, Self::OutOfCore];
+    pub const ALL: [Self; 7] =
+        [Self::Speed, Self::Ao, Self::Resolution, Self::Radius, Self::Shadows, Self::Diffuse, Self::OutOfCore];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
@@ -33,6 +36,7 @@ impl Stage {
             Self::Resolution => "resolution",
             Self::Radius => "radius",
             Self::Shadows => "shadows",
+            Self::Diffuse => "diffuse",
             Self::OutOfCore => "out-of-core",
         }
     }
@@ -83,7 +87,7 @@ impl Way {
             Self::Roma { k, size, is_unsnapped } => {
                 let unsnapped = if *is_unsnapped { "all" } else { "none" };
                 format!(
-                    "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
+                    "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-diffuse-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
                 )
             }
         }
@@ -111,6 +115,8 @@ pub struct Job {
     pub effect: &'static str,
     /// The options of `walk` for effect and light.
     pub options: String,
+    /// Those of a picture without the effect, which is taken off; none is where empty.
+    pub without: String,
     /// Share of the scene that the cache holds, per cent.
     pub cache: u32,
     /// Whether times are measured.
@@ -135,6 +141,11 @@ fn occlusion(length: f64) -> String {
     format!("--effects ao --ao-rays 1 --ao-length {length} --sun-intensity 0 --rotation full")
 }
 
+/// The sun alone, and what is lit by what it lights, if `effects` have that.
+fn bounce(effects: &str) -> String {
+    format!("--effects {effects} --diffuse-rays 1 --sky-intensity 0 --sun-angle 0 --rotation full --roma-steps 64")
+}
+
 /// All jobs, in their order.
 pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     let sizes = [32, 64, 128];
@@ -146,6 +157,7 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         variant,
         effect: "ao",
         options: occlusion(length),
+        without: String::new(),
         cache: 100,
         times: false,
         is_cold: false,
@@ -179,6 +191,17 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         let options = format!("--effects shadow --sky-intensity 0{options}");
         jobs.push(Job { effect: "shadow", options, times: true, ..own });
     }
+    let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
+    for &scene in &scenes {
+        let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped]);
+        let own =
+            Job { effect: "diffuse", times: true, ..job(Stage::Diffuse, scene, "all resident".into(), length, ways) };
+        jobs.push(Job { options: bounce("shadow,diffuse"), without: bounce("shadow"), ..own });
+    }
+    let own = job(Stage::Diffuse, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
+    let own =
+        Job { effect: "diffuse", options: bounce("shadow,diffuse"), cache: 15, times: true, errors: false, ..own };
+    jobs.push(Job { is_cold: true, ..own });
     let own = job(Stage::OutOfCore, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
     jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
     jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
