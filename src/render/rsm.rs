@@ -96,10 +96,11 @@ impl Renderer {
         if missing.is_empty() {
             return Ok(());
         }
+        let frame = records.frame();
         records.pass(self, EFFECT, |r, stats| {
             for index in missing {
                 r.rsm.made[index] = None;
-                r.make_rsm(index as u32, &wanted[index].view, stats)?;
+                r.make_rsm(frame, index as u32, &wanted[index].view, stats)?;
                 r.rsm.made[index] = Some(wanted[index].clone());
                 r.rsm.count += 1;
             }
@@ -109,8 +110,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes one map, block by block of the size of the picture. Its frame is its own, so that it does not depend on the camera's.
-    fn make_rsm(&mut self, map: u32, lamp: &LampView, stats: &mut PassStats) -> Result<(), ExecutorError> {
+    /// Makes one map in frame `number`, block by block of the size of the picture. Its frame is its own, so that it does not depend on the camera's.
+    fn make_rsm(&mut self, number: u32, map: u32, lamp: &LampView, stats: &mut PassStats) -> Result<(), ExecutorError> {
         let middle = if lamp.is_perspective {
             lamp.corner
         } else {
@@ -130,6 +131,8 @@ impl Renderer {
                 let rows = height.min(lamp.height - y);
                 let rays: Vec<Ray> = (0..width * rows).map(ray).collect();
                 self.executor.set_rays(Pass::Primary, &rays);
+                // No brick is done with for these rays.
+                self.cache.begin_pass(EFFECT, number);
                 self.trace_given(stats)?;
                 attributes::resolve(&mut *self.executor, &mut self.cache, Pass::Primary, stats)?;
                 let write = Step::RsmWrite { map, corner: [x, y] };
