@@ -106,6 +106,8 @@ fn layout_checks(module: &naga::Module) -> String {
         "Emitter",
         "RomaLevel",
         "RomaMap",
+        "RsmMap",
+        "RsmTexel",
     ];
     let mut s = String::new();
     for name in mirrored {
@@ -143,6 +145,7 @@ fn layout_checks(module: &naga::Module) -> String {
             "REFLECTANCE_",
             "ROMA_",
             "FIELD_HIT",
+            "RSM_",
             "NONE",
         ];
         if prefixes.iter().any(|p| name.starts_with(p))

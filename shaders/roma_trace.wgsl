@@ -1,6 +1,8 @@
 // Answers the pass's rays by ray-aligned occupancy maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the
 // next where the ray leaves one. Rays are off their surface by the level's lift where they enter it, so that no level meets what they
 // leave. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing are ended.
+// Where the closest is asked for, with the point, against the direction travelled as its normal, and the level's lift as its area: such a hit is known
+// to a cell.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -126,6 +128,11 @@ fn trace(index: u32, ray: Ray) -> bool {
                 } else {
                     // A ray that was sifted is not traced.
                     hits[index] = Hit(select(found.t, -1.0, params.roma_part == ROMA_SIFT), ROMA_HIT, 0.0, 0.0);
+                }
+                if (params.flags & PARAM_ANY_HIT) == 0u {
+                    surfaces[index].point = barrier3(start + barrier3(found.t * direction));
+                    surfaces[index].normal = -direction;
+                    surfaces[index].area = level.lift;
                 }
                 return is_capped;
             }

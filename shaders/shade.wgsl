@@ -73,7 +73,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         density = densities[index];
     }
     if seen_surfaces[index].leaf == NONE {
-        if (params.flags & PARAM_MISS) != 0u {
+        // What occupancy maps met is lit otherwise.
+        if (params.flags & PARAM_MISS) != 0u && seen_hits[index].id != ROMA_HIT {
             add_light(index, seen_background(ray.direction, density));
         }
         return;

@@ -230,6 +230,28 @@ fn occupancy_maps_are_measured_beside_exact_rays() {
 }
 
 #[test]
+fn maps_and_bricks_together_are_measured() {
+    let folder = folder();
+    let output = folder.path().join("out");
+    let tiny = "bench roma --triangles 10K --size 32x18 --samples 2 --repeat 1 --adapter cpu --stages handover -o";
+    succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
+    let json: Value =
+        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON");
+    // Exact rays, maps, five hand-overs and four shares, of two lengths.
+    assert_eq!(json["measured"], 22);
+    let own = table(&json, "handover");
+    let of = |way: &str, name: &str| number(&entry(own, &["city", "rays of 64, cache 15 %", way], name));
+    assert!(of("auto, one in 1", "FLIP") < of("roma 128 K=4", "FLIP"), "what is traced is not in doubt");
+    assert_eq!(of("exact (noise)", "whole ÷ exact"), 1.0);
+    for way in ["roma beyond 4 cells", "auto, one in 8"] {
+        let ratio = of(way, "whole, ms") / of("exact (noise)", "whole, ms");
+        assert_eq!(of(way, "whole ÷ exact"), ratio, "{way}");
+    }
+    let page = std::fs::read_to_string(output.join("report.html")).expect("a page");
+    assert!(page.contains("Error over time, rays of 64"));
+}
+
+#[test]
 fn distance_fields_are_measured_beside_occupancy_maps() {
     let folder = folder();
     let output = folder.path().join("out");

@@ -115,6 +115,9 @@ fn generated_scenes_look_the_same() {
         format!("{near} {EFFECTS} --schedule demand --cache 10% --evict lru"),
         format!("{near} --schedule chc --cache 20% --fronts on --tile 16 --measure-needed"),
         format!("{near} --schedule chc --cache 20% --query-threshold 20 --tile 16"),
+        format!(
+            "{near} --effects shadow,diffuse --diffuse-rays 2 --rotation full --secondary roma --schedule chc --cache 20%"
+        ),
         format!("{near} --schedule plain-bvh2 --cache 100% --spp 2"),
     ];
     for options in &of_city {

@@ -59,6 +59,10 @@ struct Params {
     field_half: u32,      // which half of the nearest cells is read
     field_steps: u32,     // look-ups of a ray at most
     field_hit: f32,       // a ray meets what it is no farther from, cells
+    rsm_maps: u32,        // reflective shadow maps of all lamps
+    rsm_map: u32,         // rsm_write: the one that is written,
+    rsm_x: u32,           // and its texel that ray 0 of the pass is for
+    rsm_y: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -308,6 +312,26 @@ struct RomaMap {          // a ray-aligned map; columns run along its z
     direction: vec4<f32>, // unit vector along the columns, world space
 }
 
+struct RsmMap {           // what a lamp lights, as it sees it
+    texel_from_point: array<vec4<f32>, 3>, // rows: place in texels, and depth, from points of the frame; in perspective the place is to be
+                          // divided by the depth
+    first: u32,           // its first texel among those of all
+    width: u32,           // texels of a row
+    height: u32,          // rows
+    lamp: u32,            // number of the emitter, NONE: the sun; maps of one lamp follow each other, the finest first
+    flags: u32,           // RSM_PERSPECTIVE: seen from a point, else along one direction
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
+}
+
+struct RsmTexel {
+    flux: vec3<f32>,      // radiance that the surface reflects of the lamp to all sides, its diffuse part
+    depth: f32,           // t of the texel's ray, device units; below 0: it met nothing
+    normal: vec3<f32>,    // geometric unit normal toward the lamp, world space
+    facing: f32,          // minus the cosine between it and the texel's ray, times the ray's length: of a unit of depth, the part across the surface
+}
+
 struct Emitter {          // in the frame, device units; one of them is drawn by an alias table over their power
     corner: vec3<f32>,    // a corner, or where the light is
     kind: u32,            // EMITTER_*, with EMITTER_TWO_SIDED
@@ -338,6 +362,7 @@ const NO_NORMAL: u32 = 0x80008000u;  // normal word of an attribute vertex witho
 const BRICK_DETAIL: u32 = 8u;
 const MATERIAL_DOUBLE_SIDED: u32 = 4u;
 const MATERIAL_UNLIT: u32 = 8u;
+const RSM_PERSPECTIVE: u32 = 1u;
 const GBUFFER_READ: u32 = 1u;      // attributes are read
 const GBUFFER_WAITS: u32 = 62u;    // bits of textures that have still to be looked up, the first is that of texture 0
 const GBUFFER_FIRST: u32 = 1u;     // its place

@@ -360,9 +360,10 @@ pub struct WalkArgs {
     /// What is traced.
     #[command(flatten)]
     pub effects: EffectArgs,
-    /// How secondary rays are answered: exact (all are traced), roma (those of ao and shadow by maps of what cells are occupied, with a
-    /// bias of a few cells, and without a brick loaded for them; others are traced), auto (those of ao and shadow that these maps find free are not
-    /// traced: an error of the nearest cell alone), df (the rays of roma by distances to occupied cells: the baseline that it is compared with)
+    /// How secondary rays are answered: exact (all are traced), roma (those of ao, shadow and diffuse by maps of what cells are occupied, with a
+    /// bias of a few cells, and without a brick loaded for them; what diffuse rays meet is lit by maps of what the sun, points and spots light, which
+    /// load what these see; others are traced), auto (those of ao and shadow that these maps find free are not traced: an error of the nearest cell
+    /// alone), df (those of ao and shadow by distances to occupied cells: the baseline that roma is compared with)
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
     /// Occupancy maps.

@@ -82,7 +82,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--roma-k 5", "one of 4, 8"),
         ("--roma-size 100", "32, 64, 128, 256"),
         ("--roma-samples 3", "1, 2, 4"),
-        ("--roma-unsnapped glossy", "known: none, shadow, ao, all"),
+        ("--roma-unsnapped glossy", "known: none, shadow, ao, diffuse, all"),
         ("--roma-steps 65", "1 to 64"),
         ("--df-size 100", "32, 64, 128, 256"),
         ("--df-steps 0", "1 to 1024"),

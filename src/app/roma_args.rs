@@ -3,6 +3,7 @@
 use super::args::ranged;
 use super::named::named_values;
 use crate::visibility::roma::{Grid, MOST_NEAR, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings};
+use crate::visibility::rsm::RsmSettings;
 use clap::Args;
 
 /// Options of ray-aligned occupancy maps.
@@ -14,6 +15,9 @@ pub struct RomaArgs {
     /// With --secondary roma: the same of shadow, 4 or 8
     #[arg(long, value_name = "N", default_value = "8", value_parser = |s: &str| of(s, &[4, 8]))]
     pub roma_shadow_k: u32,
+    /// With --secondary roma: the same of diffuse, 4 or 8
+    #[arg(long, value_name = "N", default_value = "4", value_parser = |s: &str| of(s, &[4, 8]))]
+    pub roma_diffuse_k: u32,
     /// With --secondary roma: cells of a map on each axis: 32, 64, 128 or 256; of 128, 16 maps take 4 MiB for each of up to six sizes of cells
     #[arg(long, value_name = "CELLS", default_value = "128", value_parser = |s: &str| of(s, &[32, 64, 128, 256]))]
     pub roma_size: u32,
@@ -21,9 +25,10 @@ pub struct RomaArgs {
     /// it from passing over one, which is 2]
     #[arg(long, value_name = "N", value_parser = |s: &str| of(s, &[1, 2, 4]))]
     pub roma_samples: Option<u32>,
-    /// With --secondary roma: which rays keep their direction rather than to take that of the nearest map: none, shadow, ao, all
-    #[arg(long, value_name = "RAYS", default_value = "shadow")]
-    pub roma_unsnapped: Unsnapped,
+    /// With --secondary roma: which rays keep their direction rather than to take that of the nearest map, separated by
+    /// commas: none, shadow, ao, diffuse, all
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "shadow")]
+    pub roma_unsnapped: Vec<Unsnapped>,
     /// With --secondary roma: columns of cells, 1 to 64, that a ray with a direction of its own passes before it goes on in that of its map;
     /// rays_capped counts such rays
     #[arg(long, value_name = "N", default_value = "8", value_parser = |s: &str| ranged(s, 1, MOST_STEPS.into()))]
@@ -39,6 +44,14 @@ pub struct RomaArgs {
     /// are noisier; the mean is the same
     #[arg(long, value_name = "N", default_value = "4", value_parser = |s: &str| ranged(s, 1, MOST_ONE_IN.into()))]
     pub auto_one_in: u32,
+    /// With --secondary roma and diffuse: texels of the longer side of the maps of what lamps light, 32 to 2048; a map of the sun covers what a map of
+    /// cells does, so that 256 make them as wide as cells; a point has six of half as many on both sides
+    #[arg(long, value_name = "TEXELS", default_value = "256", value_parser = |s: &str| ranged(s, 32, 2048))]
+    pub rsm_size: u32,
+    /// With --secondary roma and diffuse: points, spots and distant lights that have such maps, the strongest, 0 to 64; what others light does not light
+    /// diffuse rays. The sun has maps besides
+    #[arg(long, value_name = "N", default_value = "8", value_parser = |s: &str| ranged(s, 0, 64))]
+    pub rsm_lamps: u32,
 }
 
 named_values! {
@@ -50,7 +63,9 @@ named_values! {
         Shadow = "shadow",
         /// Those of ao.
         Ao = "ao",
-        /// Both.
+        /// Those of diffuse.
+        Diffuse = "diffuse",
+        /// All of them.
         All = "all",
     } later &[]
 }
@@ -71,12 +86,12 @@ impl RomaArgs {
                 role,
             }
         };
-        let unsnapped = self.roma_unsnapped;
-        let (ao, shadow) = (matches!(unsnapped, Unsnapped::Ao), matches!(unsnapped, Unsnapped::Shadow));
-        let both = matches!(unsnapped, Unsnapped::All);
+        let keeps = |rays| self.roma_unsnapped.iter().any(|named| [rays, Unsnapped::All].contains(named));
         RomaSettings {
-            occlusion: pass(self.roma_k, ao || both, self.roma_near, self.auto_one_in),
-            shadow: pass(self.roma_shadow_k, shadow || both, self.roma_shadow_near, 1),
+            occlusion: pass(self.roma_k, keeps(Unsnapped::Ao), self.roma_near, self.auto_one_in),
+            shadow: pass(self.roma_shadow_k, keeps(Unsnapped::Shadow), self.roma_shadow_near, 1),
+            diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), 0, 1)),
+            rsm: RsmSettings { size: self.rsm_size, lamps: self.rsm_lamps },
         }
     }
 }

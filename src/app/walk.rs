@@ -10,7 +10,7 @@ use super::summary;
 use crate::kernel::Extent;
 use crate::render::denoise::Resolve;
 use crate::render::{
-    Accumulation, BATCH_SAMPLES, Captures, Field, Light, RenderError, RenderSettings, Renderer, Roma, Schedule,
+    Accumulation, BATCH_SAMPLES, Captures, Field, Light, RenderError, RenderSettings, Renderer, Roma, Rsm, Schedule,
 };
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
@@ -100,6 +100,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         };
         if frame == 0 {
             warn_of_short_rays(&renderer);
+            warn_of_dark_lamps(&renderer);
         }
         if let Some(reference) = &mut reference {
             reference.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
@@ -171,6 +172,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         captures: None,
         roma: Roma::default(),
         field: Field::default(),
+        rsm: Rsm::default(),
         host_seen: HostCacheStats::default(),
     }
 }
@@ -184,6 +186,23 @@ fn warn_of_short_rays(renderer: &Renderer) {
             std::io::stderr(),
             "brickwalk: warning: --ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has here: \
              ao is coarse; make it longer, or use --secondary exact"
+        );
+    }
+}
+
+/// Says which lamps do not light what diffuse rays meet.
+fn warn_of_dark_lamps(renderer: &Renderer) {
+    let [others, areas] = renderer.rsm.left_out();
+    if others > 0 {
+        let _ = writeln!(
+            std::io::stderr(),
+            "brickwalk: warning: what {others} weaker points, spots and distant lights light does not light diffuse rays; raise --rsm-lamps"
+        );
+    }
+    if areas > 0 {
+        let _ = writeln!(
+            std::io::stderr(),
+            "brickwalk: warning: what {areas} areas and surfaces that shine light does not light diffuse rays by --secondary roma; use              --secondary exact for it"
         );
     }
 }

@@ -17,6 +17,7 @@ use super::query_pairs::query_pairs;
 use super::rays::{RaySet, Work};
 use super::resolve::{AttributeView, resolve};
 use super::roma::{RomaTables, roma_near, roma_rotate, roma_trace};
+use super::rsm::{RsmTables, rsm_light, rsm_write};
 use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
 use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
@@ -24,12 +25,13 @@ use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, Dispatch, FIELD_KERNELS, FIELD_TRACE, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE,
-    are_pairs_culled, dispatches,
+    COUNT_PAIRS, Dispatch, FIELD_KERNELS, FIELD_TRACE, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT,
+    RSM_WRITE, are_pairs_culled, dispatches,
 };
 use crate::kernel::field::FieldMaps;
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
@@ -54,6 +56,7 @@ struct Buffers {
     tiles: TileLists,
     roma: RomaTables,
     field: FieldTables,
+    rsm: RsmTables,
 }
 
 /// Renders one scene on the processor.
@@ -105,6 +108,7 @@ impl CpuExecutor {
                 tiles,
                 roma: RomaTables::default(),
                 field: FieldTables::default(),
+                rsm: RsmTables::default(),
             },
             binary: None,
             extent,
@@ -122,7 +126,7 @@ impl CpuExecutor {
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
         let extent = self.extent;
-        self.buffers.field.maps.params(self.buffers.roma.maps.params(Params {
+        let params = self.buffers.field.maps.params(self.buffers.roma.maps.params(Params {
             zero: 0,
             width: extent.width,
             height: extent.height,
@@ -137,7 +141,8 @@ impl CpuExecutor {
             top_count: self.scene.top2.len() as u32,
             instance_pad: self.scene.instance_pad,
             ..self.view
-        }))
+        }));
+        Params { rsm_maps: self.buffers.rsm.maps.maps.len() as u32, ..params }
     }
 
     /// The G-buffer of the hits of a set, for tests.
@@ -158,6 +163,12 @@ impl CpuExecutor {
         &self.buffers.field.fields
     }
 
+    /// The texels of reflective shadow maps, for tests.
+    #[cfg(test)]
+    pub(super) fn rsm_texels(&mut self) -> &mut Vec<layout::RsmTexel> {
+        &mut self.buffers.rsm.texels
+    }
+
     /// The tiles and their lists, for tests.
     #[cfg(test)]
     pub(super) fn tiles(&self) -> &TileLists {
@@ -175,7 +186,7 @@ fn run_kernel(
     (sampling, tile_demand): (Sampling, &[TileDemand]),
     binary: Option<&BinaryTrees>,
 ) -> Result<(), ExecutorError> {
-    let Buffers { sets, pixels, tiles, roma, field } = buffers;
+    let Buffers { sets, pixels, tiles, roma, field, rsm } = buffers;
     // The set of the pass, and the one before it, whose hits are shaded.
     let shaded = pass.set().saturating_sub(1);
     let (before, from) = sets.split_at_mut(pass.set());
@@ -229,6 +240,8 @@ fn run_kernel(
         ROMA_TRACE => roma_trace(bound, roma, own, seen),
         FIELD_TRACE => field_trace(bound, field, own, seen),
         making if FIELD_KERNELS.contains(&making) => make_field(making, bound, field),
+        RSM_WRITE => rsm_write(bound, rsm, pixels, seen, materials),
+        RSM_LIGHT => rsm_light(bound, rsm, pixels, seen),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),
             None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
@@ -371,6 +384,11 @@ impl FrameExecutor for CpuExecutor {
 
     fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
         self.buffers.field.maps = field.clone();
+        Ok(())
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        self.buffers.rsm.set(maps);
         Ok(())
     }
 

@@ -27,6 +27,11 @@ impl LampTables {
         }
     }
 
+    /// One of the emitters by its number, in the present frame.
+    pub fn emitter(&self, number: u32) -> &Emitter {
+        &self.emitters[number as usize]
+    }
+
     /// Moves the emitters to `frame`, if they are not there yet.
     pub fn rebase(&mut self, frame: Frame) {
         if self.frame != Some(frame) {

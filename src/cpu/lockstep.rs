@@ -9,8 +9,9 @@ use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
 use crate::kernel::field::FieldMaps;
-use crate::kernel::layout::{GBuffer, Hit, Params, Ray, Surface, TileList};
+use crate::kernel::layout::{GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
@@ -47,6 +48,8 @@ pub enum Defect {
     Maps,
     /// Base maps of distance fields have a cell more.
     Fields,
+    /// What lamps see is looked up a texel aside.
+    LampMaps,
 }
 
 /// Both executors.
@@ -274,6 +277,16 @@ impl Lockstep {
         if steps.contains(&Step::FieldMake) {
             findings.words("distances of fields", context, &self.gpu.read_distances()?, &words_of(self.cpu.fields()));
         }
+        if steps.iter().any(|step| matches!(step, Step::RsmWrite { .. })) {
+            let (texels, own) = (self.gpu.read_rsm_texels()?, self.cpu.rsm_texels());
+            let light: [Vec<f32>; 2] = [&texels, &*own].map(|all| all.iter().flat_map(|texel| texel.flux).collect());
+            findings.numbers("light of shadow maps", context, self.bound, &light[0], &light[1]);
+            let place =
+                |t: &RsmTexel| [[t.depth, t.facing].map(f32::to_bits), [t.normal[0], t.normal[1]].map(f32::to_bits)];
+            let places: [Vec<_>; 2] = [&texels, &*own].map(|all| all.iter().map(place).collect());
+            findings.words("texels of shadow maps", context, &places[0], &places[1]);
+            *own = texels;
+        }
         let shades = |step: &Step| {
             matches!(
                 step,
@@ -283,6 +296,7 @@ impl Lockstep {
                     | Step::Shade(_)
                     | Step::AddLight
                     | Step::AddOcclusion
+                    | Step::RsmLight
             )
         };
         if steps.iter().any(shades) {
@@ -432,6 +446,15 @@ impl FrameExecutor for Lockstep {
             Arc::make_mut(&mut own.cascades).levels.iter_mut().for_each(|bom| bom.occupy([3, 5, 7]));
         }
         self.cpu.set_field(&own)
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_rsm(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::LampMaps) {
+            own.maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
+        }
+        self.cpu.set_rsm(&own)
     }
 
     fn begin_frame(&mut self, view: &View) {

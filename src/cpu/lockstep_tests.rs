@@ -7,15 +7,17 @@ use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
-use crate::kernel::dispatch::{FIELD_KERNELS, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::dispatch::{
+    FIELD_KERNELS, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
+};
 use crate::kernel::field::FieldMaps;
 use crate::kernel::frame::Frame;
 use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
 use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Effects, Equirectangular, Field, Light, Occlusion, RenderSettings, Renderer, Roma, Schedule, emissive_triangles,
-    environment,
+    Effects, Equirectangular, Field, Light, Occlusion, RenderSettings, Renderer, Roma, Rsm, Schedule,
+    emissive_triangles, environment,
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
@@ -26,6 +28,7 @@ use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency,
 use crate::visibility::bom::{Bom, Cascades};
 use crate::visibility::distance_field::{DistanceField, FieldSettings};
 use crate::visibility::roma::{Grid, Role, RomaPass, RomaSettings};
+use crate::visibility::rsm::RsmSettings;
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -217,7 +220,8 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 /// Small maps, of both numbers of directions.
 fn roma((steps, role): (u32, Role)) -> RomaSettings {
     let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 0 }, steps, role };
-    RomaSettings { occlusion: pass(4), shadow: pass(8) }
+    let diffuse = (!matches!(role, Role::Sift(_))).then(|| RomaPass { role: Role::Answer, ..pass(4) });
+    RomaSettings { occlusion: pass(4), shadow: pass(8), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
 }
 
 /// Small fields.
@@ -306,6 +310,7 @@ fn render(
         captures: None,
         roma: Roma::default(),
         field: Field::default(),
+        rsm: Rsm::default(),
         host_seen: HostCacheStats::default(),
     };
     let path = path_from_bounds(manifest.min, manifest.max);
@@ -365,7 +370,9 @@ fn twins_agree_with_their_kernels() {
     }
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
-    let all = kernels::names().chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE]).chain(FIELD_KERNELS);
+    let all = kernels::names()
+        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, RSM_WRITE, RSM_LIGHT])
+        .chain(FIELD_KERNELS);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
     assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
@@ -385,10 +392,11 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::Lookups, &tiled, "tiles"),
         (Defect::Maps, &plain, "columns of maps"),
         (Defect::Fields, &plain, "distances of fields"),
+        (Defect::LampMaps, &plain, "radiance"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
-        let roma = (defect == Defect::Maps).then_some((0, Role::Answer));
+        let roma = matches!(defect, Defect::Maps | Defect::LampMaps).then_some((0, Role::Answer));
         let field = (defect == Defect::Fields).then_some(64);
         let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);

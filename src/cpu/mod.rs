@@ -43,6 +43,7 @@ mod random;
 mod rays;
 mod resolve;
 mod roma;
+mod rsm;
 mod sample;
 mod scene;
 mod shade;

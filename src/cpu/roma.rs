@@ -4,8 +4,8 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
-    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, NONE, Params, ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap,
-    Surface, T_INFINITE,
+    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel,
+    RomaMap, Surface, T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -151,8 +151,25 @@ struct Found {
     t: f32,
     /// It passed as many columns as it may, and was finished snapped.
     is_capped: bool,
-    /// All of it lies in the levels.
+}
+
+/// What is known of a whole ray.
+struct Answer {
+    met: Option<Met>,
+    /// It was capped in some level.
+    is_capped: bool,
+    /// It meets something, or all of it lies in the levels.
     is_known: bool,
+}
+
+/// A hit of a ray, known to a cell.
+struct Met {
+    t: f32,
+    point: Vec3,
+    /// The direction that was travelled.
+    direction: Vec3,
+    /// Of the level.
+    lift: f32,
 }
 
 /// The part of the range of t in which a coordinate lies between `low` and `high`.
@@ -251,7 +268,7 @@ impl Maps<'_> {
             let end = most(t, least(range[1], least(to_x, to_y)));
             let hit = self.met(self.first_word(map, x, y), at[2], speed[2], [t, end]);
             if hit >= 0.0 || end >= range[1] {
-                return Found { t: hit, is_capped: false, is_known: true };
+                return Found { t: hit, is_capped: false };
             }
             if to_x <= to_y {
                 x += if speed[0] > 0.0 { 1 } else { -1 };
@@ -259,16 +276,16 @@ impl Maps<'_> {
                 y += if speed[1] > 0.0 { 1 } else { -1 };
             }
             if x.min(y) < 0 || x.max(y) > last {
-                return Found { t: -1.0, is_capped: false, is_known: true };
+                return Found { t: -1.0, is_capped: false };
             }
             t = end;
         }
         let hit = self.met(self.first_word(map, x, y), at[2], speed[2], [t, range[1]]);
-        Found { t: hit, is_capped: steps > 0, is_known: true }
+        Found { t: hit, is_capped: steps > 0 }
     }
 
-    /// Where a ray meets something at or beyond t = `from`, below 0 nowhere; whether it was capped in some level.
-    fn trace(&self, index: u32, ray: &Ray, normal: Vec3, from: f32) -> Found {
+    /// What a ray meets at or beyond t = `from`.
+    fn trace(&self, index: u32, ray: &Ray, normal: Vec3, from: f32) -> Answer {
         let p = self.params;
         let maps = p.roma_k * p.roma_k;
         let (stratum, is_upper) = stratum_of(ray.direction, p.roma_k);
@@ -307,7 +324,9 @@ impl Maps<'_> {
                 let found = self.through(map, cell, cells, range, steps);
                 is_capped |= found.is_capped;
                 if found.t >= 0.0 {
-                    return Found { is_capped, ..found };
+                    let point = each(|k| start[k] + found.t * direction[k]);
+                    let met = Met { t: found.t, point, direction, lift: level.lift };
+                    return Answer { met: Some(met), is_capped, is_known: true };
                 }
                 t = range[1];
                 if t >= ray.t_max {
@@ -315,7 +334,7 @@ impl Maps<'_> {
                 }
             }
         }
-        Found { t: -1.0, is_capped, is_known: p.roma_is_part == 0 || t >= ray.t_max }
+        Answer { met: None, is_capped, is_known: p.roma_is_part == 0 || t >= ray.t_max }
     }
 }
 
@@ -341,14 +360,17 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
 }
 
 /// Answers the pass's rays by ray-aligned maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the next where
-/// the ray leaves one. What is met is written as a hit of no triangle.
+/// the ray leaves one. What is met is written as a hit of no triangle; where the closest is asked for, with what is known of its surface.
 pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let RomaMaps { levels, maps, .. } = &tables.maps;
     let of = Maps { params: bound.params, levels, maps, columns: &tables.columns };
     let part = bound.params.roma_part;
-    own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
+    let RaySet { rays, hits, surfaces } = own;
+    let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
+    all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();
-        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+        for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
+            let (hit, surface) = (&mut hits[i], &mut surfaces[i]);
             // What has met something is not asked again, nor what was traced to its end.
             if part == ROMA_FAR && (hit.id != NONE || hit.t >= ray.t_max) {
                 continue;
@@ -358,18 +380,25 @@ pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &R
             if levels.is_empty() {
                 continue;
             }
-            let found =
-                of.trace(index as u32, ray, normal_of(seen, index), if part == ROMA_FAR { hit.t } else { ray.t_min });
-            tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
-            match part {
-                // It is not traced.
-                ROMA_SIFT if found.t < 0.0 && found.is_known => hit.t = -1.0,
-                ROMA_SIFT if found.t < 0.0 => {}
+            let from = if part == ROMA_FAR { hit.t } else { ray.t_min };
+            let Answer { met, is_capped, is_known } = of.trace(index as u32, ray, normal_of(seen, index), from);
+            tally.add(COUNTER_ROMA_CAPPED, u32::from(is_capped));
+            let Some(Met { t, point, direction, lift }) = met else {
+                if part == ROMA_SIFT && is_known {
+                    // It is not traced.
+                    hit.t = -1.0;
+                }
+                continue;
+            };
+            if part == ROMA_SIFT && is_chosen(bound.params, index as u32) {
                 // What it brings counts for those that are not, too.
-                ROMA_SIFT if is_chosen(bound.params, index as u32) => hit.u = (bound.params.roma_one_in - 1) as f32,
-                ROMA_SIFT => *hit = Hit { t: -1.0, id: ROMA_HIT, u: 0.0, v: 0.0 },
-                _ if found.t >= 0.0 => *hit = Hit { t: found.t, id: ROMA_HIT, u: 0.0, v: 0.0 },
-                _ => {}
+                hit.u = (bound.params.roma_one_in - 1) as f32;
+                continue;
+            }
+            // A ray that was sifted is not traced.
+            *hit = Hit { t: if part == ROMA_SIFT { -1.0 } else { t }, id: ROMA_HIT, u: 0.0, v: 0.0 };
+            if !bound.has(PARAM_ANY_HIT) {
+                (surface.point, surface.normal, surface.area) = (point, direction.map(|x| -x), lift);
             }
         }
         bound.counters.add(&tally);

@@ -10,7 +10,7 @@ use super::vector::{Vec3, cross, dot, each, most, normalize, xyz};
 use crate::kernel::layout::{
     BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE,
     PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_SKY, PARAM_SUN,
-    Ray,
+    ROMA_HIT, Ray,
 };
 use bricks::Material;
 use rayon::prelude::*;
@@ -157,7 +157,9 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
         }
         let density = if bound.has(PARAM_BOUNCE) { densities[index] } else { 0.0 };
         if seen.surfaces[index].leaf == NONE {
-            return bound.has(PARAM_MISS).then(|| seen_background(bound, ray.direction, density));
+            // What occupancy maps met is lit otherwise.
+            let is_miss = bound.has(PARAM_MISS) && seen.hits[index].id != ROMA_HIT;
+            return is_miss.then(|| seen_background(bound, ray.direction, density));
         }
         let m = &materials[g.material as usize];
         let s = Gloss::of(g, m, ray.direction.map(|x| -x));

@@ -10,6 +10,7 @@ use super::pages::{CachePages, MappedRange};
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
 use super::readback::Readback;
 use super::roma::Roma;
+use super::rsm::Rsm;
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
@@ -20,6 +21,7 @@ use crate::kernel::dispatch::{
 use crate::kernel::field::FieldMaps;
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
     report, textures,
@@ -52,6 +54,7 @@ pub struct GpuExecutor {
     binary: Option<BinaryTrees>,
     roma: Option<Roma>,
     field: Option<Field>,
+    rsm: Option<Rsm>,
     extent: Extent,
     readback: Readback,
     timing: Timing,
@@ -155,6 +158,7 @@ impl GpuExecutor {
             binary: None,
             roma: None,
             field: None,
+            rsm: None,
             extent,
             readback,
             timing,
@@ -212,6 +216,14 @@ impl GpuExecutor {
         Ok(words[..maps.distance_words() as usize].to_vec())
     }
 
+    /// The texels of reflective shadow maps, for tests.
+    #[cfg(test)]
+    pub(crate) fn read_rsm_texels(&mut self) -> Result<Vec<layout::RsmTexel>, ExecutorError> {
+        let Some(rsm) = &self.rsm else { return Ok(Vec::new()) };
+        let bytes = self.readback.read(&self.gpu, &rsm.texels)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
@@ -240,7 +252,8 @@ impl GpuExecutor {
             ..self.view
         };
         let params = self.roma.as_ref().map_or(params, |roma| roma.maps.params(params));
-        self.field.as_ref().map_or(params, |field| field.maps.params(params))
+        let params = self.field.as_ref().map_or(params, |field| field.maps.params(params));
+        Params { rsm_maps: self.rsm.as_ref().map_or(0, |rsm| rsm.maps), ..params }
     }
 
     /// One submission: all steps, then counters and demand read back.
@@ -297,8 +310,10 @@ impl GpuExecutor {
             let binary = self.binary.as_ref().filter(|_| dispatch.kernel == INTERSECT_BINARY);
             let roma = self.roma.as_ref().and_then(|roma| Some((roma.pipeline(dispatch.kernel)?, roma)));
             let field = self.field.as_ref().and_then(|field| Some((field.pipeline(dispatch.kernel)?, field)));
-            let over_cells = roma.map(|(pipeline, _)| pipeline).or(field.map(|(pipeline, _)| pipeline));
-            let own = binary.map(|b| &b.pipeline).or(over_cells);
+            let rsm = self.rsm.as_ref().and_then(|rsm| Some((rsm.pipeline(dispatch.kernel)?, rsm)));
+            let of_maps = roma.map(|(pipeline, _)| pipeline).or(field.map(|(pipeline, _)| pipeline));
+            let of_maps = of_maps.or(rsm.map(|(pipeline, _)| pipeline));
+            let own = binary.map(|b| &b.pipeline).or(of_maps);
             compute.set_pipeline(own.unwrap_or_else(|| self.kernels.pipeline(dispatch.kernel)));
             compute.set_bind_group(0, &self.groups.scene, &[]);
             compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
@@ -307,12 +322,13 @@ impl GpuExecutor {
                 (false, Third::Shading) => &self.groups.lamps,
                 (false, Third::Roma) => roma.map_or(&self.groups.empty, |(_, roma)| &roma.group),
                 (false, Third::Field) => field.map_or(&self.groups.empty, |(_, field)| &field.group),
+                (false, Third::Rsm) => rsm.map_or(&self.groups.empty, |(_, rsm)| &rsm.group),
                 _ => &self.groups.empty,
             };
             compute.set_bind_group(2, second, &[]);
             let shaded = pass.set().saturating_sub(1);
             let third = match (dispatch.third, &self.groups.sampling) {
-                (Third::Shading | Third::Roma | Third::Field, _) => &self.groups.shading[shaded],
+                (Third::Shading | Third::Roma | Third::Field | Third::Rsm, _) => &self.groups.shading[shaded],
                 (Third::Sampling, Some(sampling)) => &sampling[shaded],
                 _ => &self.groups.tiles,
             };
@@ -422,6 +438,9 @@ impl FrameExecutor for GpuExecutor {
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
         if self.buffers.lamps.set(&self.gpu, lamps)? {
             self.rebind();
+            if let Some(rsm) = &mut self.rsm {
+                rsm.rebind(&self.gpu, &self.buffers.lamps);
+            }
         }
         Ok(())
     }
@@ -439,6 +458,15 @@ impl FrameExecutor for GpuExecutor {
     fn set_field(&mut self, maps: &FieldMaps) -> Result<(), ExecutorError> {
         let Self { gpu, kernels, field, .. } = self;
         field.get_or_insert_with(|| Field::new(gpu, kernels)).set(gpu, maps)
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        let Self { gpu, kernels, rsm, buffers, .. } = self;
+        let rsm = match rsm {
+            Some(rsm) => rsm,
+            none => none.insert(Rsm::new(gpu, kernels, &buffers.lamps)?),
+        };
+        rsm.set(gpu, &buffers.lamps, maps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -225,6 +225,12 @@ pub(super) fn field_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "field", &[Bound::Read, Bound::Read, Bound::Write, Bound::Write])
 }
 
+/// The layout of group 2 of kernels over reflective shadow maps: the lamps, the maps and their texels.
+pub(super) fn rsm_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    use Bound::{Read, Write};
+    layout(device, "rsm", &[Read, Read, Read, Read, Read, Write])
+}
+
 /// The layout of a group of `count` storage buffers that are read.
 pub(super) fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
     layout(device, label, &vec![Bound::Read; count])

@@ -12,6 +12,7 @@ pub mod probe;
 pub mod rays;
 pub mod readback;
 pub mod roma;
+mod rsm;
 pub mod scene;
 pub mod texels;
 pub mod timing;

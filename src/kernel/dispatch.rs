@@ -99,6 +99,8 @@ pub enum Third {
     Roma,
     /// The same with group 2 the distance fields.
     Field,
+    /// What shading the set before the pass's needs, with group 2 the lamps and the reflective shadow maps.
+    Rsm,
 }
 
 /// One dispatch of a kernel.
@@ -145,6 +147,13 @@ pub const ROMA_ROTATE: &str = "roma_rotate";
 pub const ROMA_NEAR: &str = "roma_near";
 /// The kernel that traces them.
 pub const ROMA_TRACE: &str = "roma_trace";
+/// The kernel that writes reflective shadow maps.
+pub const RSM_WRITE: &str = "rsm_write";
+/// The kernel that lights what ROMA met by them.
+pub const RSM_LIGHT: &str = "rsm_light";
+
+/// Which random numbers the look-ups of reflective shadow maps take.
+const RSM_STREAM: u32 = 10 << 24;
 
 /// The kernel that finds the occupied cells of a distance field.
 pub const FLOOD_SEEDS: &str = "flood_seeds";
@@ -332,6 +341,14 @@ pub fn dispatches(
         Step::FieldMake => (0..params.field_levels).flat_map(|level| make_field(&params, level)).collect(),
         Step::FieldTrace { steps } => {
             vec![field(FIELD_TRACE, Params { field_steps: steps, ..params }, per_ray, 2)]
+        }
+        Step::RsmWrite { map, corner: [x, y] } => {
+            let params = Params { rsm_map: map, rsm_x: x, rsm_y: y, ..params };
+            vec![Dispatch { third: Third::Rsm, ..shading(RSM_WRITE, params, false) }]
+        }
+        Step::RsmLight => {
+            let params = Params { stream: params.sample.wrapping_add(RSM_STREAM), ..params };
+            vec![Dispatch { third: Third::Rsm, phase: Some(2), ..shading(RSM_LIGHT, params, false) }]
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::field::FieldMaps;
 use super::layout::{GBuffer, Hit, Ray, Surface};
 use super::roma::RomaMaps;
+use super::rsm::RsmMaps;
 use super::{Keep, Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
 use crate::stream::WorkerPool;
@@ -82,6 +83,13 @@ pub trait FrameExecutor: Executor {
     /// # Errors
     /// As of [`FrameExecutor::set_cascades`].
     fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError>;
+
+    /// Takes reflective shadow maps as they lie in the frame that has begun, and makes what [`crate::schedule::Step::RsmWrite`] and
+    /// [`crate::schedule::Step::RsmLight`] need; without it these must not be run. Texels keep what was written as long as there are as many.
+    ///
+    /// # Errors
+    /// More than the device holds in one buffer, with how much it does; a device that binds too few buffers.
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError>;
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

@@ -187,6 +187,11 @@ impl Lamps {
         &self.emitters
     }
 
+    /// Of each emitter, by which probability it is drawn: its share of the power of all.
+    pub fn probabilities(&self) -> &[f32] {
+        &self.probabilities
+    }
+
     /// The emitters as kernels see them in `frame`.
     pub fn placed(&self, frame: &Frame) -> Vec<layout::Emitter> {
         let drawn = self.probabilities.iter().zip(&self.table);

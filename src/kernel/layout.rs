@@ -62,6 +62,7 @@ pub const ROMA_WHOLE: u32 = 0;
 pub const ROMA_FAR: u32 = 1;
 pub const ROMA_SIFT: u32 = 2;
 pub const FIELD_HIT: u32 = 0xffff_fffd;
+pub const RSM_PERSPECTIVE: u32 = 1;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
@@ -106,6 +107,7 @@ mirror! {
         roma_near: u32, roma_part: u32, roma_is_part: u32, roma_one_in: u32,
         field_cells: u32, field_levels: u32, field_level: u32, field_mip: u32,
         field_step: u32, field_half: u32, field_steps: u32, field_hit: f32,
+        rsm_maps: u32, rsm_map: u32, rsm_x: u32, rsm_y: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
@@ -163,6 +165,11 @@ mirror! {
     }
     struct RomaLevel { first: [f32; 3], scale: f32, lift: f32, padding0: u32, padding1: u32, padding2: u32 }
     struct RomaMap { cell_from_point: [[f32; 4]; 3], base_from_cell: [[f32; 4]; 3], direction: [f32; 4] }
+    struct RsmMap {
+        texel_from_point: [[f32; 4]; 3], first: u32, width: u32, height: u32, lamp: u32,
+        flags: u32, padding0: u32, padding1: u32, padding2: u32,
+    }
+    struct RsmTexel { flux: [f32; 3], depth: f32, normal: [f32; 3], facing: f32 }
     struct Emitter {
         corner: [f32; 3], kind: u32, u: [f32; 3], probability: f32,
         v: [f32; 3], threshold: u32, radiance: [f32; 3], other: u32,

@@ -14,6 +14,7 @@ pub mod opacity;
 pub mod reflectance;
 pub mod report;
 pub mod roma;
+pub mod rsm;
 mod setup;
 pub mod textures;
 

@@ -2,7 +2,7 @@
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Roma, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Roma, Rsm, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -58,7 +58,7 @@ pub struct RenderSettings {
     /// Interactive: bytes of tiles of textures that a frame may load. Coarser levels stand for the others, and the frame is exact only where
     /// `unresolved_pixels` says 0.
     pub tile_bytes: Option<u64>,
-    /// Occlusion rays and those to the sun and emitters are answered by occupancy maps; none of them asks for bricks.
+    /// Occlusion and diffuse rays and those to the sun and emitters are answered by occupancy maps; none of them asks for bricks.
     pub roma: Option<RomaSettings>,
     /// The same rays are answered by distance fields.
     pub field: Option<FieldSettings>,
@@ -136,6 +136,8 @@ pub struct Renderer {
     pub roma: Roma,
     /// The distance fields, where settings ask for them.
     pub field: Field,
+    /// The reflective shadow maps, where diffuse rays are answered by occupancy maps.
+    pub rsm: Rsm,
     /// The host cache's statistics at the end of the pass before.
     pub host_seen: HostCacheStats,
 }
@@ -187,6 +189,9 @@ impl Renderer {
             }
             self.executor.begin_frame(&view);
             self.roma.begin(camera.position, &view);
+            if sample == 0 && effects.diffuse.is_some() {
+                self.prepare_rsm(&mut records, &view)?;
+            }
             records.pass(self, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, &[Step::Generate], stats)?;
                 attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
@@ -205,7 +210,10 @@ impl Renderer {
             }
             for index in directions(effects.diffuse.unwrap_or(0)) {
                 let names = ["diffuse", "diffuse-shadow", "diffuse-environment"];
-                self.bounce(&mut records, names, Pass::Diffuse(index))?;
+                match self.settings.roma.and_then(|roma| roma.diffuse) {
+                    Some(roma) => self.gather(&mut records, names, index, roma)?,
+                    None => self.bounce(&mut records, names, Pass::Diffuse(index))?,
+                }
             }
             if effects.mirror {
                 self.bounce(&mut records, ["mirror", "mirror-shadow", "mirror-environment"], Pass::Mirror)?;
@@ -236,14 +244,14 @@ impl Renderer {
         output.guides = guides.map(GuideReader::finish);
         output.records = records.finish(self);
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
-        if let Some(primary) = output.records.first_mut() {
+        if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {
             primary.non_finite += output.pixels.not_finite();
         }
         Ok(output)
     }
 
     /// Whether rays lead to the environment.
-    fn draws_environment(&self) -> bool {
+    pub(super) fn draws_environment(&self) -> bool {
         self.settings.effects.environment && self.light.lamps.environment.is_some()
     }
 
@@ -342,7 +350,7 @@ impl Renderer {
     }
 
     /// Shades the hits of the set before that of `pass`.
-    fn shade(&mut self, pass: Pass, light: Shading, stats: &mut PassStats) -> Result<(), ExecutorError> {
+    pub(super) fn shade(&mut self, pass: Pass, light: Shading, stats: &mut PassStats) -> Result<(), ExecutorError> {
         stats.add(self.executor.run(pass, &[Step::Shade(light)], &self.cache.states)?);
         Ok(())
     }

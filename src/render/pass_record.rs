@@ -74,7 +74,8 @@ impl FrameRecords {
         effect.ahead.prefetched_bytes += host.prefetched_bytes - seen.prefetched_bytes;
         effect.ahead.prefetched_used_bytes += host.prefetched_used_bytes - seen.prefetched_used_bytes;
         effect.ahead.prefetched_wasted_bytes += host.prefetched_wasted_bytes - seen.prefetched_wasted_bytes;
-        if let Some(captures) = &mut renderer.captures {
+        // Maps of lamps add nothing to the picture, whose last sum they come before.
+        if let Some(captures) = renderer.captures.as_mut().filter(|_| name != super::rsm::EFFECT) {
             captures.note(&mut *renderer.executor, name)?;
         }
         Ok(())

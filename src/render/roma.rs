@@ -54,6 +54,7 @@ impl Roma {
     pub fn pass_of(settings: &RomaSettings, pass: Pass) -> Option<RomaPass> {
         match pass {
             Pass::Occlusion(_) => Some(settings.occlusion),
+            Pass::Diffuse(_) => settings.diffuse,
             Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
                 Some(settings.shadow)
             }
@@ -105,8 +106,12 @@ impl Roma {
         Ok(self.view.as_ref().map(|view| (self.cascades.clone(), view.frame)))
     }
 
-    fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32) -> Result<(), ExecutorError> {
-        let Some(RomaView { camera, .. }) = &self.view else { return Ok(()) };
+    /// The base maps around the camera of `size` cells on each axis.
+    ///
+    /// # Errors
+    /// Occupancy that cannot be read.
+    pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32) -> Result<&Arc<Cascades>, ExecutorError> {
+        let Some(RomaView { camera, .. }) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
         let (cells, mut assembler) = match self.assembler.take() {
             Some((cells, assembler)) if cells == size => (cells, assembler),
@@ -125,7 +130,7 @@ impl Roma {
             self.is_assembled = true;
         }
         self.assembler = Some((cells, assembler));
-        Ok(())
+        Ok(&self.cascades)
     }
 
     /// Side of the cells of the finest maps that were made, world units.

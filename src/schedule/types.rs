@@ -158,6 +158,15 @@ pub enum Step {
         /// Look-ups of a ray at most; one that has made them goes free.
         steps: u32,
     },
+    /// Write a block of texels of a reflective shadow map from the hits of the set before, whose attributes are read.
+    RsmWrite {
+        /// The map.
+        map: u32,
+        /// The texel that ray 0 is for.
+        corner: [u32; 2],
+    },
+    /// Add what the hits of the set before that [`Step::RomaTrace`] gave reflect of the lamps, by their reflective shadow maps: phase 3.
+    RsmLight,
 }
 
 /// Whom rays ask, and for what.

@@ -6,3 +6,4 @@
 pub mod bom;
 pub mod distance_field;
 pub mod roma;
+pub mod rsm;

@@ -10,6 +10,7 @@ use crate::kernel::field::FieldMaps;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
 use crate::kernel::roma::RomaMaps;
+use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::WorkerPool;
@@ -277,6 +278,10 @@ impl FrameExecutor for Faulty {
 
     fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
         self.inner.set_field(field)
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        self.inner.set_rsm(maps)
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -16,6 +16,8 @@
 pub mod bits;
 pub mod directions;
 
+use super::rsm::RsmSettings;
+
 /// How the maps of an array are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grid {
@@ -87,6 +89,10 @@ pub struct RomaSettings {
     pub occlusion: RomaPass,
     /// Rays to the sun and to emitters.
     pub shadow: RomaPass,
+    /// Diffuse rays; `None` where they are traced.
+    pub diffuse: Option<RomaPass>,
+    /// What lights the hits of diffuse rays.
+    pub rsm: RsmSettings,
 }
 
 /// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.

@@ -31,7 +31,8 @@ pub struct RomaBenchArgs {
     pub sponza: Option<PathBuf>,
     /// What to measure in this run, separated by commas: speed (times over resolutions and numbers of directions), ao (errors by
     /// scenes), resolution (errors by resolutions and numbers of directions), radius (errors by the length of rays), shadows (snapped and
-    /// unsnapped rays to an area light), out-of-core (a cache of 15 %) [default: all]
+    /// unsnapped rays to an area light), diffuse (light of the sun by one bounce, its errors without the sun's own), out-of-core (a cache of 15 %),
+    /// handover (maps and bricks together, out of core) [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub stages: Vec<Stage>,
     /// Begin no job after so many minutes; the results hold what is measured until then [default: no limit]

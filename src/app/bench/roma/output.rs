@@ -104,7 +104,9 @@ fn title(stage: Stage) -> &'static str {
         Stage::Resolution => "Resolutions and numbers of directions, figure 9",
         Stage::Radius => "Lengths of rays: where it fails",
         Stage::Shadows => "Soft shadows, figures 7 and 8",
+        Stage::Diffuse => "One-bounce diffuse light, figure 6",
         Stage::OutOfCore => "Out of core",
+        Stage::Handover => "Maps and bricks together",
     }
 }
 
@@ -211,8 +213,15 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
         "exact ÷ this",
         "bricks loaded",
         "capped, %",
+        "lamps' maps, ms",
     ];
     let has_times = stage == Stage::Shadows;
+    let has_lamps = stage == Stage::Diffuse;
+    columns.truncate(columns.len() - usize::from(!has_lamps));
+    let is_whole = stage == Stage::Handover;
+    if is_whole {
+        columns.extend(["whole, ms", "whole ÷ exact"]);
+    }
     if has_times {
         columns.extend([
             "generation, ms",
@@ -225,7 +234,9 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
     let mut lines = Vec::new();
     for job in jobs {
         let value = |way: &Way, name: &str| rows.value(&job.key(way), name);
-        let per_ray = |way: &Way| ratio(value(way, "ms_trace").map(|ms| 1e6 * ms), value(way, "rays"));
+        // Of rays that maps and bricks are asked about both count.
+        let rays = |way: &Way| value(if way.is_traced() { &Way::Exact } else { way }, "rays");
+        let per_ray = |way: &Way| ratio(value(way, "ms_trace").map(|ms| 1e6 * ms), rays(way));
         for way in job.ways.iter().filter(|way| rows.has(&job.key(way))) {
             let percent = |name: &str| Value::number(value(way, name).map(|x| 100.0 * x));
             let beside =
@@ -245,6 +256,13 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
                 Value::number(value(way, "bricks_loaded")),
                 Value::number(ratio(value(way, "rays_capped"), value(way, "rays")).map(|x| 100.0 * x)),
             ];
+            if has_lamps {
+                line.push(Value::number(value(way, "ms_lamps").filter(|_| *way != Way::Exact)));
+            }
+            if is_whole {
+                line.push(Value::number(value(way, "ms")));
+                line.push(Value::ratio(ratio(value(way, "ms"), value(&Way::Exact, "ms"))));
+            }
             if has_times {
                 let [generation, tracing, _] = over_field(way, &value);
                 line.push(Value::number(value(way, "ms_generation").filter(|_| *way != Way::Exact)));
@@ -257,7 +275,8 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
     }
     let caption = "How far pictures are from exact ones: converged, and with one sample a pixel. Times are those of tracing, without the \
                    making of maps; bricks are those that the pass loaded. FLIP ÷ df: over that of the distance field of as many cells, which \
-                   takes as much memory with K = 4; in the paper it is below 1 in every scene of ambient occlusion.";
+                   takes as much memory with K = 4; in the paper it is below 1 in every scene of ambient occlusion. Whole: all of the \
+                   effect, the making of maps as well.";
     Table {
         name: stage.name().into(),
         caption: caption.into(),
@@ -267,6 +286,9 @@ fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
 }
 
 fn plots(stage: Stage, all: &[Job], rows: &Rows) -> Vec<Graph> {
+    if stage == Stage::Handover {
+        return all.iter().filter(|job| job.stage == stage).filter_map(|job| error_over_time(job, rows)).collect();
+    }
     if stage != Stage::Radius {
         return Vec::new();
     }
@@ -290,4 +312,28 @@ fn plots(stage: Stage, all: &[Job], rows: &Rows) -> Vec<Graph> {
             lines: vec![line(&USUAL), line(&FIELD), line(&Way::Exact)],
         },
     }]
+}
+
+/// FLIP of converged pictures over the time of the effect, by the ways of a job; `None` where nothing is measured.
+fn error_over_time(job: &Job, rows: &Rows) -> Option<Graph> {
+    let point = |way: &Way| {
+        let value = |name: &str| rows.value(&job.key(way), name);
+        Some((value("ms")?, 100.0 * value("flip_converged")?))
+    };
+    let line = |name: &str, of: fn(&Way) -> bool| {
+        let mut points: Vec<(f64, f64)> = job.ways.iter().filter(|way| of(way)).filter_map(point).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        (name.to_string(), points)
+    };
+    let lines = vec![
+        line("maps alone", |way| matches!(way, Way::Roma { .. })),
+        line("traced near, maps beyond 1 to 16 cells", |way| matches!(way, Way::Handed { .. })),
+        line("auto: in doubt one in 1 to 8 traced", |way| matches!(way, Way::Sifted { .. })),
+        line("exact (noise)", |way| *way == Way::Exact),
+    ];
+    lines.iter().any(|(_, points)| !points.is_empty()).then(|| Graph {
+        title: format!("Error over time, {}", job.variant),
+        reading: "Hundredths of FLIP against milliseconds of ao in a frame, the making of maps as well.".into(),
+        shape: GraphShape::Lines { across: "ms", unit: Unit::Percent, lines },
+    })
 }

@@ -17,13 +17,26 @@ pub enum Stage {
     Radius,
     /// Snapped and unsnapped shadow rays (its figures 7 and 8).
     Shadows,
+    /// One-bounce diffuse light of the sun by reflective shadow maps (its figure 6).
+    Diffuse,
     /// A cache that holds 15 % of the scene.
     OutOfCore,
+    /// Rays that maps and bricks answer together, out of core.
+    Handover,
 }
 
 impl Stage {
     /// All of them, in their order.
-    pub const ALL: [Self; 6] = [Self::Speed, Self::Ao, Self::Resolution, Self::Radius, Self::Shadows, Self::OutOfCore];
+    pub const ALL: [Self; 8] = [
+        Self::Speed,
+        Self::Ao,
+        Self::Resolution,
+        Self::Radius,
+        Self::Shadows,
+        Self::Diffuse,
+        Self::OutOfCore,
+        Self::Handover,
+    ];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
@@ -33,7 +46,9 @@ impl Stage {
             Self::Resolution => "resolution",
             Self::Radius => "radius",
             Self::Shadows => "shadows",
+            Self::Diffuse => "diffuse",
             Self::OutOfCore => "out-of-core",
+            Self::Handover => "handover",
         }
     }
 }
@@ -62,6 +77,16 @@ pub enum Way {
         /// Whether rays keep their direction.
         is_unsnapped: bool,
     },
+    /// By tracing them up to so many cells from their start, by maps from there on.
+    Handed {
+        /// Cells.
+        cells: u32,
+    },
+    /// By tracing those that maps do not find free, or one of so many of them.
+    Sifted {
+        /// How many.
+        one_in: u32,
+    },
     /// By a distance field, the paper's baseline.
     Field {
         /// Cells on each axis.
@@ -76,6 +101,8 @@ impl fmt::Display for Way {
             Self::Roma { k, size, is_unsnapped } => {
                 write!(f, "roma {size} K={k}{}", if *is_unsnapped { " unsnapped" } else { "" })
             }
+            Self::Handed { cells } => write!(f, "roma beyond {cells} cells"),
+            Self::Sifted { one_in } => write!(f, "auto, one in {one_in}"),
             Self::Field { size } => write!(f, "df {size}"),
         }
     }
@@ -89,11 +116,18 @@ impl Way {
             Self::Roma { k, size, is_unsnapped } => {
                 let unsnapped = if *is_unsnapped { "all" } else { "none" };
                 format!(
-                    "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
+                    "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-diffuse-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
                 )
             }
+            Self::Handed { cells } => format!("--secondary roma --roma-near {cells}"),
+            Self::Sifted { one_in } => format!("--secondary auto --auto-one-in {one_in}"),
             Self::Field { size } => format!("--secondary df --df-size {size}"),
         }
+    }
+
+    /// Whether bricks are asked.
+    pub fn is_traced(&self) -> bool {
+        matches!(self, Self::Exact | Self::Handed { .. } | Self::Sifted { .. })
     }
 
     /// The distance field of as many cells on each axis, which with K = 4 takes as much memory as the maps.
@@ -129,6 +163,8 @@ pub struct Job {
     pub effect: &'static str,
     /// The options of `walk` for effect and light.
     pub options: String,
+    /// Those of a picture without the effect, which is taken off; none is where empty.
+    pub without: String,
     /// Share of the scene that the cache holds, per cent.
     pub cache: u32,
     /// Whether times are measured.
@@ -153,6 +189,11 @@ fn occlusion(length: f64) -> String {
     format!("--effects ao --ao-rays 1 --ao-length {length} --sun-intensity 0 --rotation full")
 }
 
+/// The sun alone, and what is lit by what it lights, if `effects` have that.
+fn bounce(effects: &str) -> String {
+    format!("--effects {effects} --diffuse-rays 1 --sky-intensity 0 --sun-angle 0 --rotation full --roma-steps 64")
+}
+
 /// All jobs, in their order.
 pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     let sizes = [32, 64, 128];
@@ -165,6 +206,7 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         variant,
         effect: "ao",
         options: occlusion(length),
+        without: String::new(),
         cache: 100,
         times: false,
         is_cold: false,
@@ -199,9 +241,29 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         let options = format!("--effects shadow --sky-intensity 0{options}");
         jobs.push(Job { effect: "shadow", options, times: true, ..own });
     }
+    let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
+    for &scene in &scenes {
+        let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped]);
+        let own =
+            Job { effect: "diffuse", times: true, ..job(Stage::Diffuse, scene, "all resident".into(), length, ways) };
+        jobs.push(Job { options: bounce("shadow,diffuse"), without: bounce("shadow"), ..own });
+    }
+    let own = job(Stage::Diffuse, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
+    let own =
+        Job { effect: "diffuse", options: bounce("shadow,diffuse"), cache: 15, times: true, errors: false, ..own };
+    jobs.push(Job { is_cold: true, ..own });
     let own = job(Stage::OutOfCore, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
     jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
     jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
+    let handed = [1, 2, 4, 8, 16].map(|cells| Way::Handed { cells });
+    let sifted = [1, 2, 4, 8].map(|one_in| Way::Sifted { one_in });
+    for length in [length, 4.0 * length] {
+        let ways = with_exact(&[&[USUAL][..], &handed, &sifted].concat());
+        let own = job(Stage::Handover, SceneId::City, format!("rays of {length}, cache 15 %"), length, ways);
+        // As many rays a sample as make the maps a small part, and as are chosen among.
+        let options = own.options.replace("--ao-rays 1", "--ao-rays 16");
+        jobs.push(Job { cache: 15, times: true, options, ..own });
+    }
     jobs
 }
 
@@ -229,8 +291,9 @@ mod tests {
             assert_eq!(keys.len(), count);
             assert!(Stage::ALL.iter().all(|stage| jobs.iter().any(|job| job.stage == *stage)));
             assert!(jobs.iter().all(|job| job.ways.contains(&Way::Exact)), "all are compared with exact rays");
-            // Beside every array of maps is the field of as many cells, but for the cache's sake.
-            let with_fields = jobs.iter().filter(|job| job.stage != Stage::OutOfCore);
+            // Beside every array of maps is the field of as many cells, where it answers such rays and bricks do not matter.
+            let with_fields =
+                jobs.iter().filter(|job| ![Stage::Diffuse, Stage::OutOfCore, Stage::Handover].contains(&job.stage));
             let has_field = |job: &Job| job.ways.iter().filter_map(Way::field).all(|field| job.ways.contains(&field));
             assert!(with_fields.clone().count() > 8 && with_fields.clone().all(has_field));
         }

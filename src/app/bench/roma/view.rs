@@ -10,9 +10,10 @@ use crate::app::session::{Session, open_scene};
 use crate::app::walk;
 use crate::kernel::Extent;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
-use crate::render::{Field, Renderer, Schedule};
+use crate::render::{Field, Renderer, Rsm, Schedule};
 use crate::scene::Camera;
 use crate::schedule::cache::Cache;
+use crate::stats::Record;
 use crate::stream::Residency;
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
@@ -45,7 +46,7 @@ impl<'a> View<'a> {
     /// The scene's, the device's.
     pub fn open(job: &'a Job, place: &Place, settings: &'a Settings, adapter: &'a Adapter) -> Result<Self> {
         let scene = place.scene.clone();
-        let line = line(job, &Way::Exact, settings, 1, 0);
+        let line = line(job, &job.options, &Way::Exact, settings, 1, 0);
         let args = walk_args(&line, &scene, adapter)?;
         let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
         let session = Session::open(open_scene(&scene)?, &scene, &args.stream, extent)?;
@@ -59,12 +60,25 @@ impl<'a> View<'a> {
     /// # Errors
     /// A brick that cannot be read, the device's, pixels that are not finite.
     pub fn picture(&mut self, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
-        let args = walk_args(&line(self.job, way, self.settings, samples, seed), &self.scene, self.adapter)?;
+        let Picture { mut image, values } = self.whole(&self.job.options, way, samples, seed)?;
+        if !self.job.without.is_empty() && self.job.errors {
+            let without = self.whole(&self.job.without, way, samples, seed)?.image;
+            for (with, without) in image.rgb.as_flattened_mut().iter_mut().zip(without.rgb.as_flattened()) {
+                *with -= without;
+            }
+        }
+        Ok(Picture { image, values })
+    }
+
+    /// A picture of all that `options` ask for.
+    fn whole(&mut self, options: &str, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
+        let args = walk_args(&line(self.job, options, way, self.settings, samples, seed), &self.scene, self.adapter)?;
         let renderer = &mut self.renderer;
         renderer.settings = walk::settings(&args, Schedule::Chc);
         // A field stays as long as the camera does: its making is measured.
         renderer.field = Field::default();
         if self.job.is_cold {
+            renderer.rsm = Rsm::default();
             let old = &renderer.cache;
             let sizes = old.bytes.sizes();
             let page_bytes = renderer.executor.page_bytes();
@@ -72,19 +86,33 @@ impl<'a> View<'a> {
             renderer.cache = Cache::new(residency, old.bytes.clone(), None);
         }
         let output = renderer.frame(0, &self.camera).with_context(|| self.scene.display().to_string())?;
-        let record = output.records.iter().find(|record| record.pass == self.job.effect);
-        let record = record.with_context(|| format!("no rays of {} were traced", self.job.effect))?;
+        let effect = self.job.effect;
+        if options == self.job.options && !output.records.iter().any(|record| record.pass == effect) {
+            bail!("no rays of {effect} were traced");
+        }
+        // With what its hits are lit by, and the maps of lamps.
+        let of_hits = format!("{effect}-shadow");
+        let is_of_maps = |record: &Record| record.pass == "rsm";
+        let own = || output.records.iter().filter(|record| record.pass == effect || record.pass == of_hits);
+        let maps = || output.records.iter().filter(|record| effect == "diffuse" && is_of_maps(record));
+        let sum = |value: fn(&Record) -> f64| own().map(value).sum::<f64>();
+        let loaded = |value: fn(&Record) -> f64| own().chain(maps()).map(value).sum::<f64>();
+        let is_exact = way.is_traced();
         if output.records.iter().any(|record| record.non_finite > 0) {
             bail!("{}: {way}: pixels were not finite; this is a defect", self.scene.display());
         }
         let values = [
-            ("rays", record.rays as f64),
-            ("ms", record.ms),
-            ("ms_generation", if matches!(way, Way::Exact) { 0.0 } else { record.ms_phase1 }),
-            ("ms_trace", if matches!(way, Way::Exact) { record.ms } else { record.ms_phase3 }),
-            ("bricks_loaded", record.bricks_loaded as f64),
-            ("bytes_loaded", (record.bytes_bvh + record.bytes_geometry) as f64),
-            ("rays_capped", record.rays_capped as f64),
+            (
+                "rays",
+                output.records.iter().filter(|record| record.pass == effect).map(|record| record.rays as f64).sum(),
+            ),
+            ("ms", sum(|record| record.ms)),
+            ("ms_generation", if is_exact { 0.0 } else { sum(|record| record.ms_phase1) }),
+            ("ms_trace", if is_exact { sum(|record| record.ms) } else { sum(|record| record.ms_phase3) }),
+            ("ms_lamps", maps().map(|record| record.ms).sum()),
+            ("bricks_loaded", loaded(|record| record.bricks_loaded as f64)),
+            ("bytes_loaded", loaded(|record| (record.bytes_bvh + record.bytes_geometry) as f64)),
+            ("rays_capped", sum(|record| record.rays_capped as f64)),
         ];
         let (width, height) = (renderer.size.0 as usize, renderer.size.1 as usize);
         let image = Image { width, height, rgb: output.pixels.radiance };
@@ -110,8 +138,8 @@ impl<'a> View<'a> {
 }
 
 /// The options of the walk that a user would type.
-fn line(job: &Job, way: &Way, settings: &Settings, samples: u32, seed: u32) -> String {
-    let Job { options, cache, .. } = job;
+fn line(job: &Job, options: &str, way: &Way, settings: &Settings, samples: u32, seed: u32) -> String {
+    let cache = job.cache;
     let Settings { tile, size, .. } = settings;
     let way = way.options();
     format!("{options} {way} --cache {cache}% --schedule chc --tile {tile} --size {size} --spp {samples} --seed {seed}")

@@ -1,0 +1,119 @@
+//! Reflective shadow maps on the device, and the kernels that write them and light by them; made when a walk first asks for them.
+
+use super::device::Gpu;
+use super::groups::numbered;
+use super::kernels::{self, Kernels};
+use super::lamps::LampBuffers;
+use super::rays::storage;
+use crate::kernel::dispatch::{RSM_LIGHT, RSM_WRITE};
+use crate::kernel::layout::{RsmMap, RsmTexel};
+use crate::kernel::rsm::RsmMaps;
+use crate::schedule::ExecutorError;
+
+/// Storage buffers of both kernels: 7 of the scene, 5 of the rays, 6 of their own, 8 of shading; one more with opacity.
+const STORAGE_BUFFERS: u32 = 26;
+
+/// Pipelines and buffers.
+pub struct Rsm {
+    layout: wgpu::BindGroupLayout,
+    write: wgpu::ComputePipeline,
+    light: wgpu::ComputePipeline,
+    map_records: wgpu::Buffer,
+    /// Texels of all maps.
+    pub texels: wgpu::Buffer,
+    /// How many maps there are.
+    pub maps: u32,
+    /// Group 2 of both kernels.
+    pub group: wgpu::BindGroup,
+}
+
+impl Rsm {
+    /// Of nothing.
+    ///
+    /// # Errors
+    /// The device binds too few buffers.
+    pub fn new(gpu: &Gpu, kernels: &Kernels, lamps: &LampBuffers) -> Result<Self, ExecutorError> {
+        let (most, needed) =
+            (gpu.limits.max_storage_buffers_per_shader_stage, STORAGE_BUFFERS + u32::from(kernels.pages.opacity));
+        if most < needed {
+            return Err(ExecutorError::Device(format!(
+                "{:?} binds {most} buffers a kernel, diffuse light by occupancy maps needs {needed}; use --secondary exact, or another --adapter",
+                gpu.info.name
+            )));
+        }
+        let layout = kernels::rsm_layout(&gpu.device);
+        let groups = [Some(&kernels.scene), Some(&kernels.rays), Some(&layout), Some(&kernels.shading)];
+        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("rsm"),
+            bind_group_layouts: &groups,
+            immediate_size: 0,
+        });
+        let [write, light] = [RSM_WRITE, RSM_LIGHT].map(|name| {
+            let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(kernels::source(name, kernels.pages).into()),
+            });
+            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(name),
+                layout: Some(&pipeline_layout),
+                module: &module,
+                entry_point: Some("main"),
+                compilation_options: Default::default(),
+                cache: None,
+            })
+        });
+        let map_records = storage(gpu, "rsm maps", 1, size_of::<RsmMap>());
+        let texels = storage(gpu, "rsm texels", 1, size_of::<RsmTexel>());
+        let group = group(gpu, &layout, lamps, [&map_records, &texels]);
+        Ok(Self { layout, write, light, map_records, texels, maps: 0, group })
+    }
+
+    /// The pipeline of a kernel, if it is one of these.
+    pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
+        match name {
+            RSM_WRITE => Some(&self.write),
+            RSM_LIGHT => Some(&self.light),
+            _ => None,
+        }
+    }
+
+    /// Takes maps; as many texels as before keep what they hold.
+    ///
+    /// # Errors
+    /// More texels than a buffer holds, with how many it does.
+    pub fn set(&mut self, gpu: &Gpu, lamps: &LampBuffers, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        let size = size_of::<RsmTexel>() as u64;
+        let most = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size) / size;
+        let texels = u64::from(maps.texels);
+        if texels > most {
+            return Err(ExecutorError::Device(format!(
+                "{:?} holds reflective shadow maps of at most {most} texels, these have {texels}; give a smaller --rsm-size or fewer --rsm-lamps",
+                gpu.info.name
+            )));
+        }
+        let records = size_of_val(&maps.maps[..]) as u64;
+        let is_new = self.texels.size() != texels.max(1) * size || self.map_records.size() < records;
+        if self.texels.size() != texels.max(1) * size {
+            self.texels = storage(gpu, "rsm texels", texels as usize, size as usize);
+        }
+        if self.map_records.size() < records {
+            self.map_records = storage(gpu, "rsm maps", maps.maps.len(), size_of::<RsmMap>());
+        }
+        if is_new {
+            self.rebind(gpu, lamps);
+        }
+        gpu.queue.write_buffer(&self.map_records, 0, bytemuck::cast_slice(&maps.maps));
+        self.maps = maps.maps.len() as u32;
+        Ok(())
+    }
+
+    /// Binds the lamps, which are new ones.
+    pub fn rebind(&mut self, gpu: &Gpu, lamps: &LampBuffers) {
+        self.group = group(gpu, &self.layout, lamps, [&self.map_records, &self.texels]);
+    }
+}
+
+fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, lamps: &LampBuffers, own: [&wgpu::Buffer; 2]) -> wgpu::BindGroup {
+    let entries = numbered(lamps.buffers().into_iter().chain(own), 0);
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("rsm"), layout, entries: &entries })
+}
