@@ -2,6 +2,7 @@
 
 use super::args::ranged;
 use super::named::named_values;
+use crate::visibility::bom::Source;
 use crate::visibility::roma::{Grid, MOST_NEAR, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings};
 use crate::visibility::rsm::RsmSettings;
 use clap::Args;
@@ -25,6 +26,11 @@ pub struct RomaArgs {
     /// it from passing over one, which is 2]
     #[arg(long, value_name = "N", value_parser = |s: &str| of(s, &[1, 2, 4]))]
     pub roma_samples: Option<u32>,
+    /// With --secondary roma or df: what maps are made of: bricks (what every brick carries of its cells: no geometry is read, and no cell that something
+    /// is in is missed), raster (the paper's: all triangles, 4M at most, rasterised along three axes and moved by up to half a cell at random in
+    /// every sample: thinner, with holes, and slow)
+    #[arg(long, value_name = "SOURCE", default_value = "bricks")]
+    pub bom: BomSource,
     /// With --secondary roma: which rays keep their direction rather than to take that of the nearest map, separated by
     /// commas: none, shadow, ao, diffuse, all
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "shadow")]
@@ -70,7 +76,25 @@ named_values! {
     } later &[]
 }
 
+named_values! {
+    /// What base maps are made of.
+    BomSource {
+        /// The maps of bricks.
+        Bricks = "bricks",
+        /// Triangles.
+        Raster = "raster",
+    } later &[]
+}
+
 impl RomaArgs {
+    /// What base maps are made of.
+    pub fn source(&self) -> Source {
+        match self.bom {
+            BomSource::Bricks => Source::Bricks,
+            BomSource::Raster => Source::Triangles,
+        }
+    }
+
     /// How rays are answered; with `is_auto` all that maps do not find free are traced, or of those of ao some.
     pub fn settings(&self, is_auto: bool) -> RomaSettings {
         let pass = |k, is_unsnapped, near, one_in| {

@@ -71,28 +71,8 @@ pub fn of_walk(
             "prefetch": args.stream.prefetch,
             "interactive_bytes": args.interactive,
             "secondary": args.secondary.name(),
-            "roma": renderer.settings.roma.map(|roma| json!({
-                "k": roma.occlusion.grid.k,
-                "shadow_k": roma.shadow.grid.k,
-                "size": roma.occlusion.grid.size,
-                "samples": roma.occlusion.grid.samples(roma.occlusion.grid.size),
-                "steps": roma.occlusion.steps,
-                "shadow_steps": roma.shadow.steps,
-                "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
-                "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
-                "near": near(roma.occlusion.role),
-                "one_in": if let Role::Sift(one_in) = roma.occlusion.role { one_in } else { 1 },
-                "shadow_near": near(roma.shadow.role),
-                "finest_cell": renderer.roma.finest_cell(),
-            })),
-            "df": renderer.settings.field.map(|field| json!({
-                "size": field.size,
-                "steps": field.occlusion_steps,
-                "shadow_steps": field.shadow_steps,
-                "lift": field.lift,
-                "hit": field.hit,
-                "finest_cell": renderer.roma.finest_cell(),
-            })),
+            "roma": roma_settings(args, renderer),
+            "df": field_settings(args, renderer),
             "rsm": renderer.rsm.report(),
             "spp": args.spp,
             "seed": args.seed,
@@ -235,6 +215,42 @@ fn memory() -> Value {
         }),
         _ => Value::Null,
     }
+}
+
+/// What answers rays by maps; `None` where none does.
+fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
+    renderer.settings.roma.map(|roma| {
+        json!({
+            "bom": args.roma.bom.name(),
+            "k": roma.occlusion.grid.k,
+            "shadow_k": roma.shadow.grid.k,
+            "size": roma.occlusion.grid.size,
+            "samples": roma.occlusion.grid.samples(roma.occlusion.grid.size),
+            "steps": roma.occlusion.steps,
+            "shadow_steps": roma.shadow.steps,
+            "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
+            "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
+            "near": near(roma.occlusion.role),
+            "one_in": if let Role::Sift(one_in) = roma.occlusion.role { one_in } else { 1 },
+            "shadow_near": near(roma.shadow.role),
+            "finest_cell": renderer.roma.finest_cell(),
+        })
+    })
+}
+
+/// What answers rays by distance fields.
+fn field_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
+    renderer.settings.field.map(|field| {
+        json!({
+            "bom": args.roma.bom.name(),
+            "size": field.size,
+            "steps": field.occlusion_steps,
+            "shadow_steps": field.shadow_steps,
+            "lift": field.lift,
+            "hit": field.hit,
+            "finest_cell": renderer.roma.finest_cell(),
+        })
+    })
 }
 
 #[cfg(test)]

@@ -170,7 +170,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         fronts,
         auto: Auto::default(),
         captures: None,
-        roma: Roma::default(),
+        roma: Roma::new(args.roma.source()),
         field: Field::default(),
         rsm: Rsm::default(),
         host_seen: HostCacheStats::default(),

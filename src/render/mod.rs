@@ -12,10 +12,12 @@ mod field;
 mod frame;
 mod light;
 mod pass_record;
+mod raster;
 mod roma;
 mod rsm;
 mod sky_model;
 mod tone_map;
+mod triangles;
 mod view;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};

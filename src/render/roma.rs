@@ -1,10 +1,11 @@
 //! Occlusion and shadow rays that occupancy maps answer: which maps, and when they are made.
 
+use super::raster::Raster;
 use crate::kernel::frame::Frame;
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
-use crate::visibility::bom::{Assembler, Bom, BomError, Cascades, Settings};
+use crate::visibility::bom::{Assembler, Bom, BomError, Cascades, Settings, Source};
 use crate::visibility::roma::{Grid, MOST_LEVELS, Role, RomaPass, RomaSettings};
 use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
@@ -15,9 +16,12 @@ use std::sync::Arc;
 pub struct Roma {
     /// What makes the base maps, of so many cells on each axis.
     assembler: Option<(u32, Assembler)>,
+    source: Source,
+    /// The scene's triangles, if base maps are made of these.
+    raster: Option<Raster>,
     cascades: Arc<Cascades>,
     view: Option<RomaView>,
-    /// Whether the base maps are those of the present camera.
+    /// Whether the base maps are those of the present camera, and sample if they depend on it.
     is_assembled: bool,
     /// The ray-aligned maps that the executor has of the present sample.
     made: Option<(Grid, Role, usize)>,
@@ -43,9 +47,15 @@ fn usual_cell_log2(resident: &Resident) -> Option<i32> {
 }
 
 impl Roma {
+    /// With base maps that are made of `source`.
+    pub fn new(source: Source) -> Self {
+        Self { source, ..Self::default() }
+    }
+
     /// Begins a sample of a frame seen from `camera`, a point of the world.
     pub fn begin(&mut self, camera: DVec3, view: &View) {
-        self.is_assembled &= self.view.as_ref().is_some_and(|before| before.camera == camera);
+        let keeps = |before: &RomaView| before.camera == camera && self.source == Source::Bricks;
+        self.is_assembled &= self.view.as_ref().is_some_and(keeps);
         self.view = Some(RomaView { frame: view.frame, camera, sample: view.params.sample, seed: view.params.seed });
         self.made = None;
     }
@@ -111,7 +121,7 @@ impl Roma {
     /// # Errors
     /// Occupancy that cannot be read.
     pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32) -> Result<&Arc<Cascades>, ExecutorError> {
-        let Some(RomaView { camera, .. }) = &self.view else { return Ok(&self.cascades) };
+        let Some(RomaView { camera, sample, seed, .. }) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
         let (cells, mut assembler) = match self.assembler.take() {
             Some((cells, assembler)) if cells == size => (cells, assembler),
@@ -124,9 +134,17 @@ impl Roma {
         };
         if !self.is_assembled {
             assembler.advance(scene.resident(), *camera).map_err(failed)?;
-            if *self.cascades != *assembler.cascades() {
+            let raster = match (self.source, self.raster.take()) {
+                (Source::Bricks, _) => None,
+                (Source::Triangles, Some(raster)) => Some(raster),
+                (Source::Triangles, None) => Some(Raster::new(scene).map_err(failed)?),
+            };
+            if let Some(raster) = &raster {
+                self.cascades = Arc::new(raster.maps(scene, assembler.cascades(), *sample, *seed));
+            } else if *self.cascades != *assembler.cascades() {
                 self.cascades = Arc::new(assembler.cascades().clone());
             }
+            self.raster = raster;
             self.is_assembled = true;
         }
         self.assembler = Some((cells, assembler));

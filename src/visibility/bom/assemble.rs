@@ -26,6 +26,18 @@ pub enum BomError {
         /// The scene file.
         path: PathBuf,
     },
+    /// Maps were to be made of triangles, which are too many to be held.
+    #[error(
+        "{path}: --bom raster holds all triangles of a scene, and it has {count}, more than {most}; use --bom bricks"
+    )]
+    TooManyTriangles {
+        /// The scene file.
+        path: PathBuf,
+        /// Triangles.
+        count: u64,
+        /// Most that are held.
+        most: u64,
+    },
     /// A brick's map cannot be read.
     #[error(transparent)]
     Read(#[from] bricks::Error),

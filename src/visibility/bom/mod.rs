@@ -98,6 +98,16 @@ impl Bom {
     }
 }
 
+/// What base maps are made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Source {
+    /// The maps that bricks carry. No geometry is read, and no occupied cell is missed.
+    #[default]
+    Bricks,
+    /// All triangles, in every sample anew: [`Voxelisation::Raster`].
+    Triangles,
+}
+
 /// Maps around the camera, each with cells twice as large as the one before, which lies in its middle.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cascades {
