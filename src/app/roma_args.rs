@@ -3,7 +3,7 @@
 use super::args::ranged;
 use super::named::named_values;
 use crate::visibility::bom::Source;
-use crate::visibility::roma::{Grid, MOST_NEAR, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings};
+use crate::visibility::roma::{CLOSED, Grid, MOST_NEAR, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings, THIN};
 use crate::visibility::rsm::RsmSettings;
 use clap::Args;
 
@@ -22,8 +22,8 @@ pub struct RomaArgs {
     /// With --secondary roma: cells of a map on each axis: 32, 64, 128 or 256; of 128, 16 maps take 4 MiB for each of up to six sizes of cells
     #[arg(long, value_name = "CELLS", default_value = "128", value_parser = |s: &str| of(s, &[32, 64, 128, 256]))]
     pub roma_size: u32,
-    /// With --secondary roma: how often a cell of a map looks into the scene's cells along the ray: 1, 2 or 4 [default: as often as keeps
-    /// it from passing over one, which is 2]
+    /// With --secondary roma: how often a cell of a map looks into the scene's cells, of which there are twice as many on each axis, along the ray: 1, 2 or
+    /// 4 [default: 4, which passes over none; 2 for ao, which is less dark, while thin sheets leak a little]
     #[arg(long, value_name = "N", value_parser = |s: &str| of(s, &[1, 2, 4]))]
     pub roma_samples: Option<u32>,
     /// With --secondary roma or df: what maps are made of: bricks (what every brick carries of its cells: no geometry is read, and no cell that something
@@ -97,24 +97,25 @@ impl RomaArgs {
 
     /// How rays are answered; with `is_auto` all that maps do not find free are traced, or of those of ao some.
     pub fn settings(&self, is_auto: bool) -> RomaSettings {
-        let pass = |k, is_unsnapped, near, one_in| {
+        let pass = |k, is_unsnapped, near, one_in, stride| {
             let role = match near {
                 _ if is_auto => Role::Sift(one_in),
                 0 => Role::Answer,
                 cells => Role::Far(cells),
             };
             let steps = if is_auto { MOST_STEPS } else { self.roma_steps };
+            let grid = Grid { k, size: self.roma_size, samples: 1 }.with_stride(if is_auto { CLOSED } else { stride });
             RomaPass {
-                grid: Grid { k, size: self.roma_size, samples: self.roma_samples.unwrap_or(0) },
+                grid: Grid { samples: self.roma_samples.unwrap_or(grid.samples), ..grid },
                 steps: if is_unsnapped || is_auto { steps } else { 0 },
                 role,
             }
         };
         let keeps = |rays| self.roma_unsnapped.iter().any(|named| [rays, Unsnapped::All].contains(named));
         RomaSettings {
-            occlusion: pass(self.roma_k, keeps(Unsnapped::Ao), self.roma_near, self.auto_one_in),
-            shadow: pass(self.roma_shadow_k, keeps(Unsnapped::Shadow), self.roma_shadow_near, 1),
-            diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), 0, 1)),
+            occlusion: pass(self.roma_k, keeps(Unsnapped::Ao), self.roma_near, self.auto_one_in, THIN),
+            shadow: pass(self.roma_shadow_k, keeps(Unsnapped::Shadow), self.roma_shadow_near, 1, CLOSED),
+            diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), 0, 1, CLOSED)),
             rsm: RsmSettings { size: self.rsm_size, lamps: self.rsm_lamps },
         }
     }

@@ -225,7 +225,7 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "k": roma.occlusion.grid.k,
             "shadow_k": roma.shadow.grid.k,
             "size": roma.occlusion.grid.size,
-            "samples": roma.occlusion.grid.samples(roma.occlusion.grid.size),
+            "samples": roma.occlusion.grid.samples,
             "steps": roma.occlusion.steps,
             "shadow_steps": roma.shadow.steps,
             "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),

@@ -219,7 +219,7 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 
 /// Small maps, of both numbers of directions.
 fn roma((steps, role): (u32, Role)) -> RomaSettings {
-    let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 0 }, steps, role };
+    let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 4 }, steps, role };
     let diffuse = (!matches!(role, Role::Sift(_))).then(|| RomaPass { role: Role::Answer, ..pass(4) });
     RomaSettings { occlusion: pass(4), shadow: pass(8), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
 }

@@ -32,13 +32,8 @@ pub struct RomaMaps {
 
 impl RomaMaps {
     /// Those of the finest `count` levels of `cascades` for `pass`, in directions drawn for sample `sample`.
-    pub fn new(
-        cascades: &Cascades,
-        count: usize,
-        frame: &Frame,
-        RomaPass { grid, role, .. }: RomaPass,
-        (sample, seed): (u32, u32),
-    ) -> Self {
+    pub fn new(cascades: &Cascades, count: usize, frame: &Frame, pass: RomaPass, (sample, seed): (u32, u32)) -> Self {
+        let RomaPass { grid, role, .. } = pass;
         let cells = cascades.levels.first().map_or(0, Bom::cells);
         let drawn = draw(grid.k, sample.wrapping_add(STREAM), seed);
         let level = |bom: &Bom| {
@@ -74,7 +69,7 @@ impl RomaMaps {
             k: grid.k,
             size: grid.size,
             cells,
-            samples: grid.samples(cells.max(1)),
+            samples: grid.samples,
             is_part: levels.len() < cascades.levels.len(),
             levels: levels.iter().map(record).collect(),
             maps,
@@ -114,7 +109,7 @@ mod tests {
     use crate::visibility::roma::{Grid, Role};
 
     fn pass(size: u32) -> RomaPass {
-        RomaPass { grid: Grid { k: 4, size, samples: 0 }, steps: 0, role: Role::Answer }
+        RomaPass { grid: Grid { k: 4, size, samples: 2 }, steps: 0, role: Role::Answer }
     }
 
     fn apply(rows: &[[f32; 4]; 3], p: DVec3) -> DVec3 {

@@ -318,7 +318,7 @@ impl Renderer {
         let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
         let (mut first, mut last) = (vec![Step::Generate], vec![Step::QueryHits]);
         if let Some(roma) = roma {
-            let RomaPass { steps, role, .. } = roma;
+            let RomaPass { grid, steps, role } = roma;
             let length = match (pass, self.settings.effects.occlusion) {
                 (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
                 _ => f64::INFINITY,
@@ -332,7 +332,7 @@ impl Renderer {
                     return Ok(());
                 }
                 Role::Far(cells) => {
-                    first.push(Step::RomaNear { cells });
+                    first.push(Step::RomaNear { cells: cells * grid.base_per_cell() });
                     last.push(trace(RomaPart::Far));
                 }
                 Role::Sift(one_in) => first.push(trace(RomaPart::Sift { one_in })),

@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// The occupancy maps of the present frame and sample.
 #[derive(Default)]
 pub struct Roma {
-    /// What makes the base maps, of so many cells on each axis.
-    assembler: Option<(u32, Assembler)>,
+    /// What makes the base maps, of whose cells on each axis the first would be enough, and there are the second.
+    assembler: Option<([u32; 2], Assembler)>,
     source: Source,
     /// The scene's triangles, if base maps are made of these.
     raster: Option<Raster>,
@@ -88,9 +88,10 @@ impl Roma {
             return Ok(None);
         }
         let RomaPass { grid, role, .. } = pass;
-        self.assemble(scene, grid.size)?;
-        let before = role.lift() / grid.scale(grid.size);
-        let before = if let Role::Far(cells) = role { before.max(cells.into()) } else { before };
+        let cells = grid.base_cells();
+        self.assemble(scene, grid.size, cells)?;
+        let before = role.lift() / grid.scale(cells);
+        let before = if let Role::Far(near) = role { before.max((near * grid.base_per_cell()).into()) } else { before };
         let is_of_use = |bom: &&Bom| before * bom.side() < length;
         let levels = self.cascades.levels.iter().take_while(is_of_use).count();
         if self.made == Some((grid, role, levels)) {
@@ -112,24 +113,27 @@ impl Roma {
         scene: &Arc<SceneFile>,
         cells: u32,
     ) -> Result<Option<(Arc<Cascades>, Frame)>, ExecutorError> {
-        self.assemble(scene, cells)?;
+        self.assemble(scene, cells, cells)?;
         Ok(self.view.as_ref().map(|view| (self.cascades.clone(), view.frame)))
     }
 
-    /// The base maps around the camera of `size` cells on each axis.
+    /// The base maps around the camera, as wide as `size` cells would be of which bricks have all, of `cells` on each axis, once or twice as
+    /// many.
     ///
     /// # Errors
     /// Occupancy that cannot be read.
-    pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32) -> Result<&Arc<Cascades>, ExecutorError> {
+    pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32, cells: u32) -> Result<&Arc<Cascades>, ExecutorError> {
         let Some(RomaView { camera, sample, seed, .. }) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
-        let (cells, mut assembler) = match self.assembler.take() {
-            Some((cells, assembler)) if cells == size => (cells, assembler),
+        let of = [size, cells];
+        let mut assembler = match self.assembler.take() {
+            Some((made, assembler)) if made == of => assembler,
             _ => {
                 self.is_assembled = false;
-                let finest_log2 = usual_cell_log2(scene.resident());
-                let settings = Settings { cells: size, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
-                (size, Assembler::new(scene.clone(), settings).map_err(failed)?)
+                let halvings = (cells / size).ilog2() as i32;
+                let finest_log2 = usual_cell_log2(scene.resident()).map(|usual| usual - halvings);
+                let settings = Settings { cells, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
+                Assembler::new(scene.clone(), settings).map_err(failed)?
             }
         };
         if !self.is_assembled {
@@ -147,12 +151,14 @@ impl Roma {
             self.raster = raster;
             self.is_assembled = true;
         }
-        self.assembler = Some((cells, assembler));
+        self.assembler = Some((of, assembler));
         Ok(&self.cascades)
     }
 
-    /// Side of the cells of the finest maps that were made, world units.
+    /// Side of the finest base map, world units, by the cells on each axis that it would have if they were bricks': of maps of twice as many, two of
+    /// their cells.
     pub fn finest_cell(&self) -> Option<f64> {
-        self.cascades.levels.first().map(|bom| f64::from(bom.cell_log2).exp2())
+        let per_cell = self.assembler.as_ref().map_or(1, |([size, cells], _)| cells / size);
+        self.cascades.levels.first().map(|bom| f64::from(bom.cell_log2).exp2() * f64::from(per_cell))
     }
 }

@@ -73,7 +73,7 @@ impl Renderer {
         let Some((settings, diffuse)) = self.settings.roma.and_then(|roma| Some((roma.rsm, roma.diffuse?))) else {
             return Ok(());
         };
-        let cascades = self.roma.assemble(&self.scene, diffuse.grid.size)?;
+        let cascades = self.roma.assemble(&self.scene, diffuse.grid.size, diffuse.grid.base_cells())?;
         let manifest = &self.scene.resident().manifest;
         let bounds = [manifest.min, manifest.max].map(DVec3::from_array);
         let light = &self.light;

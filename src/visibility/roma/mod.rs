@@ -25,7 +25,7 @@ pub struct Grid {
     pub k: u32,
     /// Texels on both axes, and cells of a column: a multiple of 32 up to 256.
     pub size: u32,
-    /// Look-ups of the base map a cell, along the column: 1, 2 or 4; 0: as many as keep them one cell of the base map apart at most.
+    /// Look-ups of the base map a cell, along the column: 1, 2 or 4.
     pub samples: u32,
 }
 
@@ -36,12 +36,22 @@ impl Grid {
         f64::from(self.size - 1) / (3f64.sqrt() * f64::from(cells))
     }
 
-    /// Look-ups a cell.
-    pub fn samples(&self, cells: u32) -> u32 {
-        match self.samples {
-            0 => [1, 2].into_iter().find(|&samples| self.scale(cells) * f64::from(samples) >= 1.0).unwrap_or(4),
-            given => given,
-        }
+    /// Cells of its base maps on each axis, up to 256 twice its own: they take an eighth of what an array does for each of its maps, and what marks a thing
+    /// is half as wide.
+    pub fn base_cells(&self) -> u32 {
+        (2 * self.size).min(MOST_CELLS)
+    }
+
+    /// Cells of its base maps in a length of which as many cells as it has on each axis are the base map's side.
+    pub fn base_per_cell(&self) -> u32 {
+        self.base_cells() / self.size
+    }
+
+    /// The same with the fewest look-ups, up to four, that are at most `stride` cells of a base map apart.
+    pub fn with_stride(self, stride: f64) -> Self {
+        let cells = self.scale(self.base_cells());
+        let is_near = |samples: &u32| cells * f64::from(*samples) * stride >= 1.0;
+        Self { samples: [1, 2].into_iter().find(is_near).unwrap_or(4), ..self }
     }
 
     /// Words of the maps of `levels` base maps.
@@ -49,6 +59,14 @@ impl Grid {
         levels as u64 * u64::from(self.k * self.k) * u64::from(self.size * self.size) * u64::from(self.size / 32)
     }
 }
+
+/// Cells of a base map between two look-ups of a column at most, of rays that must not pass through anything: those that are sifted are free for good where
+/// nothing is found, sunlight behind a wall shows, and what shines behind a wall lights.
+pub const CLOSED: f64 = 1.0;
+
+/// The same of occlusion rays. Thin sheets leak more, and cells, which are thicker than what is in them, are met less often: both errors together are
+/// less than with [`CLOSED`].
+pub const THIN: f64 = 2.0;
 
 /// What maps do for the rays of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,9 +80,9 @@ pub enum Role {
 }
 
 impl Role {
-    /// Cells of a map by which rays start off their surface. What marks a plane reaches one cell of a base map above it, 0.58 of a map of as many
-    /// cells, and is found from up to 1.03 cells of the map away: half a diagonal across the column, three quarters along it. So with the 1.5 of
-    /// Zeng et al. (§6) a plane hardly occludes itself, where the worst of both come together. Rays that are sifted start lower: what is taken
+    /// Cells of a map by which rays start off their surface. What marks a plane reaches one cell of a base map above it, 0.29 of a map of half as many
+    /// cells, and is found from up to 1.13 cells of the map away: half a diagonal across the column, seven eighths along it. So with the 1.5 of
+    /// Zeng et al. (§6) a plane does not occlude itself. Rays that are sifted start lower: what is taken
     /// for something costs time only, and what lies below their start is overlooked.
     pub fn lift(self) -> f64 {
         if matches!(self, Self::Sift(_)) { 0.75 } else { 1.5 }
@@ -98,6 +116,9 @@ pub struct RomaSettings {
 /// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.
 pub const MOST_LEVELS: u32 = 6;
 
+/// Most cells of a map on each axis.
+pub const MOST_CELLS: u32 = 256;
+
 /// Most rays of which one is traced.
 pub const MOST_ONE_IN: u32 = 16;
 
@@ -114,15 +135,15 @@ mod tests {
     #[test]
     fn look_ups_are_no_further_apart_than_cells() {
         for size in [32, 64, 128, 256] {
-            let grid = Grid { k: 4, size, samples: 0 };
-            assert_eq!(grid.samples(size), 2);
-            assert!(grid.scale(size) * 2.0 >= 1.0);
-            assert_eq!(grid.samples(size / 2), 1);
-            assert_eq!(grid.samples(2 * size), 4);
-            assert!(grid.scale(size) < 1.0, "one would not do");
-            assert_eq!(Grid { samples: 1, ..grid }.samples(size), 1);
+            let grid = Grid { k: 4, size, samples: 1 };
+            for stride in [THIN, CLOSED] {
+                let samples = grid.with_stride(stride).samples;
+                let apart = |samples: u32| 1.0 / (grid.scale(grid.base_cells()) * f64::from(samples));
+                assert!(apart(samples) <= stride && (samples == 1 || apart(samples / 2) > stride), "fewer would do");
+            }
+            assert_eq!(grid.base_per_cell(), if size == 256 { 1 } else { 2 });
         }
-        assert_eq!(Grid { k: 4, size: 128, samples: 0 }.words(1), 1 << 20);
-        assert_eq!(Grid { k: 8, size: 128, samples: 0 }.words(2) * 4, 32 << 20);
+        assert_eq!(Grid { k: 4, size: 128, samples: 1 }.words(1), 1 << 20);
+        assert_eq!(Grid { k: 8, size: 128, samples: 1 }.words(2) * 4, 32 << 20);
     }
 }
