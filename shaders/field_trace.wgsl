@@ -99,6 +99,9 @@ fn trace(index: u32, ray: Ray) -> bool {
             break;
         }
     }
+    let d = ray.direction;
+    let squares = barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z));
+    let rise = barrier(barrier(barrier(d.x * normal.x) + barrier(d.y * normal.y)) + barrier(d.z * normal.z));
     // A ray starts near a surface.
     var way = Way(0u, 0u);
     var t = ray.t_min;
@@ -109,7 +112,8 @@ fn trace(index: u32, ray: Ray) -> bool {
         let speed = barrier3(ray.direction * level.scale);
         let low = select(margin, 0.0, l + 1u == params.field_levels);
         let high = side - low;
-        var range = vec2<f32>(t, ray.t_max);
+        let end = end_of(ray.t_max, level.lift, squares, rise);
+        var range = vec2<f32>(t, end);
         range = clipped(range, at.x, speed.x, low, high);
         range = clipped(range, at.y, speed.y, low, high);
         range = clipped(range, at.z, speed.z, low, high);
@@ -118,7 +122,7 @@ fn trace(index: u32, ray: Ray) -> bool {
             if found.t >= 0.0 {
                 hits[index] = Hit(found.t, FIELD_HIT, 0.0, 0.0);
             }
-            if found.t >= 0.0 || found.is_capped || range.y >= ray.t_max {
+            if found.t >= 0.0 || found.is_capped || range.y >= end {
                 return found.is_capped;
             }
             // The distances of a level are those to what it holds: the ray goes on where it left it, however far it saw.

@@ -98,6 +98,7 @@ fn trace(index: u32, ray: Ray) -> bool {
     let margin = margin_of(index);
     let start_level = start_level_of(ray.origin, normal, margin);
     let rise = barrier(barrier(barrier(direction.x * normal.x) + barrier(direction.y * normal.y)) + barrier(direction.z * normal.z));
+    let squares = barrier(barrier(barrier(direction.x * direction.x) + barrier(direction.y * direction.y)) + barrier(direction.z * direction.z));
     var t = ray.t_min;
     if params.roma_part == ROMA_FAR {
         t = max(t, hits[index].t);
@@ -105,12 +106,15 @@ fn trace(index: u32, ray: Ray) -> bool {
     var is_capped = false;
     for (var l = start_level; l < params.roma_levels; l++) {
         let level = roma_levels[l];
-        let start = lifted(level, ray.origin, normal, barrier(t * rise));
+        let lift = lift_of(level, barrier(t * rise));
+        let start = lifted(ray.origin, normal, lift);
+        // Rays that are sifted must be free to their own end.
+        let end = select(end_of(ray.t_max, lift, squares, rise), ray.t_max, params.roma_part == ROMA_SIFT);
         let at = barrier3(barrier3(start * level.scale) + level.first);
         let speed = barrier3(direction * level.scale);
         let low = select(margin, 0.0, l + 1u == params.roma_levels && params.roma_is_part == 0u);
         let high = side - low;
-        var range = vec2<f32>(t, ray.t_max);
+        var range = vec2<f32>(t, end);
         range = clipped(range, at.x, speed.x, low, high);
         range = clipped(range, at.y, speed.y, low, high);
         range = clipped(range, at.z, speed.z, low, high);
@@ -137,7 +141,7 @@ fn trace(index: u32, ray: Ray) -> bool {
                 return is_capped;
             }
             t = range.y;
-            if t >= ray.t_max {
+            if t >= end {
                 break;
             }
         }

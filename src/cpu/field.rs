@@ -2,7 +2,7 @@
 //! `field_trace.wgsl`.
 
 use super::rays::RaySet;
-use super::roma::{BLEND, clipped};
+use super::roma::{BLEND, clipped, end_of};
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each};
 use crate::kernel::dispatch::{FLOOD_DISTANCES, FLOOD_SEEDS, HALVE_DISTANCES, JUMP_FLOOD};
@@ -67,6 +67,9 @@ impl Fields<'_> {
         let at = |level: &RomaLevel| each(|k| (ray.origin[k] + level.lift * normal[k]) * level.scale + level.first[k]);
         let holds = |level: &RomaLevel| at(level).iter().all(|&x| x >= margin && x <= side - margin);
         let start_level = self.levels.iter().position(holds).unwrap_or(self.levels.len() - 1);
+        let d = ray.direction;
+        let squares = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        let rise = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2];
         // A ray starts near a surface.
         let mut way = Way::default();
         let mut t = ray.t_min;
@@ -75,10 +78,11 @@ impl Fields<'_> {
             let speed = ray.direction.map(|x| x * level.scale);
             let low = if l + 1 == self.levels.len() { 0.0 } else { margin };
             let high = side - low;
-            let range = (0..3).fold([t, ray.t_max], |range, k| clipped(range, at[k], speed[k], low, high));
+            let end = end_of(ray.t_max, level.lift, squares, rise);
+            let range = (0..3).fold([t, end], |range, k| clipped(range, at[k], speed[k], low, high));
             if range[0] <= range[1] {
                 let (found, is_capped) = self.fields[l].through(&tracing, at, speed, range, &mut way);
-                if found.is_some() || is_capped || range[1] >= ray.t_max {
+                if found.is_some() || is_capped || range[1] >= end {
                     return (found, is_capped);
                 }
                 // The distances of a level are those to what it holds: the ray goes on where it left it, however far it saw.

@@ -25,6 +25,9 @@ pub(super) const BLEND: f32 = 1.0 / 16.0;
 /// Columns that a ray passes at most which would be snapped to below its surface and is not.
 const GRAZING_STEPS: u32 = 64;
 
+/// Rays that are this long, device units, have no end that matters, and its square does not overflow.
+const UNBOUNDED: f32 = f32::from_bits((127 + 40) << 23);
+
 /// Slower than this, in cells a unit of t, a ray stays where it is.
 const LEAST_SPEED: f32 = f32::from_bits((127 - 60) << 23);
 
@@ -209,17 +212,32 @@ fn is_chosen(p: &Params, index: u32) -> bool {
     (first + p.direction).is_multiple_of(p.roma_one_in)
 }
 
-/// A ray's start, off its surface by the level's lift, of which it may be `height` off already.
-fn lifted(level: &RomaLevel, origin: Vec3, normal: Vec3, height: f32) -> Vec3 {
-    let lift = least(most(level.lift - height, 0.0), level.lift);
+/// What is missing to the level's lift of a ray that is `height` off its surface.
+fn lift_of(level: &RomaLevel, height: f32) -> f32 {
+    least(most(level.lift - height, 0.0), level.lift)
+}
+
+fn lifted(origin: Vec3, normal: Vec3, lift: f32) -> Vec3 {
     each(|k| origin[k] + lift * normal[k])
+}
+
+/// Where a ray ends that is `lift` off its surface, so that it leaves the ball around its origin no farther than without: what it goes along must not
+/// reach across a narrow room. `squares` and `rise` are the products of its direction with itself and with the normal.
+pub(super) fn end_of(t_max: f32, lift: f32, squares: f32, rise: f32) -> f32 {
+    if t_max >= UNBOUNDED {
+        return t_max;
+    }
+    let height = lift * rise;
+    let past = t_max * t_max * squares - lift * lift;
+    let root = square_root(most(height * height + squares * past, 0.0));
+    least(most(divide(root - height, squares), 0.0), t_max)
 }
 
 /// The finest level that holds the start; the number of levels where none does.
 fn start_level_of(p: &Params, levels: &[RomaLevel], origin: Vec3, normal: Vec3, margin: f32) -> usize {
     let side = p.roma_cells as f32;
     let holds = |level: &RomaLevel| {
-        let start = lifted(level, origin, normal, 0.0);
+        let start = lifted(origin, normal, level.lift);
         let at = each(|k| start[k] * level.scale + level.first[k]);
         at.iter().all(|&x| x >= margin && x <= side - margin)
     };
@@ -307,15 +325,19 @@ impl Maps<'_> {
         let margin = margin_of(p, index);
         let start_level = start_level_of(p, self.levels, ray.origin, normal, margin);
         let rise = direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2];
+        let squares = direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2];
         let mut t = most(ray.t_min, from);
         let mut is_capped = false;
         for (l, level) in self.levels.iter().enumerate().skip(start_level) {
-            let start = lifted(level, ray.origin, normal, t * rise);
+            let lift = lift_of(level, t * rise);
+            let start = lifted(ray.origin, normal, lift);
+            // Rays that are sifted must be free to their own end.
+            let end = if p.roma_part == ROMA_SIFT { ray.t_max } else { end_of(ray.t_max, lift, squares, rise) };
             let at = each(|k| start[k] * level.scale + level.first[k]);
             let speed = direction.map(|x| x * level.scale);
             let low = if l + 1 == self.levels.len() && p.roma_is_part == 0 { 0.0 } else { margin };
             let high = side - low;
-            let range = (0..3).fold([t, ray.t_max], |range, k| clipped(range, at[k], speed[k], low, high));
+            let range = (0..3).fold([t, end], |range, k| clipped(range, at[k], speed[k], low, high));
             if range[0] <= range[1] {
                 let map = l as u32 * maps + stratum;
                 let rows = &self.maps[map as usize].cell_from_point;
@@ -329,7 +351,7 @@ impl Maps<'_> {
                     return Answer { met: Some(met), is_capped, is_known: true };
                 }
                 t = range[1];
-                if t >= ray.t_max {
+                if t >= end {
                     break;
                 }
             }
