@@ -252,6 +252,36 @@ fn maps_and_bricks_together_are_measured() {
 }
 
 #[test]
+fn seams_and_leaks_of_occupancy_maps_are_measured() {
+    let folder = folder();
+    let output = folder.path().join("out");
+    let tiny = "bench roma --triangles 10K --size 64x36 --samples 16 --repeat 1 --adapter cpu --stages seams,leaks -o";
+    succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
+    let json: Value =
+        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON");
+    // Exact rays, maps and a field, of two scenes; base maps of two kinds.
+    assert_eq!(json["measured"], 8);
+    let leaks = table(&json, "leaks")["rows"].as_array().unwrap();
+    assert_eq!(leaks.len(), 18);
+    for row in leaks.iter().filter(|row| row[4].is_number()) {
+        let [found, before] = [3, 4].map(|k| number(&row[k]));
+        // Conservative base maps that are looked up closely leak less than they did then.
+        let is_closed = row[0] == "conservative" && number(&row[2]) > 1.0;
+        assert!(found <= 1.5 * before && (found >= before / 1.5 || is_closed), "{row}");
+    }
+    let seams = table(&json, "seams")["rows"].as_array().unwrap();
+    let pixels = |way: &str| -> f64 {
+        let own = seams.iter().filter(|row| row[1] == way && row[3].is_number());
+        own.map(|row| number(&row[3])).sum()
+    };
+    assert!(pixels("roma 128 K=4") > 100.0, "some pixels show what is near a seam");
+    assert!(pixels("df 128") > 100.0, "and of the fields, whose maps lie nearly there");
+    assert!(seams.iter().filter(|row| row[3].is_number()).all(|row| number(&row[5]) + 1e-9 >= number(&row[4]).abs()));
+    let page = std::fs::read_to_string(output.join("report.html")).expect("a page");
+    assert!(page.contains("Error over the distance from a seam, city"));
+}
+
+#[test]
 fn distance_fields_are_measured_beside_occupancy_maps() {
     let folder = folder();
     let output = folder.path().join("out");

@@ -155,6 +155,11 @@ impl Roma {
         Ok(&self.cascades)
     }
 
+    /// The base maps that were made last, the finest first.
+    pub fn levels(&self) -> &[Bom] {
+        &self.cascades.levels
+    }
+
     /// Side of the finest base map, world units, by the cells on each axis that it would have if they were bricks': of maps of twice as many, two of
     /// their cells.
     pub fn finest_cell(&self) -> Option<f64> {

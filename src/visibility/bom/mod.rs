@@ -15,8 +15,6 @@ mod assemble;
 mod assemble_tests;
 mod boxes;
 mod clearance;
-#[cfg(test)]
-mod leak_tests;
 mod maps;
 mod place;
 mod plan;

@@ -85,7 +85,7 @@ impl Role {
     /// Zeng et al. (§6) a plane does not occlude itself. Rays that are sifted start lower: what is taken
     /// for something costs time only, and what lies below their start is overlooked.
     pub fn lift(self) -> f64 {
-        if matches!(self, Self::Sift(_)) { 0.75 } else { 1.5 }
+        if matches!(self, Self::Sift(_)) { 0.5 } else { 1.5 }
     }
 }
 

@@ -32,7 +32,8 @@ pub struct RomaBenchArgs {
     /// What to measure in this run, separated by commas: speed (times over resolutions and numbers of directions), ao (errors by
     /// scenes), resolution (errors by resolutions and numbers of directions), radius (errors by the length of rays), shadows (snapped and
     /// unsnapped rays to an area light), diffuse (light of the sun by one bounce, its errors without the sun's own), out-of-core (a cache of 15 %),
-    /// handover (maps and bricks together, out of core) [default: all]
+    /// handover (maps and bricks together, out of core), seams (errors by the distance from where larger cells take over), leaks (columns that pass through
+    /// single sheets) [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub stages: Vec<Stage>,
     /// Begin no job after so many minutes; the results hold what is measured until then [default: no limit]

@@ -5,9 +5,11 @@
 //! is a line of `rows.jsonl`, from which alone tables, plots and pages are made.
 
 pub mod args;
+mod leaks;
 mod output;
 mod plan;
 mod rows;
+mod seams;
 mod view;
 
 use super::cells::Header;
@@ -19,7 +21,7 @@ use crate::kernel::DeviceInfo;
 use anyhow::{Result, bail};
 use args::{RomaBenchArgs, Settings};
 use brickwalk_convert::progress::Progress;
-use plan::{Job, Way};
+use plan::{Job, Stage, Way};
 use rows::{Row, Rows};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -41,8 +43,10 @@ pub fn run(args: &RomaBenchArgs) -> Result<()> {
     let mut rows = Rows::open(&args.output, header(args, &settings)?)?;
     let deadline = args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
     let progress = Progress::new();
-    let planned: u64 = jobs.iter().map(|job| job.ways.len() as u64).sum();
-    progress.phase("measurements", planned);
+    let has_leaks = args.stages.is_empty() || args.stages.contains(&Stage::Leaks);
+    let leaks = if has_leaks { &LEAKS[..] } else { &[] };
+    let planned = jobs.iter().map(|job| job.ways.len()).sum::<usize>() + leaks.len();
+    progress.phase("measurements", planned as u64);
     let mut ended = "";
     for job in &jobs {
         let missing: Vec<&Way> = job.ways.iter().filter(|way| !rows.has(&job.key(way))).collect();
@@ -67,8 +71,15 @@ pub fn run(args: &RomaBenchArgs) -> Result<()> {
             }
         }
     }
+    for (name, is_raster) in leaks {
+        let key = leak_key(name);
+        if ended.is_empty() && !rows.has(&key) {
+            rows.push(Row { key, values: leak_values(*is_raster) })?;
+        }
+        progress.advance(1);
+    }
     progress.finish();
-    let text = output::write(&args.output, &settings, &rows, planned as usize)?;
+    let text = output::write(&args.output, &settings, &rows, planned)?;
     crate::app::print(&text)?;
     if ended.starts_with("Interrupted") {
         bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display());
@@ -94,6 +105,26 @@ fn header(args: &RomaBenchArgs, settings: &Settings) -> Result<Header> {
 }
 
 type Values = BTreeMap<String, f64>;
+
+/// How base maps are made whose leaks are measured, and whether that is by rasterising.
+const LEAKS: [(&str, bool); 2] = [("raster", true), ("conservative", false)];
+
+fn leak_key(name: &str) -> String {
+    format!("{}/{name}", Stage::Leaks.name())
+}
+
+/// Per cent of columns, by the width of maps and the number of look-ups.
+fn leak_values(is_raster: bool) -> Values {
+    let of = |(wide, values): (usize, [f64; 3])| {
+        leaks::SAMPLES.into_iter().zip(values).map(move |(samples, value)| (leak_name(wide, samples), value))
+    };
+    leaks::leaks(is_raster).into_iter().enumerate().flat_map(of).collect()
+}
+
+/// The name of the value of map width number `wide`.
+fn leak_name(wide: usize, samples: u32) -> String {
+    format!("wide {wide}, {samples} samples")
+}
 
 /// Everything that is measured of the ways of a job.
 fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings) -> Result<Vec<(Way, Values)>> {
@@ -127,6 +158,10 @@ fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings) -> Result<Vec<(
             }
             let converged: Picture = view.picture(way, settings.samples, 0)?;
             values.extend(view.errors("converged", &converged, &exact)?);
+            if job.stage == Stage::Seams {
+                values.extend(view.seams(&converged, &exact));
+                continue;
+            }
             let single = view.picture(way, 1, 0)?;
             values.extend(view.errors("single", &single, &exact)?);
         }

@@ -3,6 +3,7 @@
 use super::args::Settings;
 use super::plan::{FIELD, Job, Stage, USUAL, Way, jobs};
 use super::rows::{FORMAT, Rows};
+use super::{LEAKS, leak_key, leak_name, leaks, seams};
 use crate::app::output::atomic;
 use crate::app::sizes::human_count;
 use anyhow::Result;
@@ -42,7 +43,12 @@ pub fn write(folder: &Path, settings: &Settings, rows: &Rows, planned: usize) ->
         .into_iter()
         .filter_map(|stage| {
             let of_stage: Vec<&Job> = all.iter().filter(|job| job.stage == stage).collect();
-            let table = if stage == Stage::Speed { speed(&of_stage, rows) } else { errors(stage, &of_stage, rows) };
+            let table = match stage {
+                Stage::Speed => speed(&of_stage, rows),
+                Stage::Seams => seams_table(&of_stage, rows),
+                Stage::Leaks => leaks_table(rows),
+                _ => errors(stage, &of_stage, rows),
+            };
             (!table.rows.is_empty()).then_some((stage, table))
         })
         .collect();
@@ -107,6 +113,8 @@ fn title(stage: Stage) -> &'static str {
         Stage::Diffuse => "One-bounce diffuse light, figure 6",
         Stage::OutOfCore => "Out of core",
         Stage::Handover => "Maps and bricks together",
+        Stage::Seams => "Seams between maps",
+        Stage::Leaks => "Single sheets that leak",
     }
 }
 
@@ -289,6 +297,9 @@ fn plots(stage: Stage, all: &[Job], rows: &Rows) -> Vec<Graph> {
     if stage == Stage::Handover {
         return all.iter().filter(|job| job.stage == stage).filter_map(|job| error_over_time(job, rows)).collect();
     }
+    if stage == Stage::Seams {
+        return all.iter().filter(|job| job.stage == stage).filter_map(|job| error_over_distance(job, rows)).collect();
+    }
     if stage != Stage::Radius {
         return Vec::new();
     }
@@ -312,6 +323,77 @@ fn plots(stage: Stage, all: &[Job], rows: &Rows) -> Vec<Graph> {
             lines: vec![line(&USUAL), line(&FIELD), line(&Way::Exact)],
         },
     }]
+}
+
+/// Errors by the distance from a seam.
+fn seams_table(jobs: &[&Job], rows: &Rows) -> Table {
+    let columns = ["scene", "way", "cells from the seam, outward", "pixels", "bias, %", "error, %"];
+    let mut lines = Vec::new();
+    for job in jobs {
+        for way in job.ways.iter().filter(|way| **way != Way::Exact && rows.has(&job.key(way))) {
+            for bin in seams::bins() {
+                let value = |name: &str| rows.value(&job.key(way), &format!("{name} at {bin}"));
+                lines.push(vec![
+                    Value::Text(job.scene.name().into()),
+                    Value::Text(way.to_string()),
+                    Value::number(Some(bin.into())),
+                    Value::number(value("pixels")),
+                    Value::number(value("bias").map(|x| 100.0 * x)),
+                    Value::number(value("error").map(|x| 100.0 * x)),
+                ]);
+            }
+        }
+    }
+    let caption = "Occlusion of what is near a side of the cube of a map, beyond which cells are twice as large; cells are 128ths of that cube's side, \
+                   distances the middles of bins two cells wide. Differences from the exact picture and their magnitudes, relative to its mean there.";
+    Table { name: "seams".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: lines }
+}
+
+/// The magnitude of errors over the distance from a seam; `None` where nothing is measured.
+fn error_over_distance(job: &Job, rows: &Rows) -> Option<Graph> {
+    let line = |way: &Way| {
+        let point = |bin: i32| {
+            let error = rows.value(&job.key(way), &format!("error at {bin}"))?;
+            Some((f64::from(bin + seams::REACH), 100.0 * error))
+        };
+        (way.to_string(), seams::bins().filter_map(point).collect::<Vec<_>>())
+    };
+    let lines: Vec<_> = job.ways.iter().filter(|way| **way != Way::Exact).map(line).collect();
+    lines.iter().any(|(_, points)| !points.is_empty()).then(|| Graph {
+        title: format!("Error over the distance from a seam, {}", job.scene.name()),
+        reading: format!("Mean magnitude of differences from the exact picture, per cent, over cells from {} inside of a map to as many outside; its side is at {}.", seams::REACH, seams::REACH),
+        shape: GraphShape::Lines { across: "cells", unit: Unit::Percent, lines },
+    })
+}
+
+/// Shares of columns that pass through a plane, beside those measured before (spec §2).
+fn leaks_table(rows: &Rows) -> Table {
+    // Of one and four look-ups.
+    const BEFORE: [[[Option<f64>; 3]; 3]; 2] = [
+        [[Some(11.5), None, Some(2.7)], [Some(35.0), None, Some(6.3)], [None; 3]],
+        [[Some(0.0), None, None], [Some(8.4), Some(1.1), None], [None; 3]],
+    ];
+    let widths = ["the base map", "its diagonal", "the diagonal of twice as many cells"];
+    let columns = ["base map", "turned map as wide as", "look-ups a texel", "leaks, %", "leaks before, %"];
+    let mut lines = Vec::new();
+    for ((name, _), before) in LEAKS.iter().zip(BEFORE) {
+        for (wide, width) in widths.iter().enumerate() {
+            for (k, samples) in leaks::SAMPLES.into_iter().enumerate() {
+                if let Some(value) = rows.value(&leak_key(name), &leak_name(wide, samples)) {
+                    lines.push(vec![
+                        Value::Text((*name).into()),
+                        Value::Text((*width).into()),
+                        Value::number(Some(samples.into())),
+                        Value::number(Some(value)),
+                        Value::number(before[wide][k]),
+                    ]);
+                }
+            }
+        }
+    }
+    let caption = "Columns of turned maps that cross a random plane without a set bit: of the paper's base maps, rasterised from three sides, and of conservative \
+                   ones. Rays of ao have the last width with two look-ups, all others with four.";
+    Table { name: "leaks".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: lines }
 }
 
 /// FLIP of converged pictures over the time of the effect, by the ways of a job; `None` where nothing is measured.

@@ -23,11 +23,15 @@ pub enum Stage {
     OutOfCore,
     /// Rays that maps and bricks answer together, out of core.
     Handover,
+    /// Errors by the distance from where maps with larger cells take over.
+    Seams,
+    /// How often columns pass through single sheets, by how base maps are made and looked up (spec §2).
+    Leaks,
 }
 
 impl Stage {
     /// All of them, in their order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Speed,
         Self::Ao,
         Self::Resolution,
@@ -36,6 +40,8 @@ impl Stage {
         Self::Diffuse,
         Self::OutOfCore,
         Self::Handover,
+        Self::Seams,
+        Self::Leaks,
     ];
 
     /// Its name on the command line.
@@ -49,6 +55,8 @@ impl Stage {
             Self::Diffuse => "diffuse",
             Self::OutOfCore => "out-of-core",
             Self::Handover => "handover",
+            Self::Seams => "seams",
+            Self::Leaks => "leaks",
         }
     }
 }
@@ -264,6 +272,11 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         let options = own.options.replace("--ao-rays 1", "--ao-rays 16");
         jobs.push(Job { cache: 15, times: true, options, ..own });
     }
+    for scene in [SceneId::City, SceneId::Pipes] {
+        let own = job(Stage::Seams, scene, format!("rays of {length}"), length, with_exact(&[USUAL, FIELD]));
+        let options = format!("{} --aov", own.options);
+        jobs.push(Job { options, ..own });
+    }
     jobs
 }
 
@@ -289,7 +302,8 @@ mod tests {
             keys.sort();
             keys.dedup();
             assert_eq!(keys.len(), count);
-            assert!(Stage::ALL.iter().all(|stage| jobs.iter().any(|job| job.stage == *stage)));
+            let has_jobs = |stage: &Stage| jobs.iter().any(|job| job.stage == *stage);
+            assert!(Stage::ALL.iter().all(|stage| has_jobs(stage) != (*stage == Stage::Leaks)), "leaks need no scene");
             assert!(jobs.iter().all(|job| job.ways.contains(&Way::Exact)), "all are compared with exact rays");
             // Beside every array of maps is the field of as many cells, where it answers such rays and bricks do not matter.
             let with_fields =

@@ -2,6 +2,7 @@
 
 use super::args::Settings;
 use super::plan::{Job, Way};
+use super::seams;
 use crate::app::bench::measure::walk_args;
 use crate::app::bench::plan::View as Path;
 use crate::app::bench::scenes::Place;
@@ -35,6 +36,8 @@ pub struct View<'a> {
 /// A picture and what its pass took.
 pub struct Picture {
     image: Image,
+    /// Distances along the rays through the middles of pixels, world units; of jobs that ask for them.
+    depth: Vec<f32>,
     /// Of the pass, by name.
     pub values: BTreeMap<String, f64>,
 }
@@ -60,14 +63,14 @@ impl<'a> View<'a> {
     /// # Errors
     /// A brick that cannot be read, the device's, pixels that are not finite.
     pub fn picture(&mut self, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
-        let Picture { mut image, values } = self.whole(&self.job.options, way, samples, seed)?;
+        let Picture { mut image, depth, values } = self.whole(&self.job.options, way, samples, seed)?;
         if !self.job.without.is_empty() && self.job.errors {
             let without = self.whole(&self.job.without, way, samples, seed)?.image;
             for (with, without) in image.rgb.as_flattened_mut().iter_mut().zip(without.rgb.as_flattened()) {
                 *with -= without;
             }
         }
-        Ok(Picture { image, values })
+        Ok(Picture { image, depth, values })
     }
 
     /// A picture of all that `options` ask for.
@@ -116,7 +119,25 @@ impl<'a> View<'a> {
         ];
         let (width, height) = (renderer.size.0 as usize, renderer.size.1 as usize);
         let image = Image { width, height, rgb: output.pixels.radiance };
-        Ok(Picture { image, values: values.map(|(name, value)| (name.to_string(), value)).into() })
+        let depth = output.pixels.depth;
+        Ok(Picture { image, depth, values: values.map(|(name, value)| (name.to_string(), value)).into() })
+    }
+
+    /// Errors by the distance from sides of the base maps that a picture was made with: its own, and its pixels, by bins.
+    pub fn seams(&self, one: &Picture, reference: &Picture) -> Vec<(String, f64)> {
+        let (width, height) = self.renderer.size;
+        let basis = self.camera.ray_basis(width, height);
+        let point = |(i, &depth): (usize, &f32)| {
+            let [x, y] = [i as u32 % width, i as u32 / width].map(|x| f64::from(x) + 0.5);
+            let along = basis.direction(x, y).normalize();
+            depth.is_finite().then(|| (self.camera.position + along * f64::from(depth)).to_array())
+        };
+        let points: Vec<Option<[f64; 3]>> = one.depth.iter().enumerate().map(point).collect();
+        let found = seams::errors(self.renderer.roma.levels(), &points, &one.image, &reference.image);
+        let values = |(bin, (count, bias, size)): (i32, (u64, f64, f64))| {
+            [("pixels", count as f64), ("bias", bias), ("error", size)].map(|(name, x)| (format!("{name} at {bin}"), x))
+        };
+        found.into_iter().flat_map(values).collect()
     }
 
     /// Errors of a picture against another, named after what it is.
