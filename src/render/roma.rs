@@ -17,8 +17,12 @@ pub struct Roma {
     assembler: Option<(u32, Assembler)>,
     cascades: Arc<Cascades>,
     view: Option<RomaView>,
-    /// Whether the base maps are those of the present camera.
+    /// Whether the base maps are those of the present camera and of where instances are.
     is_assembled: bool,
+    /// The finest cells that the base maps were to have.
+    finest_log2: Option<i32>,
+    /// Whether instances have moved since.
+    has_moved: bool,
     /// The ray-aligned maps that the executor has of the present sample.
     made: Option<(Grid, Role, usize)>,
 }
@@ -48,6 +52,12 @@ impl Roma {
         self.is_assembled &= self.view.as_ref().is_some_and(|before| before.camera == camera);
         self.view = Some(RomaView { frame: view.frame, camera, sample: view.params.sample, seed: view.params.seed });
         self.made = None;
+    }
+
+    /// Notes that instances have moved: maps are made anew where these were and are.
+    pub fn scene_has_moved(&mut self) {
+        self.is_assembled = false;
+        self.has_moved = true;
     }
 
     /// How the rays of `pass` are answered; `None` where they are traced.
@@ -113,11 +123,15 @@ impl Roma {
     pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32) -> Result<&Arc<Cascades>, ExecutorError> {
         let Some(RomaView { camera, .. }) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
+        // Scales may have changed.
+        let is_as_fine = !self.has_moved || usual_cell_log2(scene.resident()) == self.finest_log2;
+        self.has_moved = false;
         let (cells, mut assembler) = match self.assembler.take() {
-            Some((cells, assembler)) if cells == size => (cells, assembler),
+            Some((cells, assembler)) if cells == size && is_as_fine => (cells, assembler),
             _ => {
                 self.is_assembled = false;
                 let finest_log2 = usual_cell_log2(scene.resident());
+                self.finest_log2 = finest_log2;
                 let settings = Settings { cells: size, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
                 (size, Assembler::new(scene.clone(), settings).map_err(failed)?)
             }
