@@ -1,7 +1,7 @@
 //! The motion of a walk: instances of the scene placed anew for every frame.
 
 use super::lighting::LampSources;
-use crate::render::{Light, Renderer};
+use crate::render::Renderer;
 use crate::scene::motion::{Motion, Movers};
 use anyhow::{Context, Result};
 use bricks::SceneFile;
@@ -36,7 +36,7 @@ impl WalkMotion {
         let context = || format!("{}: at time {time}", self.file.display());
         let moved = renderer.place(&self.still, &self.movers.at(time)).with_context(context)?;
         if let Some(lamps) = self.lamps.moved(&renderer.light.lamps, renderer.scene.resident(), &moved) {
-            renderer.light = Light { lamps: Arc::new(lamps), ..renderer.light.clone() };
+            renderer.light.lamps = Arc::new(lamps);
         }
         Ok(!moved.is_empty())
     }

@@ -237,7 +237,7 @@ mod tests {
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         let unknown = |words: [&str; 6]| Cli::try_parse_from(words).unwrap_err().to_string();
-        assert!(unknown(["brickwalk", "scene", "stif", "-o", "s.glb", "--fast"]).contains("stadium, stiff"));
+        assert!(unknown(["brickwalk", "scene", "stif", "-o", "s.glb", "--fast"]).contains("cornell, stiff"));
         assert!(unknown(["brickwalk", "scene", "stiff", "-o", "s.glb", "--case=luck"]).contains("slivers"));
     }
 

@@ -322,8 +322,13 @@ fn render(
     };
     let path = path_from_bounds(manifest.min, manifest.max);
     for frame in 0..2 {
-        // The second frame scatters directions.
+        // The second frame scatters directions, and an instance has moved.
         renderer.settings.guides = frame == 1;
+        if let Some(instance) = scene.resident().instances.get(1).filter(|_| frame == 1) {
+            let mut matrix = instance.world_from_object;
+            matrix[3] += 0.1 * (manifest.max[0] - manifest.min[0]);
+            assert_eq!(renderer.place(scene, &[(1, matrix)]), Ok(vec![1]));
+        }
         renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
     }
 }
