@@ -9,8 +9,11 @@ use std::collections::BTreeMap;
 
 /// A floor, a thing on it, and a small one below the node "group"; the thing is where `matrix` says.
 fn source(thing: [f64; 12]) -> SourceScene {
-    let meshes =
-        vec![mesh("floor", vec![sheet(20, 50.0)]), mesh("thing", vec![sheet(12, 2.0)]), mesh("small", vec![sheet(2, 1.0)])];
+    let meshes = vec![
+        mesh("floor", vec![sheet(20, 50.0)]),
+        mesh("thing", vec![sheet(12, 2.0)]),
+        mesh("small", vec![sheet(2, 1.0)]),
+    ];
     let mut placements = vec![
         placement("floor", 0, IDENTITY),
         placement("thing", 1, thing),
@@ -37,7 +40,11 @@ fn built(source: SourceScene, movable: &[&str]) -> Result<Resident, BuildError> 
 fn named_nodes_and_those_below_are_instances_and_ids_stay() {
     let all = built(source(turned()), &[]).unwrap();
     assert_eq!((all.objects.len(), all.instances.len(), all.manifest.movable.len()), (1, 1, 0));
-    for (movable, names) in [(vec!["thing"], vec!["thing"]), (vec!["th?ng", "group"], vec!["thing", "lamp"]), (vec!["*"], vec!["floor", "thing", "lamp"])] {
+    for (movable, names) in [
+        (vec!["thing"], vec!["thing"]),
+        (vec!["th?ng", "group"], vec!["thing", "lamp"]),
+        (vec!["*"], vec!["floor", "thing", "lamp"]),
+    ] {
         let kept = built(source(turned()), &movable).unwrap();
         assert_eq!((kept.objects.len(), kept.instances.len()), (1 + names.len(), 1 + names.len()), "{movable:?}");
         assert_eq!(kept.manifest.movable, movable);
