@@ -399,9 +399,9 @@ fn strength(material: &bricks::Material) -> f32 {
 
 /// What the materials need beyond glTF's own.
 fn extensions_used(materials: &[bricks::Material]) -> Vec<&'static str> {
-    let tests: [(&str, fn(&bricks::Material) -> bool); 2] =
-        [(SPECULAR, is_without_highlight), (STRENGTH, |material| strength(material) > 1.0)];
-    tests.into_iter().filter(|(_, is_needed)| materials.iter().any(is_needed)).map(|(name, _)| name).collect()
+    let without_highlight = materials.iter().any(is_without_highlight).then_some(SPECULAR);
+    let strong = materials.iter().any(|material| strength(material) > 1.0).then_some(STRENGTH);
+    without_highlight.into_iter().chain(strong).collect()
 }
 
 /// The factors of a material.

@@ -17,7 +17,7 @@ fn source(thing: [f64; 12]) -> SourceScene {
     let mut placements = vec![
         placement("floor", 0, IDENTITY),
         placement("thing", 1, thing),
-        placement("lamp", 2, matrix(rotation(0.4, [0.0, 1.0, 0.0]), [2.0, 3.0, 4.0])),
+        placement("lamp", 2, matrix(rotation(0.4, [1.0; 3]), [2.0, 3.0, 4.0])),
     ];
     placements[2].under = vec!["group".into()];
     scene(meshes, placements)
@@ -81,8 +81,8 @@ fn boxes(resident: &Resident) -> BTreeMap<(u32, u32), [[i64; 3]; 2]> {
 fn places_give_the_boxes_of_a_conversion_there_and_return() {
     let still = built(source(turned()), &["thing", "lamp"]).unwrap();
     let places = [
-        matrix(rotation(2.0, [-1.0, 0.3, 0.2]), [-20.0, 5.0, 1.0 / 3.0]),
-        matrix(rotation(0.1, [0.0, 1.0, 0.2]), [30.0, 7.0, 20.0]).map(|x| 1.25 * x),
+        matrix(rotation(2.0, [-1.0, 0.5, 0.75]), [-20.0, 5.0, 1.0 / 3.0]),
+        matrix(rotation(0.1, [1.0, 1.5, 0.5]), [30.0, 7.0, 20.0]).map(|x| 1.25 * x),
     ];
     let mut moved = still.clone();
     for place in places {
@@ -105,7 +105,7 @@ fn places_give_the_boxes_of_a_conversion_there_and_return() {
 fn places_that_cannot_be_are_refused_and_change_nothing() {
     let still = built(source(turned()), &["thing"]).unwrap();
     let mut moved = still.clone();
-    let far = |x: f64| matrix(rotation(0.0, [0.0, 1.0, 0.0]), [x, 0.0, 0.0]);
+    let far = |x: f64| matrix(rotation(0.0, [1.0; 3]), [x, 0.0, 0.0]);
     for (instance, place, says) in [
         (0, turned(), "instance 0"),
         (2, turned(), "instance 2"),
