@@ -55,7 +55,8 @@ fn seen_as(textures: TextureEncoding, sheet: &Sheet, x: f64, from_below: bool, o
         indices: vec![0, 1, 2, 0, 2, 3],
         ..Primitive::default()
     };
-    let place = |&world_from_mesh| Placement { name: "p".into(), mesh: 0, source: 0, world_from_mesh };
+    let place =
+        |&world_from_mesh| Placement { name: "p".into(), mesh: 0, source: 0, world_from_mesh, ..Placement::default() };
     let source = SourceScene {
         meshes: vec![Mesh { name: "sheet".into(), primitives: vec![primitive] }],
         placements: sheet.places.iter().map(place).collect(),

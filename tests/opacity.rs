@@ -39,7 +39,13 @@ fn sheets(folder: &Path, materials: &[Alpha]) -> PathBuf {
     };
     let source = SourceScene {
         meshes: vec![Mesh { name: "sheets".into(), primitives: (0..materials.len() as u32).map(sheet).collect() }],
-        placements: vec![Placement { name: "n".into(), mesh: 0, source: 0, world_from_mesh: IDENTITY }],
+        placements: vec![Placement {
+            name: "n".into(),
+            mesh: 0,
+            source: 0,
+            world_from_mesh: IDENTITY,
+            ..Placement::default()
+        }],
         materials: materials.iter().map(material).collect(),
         textures: vec![SourceTexture {
             name: "fade".into(),

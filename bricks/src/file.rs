@@ -6,6 +6,7 @@ use crate::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, MAGIC, PAGE_BYTES, 
 use crate::layout::{MAX_PAYLOAD_BYTES, unread_kind};
 use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
+use crate::place::PlaceError;
 use crate::records::{AttributeLayout, Brick, Span};
 use crate::resident::Resident;
 use crate::source::{MapSource, ReadSource, Source};
@@ -37,13 +38,13 @@ pub enum Access {
 pub struct SceneFile {
     path: PathBuf,
     /// What the file is read by on opening and by [`Self::verify`]: never a map.
-    file: Box<dyn Source>,
+    file: Arc<dyn Source>,
     /// What payloads are copied from.
-    source: Box<dyn Source>,
+    source: Arc<dyn Source>,
     file_bytes: u64,
     resident_bytes: u64,
     resident: Resident,
-    validated: Validated,
+    validated: Arc<Validated>,
 }
 
 impl SceneFile {
@@ -52,38 +53,38 @@ impl SceneFile {
     /// Reads and checks the header, the directory and the resident part, and nothing else.
     pub fn open(path: impl AsRef<Path>) -> Result<SceneFile, Error> {
         let (path, file) = open_file(path.as_ref())?;
-        let source: Box<dyn Source> = match MapSource::new(duplicate(&path, &file)?) {
-            Ok(map) => Box::new(map),
-            Err(_) => Box::new(ReadSource::new(duplicate(&path, &file)?)),
+        let source: Arc<dyn Source> = match MapSource::new(duplicate(&path, &file)?) {
+            Ok(map) => Arc::new(map),
+            Err(_) => Arc::new(ReadSource::new(duplicate(&path, &file)?)),
         };
-        Self::load(path, Box::new(ReadSource::new(file)), source)
+        Self::load(path, Arc::new(ReadSource::new(file)), source)
     }
 
     /// Opens a scene file with the given access; as [`Self::open`], but a map that fails is an error.
     pub fn open_with(path: impl AsRef<Path>, access: Access) -> Result<SceneFile, Error> {
         let (path, file) = open_file(path.as_ref())?;
         let duplicate = duplicate(&path, &file)?;
-        let source: Box<dyn Source> = match access {
-            Access::Map => Box::new(MapSource::new(duplicate).map_err(|source| Error::Io {
+        let source: Arc<dyn Source> = match access {
+            Access::Map => Arc::new(MapSource::new(duplicate).map_err(|source| Error::Io {
                 path: path.clone(),
                 action: "map the file into memory; open it with positional reads".to_owned(),
                 part: None,
                 source,
             })?),
-            Access::Read => Box::new(ReadSource::new(duplicate)),
+            Access::Read => Arc::new(ReadSource::new(duplicate)),
         };
-        Self::load(path, Box::new(ReadSource::new(file)), source)
+        Self::load(path, Arc::new(ReadSource::new(file)), source)
     }
 
     /// Opens a scene file that is part of the program, or otherwise in memory; `name` stands for its path in messages. As
     /// [`Self::open`].
     pub fn from_bytes(name: impl Into<PathBuf>, bytes: impl Into<Cow<'static, [u8]>>) -> Result<SceneFile, Error> {
-        let bytes = Arc::new(bytes.into());
-        Self::load(name.into(), Box::new(bytes.clone()), Box::new(bytes))
+        let bytes: Arc<dyn Source> = Arc::new(Arc::new(bytes.into()));
+        Self::load(name.into(), bytes.clone(), bytes)
     }
 
     /// Reads the resident part. It comes by positional reads, so that a failing disk is an error here, not a signal.
-    fn load(path: PathBuf, file: Box<dyn Source>, source: Box<dyn Source>) -> Result<SceneFile, Error> {
+    fn load(path: PathBuf, file: Arc<dyn Source>, source: Arc<dyn Source>) -> Result<SceneFile, Error> {
         let reader = Reader { path: &path, source: &*file };
         let header = reader.header(length_of(&path, &*file)?)?;
         let directory = reader.directory(&header)?;
@@ -105,8 +106,30 @@ impl SceneFile {
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;
         validate::spans(&resident, header.directory_offset).map_err(|flaw| reader.invalid(flaw))?;
         let resident_bytes = header.directory_bytes + directory.iter().map(|entry| entry.bytes).sum::<u64>();
-        let validated = Validated::none(&resident);
+        let validated = Arc::new(Validated::none(&resident));
         Ok(SceneFile { path, file, source, file_bytes: header.file_bytes, resident_bytes, resident, validated })
+    }
+
+    /// The same scene once more, to be placed otherwise: it reads the same file, and has a resident part of its own.
+    pub fn duplicate(&self) -> SceneFile {
+        let Self { path, file, source, file_bytes, resident_bytes, resident, validated } = self;
+        SceneFile {
+            path: path.clone(),
+            file: file.clone(),
+            source: source.clone(),
+            file_bytes: *file_bytes,
+            resident_bytes: *resident_bytes,
+            resident: resident.clone(),
+            validated: validated.clone(),
+        }
+    }
+
+    /// Moves instances, in memory alone: [`Resident::place`].
+    ///
+    /// # Errors
+    /// As of [`Resident::place`].
+    pub fn place(&mut self, places: &[(u32, [f64; 12])]) -> Result<(), PlaceError> {
+        self.resident.place(places)
     }
 
     /// The resident part; it satisfies [`validate::resident`].

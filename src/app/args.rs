@@ -119,6 +119,10 @@ pub struct ConvertArgs {
     /// How textures are stored: bc7 (blocks, a byte a texel, of BC5 for normals, the loss measured in benches/results/textures.md) or raw (RGBA8, four bytes)
     #[arg(long, value_name = "ENCODING", value_enum, default_value = "bc7")]
     pub textures: Textures,
+    /// Keep the meshes of the nodes called NAME, and of those below them, as instances of their own, so that walk --motion can move them; * stands
+    /// for any characters, ? for one. Give it once for each name [default: none; meshes that are used once are baked into the world]
+    #[arg(long, value_name = "NAME")]
+    pub movable: Vec<String>,
     /// What becomes of triangles and meshes.
     #[command(flatten)]
     pub mesh: MeshArgs,
@@ -200,7 +204,8 @@ pub struct WorkArgs {
 #[command(after_help = scene_help())]
 pub struct SceneArgs {
     /// What to generate: city (blocks of houses along streets), pipes (a plant in an open frame of steel), terrain
-    /// (mountains, woods and meadows around a pond), stadium (an ornate teapot in a stadium), stiff (a small scene that is hard for
+    /// (mountains, woods and meadows around a pond), stadium (an ornate teapot in a stadium), cornell (a Cornell box, open in front, in which a
+    /// box orbits: S.motion.json, for walk --motion, is written as well), stiff (a small scene that is hard for
     /// arithmetic or for builders, see --case)
     #[arg(value_name = "KIND")]
     pub kind: SceneKind,
@@ -211,7 +216,7 @@ pub struct SceneArgs {
     /// paths, are written beside it, for stiff scenes the latter alone
     #[arg(short, long, value_name = "S.bricks")]
     pub output: PathBuf,
-    /// Triangles of the scene with its instances, about; up to 150M, of stiff scenes up to 10M [default: 1M; of stiff scenes as
+    /// Triangles of the scene with its instances, about; up to 150M, of cornell and stiff scenes up to 10M [default: 1M; of stiff scenes as
     /// listed below]
     #[arg(long, value_name = "COUNT", value_parser = positive_count)]
     pub triangles: Option<u64>,
@@ -246,6 +251,10 @@ pub struct InfoArgs {
     /// Say which file, node, mesh, primitive and triangle the triangle with this id comes from
     #[arg(long, value_name = "N")]
     pub id: Option<u32>,
+    /// List the instances, which walk --motion can move: number, node, nodes above it that convert --movable named, mesh, triangles, bounds in world
+    /// units
+    #[arg(long, conflicts_with_all = ["id", "deep"])]
+    pub instances: bool,
 }
 
 /// Options of `verify`.
@@ -348,6 +357,14 @@ pub struct WalkArgs {
     /// Camera path (JSON) [default: one made from the scene's bounds]
     #[arg(long, value_name = "P.json")]
     pub path: Option<PathBuf>,
+    /// Motion of instances (JSON): {"instances": [{"node": NAME or "instance": N, "pivot": [x,y,z], "keyframes": [{"time": T, "translation":
+    /// [x,y,z], "rotation": [x,y,z,w], "scale": S}, ...]}]}, in world units and in the time of the camera path. A motion is applied to where the
+    /// scene has the instance: it turns and scales about the pivot, by default the middle of what it moves, and then goes by the translation, so that no
+    /// translation, rotation 0,0,0,1 and scale 1 (1e-6 to 1e6), the defaults, leave it there. Translations lie on a Catmull-Rom spline, rotations turn the
+    /// shorter way, and before the first keyframe and after the last it rests. What moves is an instance: see info --instances and convert
+    /// --movable [default: nothing moves]
+    #[arg(long, value_name = "M.json")]
+    pub motion: Option<PathBuf>,
     /// Frames along the path
     #[arg(long, value_name = "N", default_value = "30", value_parser = frames)]
     pub frames: u32,

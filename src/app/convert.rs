@@ -25,9 +25,13 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let threads = args.build.work.threads.map(|n| n as usize);
     let beside = || args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
     let scratch = args.build.work.scratch.clone().or_else(beside);
-    let source = import(&inputs, &ImportSettings { threads, scratch }, &progress)?;
-    let settings =
-        BuildSettings { textures: args.textures.into(), ..mesh_settings(&args.mesh, build_settings(&args.build)) };
+    let movable = args.movable.clone();
+    let source = import(&inputs, &ImportSettings { threads, scratch, movable: movable.clone() }, &progress)?;
+    let settings = BuildSettings {
+        textures: args.textures.into(),
+        movable,
+        ..mesh_settings(&args.mesh, build_settings(&args.build))
+    };
     let summary = usage(build_source(&source, &settings, &args.output, &progress))?;
     progress.finish();
     summarise(&args.output, &summary, start)

@@ -1,6 +1,7 @@
 //! `info`: what a `.bricks` file holds, and where a triangle comes from.
 
 use super::args::InfoArgs;
+use super::instances;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
 use super::session::scene_bytes;
 use super::sizes::{human_bytes, human_count};
@@ -26,6 +27,10 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     if let Some(id) = args.id {
         let origin = origin(&scene, id)?;
         return if args.json { super::print_json(&origin) } else { super::print(&origin.human()) };
+    }
+    if args.instances {
+        let rows = instances::rows(scene.resident());
+        return if args.json { super::print_json(&rows) } else { super::print(&instances::human(&rows)) };
     }
     let info = Info::of(&scene, args.deep)?;
     if args.json { super::print_json(&info) } else { super::print(&info.human()) }
@@ -120,6 +125,8 @@ struct Info<'a> {
     has_wide_bricks: bool,
     has_proxies: bool,
     provenance_ranges: usize,
+    /// Names of nodes whose meshes were kept as instances, as the conversion was asked.
+    movable: &'a [String],
     /// Lights without extent.
     lights: Vec<Light>,
     left_out: Vec<LeftOut>,
@@ -198,6 +205,7 @@ impl<'a> Info<'a> {
             has_wide_bricks: m.has_wide_bricks,
             has_proxies: m.has_proxies,
             provenance_ranges: m.provenance.len(),
+            movable: &m.movable,
             lights: r.lights.iter().map(Light::of).collect(),
             left_out: left_out(m),
             warnings: &m.warnings,
@@ -423,6 +431,7 @@ mod tests {
             node: node.into(),
             mesh: "mesh".into(),
             primitive: first_id,
+            under: Vec::new(),
         };
         Manifest {
             sources: vec![Source { name: "a.gltf".into(), bytes: 5, hash: "00".into() }],

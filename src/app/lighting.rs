@@ -5,10 +5,11 @@ use super::light_args::EnvironmentChoice;
 use crate::kernel::Lamps;
 use crate::kernel::lamps::{Emitter, Shape};
 use crate::render::{
-    EnvironmentNotes, Equirectangular, Light, MOST_TRIANGLES, SkyModel, emissive_triangles, environment,
+    EnvironmentNotes, Equirectangular, Light, MOST_TRIANGLES, ShiningTriangles, SkyModel, emissive_triangles,
+    environment,
 };
 use anyhow::{Context, Result, anyhow, bail};
-use bricks::{LIGHT_DISTANT, LIGHT_SPOT, PunctualLight, SceneFile};
+use bricks::{LIGHT_DISTANT, LIGHT_SPOT, PunctualLight, Resident, SceneFile};
 use exr::prelude::{MetaData, ReadChannels, ReadLayers};
 use glam::DVec3;
 use image::ImageDecoder;
@@ -29,10 +30,42 @@ const SKY_SIZE: (u32, u32) = (1024, 512);
 pub struct Lighting {
     /// Sun, sky and lamps.
     pub light: Light,
+    /// What the emitters among the lamps are made of.
+    pub sources: LampSources,
     /// What became of the environment's image; `None` without an environment.
     pub environment: Option<EnvironmentNotes>,
     /// What a person should know, a line each.
     pub warnings: Vec<String>,
+}
+
+/// What emitters are made of.
+#[derive(Clone, Debug, Default)]
+pub struct LampSources {
+    /// Those that stay where they are.
+    fixed: Vec<Emitter>,
+    /// Those that instances take along.
+    shining: ShiningTriangles,
+}
+
+impl LampSources {
+    /// The lamps of a scene whose instances have moved, those named; `None`: the same as before.
+    pub fn moved(&self, before: &Lamps, resident: &Resident, moved: &[u32]) -> Option<Lamps> {
+        let shines = |&instance: &u32| self.shining.shines(resident.instances[instance as usize].object);
+        // What distant lights send depends on the scene's size.
+        let is_distant = |emitter: &Emitter| matches!(emitter.shape, Shape::Distant { .. });
+        let is_same = !moved.iter().any(shines) && !self.fixed.iter().any(is_distant);
+        (!is_same).then(|| Lamps::new(before.environment.clone(), self.emitters(resident), radius(resident)))
+    }
+
+    fn emitters(&self, resident: &Resident) -> Vec<Emitter> {
+        self.fixed.iter().copied().chain(self.shining.emitters(resident)).collect()
+    }
+}
+
+/// Half the diagonal of a scene's bounds, world units.
+fn radius(resident: &Resident) -> f64 {
+    let manifest = &resident.manifest;
+    0.5 * (DVec3::from_array(manifest.max) - DVec3::from_array(manifest.min)).length()
 }
 
 /// The light that the options of a walk through `file` ask for.
@@ -78,12 +111,13 @@ pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
             warnings.push(format!("{choice}: scaling it down changed its power by {:e}", notes.energy_change));
         }
     }
-    let mut emitters: Vec<Emitter> = options.rectangle().into_iter().collect();
-    emitters.extend(file.resident().lights.iter().map(|light| punctual(light, options.lights_intensity)));
+    let mut sources = LampSources::default();
+    sources.fixed.extend(options.rectangle());
+    sources.fixed.extend(file.resident().lights.iter().map(|light| punctual(light, options.lights_intensity)));
     if effects.shadow {
         let found = emissive_triangles(file, MOST_TRIANGLES).with_context(|| args.scene.display().to_string())?;
         match found {
-            Ok(triangles) => emitters.extend(triangles),
+            Ok(triangles) => sources.shining = triangles,
             Err(count) => warnings.push(format!(
                 "{}: {count} triangles emit light, of which at most {MOST_TRIANGLES} can be lamps; their light comes by --effects \
                  diffuse alone",
@@ -96,10 +130,9 @@ pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
             "--effects ao adds nothing beside environment, whose light has its own shadows: it is left out".into(),
         );
     }
-    let manifest = &file.resident().manifest;
-    let radius = 0.5 * (DVec3::from_array(manifest.max) - DVec3::from_array(manifest.min)).length();
-    light.lamps = Arc::new(Lamps::new(environment, emitters, radius));
-    Ok(Lighting { light, environment: notes, warnings })
+    let resident = file.resident();
+    light.lamps = Arc::new(Lamps::new(environment, sources.emitters(resident), radius(resident)));
+    Ok(Lighting { light, sources, environment: notes, warnings })
 }
 
 /// A light of the scene file, `scale` times as bright. Photometric units are taken as radiometric ones: 1 candela as 1 W/sr, 1 lux as

@@ -108,6 +108,7 @@ fn rebuild(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Prog
         brick_triangles: manifest.brick_triangles,
         lattice_log2: args.work.lattice.or_else(of_case),
         proxies: manifest.has_proxies,
+        movable: manifest.movable.clone(),
         textures: match scene.resident().textures.first() {
             Some(texture) if texture.encoding == bricks::TEXTURE_RGBA8 => TextureEncoding::Raw,
             _ => TextureEncoding::Bc7,
@@ -130,7 +131,8 @@ fn rebuild(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Prog
 fn source(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Progress) -> Result<Box<dyn Source>> {
     if !args.inputs.inputs.is_empty() {
         let threads = args.work.threads.map(|n| n as usize);
-        let settings = ImportSettings { threads, scratch: Some(scratch.to_owned()) };
+        let movable = scene.resident().manifest.movable.clone();
+        let settings = ImportSettings { threads, scratch: Some(scratch.to_owned()), movable };
         return Ok(Box::new(import(&expand(&args.inputs.inputs)?, &settings, progress)?));
     }
     if let Some((kind, n, seed)) = stiff_scene(&scene.resident().manifest) {

@@ -11,7 +11,8 @@ use brickwalk_convert::build::{BuildSettings, BuildSummary, build_source};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{InMemory, Source};
 use brickwalk_scenes::{
-    Error, GltfForm, Kind, Settings, Stiff, far_path, generate, stiff, write_far_path, write_gltf, write_paths,
+    Error, GltfForm, Kind, Settings, Stiff, far_path, generate, stiff, write_far_path, write_gltf, write_motion,
+    write_paths,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -42,7 +43,8 @@ pub fn run(args: &SceneArgs) -> Result<()> {
         ))?,
     }
     for path in paths {
-        super::print(&format!("{}: a camera path\n", path.display()))?;
+        let is_motion = path.to_string_lossy().ends_with(".motion.json");
+        super::print(&format!("{}: {}\n", path.display(), if is_motion { "a motion" } else { "a camera path" }))?;
     }
     Ok(())
 }
@@ -64,8 +66,12 @@ fn generated(args: &SceneArgs, kind: Kind, progress: &Progress) -> Result<(Vec<P
         Error::Triangles { .. } => Usage(format!("--triangles: {error}")).into(),
         error => anyhow::Error::new(error),
     })?;
-    let summary = write(&scene, &args.output, &build_settings(&args.build), progress)?;
-    Ok((write_paths(&scene, &args.output)?, summary))
+    let movable = kind.movable().iter().map(|&name| name.to_owned()).collect();
+    let settings = BuildSettings { movable, ..build_settings(&args.build) };
+    let summary = write(&scene, &args.output, &settings, progress)?;
+    let mut paths = write_paths(&scene, &args.output)?;
+    paths.extend(write_motion(&scene, &args.output)?);
+    Ok((paths, summary))
 }
 
 /// Writes a stiff scene and its path.
@@ -231,7 +237,7 @@ mod tests {
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         let unknown = |words: [&str; 6]| Cli::try_parse_from(words).unwrap_err().to_string();
-        assert!(unknown(["brickwalk", "scene", "stif", "-o", "s.glb", "--fast"]).contains("stadium, stiff"));
+        assert!(unknown(["brickwalk", "scene", "stif", "-o", "s.glb", "--fast"]).contains("cornell, stiff"));
         assert!(unknown(["brickwalk", "scene", "stiff", "-o", "s.glb", "--case=luck"]).contains("slivers"));
     }
 

@@ -42,6 +42,7 @@ pub fn of_walk(
             "tile_bytes": tile_bytes,
             "leaves": resident.leaves.len(),
             "triangles": manifest.triangles_instanced,
+            "motion": args.motion.as_ref().map(|file| file.file_name().map(|name| name.to_string_lossy())),
         },
         "settings": {
             "frames": args.frames,

@@ -3,6 +3,7 @@
 use super::args::{Secondary, WalkArgs};
 use super::left_out;
 use super::lighting::lighting;
+use super::motion::WalkMotion;
 use super::output::atomic;
 use super::pictures::Pictures;
 use super::session::{Session, open_scene, write_requests};
@@ -10,7 +11,8 @@ use super::summary;
 use crate::kernel::Extent;
 use crate::render::denoise::Resolve;
 use crate::render::{
-    Accumulation, BATCH_SAMPLES, Captures, Field, Light, RenderError, RenderSettings, Renderer, Roma, Rsm, Schedule,
+    Accumulation, BATCH_SAMPLES, Captures, Field, Light, Moved, RenderError, RenderSettings, Renderer, Roma, Rsm,
+    Schedule,
 };
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
@@ -52,6 +54,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     for warning in &lighting.warnings {
         let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(warning));
     }
+    let motion = args.motion.as_ref().map(|file| WalkMotion::open(file, &scene, &lighting.sources)).transpose()?;
     let session = Session::open(scene.clone(), &args.scene, &args.stream, extent)?;
     let mut reference =
         if args.measure_error { Some(reference(scene.clone(), args, lighting.light.clone(), extent)?) } else { None };
@@ -77,11 +80,26 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     let stop = super::interrupt::flag();
     let mut records = Vec::new();
     let mut finished = 0;
+    // What the first frame shows, to be rendered once more.
+    let mut first = None;
     for frame in 0..args.frames {
         if stop.load(Ordering::Relaxed) {
             break;
         }
         let camera = path.frame(frame, args.frames);
+        if let Some(motion) = &motion {
+            let time = path.time(frame, args.frames);
+            let moved = motion.place(&mut renderer, time)?;
+            if let Some(reference) = &mut reference {
+                motion.place(reference, time)?;
+            }
+            if let Some(prefetcher) = prefetcher.as_mut().filter(|_| moved) {
+                prefetcher.set_boxes(BrickBox::of_scene(renderer.scene.resident()));
+            }
+        }
+        if frame == 0 && args.measure_left_out {
+            first = Some((renderer.scene.clone(), renderer.light.clone()));
+        }
         let mut told = 0;
         let mut watch = |samples: u32, so_far: &Accumulation| {
             if counts_samples {
@@ -124,9 +142,9 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     progress.finish();
     pictures.finish(args.json)?;
     let left_out = left_out::left_out(&renderer);
-    let measured = match args.measure_left_out {
-        true => left_out::measure(&left_out, &scene, args, &lighting.light, &path.frame(0, args.frames))?,
-        false => Vec::new(),
+    let measured = match &first {
+        Some((scene, light)) => left_out::measure(&left_out, scene, args, light, &path.frame(0, args.frames))?,
+        None => Vec::new(),
     };
     let left_out = left_out::listed(&left_out, &measured);
     let summary = summary::of_walk(args, &mut renderer, (&pictures, &lighting, &resolve), &records, finished, left_out);
@@ -170,6 +188,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         fronts,
         auto: Auto::default(),
         captures: None,
+        moved: Moved::default(),
         roma: Roma::new(args.roma.source()),
         field: Field::default(),
         rsm: Rsm::default(),

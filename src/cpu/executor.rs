@@ -392,6 +392,11 @@ impl FrameExecutor for CpuExecutor {
         Ok(())
     }
 
+    fn set_scene(&mut self, scene: &Arc<SceneFile>) {
+        self.file = scene.clone();
+        self.scene.forget_frame();
+    }
+
     fn begin_frame(&mut self, view: &View) {
         self.scene.rebase(self.file.resident(), view.frame);
         self.lamps.rebase(view.frame);

@@ -17,6 +17,7 @@ use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pas
 use crate::stream::WorkerPool;
 use crate::visibility::bom::Cascades;
 use crate::visibility::distance_field::{DistanceField, LEVELS};
+use bricks::SceneFile;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
@@ -455,6 +456,11 @@ impl FrameExecutor for Lockstep {
             own.maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
         }
         self.cpu.set_rsm(&own)
+    }
+
+    fn set_scene(&mut self, scene: &Arc<SceneFile>) {
+        self.gpu.set_scene(scene);
+        self.cpu.set_scene(scene);
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -16,7 +16,7 @@ use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
 use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Effects, Equirectangular, Field, Light, Occlusion, RenderSettings, Renderer, Roma, Rsm, Schedule,
+    Effects, Equirectangular, Field, Light, Moved, Occlusion, RenderSettings, Renderer, Roma, Rsm, Schedule,
     emissive_triangles, environment,
 };
 use crate::scene::path::path_from_bounds;
@@ -126,7 +126,13 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
         ..bricks::Material::DIFFUSE
     };
     let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
-    let place = |mesh, world_from_mesh| Placement { name: "p".into(), mesh, source: 0, world_from_mesh };
+    let place = |mesh, world_from_mesh| Placement {
+        name: "p".into(),
+        mesh,
+        source: 0,
+        world_from_mesh,
+        ..Placement::default()
+    };
     let source = SourceScene {
         meshes: vec![
             mesh("world", (0..4).map(|i| primitive(i, 150)).collect()),
@@ -212,7 +218,7 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
     ];
     let radiance = [4.0, 3.0, 2.0];
     let mut emitters: Vec<Emitter> = shapes.map(|shape| Emitter { shape, two_sided: false, radiance }).into();
-    let surfaces = emissive_triangles(scene, 1 << 20).unwrap().unwrap();
+    let surfaces = emissive_triangles(scene, 1 << 20).unwrap().unwrap().emitters(scene.resident());
     emitters.extend(surfaces.iter().enumerate().map(|(i, e)| Emitter { two_sided: i % 2 == 0, ..*e }));
     Lamps::new(Some(environment(image, 1.0, 40.0).0), emitters, 10.0)
 }
@@ -308,6 +314,7 @@ fn render(
         fronts: variant.fronts.then(Fronts::default),
         auto: Auto::default(),
         captures: None,
+        moved: Moved::default(),
         roma: Roma::default(),
         field: Field::default(),
         rsm: Rsm::default(),
@@ -315,8 +322,13 @@ fn render(
     };
     let path = path_from_bounds(manifest.min, manifest.max);
     for frame in 0..2 {
-        // The second frame scatters directions.
+        // The second frame scatters directions, and an instance has moved.
         renderer.settings.guides = frame == 1;
+        if let Some(instance) = scene.resident().instances.get(1).filter(|_| frame == 1) {
+            let mut matrix = instance.world_from_object;
+            matrix[3] += 0.1 * (manifest.max[0] - manifest.min[0]);
+            assert_eq!(renderer.place(scene, &[(1, matrix)]), Ok(vec![1]));
+        }
         renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
     }
 }

@@ -33,6 +33,11 @@ impl Scene {
         Self { roots: resident.bricks.iter().map(|b| b.root).collect(), ..Self::default() }
     }
 
+    /// Has the next frame place everything anew.
+    pub fn forget_frame(&mut self) {
+        self.frame = None;
+    }
+
     /// Moves everything to `frame`, if it is not there yet.
     pub fn rebase(&mut self, resident: &Resident, frame: Frame) {
         if self.frame != Some(frame) {

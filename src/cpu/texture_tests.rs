@@ -121,7 +121,13 @@ fn scene(encoding: TextureEncoding, textures: Vec<SourceTexture>) -> SceneFile {
         |i: usize| bricks::Material { base_color: [1.0; 4], base_color_texture: i as u32, ..bricks::Material::DIFFUSE };
     let source = SourceScene {
         meshes: vec![Mesh { name: "m".into(), primitives: vec![primitive] }],
-        placements: vec![Placement { name: "p".into(), mesh: 0, source: 0, world_from_mesh: IDENTITY }],
+        placements: vec![Placement {
+            name: "p".into(),
+            mesh: 0,
+            source: 0,
+            world_from_mesh: IDENTITY,
+            ..Placement::default()
+        }],
         materials: (0..textures.len()).map(material).collect(),
         textures,
         sources: vec![bricks::Source { name: "t".into(), bytes: 0, hash: "2d06800538d394c2".into() }],

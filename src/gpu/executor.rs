@@ -469,6 +469,11 @@ impl FrameExecutor for GpuExecutor {
         rsm.set(gpu, &buffers.lamps, maps)
     }
 
+    fn set_scene(&mut self, scene: &Arc<SceneFile>) {
+        self.scene = scene.clone();
+        self.buffers.scene.forget_frame();
+    }
+
     fn begin_frame(&mut self, view: &View) {
         self.buffers.scene.rebase(&self.gpu, self.scene.resident(), view.frame);
         self.buffers.lamps.rebase(&self.gpu, view.frame);

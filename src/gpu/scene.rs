@@ -74,6 +74,11 @@ impl SceneBuffers {
         [top8, top2, leaves, instances, bricks, roots, slots, opacity]
     }
 
+    /// Has the next frame place everything anew.
+    pub fn forget_frame(&mut self) {
+        self.frame = None;
+    }
+
     /// Moves everything to `frame`, if it is not there yet.
     pub fn rebase(&mut self, gpu: &Gpu, resident: &Resident, frame: Frame) {
         if self.frame == Some(frame) {

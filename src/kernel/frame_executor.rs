@@ -8,6 +8,7 @@ use super::{Keep, Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
 use crate::stream::WorkerPool;
 use crate::visibility::bom::Cascades;
+use bricks::SceneFile;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -90,6 +91,9 @@ pub trait FrameExecutor: Executor {
     /// # Errors
     /// More than the device holds in one buffer, with how much it does; a device that binds too few buffers.
     fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError>;
+
+    /// Takes the scene with instances placed anew ([`SceneFile::place`]), for frames that begin from now on. All else of it is as it was.
+    fn set_scene(&mut self, scene: &Arc<SceneFile>);
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

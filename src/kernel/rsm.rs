@@ -42,6 +42,27 @@ impl LampView {
         self.width * self.height
     }
 
+    /// Whether a box may show in it. Conservative: each side of what it sees is asked alone.
+    pub fn meets(&self, min: DVec3, max: DVec3) -> bool {
+        let [low, high] = [min - self.corner, max - self.corner];
+        // Least and greatest of n · (p - corner) over the box.
+        let span = |n: DVec3| {
+            let (a, b) = (n * low, n * high);
+            [a.min(b).element_sum(), a.max(b).element_sum()]
+        };
+        let sides = [(self.x, self.width), (self.y, self.height)];
+        let within = |(step, count): (DVec3, u32)| {
+            if !self.is_perspective {
+                let [from, to] = span(step / step.length_squared());
+                return to >= 0.0 && from <= f64::from(count);
+            }
+            // Of p = corner + depth (base + u x + v y), u depth = x (p - corner) - depth (x base), from 0 to count.
+            let across = (step - self.axis * step.dot(self.base)) / step.length_squared();
+            span(across)[1] >= 0.0 && span(across - self.axis * f64::from(count))[0] <= 0.0
+        };
+        span(self.axis)[1] >= 0.0 && sides.into_iter().all(within)
+    }
+
     /// The ray through the middle of a texel in `frame`; its t is depth.
     pub fn ray(&self, frame: &Frame, column: u32, row: u32) -> Ray {
         let across = self.x * (f64::from(column) + 0.5) + self.y * (f64::from(row) + 0.5);

@@ -2,7 +2,7 @@
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Roma, Rsm, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Moved, Roma, Rsm, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -132,6 +132,8 @@ pub struct Renderer {
     pub auto: Auto,
     /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
     pub captures: Option<Captures>,
+    /// What has moved since the frame before.
+    pub moved: Moved,
     /// The occupancy maps, where settings ask for them or for distance fields.
     pub roma: Roma,
     /// The distance fields, where settings ask for them.
@@ -173,7 +175,7 @@ impl Renderer {
         let effects = self.settings.effects;
         let mut accumulation = Accumulation::default();
         self.executor.set_lamps(&self.light.lamps)?;
-        let mut guides = self.settings.guides.then(|| GuideReader::new(camera, self.size));
+        let mut guides = self.settings.guides.then(|| GuideReader::new(camera, self.size, &self.moved));
         for sample in 0..self.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
                 && let Some(captures) = &mut self.captures
@@ -243,6 +245,7 @@ impl Renderer {
         output.pixels.radiance = accumulation.mean();
         output.guides = guides.map(GuideReader::finish);
         output.records = records.finish(self);
+        self.moved = Moved::default();
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
         if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {
             primary.non_finite += output.pixels.not_finite();

@@ -21,8 +21,12 @@ pub struct Roma {
     raster: Option<Raster>,
     cascades: Arc<Cascades>,
     view: Option<RomaView>,
-    /// Whether the base maps are those of the present camera, and sample if they depend on it.
+    /// Whether the base maps are those of the present camera and of where instances are, and of the sample if they depend on it.
     is_assembled: bool,
+    /// What [`usual_cell_log2`] was of the scene.
+    usual_log2: Option<i32>,
+    /// Whether instances have moved since.
+    has_moved: bool,
     /// The ray-aligned maps that the executor has of the present sample.
     made: Option<(Grid, Role, usize)>,
 }
@@ -58,6 +62,12 @@ impl Roma {
         self.is_assembled &= self.view.as_ref().is_some_and(keeps);
         self.view = Some(RomaView { frame: view.frame, camera, sample: view.params.sample, seed: view.params.seed });
         self.made = None;
+    }
+
+    /// Notes that instances have moved: maps are made anew where these were and are.
+    pub fn scene_has_moved(&mut self) {
+        self.is_assembled = false;
+        self.has_moved = true;
     }
 
     /// How the rays of `pass` are answered; `None` where they are traced.
@@ -125,13 +135,17 @@ impl Roma {
     pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32, cells: u32) -> Result<&Arc<Cascades>, ExecutorError> {
         let Some(RomaView { camera, sample, seed, .. }) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
+        // Scales may have changed.
+        let is_as_fine = !self.has_moved || usual_cell_log2(scene.resident()) == self.usual_log2;
+        self.has_moved = false;
         let of = [size, cells];
         let mut assembler = match self.assembler.take() {
-            Some((made, assembler)) if made == of => assembler,
+            Some((made, assembler)) if made == of && is_as_fine => assembler,
             _ => {
                 self.is_assembled = false;
+                self.usual_log2 = usual_cell_log2(scene.resident());
                 let halvings = (cells / size).ilog2() as i32;
-                let finest_log2 = usual_cell_log2(scene.resident()).map(|usual| usual - halvings);
+                let finest_log2 = self.usual_log2.map(|usual| usual - halvings);
                 let settings = Settings { cells, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
                 Assembler::new(scene.clone(), settings).map_err(failed)?
             }

@@ -11,6 +11,7 @@ use crate::kernel::{Directions, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, RomaPart, Shading, Step, attributes, chc, demand, plain};
 use crate::visibility::roma::RomaPass;
 use crate::visibility::rsm::LampViews;
+use bricks::Resident;
 use glam::DVec3;
 use serde_json::{Value, json};
 
@@ -25,6 +26,8 @@ const FAR: f64 = 4096.0;
 struct Made {
     view: LampView,
     first: u32,
+    /// What its rays are relative to.
+    frame: Frame,
     /// Of the sun, or of the emitter.
     light: Result<[f32; 3], Emitter>,
 }
@@ -58,10 +61,28 @@ impl Rsm {
         })
     }
 
+    /// Notes that instances have left and entered boxes: maps that see any of them are made anew.
+    pub fn scene_has_moved(&mut self, boxes: &[[DVec3; 2]]) {
+        let sees = |made: &Made| boxes.iter().any(|&[min, max]| made.view.meets(min, max));
+        for made in &mut self.made {
+            made.take_if(|made| sees(made));
+        }
+    }
+
     /// Emitters whose light diffuse rays do not see: points, spots and distant lights without a map, and areas.
     pub fn left_out(&self) -> [u32; 2] {
         [self.views.left_out, self.views.areas]
     }
+}
+
+/// The frame in which a map is made: its own, so that it does not depend on the camera's.
+fn lamp_frame(resident: &Resident, lamp: &LampView) -> Frame {
+    let middle = if lamp.is_perspective {
+        lamp.corner
+    } else {
+        lamp.corner + 0.5 * (f64::from(lamp.width) * lamp.x + f64::from(lamp.height) * lamp.y)
+    };
+    Frame::near(resident, middle)
 }
 
 impl Renderer {
@@ -80,9 +101,11 @@ impl Renderer {
         let sun = light.sun_color.iter().any(|&c| c > 0.0).then_some(light.sun_direction);
         let views = LampViews::new(&settings, cascades, bounds, sun, &light.lamps);
         let maps = RsmMaps::new(&views.views, &view.frame);
+        let resident = self.scene.resident();
         let place = |(lamp, map): (&LampView, &RsmMap)| Made {
             view: *lamp,
             first: map.first,
+            frame: lamp_frame(resident, lamp),
             light: light.lamps.emitters().get(lamp.lamp as usize).copied().map_or(Ok(light.sun_color), Err),
         };
         let wanted: Vec<Made> = views.views.iter().zip(&maps.maps).map(place).collect();
@@ -112,14 +135,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes one map in frame `number`, block by block of the size of the picture. Its frame is its own, so that it does not depend on the camera's.
+    /// Makes one map in frame `number`, block by block of the size of the picture.
     fn make_rsm(&mut self, number: u32, map: u32, lamp: &LampView, stats: &mut PassStats) -> Result<(), ExecutorError> {
-        let middle = if lamp.is_perspective {
-            lamp.corner
-        } else {
-            lamp.corner + 0.5 * (f64::from(lamp.width) * lamp.x + f64::from(lamp.height) * lamp.y)
-        };
-        let frame = Frame::near(self.scene.resident(), middle);
+        let frame = lamp_frame(self.scene.resident(), lamp);
         self.executor.begin_frame(&self.lamp_view(lamp, frame));
         let (width, height) = self.size;
         for y in (0..lamp.height).step_by(height as usize) {

@@ -1,6 +1,7 @@
 //! What a frame looks at and from where: cameras and camera paths, in f64 world space.
 
 pub mod camera;
+pub mod motion;
 pub mod path;
 
 pub use camera::{Camera, RayBasis};

@@ -185,15 +185,19 @@ impl CameraPath {
     /// The camera of frame `k` of `frames`: time k/(frames − 1) of the range, the first keyframe when `frames` is 1;
     /// frames at and beyond the last stand at the last keyframe.
     pub fn frame(&self, k: u32, frames: u32) -> Camera {
+        self.at(self.time(k, frames))
+    }
+
+    /// The time of frame `k` of `frames`, as of [`Self::frame`].
+    pub fn time(&self, k: u32, frames: u32) -> f64 {
         let (first, last) = (self.keyframes[0].time, self.keyframes[self.keyframes.len() - 1].time);
-        let time = if frames <= 1 || k == 0 {
+        if frames <= 1 || k == 0 {
             first
         } else if k >= frames - 1 {
             last
         } else {
             first + (last - first) * (f64::from(k) / f64::from(frames - 1))
-        };
-        self.at(time)
+        }
     }
 
     /// The time from one frame of `frames` to the next.
@@ -211,39 +215,45 @@ impl CameraPath {
             let k = &keys[i];
             return self.camera_of(k.position.into(), k.target.into());
         }
-        self.camera_of(self.spline(i, time, |k| k.position.into()), self.spline(i, time, |k| k.target.into()))
+        let along = |value: fn(&Keyframe) -> DVec3| spline(keys, i, time, |k| k.time, value);
+        self.camera_of(along(|k| k.position.into()), along(|k| k.target.into()))
     }
 
     fn camera_of(&self, position: DVec3, target: DVec3) -> Camera {
         Camera { position, target, up: self.up.into(), fov_y: self.fov_y_degrees.to_radians() }
     }
+}
 
-    /// `value` of the keyframes at `time` within segment `[i, i + 1]`.
-    fn spline(&self, i: usize, time: f64, value: impl Fn(&Keyframe) -> DVec3 + Copy) -> DVec3 {
-        let (a, b) = (&self.keyframes[i], &self.keyframes[i + 1]);
-        let span = b.time - a.time;
-        let s = (time - a.time) / span;
-        let (m_a, m_b) = (self.tangent(i, value) * span, self.tangent(i + 1, value) * span);
-        let (s2, s3) = (s * s, s * s * s);
-        value(a) * (2.0 * s3 - 3.0 * s2 + 1.0)
-            + m_a * (s3 - 2.0 * s2 + s)
-            + value(b) * (3.0 * s2 - 2.0 * s3)
-            + m_b * (s3 - s2)
-    }
-
-    /// Velocity at keyframe `i`.
-    fn tangent(&self, i: usize, value: impl Fn(&Keyframe) -> DVec3) -> DVec3 {
+/// `value` of the keyframes at `time` within segment `[i, i + 1]`, on the spline of this module.
+pub(super) fn spline<K>(
+    keys: &[K],
+    i: usize,
+    time: f64,
+    time_of: impl Fn(&K) -> f64,
+    value: impl Fn(&K) -> DVec3,
+) -> DVec3 {
+    let (a, b) = (&keys[i], &keys[i + 1]);
+    let span = time_of(b) - time_of(a);
+    let s = (time - time_of(a)) / span;
+    // Velocity at a keyframe.
+    let tangent = |i: usize| {
         let slope = |a: usize, b: usize| {
-            let (a, b) = (&self.keyframes[a], &self.keyframes[b]);
-            (value(b) - value(a)) / (b.time - a.time)
+            let (a, b) = (&keys[a], &keys[b]);
+            (value(b) - value(a)) / (time_of(b) - time_of(a))
         };
-        let last = self.keyframes.len() - 1;
+        let last = keys.len() - 1;
         match i {
             0 => slope(0, 1),
             i if i == last => slope(last - 1, last),
             i => slope(i - 1, i) - slope(i - 1, i + 1) + slope(i, i + 1),
         }
-    }
+    };
+    let (m_a, m_b) = (tangent(i) * span, tangent(i + 1) * span);
+    let (s2, s3) = (s * s, s * s * s);
+    value(a) * (2.0 * s3 - 3.0 * s2 + 1.0)
+        + m_a * (s3 - 2.0 * s2 + s)
+        + value(b) * (3.0 * s2 - 2.0 * s3)
+        + m_b * (s3 - s2)
 }
 
 /// A path through a scene of which only the world bounds are known, 60° high, 10 s long:

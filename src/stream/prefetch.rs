@@ -120,6 +120,11 @@ impl Prefetcher {
         Self { boxes, aspect, most, last: None }
     }
 
+    /// Takes the boxes of bricks that have moved, and of all others.
+    pub fn set_boxes(&mut self, boxes: Vec<BrickBox>) {
+        self.boxes = boxes;
+    }
+
     /// Takes the view of the frame just rendered and returns what to have ready for the next one, most urgent first: of the
     /// bricks in the predicted view, near to far, the geometry and then the attributes, but for what is `at_hand`. Empty
     /// after the first frame and while the camera rests.

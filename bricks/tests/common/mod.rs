@@ -354,6 +354,7 @@ pub fn scene() -> Scene {
         node: node.to_owned(),
         mesh: "mesh".to_owned(),
         primitive: 0,
+        under: Vec::new(),
     };
     let manifest = Manifest {
         generator: "test 1".to_owned(),

@@ -284,6 +284,10 @@ impl FrameExecutor for Faulty {
         self.inner.set_rsm(maps)
     }
 
+    fn set_scene(&mut self, scene: &Arc<SceneFile>) {
+        self.inner.set_scene(scene);
+    }
+
     fn begin_frame(&mut self, view: &View) {
         let mut view = *view;
         if self.defect == Some(Defect::WorldF32) {

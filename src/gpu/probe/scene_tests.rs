@@ -101,7 +101,13 @@ fn ball() -> Mesh {
 }
 
 fn source() -> SourceScene {
-    let place = |name: &str, mesh, world_from_mesh| Placement { name: name.into(), mesh, source: 0, world_from_mesh };
+    let place = |name: &str, mesh, world_from_mesh| Placement {
+        name: name.into(),
+        mesh,
+        source: 0,
+        world_from_mesh,
+        ..Placement::default()
+    };
     let material =
         bricks::Material { base_color: [1.0; 4], base_color_texture: bricks::NONE, ..bricks::Material::DIFFUSE };
     SourceScene {

@@ -4,6 +4,7 @@ use super::Projection;
 use crate::cpu::Gloss;
 use crate::kernel::layout::{BATCH_SAMPLES, GBuffer, Hit, NONE, Ray, Surface};
 use crate::kernel::{FrameExecutor, View};
+use crate::render::Moved;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Pass};
 use bricks::Material;
@@ -60,6 +61,17 @@ pub struct Guides {
     pub seen: Vec<Seen>,
     /// What hits show by themselves and the light of the lamps, the mean over the samples.
     pub direct: Vec<[f32; 3]>,
+    /// What has moved since the frame before.
+    pub moved: Moved,
+}
+
+impl Guides {
+    /// A surface where it was in the frame before, if it has moved with its instance.
+    pub fn then(&self, seen: &Seen) -> Seen {
+        let Some(motion) = self.moved.of_triangle(seen.id).filter(|_| seen.is_hit()) else { return *seen };
+        let turned = |n: Vec3| motion.turn(n.as_dvec3()).as_vec3();
+        Seen { point: motion.point(seen.point), plane: turned(seen.plane), normal: turned(seen.normal), ..*seen }
+    }
 }
 
 /// Reads guides from an executor while it renders a frame.
@@ -74,6 +86,7 @@ pub struct GuideReader {
     /// What the lamps' passes added, summed over samples.
     direct: Vec<[f64; 3]>,
     samples: u32,
+    moved: Moved,
 }
 
 /// What the surface of a hit reflects of light from everywhere.
@@ -83,8 +96,8 @@ fn albedo(g: &GBuffer, materials: &[Material], ray: &Ray) -> [f32; 3] {
 }
 
 impl GuideReader {
-    /// Of a frame of `width` x `height` pixels.
-    pub fn new(camera: &Camera, size: (u32, u32)) -> Self {
+    /// Of a frame of `width` x `height` pixels, before which instances have `moved`.
+    pub fn new(camera: &Camera, size: (u32, u32), moved: &Moved) -> Self {
         Self {
             size,
             projection: Projection::new(camera, size),
@@ -93,6 +106,7 @@ impl GuideReader {
             before: Vec::new(),
             direct: Vec::new(),
             samples: 0,
+            moved: moved.clone(),
         }
     }
 
@@ -173,8 +187,8 @@ impl GuideReader {
     pub fn finish(self) -> Guides {
         let count = f64::from(self.samples.max(1));
         let direct = self.direct.iter().map(|sum| sum.map(|x| (x / count) as f32)).collect();
-        let Self { size, projection, jitter, seen, .. } = self;
-        Guides { size, projection, jitter, seen, direct }
+        let Self { size, projection, jitter, seen, moved, .. } = self;
+        Guides { size, projection, jitter, seen, direct, moved }
     }
 }
 

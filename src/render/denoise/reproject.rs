@@ -42,5 +42,5 @@ fn taps(grid: &Grid, seen: &Seen, before: &Guides) -> Option<Taps> {
 
 /// For every pixel where its surface was before; `None` where it is new.
 pub fn reproject(grid: &Grid, now: &Guides, before: Option<&Guides>) -> Vec<Option<Taps>> {
-    grid.map(|pixel| before.and_then(|before| taps(grid, &now.seen[pixel], before)))
+    grid.map(|pixel| before.and_then(|before| taps(grid, &now.then(&now.seen[pixel]), before)))
 }

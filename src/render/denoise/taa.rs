@@ -115,7 +115,7 @@ fn place_before(grid: &Grid, guides: &Guides, before: &Projection, pixel: usize)
             nearest = other;
         }
     }
-    let seen = &guides.seen[nearest];
+    let seen = guides.then(&guides.seen[nearest]);
     let there = if seen.is_hit() { before.pixel_of_point(seen.point) } else { before.pixel_of_direction(seen.point) }?;
     let (column, row) = grid.position(nearest);
     let (x, y) = grid.position(pixel);

@@ -3,7 +3,7 @@
 use super::voxelise::touched;
 use super::{Assembler, Bom, BomError, Cascades, Detail, Settings, assemble};
 use crate::reference::Truth;
-use bricks::{Resident, SceneFile, TOP_LEAF};
+use bricks::{Resident, SceneFile};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Primitive, SourceScene};
@@ -212,32 +212,7 @@ fn small_and_large_scenes() {
 /// The scene with an instance elsewhere, and the bounds of the top level as they follow.
 fn with_moved(resident: &Resident, instance: usize, matrix: [f64; 12]) -> Resident {
     let mut moved = resident.clone();
-    moved.instances[instance].world_from_object = matrix;
-    let world_step = f64::from(resident.objects[0].step_log2).exp2();
-    for index in (0..moved.top2.len()).rev() {
-        let node = moved.top2[index];
-        let [min, max] = if node.right == TOP_LEAF {
-            let leaf = resident.leaves[node.left as usize];
-            if leaf.instance as usize != instance {
-                continue;
-            }
-            let brick = &resident.bricks[leaf.brick as usize];
-            let step = f64::from(resident.objects[brick.object as usize].step_log2).exp2();
-            let corners = (0..8).map(|c| {
-                let p: [f64; 3] = std::array::from_fn(|k| [brick.min, brick.max][c >> k & 1][k] as f64 * step);
-                let at = |k: usize| (0..3).map(|j| matrix[4 * k + j] * p[j]).sum::<f64>() + matrix[4 * k + 3];
-                DVec3::new(at(0), at(1), at(2)) / world_step
-            });
-            let corners: Vec<DVec3> = corners.collect();
-            let min = corners.iter().copied().reduce(DVec3::min).unwrap().to_array().map(|x| x.floor() as i64 - 1);
-            let max = corners.iter().copied().reduce(DVec3::max).unwrap().to_array().map(|x| x.ceil() as i64 + 1);
-            [min, max]
-        } else {
-            let [a, b] = [node.left, node.right].map(|child| moved.top2[child as usize]);
-            [std::array::from_fn(|k| a.min[k].min(b.min[k])), std::array::from_fn(|k| a.max[k].max(b.max[k]))]
-        };
-        (moved.top2[index].min, moved.top2[index].max) = (min, max);
-    }
+    moved.place(&[(instance as u32, matrix)]).unwrap();
     moved
 }
 

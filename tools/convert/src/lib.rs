@@ -3,5 +3,6 @@
 
 pub mod build;
 pub mod import;
+pub mod pattern;
 pub mod progress;
 pub mod source;

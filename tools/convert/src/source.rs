@@ -210,6 +210,8 @@ pub struct Primitive {
 pub struct Placement {
     /// Node name, or its index in the source.
     pub name: String,
+    /// Names of nodes above it that were asked for, the outermost first.
+    pub under: Vec<String>,
     /// Index of the mesh.
     pub mesh: u32,
     /// Index of the source.

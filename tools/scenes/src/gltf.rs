@@ -26,6 +26,8 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 /// Says how much dielectrics reflect.
 const SPECULAR: &str = "KHR_materials_specular";
+/// Lets emission be more than 1.
+const STRENGTH: &str = "KHR_materials_emissive_strength";
 /// GLB header and two chunk headers (glTF 2.0, section 4.4).
 const GLB_HEADERS: u64 = 12 + 8 + 8;
 
@@ -340,7 +342,7 @@ fn document<'a>(source: &'a dyn Source, written: &Written, uri: Option<String>) 
         scenes: json!([{ "nodes": (0..outline.placements.len()).collect::<Vec<_>>() }]),
         nodes: nodes.collect(),
         meshes,
-        extensions_used: if outline.materials.iter().any(is_without_highlight) { vec![SPECULAR] } else { Vec::new() },
+        extensions_used: extensions_used(&outline.materials),
         materials: outline.materials.iter().map(material).collect(),
         accessors,
         buffer_views: views,
@@ -390,6 +392,18 @@ fn is_without_highlight(material: &bricks::Material) -> bool {
     material.specular_weight == 0.0
 }
 
+/// The greatest factor of its emission.
+fn strength(material: &bricks::Material) -> f32 {
+    material.emission.iter().copied().fold(0.0, f32::max)
+}
+
+/// What the materials need beyond glTF's own.
+fn extensions_used(materials: &[bricks::Material]) -> Vec<&'static str> {
+    let without_highlight = materials.iter().any(is_without_highlight).then_some(SPECULAR);
+    let strong = materials.iter().any(|material| strength(material) > 1.0).then_some(STRENGTH);
+    without_highlight.into_iter().chain(strong).collect()
+}
+
 /// The factors of a material.
 fn material(material: &bricks::Material) -> Value {
     let is = |flag: u32| material.flags & flag != 0;
@@ -413,7 +427,12 @@ fn material(material: &bricks::Material) -> Value {
     }
     if is_without_highlight(material) {
         // Without the extension glTF's materials have one.
-        json["extensions"] = json!({ (SPECULAR): { "specularFactor": 0 } });
+        json["extensions"][SPECULAR] = json!({ "specularFactor": 0 });
+    }
+    let strength = strength(material);
+    if strength > 1.0 {
+        json["emissiveFactor"] = json!(material.emission.map(|c| c / strength));
+        json["extensions"][STRENGTH] = json!({ "emissiveStrength": strength });
     }
     json
 }

@@ -7,12 +7,14 @@ mod block;
 mod building;
 mod city;
 mod copies;
+mod cornell;
 mod facade;
 mod furniture;
 mod gltf;
 mod layout;
 mod material;
 mod mesh;
+mod motion;
 mod open;
 mod output;
 mod path;
@@ -42,6 +44,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 pub use gltf::{GltfForm, write_gltf};
+pub use motion::{Mover, Pose, write_motion};
 pub use path::{CameraPath, Keyframe, LONG_FRAMES, NEAR_FRAMES, write_far_path, write_paths};
 pub use rng::Rng;
 pub use scene::Scene;
@@ -59,11 +62,13 @@ pub enum Kind {
     Terrain,
     /// An ornate teapot in a stadium.
     Stadium,
+    /// A Cornell box in which a box orbits.
+    Cornell,
 }
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Self; 4] = [Self::City, Self::Pipes, Self::Terrain, Self::Stadium];
+    pub const ALL: [Self; 5] = [Self::City, Self::Pipes, Self::Terrain, Self::Stadium, Self::Cornell];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
@@ -72,6 +77,7 @@ impl Kind {
             Self::Pipes => "pipes",
             Self::Terrain => "terrain",
             Self::Stadium => "stadium",
+            Self::Cornell => "cornell",
         }
     }
 
@@ -81,6 +87,15 @@ impl Kind {
             Self::City | Self::Pipes => 10_000..=150_000_000,
             Self::Terrain => 50_000..=150_000_000,
             Self::Stadium => 500_000..=150_000_000,
+            Self::Cornell => 10_000..=10_000_000,
+        }
+    }
+
+    /// The nodes that are meant to move, which the builder keeps as instances of their own.
+    pub fn movable(self) -> &'static [&'static str] {
+        match self {
+            Self::Cornell => &[cornell::MOVER],
+            _ => &[],
         }
     }
 }
@@ -187,7 +202,7 @@ pub enum Error {
 /// Each block of the city is one mesh, placed once with the identity; `settings.instanced` takes trees and vehicles out of
 /// the blocks. The city's first crossing is at the origin, the street at y = 0. Each bay of the plant and each tile of the
 /// terrain is one mesh, too; what grows and lies on the terrain is stored once. The stadium is whole in every size: more
-/// triangles go into its seats and into the teapot.
+/// triangles go into its seats and into the teapot. So is the Cornell box: more of them go into the boxes in it.
 ///
 /// # Errors
 ///
@@ -203,6 +218,7 @@ pub fn generate(settings: &Settings, progress: &Progress) -> Result<Scene, Error
         Kind::Pipes => pipes::generate(settings, progress),
         Kind::Terrain => terrain::generate(settings, progress),
         Kind::Stadium => stadium::generate(settings, progress),
+        Kind::Cornell => cornell::generate(settings, progress),
     };
     progress.finish();
     Ok(scene.copied(settings.copies))

@@ -101,15 +101,20 @@ pub fn walk(way: &Way, eye: f64, frames: u32) -> CameraPath {
     CameraPath { fov_y_degrees: 65.0, up: UP, keyframes: keyframes.collect() }
 }
 
-/// A third of a circle around `target`, `rise` above the horizon, all of `bounds` in view of a picture of 4:3 or wider in
-/// every keyframe.
+/// A third of a circle around `target`, as [`arc`].
 pub fn around(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64) -> CameraPath {
+    arc(target, bounds, rise, start, std::f64::consts::TAU / 3.0)
+}
+
+/// An arc of `span` radians around `target`, `rise` above the horizon, all of `bounds` in view of a picture of 4:3 or wider in every
+/// keyframe.
+pub fn arc(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64, span: f64) -> CameraPath {
     const KEYS: u32 = 13;
     let fov_y_degrees: f64 = 50.0;
     // Away from the target.
     let directions: Vec<DVec3> = (0..KEYS)
         .map(|k| {
-            let angle = start + f64::from(k) / f64::from(KEYS - 1) * std::f64::consts::TAU / 3.0;
+            let angle = start + f64::from(k) / f64::from(KEYS - 1) * span;
             DVec3::new(angle.cos() * rise.cos(), rise.sin(), angle.sin() * rise.cos())
         })
         .collect();
@@ -154,7 +159,8 @@ pub fn write_far_path(path: &CameraPath, base: &Path) -> Result<PathBuf, Error> 
     write_beside(path, base, "far")
 }
 
-fn write_beside(path: &CameraPath, base: &Path, suffix: &str) -> Result<PathBuf, Error> {
+/// Writes `path` into `dir/S.suffix.json`, for `base` as of [`write_paths`]; returns that name.
+pub fn write_beside(path: &impl Serialize, base: &Path, suffix: &str) -> Result<PathBuf, Error> {
     let is_scene = base.extension().is_some_and(|e| SCENE_EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)));
     let stem = if is_scene { base.with_extension("") } else { base.to_path_buf() };
     let mut name = stem.into_os_string();
@@ -164,7 +170,7 @@ fn write_beside(path: &CameraPath, base: &Path, suffix: &str) -> Result<PathBuf,
     Ok(file)
 }
 
-fn write_json(path: &CameraPath, file: &Path) -> std::io::Result<()> {
+fn write_json(path: &impl Serialize, file: &Path) -> std::io::Result<()> {
     let mut temporary = output::temporary(file)?;
     serde_json::to_writer_pretty(&mut temporary, path)?;
     temporary.write_all(b"\n")?;

@@ -1,6 +1,7 @@
 //! A generated scene as a source: counts, names and bounds are kept, geometry is made again whenever it is read.
 
 use crate::Settings;
+use crate::motion::Mover;
 use crate::path::CameraPath;
 use brickwalk_convert::source::{
     Mesh, MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, Source, SourceError, SourceScene,
@@ -27,6 +28,11 @@ pub trait Recipe: Send + Sync {
 
     /// Boxes around all that is worth seeing.
     fn bounds(&self) -> &[[DVec3; 2]];
+
+    /// What moves, and how, for `steps` units of time.
+    fn movers(&self, _steps: u32) -> Vec<Mover> {
+        Vec::new()
+    }
 }
 
 /// A mesh that is made while its parts are read.
@@ -61,6 +67,11 @@ impl Scene {
     /// The path that has the whole scene in view.
     pub fn far_path(&self) -> CameraPath {
         if self.copies.is_empty() { self.recipe.far() } else { self.far_of_copies() }
+    }
+
+    /// What moves, and how, for `steps` units of the time of its paths; nothing in most scenes.
+    pub fn movers(&self, steps: u32) -> Vec<Mover> {
+        self.recipe.movers(steps)
     }
 
     /// Triangles, every use of a mesh counted.
@@ -169,7 +180,7 @@ impl Draft {
 
     /// Places a mesh.
     pub fn place(&mut self, name: String, mesh: u32, world_from_mesh: [f64; 12]) {
-        self.outline.placements.push(Placement { name, mesh, source: 0, world_from_mesh });
+        self.outline.placements.push(Placement { name, mesh, source: 0, world_from_mesh, ..Placement::default() });
     }
 }
 

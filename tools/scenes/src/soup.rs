@@ -56,7 +56,8 @@ pub fn soup(kind: SoupKind, n: u32, seed: u64) -> SourceScene {
     });
     let name = format!("soup {kind:?} seed={seed} triangles={n}").to_lowercase();
     let mesh = Mesh { name: "soup".into(), primitives: primitives.collect() };
-    let placement = Placement { name: "soup".into(), mesh: 0, source: 0, world_from_mesh: IDENTITY };
+    let placement =
+        Placement { name: "soup".into(), mesh: 0, source: 0, world_from_mesh: IDENTITY, ..Placement::default() };
     scene(name, vec![mesh], vec![placement])
 }
 
@@ -89,7 +90,13 @@ pub fn rotated_instances(seed: u64) -> SourceScene {
             let matrix = DMat3::from_quat(turn) * DMat3::from_diagonal(size * uneven * mirror);
             let at = inside(&mut rng, 2.5);
             let a = DAffine3::from_mat3_translation(matrix, at);
-            Placement { name: format!("sphere {k}"), mesh: 0, source: 0, world_from_mesh: crate::scene::rows(&a) }
+            Placement {
+                name: format!("sphere {k}"),
+                mesh: 0,
+                source: 0,
+                world_from_mesh: crate::scene::rows(&a),
+                ..Placement::default()
+            }
         })
         .collect();
     scene(format!("rotated instances seed={seed}"), vec![mesh], placements)

@@ -157,6 +157,7 @@ pub(super) fn manifest(
         has_proxies: !resident.occupancy.is_empty(),
         instance_scale_ratio: plan.instances.iter().fold(1.0, |most, instance| instance.matrix.scale_ratio().max(most)),
         warnings,
+        movable: settings.movable.clone(),
         provenance: plan.provenance.clone(),
     }
 }

@@ -87,6 +87,23 @@ pub enum BuildError {
         /// Largest magnitude of a coordinate.
         limit: f64,
     },
+    /// Nothing has the name of what is to be movable.
+    #[error("--movable {pattern}: no node with a mesh, nor one above such a node, has this name; there are: {known}")]
+    NothingMovable {
+        /// The name as given.
+        pattern: String,
+        /// Names of nodes that there are.
+        known: String,
+    },
+    /// A placement that cannot be an instance.
+    #[error(
+        "node \"{node}\": it cannot be movable, for its matrix has no inverse or scales one axis too much against another; correct the matrix, or \
+         leave the node out of --movable"
+    )]
+    NotMovable {
+        /// Name of the node.
+        node: String,
+    },
     /// The lattice that was asked for is too fine for the size or place of an object.
     #[error(
         "--lattice {found}: steps of 2^{found} are too fine for {object}, which reaches {reach:e} and is {size:e} large; \

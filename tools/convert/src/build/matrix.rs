@@ -1,8 +1,5 @@
 //! Placements in f64: points, normals and boxes through a row-major 3x4 matrix.
 
-/// Unit roundoff of f64.
-const UNIT: f64 = f64::EPSILON / 2.0;
-
 /// An affine map, row-major 3x4.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Affine(pub [f64; 12]);
@@ -66,22 +63,7 @@ impl Affine {
 
     /// A box that contains the images of all points of a box, rounding errors included.
     pub fn bounds(&self, min: [f64; 3], max: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-        let m = &self.0;
-        let mut out = ([0.0; 3], [0.0; 3]);
-        for k in 0..3 {
-            let (mut low, mut high, mut size) = (m[4 * k + 3], m[4 * k + 3], m[4 * k + 3].abs());
-            for j in 0..3 {
-                let (a, b) = (m[4 * k + j] * min[j], m[4 * k + j] * max[j]);
-                low += a.min(b);
-                high += a.max(b);
-                size += a.abs().max(b.abs());
-            }
-            // Three products and three sums: at most 4 roundings on any term, and as many in the point itself.
-            let margin = 16.0 * UNIT * size;
-            out.0[k] = low - margin;
-            out.1[k] = high + margin;
-        }
-        out
+        bricks::image_bounds(&self.0, min, max)
     }
 }
 

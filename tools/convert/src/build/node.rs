@@ -4,43 +4,17 @@
 use super::binary::Box3;
 use super::lattice::pow2;
 use super::wide::WideNode;
-use bricks::{NODE_WIDTH, Node, TopNode8};
-
-/// Largest grid coordinate.
-const GRID_END: i64 = 255;
-
-/// Child boxes on the grid of a node.
-struct Grid {
-    /// log2 of the grid step in lattice steps.
-    exponent: [u8; 3],
-    lo: [[u8; NODE_WIDTH]; 3],
-    hi: [[u8; NODE_WIDTH]; 3],
-}
+use bricks::{Grid, Node, TopNode8};
+#[cfg(test)]
+use bricks::{NODE_WIDTH, ceil_shift};
 
 /// Child boxes on the finest grids with steps of powers of two from `origin`, which is at most the node's least corner.
-/// Absent children are inverted, so that they are neutral to unions and entered by no ray.
 fn quantise(node: &WideNode, origin: [i64; 3]) -> Grid {
-    let mut grid = Grid { exponent: [0; 3], lo: [[GRID_END as u8; NODE_WIDTH]; 3], hi: [[0; NODE_WIDTH]; 3] };
-    for (k, &origin) in origin.iter().enumerate() {
-        let extent = node.bounds.max[k] - origin;
-        let mut exponent = 0;
-        while ceil_shift(extent, exponent) > GRID_END {
-            exponent += 1;
-        }
-        grid.exponent[k] = exponent;
-        for (slot, child) in node.children.iter().enumerate() {
-            if let Some(child) = child {
-                grid.lo[k][slot] = ((child.bounds.min[k] - origin) >> exponent) as u8;
-                grid.hi[k][slot] = ceil_shift(child.bounds.max[k] - origin, exponent) as u8;
-            }
-        }
-    }
-    grid
-}
-
-/// ⌈x / 2^exponent⌉ for x ≥ 0.
-fn ceil_shift(x: i64, exponent: u8) -> i64 {
-    (x + ((1 << exponent) - 1)) >> exponent
+    Grid::over(
+        &node.children.map(|child| child.map(|child| [child.bounds.min, child.bounds.max])),
+        origin,
+        node.bounds.max,
+    )
 }
 
 /// The largest multiple of a power of two that is at most `x` and has a significand of 24 bits: an exact f32.

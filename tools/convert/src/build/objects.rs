@@ -3,11 +3,15 @@
 use super::error::BuildError;
 use super::matrix::Affine;
 use super::settings::BuildSettings;
+use crate::pattern::names;
 use crate::source::{IDENTITY, MeshOutline, Outline, Placement, Primitive};
 use bricks::Provenance;
 
 /// Ratio of scales above which a matrix is not inverted: error bounds of rays in the object's space grow with it.
 const LARGEST_SCALE_RATIO: f64 = (1u64 << 20) as f64;
+
+/// Most names of nodes that a message lists.
+const MOST_NAMES: usize = 16;
 
 /// How a part is brought into its object.
 #[derive(Clone, Copy, Debug)]
@@ -162,7 +166,8 @@ pub(super) fn plan<'a>(scene: &'a Outline, settings: &BuildSettings) -> Result<P
     }
 
     let invertible: Vec<bool> = scene.placements.iter().map(is_invertible).collect();
-    let instanced = choose_instanced(scene, &counts, &invertible, settings);
+    let movable = movable(scene, &invertible, settings)?;
+    let instanced = choose_instanced(scene, &counts, &invertible, &movable, settings);
     let mut objects = vec![ObjectPlan {
         name: "the scene".to_owned(),
         parts: Vec::new(),
@@ -207,9 +212,44 @@ fn is_invertible(placement: &Placement) -> bool {
     matrix.is_finite() && determinant.is_normal() && matrix.scale_ratio() <= LARGEST_SCALE_RATIO
 }
 
-/// Which meshes are stored once and placed by instances: those with enough triangles that are placed twice or more, and
-/// smaller ones once the budget for copies of them is spent.
-fn choose_instanced(scene: &Outline, counts: &[u64], invertible: &[bool], settings: &BuildSettings) -> Vec<bool> {
+/// Which meshes are to be movable.
+///
+/// # Errors
+/// A name that nothing has; a placement that rays cannot be taken through.
+fn movable(scene: &Outline, invertible: &[bool], settings: &BuildSettings) -> Result<Vec<bool>, BuildError> {
+    let mut movable = vec![false; scene.meshes.len()];
+    let mut is_met = vec![false; settings.movable.len()];
+    if settings.movable.is_empty() {
+        return Ok(movable);
+    }
+    for (placement, invertible) in scene.placements.iter().zip(invertible) {
+        for (pattern, is_met) in settings.movable.iter().zip(&mut is_met) {
+            if names(pattern, &placement.name) || placement.under.iter().any(|name| names(pattern, name)) {
+                if !invertible {
+                    return Err(BuildError::NotMovable { node: placement.name.clone() });
+                }
+                *is_met = true;
+                movable[placement.mesh as usize] = true;
+            }
+        }
+    }
+    let Some(missing) = is_met.iter().position(|is_met| !is_met) else { return Ok(movable) };
+    let mut known: Vec<&str> = scene.placements.iter().take(MOST_NAMES + 1).map(|one| one.name.as_str()).collect();
+    if known.len() > MOST_NAMES {
+        known[MOST_NAMES] = "…";
+    }
+    Err(BuildError::NothingMovable { pattern: settings.movable[missing].clone(), known: known.join(", ") })
+}
+
+/// Which meshes are stored once and placed by instances: those that are movable, those with enough triangles that are placed twice or more,
+/// and smaller ones once the budget for copies of them is spent.
+fn choose_instanced(
+    scene: &Outline,
+    counts: &[u64],
+    invertible: &[bool],
+    movable: &[bool],
+    settings: &BuildSettings,
+) -> Vec<bool> {
     let mut uses = vec![0u64; scene.meshes.len()];
     for (placement, invertible) in scene.placements.iter().zip(invertible) {
         uses[placement.mesh as usize] += u64::from(*invertible);
@@ -217,7 +257,11 @@ fn choose_instanced(scene: &Outline, counts: &[u64], invertible: &[bool], settin
     let mut budget = settings.bake_budget_triangles;
     uses.iter()
         .zip(counts)
-        .map(|(&uses, &count)| {
+        .zip(movable)
+        .map(|((&uses, &count), &is_movable)| {
+            if is_movable && count > 0 {
+                return true;
+            }
             if uses < 2 || count == 0 {
                 return false;
             }
@@ -237,8 +281,9 @@ fn trace_ids(provenance: &mut Vec<Provenance>, placement: &Placement, mesh: &Mes
     for parts in mesh.parts.chunk_by(|a, b| a.primitive == b.primitive) {
         let count = parts.iter().map(|part| part.triangles).sum();
         if count > 0 {
-            let (node, mesh, primitive) = (placement.name.clone(), mesh.name.clone(), parts[0].primitive);
-            provenance.push(Provenance { first_id, count, source: placement.source, node, mesh, primitive });
+            let (node, under) = (placement.name.clone(), placement.under.clone());
+            let (mesh, primitive) = (mesh.name.clone(), parts[0].primitive);
+            provenance.push(Provenance { first_id, count, source: placement.source, node, mesh, primitive, under });
             first_id += count;
         }
     }

@@ -33,6 +33,9 @@ pub struct BuildSettings {
     /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they too are stored
     /// once.
     pub bake_budget_triangles: u64,
+    /// Names of nodes, with wildcards ([`crate::pattern`]), whose meshes, and those of the nodes below them, are kept as objects with instances of
+    /// their own, however often they are placed.
+    pub movable: Vec<String>,
     /// Memory to get by with, in bytes, the source not counted if it lies in memory; `None`: a quarter of the machine's.
     /// What does not fit goes to the scratch folder. Changes nothing but the time.
     pub memory_bytes: Option<u64>,
@@ -58,6 +61,7 @@ impl Default for BuildSettings {
             drop_non_finite: false,
             instance_min_triangles: 1000,
             bake_budget_triangles: 4_000_000,
+            movable: Vec::new(),
             memory_bytes: None,
             fast: false,
             proxies: true,

@@ -24,9 +24,9 @@ pub(super) struct TopLevel {
 
 /// The box of a brick of an instance in steps of the world's lattice, outward: that of the image of the brick's box.
 pub(super) fn world_box(brick: Box3, object: &Lattice, matrix: &Affine, world: &Lattice) -> Box3 {
-    let (min, max) = matrix.bounds(brick.min.map(|x| object.length(x)), brick.max.map(|x| object.length(x)));
-    // Scaling by a power of two is exact, and the lattice was chosen so that the images are in range.
-    Box3 { min: min.map(|x| world.steps(x).floor() as i64), max: max.map(|x| world.steps(x).ceil() as i64) }
+    // The lattice was chosen so that the images are in range.
+    let [min, max] = bricks::world_box([brick.min, brick.max], object.step_log2, &matrix.0, world.step_log2);
+    Box3 { min, max }
 }
 
 /// Builds the trees over leaves and their boxes.

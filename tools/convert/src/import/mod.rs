@@ -56,6 +56,9 @@ pub struct ImportSettings {
     pub threads: Option<usize>,
     /// Folder for an unnamed temporary file of what has to be decoded; `None`: the system's.
     pub scratch: Option<PathBuf>,
+    /// Names of nodes, with wildcards ([`crate::pattern`]), of which the placements below them are to tell
+    /// ([`crate::source::Placement::under`]).
+    pub movable: Vec<String>,
 }
 
 /// A file, and what of it is taken how.
@@ -138,12 +141,12 @@ fn open_all(inputs: &[Input], settings: &ImportSettings, progress: &Progress) ->
         progress.check().map_err(ImportError::Interrupted)?;
         let (path, budget, axes) = (input.path.as_path(), &mut budget, input.axes(Up::Y));
         let opened = match format {
-            Format::Gltf => gltf::open(path, input.scene.as_deref(), &spool, budget)?,
+            Format::Gltf => gltf::open(path, input.scene.as_deref(), &settings.movable, &spool, budget)?,
             Format::Obj => obj::open(path, &axes, &spool, budget)?,
             Format::Ply => ply::open(path, &axes, &spool, budget)?,
             Format::Stl => stl::open(path, &axes, &spool, budget)?,
             Format::Tiles => {
-                append_tiles(&mut imported, input, &spool, budget, progress)?;
+                append_tiles(&mut imported, input, (settings, &spool), budget, progress)?;
                 continue;
             }
         };
@@ -158,7 +161,7 @@ fn open_all(inputs: &[Input], settings: &ImportSettings, progress: &Progress) ->
 fn append_tiles(
     imported: &mut Imported,
     input: &Input,
-    spool: &Arc<Spool>,
+    (settings, spool): (&ImportSettings, &Arc<Spool>),
     budget: &mut TriangleBudget,
     progress: &Progress,
 ) -> Result<(), ImportError> {
@@ -168,7 +171,7 @@ fn append_tiles(
     progress.phase("tiles", tileset.models.len() as u64);
     for model in &tileset.models {
         progress.check().map_err(ImportError::Interrupted)?;
-        let opened = tiles::open_model(model, spool, budget)?;
+        let opened = tiles::open_model(model, &settings.movable, spool, budget)?;
         let meshes = &opened.outline.meshes;
         let triangles = opened.outline.placements.iter().map(|p| meshes[p.mesh as usize].triangle_count()).sum();
         // Opening it counted one.

@@ -60,7 +60,7 @@ pub(super) fn stem(path: &Path) -> String {
 
 /// Mesh `index`, placed once where it is; `axes` says where that is in metres with Y up.
 fn placement(index: usize, name: &str, axes: &[f64; 12]) -> Placement {
-    Placement { name: name.to_owned(), mesh: index as u32, source: 0, world_from_mesh: *axes }
+    Placement { name: name.to_owned(), under: Vec::new(), mesh: index as u32, source: 0, world_from_mesh: *axes }
 }
 
 /// Parts of at most [`PART_TRIANGLES`] of one primitive of `triangles`.

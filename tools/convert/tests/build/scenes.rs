@@ -62,7 +62,7 @@ pub fn mesh(name: &str, primitives: Vec<Primitive>) -> Mesh {
 }
 
 pub fn placement(name: &str, mesh: u32, world_from_mesh: [f64; 12]) -> Placement {
-    Placement { name: name.to_owned(), mesh, source: 0, world_from_mesh }
+    Placement { name: name.to_owned(), mesh, source: 0, world_from_mesh, ..Placement::default() }
 }
 
 pub fn scene(meshes: Vec<Mesh>, placements: Vec<Placement>) -> SourceScene {

@@ -57,7 +57,8 @@ pub fn far_path(source: &SourceScene) -> Option<CameraPath> {
 /// A scene of one mesh, placed once where it is.
 pub fn one_mesh(name: &str, primitive: Primitive) -> SourceScene {
     let mesh = Mesh { name: name.into(), primitives: vec![primitive] };
-    let placement = Placement { name: name.into(), mesh: 0, source: 0, world_from_mesh: IDENTITY };
+    let placement =
+        Placement { name: name.into(), mesh: 0, source: 0, world_from_mesh: IDENTITY, ..Placement::default() };
     scene(name.into(), vec![mesh], vec![placement])
 }
 

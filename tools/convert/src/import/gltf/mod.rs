@@ -64,16 +64,17 @@ struct Mesh {
     parts: Vec<(u32, u64)>,
 }
 
-/// Opens one .gltf or .glb file: of its scenes the one that is asked for, by name or number.
+/// Opens one .gltf or .glb file: of its scenes the one that is asked for, by name or number; placements tell which nodes above them `movable` names.
 pub(super) fn open(
     path: &Path,
     scene: Option<&str>,
+    movable: &[String],
     spool: &Arc<Spool>,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
     let unreadable = |reason| ImportError::Read { file: show(path), reason };
     let bytes = Bytes::of_file(path).map_err(unreadable)?;
-    open_within(path, [&bytes, &bytes], scene, &IDENTITY, spool, budget)
+    open_within(path, [&bytes, &bytes], (scene, movable), &IDENTITY, spool, budget)
 }
 
 /// Opens the glTF file that is a piece of the file at `path`, whose bytes are `[all, piece]`, placed by `placing`: a
@@ -81,7 +82,7 @@ pub(super) fn open(
 pub(super) fn open_within(
     path: &Path,
     bytes: [&Bytes; 2],
-    scene: Option<&str>,
+    asked: (Option<&str>, &[String]),
     placing: &Affine,
     spool: &Arc<Spool>,
     budget: &mut TriangleBudget,
@@ -102,7 +103,7 @@ pub(super) fn open_within(
     }
     meshopt::decode_views(&mut file)?;
     let document = &file.document;
-    let nodes::Placed { uses, lights } = nodes::uses(&file, scene, &placing, &mut warnings)?;
+    let nodes::Placed { uses, lights } = nodes::uses(&file, asked, &placing, &mut warnings)?;
     let mut is_used = vec![false; document.meshes.len()];
     uses.iter().for_each(|one| is_used[one.mesh] = true);
     let (meshes, numbers) = check_meshes(&file, &is_used, &mut warnings)?;
@@ -287,7 +288,7 @@ fn place(file: &File, uses: &[nodes::Use], numbers: &[Option<u32>]) -> Result<Ve
         // Every mesh in use has a number.
         let Some(mesh) = numbers[one.mesh] else { continue };
         let Some(instances) = &one.instances else {
-            placements.push(Placement { name, mesh, source: 0, world_from_mesh: one.world });
+            placements.push(Placement { name, under: one.names_above(), mesh, source: 0, world_from_mesh: one.world });
             continue;
         };
         let fault = |what: String, remedy| file.fault(nodes::node_place(document, one.node), Problem { what, remedy });
@@ -301,7 +302,8 @@ fn place(file: &File, uses: &[nodes::Use], numbers: &[Option<u32>]) -> Result<Ve
                 if !world_from_mesh.iter().all(|c| c.is_finite()) {
                     return Err(fault(format!("instance {i}: its transformation is not finite"), EXPORT_AGAIN));
                 }
-                placements.push(Placement { name: name.clone(), mesh, source: 0, world_from_mesh });
+                let (name, under) = (name.clone(), one.names_above());
+                placements.push(Placement { name, under, mesh, source: 0, world_from_mesh });
             }
         }
     }

@@ -3,12 +3,14 @@
 use super::accessor::{Accessor, Component, Shape};
 use super::document::{Document, Index, Uint};
 use super::file::{File, Problem, item};
-use super::{label, lights};
+use super::{display_name, label, lights};
 use crate::import::affine::{Affine, from_columns, from_parts, multiply};
 use crate::import::error::{ImportError, one_line};
 use crate::import::warnings::Warnings;
+use crate::pattern::names;
 use bricks::PunctualLight;
 use std::io;
+use std::rc::Rc;
 
 /// A node with a mesh, placed in the world.
 pub(super) struct Use {
@@ -18,8 +20,38 @@ pub(super) struct Use {
     pub mesh: usize,
     /// world_from_node.
     pub world: Affine,
+    /// The nodes above that were asked for.
+    above: Above,
     /// EXT_mesh_gpu_instancing: transformations between node and mesh; `None`: one placement.
     pub instances: Option<Instances>,
+}
+
+/// The innermost of the nodes above a node that were asked for.
+type Above = Option<Rc<Ancestor>>;
+
+/// A node that was asked for, and those above it.
+struct Ancestor {
+    name: String,
+    above: Above,
+    /// How many there are, this one counted.
+    depth: u32,
+}
+
+/// Most nodes above a mesh of which it keeps the names, the outermost.
+const MOST_ABOVE: u32 = 16;
+
+impl Use {
+    /// Names of the nodes above that were asked for, the outermost first.
+    pub fn names_above(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        let mut next = &self.above;
+        while let Some(ancestor) = next {
+            names.push(ancestor.name.clone());
+            next = &ancestor.above;
+        }
+        names.reverse();
+        names
+    }
 }
 
 /// Accessors of instance transformations, all of the same count.
@@ -60,10 +92,10 @@ pub(super) struct Placed {
 }
 
 /// Every use of a mesh and of a light in the scene that is asked for (else the default scene, else scene 0, else all root nodes), depth
-/// first; `placing` takes the scene to the world.
+/// first; `placing` takes the scene to the world. Uses know which nodes above them `movable` names.
 pub(super) fn uses(
     file: &File,
-    asked: Option<&str>,
+    (asked, movable): (Option<&str>, &[String]),
     placing: &Affine,
     warnings: &mut Warnings,
 ) -> Result<Placed, ImportError> {
@@ -74,8 +106,8 @@ pub(super) fn uses(
 
     let Placed { mut uses, mut lights } = Placed::default();
     let mut visited = 0;
-    let mut stack: Vec<(usize, Affine)> = roots.iter().rev().map(|&root| (root, *placing)).collect();
-    while let Some((index, parent)) = stack.pop() {
+    let mut stack: Vec<(usize, Affine, Above)> = roots.iter().rev().map(|&root| (root, *placing, None)).collect();
+    while let Some((index, parent, above)) = stack.pop() {
         visited += 1;
         let node = &document.nodes[index];
         let fault = |problem| file.fault(node_place(document, index), problem);
@@ -93,13 +125,22 @@ pub(super) fn uses(
             }
             let instances = instances(file, index).map_err(fault)?;
             // In range: `parents` checked it.
-            uses.push(Use { node: index, mesh: mesh.0 as usize, world, instances });
+            uses.push(Use { node: index, mesh: mesh.0 as usize, world, above: above.clone(), instances });
         }
         if let Some(light) = &node.extensions.light {
             lights.extend(lights::place(document, light, &world, warnings, &|| node_place(document, index)));
         }
+        let depth = above.as_ref().map_or(0, |ancestor| ancestor.depth);
+        let above = match movable.is_empty() || depth == MOST_ABOVE || node.children.is_empty() {
+            true => above,
+            false => {
+                let name = display_name(index, node.name.as_deref());
+                let is_asked = movable.iter().any(|pattern| names(pattern, &name));
+                if is_asked { Some(Rc::new(Ancestor { name, above, depth: depth + 1 })) } else { above }
+            }
+        };
         // In range: `parents` checked them.
-        stack.extend(node.children.iter().rev().map(|&child| (child.0 as usize, world)));
+        stack.extend(node.children.iter().rev().map(|&child| (child.0 as usize, world, above.clone())));
     }
     let left_out = document.nodes.len() - visited;
     if left_out > 0 && document.nodes.iter().any(|node| node.mesh.is_some()) {

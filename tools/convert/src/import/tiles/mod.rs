@@ -285,10 +285,11 @@ fn starts_json(start: &[u8; 4]) -> bool {
 /// Opens a model: its placements are those in its tile, Z up.
 pub(super) fn open_model(
     model: &Model,
+    movable: &[String],
     spool: &Arc<Spool>,
     budget: &mut super::TriangleBudget,
 ) -> Result<super::Opened, ImportError> {
-    gltf::open_within(&model.path, model.bytes.each_ref(), None, &model.tile_from_model, spool, budget)
+    gltf::open_within(&model.path, model.bytes.each_ref(), (None, movable), &model.tile_from_model, spool, budget)
 }
 
 fn fault(file: &str, place: String, problem: String) -> ImportError {
