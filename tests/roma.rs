@@ -182,6 +182,22 @@ fn rays_that_maps_find_free_are_not_traced() {
 }
 
 #[test]
+fn rays_too_short_for_maps_are_traced() {
+    let folder = folder();
+    let scene = scene(folder.path(), true);
+    // Cells of bricks are 1/32 m and 1/16 m wide.
+    let frame = |length: f64, secondary: &str| {
+        let mut renderer = renderer(&scene, &format!("--effects ao --secondary {secondary} --auto-one-in 1"));
+        renderer.settings.effects.occlusion.as_mut().expect("ao").length = length;
+        let output = renderer.frame(0, &eye()).expect("a frame");
+        let rays: u64 = output.records.iter().filter(|r| r.pass == "ao").map(|r| r.rays).sum();
+        (output.pixels.radiance, rays)
+    };
+    assert_eq!(frame(0.05, "auto"), frame(0.05, "exact"));
+    assert!(frame(1.0, "auto").1 > frame(1.0, "exact").1, "control: longer ones are asked about");
+}
+
+#[test]
 fn a_plane_hardly_occludes_itself() {
     let folder = folder();
     for options in

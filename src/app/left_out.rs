@@ -6,6 +6,7 @@ use super::walk::lit_renderer;
 use crate::kernel::{Extent, Keep, opacity, reflectance};
 use crate::render::{Light, Renderer};
 use crate::scene::Camera;
+use crate::visibility::roma::Role;
 use anyhow::Result;
 use bricks::SceneFile;
 use serde_json::{Map, Value, json};
@@ -25,11 +26,12 @@ pub struct LeftOut {
 }
 
 /// What `renderer` leaves out.
-pub fn left_out(renderer: &Renderer) -> Vec<LeftOut> {
+pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
+    let has_short_rays = has_short_rays(renderer);
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let fits = renderer.cache.residency.budget_bytes() >= renderer.cache.bytes.sizes().sum();
-    let all: [(bool, LeftOut); 6] = [
+    let all: [(bool, LeftOut); 7] = [
         (
             fits,
             LeftOut {
@@ -66,9 +68,24 @@ pub fn left_out(renderer: &Renderer) -> Vec<LeftOut> {
             !manifest.has_instances,
             LeftOut { what: "instance transforms", why: "everything is baked into the world", keep: None },
         ),
+        (
+            has_short_rays,
+            LeftOut {
+                what: "occupancy maps for ao",
+                why: "its rays are shorter than three cells of bricks",
+                keep: None,
+            },
+        ),
         (!manifest.has_wide_bricks, LeftOut { what: "two-part vertices", why: "every brick is near", keep: None }),
     ];
     all.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, one)| one).collect()
+}
+
+/// Whether maps would have sifted rays of ao that are too short for it.
+fn has_short_rays(renderer: &mut Renderer) -> bool {
+    let is_sifted = renderer.settings.roma.is_some_and(|roma| matches!(roma.occlusion.role, Role::Sift(_)));
+    let length = renderer.settings.effects.occlusion.map(|occlusion| occlusion.length);
+    is_sifted && length.is_some_and(|length| renderer.roma.is_short(&renderer.scene, length))
 }
 
 /// As the summary lists them, with what `measured` found.

@@ -21,6 +21,7 @@ use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
 use crate::stats::Record;
 use crate::stream::{BrickBox, HostCacheStats, Item, Prefetcher};
+use crate::visibility::roma::LEAST_CELLS;
 use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
 use brickwalk_convert::progress::Progress;
@@ -141,7 +142,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     }
     progress.finish();
     pictures.finish(args.json)?;
-    let left_out = left_out::left_out(&renderer);
+    let left_out = left_out::left_out(&mut renderer);
     let measured = match &first {
         Some((scene, light)) => left_out::measure(&left_out, scene, args, light, &path.frame(0, args.frames))?,
         None => Vec::new(),
@@ -198,7 +199,6 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
 
 /// Says that rays of ao are too short for the cells that they are to meet.
 fn warn_of_short_rays(renderer: &Renderer) {
-    const LEAST_CELLS: f64 = 3.0;
     let length = renderer.settings.effects.occlusion.map_or(f64::INFINITY, |occlusion| occlusion.length);
     if let Some(cell) = renderer.roma.finest_cell().filter(|cell| length < LEAST_CELLS * cell) {
         let _ = writeln!(

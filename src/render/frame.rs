@@ -320,12 +320,13 @@ impl Renderer {
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
         let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
         let (mut first, mut last) = (vec![Step::Generate], vec![Step::QueryHits]);
-        if let Some(roma) = roma {
+        let length = match (pass, self.settings.effects.occlusion) {
+            (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
+            _ => f64::INFINITY,
+        };
+        let is_short = |r: &mut Self| r.roma.is_short(&r.scene, length);
+        if let Some(roma) = roma.filter(|roma| !matches!(roma.role, Role::Sift(_)) || !is_short(self)) {
             let RomaPass { grid, steps, role } = roma;
-            let length = match (pass, self.settings.effects.occlusion) {
-                (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
-                _ => f64::INFINITY,
-            };
             first.extend(self.roma.prepare(&mut *self.executor, &self.scene, roma, length)?);
             let trace = |part| Step::RomaTrace { steps, part };
             match role {

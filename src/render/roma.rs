@@ -6,7 +6,7 @@ use crate::kernel::roma::RomaMaps;
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
 use crate::visibility::bom::{Assembler, Bom, BomError, Cascades, Settings, Source};
-use crate::visibility::roma::{Grid, MOST_LEVELS, Role, RomaPass, RomaSettings};
+use crate::visibility::roma::{Grid, LEAST_CELLS, MOST_LEVELS, Role, RomaPass, RomaSettings};
 use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
 use std::sync::Arc;
@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// The occupancy maps of the present frame and sample.
 #[derive(Default)]
 pub struct Roma {
-    /// What makes the base maps, of whose cells on each axis the first would be enough, and there are the second.
-    assembler: Option<([u32; 2], Assembler)>,
+    /// What makes the base maps, and for what.
+    assembler: Option<(Wanted, Assembler)>,
     source: Source,
     /// The scene's triangles, if base maps are made of these.
     raster: Option<Raster>,
@@ -23,12 +23,21 @@ pub struct Roma {
     view: Option<RomaView>,
     /// Whether the base maps are those of the present camera and of where instances are, and of the sample if they depend on it.
     is_assembled: bool,
-    /// What [`usual_cell_log2`] was of the scene.
-    usual_log2: Option<i32>,
-    /// Whether instances have moved since.
-    has_moved: bool,
+    /// [`usual_cell_log2`] of the scene, once it is known.
+    usual_log2: Option<Option<i32>>,
     /// The ray-aligned maps that the executor has of the present sample.
     made: Option<(Grid, Role, usize)>,
+}
+
+/// What base maps were wanted.
+#[derive(Clone, Copy, PartialEq)]
+struct Wanted {
+    /// Cells on each axis that would be enough.
+    size: u32,
+    /// Those that there are, once or twice as many.
+    cells: u32,
+    /// See [`Roma::usual_log2`].
+    usual_log2: Option<i32>,
 }
 
 struct RomaView {
@@ -67,7 +76,8 @@ impl Roma {
     /// Notes that instances have moved: maps are made anew where these were and are.
     pub fn scene_has_moved(&mut self) {
         self.is_assembled = false;
-        self.has_moved = true;
+        // Scales may have changed.
+        self.usual_log2 = None;
     }
 
     /// How the rays of `pass` are answered; `None` where they are traced.
@@ -127,25 +137,31 @@ impl Roma {
         Ok(self.view.as_ref().map(|view| (self.cascades.clone(), view.frame)))
     }
 
+    fn usual_log2(&mut self, scene: &SceneFile) -> Option<i32> {
+        *self.usual_log2.get_or_insert_with(|| usual_cell_log2(scene.resident()))
+    }
+
+    /// Whether rays of a length, world units, are too short for maps to help tracing them: what they meet is as near as what is overlooked.
+    pub fn is_short(&mut self, scene: &SceneFile, length: f64) -> bool {
+        self.usual_log2(scene).is_some_and(|cell_log2| length < LEAST_CELLS * f64::from(cell_log2).exp2())
+    }
+
     /// The base maps around the camera, as wide as `size` cells would be of which bricks have all, of `cells` on each axis, once or twice as
     /// many.
     ///
     /// # Errors
     /// Occupancy that cannot be read.
     pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32, cells: u32) -> Result<&Arc<Cascades>, ExecutorError> {
+        let usual_log2 = self.usual_log2(scene);
         let Some(RomaView { camera, sample, seed, .. }) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
-        // Scales may have changed.
-        let is_as_fine = !self.has_moved || usual_cell_log2(scene.resident()) == self.usual_log2;
-        self.has_moved = false;
-        let of = [size, cells];
+        let wanted = Wanted { size, cells, usual_log2 };
         let mut assembler = match self.assembler.take() {
-            Some((made, assembler)) if made == of && is_as_fine => assembler,
+            Some((made, assembler)) if made == wanted => assembler,
             _ => {
                 self.is_assembled = false;
-                self.usual_log2 = usual_cell_log2(scene.resident());
                 let halvings = (cells / size).ilog2() as i32;
-                let finest_log2 = self.usual_log2.map(|usual| usual - halvings);
+                let finest_log2 = wanted.usual_log2.map(|usual| usual - halvings);
                 let settings = Settings { cells, finest_log2, levels: MOST_LEVELS, ..Settings::default() };
                 Assembler::new(scene.clone(), settings).map_err(failed)?
             }
@@ -165,7 +181,7 @@ impl Roma {
             self.raster = raster;
             self.is_assembled = true;
         }
-        self.assembler = Some((of, assembler));
+        self.assembler = Some((wanted, assembler));
         Ok(&self.cascades)
     }
 
@@ -177,7 +193,7 @@ impl Roma {
     /// Side of the finest base map, world units, by the cells on each axis that it would have if they were bricks': of maps of twice as many, two of
     /// their cells.
     pub fn finest_cell(&self) -> Option<f64> {
-        let per_cell = self.assembler.as_ref().map_or(1, |([size, cells], _)| cells / size);
+        let per_cell = self.assembler.as_ref().map_or(1, |(made, _)| made.cells / made.size);
         self.cascades.levels.first().map(|bom| f64::from(bom.cell_log2).exp2() * f64::from(per_cell))
     }
 }

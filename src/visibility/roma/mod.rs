@@ -119,6 +119,9 @@ pub const MOST_LEVELS: u32 = 6;
 /// Most cells of a map on each axis.
 pub const MOST_CELLS: u32 = 256;
 
+/// Cells of bricks than which no ray of use is shorter (spec §2).
+pub const LEAST_CELLS: f64 = 3.0;
+
 /// Most rays of which one is traced.
 pub const MOST_ONE_IN: u32 = 16;
 
