@@ -10,7 +10,7 @@ use super::summary;
 use crate::kernel::Extent;
 use crate::render::denoise::Resolve;
 use crate::render::{
-    Accumulation, BATCH_SAMPLES, Captures, Field, Light, RenderError, RenderSettings, Renderer, Roma, Rsm, Schedule,
+    Accumulation, BATCH_SAMPLES, Captures, Dvf, Field, Light, RenderError, RenderSettings, Renderer, Roma, Rsm, Schedule,
 };
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
@@ -173,6 +173,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         roma: Roma::default(),
         field: Field::default(),
         rsm: Rsm::default(),
+        dvf: Dvf::default(),
         host_seen: HostCacheStats::default(),
     }
 }

@@ -8,8 +8,9 @@
 use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
+use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;
-use crate::kernel::layout::{GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
+use crate::kernel::layout::{DvfTriangle, GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
@@ -50,6 +51,8 @@ pub enum Defect {
     Fields,
     /// What lamps see is looked up a texel aside.
     LampMaps,
+    /// Points of fields of visibility lie elsewhere.
+    Points,
 }
 
 /// Both executors.
@@ -140,6 +143,7 @@ impl Findings {
                 r.unresolved,
                 r.queries_tightened,
                 r.rays_capped,
+                r.rays_answered,
             ]
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
@@ -273,6 +277,17 @@ impl Lockstep {
         }
         if steps.contains(&Step::RomaRotate) {
             findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfAreas { .. } | Step::DvfCounts { .. })) {
+            findings.words("sums over triangles", context, &self.gpu.read_dvf_sums()?, &self.cpu.read_dvf_sums()?);
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfRays { .. })) {
+            findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfWrite | Step::DvfFinish { .. })) {
+            let (gpu, cpu) = (self.gpu.read_dvf()?, self.cpu.read_dvf()?);
+            findings.words("masks of cells", context, &gpu.0, &cpu.0);
+            findings.words("labels of cells", context, &gpu.1, &cpu.1);
         }
         if steps.contains(&Step::FieldMake) {
             findings.words("distances of fields", context, &self.gpu.read_distances()?, &words_of(self.cpu.fields()));
@@ -455,6 +470,28 @@ impl FrameExecutor for Lockstep {
             own.maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
         }
         self.cpu.set_rsm(&own)
+    }
+
+    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::Points) {
+            own.grid.seed ^= 1;
+        }
+        self.cpu.set_dvf(&own)
+    }
+
+    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf_triangles(triangles, points)?;
+        self.cpu.set_dvf_triangles(triangles, points)
+    }
+
+    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
+        self.gpu.read_dvf()
+    }
+
+    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
+        self.gpu.read_dvf_sums()
     }
 
     fn begin_frame(&mut self, view: &View) {

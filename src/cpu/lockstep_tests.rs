@@ -16,7 +16,7 @@ use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
 use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Effects, Equirectangular, Field, Light, Occlusion, RenderSettings, Renderer, Roma, Rsm, Schedule,
+    Dvf, Effects, Equirectangular, Field, Light, Occlusion, RenderSettings, Renderer, Roma, Rsm, Schedule,
     emissive_triangles, environment,
 };
 use crate::scene::path::path_from_bounds;
@@ -311,6 +311,7 @@ fn render(
         roma: Roma::default(),
         field: Field::default(),
         rsm: Rsm::default(),
+        dvf: Dvf::default(),
         host_seen: HostCacheStats::default(),
     };
     let path = path_from_bounds(manifest.min, manifest.max);

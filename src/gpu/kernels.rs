@@ -231,6 +231,12 @@ pub(super) fn rsm_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "rsm", &[Read, Read, Read, Read, Read, Write])
 }
 
+/// The layout of group 2 of kernels over discrete visibility fields.
+pub(super) fn dvf_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    use Bound::{Read, Write};
+    layout(device, "dvf", &[Read, Write, Write, Read, Write, Read])
+}
+
 /// The layout of a group of `count` storage buffers that are read.
 pub(super) fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
     layout(device, label, &vec![Bound::Read; count])

@@ -67,7 +67,7 @@ fn emitter(file: &SceneFile, triangle: &Shining, place: &bricks::Instance) -> Em
 }
 
 /// Words of a payload, checked by the file as they are copied.
-fn words(file: &SceneFile, payload: Payload) -> Result<Vec<u32>, bricks::Error> {
+pub(super) fn words(file: &SceneFile, payload: Payload) -> Result<Vec<u32>, bricks::Error> {
     let mut words = vec![0u32; file.loaded_bytes(payload) as usize / 4];
     file.copy(payload, bytemuck::cast_slice_mut(&mut words))?;
     Ok(words)
@@ -97,7 +97,7 @@ fn append(file: &SceneFile, object: &Object, index: u32, out: &mut Vec<Shining>)
 }
 
 /// A vertex in object units.
-fn vertex(object: &Object, brick: &Brick, words: &[u32], index: usize) -> DVec3 {
+pub(super) fn vertex(object: &Object, brick: &Brick, words: &[u32], index: usize) -> DVec3 {
     let (step, unit) = (f64::from(object.step_log2).exp2(), f64::from(object.unit_log2).exp2());
     let is_wide = brick.flags & BRICK_WIDE != 0;
     let first = index * if is_wide { 6 } else { 3 };

@@ -2,7 +2,7 @@
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Roma, Rsm, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Dvf, Effects, Field, Light, Roma, Rsm, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -136,6 +136,8 @@ pub struct Renderer {
     pub roma: Roma,
     /// The distance fields, where settings ask for them.
     pub field: Field,
+    /// The field of visibility, where one has been made or read.
+    pub dvf: Dvf,
     /// The reflective shadow maps, where diffuse rays are answered by occupancy maps.
     pub rsm: Rsm,
     /// The host cache's statistics at the end of the pass before.
@@ -189,6 +191,7 @@ impl Renderer {
             }
             self.executor.begin_frame(&view);
             self.roma.begin(camera.position, &view);
+            self.dvf.begin(&view);
             if sample == 0 && effects.diffuse.is_some() {
                 self.prepare_rsm(&mut records, &view)?;
             }
@@ -338,6 +341,7 @@ impl Renderer {
                 Role::Sift(one_in) => first.push(trace(RomaPart::Sift { one_in })),
             }
         }
+        first.extend(self.dvf.prepare(&mut *self.executor, pass)?);
         if self.add_by_field(pass, add, stats)? {
             return Ok(());
         }
