@@ -1,16 +1,48 @@
 // Answers the rays of the pass that a discrete visibility field tells: those are ended before they are traced. In a cell that is mostly visible
-// directions that no ray from it missed in vain are free; in one that is mostly occluded, directions in which none went free are not. All others
-// are traced: the same rays as without a field, in whatever way it is wrong they see it.
+// directions that no ray from it met anything in are free; in one that is mostly occluded, directions in which none went free are not. All others
+// are traced, and are the same rays as without a field.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
+#include "shared/shading.wgsl"
 #include "shared/exact.wgsl"
 #include "shared/dvf.wgsl"
 
 var<workgroup> counted: atomic<u32>;
 
+// As the paper has it: only what the masks know to be against the label is traced; the label is noted.
+fn sift_as_in_paper(index: u32, ray: Ray) -> bool {
+    let cell = dvf_cell(ray.origin);
+    var is_free = false;
+    var is_met = false;
+    var is_occluded_cell = false;
+    if cell != NONE {
+        let texel = dvf_texel(ray.direction);
+        let words = dvf_words();
+        let at = 2u * cell * words + texel / 32u;
+        is_free = (atomicLoad(&dvf_masks[at]) >> (texel % 32u) & 1u) != 0u;
+        is_met = (atomicLoad(&dvf_masks[at + words]) >> (texel % 32u) & 1u) != 0u;
+        is_occluded_cell = dvf_labels[cell] == DVF_OCCLUDED_LABEL;
+    }
+    gbuffer[index].padding0 = select(0u, 1u, is_occluded_cell);
+    if !is_traced(index, ray) || select(is_met, is_free, is_occluded_cell) {
+        return false;
+    }
+    hits[index].t = -1.0;
+    if is_occluded_cell {
+        hits[index].id = DVF_HIT;
+    }
+    return true;
+}
+
 // Answers a ray; whether it did.
 fn sift(index: u32, ray: Ray) -> bool {
+    if (dvf.flags & DVF_PAPER) != 0u {
+        return sift_as_in_paper(index, ray);
+    }
     let cell = dvf_cell(ray.origin);
+    if !is_traced(index, ray) {
+        return false;
+    }
     if cell == NONE {
         return false;
     }
@@ -42,7 +74,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
     if global.x < params.width && global.y < params.height {
         let index = global.y * params.width + global.x;
         let ray = rays[index];
-        if is_traced(index, ray) && sift(index, ray) {
+        if sift(index, ray) {
             atomicAdd(&counted, 1u);
         }
     }

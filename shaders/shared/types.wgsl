@@ -297,7 +297,7 @@ struct GBuffer {          // what shading reads of a primary hit
     occlusion: f32,       // share of unshadowed light that the occlusion texture leaves
     metallic: f32,
     roughness: f32,
-    padding0: u32,
+    padding0: u32,        // with DVF_PAPER: 1 where its cell is mostly occluded
     padding1: u32,
 }
 
@@ -420,6 +420,7 @@ const DVF_HAMMERSLEY: u32 = 1u;    // points are those of Hammersley, else hashe
 const DVF_ROUND: u32 = 2u;         // numbers of points are rounded, else raised to whole ones
 const DVF_BOTH: u32 = 4u;          // rays start from both sides of triangles, else from their front
 const DVF_DOUBT: u32 = 8u;         // rays are traced where a mask says both or neither, else by the label
+const DVF_PAPER: u32 = 16u;        // what the masks do not know is not traced, and the label is noted with the hit's attributes
 const DVF_WALK: u32 = 512u;        // elements of a sweep that a workgroup has
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident

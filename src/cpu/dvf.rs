@@ -8,7 +8,7 @@ use super::vector::{Vec3, each, most3};
 use crate::kernel::dispatch::{DVF_AREAS, DVF_COUNTS, DVF_DILATE, DVF_DOWN, DVF_LABELS, DVF_UP};
 use crate::kernel::dvf::{CIRCLE, DvfMaps, sum, sweep_elements};
 use crate::kernel::layout::{
-    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_HIT, DVF_ROUND, DVF_WALK, DvfGrid, DvfTriangle,
+    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_HIT, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid, DvfTriangle, GBuffer,
     INSTANCE_MIRRORED, NONE, Params, Ray, T_INFINITE,
 };
 use crate::math::exact::{
@@ -43,9 +43,7 @@ impl DvfTables {
     pub fn set(&mut self, maps: &DvfMaps) {
         let is_same = match (&maps.field, &self.maps.field) {
             (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-            (None, _) => {
-                !maps.is_new && self.masks.len() == maps.mask_words() && self.labels.len() == maps.cells()
-            }
+            (None, _) => !maps.is_new && self.masks.len() == maps.mask_words() && self.labels.len() == maps.cells(),
             _ => false,
         };
         match &maps.field {
@@ -274,12 +272,33 @@ fn answer(tables: &DvfTables, ray: &Ray) -> Option<bool> {
     is_told.then_some(is_met)
 }
 
+/// Whether a ray, as the paper has it, is traced, and whether its cell is mostly occluded.
+fn as_in_paper(tables: &DvfTables, ray: &Ray) -> (bool, bool) {
+    let grid = &tables.maps.grid;
+    let Some(cell) = cell_of(grid, ray.origin) else { return (false, false) };
+    let texel = mask::texel(ray.direction, grid.octahedral);
+    let words = mask::words(grid.octahedral);
+    let at = 2 * cell * words + texel as usize / 32;
+    let bit = |at: usize| tables.masks[at].load(Ordering::Relaxed) >> (texel % 32) & 1 != 0;
+    let is_occluded = tables.labels[cell] == OCCLUDED;
+    (bit(if is_occluded { at } else { at + words }), is_occluded)
+}
+
 /// Answers the rays of the pass that the field tells; those are not traced.
-pub fn sift(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
-    own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).for_each(|(hits, rays)| {
+pub fn sift(bound: &Bound, tables: &DvfTables, own: &mut RaySet, gbuffer: &mut [GBuffer]) {
+    let is_paper = tables.maps.grid.flags & DVF_PAPER != 0;
+    let all = own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).zip(gbuffer.par_chunks_mut(RUN));
+    all.for_each(|((hits, rays), gbuffer)| {
         let mut tally = Tally::default();
-        for (hit, ray) in hits.iter_mut().zip(rays).filter(|(hit, ray)| is_traced(ray, hit)) {
-            let Some(is_met) = answer(tables, ray) else { continue };
+        for ((hit, ray), g) in hits.iter_mut().zip(rays).zip(gbuffer) {
+            let is_met = if is_paper {
+                let (is_to_trace, is_occluded) = as_in_paper(tables, ray);
+                g.padding0 = is_occluded.into();
+                (is_traced(ray, hit) && !is_to_trace).then_some(is_occluded)
+            } else {
+                is_traced(ray, hit).then(|| answer(tables, ray)).flatten()
+            };
+            let Some(is_met) = is_met else { continue };
             hit.t = -1.0;
             if is_met {
                 hit.id = DVF_HIT;

@@ -21,13 +21,13 @@ use super::roma::{RomaTables, roma_near, roma_rotate, roma_trace};
 use super::rsm::{RsmTables, rsm_light, rsm_write};
 use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
-use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
+use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, dvf_light, hit_demand, shade};
 use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, DVF_KERNELS, DVF_RAYS, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS, FIELD_TRACE, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT,
-    RSM_WRITE, are_pairs_culled, dispatches,
+    COUNT_PAIRS, DVF_KERNELS, DVF_RAYS, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS, FIELD_TRACE, INTERSECT_BINARY,
+    ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE, are_pairs_culled, dispatches,
 };
 use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;
@@ -248,7 +248,8 @@ fn run_kernel(
         RSM_LIGHT => rsm_light(bound, rsm, pixels, seen),
         DVF_RAYS => dvf::rays(bound, visibility, own),
         DVF_WRITE => dvf::write(visibility, own),
-        DVF_SIFT => dvf::sift(bound, visibility, own),
+        DVF_SIFT => dvf::sift(bound, visibility, own, &mut pixels.gbuffers[shaded]),
+        "dvf_light" => dvf_light(bound, pixels, shaded, (seen, own), materials),
         making if DVF_KERNELS.contains(&making) => dvf::make(making, bound, visibility),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),

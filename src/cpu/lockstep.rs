@@ -186,9 +186,15 @@ impl Lockstep {
     }
 
     /// Rays that have been made alike on both sides.
-    fn generate(&mut self, context: &str, pass: Pass, bricks: &BrickStates) -> Result<(), ExecutorError> {
-        self.gpu.run(pass, &[Step::Generate], bricks)?;
-        self.cpu.run(pass, &[Step::Generate], bricks)?;
+    fn generate(
+        &mut self,
+        context: &str,
+        pass: Pass,
+        step: Step,
+        bricks: &BrickStates,
+    ) -> Result<(), ExecutorError> {
+        self.gpu.run(pass, &[step], bricks)?;
+        self.cpu.run(pass, &[step], bricks)?;
         let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);
         let surfaces = match pass.set() {
             0 => Vec::new(),
@@ -312,6 +318,7 @@ impl Lockstep {
                     | Step::AddLight
                     | Step::AddOcclusion
                     | Step::RsmLight
+                    | Step::DvfLight
             )
         };
         if steps.iter().any(shades) {
@@ -378,8 +385,8 @@ impl Executor for Lockstep {
             }
         }
         let rest = match steps {
-            [Step::Generate, rest @ ..] => {
-                self.generate(&context, pass, bricks)?;
+            [step @ (Step::Generate | Step::DvfCosine), rest @ ..] => {
+                self.generate(&context, pass, *step, bricks)?;
                 rest
             }
             all => all,

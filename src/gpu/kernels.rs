@@ -83,6 +83,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("shade", "shade", Groups::Shading, &[]),
     ("add_light", "add_light", Groups::Shading, &[]),
     ("add_occlusion", "add_occlusion", Groups::Shading, &[]),
+    ("dvf_light", "dvf_light", Groups::Shading, &[]),
     ("tile_bounds", "tile_bounds", Groups::Tiles, &[]),
     ("tile_walk", "tile_walk_count", Groups::Tiles, &[("WRITE", 0.0)]),
     ("tile_walk", "tile_walk_write", Groups::Tiles, &[("WRITE", 1.0)]),

@@ -385,6 +385,12 @@ pub fn dispatches(
             let widened = dilate.then(|| dvf(DVF_DILATE, params, across((2 * cells).div_ceil(64))));
             widened.into_iter().chain([dvf(DVF_LABELS, params, across(cells.div_ceil(64)))]).collect()
         }
+        Step::DvfCosine => {
+            let [x, y, z] = direction_around(params.sample);
+            let around = [x, y, z, std::f32::consts::TAU];
+            vec![shading("generate_occlusion", Params { around, length: layout::T_INFINITE, ..params }, false)]
+        }
+        Step::DvfLight => vec![shading("dvf_light", params, false)],
         Step::DvfSift => vec![dvf(DVF_SIFT, params, per_ray)],
         Step::RsmWrite { map, corner: [x, y] } => {
             let params = Params { rsm_map: map, rsm_x: x, rsm_y: y, ..params };

@@ -1,7 +1,7 @@
 //! Discrete visibility fields as kernels see them: placed in a frame.
 
 use super::frame::Frame;
-use super::layout::{DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_ROUND, DVF_WALK, DvfGrid};
+use super::layout::{DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid};
 use crate::visibility::dvf::{DvfField, DvfSettings, DvfUse, Shape};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -73,7 +73,7 @@ fn placed(shape: &Shape, frame: &Frame) -> DvfGrid {
 impl DvfMaps {
     /// A field by which rays are answered.
     pub fn to_answer(field: &Arc<DvfField>, frame: &Frame, how: DvfUse) -> Self {
-        let flags = if how.doubt { DVF_DOUBT } else { 0 };
+        let flags = if how.doubt { DVF_DOUBT } else { 0 } | if how.paper { DVF_PAPER } else { 0 };
         Self { grid: DvfGrid { flags, ..placed(&field.shape, frame) }, field: Some(field.clone()), ..Self::default() }
     }
 

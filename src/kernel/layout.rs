@@ -69,6 +69,7 @@ pub const DVF_HAMMERSLEY: u32 = 1;
 pub const DVF_ROUND: u32 = 2;
 pub const DVF_BOTH: u32 = 4;
 pub const DVF_DOUBT: u32 = 8;
+pub const DVF_PAPER: u32 = 16;
 pub const DVF_WALK: u32 = 512;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.

@@ -62,8 +62,14 @@ impl Dvf {
     pub fn prepare(&self, executor: &mut dyn FrameExecutor, pass: Pass) -> Result<Option<Step>, ExecutorError> {
         let is_of_pass = matches!(pass, Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment));
         let (Some(field), Some(frame), true) = (&self.field, &self.frame, is_of_pass) else { return Ok(None) };
-        executor.set_dvf(&DvfMaps::to_answer(field, frame, self.how))?;
+        let how = DvfUse { paper: self.is_paper(pass), ..self.how };
+        executor.set_dvf(&DvfMaps::to_answer(field, frame, how))?;
         Ok(Some(Step::DvfSift))
+    }
+
+    /// Whether the rays of `pass` are made and light is added as in the paper.
+    pub fn is_paper(&self, pass: Pass) -> bool {
+        self.how.paper && self.field.is_some() && pass == Pass::Shadow(Lamp::Environment)
     }
 }
 
@@ -118,11 +124,8 @@ impl Renderer {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn visible_region(&mut self, cameras: &[Camera]) -> Result<Region, RenderError> {
-        let mut region = Region {
-            min: DVec3::INFINITY,
-            max: DVec3::NEG_INFINITY,
-            bricks: Some(std::collections::BTreeSet::new()),
-        };
+        let mut region =
+            Region { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, bricks: Some(std::collections::BTreeSet::new()) };
         for camera in cameras {
             let effects = self.settings.effects;
             let resident = self.scene.resident();

@@ -254,7 +254,7 @@ impl Renderer {
     }
 
     /// Whether rays lead to the environment.
-    pub(super) fn draws_environment(&self) -> bool {
+    pub fn draws_environment(&self) -> bool {
         self.settings.effects.environment && self.light.lamps.environment.is_some()
     }
 
@@ -317,9 +317,13 @@ impl Renderer {
 
     /// Traces any-hit rays, notes the bricks that were hit, and adds the light that comes through.
     fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
-        let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
+        let (generate, add) = match pass {
+            Pass::Occlusion(_) => (Step::Generate, Step::AddOcclusion),
+            _ if self.dvf.is_paper(pass) => (Step::DvfCosine, Step::DvfLight),
+            _ => (Step::Generate, Step::AddLight),
+        };
         let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
-        let (mut first, mut last) = (vec![Step::Generate], vec![Step::QueryHits]);
+        let (mut first, mut last) = (vec![generate], vec![Step::QueryHits]);
         if let Some(roma) = roma {
             let RomaPass { steps, role, .. } = roma;
             let length = match (pass, self.settings.effects.occlusion) {

@@ -191,6 +191,10 @@ pub enum Step {
         /// Whether masks are widened.
         dilate: bool,
     },
+    /// Make rays around primary hits by the cosine, in place of [`Step::Generate`].
+    DvfCosine,
+    /// Add what they bring of the environment, and what needs no ray, as the paper has it.
+    DvfLight,
     /// Answer the pass's rays, not traced yet, that the field tells, and count them: they are not traced.
     DvfSift,
     /// Add what the hits of the set before that [`Step::RomaTrace`] gave reflect of the lamps, by their reflective shadow maps: phase 3.

@@ -85,7 +85,8 @@ impl DvfField {
     /// How it does on rays from points of the world of which it is known whether they meet anything.
     pub fn trial(&self, rays: &[(DVec3, [f32; 3], bool)], how: DvfUse) -> Trial {
         let count = |is: &(dyn Fn(Answer, bool) -> bool + Sync)| {
-            let counted = rays.par_iter().filter(|(point, direction, hit)| is(self.answer(*point, *direction, how), *hit));
+            let counted =
+                rays.par_iter().filter(|(point, direction, hit)| is(self.answer(*point, *direction, how), *hit));
             counted.count() as f64 / rays.len().max(1) as f64
         };
         Trial {
@@ -127,7 +128,7 @@ mod tests {
     fn what_is_not_known_is_traced() {
         let mut field = field();
         field.finish(false);
-        let [label, doubt] = [false, true].map(|doubt| DvfUse { doubt });
+        let [label, doubt] = [false, true].map(|doubt| DvfUse { doubt, ..DvfUse::default() });
         let (up, down, aside) = ([0.1, 0.0, 5.0], [0.05, 0.02, -5.0], [1.0, 0.2, 0.1]);
         assert_eq!(field.answer(DVec3::ONE, up, label), Answer::Free);
         assert_eq!(field.answer(DVec3::ONE, down, label), Answer::Trace, "the cell is mostly visible");
@@ -136,7 +137,8 @@ mod tests {
         for far in [DVec3::splat(3.9), DVec3::splat(-9.0)] {
             assert_eq!(field.answer(far, up, doubt), Answer::Trace, "empty cells and what lies outside");
         }
-        let rays = [(DVec3::ONE, up, false), (DVec3::ONE, up, true), (DVec3::ONE, down, true), (DVec3::ONE, aside, true)];
+        let rays =
+            [(DVec3::ONE, up, false), (DVec3::ONE, up, true), (DVec3::ONE, down, true), (DVec3::ONE, aside, true)];
         let trial = field.trial(&rays, label);
         assert_eq!((trial.traced, trial.wrong), (0.5, 0.25));
     }

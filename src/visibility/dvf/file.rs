@@ -74,7 +74,8 @@ pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfField, FileError> 
         return Err(FileError::Foreign);
     }
     let array = |at: usize| bytes.get(at..at + 8).and_then(|b| <[u8; 8]>::try_from(b).ok());
-    let word = |at: usize| bytes.get(at..at + 4).and_then(|b| <[u8; 4]>::try_from(b).ok()).map_or(0, u32::from_le_bytes);
+    let word =
+        |at: usize| bytes.get(at..at + 4).and_then(|b| <[u8; 4]>::try_from(b).ok()).map_or(0, u32::from_le_bytes);
     let version = word(8);
     if bytes.len() >= HEAD && version != VERSION {
         return Err(FileError::Version(version));

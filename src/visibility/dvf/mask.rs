@@ -141,7 +141,9 @@ mod tests {
     fn widening_what_was_brought_together_is_bringing_together_what_was_widened() {
         for side in [8, 16, 32] {
             let random = |seed: u32| -> Vec<u32> {
-                (0..words(side) as u32).map(|i| crate::math::sampling::pcg(i ^ seed << 8) & crate::math::sampling::pcg(i + 77 * seed)).collect()
+                (0..words(side) as u32)
+                    .map(|i| crate::math::sampling::pcg(i ^ seed << 8) & crate::math::sampling::pcg(i + 77 * seed))
+                    .collect()
             };
             let (mut a, mut b) = (random(1), random(2));
             let mut both: Vec<u32> = a.iter().zip(&b).map(|(a, b)| a | b).collect();

@@ -71,6 +71,9 @@ pub const TRIAL_CELLS: [u32; 2] = [128, 4];
 pub struct DvfUse {
     /// Rays are traced where a mask says both or neither; else by the label, as in the paper: more are traced, and fewer answered wrongly.
     pub doubt: bool,
+    /// As in the paper: rays by the cosine, none where masks know nothing, and spherical harmonics for what is not occluded in cells that are mostly
+    /// visible. Primary hits alone.
+    pub paper: bool,
 }
 
 impl Default for DvfSettings {
