@@ -42,7 +42,9 @@ pub fn prepare(renderer: &mut Renderer, args: &WalkArgs, path: &CameraPath) -> R
         return Ok(None);
     }
     if args.dvf.how().paper && renderer.settings.effects.diffuse.is_some() {
-        bail!("--dvf-mode paper goes without diffuse in --effects, which would bring the environment's light again; use --dvf-mode same-sample");
+        bail!(
+            "--dvf-mode paper goes without diffuse in --effects, which would bring the environment's light again; use --dvf-mode same-sample"
+        );
     }
     let settings = args.dvf.settings();
     let name = args.scene.display().to_string();

@@ -8,8 +8,8 @@ use super::vector::{Vec3, each, most3};
 use crate::kernel::dispatch::{DVF_AREAS, DVF_COUNTS, DVF_DILATE, DVF_DOWN, DVF_LABELS, DVF_UP};
 use crate::kernel::dvf::{CIRCLE, DvfMaps, sum, sweep_elements};
 use crate::kernel::layout::{
-    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_HIT, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid, DvfTriangle, GBuffer,
-    INSTANCE_MIRRORED, NONE, Params, Ray, T_INFINITE,
+    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_HIT, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid,
+    DvfTriangle, GBuffer, INSTANCE_MIRRORED, NONE, Params, Ray, T_INFINITE,
 };
 use crate::math::exact::{
     TriangleHit, barrier, diffprod, divide, length_of, offset_origin, scaled, square_root, surface_point,

@@ -186,13 +186,7 @@ impl Lockstep {
     }
 
     /// Rays that have been made alike on both sides.
-    fn generate(
-        &mut self,
-        context: &str,
-        pass: Pass,
-        step: Step,
-        bricks: &BrickStates,
-    ) -> Result<(), ExecutorError> {
+    fn generate(&mut self, context: &str, pass: Pass, step: Step, bricks: &BrickStates) -> Result<(), ExecutorError> {
         self.gpu.run(pass, &[step], bricks)?;
         self.cpu.run(pass, &[step], bricks)?;
         let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);

@@ -328,7 +328,13 @@ fn render(
         let made = renderer.make_dvf(settings, &Region::scene(scene.resident()), 4, &mut |_, _| true).unwrap();
         assert!(made.points > 0 && made.field.known_cells() > 0);
         assert_eq!(made.trials.is_empty(), settings.cells != Cells::Auto);
-        renderer.dvf = Dvf::new(Arc::new(made.field), DvfUse { doubt: settings.octahedral == 8, paper: settings.hammersley && settings.dilate && settings.octahedral == 16 });
+        renderer.dvf = Dvf::new(
+            Arc::new(made.field),
+            DvfUse {
+                doubt: settings.octahedral == 8,
+                paper: settings.hammersley && settings.dilate && settings.octahedral == 16,
+            },
+        );
     }
     for frame in 0..2 {
         // The second frame scatters directions.

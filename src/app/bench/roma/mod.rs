@@ -7,7 +7,7 @@
 pub mod args;
 mod output;
 mod plan;
-mod rows;
+pub(in crate::app::bench) mod rows;
 mod view;
 
 use super::cells::Header;
