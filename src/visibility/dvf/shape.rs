@@ -27,7 +27,8 @@ impl Shape {
         let greatest = extent.max_element();
         // A point has a cell of some size.
         let greatest = if greatest > 0.0 { greatest } else { 1.0 };
-        let side = greatest / (f64::from(longest) - BEFORE).max(0.5);
+        // The last cell holds the region's end, by the same margin about.
+        let side = greatest / (f64::from(longest) - 0.5);
         let size = extent.to_array().map(|x| ((x / side + BEFORE).floor() + 1.0) as u32);
         Self { corner: min - BEFORE * side, side, size, octahedral }
     }
@@ -70,12 +71,12 @@ mod tests {
         for longest in [1, 2, 3, 8, 77] {
             let (min, max) = (DVec3::new(-3.0, 1.0, 1e6), DVec3::new(5.0, 1.0, 1e6 + 2.0));
             let shape = Shape::new(min, max, longest, 16);
-            assert!(shape.size[0].abs_diff(longest) <= u32::from(longest < 2), "{longest}: {:?}", shape.size);
+            assert_eq!(shape.size[0], longest, "{:?}", shape.size);
             assert!(shape.size[1] >= 1);
             for corner in [min, max, 0.5 * (min + max)] {
                 assert!(shape.cell(corner).is_some(), "{longest} {corner}");
             }
-            assert_eq!(shape.cell(max + shape.side * 2.0), None);
+            assert_eq!(shape.cell(max + shape.side), None);
             assert_eq!(shape.cell(min - shape.side), None);
         }
         assert_eq!(Shape::new(DVec3::ONE, DVec3::ONE, 16, 8).cells(), 1);
