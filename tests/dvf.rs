@@ -19,10 +19,10 @@ use std::sync::Arc;
 
 /// A renderer of a scene in an environment that is 1 everywhere.
 fn renderer(scene: &Path, options: &str) -> Renderer {
-    let words = format!(
-        "brickwalk walk {} -o o --tile 16 --adapter cpu --aov --sun-intensity 0 --effects environment {options}",
-        scene.display()
-    );
+    let options =
+        if options.contains("--effects") { options.into() } else { format!("{options} --effects environment") };
+    let words =
+        format!("brickwalk walk {} -o o --tile 16 --adapter cpu --aov --sun-intensity 0 {options}", scene.display());
     let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
         panic!("a walk")
     };

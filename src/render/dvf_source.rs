@@ -116,11 +116,11 @@ pub fn triangles(
         let m = &instance.world_from_object;
         let row = |k: usize| DVec3::new(m[4 * k], m[4 * k + 1], m[4 * k + 2]);
         let world = |p: DVec3| DVec3::from_array([0, 1, 2].map(|k| row(k).dot(p) + m[4 * k + 3]));
-        for i in 0..brick.triangle_count as usize {
+        for (i, id) in ids.iter().take(brick.triangle_count as usize).enumerate() {
             let [a, b, c] = [0, 1, 2].map(|k| world(vertex(object, brick, vertices, corner(3 * i + k))));
             if region.meets(a.min(b).min(c), a.max(b).max(c)) {
                 let [a, b, c] = [a, b, c].map(|p| frame.point(p));
-                out.push(DvfTriangle { a, id: instance.base + ids[i], b, flags: instance.flags, c, padding: 0 });
+                out.push(DvfTriangle { a, id: instance.base + id, b, flags: instance.flags, c, padding: 0 });
             }
         }
     }
