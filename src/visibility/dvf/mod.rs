@@ -12,7 +12,7 @@
 //! triangles and found by binary search, so that large triangles are shared out over lanes by themselves; hashes take the triangle's id rather than
 //! its vertices' numbers, which repeat in simple scenes.
 //!
-//! *Practice.* [`mask`] has the masks, [`shape`] the grid, [`field`] a whole field and what is said of it, [`file`] its file.
+//! *Practice.* [`mask`] has the masks, [`shape`] the grid, [`field`] a whole field and what is said of it, [`mod@file`] its file.
 //! Kernels: `shaders/dvf_*.wgsl`.
 
 pub mod field;
