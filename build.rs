@@ -108,6 +108,8 @@ fn layout_checks(module: &naga::Module) -> String {
         "RomaMap",
         "RsmMap",
         "RsmTexel",
+        "DvfGrid",
+        "DvfTriangle",
     ];
     let mut s = String::new();
     for name in mirrored {
@@ -146,6 +148,7 @@ fn layout_checks(module: &naga::Module) -> String {
             "ROMA_",
             "FIELD_HIT",
             "RSM_",
+            "DVF_",
             "NONE",
         ];
         if prefixes.iter().any(|p| name.starts_with(p))

@@ -43,6 +43,7 @@ pub struct SceneFile {
     source: Arc<dyn Source>,
     file_bytes: u64,
     resident_bytes: u64,
+    checksum: u64,
     resident: Resident,
     validated: Arc<Validated>,
 }
@@ -107,18 +108,20 @@ impl SceneFile {
         validate::spans(&resident, header.directory_offset).map_err(|flaw| reader.invalid(flaw))?;
         let resident_bytes = header.directory_bytes + directory.iter().map(|entry| entry.bytes).sum::<u64>();
         let validated = Arc::new(Validated::none(&resident));
-        Ok(SceneFile { path, file, source, file_bytes: header.file_bytes, resident_bytes, resident, validated })
+        let (file_bytes, checksum) = (header.file_bytes, header.checksum);
+        Ok(SceneFile { path, file, source, file_bytes, resident_bytes, checksum, resident, validated })
     }
 
     /// The same scene once more, to be placed otherwise: it reads the same file, and has a resident part of its own.
     pub fn duplicate(&self) -> SceneFile {
-        let Self { path, file, source, file_bytes, resident_bytes, resident, validated } = self;
+        let Self { path, file, source, file_bytes, resident_bytes, checksum, resident, validated } = self;
         SceneFile {
             path: path.clone(),
             file: file.clone(),
             source: source.clone(),
             file_bytes: *file_bytes,
             resident_bytes: *resident_bytes,
+            checksum: *checksum,
             resident: resident.clone(),
             validated: validated.clone(),
         }
@@ -150,6 +153,11 @@ impl SceneFile {
     /// Bytes of the directory and the sections: what opening reads besides the header.
     pub fn resident_bytes(&self) -> u64 {
         self.resident_bytes
+    }
+
+    /// The header's checksum: through the directory's, it depends on every byte of the file that means anything.
+    pub fn checksum(&self) -> u64 {
+        self.checksum
     }
 
     /// Where a payload lies in the file; all zero for proxies that the scene does not have.

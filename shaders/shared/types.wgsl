@@ -63,6 +63,10 @@ struct Params {
     rsm_map: u32,         // rsm_write: the one that is written,
     rsm_x: u32,           // and its texel that ray 0 of the pass is for
     rsm_y: u32,
+    dvf_first: u32,       // dvf_rays: number of the first ray of the block; sweeps: first element of the level
+    dvf_next: u32,        // sweeps: first element of the level above
+    dvf_count: u32,       // sweeps: elements of the level
+    dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -293,7 +297,7 @@ struct GBuffer {          // what shading reads of a primary hit
     occlusion: f32,       // share of unshadowed light that the occlusion texture leaves
     metallic: f32,
     roughness: f32,
-    padding0: u32,
+    padding0: u32,        // with DVF_PAPER: 1 where its cell is mostly occluded
     padding1: u32,
 }
 
@@ -330,6 +334,34 @@ struct RsmTexel {
     depth: f32,           // t of the texel's ray, device units; below 0: it met nothing
     normal: vec3<f32>,    // geometric unit normal toward the lamp, world space
     facing: f32,          // minus the cosine between it and the texel's ray, times the ray's length: of a unit of depth, the part across the surface
+}
+
+struct DvfGrid {          // a discrete visibility field in the frame: point p lies at scale * p + first, in cells
+    first: vec3<f32>,
+    scale: f32,
+    size: vec3<u32>,      // cells on each axis
+    octahedral: u32,      // texels of a mask on both axes: 8, 16 or 32
+    flags: u32,           // DVF_* bits
+    points: f32,          // that are to lie on all triangles
+    total: f32,           // twice the area of all triangles, device units
+    area_scale: f32,      // steps in which areas are summed, a device unit of area
+    rays: u32,            // of a point, on each side
+    lanes: u32,           // over which the rays of a point are shared out
+    triangles: u32,       // of the group at hand
+    point_count: u32,     // on these
+    seed: u32,
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
+}
+
+struct DvfTriangle {      // in the frame, device units
+    a: vec3<f32>,
+    id: u32,              // global id
+    b: vec3<f32>,
+    flags: u32,           // INSTANCE_MIRRORED: its front is where a, b, c go clockwise
+    c: vec3<f32>,
+    padding: u32,
 }
 
 struct Emitter {          // in the frame, device units; one of them is drawn by an alias table over their power
@@ -383,6 +415,13 @@ const ROMA_WHOLE: u32 = 0u; // all of them
 const ROMA_FAR: u32 = 1u;   // from where they have been traced to
 const ROMA_SIFT: u32 = 2u;  // those alone that meet nothing
 const FIELD_HIT: u32 = 0xfffffffdu;  // id of what is met in a distance field, which is no triangle
+const DVF_HIT: u32 = 0xfffffffcu;    // id of what a discrete visibility field says is met, which is no triangle
+const DVF_HAMMERSLEY: u32 = 1u;    // points are those of Hammersley, else hashed
+const DVF_ROUND: u32 = 2u;         // numbers of points are rounded, else raised to whole ones
+const DVF_BOTH: u32 = 4u;          // rays start from both sides of triangles, else from their front
+const DVF_DOUBT: u32 = 8u;         // rays are traced where a mask says both or neither, else by the label
+const DVF_PAPER: u32 = 16u;        // what the masks do not know is not traced, and the label is noted with the hit's attributes
+const DVF_WALK: u32 = 512u;        // elements of a sweep that a workgroup has
 const BINARY_LEAF: u32 = 0x80000000u;
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass
@@ -410,6 +449,7 @@ const COUNTER_TILES_FROM_ROOT: u32 = 18u;
 const COUNTER_TILES_CHOSEN: u32 = 19u;
 const COUNTER_ROMA_CAPPED: u32 = 20u;
 const COUNTER_UNRESOLVED: u32 = 21u;
+const COUNTER_DVF_ANSWERED: u32 = 22u;
 const COUNTER_FIELD_CAPPED: u32 = 23u;
 const WORK_CHOSEN: u32 = 24u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 28u;      // the same over tiles whose rays walk from the root

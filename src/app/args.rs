@@ -3,6 +3,7 @@
 
 use super::bench::args::BenchArgs;
 use super::device::Adapter;
+use super::dvf_args::DvfArgs;
 use super::field_args::FieldArgs;
 use super::inputs::{FromArgs, InputArgs};
 use super::light_args::{EffectArgs, LightArgs};
@@ -363,6 +364,7 @@ pub struct WalkArgs {
     /// translation, rotation 0,0,0,1 and scale 1 (1e-6 to 1e6), the defaults, leave it there. Translations lie on a Catmull-Rom spline, rotations turn the
     /// shorter way, and before the first keyframe and after the last it rests. What moves is an instance: see info --instances and convert
     /// --movable [default: nothing moves]
+    #[allow(rustdoc::broken_intra_doc_links)]
     #[arg(long, value_name = "M.json")]
     pub motion: Option<PathBuf>,
     /// Frames along the path
@@ -380,7 +382,9 @@ pub struct WalkArgs {
     /// How secondary rays are answered: exact (all are traced), roma (those of ao, shadow and diffuse by maps of what cells are occupied, with a
     /// bias of a few cells, and without a brick loaded for them; what diffuse rays meet is lit by maps of what the sun, points and spots light, which
     /// load what these see; others are traced), auto (those of ao and shadow that these maps find free are not traced: an error of the nearest cell
-    /// alone), df (those of ao and shadow by distances to occupied cells: the baseline that roma is compared with)
+    /// alone), df (those of ao and shadow by distances to occupied cells: the baseline that roma is compared with),
+    /// dvf (those to the environment by what a field knows of the directions around them: most are not traced; the field is made on the first walk
+    /// and kept beside the scene)
     #[arg(long, value_name = "METHOD", default_value = "exact")]
     pub secondary: Secondary,
     /// Occupancy maps.
@@ -389,6 +393,9 @@ pub struct WalkArgs {
     /// Distance fields.
     #[command(flatten)]
     pub df: FieldArgs,
+    /// Fields of visibility.
+    #[command(flatten)]
+    pub dvf: DvfArgs,
     /// Samples per pixel, 1 to 1M; beyond 64 they are summed in f64, so that no number of them makes the sum drift
     #[arg(long, value_name = "N", default_value = "1", value_parser = samples)]
     pub spp: u32,
@@ -560,7 +567,9 @@ named_values! {
         Auto = "auto",
         /// Those that occupancy maps can answer by distance fields.
         Df = "df",
-    } later &["dvf", "displacement"]
+        /// Those to the environment by fields of visibility.
+        Dvf = "dvf",
+    } later &["displacement"]
 }
 
 /// Accepts the values of a list.

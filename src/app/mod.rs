@@ -8,6 +8,8 @@ pub mod compare;
 pub mod convert;
 pub mod demo;
 pub mod device;
+pub mod dvf;
+pub mod dvf_args;
 pub mod field_args;
 pub mod info;
 mod inputs;

@@ -1,6 +1,7 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::args::{Secondary, WalkArgs};
+use super::dvf;
 use super::left_out;
 use super::lighting::lighting;
 use super::motion::WalkMotion;
@@ -11,7 +12,7 @@ use super::summary;
 use crate::kernel::Extent;
 use crate::render::denoise::Resolve;
 use crate::render::{
-    Accumulation, BATCH_SAMPLES, Captures, Field, Light, Moved, RenderError, RenderSettings, Renderer, Roma, Rsm,
+    Accumulation, BATCH_SAMPLES, Captures, Dvf, Field, Light, Moved, RenderError, RenderSettings, Renderer, Roma, Rsm,
     Schedule,
 };
 use crate::scene::Camera;
@@ -37,7 +38,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     let scene = open_scene(&args.scene)?;
     let manifest = &scene.resident().manifest;
     let has_occupancy = scene.resident().bricks.is_empty() || !scene.resident().occupancy.is_empty();
-    if args.secondary != Secondary::Exact && !has_occupancy {
+    if !matches!(args.secondary, Secondary::Exact | Secondary::Dvf) && !has_occupancy {
         let (name, secondary) = (args.scene.display(), args.secondary.name());
         bail!(
             "{name}: --secondary {secondary} needs the occupancy of bricks; convert the scene again without --no-proxies"
@@ -67,6 +68,10 @@ pub fn run(args: &WalkArgs) -> Result<()> {
     }
     let mut renderer = lit_renderer(session, args, lighting.light.clone());
     renderer.captures = args.measure_error.then(Captures::default);
+    let note = match args.secondary {
+        Secondary::Dvf => dvf::prepare(&mut renderer, args, &path)?,
+        _ => None,
+    };
     let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
     let mut resolve = Resolve::new(args.pictures.denoise, args.pictures.taa);
     let mut pictures = Pictures::create(&frames_folder, args)?;
@@ -148,7 +153,10 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         None => Vec::new(),
     };
     let left_out = left_out::listed(&left_out, &measured);
-    let summary = summary::of_walk(args, &mut renderer, (&pictures, &lighting, &resolve), &records, finished, left_out);
+    let visibility = note.map(|note| note.report(&renderer, args));
+    let mut summary =
+        summary::of_walk(args, &mut renderer, (&pictures, &lighting, &resolve), &records, finished, left_out);
+    summary["settings"]["dvf"] = visibility.into();
     finish(args, &renderer, &summary)?;
     if finished < args.frames {
         bail!("interrupted after {finished} of {} frames; {} holds what is done", args.frames, args.output.display());
@@ -193,6 +201,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         roma: Roma::new(args.roma.source()),
         field: Field::default(),
         rsm: Rsm::default(),
+        dvf: Dvf::default(),
         host_seen: HostCacheStats::default(),
     }
 }

@@ -1,6 +1,7 @@
 //! The CPU executor: runs the kernels that a step consists of one after the other, each over all rays or tiles in parallel.
 
 use super::cache::{BrickCache, Shared};
+use super::dvf::{self, DvfTables};
 use super::field::{FieldTables, field_trace, make_field};
 use super::generate::{
     generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
@@ -20,14 +21,15 @@ use super::roma::{RomaTables, roma_near, roma_rotate, roma_trace};
 use super::rsm::{RsmTables, rsm_light, rsm_write};
 use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
-use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
+use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, dvf_light, hit_demand, shade};
 use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, Dispatch, FIELD_KERNELS, FIELD_TRACE, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT,
-    RSM_WRITE, are_pairs_culled, dispatches,
+    COUNT_PAIRS, DVF_KERNELS, DVF_RAYS, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS, FIELD_TRACE, INTERSECT_BINARY,
+    ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE, are_pairs_culled, dispatches,
 };
+use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
@@ -57,6 +59,7 @@ struct Buffers {
     roma: RomaTables,
     field: FieldTables,
     rsm: RsmTables,
+    dvf: DvfTables,
 }
 
 /// Renders one scene on the processor.
@@ -109,6 +112,7 @@ impl CpuExecutor {
                 roma: RomaTables::default(),
                 field: FieldTables::default(),
                 rsm: RsmTables::default(),
+                dvf: DvfTables::default(),
             },
             binary: None,
             extent,
@@ -186,7 +190,7 @@ fn run_kernel(
     (sampling, tile_demand): (Sampling, &[TileDemand]),
     binary: Option<&BinaryTrees>,
 ) -> Result<(), ExecutorError> {
-    let Buffers { sets, pixels, tiles, roma, field, rsm } = buffers;
+    let Buffers { sets, pixels, tiles, roma, field, rsm, dvf: visibility } = buffers;
     // The set of the pass, and the one before it, whose hits are shaded.
     let shaded = pass.set().saturating_sub(1);
     let (before, from) = sets.split_at_mut(pass.set());
@@ -242,6 +246,11 @@ fn run_kernel(
         making if FIELD_KERNELS.contains(&making) => make_field(making, bound, field),
         RSM_WRITE => rsm_write(bound, rsm, pixels, seen, materials),
         RSM_LIGHT => rsm_light(bound, rsm, pixels, seen),
+        DVF_RAYS => dvf::rays(bound, visibility, own),
+        DVF_WRITE => dvf::write(visibility, own),
+        DVF_SIFT => dvf::sift(bound, visibility, own, &mut pixels.gbuffers[shaded]),
+        "dvf_light" => dvf_light(bound, pixels, shaded, (seen, own), materials),
+        making if DVF_KERNELS.contains(&making) => dvf::make(making, bound, visibility),
         INTERSECT_BINARY => match binary {
             Some(trees) => intersect_binary(bound, own, trees),
             None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
@@ -395,6 +404,24 @@ impl FrameExecutor for CpuExecutor {
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.file = scene.clone();
         self.scene.forget_frame();
+    }
+
+    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
+        self.buffers.dvf.set(maps);
+        Ok(())
+    }
+
+    fn set_dvf_triangles(&mut self, triangles: &[layout::DvfTriangle], points: u32) -> Result<(), ExecutorError> {
+        self.buffers.dvf.set_triangles(triangles, points);
+        Ok(())
+    }
+
+    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
+        Ok((self.buffers.dvf.masks(), self.buffers.dvf.labels.clone()))
+    }
+
+    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
+        Ok(self.buffers.dvf.sums.clone())
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -8,8 +8,9 @@
 use super::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernel::dispatch::dispatches;
+use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;
-use crate::kernel::layout::{GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
+use crate::kernel::layout::{DvfTriangle, GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
@@ -51,6 +52,8 @@ pub enum Defect {
     Fields,
     /// What lamps see is looked up a texel aside.
     LampMaps,
+    /// Points of fields of visibility lie elsewhere.
+    Points,
 }
 
 /// Both executors.
@@ -141,6 +144,7 @@ impl Findings {
                 r.unresolved,
                 r.queries_tightened,
                 r.rays_capped,
+                r.rays_answered,
             ]
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
@@ -183,9 +187,9 @@ impl Lockstep {
     }
 
     /// Rays that have been made alike on both sides.
-    fn generate(&mut self, context: &str, pass: Pass, bricks: &BrickStates) -> Result<(), ExecutorError> {
-        self.gpu.run(pass, &[Step::Generate], bricks)?;
-        self.cpu.run(pass, &[Step::Generate], bricks)?;
+    fn generate(&mut self, context: &str, pass: Pass, step: Step, bricks: &BrickStates) -> Result<(), ExecutorError> {
+        self.gpu.run(pass, &[step], bricks)?;
+        self.cpu.run(pass, &[step], bricks)?;
         let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);
         let surfaces = match pass.set() {
             0 => Vec::new(),
@@ -275,6 +279,17 @@ impl Lockstep {
         if steps.contains(&Step::RomaRotate) {
             findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
         }
+        if steps.iter().any(|step| matches!(step, Step::DvfAreas { .. } | Step::DvfCounts { .. })) {
+            findings.words("sums over triangles", context, &self.gpu.read_dvf_sums()?, &self.cpu.read_dvf_sums()?);
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfRays { .. })) {
+            findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfWrite | Step::DvfFinish { .. })) {
+            let (gpu, cpu) = (self.gpu.read_dvf()?, self.cpu.read_dvf()?);
+            findings.words("masks of cells", context, &gpu.0, &cpu.0);
+            findings.words("labels of cells", context, &gpu.1, &cpu.1);
+        }
         if steps.contains(&Step::FieldMake) {
             findings.words("distances of fields", context, &self.gpu.read_distances()?, &words_of(self.cpu.fields()));
         }
@@ -298,6 +313,7 @@ impl Lockstep {
                     | Step::AddLight
                     | Step::AddOcclusion
                     | Step::RsmLight
+                    | Step::DvfLight
             )
         };
         if steps.iter().any(shades) {
@@ -364,8 +380,8 @@ impl Executor for Lockstep {
             }
         }
         let rest = match steps {
-            [Step::Generate, rest @ ..] => {
-                self.generate(&context, pass, bricks)?;
+            [step @ (Step::Generate | Step::DvfCosine), rest @ ..] => {
+                self.generate(&context, pass, *step, bricks)?;
                 rest
             }
             all => all,
@@ -461,6 +477,28 @@ impl FrameExecutor for Lockstep {
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.gpu.set_scene(scene);
         self.cpu.set_scene(scene);
+    }
+
+    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::Points) {
+            own.grid.seed ^= 1;
+        }
+        self.cpu.set_dvf(&own)
+    }
+
+    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf_triangles(triangles, points)?;
+        self.cpu.set_dvf_triangles(triangles, points)
+    }
+
+    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
+        self.gpu.read_dvf()
+    }
+
+    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
+        self.gpu.read_dvf_sums()
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -8,7 +8,7 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernel::dispatch::{
-    FIELD_KERNELS, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
+    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
 };
 use crate::kernel::field::FieldMaps;
 use crate::kernel::frame::Frame;
@@ -16,8 +16,8 @@ use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
 use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Effects, Equirectangular, Field, Light, Moved, Occlusion, RenderSettings, Renderer, Roma, Rsm, Schedule,
-    emissive_triangles, environment,
+    Dvf, Effects, Equirectangular, Field, Light, Moved, Occlusion, Region, RenderSettings, Renderer, Roma, Rsm,
+    Schedule, emissive_triangles, environment,
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
@@ -27,6 +27,7 @@ use crate::schedule::{Executor, Lamp, Optimisation, Pass, Step, Tracing};
 use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use crate::visibility::bom::{Bom, Cascades};
 use crate::visibility::distance_field::{DistanceField, FieldSettings};
+use crate::visibility::dvf::{Cells, DvfSettings, DvfUse};
 use crate::visibility::roma::{Grid, Role, RomaPass, RomaSettings};
 use crate::visibility::rsm::RsmSettings;
 use bricks::SceneFile;
@@ -177,6 +178,8 @@ struct Variant {
     tile_bytes: Option<u64>,
     /// Look-ups of rays answered by distance fields, if they are.
     field: Option<u32>,
+    /// How a field of visibility is made that answers rays to the environment, if one does.
+    dvf: Option<DvfSettings>,
 }
 
 const VARIANT: Variant = Variant {
@@ -190,6 +193,7 @@ const VARIANT: Variant = Variant {
     roma: None,
     tile_bytes: None,
     field: None,
+    dvf: None,
 };
 
 fn effects() -> Effects {
@@ -233,6 +237,11 @@ fn roma((steps, role): (u32, Role)) -> RomaSettings {
 /// Small fields.
 fn field(steps: u32) -> FieldSettings {
     FieldSettings { size: 32, occlusion_steps: steps, shadow_steps: steps, lift: 1.75, hit: 0.75 }
+}
+
+/// A field of visibility of few points.
+fn visibility(octahedral: u32) -> DvfSettings {
+    DvfSettings { points: 200, rays: 6, cells: Cells::Longest(6), octahedral, ..DvfSettings::default() }
 }
 
 /// Both executors with pages of these sizes.
@@ -318,9 +327,22 @@ fn render(
         roma: Roma::default(),
         field: Field::default(),
         rsm: Rsm::default(),
+        dvf: Dvf::default(),
         host_seen: HostCacheStats::default(),
     };
     let path = path_from_bounds(manifest.min, manifest.max);
+    if let Some(settings) = &variant.dvf {
+        let made = renderer.make_dvf(settings, &Region::scene(scene.resident()), 4, &mut |_, _| true).unwrap();
+        assert!(made.points > 0 && made.field.known_cells() > 0);
+        assert_eq!(made.trials.is_empty(), settings.cells != Cells::Auto);
+        renderer.dvf = Dvf::new(
+            Arc::new(made.field),
+            DvfUse {
+                doubt: settings.octahedral == 8,
+                paper: settings.hammersley && settings.dilate && settings.octahedral == 16,
+            },
+        );
+    }
     for frame in 0..2 {
         // The second frame scatters directions, and an instance has moved.
         renderer.settings.guides = frame == 1;
@@ -361,6 +383,10 @@ fn twins_agree_with_their_kernels() {
         Variant { roma: Some((3, Role::Sift(3))), schedule: Schedule::Demand, ..VARIANT },
         Variant { field: Some(64), ..VARIANT },
         Variant { field: Some(3), ..VARIANT },
+        Variant { dvf: Some(visibility(8)), ..VARIANT },
+        Variant { dvf: Some(visibility(16)), ..VARIANT },
+        Variant { dvf: Some(DvfSettings { hammersley: false, both: true, round: true, ..visibility(16) }), ..VARIANT },
+        Variant { dvf: Some(DvfSettings { dilate: false, cells: Cells::Auto, ..visibility(32) }), ..VARIANT },
         Variant { fronts: true, ..VARIANT },
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
@@ -384,7 +410,8 @@ fn twins_agree_with_their_kernels() {
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
     let all = kernels::names()
         .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, RSM_WRITE, RSM_LIGHT])
-        .chain(FIELD_KERNELS);
+        .chain(FIELD_KERNELS)
+        .chain(DVF_KERNELS);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
     assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
@@ -405,12 +432,15 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::Maps, &plain, "columns of maps"),
         (Defect::Fields, &plain, "distances of fields"),
         (Defect::LampMaps, &plain, "radiance"),
+        (Defect::Points, &plain, "rays of points"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
         let roma = matches!(defect, Defect::Maps | Defect::LampMaps).then_some((0, Role::Answer));
         let field = (defect == Defect::Fields).then_some(64);
-        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, ..VARIANT };
+        // Points of the set of Hammersley have no seed but for how their rays are turned.
+        let dvf = (defect == Defect::Points).then(|| visibility(8));
+        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, dvf, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();
         assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);

@@ -15,6 +15,7 @@ mod bc5;
 mod bc7;
 pub mod brick;
 pub mod cache;
+mod dvf;
 pub mod executor;
 mod field;
 mod generate;

@@ -181,6 +181,31 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
     });
 }
 
+/// Adds the light of the environment to the primary hits as the paper of visibility fields has it: twin of `shaders/dvf_light.wgsl`.
+pub fn dvf_light(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    (seen, own): (&RaySet, &RaySet),
+    materials: &[Material],
+) {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
+        if seen.surfaces[index].leaf == NONE {
+            return None;
+        }
+        let ray = &own.rays[index];
+        let is_met = !is_traced(ray) || own.hits[index].id != NONE;
+        let is_occluded_cell = g.padding0 == 1;
+        let mut light = if is_met != is_occluded_cell { background(bound, ray.direction) } else { [0.0; 3] };
+        if !is_occluded_cell {
+            let all = ambient(bound.params, g.normal);
+            light = each(|k| all[k] - light[k]);
+        }
+        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+        Some(each(|k| surface_share(bound) * s.diffuse[k] * light[k]))
+    });
+}
+
 /// Adds the light of the pass's lamp to the hits of the shaded set, those of `seen`, whose shadow ray went free. The environment
 /// shares a direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their gloss.
 pub fn add_light(

@@ -2,6 +2,7 @@
 
 use super::binary::BinaryTrees;
 use super::device::Gpu;
+use super::dvf::Dvf;
 use super::field::Field;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
@@ -18,6 +19,7 @@ use super::wgsl::Pages;
 use crate::kernel::dispatch::{
     COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Third, Workgroups, are_pairs_culled, dispatches,
 };
+use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;
 use crate::kernel::layout::{self, Params};
 use crate::kernel::roma::RomaMaps;
@@ -55,6 +57,7 @@ pub struct GpuExecutor {
     roma: Option<Roma>,
     field: Option<Field>,
     rsm: Option<Rsm>,
+    dvf: Option<Dvf>,
     extent: Extent,
     readback: Readback,
     timing: Timing,
@@ -159,6 +162,7 @@ impl GpuExecutor {
             roma: None,
             field: None,
             rsm: None,
+            dvf: None,
             extent,
             readback,
             timing,
@@ -227,6 +231,12 @@ impl GpuExecutor {
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// The first words of a buffer.
+    fn read_words(&self, (buffer, count): (&wgpu::Buffer, usize)) -> Result<Vec<u32>, ExecutorError> {
+        let bytes = self.readback.read(&self.gpu, buffer)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes[..4 * count]))
     }
 
     fn rebind(&mut self) {
@@ -312,7 +322,8 @@ impl GpuExecutor {
             let field = self.field.as_ref().and_then(|field| Some((field.pipeline(dispatch.kernel)?, field)));
             let rsm = self.rsm.as_ref().and_then(|rsm| Some((rsm.pipeline(dispatch.kernel)?, rsm)));
             let of_maps = roma.map(|(pipeline, _)| pipeline).or(field.map(|(pipeline, _)| pipeline));
-            let of_maps = of_maps.or(rsm.map(|(pipeline, _)| pipeline));
+            let dvf = self.dvf.as_ref().and_then(|dvf| Some((dvf.pipeline(dispatch.kernel)?, dvf)));
+            let of_maps = of_maps.or(rsm.map(|(pipeline, _)| pipeline)).or(dvf.map(|(pipeline, _)| pipeline));
             let own = binary.map(|b| &b.pipeline).or(of_maps);
             compute.set_pipeline(own.unwrap_or_else(|| self.kernels.pipeline(dispatch.kernel)));
             compute.set_bind_group(0, &self.groups.scene, &[]);
@@ -323,12 +334,15 @@ impl GpuExecutor {
                 (false, Third::Roma) => roma.map_or(&self.groups.empty, |(_, roma)| &roma.group),
                 (false, Third::Field) => field.map_or(&self.groups.empty, |(_, field)| &field.group),
                 (false, Third::Rsm) => rsm.map_or(&self.groups.empty, |(_, rsm)| &rsm.group),
+                (false, Third::Dvf) => dvf.map_or(&self.groups.empty, |(_, dvf)| &dvf.group),
                 _ => &self.groups.empty,
             };
             compute.set_bind_group(2, second, &[]);
             let shaded = pass.set().saturating_sub(1);
             let third = match (dispatch.third, &self.groups.sampling) {
-                (Third::Shading | Third::Roma | Third::Field | Third::Rsm, _) => &self.groups.shading[shaded],
+                (Third::Shading | Third::Roma | Third::Field | Third::Rsm | Third::Dvf, _) => {
+                    &self.groups.shading[shaded]
+                }
                 (Third::Sampling, Some(sampling)) => &sampling[shaded],
                 _ => &self.groups.tiles,
             };
@@ -472,6 +486,32 @@ impl FrameExecutor for GpuExecutor {
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.scene = scene.clone();
         self.buffers.scene.forget_frame();
+    }
+
+    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
+        let Self { gpu, kernels, dvf, .. } = self;
+        let dvf = match dvf {
+            Some(dvf) => dvf,
+            none => none.insert(Dvf::new(gpu, kernels)?),
+        };
+        dvf.set(gpu, maps)
+    }
+
+    fn set_dvf_triangles(&mut self, triangles: &[layout::DvfTriangle], points: u32) -> Result<(), ExecutorError> {
+        let Self { gpu, dvf, .. } = self;
+        dvf.as_mut().map_or(Ok(()), |dvf| dvf.set_triangles(gpu, triangles, points))
+    }
+
+    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
+        let Some(dvf) = &self.dvf else { return Ok(Default::default()) };
+        let [masks, labels, _] = dvf.results();
+        Ok((self.read_words(masks)?, self.read_words(labels)?))
+    }
+
+    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
+        let Some(dvf) = &self.dvf else { return Ok(Vec::new()) };
+        let words = self.read_words(dvf.results()[2])?;
+        Ok(words.as_chunks::<2>().0.to_vec())
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -83,6 +83,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("shade", "shade", Groups::Shading, &[]),
     ("add_light", "add_light", Groups::Shading, &[]),
     ("add_occlusion", "add_occlusion", Groups::Shading, &[]),
+    ("dvf_light", "dvf_light", Groups::Shading, &[]),
     ("tile_bounds", "tile_bounds", Groups::Tiles, &[]),
     ("tile_walk", "tile_walk_count", Groups::Tiles, &[("WRITE", 0.0)]),
     ("tile_walk", "tile_walk_write", Groups::Tiles, &[("WRITE", 1.0)]),
@@ -229,6 +230,12 @@ pub(super) fn field_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 pub(super) fn rsm_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     use Bound::{Read, Write};
     layout(device, "rsm", &[Read, Read, Read, Read, Read, Write])
+}
+
+/// The layout of group 2 of kernels over discrete visibility fields.
+pub(super) fn dvf_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    use Bound::{Read, Write};
+    layout(device, "dvf", &[Read, Write, Write, Read, Write, Read])
 }
 
 /// The layout of a group of `count` storage buffers that are read.

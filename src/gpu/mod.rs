@@ -2,6 +2,7 @@
 
 pub mod binary;
 pub mod device;
+mod dvf;
 pub mod executor;
 pub mod field;
 pub mod groups;

@@ -1,5 +1,6 @@
 //! Which dispatches of which kernels a step consists of.
 
+use super::dvf::sweep_levels;
 use super::layout::{self, Params};
 use crate::math::sampling::{cosine_hemisphere, halton};
 use crate::schedule::{Lamp, Pass, Query, RomaPart, Step};
@@ -99,6 +100,8 @@ pub enum Third {
     Roma,
     /// The same with group 2 the distance fields.
     Field,
+    /// The same with group 2 a field of visibility.
+    Dvf,
     /// What shading the set before the pass's needs, with group 2 the lamps and the reflective shadow maps.
     Rsm,
 }
@@ -167,6 +170,28 @@ pub const HALVE_DISTANCES: &str = "halve_distances";
 pub const FIELD_TRACE: &str = "field_trace";
 /// All kernels over distance fields.
 pub const FIELD_KERNELS: [&str; 5] = [FLOOD_SEEDS, JUMP_FLOOD, FLOOD_DISTANCES, HALVE_DISTANCES, FIELD_TRACE];
+
+/// The kernel of areas of triangles.
+pub const DVF_AREAS: &str = "dvf_areas";
+/// The kernel of numbers of points on triangles.
+pub const DVF_COUNTS: &str = "dvf_counts";
+/// The kernel that sums blocks.
+pub const DVF_UP: &str = "dvf_up";
+/// The kernel that hands sums down.
+pub const DVF_DOWN: &str = "dvf_down";
+/// The kernel that makes rays of points.
+pub const DVF_RAYS: &str = "dvf_rays";
+/// The kernel that enters what they met.
+pub const DVF_WRITE: &str = "dvf_write";
+/// The kernel that widens masks.
+pub const DVF_DILATE: &str = "dvf_dilate";
+/// The kernel that labels cells.
+pub const DVF_LABELS: &str = "dvf_labels";
+/// The kernel that answers rays by a field.
+pub const DVF_SIFT: &str = "dvf_sift";
+/// All kernels over fields of visibility.
+pub const DVF_KERNELS: [&str; 9] =
+    [DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_SIFT];
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -342,6 +367,31 @@ pub fn dispatches(
         Step::FieldTrace { steps } => {
             vec![field(FIELD_TRACE, Params { field_steps: steps, ..params }, per_ray, 2)]
         }
+        Step::DvfAreas { triangles } => {
+            let mut all = vec![dvf(DVF_AREAS, params, across(triangles.div_ceil(64)))];
+            all.extend(sweep(&params, triangles, false));
+            all
+        }
+        Step::DvfCounts { triangles } => {
+            let mut all = vec![dvf(DVF_COUNTS, params, across(triangles.div_ceil(64)))];
+            all.extend(sweep(&params, triangles, true));
+            all
+        }
+        Step::DvfRays { first, turn } => {
+            vec![dvf(DVF_RAYS, Params { dvf_first: first, dvf_turn: turn, ..params }, per_ray)]
+        }
+        Step::DvfWrite => vec![dvf(DVF_WRITE, params, per_ray)],
+        Step::DvfFinish { cells, dilate } => {
+            let widened = dilate.then(|| dvf(DVF_DILATE, params, across((2 * cells).div_ceil(64))));
+            widened.into_iter().chain([dvf(DVF_LABELS, params, across(cells.div_ceil(64)))]).collect()
+        }
+        Step::DvfCosine => {
+            let [x, y, z] = direction_around(params.sample);
+            let around = [x, y, z, std::f32::consts::TAU];
+            vec![shading("generate_occlusion", Params { around, length: layout::T_INFINITE, ..params }, false)]
+        }
+        Step::DvfLight => vec![shading("dvf_light", params, false)],
+        Step::DvfSift => vec![dvf(DVF_SIFT, params, per_ray)],
         Step::RsmWrite { map, corner: [x, y] } => {
             let params = Params { rsm_map: map, rsm_x: x, rsm_y: y, ..params };
             vec![Dispatch { third: Third::Rsm, ..shading(RSM_WRITE, params, false) }]
@@ -357,6 +407,28 @@ pub fn dispatches(
 fn field(kernel: &'static str, params: Params, groups: [u32; 2], phase: usize) -> Dispatch {
     let groups = Workgroups::Fixed(groups);
     Dispatch { kernel, params, groups, cache: false, third: Third::Field, phase: Some(phase) }
+}
+
+/// A dispatch of a kernel over a field of visibility.
+fn dvf(kernel: &'static str, params: Params, groups: [u32; 2]) -> Dispatch {
+    let groups = Workgroups::Fixed(groups);
+    Dispatch { kernel, params, groups, cache: false, third: Third::Dvf, phase: None }
+}
+
+/// The dispatches that sum `count` elements, and with `is_down` make each the sum of those before it; the sum of all is left in the last level.
+fn sweep(params: &Params, count: u32, is_down: bool) -> Vec<Dispatch> {
+    let levels = sweep_levels(count);
+    let of = |kernel, level: usize, next: u32| {
+        let (first, count) = levels[level];
+        let params = Params { dvf_first: first, dvf_count: count, dvf_next: next, ..*params };
+        dvf(kernel, params, across(count.div_ceil(layout::DVF_WALK)))
+    };
+    let last = levels.len() - 1;
+    let up = (0..last).map(|level| of(DVF_UP, level, levels[level + 1].0));
+    // Of the one block below the sum of all nothing comes before.
+    let next = |level: usize| if level + 1 == last { layout::NONE } else { levels[level + 1].0 };
+    let down = (0..last).rev().filter(|_| is_down).map(|level| of(DVF_DOWN, level, next(level)));
+    up.chain(down).collect()
 }
 
 /// The dispatches that make field `level`.

@@ -1,7 +1,8 @@
 //! What a frame needs of an executor beside steps.
 
+use super::dvf::DvfMaps;
 use super::field::FieldMaps;
-use super::layout::{GBuffer, Hit, Ray, Surface};
+use super::layout::{DvfTriangle, GBuffer, Hit, Ray, Surface};
 use super::roma::RomaMaps;
 use super::rsm::RsmMaps;
 use super::{Keep, Lamps, Tuning, View};
@@ -94,6 +95,32 @@ pub trait FrameExecutor: Executor {
 
     /// Takes the scene with instances placed anew ([`SceneFile::place`]), for frames that begin from now on. All else of it is as it was.
     fn set_scene(&mut self, scene: &Arc<SceneFile>);
+
+    /// Places a field of visibility in the frame that has begun, and makes what the steps [`crate::schedule::Step::DvfAreas`] to
+    /// [`crate::schedule::Step::DvfSift`] need; without it these must not be run. Masks and labels are those that it gives; where it gives none,
+    /// those that are there, unless it says otherwise or they are not as many: then empty ones.
+    ///
+    /// # Errors
+    /// More than the device holds in one buffer, with how much it does; a device that binds too few buffers.
+    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError>;
+
+    /// Takes the triangles of which areas, numbers and rays are made next, and the number of points on all of them once it is known.
+    ///
+    /// # Errors
+    /// As of [`FrameExecutor::set_dvf`], which has been called.
+    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError>;
+
+    /// Reads the masks and labels of all cells back.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError>;
+
+    /// Reads the sums of areas or points back, level by level ([`super::dvf::sweep_levels`]).
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError>;
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

@@ -51,6 +51,7 @@ pub const COUNTER_TILES_FROM_ROOT: u32 = 18;
 pub const COUNTER_TILES_CHOSEN: u32 = 19;
 pub const COUNTER_ROMA_CAPPED: u32 = 20;
 pub const COUNTER_UNRESOLVED: u32 = 21;
+pub const COUNTER_DVF_ANSWERED: u32 = 22;
 pub const COUNTER_FIELD_CAPPED: u32 = 23;
 pub const WORK_CHOSEN: u32 = 24;
 pub const WORK_ROOTED: u32 = 28;
@@ -63,6 +64,13 @@ pub const ROMA_FAR: u32 = 1;
 pub const ROMA_SIFT: u32 = 2;
 pub const FIELD_HIT: u32 = 0xffff_fffd;
 pub const RSM_PERSPECTIVE: u32 = 1;
+pub const DVF_HIT: u32 = 0xffff_fffc;
+pub const DVF_HAMMERSLEY: u32 = 1;
+pub const DVF_ROUND: u32 = 2;
+pub const DVF_BOTH: u32 = 4;
+pub const DVF_DOUBT: u32 = 8;
+pub const DVF_PAPER: u32 = 16;
+pub const DVF_WALK: u32 = 512;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
 pub const BATCH_SAMPLES: u32 = 64;
@@ -108,6 +116,7 @@ mirror! {
         field_cells: u32, field_levels: u32, field_level: u32, field_mip: u32,
         field_step: u32, field_half: u32, field_steps: u32, field_hit: f32,
         rsm_maps: u32, rsm_map: u32, rsm_x: u32, rsm_y: u32,
+        dvf_first: u32, dvf_next: u32, dvf_count: u32, dvf_turn: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
@@ -169,6 +178,13 @@ mirror! {
         texel_from_point: [[f32; 4]; 3], first: u32, width: u32, height: u32, lamp: u32,
         flags: u32, padding0: u32, padding1: u32, padding2: u32,
     }
+    struct DvfGrid {
+        first: [f32; 3], scale: f32, size: [u32; 3], octahedral: u32,
+        flags: u32, points: f32, total: f32, area_scale: f32,
+        rays: u32, lanes: u32, triangles: u32, point_count: u32,
+        seed: u32, padding0: u32, padding1: u32, padding2: u32,
+    }
+    struct DvfTriangle { a: [f32; 3], id: u32, b: [f32; 3], flags: u32, c: [f32; 3], padding: u32 }
     struct RsmTexel { flux: [f32; 3], depth: f32, normal: [f32; 3], facing: f32 }
     struct Emitter {
         corner: [f32; 3], kind: u32, u: [f32; 3], probability: f32,

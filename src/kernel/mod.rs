@@ -5,6 +5,7 @@
 
 pub mod binary_tree;
 pub mod dispatch;
+pub mod dvf;
 pub mod field;
 pub mod frame;
 mod frame_executor;

@@ -70,6 +70,7 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
         tile_batch_leaves: count(layout::COUNTER_TILE_BATCH_LEAVES),
         leaf_groups_postponed: count(layout::COUNTER_LEAF_GROUPS),
         rays: count(layout::COUNTER_RAYS),
+        rays_answered: count(layout::COUNTER_DVF_ANSWERED),
         nodes: count(layout::COUNTER_NODES),
         triangles: count(layout::COUNTER_TRIANGLES),
         non_finite: count(layout::COUNTER_NON_FINITE),

@@ -383,7 +383,7 @@ pub fn length_of(x: [f32; 3]) -> f32 {
 }
 
 /// (x / 2^e with the largest component in 1..2, 2^e); components too small to matter become 0.
-fn scaled(x: [f32; 3]) -> ([f32; 3], f32) {
+pub fn scaled(x: [f32; 3]) -> ([f32; 3], f32) {
     let exponent = (greatest(x.map(f32::abs)).to_bits() >> 23).clamp(1, 253);
     let scale = f32::from_bits((254 - exponent) << 23);
     let y = x.map(|v| {

@@ -2,7 +2,7 @@
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
 use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Field, Light, Moved, Roma, Rsm, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Captures, Dvf, Effects, Field, Light, Moved, Roma, Rsm, camera_view};
 use crate::kernel::FrameExecutor;
 use crate::kernel::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::scene::Camera;
@@ -138,6 +138,8 @@ pub struct Renderer {
     pub roma: Roma,
     /// The distance fields, where settings ask for them.
     pub field: Field,
+    /// The field of visibility, where one has been made or read.
+    pub dvf: Dvf,
     /// The reflective shadow maps, where diffuse rays are answered by occupancy maps.
     pub rsm: Rsm,
     /// The host cache's statistics at the end of the pass before.
@@ -191,6 +193,7 @@ impl Renderer {
             }
             self.executor.begin_frame(&view);
             self.roma.begin(camera.position, &view);
+            self.dvf.begin(&view);
             if sample == 0 && effects.diffuse.is_some() {
                 self.prepare_rsm(&mut records, &view)?;
             }
@@ -254,7 +257,7 @@ impl Renderer {
     }
 
     /// Whether rays lead to the environment.
-    pub(super) fn draws_environment(&self) -> bool {
+    pub fn draws_environment(&self) -> bool {
         self.settings.effects.environment && self.light.lamps.environment.is_some()
     }
 
@@ -317,9 +320,13 @@ impl Renderer {
 
     /// Traces any-hit rays, notes the bricks that were hit, and adds the light that comes through.
     fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
-        let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
+        let (generate, add) = match pass {
+            Pass::Occlusion(_) => (Step::Generate, Step::AddOcclusion),
+            _ if self.dvf.is_paper(pass) => (Step::DvfCosine, Step::DvfLight),
+            _ => (Step::Generate, Step::AddLight),
+        };
         let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
-        let (mut first, mut last) = (vec![Step::Generate], vec![Step::QueryHits]);
+        let (mut first, mut last) = (vec![generate], vec![Step::QueryHits]);
         let length = match (pass, self.settings.effects.occlusion) {
             (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
             _ => f64::INFINITY,
@@ -342,6 +349,7 @@ impl Renderer {
                 Role::Sift(one_in) => first.push(trace(RomaPart::Sift { one_in })),
             }
         }
+        first.extend(self.dvf.prepare(&mut *self.executor, pass)?);
         if self.add_by_field(pass, add, stats)? {
             return Ok(());
         }

@@ -4,6 +4,8 @@
 mod accumulate;
 mod capture;
 pub mod denoise;
+mod dvf;
+mod dvf_source;
 mod effects;
 mod emissive;
 mod environment;
@@ -23,6 +25,7 @@ mod view;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};
 pub use capture::{Captures, EffectError};
+pub use dvf::{Dvf, DvfMade, Region};
 pub use effects::{Effects, Occlusion};
 pub use emissive::{MOST_TRIANGLES, ShiningTriangles, emissive_triangles};
 pub use environment::{EnvironmentNotes, Equirectangular, environment};

@@ -105,6 +105,15 @@ impl Renderer {
             self.moved.instances.push(InstanceMotion { ids: record.base..end, before_from_now, normals });
         }
         self.moved.instances.sort_by_key(|one| one.ids.start);
+        // A field of visibility is that of the scene as it was opened.
+        let mut displaced: Vec<u32> = places.iter().map(|(instance, _)| *instance).collect();
+        displaced.sort_unstable();
+        let own = still.resident();
+        let matrix = |of: &Resident, instance: u32| of.instances[instance as usize].world_from_object;
+        displaced.retain(|&instance| matrix(own, instance) != matrix(resident, instance));
+        let mut elsewhere = boxes(own, &displaced);
+        elsewhere.extend(boxes(resident, &displaced));
+        self.dvf.scene_has_moved(&elsewhere);
         self.roma.scene_has_moved();
         self.rsm.scene_has_moved(&touched);
         Ok(moving)

@@ -74,8 +74,9 @@ impl FrameRecords {
         effect.ahead.prefetched_bytes += host.prefetched_bytes - seen.prefetched_bytes;
         effect.ahead.prefetched_used_bytes += host.prefetched_used_bytes - seen.prefetched_used_bytes;
         effect.ahead.prefetched_wasted_bytes += host.prefetched_wasted_bytes - seen.prefetched_wasted_bytes;
-        // Maps of lamps add nothing to the picture, whose last sum they come before.
-        if let Some(captures) = renderer.captures.as_mut().filter(|_| name != super::rsm::EFFECT) {
+        // Maps of lamps and fields of visibility add nothing to the picture, whose last sum they come before.
+        let adds = ![super::rsm::EFFECT, super::dvf::EFFECT].contains(&name);
+        if let Some(captures) = renderer.captures.as_mut().filter(|_| adds) {
             captures.note(&mut *renderer.executor, name)?;
         }
         Ok(())

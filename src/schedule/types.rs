@@ -165,6 +165,38 @@ pub enum Step {
         /// The texel that ray 0 is for.
         corner: [u32; 2],
     },
+    /// Sum the areas of so many triangles that the executor was given last, for a field of visibility.
+    DvfAreas {
+        /// How many.
+        triangles: u32,
+    },
+    /// Say how many points lie on all triangles before each of them.
+    DvfCounts {
+        /// How many triangles.
+        triangles: u32,
+    },
+    /// Make the rays of so many lanes of the points, in place of [`Step::Generate`].
+    DvfRays {
+        /// The first lane.
+        first: u32,
+        /// Which of its directions each takes.
+        turn: u32,
+    },
+    /// Enter what they met into the masks of the cells that they start in.
+    DvfWrite,
+    /// Label so many cells, after masks have been widened, if they are to be.
+    DvfFinish {
+        /// How many.
+        cells: u32,
+        /// Whether masks are widened.
+        dilate: bool,
+    },
+    /// Make rays around primary hits by the cosine, in place of [`Step::Generate`].
+    DvfCosine,
+    /// Add what they bring of the environment, and what needs no ray, as the paper has it.
+    DvfLight,
+    /// Answer the pass's rays, not traced yet, that the field tells, and count them: they are not traced.
+    DvfSift,
     /// Add what the hits of the set before that [`Step::RomaTrace`] gave reflect of the lamps, by their reflective shadow maps: phase 3.
     RsmLight,
 }
@@ -328,6 +360,8 @@ pub struct Report {
     /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`], [`Step::RomaTrace`] and
     /// [`Step::FieldTrace`].
     pub rays: u64,
+    /// Rays that [`Step::DvfSift`] answered.
+    pub rays_answered: u64,
     /// Nodes visited, when the executor counts.
     pub nodes: u64,
     /// Triangles tested, when the executor counts.
@@ -474,6 +508,7 @@ impl PassStats {
         sum.queries_tightened += r.queries_tightened;
         sum.rays_capped += r.rays_capped;
         sum.rays += r.rays;
+        sum.rays_answered += r.rays_answered;
         sum.nodes += r.nodes;
         sum.triangles += r.triangles;
         sum.non_finite += r.non_finite;

@@ -14,6 +14,8 @@ pub struct Record {
     pub pass: &'static str,
     /// Rays traced.
     pub rays: u64,
+    /// Rays besides that a field of visibility answered: they were not traced.
+    pub rays_answered: u64,
     /// Wall time from first submission to last fence, ms.
     pub ms: f64,
     /// Device time of intersecting what was resident, ms; with ROMA and distance fields, of making these.
@@ -141,6 +143,7 @@ impl Record {
             frame,
             pass,
             rays: r.rays,
+            rays_answered: r.rays_answered,
             ms: stats.ms,
             ms_phase1: r.ms_phases[0],
             ms_phase2: r.ms_phases[1],

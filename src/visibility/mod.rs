@@ -5,5 +5,6 @@
 
 pub mod bom;
 pub mod distance_field;
+pub mod dvf;
 pub mod roma;
 pub mod rsm;

@@ -1,5 +1,6 @@
 //! Options of `bench`.
 
+use super::dvf::args::DvfBenchArgs;
 use super::plan::Stage;
 use super::roma::args::RomaBenchArgs;
 use crate::app::args::{UNITS, ranged};
@@ -25,6 +26,8 @@ pub enum Experiments {
     Executors(Box<ExecutorsArgs>),
     /// The experiments of the ROMA paper: times of ray-aligned occupancy maps, and how far pictures by them are from exact ones
     Roma(Box<RomaBenchArgs>),
+    /// The experiments of the paper of discrete visibility fields: rays to the environment that are left to be traced, and errors
+    Dvf(Box<DvfBenchArgs>),
 }
 
 /// Options of `bench executors`.

@@ -1,10 +1,11 @@
-//! `brickwalk bench executors` (`executors.rs`), `brickwalk bench roma` (`roma/`), and `brickwalk bench chc`: the experiments of Mattausch et al. 2015 on the generated scenes, each ratio beside the paper's.
+//! `brickwalk bench executors` (`executors.rs`), `brickwalk bench roma` (`roma/`), `brickwalk bench dvf` (`dvf/`), and `brickwalk bench chc`: the experiments of Mattausch et al. 2015 on the generated scenes, each ratio beside the paper's.
 //!
 //! Everything runs in this process: a renderer a scene, cache and size of tiles, in which the cases of a group take turns. Each
 //! finished walk is a line of `cells.jsonl`; tables, plots and pages are made from these lines alone.
 
 pub mod args;
 mod cells;
+mod dvf;
 mod executors;
 mod measure;
 mod output;
@@ -39,6 +40,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         Experiments::Chc(args) => args,
         Experiments::Executors(args) => return executors::run(args),
         Experiments::Roma(args) => return roma::run(args),
+        Experiments::Dvf(args) => return dvf::run(args),
     };
     let settings = args.settings();
     if settings.frames <= settings.skip {

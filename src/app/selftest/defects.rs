@@ -6,9 +6,10 @@
 use crate::gpu::device::Gpu;
 use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::wgsl::Pages;
+use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;
 use crate::kernel::frame::Frame;
-use crate::kernel::layout::{GBuffer, Hit, Ray, Surface};
+use crate::kernel::layout::{DvfTriangle, GBuffer, Hit, Ray, Surface};
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::rsm::RsmMaps;
 use crate::kernel::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
@@ -286,6 +287,22 @@ impl FrameExecutor for Faulty {
 
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.inner.set_scene(scene);
+    }
+
+    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
+        self.inner.set_dvf(maps)
+    }
+
+    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError> {
+        self.inner.set_dvf_triangles(triangles, points)
+    }
+
+    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
+        self.inner.read_dvf()
+    }
+
+    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
+        self.inner.read_dvf_sums()
     }
 
     fn begin_frame(&mut self, view: &View) {

@@ -3,7 +3,7 @@
 use super::case::Source::{Analytic, Exact, Paths, Reference, Unit};
 use super::case::{Case, Checks, Source};
 use super::lab::Lab;
-use super::{boxes, histories, lights, maps, meshes, roma, samples, shapes, streaming, surfaces, views};
+use super::{boxes, histories, lights, maps, meshes, roma, samples, shapes, streaming, surfaces, views, visibility};
 use anyhow::Result;
 
 const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab) -> Result<Checks>) -> Case {
@@ -62,11 +62,11 @@ pub const CASES: &[Case] = &[
     case(44, "concentric map: centre, diagonals, border", Analytic, maps::concentric),
     case(45, "octahedral map: seams, zeros of either sign", Analytic, maps::octahedral),
     case(46, "ends of the Hammersley set, root of -eps", Unit, maps::hammersley_ends),
-    later(47, "DVF: empty cell, point on a face", Unit),
-    later(48, "prefix sum over 3M areas from 10^-12 to 10^6", Reference),
-    later(49, "spherical harmonics of a delta light", Analytic),
+    case(47, "DVF: empty cell, point on a face", Unit, visibility::unknown),
+    case(48, "prefix sum over 3M areas from 10^-12 to 10^6", Reference, visibility::prefix_sums),
+    case(49, "spherical harmonics of a delta light", Analytic, visibility::delta_light),
     case(50, "texel of the sun, 10^6", Analytic, lights::sun_texel),
-    later(51, "E_all - E_occ in a closed box", Analytic),
+    case(51, "E_all - E_occ in a closed box", Analytic, visibility::closed_box),
     case(52, "NaN in the history", Unit, histories::not_a_number),
     case(53, "running variance: mean 10^8, sigma 1", Analytic, histories::running_variance),
     case(54, "10^6 accumulated frames", Analytic, samples::accumulation),

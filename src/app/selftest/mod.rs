@@ -25,6 +25,7 @@ mod shapes;
 mod streaming;
 mod surfaces;
 mod views;
+mod visibility;
 
 use super::device::Device;
 use crate::cpu;

@@ -8,7 +8,7 @@ pub mod args;
 mod leaks;
 mod output;
 mod plan;
-mod rows;
+pub(in crate::app::bench) mod rows;
 mod seams;
 mod view;
 

@@ -1,0 +1,25 @@
+// Enters what a block's rays met into the masks of the cells that they start in.
+#include "shared/types.wgsl"
+#include "shared/bindings.wgsl"
+#include "shared/exact.wgsl"
+#include "shared/dvf.wgsl"
+
+// One thread a ray.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let ray = rays[index];
+    if !(ray.t_min <= ray.t_max) {
+        return;
+    }
+    let cell = dvf_cell(ray.origin);
+    if cell == NONE {
+        return;
+    }
+    let texel = dvf_texel(ray.direction);
+    let mask = 2u * cell + select(1u, 0u, hits[index].id == NONE);
+    atomicOr(&dvf_masks[mask * dvf_words() + texel / 32u], 1u << (texel % 32u));
+}

@@ -1,0 +1,47 @@
+// Discrete visibility fields (src/visibility/dvf): bindings of group 2, and where things lie in them. Twin: src/cpu/dvf.rs.
+
+@group(2) @binding(0) var<storage, read> dvf: DvfGrid;
+@group(2) @binding(1) var<storage, read_write> dvf_masks: array<atomic<u32>>; // of each cell, texel by texel: where some ray missed, then where some
+                                                                              // ray hit
+@group(2) @binding(2) var<storage, read_write> dvf_labels: array<u32>;        // of each cell: DVF_VISIBLE, DVF_OCCLUDED or DVF_UNKNOWN
+@group(2) @binding(3) var<storage, read> dvf_triangles: array<DvfTriangle>;   // of the group at hand
+@group(2) @binding(4) var<storage, read_write> dvf_sums: array<vec2<u32>>;    // sums of 64 bits, the low word first, level by level
+@group(2) @binding(5) var<storage, read> dvf_directions: array<vec4<f32>>;    // of rays about z, then points of the unit circle: DVF_CIRCLE of them
+
+const DVF_VISIBLE_LABEL: u32 = 0u;  // more directions miss than hit
+const DVF_OCCLUDED_LABEL: u32 = 1u;
+const DVF_UNKNOWN_LABEL: u32 = 2u;  // no ray started there
+const DVF_CIRCLE_POINTS: u32 = 1024u;
+
+// Words of a mask.
+fn dvf_words() -> u32 {
+    return dvf.octahedral * dvf.octahedral / 32u;
+}
+
+// The cell that holds a point of the frame; NONE: none does.
+fn dvf_cell(p: vec3<f32>) -> u32 {
+    let at = barrier3(barrier3(p * dvf.scale) + dvf.first);
+    if !(all(at >= vec3<f32>(0.0)) && all(at < vec3<f32>(dvf.size))) {
+        return NONE;
+    }
+    let cell = min(vec3<u32>(at), dvf.size - 1u);
+    return (cell.z * dvf.size.y + cell.y) * dvf.size.x + cell.x;
+}
+
+// The texel of a direction of any length but 0 (octahedral map: Cigolle et al. 2014; a component of 0 counts as positive).
+fn dvf_texel(d: vec3<f32>) -> u32 {
+    let m = abs(d);
+    let sum = barrier(barrier(m.x + m.y) + m.z);
+    var u = divide(d.x, sum);
+    var v = divide(d.y, sum);
+    if d.z < 0.0 {
+        let folded = barrier(1.0 - abs(v));
+        v = select(-1.0, 1.0, v >= 0.0) * barrier(1.0 - abs(u));
+        u = select(-1.0, 1.0, u >= 0.0) * folded;
+    }
+    let side = f32(dvf.octahedral);
+    let last = dvf.octahedral - 1u;
+    let x = min(u32(max(barrier(barrier(barrier(u + 1.0) * 0.5) * side), 0.0)), last);
+    let y = min(u32(max(barrier(barrier(barrier(v + 1.0) * 0.5) * side), 0.0)), last);
+    return y * dvf.octahedral + x;
+}

@@ -1,0 +1,310 @@
+//! Discrete visibility fields: twins of `shaders/dvf_areas.wgsl`, `dvf_counts.wgsl`, `dvf_up.wgsl`, `dvf_down.wgsl`, `dvf_rays.wgsl`,
+//! `dvf_write.wgsl`, `dvf_dilate.wgsl`, `dvf_labels.wgsl` and `dvf_sift.wgsl`.
+
+use super::lamps::unit;
+use super::rays::{RaySet, is_traced, start_hit};
+use super::scene::{Bound, Tally};
+use super::vector::{Vec3, each, most3};
+use crate::kernel::dispatch::{DVF_AREAS, DVF_COUNTS, DVF_DILATE, DVF_DOWN, DVF_LABELS, DVF_UP};
+use crate::kernel::dvf::{CIRCLE, DvfMaps, sum, sweep_elements};
+use crate::kernel::layout::{
+    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_HIT, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid,
+    DvfTriangle, GBuffer, INSTANCE_MIRRORED, NONE, Params, Ray, T_INFINITE,
+};
+use crate::math::exact::{
+    TriangleHit, barrier, diffprod, divide, length_of, offset_origin, scaled, square_root, surface_point,
+};
+use crate::math::sampling::random4;
+use crate::visibility::dvf::mask::{self, OCCLUDED, UNKNOWN};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Rays that a task handles in a row.
+const RUN: usize = 1024;
+
+/// A field, and what is made of it.
+#[derive(Default)]
+pub struct DvfTables {
+    /// How it is placed.
+    pub maps: DvfMaps,
+    /// Of all cells.
+    pub masks: Vec<AtomicU32>,
+    /// Of all cells.
+    pub labels: Vec<u32>,
+    /// Of the group at hand.
+    pub triangles: Vec<DvfTriangle>,
+    /// Level by level.
+    pub sums: Vec<[u32; 2]>,
+}
+
+impl DvfTables {
+    /// Places a field.
+    pub fn set(&mut self, maps: &DvfMaps) {
+        let is_same = match (&maps.field, &self.maps.field) {
+            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+            (None, _) => !maps.is_new && self.masks.len() == maps.mask_words() && self.labels.len() == maps.cells(),
+            _ => false,
+        };
+        match &maps.field {
+            _ if is_same => {}
+            Some(field) => {
+                self.masks = field.masks.iter().map(|&word| AtomicU32::new(word)).collect();
+                self.labels.clone_from(&field.labels);
+            }
+            None => {
+                self.masks = (0..maps.mask_words()).map(|_| AtomicU32::new(0)).collect();
+                self.labels = vec![UNKNOWN; maps.cells()];
+            }
+        }
+        let triangles = self.maps.grid.triangles;
+        self.maps = maps.clone();
+        self.maps.grid.triangles = triangles;
+    }
+
+    /// Takes the triangles of a group.
+    pub fn set_triangles(&mut self, triangles: &[DvfTriangle], point_count: u32) {
+        self.triangles = triangles.to_vec();
+        (self.maps.grid.triangles, self.maps.grid.point_count) = (triangles.len() as u32, point_count);
+        self.sums.resize(sweep_elements(triangles.len() as u32) as usize, [0; 2]);
+    }
+
+    /// The masks.
+    pub fn masks(&self) -> Vec<u32> {
+        self.masks.iter().map(|word| word.load(Ordering::Relaxed)).collect()
+    }
+}
+
+/// The cell that holds a point of the frame.
+fn cell_of(grid: &DvfGrid, p: Vec3) -> Option<usize> {
+    let at = each(|k| barrier(barrier(p[k] * grid.scale) + grid.first[k]));
+    if !(0..3).all(|k| at[k] >= 0.0 && at[k] < grid.size[k] as f32) {
+        return None;
+    }
+    let [x, y, z] = [0, 1, 2].map(|k| (at[k] as u32).min(grid.size[k] - 1));
+    Some(((z * grid.size[1] + y) * grid.size[0] + x) as usize)
+}
+
+/// a, b, c turned against the front, of any length; zero where the vertices lie on a line.
+fn back_of(t: &DvfTriangle) -> Vec3 {
+    let ab = each(|k| barrier(t.b[k] - t.a[k]));
+    let ca = each(|k| barrier(t.a[k] - t.c[k]));
+    // cross(ab, ac) is -cross(ab, ca): this one.
+    let back = [
+        diffprod(ab[1], ca[2], ab[2], ca[1]),
+        diffprod(ab[2], ca[0], ab[0], ca[2]),
+        diffprod(ab[0], ca[1], ab[1], ca[0]),
+    ];
+    if t.flags & INSTANCE_MIRRORED != 0 { back.map(|x| -x) } else { back }
+}
+
+/// Twice the area of a triangle, device units.
+fn twice_area(t: &DvfTriangle) -> f32 {
+    let back = back_of(t);
+    if most3(back.map(f32::abs)) == 0.0 {
+        return 0.0;
+    }
+    let (s, scale) = scaled(back);
+    barrier(length_of(s) * scale)
+}
+
+/// An area in steps of the sums, at least one.
+fn steps_of(grid: &DvfGrid, area: f32) -> [u32; 2] {
+    let steps = barrier(area * grid.area_scale);
+    let high = barrier(steps / 4_294_967_296.0).floor();
+    [if steps < 1.0 { 1 } else { barrier(steps - barrier(high * 4_294_967_296.0)) as u32 }, high as u32]
+}
+
+/// Points on a triangle: their share by area (Günay, Akyüz, eq. 1).
+fn points_on(grid: &DvfGrid, t: &DvfTriangle) -> u32 {
+    let share = divide(barrier(grid.points * twice_area(t)), grid.total);
+    if grid.flags & DVF_ROUND != 0 { barrier(share + 0.5).floor() as u32 } else { (share.ceil() as u32).max(1) }
+}
+
+fn plus(a: [u32; 2], b: [u32; 2]) -> [u32; 2] {
+    let all = sum(a).wrapping_add(sum(b));
+    [all as u32, (all >> 32) as u32]
+}
+
+/// Sums each block of the level at hand into an element of the level above.
+pub fn up(params: &Params, sums: &mut [[u32; 2]]) {
+    let (first, count) = (params.dvf_first as usize, params.dvf_count as usize);
+    for (block, at) in (first..first + count).step_by(DVF_WALK as usize).enumerate() {
+        let end = (at + DVF_WALK as usize).min(first + count);
+        let total = sums[at..end].iter().fold([0; 2], |all, one| plus(all, *one));
+        sums[params.dvf_next as usize + block] = total;
+    }
+}
+
+/// Makes each element of the level at hand the sum of all before it.
+pub fn down(params: &Params, sums: &mut [[u32; 2]]) {
+    let (first, count) = (params.dvf_first as usize, params.dvf_count as usize);
+    for (block, at) in (first..first + count).step_by(DVF_WALK as usize).enumerate() {
+        let end = (at + DVF_WALK as usize).min(first + count);
+        let mut before = if params.dvf_next == NONE { [0; 2] } else { sums[params.dvf_next as usize + block] };
+        for element in &mut sums[at..end] {
+            let own = std::mem::replace(element, before);
+            before = plus(before, own);
+        }
+    }
+}
+
+/// Runs a kernel that works on triangles, sums or cells.
+pub fn make(kernel: &str, bound: &Bound, tables: &mut DvfTables) {
+    let DvfTables { maps, masks, labels, triangles, sums } = tables;
+    let grid = &maps.grid;
+    match kernel {
+        DVF_AREAS => {
+            let all = sums.par_iter_mut().zip(&*triangles);
+            all.for_each(|(steps, t)| *steps = steps_of(grid, twice_area(t)));
+        }
+        DVF_COUNTS => sums.par_iter_mut().zip(&*triangles).for_each(|(count, t)| *count = [points_on(grid, t), 0]),
+        DVF_UP => up(bound.params, sums),
+        DVF_DOWN => down(bound.params, sums),
+        DVF_DILATE => masks.par_chunks_exact_mut(mask::words(grid.octahedral)).for_each(|words| {
+            let mut mask: Vec<u32> = words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
+            mask::dilate(&mut mask, grid.octahedral);
+            words.iter_mut().zip(mask).for_each(|(word, dilated)| *word.get_mut() = dilated);
+        }),
+        DVF_LABELS => {
+            let cells = masks.par_chunks_exact(2 * mask::words(grid.octahedral)).zip(labels);
+            cells.for_each(|(words, label)| {
+                let masks: Vec<u32> = words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
+                *label = mask::label(&masks);
+            });
+        }
+        _ => unreachable!("no kernel of fields of visibility"),
+    }
+}
+
+/// The ray of lane `slot` of the block, and the triangle that it starts from.
+fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> (Ray, u32) {
+    let grid = &tables.maps.grid;
+    let none = Ray { origin: [0.0; 3], t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 };
+    let point = slot / grid.lanes;
+    let mut turn = slot % grid.lanes + params.dvf_turn * grid.lanes;
+    let all_rays = if grid.flags & DVF_BOTH != 0 { 2 * grid.rays } else { grid.rays };
+    if point >= grid.point_count || turn >= all_rays {
+        return (none, NONE);
+    }
+    let is_behind = turn >= grid.rays;
+    if is_behind {
+        turn -= grid.rays;
+    }
+    let sums = &tables.sums[..tables.triangles.len()];
+    let number = sums.partition_point(|sum| sum[0] <= point).max(1) - 1;
+    let t = &tables.triangles[number];
+    let first = sums[number][0];
+    let end = sums.get(number + 1).map_or(grid.point_count, |sum| sum[0]);
+    let count = (end - first).max(1);
+    let own = point - first;
+    let words = random4(own, t.id, grid.seed);
+    let r = match grid.flags & DVF_HAMMERSLEY != 0 {
+        true => [divide(barrier(own as f32 + 0.5), count as f32), unit(own.reverse_bits())],
+        false => [unit(words[0]), unit(words[1])],
+    };
+    let s = square_root(r[0].min(1.0 - f32::EPSILON / 2.0));
+    let (u, v, w) = (barrier(1.0 - s), barrier(s * barrier(1.0 - r[1])), barrier(s * r[1]));
+    let back = back_of(t);
+    if most3(back.map(f32::abs)) == 0.0 {
+        return (none, NONE);
+    }
+    let toward = scaled(if is_behind { back.map(|x| -x) } else { back }).0;
+    let weights = TriangleHit { u, v, w, det: 1.0, ..TriangleHit::default() };
+    let start = surface_point(t.a, t.b, t.c, &weights, toward);
+    let origin = offset_origin(&start);
+    if cell_of(grid, origin).is_none() {
+        return (none, NONE);
+    }
+    let local = tables.maps.directions[turn as usize];
+    let around = tables.maps.directions[(grid.rays + words[2] % CIRCLE) as usize];
+    let x = barrier(barrier(around[0] * local[0]) - barrier(around[1] * local[1]));
+    let y = barrier(barrier(around[1] * local[0]) + barrier(around[0] * local[1]));
+    let n = start.n;
+    let side = if n[2] >= 0.0 { 1.0 } else { -1.0 };
+    let a = -divide(1.0, barrier(side + n[2]));
+    let b = barrier(barrier(n[0] * n[1]) * a);
+    let across = [barrier(1.0 + barrier(barrier(side * barrier(n[0] * n[0])) * a)), side * b, -side * n[0]];
+    let up = [b, barrier(side + barrier(barrier(n[1] * n[1]) * a)), -n[1]];
+    let direction = each(|k| barrier(barrier(barrier(x * across[k]) + barrier(y * up[k])) + barrier(local[2] * n[k])));
+    (Ray { origin, t_min: 0.0, direction, t_max: T_INFINITE }, t.id)
+}
+
+/// Makes a block of the rays of a group.
+pub fn rays(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
+    let RaySet { rays, hits, surfaces } = own;
+    let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
+    all.enumerate().with_min_len(RUN).for_each(|(index, ((ray, hit), surface))| {
+        let source;
+        (*ray, source) = ray_of(tables, bound.params, bound.params.dvf_first + index as u32);
+        (*hit, *surface) = start_hit(ray.t_max, source);
+    });
+}
+
+/// Enters what a block's rays met into the masks of the cells that they start in.
+pub fn write(tables: &DvfTables, own: &RaySet) {
+    let grid = &tables.maps.grid;
+    let words = mask::words(grid.octahedral);
+    let rays = own.rays.par_iter().zip(&own.hits).with_min_len(RUN);
+    rays.filter(|(ray, _)| ray.t_min <= ray.t_max).for_each(|(ray, hit)| {
+        if let Some(cell) = cell_of(grid, ray.origin) {
+            let texel = mask::texel(ray.direction, grid.octahedral);
+            let mask = 2 * cell + usize::from(hit.id != NONE);
+            tables.masks[mask * words + texel as usize / 32].fetch_or(1 << (texel % 32), Ordering::Relaxed);
+        }
+    });
+}
+
+/// Answers a ray: whether it meets something; `None`: it is to be traced.
+fn answer(tables: &DvfTables, ray: &Ray) -> Option<bool> {
+    let grid = &tables.maps.grid;
+    let cell = cell_of(grid, ray.origin)?;
+    let label = tables.labels[cell];
+    if label == UNKNOWN {
+        return None;
+    }
+    let texel = mask::texel(ray.direction, grid.octahedral);
+    let words = mask::words(grid.octahedral);
+    let at = 2 * cell * words + texel as usize / 32;
+    let bit = |at: usize| tables.masks[at].load(Ordering::Relaxed) >> (texel % 32) & 1 != 0;
+    let (is_free, is_met) = (bit(at), bit(at + words));
+    let is_told = is_free != is_met && (grid.flags & DVF_DOUBT != 0 || is_met == (label == OCCLUDED));
+    is_told.then_some(is_met)
+}
+
+/// Whether a ray, as the paper has it, is traced, and whether its cell is mostly occluded.
+fn as_in_paper(tables: &DvfTables, ray: &Ray) -> (bool, bool) {
+    let grid = &tables.maps.grid;
+    let Some(cell) = cell_of(grid, ray.origin) else { return (false, false) };
+    let texel = mask::texel(ray.direction, grid.octahedral);
+    let words = mask::words(grid.octahedral);
+    let at = 2 * cell * words + texel as usize / 32;
+    let bit = |at: usize| tables.masks[at].load(Ordering::Relaxed) >> (texel % 32) & 1 != 0;
+    let is_occluded = tables.labels[cell] == OCCLUDED;
+    (bit(if is_occluded { at } else { at + words }), is_occluded)
+}
+
+/// Answers the rays of the pass that the field tells; those are not traced.
+pub fn sift(bound: &Bound, tables: &DvfTables, own: &mut RaySet, gbuffer: &mut [GBuffer]) {
+    let is_paper = tables.maps.grid.flags & DVF_PAPER != 0;
+    let all = own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).zip(gbuffer.par_chunks_mut(RUN));
+    all.for_each(|((hits, rays), gbuffer)| {
+        let mut tally = Tally::default();
+        for ((hit, ray), g) in hits.iter_mut().zip(rays).zip(gbuffer) {
+            let is_met = if is_paper {
+                let (is_to_trace, is_occluded) = as_in_paper(tables, ray);
+                g.padding0 = is_occluded.into();
+                (is_traced(ray, hit) && !is_to_trace).then_some(is_occluded)
+            } else {
+                is_traced(ray, hit).then(|| answer(tables, ray)).flatten()
+            };
+            let Some(is_met) = is_met else { continue };
+            hit.t = -1.0;
+            if is_met {
+                hit.id = DVF_HIT;
+            }
+            tally.add(COUNTER_DVF_ANSWERED, 1);
+        }
+        bound.counters.add(&tally);
+    });
+}

@@ -1,0 +1,177 @@
+//! Discrete visibility fields on the device, and the kernels that make them and answer rays by them; made when a walk first asks for them.
+
+use super::device::Gpu;
+use super::groups::numbered;
+use super::kernels::{self, Kernels};
+use super::rays::storage;
+use super::roma::grow;
+use crate::kernel::dispatch::DVF_KERNELS;
+use crate::kernel::dvf::{DvfMaps, sweep_elements};
+use crate::kernel::layout::{DvfGrid, DvfTriangle};
+use crate::schedule::ExecutorError;
+use crate::visibility::dvf::mask::UNKNOWN;
+use std::sync::Arc;
+
+/// Storage buffers of the kernels: 7 of the scene, 5 of the rays, 6 of their own, 8 of shading; one more with opacity.
+const STORAGE_BUFFERS: u32 = 26;
+
+/// Pipelines and buffers.
+pub struct Dvf {
+    layout: wgpu::BindGroupLayout,
+    pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
+    grid: wgpu::Buffer,
+    masks: wgpu::Buffer,
+    labels: wgpu::Buffer,
+    triangles: wgpu::Buffer,
+    sums: wgpu::Buffer,
+    directions: wgpu::Buffer,
+    maps: DvfMaps,
+    /// Group 2 of all kernels.
+    pub group: wgpu::BindGroup,
+}
+
+impl Dvf {
+    /// Of nothing.
+    ///
+    /// # Errors
+    /// The device binds too few buffers.
+    pub fn new(gpu: &Gpu, kernels: &Kernels) -> Result<Self, ExecutorError> {
+        let (most, needed) =
+            (gpu.limits.max_storage_buffers_per_shader_stage, STORAGE_BUFFERS + u32::from(kernels.pages.opacity));
+        if most < needed {
+            return Err(ExecutorError::Device(format!(
+                "{:?} binds {most} buffers a kernel, fields of visibility need {needed}; use --secondary exact, or another --adapter",
+                gpu.info.name
+            )));
+        }
+        let layout = kernels::dvf_layout(&gpu.device);
+        let groups = [Some(&kernels.scene), Some(&kernels.rays), Some(&layout), Some(&kernels.shading)];
+        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("dvf"),
+            bind_group_layouts: &groups,
+            immediate_size: 0,
+        });
+        let pipeline = |name: &str| {
+            let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(kernels::source(name, kernels.pages).into()),
+            });
+            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(name),
+                layout: Some(&pipeline_layout),
+                module: &module,
+                entry_point: Some("main"),
+                compilation_options: Default::default(),
+                cache: None,
+            })
+        };
+        let pipelines = DVF_KERNELS.map(|name| (name, pipeline(name))).into();
+        let strides = [size_of::<DvfGrid>(), 4, 4, size_of::<DvfTriangle>(), 8, 16];
+        let labels = ["dvf grid", "dvf masks", "dvf labels", "dvf triangles", "dvf sums", "dvf directions"];
+        let mut buffers = labels.into_iter().zip(strides).map(|(label, stride)| storage(gpu, label, 1, stride));
+        let [grid, masks, labels, triangles, sums, directions] =
+            std::array::from_fn(|_| buffers.next().expect("six of them"));
+        let group = group(gpu, &layout, [&grid, &masks, &labels, &triangles, &sums, &directions]);
+        let maps = DvfMaps::default();
+        Ok(Self { layout, pipelines, grid, masks, labels, triangles, sums, directions, maps, group })
+    }
+
+    /// The pipeline of a kernel, if it is one of these.
+    pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
+        self.pipelines.iter().find(|(own, _)| *own == name).map(|(_, pipeline)| pipeline)
+    }
+
+    /// Places a field; see [`crate::kernel::FrameExecutor::set_dvf`].
+    ///
+    /// # Errors
+    /// More than a buffer holds, with how much it does.
+    pub fn set(&mut self, gpu: &Gpu, maps: &DvfMaps) -> Result<(), ExecutorError> {
+        let (words, cells) = (maps.mask_words(), maps.cells());
+        check(gpu, 4 * words as u64)?;
+        let is_same = match (&maps.field, &self.maps.field) {
+            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+            (None, _) => !maps.is_new && (self.maps.mask_words(), self.maps.cells()) == (words, cells),
+            _ => false,
+        };
+        let grown = [
+            grow(gpu, &mut self.masks, "dvf masks", words, 4),
+            grow(gpu, &mut self.labels, "dvf labels", cells, 4),
+            grow(gpu, &mut self.directions, "dvf directions", maps.directions.len(), 16),
+        ];
+        if grown.contains(&true) {
+            self.rebind(gpu);
+        }
+        match &maps.field {
+            _ if is_same => {}
+            Some(field) => {
+                gpu.queue.write_buffer(&self.masks, 0, bytemuck::cast_slice(&field.masks));
+                gpu.queue.write_buffer(&self.labels, 0, bytemuck::cast_slice(&field.labels));
+            }
+            None => {
+                gpu.queue.write_buffer(&self.masks, 0, &vec![0; 4 * words]);
+                gpu.queue.write_buffer(&self.labels, 0, bytemuck::cast_slice(&vec![UNKNOWN; cells]));
+            }
+        }
+        if !maps.directions.is_empty() {
+            gpu.queue.write_buffer(&self.directions, 0, bytemuck::cast_slice(&maps.directions));
+        }
+        let triangles = self.maps.grid.triangles;
+        self.maps = maps.clone();
+        self.maps.grid.triangles = triangles;
+        gpu.queue.write_buffer(&self.grid, 0, bytemuck::bytes_of(&self.maps.grid));
+        Ok(())
+    }
+
+    /// Takes the triangles of a group, on which so many points lie.
+    ///
+    /// # Errors
+    /// More than a buffer holds.
+    pub fn set_triangles(
+        &mut self,
+        gpu: &Gpu,
+        triangles: &[DvfTriangle],
+        point_count: u32,
+    ) -> Result<(), ExecutorError> {
+        check(gpu, size_of_val(triangles) as u64)?;
+        let elements = sweep_elements(triangles.len() as u32) as usize;
+        let grown = [
+            grow(gpu, &mut self.triangles, "dvf triangles", triangles.len(), size_of::<DvfTriangle>()),
+            grow(gpu, &mut self.sums, "dvf sums", elements, 8),
+        ];
+        if grown.contains(&true) {
+            self.rebind(gpu);
+        }
+        gpu.queue.write_buffer(&self.triangles, 0, bytemuck::cast_slice(triangles));
+        (self.maps.grid.triangles, self.maps.grid.point_count) = (triangles.len() as u32, point_count);
+        gpu.queue.write_buffer(&self.grid, 0, bytemuck::bytes_of(&self.maps.grid));
+        Ok(())
+    }
+
+    /// The buffers of masks, labels and sums, and how many words of them are in use.
+    pub fn results(&self) -> [(&wgpu::Buffer, usize); 3] {
+        let elements = sweep_elements(self.maps.grid.triangles) as usize;
+        [(&self.masks, self.maps.mask_words()), (&self.labels, self.maps.cells()), (&self.sums, 2 * elements)]
+    }
+
+    fn rebind(&mut self, gpu: &Gpu) {
+        let buffers = [&self.grid, &self.masks, &self.labels, &self.triangles, &self.sums, &self.directions];
+        self.group = group(gpu, &self.layout, buffers);
+    }
+}
+
+fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, buffers: [&wgpu::Buffer; 6]) -> wgpu::BindGroup {
+    let entries = numbered(buffers, 0);
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("dvf"), layout, entries: &entries })
+}
+
+/// Refuses fields of more bytes than the device binds.
+fn check(gpu: &Gpu, bytes: u64) -> Result<(), ExecutorError> {
+    let most = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
+    if bytes <= most {
+        return Ok(());
+    }
+    Err(ExecutorError::Device(format!(
+        "{:?} holds fields of visibility of at most {most} bytes, this one has {bytes}; give fewer --dvf-cells or a smaller --dvf-octahedral",
+        gpu.info.name
+    )))
+}

@@ -1,0 +1,173 @@
+//! Discrete visibility fields as kernels see them: placed in a frame.
+
+use super::frame::Frame;
+use super::layout::{DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid};
+use crate::visibility::dvf::{DvfField, DvfSettings, DvfUse, Shape};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Points of the unit circle by which the directions of a point are turned.
+pub const CIRCLE: u32 = 1024;
+
+/// A field in a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DvfMaps {
+    /// How it lies, and what is being made.
+    pub grid: DvfGrid,
+    /// What its masks and labels are; `None`: those that the executor has.
+    pub field: Option<Arc<DvfField>>,
+    /// Without `field`: masks and labels are emptied; so they are, too, where there are not as many.
+    pub is_new: bool,
+    /// Directions of rays about z, then [`CIRCLE`] points of the unit circle.
+    pub directions: Arc<Vec<[f32; 4]>>,
+}
+
+/// What is summed over all triangles of a region.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Areas {
+    /// Steps in which areas are summed, a device unit of area.
+    pub scale: f32,
+    /// Twice the area of all, device units.
+    pub total: f32,
+}
+
+impl Areas {
+    /// Of so many triangles, none of which has twice an area of `most` device units or more, nothing yet; sums stay below 2^62 and areas below 2^40.
+    pub fn of(triangles: u64, most: f64) -> Self {
+        let bits = (most.log2().ceil() as i32).clamp(-80, 80);
+        let count = 64 - triangles.max(1).leading_zeros() as i32;
+        Self { scale: f64::from((62 - count).min(40) - bits).exp2() as f32, total: 0.0 }
+    }
+
+    /// With the sum of all.
+    pub fn with_sum(self, sum: u64) -> Self {
+        Self { total: (sum as f64 / f64::from(self.scale)) as f32, ..self }
+    }
+}
+
+/// The cosine-weighted directions of `rays` rays about z (Hammersley; Malley), then the circle.
+pub fn directions(rays: u32) -> Vec<[f32; 4]> {
+    let around = |i: u32| {
+        let share = (f64::from(i) + 0.5) / f64::from(rays);
+        let (radius, angle) = (share.sqrt(), TAU * f64::from(i.reverse_bits()) / 4_294_967_296.0);
+        [radius * angle.cos(), radius * angle.sin(), (1.0 - share).max(0.0).sqrt(), 0.0].map(|x| x as f32)
+    };
+    let turn = |i: u32| {
+        let angle = TAU * f64::from(i) / f64::from(CIRCLE);
+        [angle.cos() as f32, angle.sin() as f32, 0.0, 0.0]
+    };
+    (0..rays).map(around).chain((0..CIRCLE).map(turn)).collect()
+}
+
+/// The grid of `shape` in `frame`.
+fn placed(shape: &Shape, frame: &Frame) -> DvfGrid {
+    DvfGrid {
+        first: ((frame.origin - shape.corner) / shape.side).as_vec3().to_array(),
+        scale: (frame.unit / shape.side) as f32,
+        size: shape.size,
+        octahedral: shape.octahedral,
+        ..DvfGrid::default()
+    }
+}
+
+impl DvfMaps {
+    /// A field by which rays are answered.
+    pub fn to_answer(field: &Arc<DvfField>, frame: &Frame, how: DvfUse) -> Self {
+        let flags = if how.doubt { DVF_DOUBT } else { 0 } | if how.paper { DVF_PAPER } else { 0 };
+        Self { grid: DvfGrid { flags, ..placed(&field.shape, frame) }, field: Some(field.clone()), ..Self::default() }
+    }
+
+    /// A field that is being made, of `lanes` to a point. Masks are those that the executor has.
+    pub fn to_make(
+        shape: &Shape,
+        frame: &Frame,
+        settings: &DvfSettings,
+        lanes: u32,
+        areas: &Areas,
+        directions: &Arc<Vec<[f32; 4]>>,
+    ) -> Self {
+        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+        let grid = DvfGrid {
+            flags: flag(settings.hammersley, DVF_HAMMERSLEY)
+                | flag(settings.round, DVF_ROUND)
+                | flag(settings.both, DVF_BOTH),
+            points: settings.points as f32,
+            total: areas.total,
+            area_scale: areas.scale,
+            rays: settings.rays,
+            lanes,
+            seed: settings.seed,
+            ..placed(shape, frame)
+        };
+        Self { grid, field: None, is_new: false, directions: directions.clone() }
+    }
+
+    /// Cells.
+    pub fn cells(&self) -> usize {
+        self.grid.size.iter().map(|&n| n as usize).product()
+    }
+
+    /// Words of all masks.
+    pub fn mask_words(&self) -> usize {
+        self.cells() * 2 * (self.grid.octahedral * self.grid.octahedral / 32) as usize
+    }
+}
+
+/// Where the levels of a sweep over `count` elements lie: first element and number, from the elements themselves to their sum.
+pub fn sweep_levels(count: u32) -> Vec<(u32, u32)> {
+    let mut levels = vec![(0, count.max(1))];
+    loop {
+        let (first, count) = levels[levels.len() - 1];
+        levels.push((first + count, count.div_ceil(DVF_WALK)));
+        if count <= DVF_WALK {
+            return levels;
+        }
+    }
+}
+
+/// Elements of all levels.
+pub fn sweep_elements(count: u32) -> u32 {
+    sweep_levels(count).last().map_or(0, |(first, count)| first + count)
+}
+
+/// A sum of 64 bits.
+pub fn sum(words: [u32; 2]) -> u64 {
+    u64::from(words[0]) | u64::from(words[1]) << 32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_end_in_one_sum() {
+        assert_eq!(sweep_levels(1), [(0, 1), (1, 1)]);
+        assert_eq!(sweep_levels(512), [(0, 512), (512, 1)]);
+        assert_eq!(sweep_levels(513), [(0, 513), (513, 2), (515, 1)]);
+        assert_eq!(sweep_levels(3_000_000), [(0, 3_000_000), (3_000_000, 5860), (3_005_860, 12), (3_005_872, 1)]);
+        assert_eq!(sweep_elements(513), 516);
+    }
+
+    #[test]
+    fn directions_lie_by_the_cosine() {
+        for rays in [1, 7, 128] {
+            let all = directions(rays);
+            let around = &all[..rays as usize];
+            assert!(around.iter().all(|d| d[2] > 0.0 && (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - 1.0).abs() < 1e-6));
+            // The mean of the height is that of a cosine-weighted hemisphere.
+            let mean = around.iter().map(|d| f64::from(d[2])).sum::<f64>() / f64::from(rays);
+            assert!((mean - 2.0 / 3.0).abs() < 0.1 / f64::from(rays), "{mean}");
+            assert_eq!(all.len(), (rays + CIRCLE) as usize);
+        }
+    }
+
+    #[test]
+    fn sums_of_areas_have_room() {
+        for (triangles, most) in [(1, 1.0), (3_000_000, 1e6), (4_000_000_000, 4e6), (12, 1e-12)] {
+            let areas = Areas::of(triangles, most);
+            assert!(f64::from(areas.scale) * most * triangles as f64 <= 2f64.powi(62), "{triangles} {most}");
+            assert!(f64::from(areas.scale) * most <= 2f64.powi(40));
+        }
+        assert_eq!(Areas { scale: 4.0, total: 0.0 }.with_sum(10).total, 2.5);
+    }
+}
