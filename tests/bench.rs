@@ -278,7 +278,7 @@ fn seams_and_leaks_of_occupancy_maps_are_measured() {
     assert!(pixels("df 128") > 100.0, "and of the fields, whose maps lie nearly there");
     assert!(seams.iter().filter(|row| row[3].is_number()).all(|row| number(&row[5]) + 1e-9 >= number(&row[4]).abs()));
     let page = std::fs::read_to_string(output.join("report.html")).expect("a page");
-    assert!(page.contains("Error over the distance from a seam, city"));
+    assert!(page.contains("Error over the distance from a seam, pipes"));
 }
 
 #[test]

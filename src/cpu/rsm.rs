@@ -36,6 +36,9 @@ pub struct RsmTables {
 impl RsmTables {
     /// Takes maps; as many texels as before keep what they hold.
     pub fn set(&mut self, maps: &RsmMaps) {
+        if self.texels.len() != maps.texels as usize {
+            self.texels.clear();
+        }
         self.texels.resize(maps.texels as usize, RsmTexel::default());
         self.maps = maps.clone();
     }
