@@ -42,8 +42,19 @@ fn met(column: u32, at: f32, speed: f32, range: vec2<f32>) -> f32 {
     return clamp(divide(barrier(depth - at), speed), range.x, range.y);
 }
 
+// The part of a range between whose first and last cell the middles lie: half a cell less at the ends that are the ray's own, so that on the
+// average over the places of maps it is as long as it is. `speed` in cells a unit of t.
+fn trimmed(range: vec2<f32>, speed: vec3<f32>, ends: vec2<bool>) -> vec2<f32> {
+    let squares = barrier(barrier(barrier(speed.x * speed.x) + barrier(speed.y * speed.y)) + barrier(speed.z * speed.z));
+    let half = divide(0.5, square_root(squares));
+    return select(range, vec2<f32>(barrier(range.x + half), barrier(range.y - half)), ends);
+}
+
 // Through a map: `at` and `speed` in its cells, `range` within it. With no `steps` the ray is along the columns.
 fn through(map: u32, at: vec3<f32>, speed: vec3<f32>, range: vec2<f32>, steps: u32) -> Found {
+    if range.x > range.y {
+        return Found(-1.0, false);
+    }
     let last = i32(params.roma_size) - 1;
     var x = clamp(i32(floor(along(at.x, speed.x, range.x))), 0, last);
     var y = clamp(i32(floor(along(at.y, speed.y, range.x))), 0, last);
@@ -123,7 +134,8 @@ fn trace(index: u32, ray: Ray) -> bool {
             let rows = roma_maps[map].cell_from_point;
             let cell = vec3<f32>(affine(rows[0], start), affine(rows[1], start), affine(rows[2], start));
             let cells = vec3<f32>(linear(rows[0], direction), linear(rows[1], direction), linear(rows[2], direction));
-            let found = through(map, cell, cells, range, steps);
+            let ends = vec2<bool>(l == start_level, range.y >= end);
+            let found = through(map, cell, cells, select(trimmed(range, cells, ends), range, params.roma_part == ROMA_SIFT), steps);
             is_capped = is_capped || found.is_capped;
             if found.t >= 0.0 {
                 if params.roma_part == ROMA_SIFT && is_chosen(index) {

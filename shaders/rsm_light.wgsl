@@ -10,12 +10,12 @@
 #include "shared/light.wgsl"
 #include "shared/rsm.wgsl"
 
-// All by the lift of the level that was met, 1.5 cells: how wide points are moved,
-const MOVED: f32 = 0.6666667;
+// All by the lift of the level that was met, 1.25 cells: how wide points are moved,
+const MOVED: f32 = 0.8;
 // how far what is seen may be from the point, across its surface,
-const ACROSS: f32 = 1.0;
+const ACROSS: f32 = 1.2;
 // and in depth, which is more where the light grazes it.
-const IN_DEPTH: f32 = 3.0;
+const IN_DEPTH: f32 = 3.6;
 
 fn row_at(row: vec4<f32>, p: vec3<f32>) -> f32 {
     return barrier(barrier(barrier(barrier(row.x * p.x) + barrier(row.y * p.y)) + barrier(row.z * p.z)) + row.w);

@@ -233,6 +233,13 @@ pub(super) fn end_of(t_max: f32, lift: f32, squares: f32, rise: f32) -> f32 {
     least(most(divide(root - height, squares), 0.0), t_max)
 }
 
+/// The part of a range between whose first and last cell the middles lie: half a cell less at the ends that are the ray's own, so that on the
+/// average over the places of maps it is as long as it is. `speed` in cells a unit of t.
+fn trimmed(range: [f32; 2], speed: Vec3, [is_first, is_last]: [bool; 2]) -> [f32; 2] {
+    let half = divide(0.5, square_root(speed[0] * speed[0] + speed[1] * speed[1] + speed[2] * speed[2]));
+    [if is_first { range[0] + half } else { range[0] }, if is_last { range[1] - half } else { range[1] }]
+}
+
 /// The finest level that holds the start; the number of levels where none does.
 fn start_level_of(p: &Params, levels: &[RomaLevel], origin: Vec3, normal: Vec3, margin: f32) -> usize {
     let side = p.roma_cells as f32;
@@ -276,6 +283,9 @@ impl Maps<'_> {
 
     /// Through a map: `at` and `speed` in its cells, `range` within it. With no `steps` the ray is along the columns.
     fn through(&self, map: u32, at: Vec3, speed: Vec3, range: [f32; 2], steps: u32) -> Found {
+        if range[0] > range[1] {
+            return Found { t: -1.0, is_capped: false };
+        }
         let last = self.params.roma_size as i32 - 1;
         let mut x = (along(at[0], speed[0], range[0]).floor() as i32).clamp(0, last);
         let mut y = (along(at[1], speed[1], range[0]).floor() as i32).clamp(0, last);
@@ -343,7 +353,9 @@ impl Maps<'_> {
                 let rows = &self.maps[map as usize].cell_from_point;
                 let cell = each(|k| affine(&rows[k], start));
                 let cells = each(|k| linear(&rows[k], direction));
-                let found = self.through(map, cell, cells, range, steps);
+                let ends = [l == start_level, range[1] >= end];
+                let trimmed = if p.roma_part == ROMA_SIFT { range } else { trimmed(range, cells, ends) };
+                let found = self.through(map, cell, cells, trimmed, steps);
                 is_capped |= found.is_capped;
                 if found.t >= 0.0 {
                     let point = each(|k| start[k] + found.t * direction[k]);

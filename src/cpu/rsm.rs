@@ -15,11 +15,11 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 
 /// By the lift of the level that was met: how wide points are moved.
-const MOVED: f32 = 0.666_666_7;
+const MOVED: f32 = 0.8;
 /// How far what is seen may be from the point, across its surface.
-const ACROSS: f32 = 1.0;
+const ACROSS: f32 = 1.2;
 /// And in depth.
-const IN_DEPTH: f32 = 3.0;
+const IN_DEPTH: f32 = 3.6;
 
 /// Pixels that a task lights in a row.
 const RUN: usize = 1024;

@@ -81,11 +81,12 @@ pub enum Role {
 
 impl Role {
     /// Cells of a map by which rays start off their surface. What marks a plane reaches one cell of a base map above it, 0.29 of a map of half as many
-    /// cells, and is found from up to 1.13 cells of the map away: half a diagonal across the column, seven eighths along it. So with the 1.5 of
-    /// Zeng et al. (§6) a plane does not occlude itself. Rays that are sifted start lower: what is taken
-    /// for something costs time only, and what lies below their start is overlooked.
+    /// cells, and is found from up to 0.80 cells of the map away: half a diagonal across the column, three eighths along it, since the middles of the
+    /// cells that count lie beyond the start. So from 1.09 on a plane does not occlude itself. Zeng et al. (§6) have 1.5, and cells that begin
+    /// half a cell before their start on the average. Rays that are sifted start lower: what is taken for something costs time only, and what lies below
+    /// their start is overlooked.
     pub fn lift(self) -> f64 {
-        if matches!(self, Self::Sift(_)) { 0.5 } else { 1.5 }
+        if matches!(self, Self::Sift(_)) { 0.5 } else { 1.25 }
     }
 }
 
