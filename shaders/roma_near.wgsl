@@ -18,11 +18,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let index = global.y * params.width + global.x;
     let ray = rays[index];
     if ray.t_min <= ray.t_max {
-        let d = ray.direction;
-        let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
-        let l = start_level_of(ray.origin, seen_surfaces[index].normal, margin_of(index));
-        if l < params.roma_levels {
-            hits[index].t = min(ray.t_max, divide(f32(params.roma_near), barrier(roma_levels[l].scale * length)));
-        }
+        hits[index].t = min(ray.t_max, near_end(index, ray, params.roma_near));
     }
 }

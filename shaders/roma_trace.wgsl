@@ -1,6 +1,5 @@
-// Answers the pass's rays by ray-aligned occupancy maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the
-// next where the ray leaves one. Rays are off their surface by the level's lift where they enter it, so that no level meets what they
-// leave. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing are ended.
+// Answers the pass's rays by ray-aligned occupancy maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that
+// meet nothing are ended, and others are traced up to roma_near cells from their start.
 // Where the closest is asked for, with the point, against the direction travelled as its normal, and the level's lift as its area: such a hit is known
 // to a cell.
 #include "shared/types.wgsl"
@@ -11,158 +10,41 @@
 #include "shared/roma.wgsl"
 #include "shared/levels.wgsl"
 #include "shared/roma_start.wgsl"
+#include "shared/roma_walk.wgsl"
+#include "shared/roma_pilot.wgsl"
 
-// Columns that a ray passes at most which would be snapped to below its surface and is not.
-const GRAZING_STEPS: u32 = 64u;
-
-// What a ray finds in a level.
-struct Found {
-    t: f32,          // where it meets something; below 0: nothing
-    is_capped: bool, // it passed as many columns as it may, and was finished snapped
-}
-
-// t at which a ray meets the next border of cell `cell`.
-fn border(at: f32, speed: f32, cell: i32) -> f32 {
-    if abs(speed) < LEAST_SPEED {
-        return T_INFINITE;
-    }
-    let side = f32(cell + select(0, 1, speed > 0.0));
-    return barrier(barrier(side - at) * divide(1.0, speed));
-}
-
-// The first cell of a column that a ray at height `at` with vertical `speed` meets from t = range.x to range.y; below 0: none.
-fn met(column: u32, at: f32, speed: f32, range: vec2<f32>) -> f32 {
-    let depth = first_cell(column, along(at, speed, range.x), along(at, speed, range.y), speed >= 0.0);
-    if depth < 0.0 {
-        return -1.0;
-    }
-    if abs(speed) < LEAST_SPEED {
-        return range.x;
-    }
-    return clamp(divide(barrier(depth - at), speed), range.x, range.y);
-}
-
-// The part of a range between whose first and last cell the middles lie: half a cell less at the ends that are the ray's own, so that on the
-// average over the places of maps it is as long as it is. `speed` in cells a unit of t.
-fn trimmed(range: vec2<f32>, speed: vec3<f32>, ends: vec2<bool>) -> vec2<f32> {
-    let squares = barrier(barrier(barrier(speed.x * speed.x) + barrier(speed.y * speed.y)) + barrier(speed.z * speed.z));
-    let half = divide(0.5, square_root(squares));
-    return select(range, vec2<f32>(barrier(range.x + half), barrier(range.y - half)), ends);
-}
-
-// Through a map: `at` and `speed` in its cells, `range` within it. With no `steps` the ray is along the columns.
-fn through(map: u32, at: vec3<f32>, speed: vec3<f32>, range: vec2<f32>, steps: u32) -> Found {
-    if range.x > range.y {
-        return Found(-1.0, false);
-    }
-    let last = i32(params.roma_size) - 1;
-    var x = clamp(i32(floor(along(at.x, speed.x, range.x))), 0, last);
-    var y = clamp(i32(floor(along(at.y, speed.y, range.x))), 0, last);
-    var t = range.x;
-    for (var i = 0u; i < steps; i++) {
-        let to_x = border(at.x, speed.x, x);
-        let to_y = border(at.y, speed.y, y);
-        let end = max(t, min(range.y, min(to_x, to_y)));
-        let hit = met(first_word(map, u32(x), u32(y)), at.z, speed.z, vec2<f32>(t, end));
-        if hit >= 0.0 || end >= range.y {
-            return Found(hit, false);
+// Ends a ray that maps find free; what they do not is traced.
+fn sift(index: u32, ray: Ray, found: Answer) {
+    if found.t < 0.0 {
+        if found.is_known {
+            hits[index].t = ANSWERED;
         }
-        if to_x <= to_y {
-            x += select(-1, 1, speed.x > 0.0);
-        } else {
-            y += select(-1, 1, speed.y > 0.0);
-        }
-        if min(x, y) < 0 || max(x, y) > last {
-            return Found(-1.0, false);
-        }
-        t = end;
+        return;
     }
-    return Found(met(first_word(map, u32(x), u32(y)), at.z, speed.z, vec2<f32>(t, range.y)), steps > 0u);
+    if !is_chosen(index) {
+        hits[index] = Hit(ANSWERED, ROMA_HIT, 0.0, 0.0);
+        return;
+    }
+    // What it brings counts for those that are not, too.
+    hits[index].u = f32(params.roma_one_in - 1u);
+    if params.roma_near == 0u {
+        hits[index].t = WAITING;
+    } else if params.roma_near != NONE {
+        hits[index].t = min(ray.t_max, near_end(index, ray, params.roma_near));
+    }
 }
 
-// Whether a ray in doubt is traced: of the directions of a pixel one in so many, evenly, the first at random. Rays of a workgroup go together.
-fn is_chosen(index: u32) -> bool {
-    let workgroup = index / params.width / 8u * params.width + index % params.width / 8u;
-    let first = u32(random2(workgroup, ~params.stream, params.seed).y * f32(params.roma_one_in));
-    return (first + params.direction) % params.roma_one_in == 0u;
-}
-
-// Answers a ray; whether it was capped in some level.
-fn trace(index: u32, ray: Ray) -> bool {
-    let normal = seen_surfaces[index].normal;
-    let maps = params.roma_k * params.roma_k;
-    let stratum = stratum_of(ray.direction);
-    var direction = ray.direction;
-    var steps = params.roma_steps;
-    if steps == 0u {
-        let d = ray.direction;
-        let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
-        let snapped = barrier3(select(-length, length, d.z >= 0.0) * roma_maps[stratum].direction.xyz);
-        let above = barrier(barrier(snapped.x * normal.x) + barrier(snapped.y * normal.y)) + barrier(snapped.z * normal.z);
-        if above >= 0.0 {
-            direction = snapped;
-        } else {
-            steps = GRAZING_STEPS;
-        }
+// Writes what a ray meets.
+fn write(index: u32, found: Answer) {
+    if found.t < 0.0 {
+        return;
     }
-    let side = f32(params.roma_cells);
-    let margin = margin_of(index);
-    let start_level = start_level_of(ray.origin, normal, margin);
-    let rise = barrier(barrier(barrier(direction.x * normal.x) + barrier(direction.y * normal.y)) + barrier(direction.z * normal.z));
-    let squares = barrier(barrier(barrier(direction.x * direction.x) + barrier(direction.y * direction.y)) + barrier(direction.z * direction.z));
-    var t = ray.t_min;
-    if params.roma_part == ROMA_FAR {
-        t = max(t, hits[index].t);
+    hits[index] = Hit(found.t, ROMA_HIT, 0.0, 0.0);
+    if (params.flags & PARAM_ANY_HIT) == 0u {
+        surfaces[index].point = found.point;
+        surfaces[index].normal = -found.direction;
+        surfaces[index].area = found.lift;
     }
-    var is_capped = false;
-    for (var l = start_level; l < params.roma_levels; l++) {
-        let level = roma_levels[l];
-        let lift = lift_of(level, barrier(t * rise));
-        let start = lifted(ray.origin, normal, lift);
-        // Rays that are sifted must be free to their own end.
-        let end = select(end_of(ray.t_max, lift, squares, rise), ray.t_max, params.roma_part == ROMA_SIFT);
-        let at = barrier3(barrier3(start * level.scale) + level.first);
-        let speed = barrier3(direction * level.scale);
-        let low = select(margin, 0.0, l + 1u == params.roma_levels && params.roma_is_part == 0u);
-        let high = side - low;
-        var range = vec2<f32>(t, end);
-        range = clipped(range, at.x, speed.x, low, high);
-        range = clipped(range, at.y, speed.y, low, high);
-        range = clipped(range, at.z, speed.z, low, high);
-        if range.x <= range.y {
-            let map = l * maps + stratum;
-            let rows = roma_maps[map].cell_from_point;
-            let cell = vec3<f32>(affine(rows[0], start), affine(rows[1], start), affine(rows[2], start));
-            let cells = vec3<f32>(linear(rows[0], direction), linear(rows[1], direction), linear(rows[2], direction));
-            let ends = vec2<bool>(l == start_level, range.y >= end);
-            let found = through(map, cell, cells, select(trimmed(range, cells, ends), range, params.roma_part == ROMA_SIFT), steps);
-            is_capped = is_capped || found.is_capped;
-            if found.t >= 0.0 {
-                if params.roma_part == ROMA_SIFT && is_chosen(index) {
-                    // What it brings counts for those that are not, too.
-                    hits[index].u = f32(params.roma_one_in - 1u);
-                } else {
-                    // A ray that was sifted is not traced.
-                    hits[index] = Hit(select(found.t, -1.0, params.roma_part == ROMA_SIFT), ROMA_HIT, 0.0, 0.0);
-                }
-                if (params.flags & PARAM_ANY_HIT) == 0u {
-                    surfaces[index].point = barrier3(start + barrier3(found.t * direction));
-                    surfaces[index].normal = -direction;
-                    surfaces[index].area = level.lift;
-                }
-                return is_capped;
-            }
-            t = range.y;
-            if t >= end {
-                break;
-            }
-        }
-    }
-    if params.roma_part == ROMA_SIFT && (params.roma_is_part == 0u || t >= ray.t_max) {
-        // All of it lies in the levels, and it is not traced.
-        hits[index].t = -1.0;
-    }
-    return is_capped;
 }
 
 var<workgroup> counted: atomic<u32>; // rays, and in the upper half those that were capped
@@ -173,10 +55,18 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
     if global.x < params.width && global.y < params.height {
         let index = global.y * params.width + global.x;
         let ray = rays[index];
-        // What has met something is not asked again, nor what was traced to its end.
-        let is_open = params.roma_part != ROMA_FAR || (hits[index].id == NONE && hits[index].t < ray.t_max);
-        if ray.t_min <= ray.t_max && is_open {
-            atomicAdd(&counted, select(1u, 65537u, trace(index, ray)));
+        let is_far = params.roma_part == ROMA_FAR;
+        let is_sifted = params.roma_part == ROMA_SIFT;
+        // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
+        let is_done = hits[index].id != NONE || hits[index].t == ANSWERED || hits[index].t >= ray.t_max;
+        if ray.t_min <= ray.t_max && !(is_far && is_done) && !(is_sifted && is_pilot(index)) {
+            let found = answer(index, ray, select(ray.t_min, hits[index].t, is_far), is_sifted);
+            if is_sifted {
+                sift(index, ray, found);
+            } else {
+                write(index, found);
+            }
+            atomicAdd(&counted, select(1u, 65537u, found.is_capped));
         }
     }
     workgroupBarrier();

@@ -7,7 +7,7 @@ use brickwalk::app::session::{Session, open_scene};
 use brickwalk::app::walk;
 use brickwalk::kernel::Extent;
 use brickwalk::reference::Truth;
-use brickwalk::render::Renderer;
+use brickwalk::render::{FrameOutput, Renderer, Trust};
 use brickwalk::scene::Camera;
 use brickwalk::visibility::bom::{Settings, assemble};
 use clap::Parser;
@@ -166,8 +166,12 @@ fn rays_that_maps_find_free_are_not_traced() {
     let folder = folder();
     let scene = scene(folder.path(), true);
     let of = |options: &str| openness(folder.path(), true, &format!("--spp 16 {options}"));
-    let (exact, roma, auto, fewer) =
-        (of(""), of("--secondary roma"), of("--secondary auto --auto-one-in 1"), of("--secondary auto"));
+    let (exact, roma, auto, fewer) = (
+        of(""),
+        of("--secondary roma"),
+        of("--secondary auto --auto-error off --auto-one-in 1"),
+        of("--secondary auto --auto-error off"),
+    );
     let mean = |pixels: &[(f64, f64)]| pixels.iter().map(|p| p.1).sum::<f64>() / pixels.len() as f64;
     let bias = |pixels: &[(f64, f64)]| mean(pixels) - mean(&exact);
     let (error_of_maps, error) = (apart(&roma, &exact), apart(&auto, &exact));
@@ -181,12 +185,54 @@ fn rays_that_maps_find_free_are_not_traced() {
         let output = renderer(&scene, &format!("--effects ao {options}")).frame(0, &eye()).expect("a frame");
         output.records.iter().filter(|r| r.pass == "ao").map(|r| r.rays).sum()
     };
-    let [all, doubt, some] = ["", "--secondary auto --auto-one-in 1", "--secondary auto"].map(rays);
+    let [all, doubt, some] =
+        ["", "--secondary auto --auto-error off --auto-one-in 1", "--secondary auto --auto-error off"].map(rays);
     assert_eq!(all, (SIZE * SIZE * 16) as u64);
     let share = |rays: u64| (rays - all) as f64 / all as f64;
     println!("traced: {:.3}, of those in doubt one in four {:.3}", share(doubt), share(some));
     assert!(share(doubt) > 0.1 && share(doubt) < 0.8, "{}", share(doubt));
     assert!((share(some) / share(doubt) - 0.25).abs() < 0.02, "{} of {}", share(some), share(doubt));
+}
+
+#[test]
+fn maps_answer_what_measured_errors_allow() {
+    let folder = folder();
+    let scene = scene(folder.path(), true);
+    let walk = |options: &str| {
+        let mut renderer = renderer(&scene, &format!("--effects ao --spp 4 {options}"));
+        // What is measured in the first picture decides of the second.
+        let pictures = [0, 1].map(|frame| renderer.frame(frame, &eye()).expect("a frame"));
+        (pictures, renderer.roma.handovers()[0])
+    };
+    let seen = |output: &FrameOutput| output.pixels.radiance.iter().map(|x| x[1] as f64).collect::<Vec<_>>();
+    let ([_, exact], _) = walk("");
+    let ([_, alone], _) = walk("--secondary roma --roma-unsnapped all --roma-steps 64 --roma-samples 4");
+    let mut before = f64::INFINITY;
+    for (percent, least_trust) in [(50.0, Trust::Beyond(0)), (2.0, Trust::Beyond(32)), (0.1, Trust::Nothing)] {
+        let options = format!("--secondary auto --auto-one-in 1 --auto-error {percent}");
+        let ([_, output], measured) = walk(&options);
+        let trust = measured.trust((1e4 * percent) as u32);
+        let wrong = measured.share_wrong(trust);
+        let sum = |pixels: &[f64]| pixels.iter().sum::<f64>();
+        let (all, found, of_maps) = (sum(&seen(&exact)), sum(&seen(&output)), sum(&seen(&alone)));
+        println!(
+            "{percent} %: trusted with {trust}, wrong {wrong:.4}, light {:.4}, of maps alone {:.4}",
+            found / all - 1.0,
+            of_maps / all - 1.0
+        );
+        assert!(wrong <= percent / 100.0);
+        assert!(wrong <= before, "errors fall");
+        before = wrong;
+        let places = |trust| Trust::all().position(|other| other == trust);
+        assert!(places(trust) <= places(least_trust), "{trust}");
+        if trust == Trust::Nothing {
+            assert!(output.pixels.radiance == exact.pixels.radiance, "all rays are traced");
+        } else {
+            assert!(output.pixels.radiance != exact.pixels.radiance, "control: maps answer some");
+        }
+        // What is answered wrongly makes as much darker or brighter at most.
+        assert!((found / all - 1.0).abs() <= wrong + 0.02, "{found} of {all}");
+    }
 }
 
 #[test]

@@ -6,9 +6,20 @@ fn margin_of(index: u32) -> f32 {
     return barrier(BLEND * barrier(side * random2(index, ~params.stream, params.seed).x));
 }
 
-// What is missing to the level's lift of a ray that is `height` off its surface.
-fn lift_of(level: RomaLevel, height: f32) -> f32 {
-    return clamp(level.lift - height, 0.0, level.lift);
+// What is missing to a level's lift of a ray that is `height` off its surface.
+fn lift_of(lift: f32, height: f32) -> f32 {
+    return clamp(lift - height, 0.0, lift);
+}
+
+// t at which a ray is so many cells of the base map that holds its start from there; T_INFINITE where none holds it.
+fn near_end(index: u32, ray: Ray, cells: u32) -> f32 {
+    let d = ray.direction;
+    let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
+    let l = start_level_of(ray.origin, seen_surfaces[index].normal, margin_of(index));
+    if l >= params.roma_levels {
+        return T_INFINITE;
+    }
+    return divide(f32(cells), barrier(roma_levels[l].scale * length));
 }
 
 fn lifted(origin: vec3<f32>, normal: vec3<f32>, lift: f32) -> vec3<f32> {

@@ -47,7 +47,7 @@ struct Params {
     roma_levels: u32,     // base maps
     roma_samples: u32,    // look-ups of the base map a cell
     roma_steps: u32,      // columns that a ray passes before it is finished snapped; 0: it is snapped
-    roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced
+    roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced; NONE: to its end. roma_measure: in one of a map
     roma_part: u32,       // which part of rays roma_trace answers, ROMA_*
     roma_is_part: u32,    // 1: rays that leave the coarsest base map are not answered, 0: it holds the scene
     roma_one_in: u32,     // of rays that roma_trace sifts and does not find free one in so many is traced
@@ -67,6 +67,10 @@ struct Params {
     dvf_next: u32,        // sweeps: first element of the level above
     dvf_count: u32,       // sweeps: elements of the level
     dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
+    roma_pilots: u32,     // of rays that are sifted one in so many is traced to its end all the same; 0: none
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }
@@ -413,6 +417,7 @@ const TILE_TEXELS: u32 = 128u;     // side of a tile
 const ROMA_HIT: u32 = 0xfffffffeu;   // id of what ROMA meets, which is no triangle
 const ROMA_WHOLE: u32 = 0u; // all of them
 const ROMA_FAR: u32 = 1u;   // from where they have been traced to
+const HANDOVERS: u32 = 6u;       // distances up to which rays may be traced, roma_measure
 const ROMA_SIFT: u32 = 2u;  // those alone that meet nothing
 const FIELD_HIT: u32 = 0xfffffffdu;  // id of what is met in a distance field, which is no triangle
 const DVF_HIT: u32 = 0xfffffffcu;    // id of what a discrete visibility field says is met, which is no triangle
@@ -451,5 +456,6 @@ const COUNTER_ROMA_CAPPED: u32 = 20u;
 const COUNTER_UNRESOLVED: u32 = 21u;
 const COUNTER_DVF_ANSWERED: u32 = 22u;
 const COUNTER_FIELD_CAPPED: u32 = 23u;
-const WORK_CHOSEN: u32 = 24u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
-const WORK_ROOTED: u32 = 28u;      // the same over tiles whose rays walk from the root
+const COUNTER_PILOTS: u32 = 24u;    // rays that were sifted and traced all the same; then those wrongly free, and those wrongly met by HANDOVERS
+const WORK_CHOSEN: u32 = 32u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
+const WORK_ROOTED: u32 = 36u;      // the same over tiles whose rays walk from the root

@@ -83,7 +83,7 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
 
 /// Whether maps would have sifted rays of ao that are too short for it.
 fn has_short_rays(renderer: &mut Renderer) -> bool {
-    let is_sifted = renderer.settings.roma.is_some_and(|roma| matches!(roma.occlusion.role, Role::Sift(_)));
+    let is_sifted = renderer.settings.roma.is_some_and(|roma| matches!(roma.occlusion.role, Role::Sift { .. }));
     let length = renderer.settings.effects.occlusion.map(|occlusion| occlusion.length);
     is_sifted && length.is_some_and(|length| renderer.roma.is_short(&renderer.scene, length))
 }

@@ -50,6 +50,12 @@ pub struct RomaArgs {
     /// are noisier; the mean is the same
     #[arg(long, value_name = "N", default_value = "4", value_parser = |s: &str| ranged(s, 1, MOST_ONE_IN.into()))]
     pub auto_one_in: u32,
+    /// With --secondary auto: of a hundred rays of ao or shadow, how many maps may answer otherwise than exact rays would, 0.1 to 50: rays that maps do not find
+    /// free are traced up to 0, 2, 4, 8, 16 or 32 cells of a map from their start, or to their end, the least that keeps to it, and maps say what is
+    /// beyond. It is measured by one ray in 16, traced to its end; while too little is measured, and where even rays found free err more, all are. off:
+    /// rays in doubt are traced to their ends, and nothing is measured
+    #[arg(long, value_name = "PERCENT|off", default_value = "2", value_parser = |s: &str| most_wrong(s))]
+    pub auto_error: MostWrong,
     /// With --secondary roma and diffuse: texels of the longer side of the maps of what lamps light, 32 to 2048; a map of the sun covers what a map of
     /// cells does, so that 256 make them as wide as cells; a point has six of half as many on both sides
     #[arg(long, value_name = "TEXELS", default_value = "256", value_parser = |s: &str| ranged(s, 32, 2048))]
@@ -99,7 +105,7 @@ impl RomaArgs {
     pub fn settings(&self, is_auto: bool) -> RomaSettings {
         let pass = |k, is_unsnapped, near, one_in, stride| {
             let role = match near {
-                _ if is_auto => Role::Sift(one_in),
+                _ if is_auto => Role::Sift { one_in, most_wrong: self.auto_error },
                 0 => Role::Answer,
                 cells => Role::Far(cells),
             };
@@ -118,6 +124,18 @@ impl RomaArgs {
             diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), 0, 1, CLOSED)),
             rsm: RsmSettings { size: self.rsm_size, lamps: self.rsm_lamps },
         }
+    }
+}
+
+/// As of [`Role::Sift`].
+type MostWrong = Option<u32>;
+
+fn most_wrong(text: &str) -> Result<MostWrong, String> {
+    let found: Option<f64> = text.parse().ok().filter(|x| (0.1..=50.0).contains(x));
+    match (text, found) {
+        ("off", _) => Ok(None),
+        (_, Some(percent)) => Ok(Some((1e4 * percent).round() as u32)),
+        _ => Err("it must be a number from 0.1 to 50, or off".into()),
     }
 }
 

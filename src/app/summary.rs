@@ -5,7 +5,7 @@ use super::lighting::Lighting;
 use super::optimisation_args::names;
 use super::pictures::Pictures;
 use crate::render::denoise::Resolve;
-use crate::render::{Renderer, Schedule};
+use crate::render::{Handover, Renderer, Schedule, Trust};
 use crate::stats::Record;
 use crate::visibility::roma::Role;
 use serde_json::{Map, Value, json};
@@ -218,6 +218,17 @@ fn memory() -> Value {
     }
 }
 
+/// What was measured of rays that maps sift: shares of all, 0 to 1, that would be answered otherwise than exact ones, by how far rays in doubt are traced.
+fn handover(role: Role, measured: &Handover) -> Option<Value> {
+    let Role::Sift { most_wrong: Some(most_wrong), .. } = role else { return None };
+    let ways = Trust::all().map(|trust| json!({ "trust": trust.to_string(), "wrong": measured.share_wrong(trust) }));
+    Some(json!({
+        "pilots": measured.pilots(),
+        "trust": measured.trust(most_wrong).to_string(),
+        "measured": ways.collect::<Vec<_>>(),
+    }))
+}
+
 /// What answers rays by maps; `None` where none does.
 fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
     renderer.settings.roma.map(|roma| {
@@ -232,8 +243,11 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
             "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
             "near": near(roma.occlusion.role),
-            "one_in": if let Role::Sift(one_in) = roma.occlusion.role { one_in } else { 1 },
+            "one_in": if let Role::Sift { one_in, .. } = roma.occlusion.role { one_in } else { 1 },
+            "most_wrong": if let Role::Sift { most_wrong: Some(n), .. } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
             "shadow_near": near(roma.shadow.role),
+            "ao_handover": handover(roma.occlusion.role, &renderer.roma.handovers()[0]),
+            "shadow_handover": handover(roma.shadow.role, &renderer.roma.handovers()[1]),
             "finest_cell": renderer.roma.finest_cell(),
         })
     })

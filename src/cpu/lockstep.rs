@@ -145,7 +145,12 @@ impl Findings {
                 r.queries_tightened,
                 r.rays_capped,
                 r.rays_answered,
+                r.pilots.rays,
+                r.pilots.missed,
             ]
+            .into_iter()
+            .chain(r.pilots.doubted)
+            .collect::<Vec<u64>>()
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
         let demand = |r: &Report| -> Vec<[u32; 4]> {

@@ -8,7 +8,8 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernel::dispatch::{
-    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
+    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT,
+    RSM_WRITE,
 };
 use crate::kernel::field::FieldMaps;
 use crate::kernel::frame::Frame;
@@ -230,7 +231,7 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 /// Small maps, of both numbers of directions.
 fn roma((steps, role): (u32, Role)) -> RomaSettings {
     let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 4 }, steps, role };
-    let diffuse = (!matches!(role, Role::Sift(_))).then(|| RomaPass { role: Role::Answer, ..pass(4) });
+    let diffuse = (!matches!(role, Role::Sift { .. })).then(|| RomaPass { role: Role::Answer, ..pass(4) });
     RomaSettings { occlusion: pass(4), shadow: pass(8), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
 }
 
@@ -379,8 +380,11 @@ fn twins_agree_with_their_kernels() {
         Variant { roma: Some((0, Role::Answer)), ..VARIANT },
         Variant { roma: Some((3, Role::Answer)), ..VARIANT },
         Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
-        Variant { roma: Some((64, Role::Sift(1))), ..VARIANT },
-        Variant { roma: Some((3, Role::Sift(3))), schedule: Schedule::Demand, ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { one_in: 1, most_wrong: None })), ..VARIANT },
+        Variant { roma: Some((3, Role::Sift { one_in: 3, most_wrong: None })), schedule: Schedule::Demand, ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { one_in: 1, most_wrong: Some(100_000) })), ..VARIANT },
+        Variant { roma: Some((3, Role::Sift { one_in: 2, most_wrong: Some(500_000) })), ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { one_in: 1, most_wrong: Some(1000) })), ..VARIANT },
         Variant { field: Some(64), ..VARIANT },
         Variant { field: Some(3), ..VARIANT },
         Variant { dvf: Some(visibility(8)), ..VARIANT },
@@ -409,7 +413,7 @@ fn twins_agree_with_their_kernels() {
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
     let all = kernels::names()
-        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, RSM_WRITE, RSM_LIGHT])
+        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_MEASURE, RSM_WRITE, RSM_LIGHT])
         .chain(FIELD_KERNELS)
         .chain(DVF_KERNELS);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();

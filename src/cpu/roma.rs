@@ -4,8 +4,8 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
-    COUNTER_RAYS, COUNTER_ROMA_CAPPED, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel,
-    RomaMap, Surface, T_INFINITE,
+    COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_FAR, ROMA_HIT,
+    ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -21,6 +21,15 @@ const LEAST_STEP: f32 = 1.0 / 1024.0;
 
 /// A level ends before its sides, ray by ray, by up to this share of them.
 pub(super) const BLEND: f32 = 1.0 / 16.0;
+
+/// Share of a level's lift by which rays start that are sifted.
+const SIFTED_LIFT: f32 = 0.4;
+
+/// What hits of rays that are sifted have in place of a distance: answered.
+const ANSWERED: f32 = -1.0;
+
+/// The same: waiting for maps to answer them.
+const WAITING: f32 = -2.0;
 
 /// Columns that a ray passes at most which would be snapped to below its surface and is not.
 const GRAZING_STEPS: u32 = 64;
@@ -205,16 +214,30 @@ fn margin_of(p: &Params, index: u32) -> f32 {
     BLEND * (p.roma_cells as f32 * random2(index, !p.stream, p.seed)[0])
 }
 
-/// Whether a ray in doubt is traced: of the directions of a pixel one in so many, evenly, the first at random. Rays of a workgroup go together.
-fn is_chosen(p: &Params, index: u32) -> bool {
+/// Random numbers of a ray's workgroup, whose rays go together.
+fn workgroup_words(p: &Params, index: u32) -> [f32; 2] {
     let workgroup = index / p.width / 8 * p.width + index % p.width / 8;
-    let first = (random2(workgroup, !p.stream, p.seed)[1] * p.roma_one_in as f32) as u32;
+    random2(workgroup, !p.stream, p.seed)
+}
+
+/// Whether a ray in doubt is traced: of the directions of a pixel one in so many, evenly, the first at random.
+fn is_chosen(p: &Params, index: u32) -> bool {
+    let first = (workgroup_words(p, index)[1] * p.roma_one_in as f32) as u32;
     (first + p.direction).is_multiple_of(p.roma_one_in)
 }
 
-/// What is missing to the level's lift of a ray that is `height` off its surface.
-fn lift_of(level: &RomaLevel, height: f32) -> f32 {
-    least(most(level.lift - height, 0.0), level.lift)
+/// Whether a ray is traced to its end, whatever maps say of it, and shows what they would have got wrong.
+fn is_pilot(p: &Params, index: u32) -> bool {
+    if p.roma_pilots == 0 {
+        return false;
+    }
+    let first = (workgroup_words(p, index)[0] * p.roma_pilots as f32) as u32;
+    (first + p.direction).is_multiple_of(p.roma_pilots)
+}
+
+/// What is missing to a level's lift of a ray that is `height` off its surface.
+fn lift_of(lift: f32, height: f32) -> f32 {
+    least(most(lift - height, 0.0), lift)
 }
 
 fn lifted(origin: Vec3, normal: Vec3, lift: f32) -> Vec3 {
@@ -312,8 +335,10 @@ impl Maps<'_> {
         Found { t: hit, is_capped: steps > 0 }
     }
 
-    /// What a ray meets at or beyond t = `from`.
-    fn trace(&self, index: u32, ray: &Ray, normal: Vec3, from: f32) -> Answer {
+    /// Asks for a ray from t = `from` on: in the finest level that holds its start, then in the next where it leaves one. Rays are off their surface by
+    /// the level's lift where they enter it, so that no level meets what they leave; with `is_sifted` by less, and must be free to their own
+    /// ends.
+    fn answer(&self, index: u32, ray: &Ray, normal: Vec3, from: f32, is_sifted: bool) -> Answer {
         let p = self.params;
         let maps = p.roma_k * p.roma_k;
         let (stratum, is_upper) = stratum_of(ray.direction, p.roma_k);
@@ -339,10 +364,9 @@ impl Maps<'_> {
         let mut t = most(ray.t_min, from);
         let mut is_capped = false;
         for (l, level) in self.levels.iter().enumerate().skip(start_level) {
-            let lift = lift_of(level, t * rise);
+            let lift = lift_of(if is_sifted { SIFTED_LIFT * level.lift } else { level.lift }, t * rise);
             let start = lifted(ray.origin, normal, lift);
-            // Rays that are sifted must be free to their own end.
-            let end = if p.roma_part == ROMA_SIFT { ray.t_max } else { end_of(ray.t_max, lift, squares, rise) };
+            let end = if is_sifted { ray.t_max } else { end_of(ray.t_max, lift, squares, rise) };
             let at = each(|k| start[k] * level.scale + level.first[k]);
             let speed = direction.map(|x| x * level.scale);
             let low = if l + 1 == self.levels.len() && p.roma_is_part == 0 { 0.0 } else { margin };
@@ -354,7 +378,7 @@ impl Maps<'_> {
                 let cell = each(|k| affine(&rows[k], start));
                 let cells = each(|k| linear(&rows[k], direction));
                 let ends = [l == start_level, range[1] >= end];
-                let trimmed = if p.roma_part == ROMA_SIFT { range } else { trimmed(range, cells, ends) };
+                let trimmed = if is_sifted { range } else { trimmed(range, cells, ends) };
                 let found = self.through(map, cell, cells, trimmed, steps);
                 is_capped |= found.is_capped;
                 if found.t >= 0.0 {
@@ -372,6 +396,14 @@ impl Maps<'_> {
     }
 }
 
+/// t at which a ray is so many cells of the base map that holds its start from there; [`T_INFINITE`] where none holds it.
+fn near_end(p: &Params, levels: &[RomaLevel], index: u32, ray: &Ray, normal: Vec3, cells: u32) -> f32 {
+    let d = ray.direction;
+    let length = square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    let level = levels.get(start_level_of(p, levels, ray.origin, normal, margin_of(p, index)));
+    level.map_or(T_INFINITE, |level| divide(cells as f32, level.scale * length))
+}
+
 /// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those that no base map holds are
 /// traced whole.
 pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
@@ -382,57 +414,98 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
     own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
         for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
             let index = run * RUN + i;
-            let d = ray.direction;
-            let length = square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-            let margin = margin_of(p, index as u32);
-            let level = levels.get(start_level_of(p, levels, ray.origin, normal_of(seen, index), margin));
-            if let Some(level) = level {
-                hit.t = least(ray.t_max, divide(p.roma_near as f32, level.scale * length));
-            }
+            let end = near_end(p, levels, index as u32, ray, normal_of(seen, index), p.roma_near);
+            hit.t = least(ray.t_max, end);
         }
     });
 }
 
-/// Answers the pass's rays by ray-aligned maps (Zeng et al., Algorithm 2): in the finest level that holds the start, then in the next where
-/// the ray leaves one. What is met is written as a hit of no triangle; where the closest is asked for, with what is known of its surface.
+/// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing
+/// are ended, and others are traced up to `roma_near` cells from their start. Where the closest is asked for, with what is known of its surface.
 pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let RomaMaps { levels, maps, .. } = &tables.maps;
-    let of = Maps { params: bound.params, levels, maps, columns: &tables.columns };
-    let part = bound.params.roma_part;
+    let p = bound.params;
+    let of = Maps { params: p, levels, maps, columns: &tables.columns };
+    let (is_far, is_sifted) = (p.roma_part == ROMA_FAR, p.roma_part == ROMA_SIFT);
     let RaySet { rays, hits, surfaces } = own;
     let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
     all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();
         for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
-            let (hit, surface) = (&mut hits[i], &mut surfaces[i]);
-            // What has met something is not asked again, nor what was traced to its end.
-            if part == ROMA_FAR && (hit.id != NONE || hit.t >= ray.t_max) {
+            let (hit, surface, index) = (&mut hits[i], &mut surfaces[i], run * RUN + i);
+            // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
+            let is_done = hit.id != NONE || hit.t == ANSWERED || hit.t >= ray.t_max;
+            if is_far && is_done || is_sifted && is_pilot(p, index as u32) {
                 continue;
             }
-            let index = run * RUN + i;
             tally.add(COUNTER_RAYS, 1);
             if levels.is_empty() {
                 continue;
             }
-            let from = if part == ROMA_FAR { hit.t } else { ray.t_min };
-            let Answer { met, is_capped, is_known } = of.trace(index as u32, ray, normal_of(seen, index), from);
-            tally.add(COUNTER_ROMA_CAPPED, u32::from(is_capped));
-            let Some(Met { t, point, direction, lift }) = met else {
-                if part == ROMA_SIFT && is_known {
-                    // It is not traced.
-                    hit.t = -1.0;
+            let normal = normal_of(seen, index);
+            let from = if is_far { hit.t } else { ray.t_min };
+            let found = of.answer(index as u32, ray, normal, from, is_sifted);
+            tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
+            if is_sifted {
+                of.sift(index as u32, ray, normal, &found, hit);
+            } else if let Some(Met { t, point, direction, lift }) = found.met {
+                *hit = Hit { t, id: ROMA_HIT, u: 0.0, v: 0.0 };
+                if !bound.has(PARAM_ANY_HIT) {
+                    (surface.point, surface.normal, surface.area) = (point, direction.map(|x| -x), lift);
                 }
-                continue;
-            };
-            if part == ROMA_SIFT && is_chosen(bound.params, index as u32) {
-                // What it brings counts for those that are not, too.
-                hit.u = (bound.params.roma_one_in - 1) as f32;
+            }
+        }
+        bound.counters.add(&tally);
+    });
+}
+
+impl Maps<'_> {
+    /// Ends a ray that maps find free; what they do not is traced.
+    fn sift(&self, index: u32, ray: &Ray, normal: Vec3, found: &Answer, hit: &mut Hit) {
+        let p = self.params;
+        if found.met.is_none() {
+            if found.is_known {
+                hit.t = ANSWERED;
+            }
+            return;
+        }
+        if !is_chosen(p, index) {
+            *hit = Hit { t: ANSWERED, id: ROMA_HIT, u: 0.0, v: 0.0 };
+            return;
+        }
+        // What it brings counts for those that are not, too.
+        hit.u = (p.roma_one_in - 1) as f32;
+        if p.roma_near == 0 {
+            hit.t = WAITING;
+        } else if p.roma_near != NONE {
+            hit.t = least(ray.t_max, near_end(p, self.levels, index, ray, normal, p.roma_near));
+        }
+    }
+}
+
+/// Counts, of the pilots, which were traced to their ends, how many maps would have answered wrongly: those that meet something though they were found
+/// free, and for each of several distances up to which rays in doubt may be traced, those that are free and meet something in the maps from there on.
+pub fn roma_measure(bound: &Bound, tables: &RomaTables, own: &RaySet, seen: &RaySet) {
+    let RomaMaps { levels, maps, .. } = &tables.maps;
+    let p = bound.params;
+    let of = Maps { params: p, levels, maps, columns: &tables.columns };
+    own.hits.par_chunks(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
+        let mut tally = Tally::default();
+        for (i, (hit, ray)) in hits.iter().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+            let index = (run * RUN + i) as u32;
+            if !is_pilot(p, index) {
                 continue;
             }
-            // A ray that was sifted is not traced.
-            *hit = Hit { t: if part == ROMA_SIFT { -1.0 } else { t }, id: ROMA_HIT, u: 0.0, v: 0.0 };
-            if !bound.has(PARAM_ANY_HIT) {
-                (surface.point, surface.normal, surface.area) = (point, direction.map(|x| -x), lift);
+            tally.add(COUNTER_PILOTS, 1);
+            let (is_free, normal) = (hit.id == NONE, normal_of(seen, index as usize));
+            let found = of.answer(index, ray, normal, ray.t_min, true);
+            let is_met = found.met.is_some();
+            tally.add(COUNTER_PILOTS + 1, u32::from(!is_free && !is_met && found.is_known));
+            for i in 0..if is_free && is_met { HANDOVERS } else { 0 } {
+                let cells = if i == 0 { 0 } else { 1 << i };
+                let from = near_end(p, levels, index, ray, normal, cells * p.roma_near);
+                let is_wrong = from < ray.t_max && of.answer(index, ray, normal, from, false).met.is_some();
+                tally.add(COUNTER_PILOTS + 2 + i, u32::from(is_wrong));
             }
         }
         bound.counters.add(&tally);

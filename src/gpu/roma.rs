@@ -4,7 +4,7 @@ use super::device::Gpu;
 use super::groups::numbered;
 use super::kernels::{self, Kernels};
 use super::rays::storage;
-use crate::kernel::dispatch::{ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::dispatch::{ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernel::layout::{RomaLevel, RomaMap};
 use crate::kernel::roma::RomaMaps;
 use crate::schedule::ExecutorError;
@@ -18,6 +18,7 @@ pub struct Roma {
     rotate: wgpu::ComputePipeline,
     near: wgpu::ComputePipeline,
     trace: wgpu::ComputePipeline,
+    measure: wgpu::ComputePipeline,
     levels: wgpu::Buffer,
     map_records: wgpu::Buffer,
     boms: wgpu::Buffer,
@@ -26,7 +27,7 @@ pub struct Roma {
     cascades: Arc<Cascades>,
     /// How the maps are placed.
     pub maps: RomaMaps,
-    /// Group 2 of both kernels.
+    /// Group 2 of the kernels.
     pub group: wgpu::BindGroup,
 }
 
@@ -58,9 +59,9 @@ impl Roma {
             [("roma levels", size_of::<RomaLevel>()), ("roma maps", size_of::<RomaMap>()), ("boms", 4), ("columns", 4)]
                 .map(|(label, stride)| storage(gpu, label, 1, stride));
         let group = group(gpu, &layout, [&levels, &map_records, &boms, &columns]);
-        let [rotate, near, trace] = [ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE].map(pipeline);
+        let [rotate, near, trace, measure] = [ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_MEASURE].map(pipeline);
         let (cascades, maps) = (Arc::default(), RomaMaps::default());
-        Self { layout, rotate, near, trace, levels, map_records, boms, columns, cascades, maps, group }
+        Self { layout, rotate, near, trace, measure, levels, map_records, boms, columns, cascades, maps, group }
     }
 
     /// The pipeline of a kernel, if it is one of these.
@@ -69,6 +70,7 @@ impl Roma {
             ROMA_ROTATE => Some(&self.rotate),
             ROMA_NEAR => Some(&self.near),
             ROMA_TRACE => Some(&self.trace),
+            ROMA_MEASURE => Some(&self.measure),
             _ => None,
         }
     }

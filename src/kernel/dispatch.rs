@@ -3,7 +3,7 @@
 use super::dvf::sweep_levels;
 use super::layout::{self, Params};
 use crate::math::sampling::{cosine_hemisphere, halton};
-use crate::schedule::{Lamp, Pass, Query, RomaPart, Step};
+use crate::schedule::{Lamp, Pass, Query, RomaPart, Sift, Step};
 use crate::visibility::distance_field::{LEVELS, flood_steps};
 
 /// The directions of the passes that start at hits.
@@ -150,6 +150,8 @@ pub const ROMA_ROTATE: &str = "roma_rotate";
 pub const ROMA_NEAR: &str = "roma_near";
 /// The kernel that traces them.
 pub const ROMA_TRACE: &str = "roma_trace";
+/// The kernel that counts what they get wrong.
+pub const ROMA_MEASURE: &str = "roma_measure";
 /// The kernel that writes reflective shadow maps.
 pub const RSM_WRITE: &str = "rsm_write";
 /// The kernel that lights what ROMA met by them.
@@ -351,17 +353,29 @@ pub fn dispatches(
         }
         Step::RomaNear { cells } => vec![roma(ROMA_NEAR, Params { roma_near: cells, ..params }, per_ray, 0)],
         Step::RomaTrace { steps, part } => {
-            let (part, one_in) = match part {
-                RomaPart::Whole => (layout::ROMA_WHOLE, 1),
-                RomaPart::Far => (layout::ROMA_FAR, 1),
-                RomaPart::Sift { one_in } => (layout::ROMA_SIFT, one_in),
+            let (part, sift) = match part {
+                RomaPart::Whole => (layout::ROMA_WHOLE, None),
+                RomaPart::Far => (layout::ROMA_FAR, None),
+                RomaPart::Sift(sift) => (layout::ROMA_SIFT, Some(sift)),
             };
+            let Sift { one_in, near, pilots } = sift.unwrap_or_default();
             vec![roma(
                 ROMA_TRACE,
-                Params { roma_steps: steps, roma_part: part, roma_one_in: one_in, ..params },
+                Params {
+                    roma_steps: steps,
+                    roma_part: part,
+                    roma_one_in: one_in,
+                    roma_near: near.unwrap_or(layout::NONE),
+                    roma_pilots: pilots,
+                    ..params
+                },
                 per_ray,
                 2,
             )]
+        }
+        Step::RomaMeasure { steps, pilots, cell } => {
+            let params = Params { roma_steps: steps, roma_pilots: pilots, roma_near: cell, ..params };
+            vec![roma(ROMA_MEASURE, params, per_ray, 2)]
         }
         Step::FieldMake => (0..params.field_levels).flat_map(|level| make_field(&params, level)).collect(),
         Step::FieldTrace { steps } => {

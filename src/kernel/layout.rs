@@ -53,8 +53,9 @@ pub const COUNTER_ROMA_CAPPED: u32 = 20;
 pub const COUNTER_UNRESOLVED: u32 = 21;
 pub const COUNTER_DVF_ANSWERED: u32 = 22;
 pub const COUNTER_FIELD_CAPPED: u32 = 23;
-pub const WORK_CHOSEN: u32 = 24;
-pub const WORK_ROOTED: u32 = 28;
+pub const COUNTER_PILOTS: u32 = 24;
+pub const WORK_CHOSEN: u32 = 32;
+pub const WORK_ROOTED: u32 = 36;
 pub const GBUFFER_READ: u32 = 1;
 pub const GBUFFER_WAITS: u32 = 62;
 pub const GBUFFER_FIRST: u32 = 1;
@@ -62,6 +63,8 @@ pub const ROMA_HIT: u32 = 0xffff_fffe;
 pub const ROMA_WHOLE: u32 = 0;
 pub const ROMA_FAR: u32 = 1;
 pub const ROMA_SIFT: u32 = 2;
+/// Distances up to which rays in doubt may be traced: 0, 2, 4, 8, 16 and 32 cells of a map.
+pub const HANDOVERS: u32 = 6;
 pub const FIELD_HIT: u32 = 0xffff_fffd;
 pub const RSM_PERSPECTIVE: u32 = 1;
 pub const DVF_HIT: u32 = 0xffff_fffc;
@@ -84,9 +87,9 @@ pub const EMITTER_TWO_SIDED: u32 = 8;
 /// Rows and columns of the table of reflectances.
 pub const REFLECTANCE_SIZE: u32 = 32;
 /// Number of counters.
-pub const COUNTERS: usize = 24;
+pub const COUNTERS: usize = 32;
 /// Counters and, behind them, what indirect dispatches take: from [`WORK_CHOSEN`] and [`WORK_ROOTED`] on, four words each.
-pub const COUNTERS_AND_WORK: usize = 32;
+pub const COUNTERS_AND_WORK: usize = 40;
 /// What an unbounded ray has for t_max on the device: the greatest f32 but one.
 pub const T_INFINITE: f32 = 3.402_823_4e38;
 
@@ -117,6 +120,7 @@ mirror! {
         field_step: u32, field_half: u32, field_steps: u32, field_hit: f32,
         rsm_maps: u32, rsm_map: u32, rsm_x: u32, rsm_y: u32,
         dvf_first: u32, dvf_next: u32, dvf_count: u32, dvf_turn: u32,
+        roma_pilots: u32, padding_0: u32, padding_1: u32, padding_2: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

@@ -3,8 +3,8 @@
 use super::frame::Frame;
 use super::layout::{Params, RomaLevel, RomaMap};
 use crate::visibility::bom::{Bom, Cascades};
-use crate::visibility::roma::RomaPass;
 use crate::visibility::roma::directions::{Drawn, draw};
+use crate::visibility::roma::{LIFT, RomaPass};
 use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
 
@@ -33,7 +33,7 @@ pub struct RomaMaps {
 impl RomaMaps {
     /// Those of the finest `count` levels of `cascades` for `pass`, in directions drawn for sample `sample`.
     pub fn new(cascades: &Cascades, count: usize, frame: &Frame, pass: RomaPass, (sample, seed): (u32, u32)) -> Self {
-        let RomaPass { grid, role, .. } = pass;
+        let grid = pass.grid;
         let cells = cascades.levels.first().map_or(0, Bom::cells);
         let drawn = draw(grid.k, sample.wrapping_add(STREAM), seed);
         let level = |bom: &Bom| {
@@ -46,7 +46,7 @@ impl RomaMaps {
         let record = |&(first, per_unit): &(DVec3, f64)| RomaLevel {
             first: first.as_vec3().to_array(),
             scale: per_unit as f32,
-            lift: (role.lift() / (scale * per_unit)) as f32,
+            lift: (LIFT / (scale * per_unit)) as f32,
             ..RomaLevel::default()
         };
         let middle = DVec3::splat(f64::from(cells) / 2.0);

@@ -1,6 +1,7 @@
 //! The frame loop.
 
 use super::denoise::{GuideReader, Guides, taa_jitter};
+use super::handover::{PILOTS, Trust};
 use super::pass_record::FrameRecords;
 use super::{Accumulation, BATCH_SAMPLES, Captures, Dvf, Effects, Field, Light, Moved, Roma, Rsm, camera_view};
 use crate::kernel::FrameExecutor;
@@ -10,7 +11,7 @@ use crate::schedule::auto::{Auto, Fixed};
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{
-    ExecutorError, Lamp, Pass, PassStats, RomaPart, Shading, Step, Tracing, attributes, chc, demand, plain,
+    ExecutorError, Lamp, Pass, PassStats, RomaPart, Shading, Sift, Step, Tracing, attributes, chc, demand, plain,
 };
 use crate::stats::Record;
 use crate::stream::HostCacheStats;
@@ -332,7 +333,8 @@ impl Renderer {
             _ => f64::INFINITY,
         };
         let is_short = |r: &mut Self| r.roma.is_short(&r.scene, length);
-        if let Some(roma) = roma.filter(|roma| !matches!(roma.role, Role::Sift(_)) || !is_short(self)) {
+        let mut is_measured = false;
+        if let Some(roma) = roma.filter(|roma| !matches!(roma.role, Role::Sift { .. }) || !is_short(self)) {
             let RomaPass { grid, steps, role } = roma;
             first.extend(self.roma.prepare(&mut *self.executor, &self.scene, roma, length)?);
             let trace = |part| Step::RomaTrace { steps, part };
@@ -346,7 +348,24 @@ impl Renderer {
                     first.push(Step::RomaNear { cells: cells * grid.base_per_cell() });
                     last.push(trace(RomaPart::Far));
                 }
-                Role::Sift(one_in) => first.push(trace(RomaPart::Sift { one_in })),
+                Role::Sift { one_in, most_wrong: None } => {
+                    first.push(trace(RomaPart::Sift(Sift { one_in, ..Sift::default() })));
+                }
+                Role::Sift { one_in, most_wrong: Some(most_wrong) } => {
+                    is_measured = true;
+                    let trust = self.roma.handover(pass).trust(most_wrong);
+                    let near = match trust {
+                        Trust::Beyond(cells) => Some(cells * grid.base_per_cell()),
+                        Trust::Free | Trust::Nothing => None,
+                    };
+                    if trust != Trust::Nothing {
+                        first.push(trace(RomaPart::Sift(Sift { one_in, near, pilots: PILOTS })));
+                    }
+                    last.push(Step::RomaMeasure { steps, pilots: PILOTS, cell: grid.base_per_cell() });
+                    if near.is_some() {
+                        last.push(trace(RomaPart::Far));
+                    }
+                }
             }
         }
         first.extend(self.dvf.prepare(&mut *self.executor, pass)?);
@@ -356,6 +375,9 @@ impl Renderer {
         self.trace(frame, pass, &first, stats)?;
         last.push(add);
         let report = self.executor.run(pass, &last, &self.cache.states)?;
+        if is_measured {
+            self.roma.handover(pass).note(report.pilots);
+        }
         stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
         stats.add(report);
         Ok(())

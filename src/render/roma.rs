@@ -1,12 +1,13 @@
 //! Occlusion and shadow rays that occupancy maps answer: which maps, and when they are made.
 
+use super::handover::Handover;
 use super::raster::Raster;
 use crate::kernel::frame::Frame;
 use crate::kernel::roma::RomaMaps;
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
 use crate::visibility::bom::{Assembler, Bom, BomError, Cascades, Settings, Source};
-use crate::visibility::roma::{Grid, LEAST_CELLS, MOST_LEVELS, Role, RomaPass, RomaSettings};
+use crate::visibility::roma::{Grid, LEAST_CELLS, LIFT, MOST_LEVELS, Role, RomaPass, RomaSettings};
 use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
 use std::sync::Arc;
@@ -25,6 +26,8 @@ pub struct Roma {
     is_assembled: bool,
     /// [`usual_cell_log2`] of the scene, once it is known.
     usual_log2: Option<Option<i32>>,
+    /// What was measured of the rays of ao, and of those from what is seen and from what that sees to lamps.
+    handovers: [Handover; 3],
     /// The ray-aligned maps that the executor has of the present sample.
     made: Option<(Grid, Role, usize)>,
 }
@@ -80,6 +83,21 @@ impl Roma {
         self.usual_log2 = None;
     }
 
+    /// What was measured of the rays of a pass that maps sift.
+    pub fn handover(&mut self, pass: Pass) -> &mut Handover {
+        let kind = match pass {
+            Pass::Occlusion(_) => 0,
+            Pass::BounceShadow(_) => 2,
+            _ => 1,
+        };
+        &mut self.handovers[kind]
+    }
+
+    /// Of rays of ao, of those from what is seen to lamps, and of those from what that sees.
+    pub fn handovers(&self) -> &[Handover; 3] {
+        &self.handovers
+    }
+
     /// How the rays of `pass` are answered; `None` where they are traced.
     pub fn pass_of(settings: &RomaSettings, pass: Pass) -> Option<RomaPass> {
         match pass {
@@ -110,7 +128,7 @@ impl Roma {
         let RomaPass { grid, role, .. } = pass;
         let cells = grid.base_cells();
         self.assemble(scene, grid.size, cells)?;
-        let before = role.lift() / grid.scale(cells);
+        let before = LIFT / grid.scale(cells);
         let before = if let Role::Far(near) = role { before.max((near * grid.base_per_cell()).into()) } else { before };
         let is_of_use = |bom: &&Bom| before * bom.side() < length;
         let levels = self.cascades.levels.iter().take_while(is_of_use).count();

@@ -25,6 +25,6 @@ mod types;
 pub use optimisations::{Optimisation, Optimisations, PartOf};
 pub use states::BrickStates;
 pub use types::{
-    Demand, Executor, ExecutorError, Lamp, Load, PairQuery, Pass, PassStats, Query, Report, RomaPart, Shading, Step,
-    TileDemand, Tracing,
+    Demand, Executor, ExecutorError, Lamp, Load, PairQuery, Pass, PassStats, Pilots, Query, Report, RomaPart, Shading,
+    Sift, Step, TileDemand, Tracing,
 };

@@ -1,6 +1,7 @@
 //! What a schedule and an executor say to each other.
 
 use super::{BrickStates, Optimisations};
+use crate::kernel::layout::HANDOVERS;
 use crate::stream::{Item, Slot};
 use thiserror::Error;
 
@@ -151,6 +152,15 @@ pub enum Step {
         /// Which part of them.
         part: RomaPart,
     },
+    /// Count what maps would have answered wrongly of the rays that were not sifted, after they have been traced: phase 3.
+    RomaMeasure {
+        /// As of [`Step::RomaTrace`].
+        steps: u32,
+        /// As of [`Sift::pilots`].
+        pilots: u32,
+        /// Cells of a base map in one of a map.
+        cell: u32,
+    },
     /// Make the distance fields of the base maps that the executor was given last: phase 1.
     FieldMake,
     /// Answer the pass's rays by them, and count them: phase 3.
@@ -212,6 +222,17 @@ pub struct Query {
     pub up_to_next: bool,
 }
 
+impl Pilots {
+    /// Adds others.
+    pub fn add(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.missed += other.missed;
+        for (total, doubted) in self.doubted.iter_mut().zip(other.doubted) {
+            *total += doubted;
+        }
+    }
+}
+
 /// Which part of rays occupancy maps answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RomaPart {
@@ -221,10 +242,35 @@ pub enum RomaPart {
     Far,
     /// Whether they meet anything. Those that do not are answered; of the others one in so many is still to be traced and counts for them
     /// all, and the rest are taken for occluded.
-    Sift {
-        /// How many.
-        one_in: u32,
-    },
+    Sift(Sift),
+}
+
+/// How rays are sifted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sift {
+    /// Of those in doubt one in so many is traced.
+    pub one_in: u32,
+    /// Up to so many cells of the base map that holds their start from it; `None`: to their ends.
+    pub near: Option<u32>,
+    /// One ray in so many is a pilot: it is not sifted; 0: none.
+    pub pilots: u32,
+}
+
+impl Default for Sift {
+    fn default() -> Self {
+        Self { one_in: 1, near: None, pilots: 0 }
+    }
+}
+
+/// Rays that are traced to their ends though they could be sifted, and what maps would have answered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pilots {
+    /// How many there are.
+    pub rays: u64,
+    /// That meet something and would have been found free.
+    pub missed: u64,
+    /// That are free and would have met something in the maps, had they been traced up to each of [`HANDOVERS`] distances.
+    pub doubted: [u64; HANDOVERS as usize],
 }
 
 impl Step {
@@ -357,6 +403,8 @@ pub struct Report {
     /// Rays that [`Step::RomaTrace`] finished along their map's direction because they had passed as many columns as they may, and those that
     /// [`Step::FieldTrace`] let go free because they had made as many look-ups as they may.
     pub rays_capped: u64,
+    /// What [`Step::RomaMeasure`] counted.
+    pub pilots: Pilots,
     /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`], [`Step::RomaTrace`] and
     /// [`Step::FieldTrace`].
     pub rays: u64,
@@ -507,6 +555,7 @@ impl PassStats {
         sum.leaf_groups_postponed += r.leaf_groups_postponed;
         sum.queries_tightened += r.queries_tightened;
         sum.rays_capped += r.rays_capped;
+        sum.pilots.add(r.pilots);
         sum.rays += r.rays;
         sum.rays_answered += r.rays_answered;
         sum.nodes += r.nodes;

@@ -75,20 +75,22 @@ pub enum Role {
     Answer,
     /// They answer what lies beyond so many cells of the base map that holds a ray's start from it; up to there rays are traced.
     Far(u32),
-    /// They say which rays meet nothing. Of the others, one in so many is traced and counts for them all (Russian roulette).
-    Sift(u32),
+    /// They say which rays meet nothing, and answer what lies so far from their start that they err little.
+    Sift {
+        /// Of the rays that meet something one in so many is traced and counts for them all (Russian roulette).
+        one_in: u32,
+        /// Of a million rays, how many may be answered otherwise than exact ones, as far as it is measured; `None`: nothing is, and rays that meet something
+        /// are traced to their ends.
+        most_wrong: Option<u32>,
+    },
 }
 
-impl Role {
-    /// Cells of a map by which rays start off their surface. What marks a plane reaches one cell of a base map above it, 0.29 of a map of half as many
-    /// cells, and is found from up to 0.80 cells of the map away: half a diagonal across the column, three eighths along it, since the middles of the
-    /// cells that count lie beyond the start. So from 1.09 on a plane does not occlude itself. Zeng et al. (§6) have 1.5, and cells that begin
-    /// half a cell before their start on the average. Rays that are sifted start lower: what is taken for something costs time only, and what lies below
-    /// their start is overlooked.
-    pub fn lift(self) -> f64 {
-        if matches!(self, Self::Sift(_)) { 0.5 } else { 1.25 }
-    }
-}
+/// Cells of a map by which rays start off their surface. What marks a plane reaches one cell of a base map above it, 0.29 of a map of half as many
+/// cells, and is found from up to 0.80 cells of the map away: half a diagonal across the column, three eighths along it, since the middles of the
+/// cells that count lie beyond the start. So from 1.09 on a plane does not occlude itself. Zeng et al. (§6) have 1.5, and cells that begin
+/// half a cell before their start on the average. Rays that are sifted start lower, by 0.4 of it: what is taken for something costs time only, and what
+/// lies below their start is overlooked.
+pub const LIFT: f64 = 1.25;
 
 /// How the rays of a pass are answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -411,6 +411,7 @@ fn error_over_time(job: &Job, rows: &Rows) -> Option<Graph> {
         line("maps alone", |way| matches!(way, Way::Roma { .. })),
         line("traced near, maps beyond 1 to 16 cells", |way| matches!(way, Way::Handed { .. })),
         line("auto: in doubt one in 1 to 8 traced", |way| matches!(way, Way::Sifted { .. })),
+        line("auto: 2 to 10 % wrong", |way| matches!(way, Way::Bounded { .. })),
         line("exact (noise)", |way| *way == Way::Exact),
     ];
     lines.iter().any(|(_, points)| !points.is_empty()).then(|| Graph {

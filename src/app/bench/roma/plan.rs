@@ -95,6 +95,11 @@ pub enum Way {
         /// How many.
         one_in: u32,
     },
+    /// By tracing them as far as it takes for so many of a hundred to be answered otherwise.
+    Bounded {
+        /// How many.
+        percent: u32,
+    },
     /// By a distance field, the paper's baseline.
     Field {
         /// Cells on each axis.
@@ -111,6 +116,7 @@ impl fmt::Display for Way {
             }
             Self::Handed { cells } => write!(f, "roma beyond {cells} cells"),
             Self::Sifted { one_in } => write!(f, "auto, one in {one_in}"),
+            Self::Bounded { percent } => write!(f, "auto, {percent} % wrong"),
             Self::Field { size } => write!(f, "df {size}"),
         }
     }
@@ -128,14 +134,15 @@ impl Way {
                 )
             }
             Self::Handed { cells } => format!("--secondary roma --roma-near {cells}"),
-            Self::Sifted { one_in } => format!("--secondary auto --auto-one-in {one_in}"),
+            Self::Sifted { one_in } => format!("--secondary auto --auto-error off --auto-one-in {one_in}"),
+            Self::Bounded { percent } => format!("--secondary auto --auto-error {percent} --auto-one-in 1"),
             Self::Field { size } => format!("--secondary df --df-size {size}"),
         }
     }
 
     /// Whether bricks are asked.
     pub fn is_traced(&self) -> bool {
-        matches!(self, Self::Exact | Self::Handed { .. } | Self::Sifted { .. })
+        matches!(self, Self::Exact | Self::Handed { .. } | Self::Sifted { .. } | Self::Bounded { .. })
     }
 
     /// The distance field of as many cells on each axis, which with K = 4 takes as much memory as the maps.
@@ -265,8 +272,9 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
     let handed = [1, 2, 4, 8, 16].map(|cells| Way::Handed { cells });
     let sifted = [1, 2, 4, 8].map(|one_in| Way::Sifted { one_in });
+    let bounded = [2, 5, 10].map(|percent| Way::Bounded { percent });
     for length in [length, 4.0 * length] {
-        let ways = with_exact(&[&[USUAL][..], &handed, &sifted].concat());
+        let ways = with_exact(&[&[USUAL][..], &handed, &sifted, &bounded].concat());
         let own = job(Stage::Handover, SceneId::City, format!("rays of {length}, cache 15 %"), length, ways);
         // As many rays a sample as make the maps a small part, and as are chosen among.
         let options = own.options.replace("--ao-rays 1", "--ao-rays 16");
