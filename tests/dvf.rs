@@ -334,8 +334,6 @@ fn bricks_are_loaded_once_for_all_rays_that_wait() {
     let (in_core, blocks) = make("--cache 100% --schedule plain --measure-needed", 1);
     let needed = in_core.record.bricks_needed;
     assert!(blocks > 100 && in_core.drains == 0, "{blocks} blocks, {} drains", in_core.drains);
-    // What is needed is the same where rays wait.
-    assert_eq!(make("--cache 15% --measure-needed", 512_000_000).0.record.bricks_needed, needed);
     let mut loads = Vec::new();
     for pool in [512_000_000, 100_000, 1] {
         let (made, _) = make("--cache 15%", pool);
