@@ -23,9 +23,22 @@ fn triangle_of(point: u32) -> u32 {
     return low;
 }
 
+// Whether a ray is made: all, or those that wait.
+fn is_made(index: u32) -> bool {
+    if params.dvf_next == NONE {
+        return true;
+    }
+    return (atomicLoad(&dvf_waiting[params.dvf_next + index / 32u]) >> (index % 32u) & 1u) != 0u;
+}
+
+// No ray.
+fn no_ray() -> Ray {
+    return Ray(vec3<f32>(0.0), 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0);
+}
+
 // The ray of lane `slot` of the block.
 fn ray_of(slot: u32) -> Ray {
-    var ray = Ray(vec3<f32>(0.0), 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0);
+    var ray = no_ray();
     let point = slot / dvf.lanes;
     var turn = slot % dvf.lanes + params.dvf_turn * dvf.lanes;
     let is_both = (dvf.flags & DVF_BOTH) != 0u;
@@ -89,7 +102,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     let slot = params.dvf_first + index;
-    let ray = ray_of(slot);
+    var ray = no_ray();
+    if is_made(index) {
+        ray = ray_of(slot);
+    }
     var source = NONE;
     if ray.t_min <= ray.t_max {
         source = dvf_triangles[triangle_of(slot / dvf.lanes)].id;

@@ -1,4 +1,5 @@
-// Enters what a block's rays met into the masks of the cells that they start in.
+// Enters what a block's rays met into the masks of the cells that they start in. Those that wait for bricks are noted and ended: they are made again
+// when these have come.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/exact.wgsl"
@@ -12,6 +13,19 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     let ray = rays[index];
+    if params.dvf_next != NONE {
+        let word = params.dvf_next + index / 32u;
+        let bit = 1u << (index % 32u);
+        if is_traced(index, ray) && surfaces[index].pending != 0u {
+            atomicOr(&dvf_waiting[word], bit);
+            hits[index].t = -1.0;
+            return;
+        }
+        atomicAnd(&dvf_waiting[word], ~bit);
+    }
+    if params.dvf_count == 0u {
+        return;
+    }
     if !(ray.t_min <= ray.t_max) {
         return;
     }

@@ -6,7 +6,9 @@ use brickwalk::app::args::{Cli, Command as AppCommand};
 use brickwalk::app::session::{Session, open_scene};
 use brickwalk::app::walk;
 use brickwalk::kernel::{Extent, Lamps};
-use brickwalk::render::{Dvf, DvfMade, Equirectangular, FrameOutput, Region, Renderer, environment};
+use brickwalk::render::{
+    Dvf, DvfMade, DvfTracing, Equirectangular, FrameOutput, Region, RenderError, Renderer, environment,
+};
 use brickwalk::scene::Camera;
 use brickwalk::scene::path::CameraPath;
 use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
@@ -77,7 +79,7 @@ fn settings(points: u32, longest: u32) -> DvfSettings {
 
 fn made(renderer: &mut Renderer, settings: &DvfSettings, lanes: u32) -> DvfMade {
     let region = Region::scene(renderer.scene.resident());
-    renderer.make_dvf(settings, &region, lanes, &mut |_, _| true).expect("a field")
+    renderer.make_dvf(settings, &region, DvfTracing::over(lanes), &mut |_, _| true).expect("a field")
 }
 
 /// Rays to the environment: traced, and answered.
@@ -294,7 +296,7 @@ fn the_field_of_a_view_out_of_core_is_that_in_core() {
         let bricks = region.bricks.as_ref().map_or(0, |bricks| bricks.len());
         assert!(bricks > 3 && bricks < renderer.scene.resident().bricks.len(), "{bricks} bricks are seen");
         let asked = DvfSettings { rays: 32, ..settings(5000, 24) };
-        let made = renderer.make_dvf(&asked, &region, 32, &mut |_, _| true).expect("a field");
+        let made = renderer.make_dvf(&asked, &region, DvfTracing::over(32), &mut |_, _| true).expect("a field");
         renderer.dvf = Dvf::new(Arc::new(made.field.clone()), LABEL);
         let frame = renderer.frame(0, &camera).expect("a frame");
         println!(
@@ -304,6 +306,59 @@ fn the_field_of_a_view_out_of_core_is_that_in_core() {
         fields.push((made.field, frame.pixels));
     }
     assert_eq!(fields[0], fields[1]);
+}
+
+/// In many small blocks: rays of all of them wait for bricks together.
+#[test]
+fn bricks_are_loaded_once_for_all_rays_that_wait() {
+    let folder = folder();
+    let scene = city(folder.path(), "100K", "512");
+    let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
+    let camera = path.frame(0, 1);
+    let asked = DvfSettings { rays: 24, cells: Cells::Auto, ..settings(3000, 0) };
+    let tracing = |pool| DvfTracing { pool, ..DvfTracing::over(24) };
+    let open = |options: &str| renderer(&scene, &format!("--size 64x48 {options}"));
+    let make = |options: &str, pool: u64| {
+        let mut renderer = open(options);
+        let region = renderer.visible_region(&[camera]).expect("a region");
+        let mut told = Vec::new();
+        let mut watch = |rays, _| {
+            told.push(rays);
+            true
+        };
+        let made = renderer.make_dvf(&asked, &region, tracing(pool), &mut watch).expect("a field");
+        // No ray is told of twice, and in the end all of them.
+        assert!(told.is_sorted() && told.last().is_some_and(|&last| last >= made.record.rays), "{told:?}");
+        (made, told.len())
+    };
+    let (in_core, blocks) = make("--cache 100% --schedule plain --measure-needed", 1);
+    let needed = in_core.record.bricks_needed;
+    assert!(blocks > 100 && in_core.drains == 0, "{blocks} blocks, {} drains", in_core.drains);
+    let mut loads = Vec::new();
+    for pool in [512_000_000, 100_000, 1] {
+        let (made, _) = make("--cache 15%", pool);
+        let read = in_core.bricks_read;
+        assert_eq!((&made.field, &made.trials, made.bricks_read), (&in_core.field, &in_core.trials, read), "{pool}");
+        loads.push((made.record.bricks_loaded, made.drains));
+    }
+    println!("{blocks} blocks, {needed} bricks needed; loaded, drains: {loads:?}");
+    let [(all, 1), (some, some_drains), (none, none_drains)] = loads[..] else { panic!("{loads:?}") };
+    assert!(all <= 2 * needed && all < some, "{all} bricks loaded, {needed} needed");
+    // Control: with room for a block alone they are loaded again and again.
+    assert!(none > 4 * needed && none > some && none_drains > some_drains && some_drains > 1, "{loads:?}");
+    // Stopped half way, and then made after all.
+    let mut renderer = open("--cache 15%");
+    let region = renderer.visible_region(&[camera]).expect("a region");
+    let mut most = 0;
+    let mut watch = |rays, _| {
+        most = rays;
+        rays < in_core.record.rays / 2
+    };
+    let stopped = renderer.make_dvf(&asked, &region, tracing(1 << 29), &mut watch);
+    assert!(matches!(stopped, Err(RenderError::Interrupted)));
+    assert!(most < in_core.record.rays, "{most} rays");
+    let made = renderer.make_dvf(&asked, &region, tracing(1 << 29), &mut |_, _| true).expect("a field");
+    assert_eq!(made.field, in_core.field);
 }
 
 #[test]

@@ -7,6 +7,7 @@
 @group(2) @binding(3) var<storage, read> dvf_triangles: array<DvfTriangle>;   // of the group at hand
 @group(2) @binding(4) var<storage, read_write> dvf_sums: array<vec2<u32>>;    // sums of 64 bits, the low word first, level by level
 @group(2) @binding(5) var<storage, read> dvf_directions: array<vec4<f32>>;    // of rays about z, then points of the unit circle: DVF_CIRCLE of them
+@group(2) @binding(6) var<storage, read_write> dvf_waiting: array<atomic<u32>>; // a bit for each ray of some blocks: whether it waits for bricks
 
 const DVF_VISIBLE_LABEL: u32 = 0u;  // more directions miss than hit
 const DVF_OCCLUDED_LABEL: u32 = 1u;

@@ -3,7 +3,7 @@
 use super::args::WalkArgs;
 use super::dvf_args::RegionKind;
 use super::output::atomic;
-use crate::render::{Dvf, DvfMade, Region, RenderError, Renderer};
+use crate::render::{Dvf, DvfMade, DvfTracing, Region, RenderError, Renderer};
 use crate::scene::path::CameraPath;
 use crate::visibility::dvf::file::{FileError, decode, encode};
 use crate::visibility::dvf::{Cells, DvfField, DvfSettings};
@@ -18,7 +18,7 @@ use std::time::Instant;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Raised when the same settings make other bits.
-const MAKING: u64 = 1;
+const MAKING: u64 = 2;
 /// Most frames whose views make a region.
 const MOST_VIEWS: u32 = 5;
 /// Most bytes of the masks of a field that is read.
@@ -62,7 +62,7 @@ pub fn prepare(renderer: &mut Renderer, args: &WalkArgs, path: &CameraPath) -> R
     let (field, made) = match read(&file, key) {
         Some(field) => (field, None),
         None => {
-            let (made, seconds) = make(renderer, &settings, &region, args.dvf.dvf_lanes).with_context(|| name)?;
+            let (made, seconds) = make(renderer, &settings, &region, args.dvf.tracing()).with_context(|| name)?;
             if let Err(error) = atomic::write(&file, &encode(&made.field, key)) {
                 warn(&format!("the field of visibility is not kept: {error:#}"));
             }
@@ -109,7 +109,12 @@ fn read(file: &Path, key: u64) -> Option<DvfField> {
 ///
 /// # Errors
 /// As of [`Renderer::make_dvf`].
-pub fn make(renderer: &mut Renderer, settings: &DvfSettings, region: &Region, lanes: u32) -> Result<(DvfMade, f64)> {
+pub fn make(
+    renderer: &mut Renderer,
+    settings: &DvfSettings,
+    region: &Region,
+    tracing: DvfTracing,
+) -> Result<(DvfMade, f64)> {
     let stop = super::interrupt::flag();
     let progress = Progress::new();
     let mut told = None;
@@ -123,7 +128,7 @@ pub fn make(renderer: &mut Renderer, settings: &DvfSettings, region: &Region, la
         !stop.load(Ordering::Relaxed)
     };
     let start = Instant::now();
-    let made = renderer.make_dvf(settings, region, lanes, &mut watch);
+    let made = renderer.make_dvf(settings, region, tracing, &mut watch);
     progress.finish();
     match made {
         Err(RenderError::Interrupted) => {
@@ -159,6 +164,7 @@ impl Note {
                 "points": made.points,
                 "triangles": made.triangles,
                 "bricks_read": made.bricks_read,
+                "drains": made.drains,
                 "record": made.record,
                 "trials": made.trials.iter().map(|trial| json!({
                     "longest": trial.longest, "traced": trial.traced, "wrong": trial.wrong,

@@ -3,6 +3,7 @@
 use super::args::ranged;
 use super::named::named_values;
 use super::roma_args::of;
+use crate::render::DvfTracing;
 use crate::visibility::dvf::{CELLS, Cells, DvfSettings, DvfUse, POINTS, RAYS};
 use clap::Args;
 use std::path::PathBuf;
@@ -19,6 +20,11 @@ pub struct DvfArgs {
     /// With --secondary dvf: lanes over which the rays of a point are shared out while the field is made, 1 to 1024; shows in time only
     #[arg(long, value_name = "N", default_value = "128", value_parser = |s: &str| ranged(s, 1, RAYS[1].into()))]
     pub dvf_lanes: u32,
+    /// With --secondary dvf: rays that may wait for bricks at once while the field is made, 1 to 1G, a bit each on the device: only when there are as
+    /// many, in whole blocks of the picture's size and one at least, bricks are loaded until none waits. Fewer load bricks again; shows in
+    /// time and loads only
+    #[arg(long, value_name = "N", default_value = "512M", value_parser = |s: &str| ranged(s, 1, 1_000_000_000))]
+    pub dvf_pool: u32,
     /// With --secondary dvf: cells along the longest side of the field's region, 1 to 512; auto: of 4 to 128 cells by powers of two those that trace
     /// the fewest of some trial rays and answer at most 0.05 % of them wrongly
     #[arg(long, value_name = "CELLS", default_value = "auto", value_parser = cells)]
@@ -143,6 +149,11 @@ impl DvfArgs {
             both: self.dvf_sides == Sides::Both,
             seed: 0,
         }
+    }
+
+    /// How its rays are traced.
+    pub fn tracing(&self) -> DvfTracing {
+        DvfTracing { lanes: self.dvf_lanes, pool: self.dvf_pool.into() }
     }
 
     /// How rays are answered by it.

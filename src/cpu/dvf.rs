@@ -36,6 +36,8 @@ pub struct DvfTables {
     pub triangles: Vec<DvfTriangle>,
     /// Level by level.
     pub sums: Vec<[u32; 2]>,
+    /// A bit for each ray of some blocks: whether it waits for bricks.
+    pub waiting: Vec<AtomicU32>,
 }
 
 impl DvfTables {
@@ -56,6 +58,9 @@ impl DvfTables {
                 self.masks = (0..maps.mask_words()).map(|_| AtomicU32::new(0)).collect();
                 self.labels = vec![UNKNOWN; maps.cells()];
             }
+        }
+        if self.waiting.len() < maps.waiting_words {
+            self.waiting.resize_with(maps.waiting_words, AtomicU32::default);
         }
         let triangles = self.maps.grid.triangles;
         self.maps = maps.clone();
@@ -151,7 +156,7 @@ pub fn down(params: &Params, sums: &mut [[u32; 2]]) {
 
 /// Runs a kernel that works on triangles, sums or cells.
 pub fn make(kernel: &str, bound: &Bound, tables: &mut DvfTables) {
-    let DvfTables { maps, masks, labels, triangles, sums } = tables;
+    let DvfTables { maps, masks, labels, triangles, sums, .. } = tables;
     let grid = &maps.grid;
     match kernel {
         DVF_AREAS => {
@@ -177,10 +182,19 @@ pub fn make(kernel: &str, bound: &Bound, tables: &mut DvfTables) {
     }
 }
 
+/// Whether a ray is made: all, or those that wait.
+fn is_made(tables: &DvfTables, params: &Params, index: usize) -> bool {
+    let word = |first: u32| tables.waiting[first as usize + index / 32].load(Ordering::Relaxed);
+    params.dvf_next == NONE || word(params.dvf_next) >> (index % 32) & 1 != 0
+}
+
+/// No ray.
+const NO_RAY: Ray = Ray { origin: [0.0; 3], t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 };
+
 /// The ray of lane `slot` of the block, and the triangle that it starts from.
 fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> (Ray, u32) {
     let grid = &tables.maps.grid;
-    let none = Ray { origin: [0.0; 3], t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 };
+    let none = NO_RAY;
     let point = slot / grid.lanes;
     let mut turn = slot % grid.lanes + params.dvf_turn * grid.lanes;
     let all_rays = if grid.flags & DVF_BOTH != 0 { 2 * grid.rays } else { grid.rays };
@@ -235,18 +249,44 @@ pub fn rays(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
     let RaySet { rays, hits, surfaces } = own;
     let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
     all.enumerate().with_min_len(RUN).for_each(|(index, ((ray, hit), surface))| {
-        let source;
-        (*ray, source) = ray_of(tables, bound.params, bound.params.dvf_first + index as u32);
+        let mut source = NONE;
+        *ray = NO_RAY;
+        if is_made(tables, bound.params, index) {
+            (*ray, source) = ray_of(tables, bound.params, bound.params.dvf_first + index as u32);
+        }
         (*hit, *surface) = start_hit(ray.t_max, source);
     });
 }
 
-/// Enters what a block's rays met into the masks of the cells that they start in.
-pub fn write(tables: &DvfTables, own: &RaySet) {
+/// Notes whether a ray waits.
+fn note(tables: &DvfTables, first: u32, index: usize, waits: bool) {
+    let (word, bit) = (&tables.waiting[first as usize + index / 32], 1 << (index % 32));
+    if waits {
+        word.fetch_or(bit, Ordering::Relaxed);
+    } else {
+        word.fetch_and(!bit, Ordering::Relaxed);
+    }
+}
+
+/// Enters what a block's rays met into the masks of the cells that they start in; those that wait are noted and ended.
+pub fn write(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
+    let RaySet { rays, hits, surfaces } = own;
     let grid = &tables.maps.grid;
     let words = mask::words(grid.octahedral);
-    let rays = own.rays.par_iter().zip(&own.hits).with_min_len(RUN);
-    rays.filter(|(ray, _)| ray.t_min <= ray.t_max).for_each(|(ray, hit)| {
+    let first = bound.params.dvf_next;
+    let rays = rays.par_iter().zip(hits.par_iter_mut()).zip(&*surfaces).enumerate().with_min_len(RUN);
+    rays.for_each(|(index, ((ray, hit), surface))| {
+        if first != NONE {
+            let waits = is_traced(ray, hit) && surface.pending != 0;
+            note(tables, first, index, waits);
+            if waits {
+                hit.t = -1.0;
+                return;
+            }
+        }
+        if bound.params.dvf_count == 0 || !(ray.t_min <= ray.t_max) {
+            return;
+        }
         if let Some(cell) = cell_of(grid, ray.origin) {
             let texel = mask::texel(ray.direction, grid.octahedral);
             let mask = 2 * cell + usize::from(hit.id != NONE);

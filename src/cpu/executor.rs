@@ -45,6 +45,8 @@ use crate::visibility::distance_field::DistanceField;
 use bricks::SceneFile;
 use rayon::prelude::*;
 use std::sync::Arc;
+#[cfg(test)]
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Bytes of a page of the cache: offsets within one are u32. Pages are numbers here, no memory.
@@ -173,6 +175,12 @@ impl CpuExecutor {
         &mut self.buffers.rsm.texels
     }
 
+    /// The bits of rays that wait for bricks, for tests.
+    #[cfg(test)]
+    pub(super) fn dvf_waiting(&self) -> Vec<u32> {
+        self.buffers.dvf.waiting.iter().map(|word| word.load(Ordering::Relaxed)).collect()
+    }
+
     /// The tiles and their lists, for tests.
     #[cfg(test)]
     pub(super) fn tiles(&self) -> &TileLists {
@@ -248,7 +256,7 @@ fn run_kernel(
         RSM_WRITE => rsm_write(bound, rsm, pixels, seen, materials),
         RSM_LIGHT => rsm_light(bound, rsm, pixels, seen),
         DVF_RAYS => dvf::rays(bound, visibility, own),
-        DVF_WRITE => dvf::write(visibility, own),
+        DVF_WRITE => dvf::write(bound, visibility, own),
         DVF_SIFT => dvf::sift(bound, visibility, own, &mut pixels.gbuffers[shaded]),
         "dvf_light" => dvf_light(bound, pixels, shaded, (seen, own), materials),
         making if DVF_KERNELS.contains(&making) => dvf::make(making, bound, visibility),

@@ -290,10 +290,12 @@ impl Lockstep {
         if steps.iter().any(|step| matches!(step, Step::DvfRays { .. })) {
             findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);
         }
-        if steps.iter().any(|step| matches!(step, Step::DvfWrite | Step::DvfFinish { .. })) {
+        if steps.iter().any(|step| matches!(step, Step::DvfWrite { .. } | Step::DvfFinish { .. })) {
             let (gpu, cpu) = (self.gpu.read_dvf()?, self.cpu.read_dvf()?);
             findings.words("masks of cells", context, &gpu.0, &cpu.0);
             findings.words("labels of cells", context, &gpu.1, &cpu.1);
+            let gpu = self.gpu.read_dvf_waiting()?;
+            findings.words("rays that wait", context, &gpu, &self.cpu.dvf_waiting()[..gpu.len()]);
         }
         if steps.contains(&Step::FieldMake) {
             findings.words("distances of fields", context, &self.gpu.read_distances()?, &words_of(self.cpu.fields()));

@@ -17,8 +17,8 @@ use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
 use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Dvf, Effects, Equirectangular, Field, Light, Moved, Occlusion, Region, RenderSettings, Renderer, Roma, Rsm,
-    Schedule, emissive_triangles, environment,
+    Dvf, DvfTracing, Effects, Equirectangular, Field, Light, Moved, Occlusion, Region, RenderSettings, Renderer, Roma,
+    Rsm, Schedule, emissive_triangles, environment,
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
@@ -333,9 +333,13 @@ fn render(
     };
     let path = path_from_bounds(manifest.min, manifest.max);
     if let Some(settings) = &variant.dvf {
-        let made = renderer.make_dvf(settings, &Region::scene(scene.resident()), 4, &mut |_, _| true).unwrap();
+        let made = renderer
+            .make_dvf(settings, &Region::scene(scene.resident()), DvfTracing::over(4), &mut |_, _| true)
+            .unwrap();
         assert!(made.points > 0 && made.field.known_cells() > 0);
         assert_eq!(made.trials.is_empty(), settings.cells != Cells::Auto);
+        // Rays wait, so that blocks are made again.
+        assert_eq!(made.drains > 0, variant.schedule != Schedule::Plain);
         renderer.dvf = Dvf::new(
             Arc::new(made.field),
             DvfUse {

@@ -12,8 +12,8 @@ use crate::schedule::ExecutorError;
 use crate::visibility::dvf::mask::UNKNOWN;
 use std::sync::Arc;
 
-/// Storage buffers of the kernels: 7 of the scene, 5 of the rays, 6 of their own, 8 of shading; one more with opacity.
-const STORAGE_BUFFERS: u32 = 26;
+/// Storage buffers of the kernels: 7 of the scene, 5 of the rays, 7 of their own, 8 of shading; one more with opacity.
+const STORAGE_BUFFERS: u32 = 27;
 
 /// Pipelines and buffers.
 pub struct Dvf {
@@ -25,6 +25,7 @@ pub struct Dvf {
     triangles: wgpu::Buffer,
     sums: wgpu::Buffer,
     directions: wgpu::Buffer,
+    waiting: wgpu::Buffer,
     maps: DvfMaps,
     /// Group 2 of all kernels.
     pub group: wgpu::BindGroup,
@@ -66,14 +67,15 @@ impl Dvf {
             })
         };
         let pipelines = DVF_KERNELS.map(|name| (name, pipeline(name))).into();
-        let strides = [size_of::<DvfGrid>(), 4, 4, size_of::<DvfTriangle>(), 8, 16];
-        let labels = ["dvf grid", "dvf masks", "dvf labels", "dvf triangles", "dvf sums", "dvf directions"];
+        let strides = [size_of::<DvfGrid>(), 4, 4, size_of::<DvfTriangle>(), 8, 16, 4];
+        let labels =
+            ["dvf grid", "dvf masks", "dvf labels", "dvf triangles", "dvf sums", "dvf directions", "dvf waiting"];
         let mut buffers = labels.into_iter().zip(strides).map(|(label, stride)| storage(gpu, label, 1, stride));
-        let [grid, masks, labels, triangles, sums, directions] =
-            std::array::from_fn(|_| buffers.next().expect("six of them"));
-        let group = group(gpu, &layout, [&grid, &masks, &labels, &triangles, &sums, &directions]);
+        let [grid, masks, labels, triangles, sums, directions, waiting] =
+            std::array::from_fn(|_| buffers.next().expect("seven of them"));
+        let group = group(gpu, &layout, [&grid, &masks, &labels, &triangles, &sums, &directions, &waiting]);
         let maps = DvfMaps::default();
-        Ok(Self { layout, pipelines, grid, masks, labels, triangles, sums, directions, maps, group })
+        Ok(Self { layout, pipelines, grid, masks, labels, triangles, sums, directions, waiting, maps, group })
     }
 
     /// The pipeline of a kernel, if it is one of these.
@@ -97,6 +99,7 @@ impl Dvf {
             grow(gpu, &mut self.masks, "dvf masks", words, 4),
             grow(gpu, &mut self.labels, "dvf labels", cells, 4),
             grow(gpu, &mut self.directions, "dvf directions", maps.directions.len(), 16),
+            grow(gpu, &mut self.waiting, "dvf waiting", maps.waiting_words, 4),
         ];
         if grown.contains(&true) {
             self.rebind(gpu);
@@ -153,13 +156,20 @@ impl Dvf {
         [(&self.masks, self.maps.mask_words()), (&self.labels, self.maps.cells()), (&self.sums, 2 * elements)]
     }
 
+    /// The bits of rays that wait, for tests.
+    #[cfg(test)]
+    pub fn waiting(&self) -> (&wgpu::Buffer, usize) {
+        (&self.waiting, self.maps.waiting_words)
+    }
+
     fn rebind(&mut self, gpu: &Gpu) {
-        let buffers = [&self.grid, &self.masks, &self.labels, &self.triangles, &self.sums, &self.directions];
+        let buffers =
+            [&self.grid, &self.masks, &self.labels, &self.triangles, &self.sums, &self.directions, &self.waiting];
         self.group = group(gpu, &self.layout, buffers);
     }
 }
 
-fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, buffers: [&wgpu::Buffer; 6]) -> wgpu::BindGroup {
+fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, buffers: [&wgpu::Buffer; 7]) -> wgpu::BindGroup {
     let entries = numbered(buffers, 0);
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("dvf"), layout, entries: &entries })
 }

@@ -228,6 +228,12 @@ impl GpuExecutor {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
+    /// The bits of rays that wait for bricks, for tests.
+    #[cfg(test)]
+    pub(crate) fn read_dvf_waiting(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        self.dvf.as_ref().map_or(Ok(Vec::new()), |dvf| self.read_words(dvf.waiting()))
+    }
+
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))

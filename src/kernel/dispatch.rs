@@ -391,10 +391,14 @@ pub fn dispatches(
             all.extend(sweep(&params, triangles, true));
             all
         }
-        Step::DvfRays { first, turn } => {
-            vec![dvf(DVF_RAYS, Params { dvf_first: first, dvf_turn: turn, ..params }, per_ray)]
+        Step::DvfRays { first, turn, waiting } => {
+            let dvf_next = waiting.unwrap_or(layout::NONE);
+            vec![dvf(DVF_RAYS, Params { dvf_first: first, dvf_turn: turn, dvf_next, ..params }, per_ray)]
         }
-        Step::DvfWrite => vec![dvf(DVF_WRITE, params, per_ray)],
+        Step::DvfWrite { waiting, enters } => {
+            let dvf_next = waiting.unwrap_or(layout::NONE);
+            vec![dvf(DVF_WRITE, Params { dvf_next, dvf_count: enters.into(), ..params }, per_ray)]
+        }
         Step::DvfFinish { cells, dilate } => {
             let widened = dilate.then(|| dvf(DVF_DILATE, params, across((2 * cells).div_ceil(64))));
             widened.into_iter().chain([dvf(DVF_LABELS, params, across(cells.div_ceil(64)))]).collect()

@@ -20,6 +20,8 @@ pub struct DvfMaps {
     pub is_new: bool,
     /// Directions of rays about z, then [`CIRCLE`] points of the unit circle.
     pub directions: Arc<Vec<[f32; 4]>>,
+    /// Words in which rays that wait for bricks are noted; where there are as many or more already, these keep what was noted.
+    pub waiting_words: usize,
 }
 
 /// What is summed over all triangles of a region.
@@ -99,7 +101,7 @@ impl DvfMaps {
             seed: settings.seed,
             ..placed(shape, frame)
         };
-        Self { grid, field: None, is_new: false, directions: directions.clone() }
+        Self { grid, directions: directions.clone(), ..Self::default() }
     }
 
     /// Cells.

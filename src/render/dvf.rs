@@ -2,12 +2,13 @@
 
 use super::Renderer;
 use super::dvf_source::{Group, groups, triangles};
+use super::dvf_strew::{Strewing, Strewn, Traced};
 use super::frame::{RenderError, Schedule};
 use super::pass_record::FrameRecords;
 use crate::kernel::dvf::{Areas, DvfMaps, directions, sum};
 use crate::kernel::frame::Frame;
-use crate::kernel::layout::{Hit, NONE, Params, Ray};
-use crate::kernel::{Directions, FrameExecutor, View};
+use crate::kernel::layout::NONE;
+use crate::kernel::{FrameExecutor, View};
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, demand, plain};
 use crate::stats::Record;
@@ -22,14 +23,7 @@ pub use super::dvf_source::Region;
 pub const EFFECT: &str = "dvf";
 
 /// The pass that these rays lie in.
-const PASS: Pass = Pass::Shadow(Lamp::Environment);
-
-/// Most rays by which grids are tried.
-const MOST_TRIAL_RAYS: u64 = 1 << 20;
-/// Seed of their points, beside that of the field's.
-const TRIAL_SEED: u32 = 0x9e37_79b9;
-/// Turns of the directions that they take, of [`DvfSettings::rays`].
-const TRIAL_TURNS: [(u32, u32); 2] = [(1, 4), (3, 4)];
+pub(super) const PASS: Pass = Pass::Shadow(Lamp::Environment);
 
 /// The field of visibility of a walk.
 #[derive(Default)]
@@ -92,37 +86,56 @@ pub struct DvfMade {
     pub triangles: u64,
     /// Bricks that triangles were read of, once for areas and once for points.
     pub bricks_read: u64,
+    /// How many times bricks were loaded until no ray waited for any.
+    pub drains: u64,
     /// Grids that were tried, where the settings leave it open which it is to be.
     pub trials: Vec<Trial>,
     /// What the passes of its rays did, one record.
     pub record: Record,
 }
 
+/// How the rays of a field are traced while it is made: shows in time and loads alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DvfTracing {
+    /// Lanes over which the rays of a point are shared out.
+    pub lanes: u32,
+    /// Most rays of all blocks in which some wait for bricks, a bit each on the device; one block in any case.
+    pub pool: u64,
+}
+
+impl DvfTracing {
+    /// Over so many lanes, with room for 512M rays: 64 MB.
+    pub fn over(lanes: u32) -> Self {
+        Self { lanes, pool: 512_000_000 }
+    }
+}
+
 /// What a field is made of.
-struct Plan {
-    settings: DvfSettings,
-    region: Region,
-    groups: Vec<Group>,
-    directions: Arc<Vec<[f32; 4]>>,
-    areas: Areas,
-    lanes: u32,
+pub(super) struct Plan {
+    pub settings: DvfSettings,
+    pub tracing: DvfTracing,
+    pub region: Region,
+    pub groups: Vec<Group>,
+    pub directions: Arc<Vec<[f32; 4]>>,
+    pub areas: Areas,
+    /// That meet the region.
+    pub triangles: u64,
 }
 
-/// What is done with the rays of a block once they are traced.
-enum Sink<'a> {
-    /// They are entered into masks.
-    Masks,
-    /// One in so many is kept: where it starts, its direction, whether it met anything.
-    Trial { one_in: u64, rays: &'a mut Vec<(DVec3, [f32; 3], bool)> },
-}
+impl Plan {
+    /// Rays of a point.
+    pub fn all_rays(&self) -> u32 {
+        if self.settings.both { 2 * self.settings.rays } else { self.settings.rays }
+    }
 
-/// What a frame of its own is seen from.
-fn view(frame: Frame, seed: u32) -> View {
-    View { frame, params: Params { seed, surface_share: 1.0, ..Params::default() }, directions: Directions::default() }
+    /// Whether rays from other points try grids.
+    pub fn has_trials(&self) -> bool {
+        self.settings.cells == Cells::Auto
+    }
 }
 
 /// A brick that could not be read.
-fn unread(error: bricks::Error) -> ExecutorError {
+pub(super) fn unread(error: bricks::Error) -> ExecutorError {
     ExecutorError::Device(format!("got no triangles: {error}"))
 }
 
@@ -156,9 +169,8 @@ impl Renderer {
         Ok(if region.min.x <= region.max.x { region } else { Region::scene(self.scene.resident()) })
     }
 
-    /// Makes the field of a region. Its bits depend on scene, region and settings alone, not on the cache, the size of pictures, threads or the
-    /// executor; `lanes` is over how many lanes the rays of a point are shared out. `watch` is told how many of about how many rays are traced, and says
-    /// whether to go on.
+    /// Makes the field of a region. Its bits depend on scene, region and settings alone, not on the cache, the size of pictures, threads, the
+    /// executor or `tracing`. `watch` is told how many of about how many rays are answered, and says whether to go on.
     ///
     /// # Errors
     /// A brick that cannot be read, the device's, or `watch` said no.
@@ -166,7 +178,7 @@ impl Renderer {
         &mut self,
         settings: &DvfSettings,
         region: &Region,
-        lanes: u32,
+        tracing: DvfTracing,
         watch: &mut dyn FnMut(u64, u64) -> bool,
     ) -> Result<DvfMade, RenderError> {
         let finest = match settings.cells {
@@ -176,37 +188,36 @@ impl Renderer {
         let shape = Shape::new(region.min, region.max, finest, settings.octahedral);
         let mut plan = Plan {
             settings: *settings,
+            tracing,
             region: region.clone(),
             groups: groups(self.scene.resident(), region),
             directions: Arc::new(directions(settings.rays)),
             areas: Areas { scale: 1.0, total: 0.0 },
-            lanes,
+            triangles: 0,
         };
         let place = Frame::near(self.scene.resident(), 0.5 * (region.min + region.max));
         let empty = DvfMaps {
             is_new: true,
-            ..DvfMaps::to_make(&shape, &place, settings, lanes, &plan.areas, &plan.directions)
+            ..DvfMaps::to_make(&shape, &place, settings, tracing.lanes, &plan.areas, &plan.directions)
         };
         self.executor.set_dvf(&empty)?;
-        let triangles = self.sum_areas(&mut plan, &shape)?;
+        self.sum_areas(&mut plan, &shape)?;
         let mut records = FrameRecords::new(0);
-        let mut points = 0;
-        let mut stopped = false;
+        let mut strewn = Strewn::default();
         records.pass(self, EFFECT, |r, stats| {
-            let all_rays = if settings.both { 2 * settings.rays } else { settings.rays };
-            let about = u64::from(settings.points.max(triangles as u32)) * u64::from(all_rays);
+            let about = u64::from(settings.points).max(plan.triangles) * u64::from(plan.all_rays());
             let mut watch = |rays: u64| watch(rays, about);
-            (points, stopped) = r.strew(&plan, &shape, &mut Sink::Masks, stats, &mut watch)?;
+            strewn = Strewing::new(r, &plan, &shape, stats, &mut watch).run()?;
             Ok(())
         })?;
-        if stopped {
+        if strewn.stopped {
             return Err(RenderError::Interrupted);
         }
         let mut trials = Vec::new();
         let mut field = DvfField { shape, masks: Vec::new(), labels: Vec::new() };
         if settings.cells == Cells::Auto {
             field.masks = self.executor.read_dvf()?.0;
-            field = self.choose(&plan, field, &mut records, &mut trials)?;
+            field = choose(field, &strewn.trials, settings.dilate, &mut trials);
             let chosen = Arc::new(field.clone());
             self.executor.set_dvf(&DvfMaps::to_answer(&chosen, &place, DvfUse::default()))?;
         }
@@ -217,11 +228,12 @@ impl Renderer {
         self.executor.set_dvf(&empty)?;
         let bricks_read = 2 * plan.groups.iter().map(Group::bricks).sum::<u64>();
         let record = records.finish(self).pop().unwrap_or_default();
-        Ok(DvfMade { field, points, triangles, bricks_read, trials, record })
+        let Strewn { points, drains, .. } = strewn;
+        Ok(DvfMade { field, points, triangles: plan.triangles, bricks_read, drains, trials, record })
     }
 
-    /// Sums the areas of all triangles of the plan; their number.
-    fn sum_areas(&mut self, plan: &mut Plan, shape: &Shape) -> Result<u64, ExecutorError> {
+    /// Sums the areas of all triangles of the plan, and counts them.
+    fn sum_areas(&mut self, plan: &mut Plan, shape: &Shape) -> Result<(), ExecutorError> {
         let resident = self.scene.resident();
         let (unit, manifest) = (Frame::near(resident, DVec3::ZERO).unit, &resident.manifest);
         let diagonal = (DVec3::from_array(manifest.max) - DVec3::from_array(manifest.min)).length() / unit;
@@ -234,7 +246,7 @@ impl Renderer {
             if triangles.is_empty() {
                 continue;
             }
-            let maps = DvfMaps::to_make(shape, &frame, &plan.settings, plan.lanes, &plan.areas, &plan.directions);
+            let maps = DvfMaps::to_make(shape, &frame, &plan.settings, 1, &plan.areas, &plan.directions);
             self.executor.set_dvf(&maps)?;
             self.executor.set_dvf_triangles(&triangles, 0)?;
             let step = Step::DvfAreas { triangles: triangles.len() as u32 };
@@ -243,108 +255,8 @@ impl Renderer {
             count += triangles.len() as u64;
         }
         plan.areas = plan.areas.with_sum(total.max(1));
-        Ok(count)
-    }
-
-    /// Strews the points of the plan, group by group, each in a frame of its own, and traces their rays; how many points, and whether `watch`
-    /// said to stop.
-    fn strew(
-        &mut self,
-        plan: &Plan,
-        shape: &Shape,
-        sink: &mut Sink,
-        stats: &mut PassStats,
-        watch: &mut dyn FnMut(u64) -> bool,
-    ) -> Result<(u64, bool), ExecutorError> {
-        let settings = &plan.settings;
-        let all_rays = if settings.both { 2 * settings.rays } else { settings.rays };
-        let capacity = self.size.0 * self.size.1;
-        let mut points = 0;
-        let mut traced = 0;
-        for group in &plan.groups {
-            let frame = Frame::near(self.scene.resident(), group.middle);
-            let triangles = triangles(&self.scene, group, &plan.region, &frame).map_err(unread)?;
-            if triangles.is_empty() {
-                continue;
-            }
-            self.executor.begin_frame(&view(frame, settings.seed));
-            let maps = DvfMaps::to_make(shape, &frame, settings, plan.lanes, &plan.areas, &plan.directions);
-            self.executor.set_dvf(&maps)?;
-            self.executor.set_dvf_triangles(&triangles, 0)?;
-            let counts = Step::DvfCounts { triangles: triangles.len() as u32 };
-            self.executor.run(PASS, &[counts], &self.cache.states)?;
-            let count = self.executor.read_dvf_sums()?.last().map_or(0, |words| words[0]);
-            if count == 0 {
-                continue;
-            }
-            // A block holds a point's lanes, and all lanes of a group can be counted.
-            let lanes = plan.lanes.min(all_rays).min(capacity).min(u32::MAX / count).max(1);
-            let mut maps = maps;
-            maps.grid.lanes = lanes;
-            self.executor.set_dvf(&maps)?;
-            self.executor.set_dvf_triangles(&triangles, count)?;
-            let turns: Vec<u32> = match sink {
-                Sink::Masks => (0..all_rays.div_ceil(lanes)).collect(),
-                Sink::Trial { .. } => TRIAL_TURNS.iter().map(|(n, of)| n * settings.rays / of).collect(),
-            };
-            for first in (0..u64::from(count) * u64::from(lanes)).step_by(capacity as usize) {
-                for &turn in &turns {
-                    self.cache.begin_pass(EFFECT, 0);
-                    self.trace_block(PASS, &[Step::DvfRays { first: first as u32, turn }], stats)?;
-                    match sink {
-                        Sink::Masks => stats.add(self.executor.run(PASS, &[Step::DvfWrite], &self.cache.states)?),
-                        Sink::Trial { one_in, rays } => {
-                            let (all, hits) = (self.executor.read_rays(PASS)?, self.executor.read_hits(PASS)?);
-                            let kept = all.iter().zip(&hits).filter(|(ray, _)| ray.t_min <= ray.t_max);
-                            rays.extend(kept.step_by(*one_in as usize).map(|(ray, hit)| in_world(&frame, ray, hit)));
-                        }
-                    }
-                    traced += u64::from(capacity).min(u64::from(count) * u64::from(lanes) - first);
-                    if !watch(traced) {
-                        return Ok((points, true));
-                    }
-                }
-            }
-            points += u64::from(count);
-        }
-        Ok((points, false))
-    }
-
-    /// Brings the cells of `finest` together as trials of rays from other points find best.
-    fn choose(
-        &mut self,
-        plan: &Plan,
-        finest: DvfField,
-        records: &mut FrameRecords,
-        trials: &mut Vec<Trial>,
-    ) -> Result<DvfField, ExecutorError> {
-        let settings = DvfSettings { seed: plan.settings.seed ^ TRIAL_SEED, hammersley: false, ..plan.settings };
-        let trial = Plan {
-            settings,
-            lanes: 1,
-            region: plan.region.clone(),
-            groups: plan.groups.clone(),
-            directions: plan.directions.clone(),
-            areas: plan.areas,
-        };
-        let triangles: u64 = plan.groups.iter().map(|group| group.triangles).sum();
-        let expected = (triangles + u64::from(settings.points)) * TRIAL_TURNS.len() as u64;
-        let mut rays = Vec::new();
-        let mut sink = Sink::Trial { one_in: expected.div_ceil(MOST_TRIAL_RAYS), rays: &mut rays };
-        records.more(self, EFFECT, |r, stats| {
-            r.strew(&trial, &finest.shape, &mut sink, stats, &mut |_| true)?;
-            Ok(())
-        })?;
-        let longest = finest.shape.size.into_iter().max().unwrap_or(1);
-        let factors: Vec<u32> =
-            (0..16).map(|log2| 1 << log2).take_while(|factor| longest.div_ceil(*factor) >= TRIAL_CELLS[1]).collect();
-        for &factor in &factors {
-            let mut tried = finest.coarser(factor);
-            tried.finish(settings.dilate);
-            trials.push(tried.trial(&rays, DvfUse::default()));
-        }
-        let factor = best(trials, MOST_WRONG).map_or(1, |i| factors[i]);
-        Ok(finest.coarser(factor))
+        plan.triangles = count;
+        Ok(())
     }
 
     /// Traces rays that have nothing in common with those of a frame.
@@ -370,8 +282,16 @@ fn finest_trial(region: &Region, octahedral: u32) -> u32 {
     tried.take_while(|&longest| longest >= TRIAL_CELLS[1]).find(fits).unwrap_or(TRIAL_CELLS[1])
 }
 
-/// Where a ray of a frame starts in the world, its direction, and whether it met anything.
-fn in_world(frame: &Frame, ray: &Ray, hit: &Hit) -> (DVec3, [f32; 3], bool) {
-    let origin = DVec3::from_array(ray.origin.map(f64::from));
-    (frame.origin + frame.unit * origin, ray.direction, hit.id != NONE)
+/// Brings the cells of `finest` together as trials of rays from other points find best.
+fn choose(finest: DvfField, rays: &[Traced], dilate: bool, trials: &mut Vec<Trial>) -> DvfField {
+    let longest = finest.shape.size.into_iter().max().unwrap_or(1);
+    let factors: Vec<u32> =
+        (0..16).map(|log2| 1 << log2).take_while(|factor| longest.div_ceil(*factor) >= TRIAL_CELLS[1]).collect();
+    for &factor in &factors {
+        let mut tried = finest.coarser(factor);
+        tried.finish(dilate);
+        trials.push(tried.trial(rays, DvfUse::default()));
+    }
+    let factor = best(trials, MOST_WRONG).map_or(1, |i| factors[i]);
+    finest.coarser(factor)
 }

@@ -6,6 +6,7 @@ mod capture;
 pub mod denoise;
 mod dvf;
 mod dvf_source;
+mod dvf_strew;
 mod effects;
 mod emissive;
 mod environment;
@@ -26,7 +27,7 @@ mod view;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};
 pub use capture::{Captures, EffectError};
-pub use dvf::{Dvf, DvfMade, Region};
+pub use dvf::{Dvf, DvfMade, DvfTracing, Region};
 pub use effects::{Effects, Occlusion};
 pub use emissive::{MOST_TRIANGLES, ShiningTriangles, emissive_triangles};
 pub use environment::{EnvironmentNotes, Equirectangular, environment};

@@ -131,12 +131,49 @@ impl Cache {
         most: usize,
         stats: &mut PassStats,
     ) -> Result<usize, ExecutorError> {
-        let start = Instant::now();
-        let before = self.residency.counters();
+        self.begin_batch();
+        self.load_beside(executor, items, most, stats)
+    }
+
+    /// The same without these limits: as many as the cache holds.
+    ///
+    /// # Errors
+    /// As of [`Self::load`].
+    pub fn fill(
+        &mut self,
+        executor: &mut dyn Executor,
+        items: &[Item],
+        stats: &mut PassStats,
+    ) -> Result<usize, ExecutorError> {
+        self.begin_batch();
+        let mut taken = 0;
+        while taken < items.len() {
+            let count = self.load_beside(executor, &items[taken..], usize::MAX, stats)?;
+            if count == 0 {
+                break;
+            }
+            taken += count;
+        }
+        Ok(taken)
+    }
+
+    fn begin_batch(&mut self) {
         self.residency.unpin_all();
         if let Some(trace) = &mut self.trace {
             trace.begin_batch();
         }
+    }
+
+    /// [`Self::load`] beside what the batch has loaded; none where no more fit.
+    fn load_beside(
+        &mut self,
+        executor: &mut dyn Executor,
+        items: &[Item],
+        most: usize,
+        stats: &mut PassStats,
+    ) -> Result<usize, ExecutorError> {
+        let start = Instant::now();
+        let before = self.residency.counters();
         let (mut taken, mut loads, mut bytes) = (0, Vec::new(), 0);
         for &item in items.iter().take(most) {
             let is_resident = self.residency.slot(item).is_some();

@@ -19,6 +19,7 @@ mod multi_query;
 pub mod optimisations;
 mod pair_tree;
 pub mod plain;
+pub mod pool;
 mod states;
 mod types;
 

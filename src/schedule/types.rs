@@ -191,9 +191,16 @@ pub enum Step {
         first: u32,
         /// Which of its directions each takes.
         turn: u32,
+        /// Only those that [`Step::DvfWrite`] noted from this word on to wait for bricks; else all.
+        waiting: Option<u32>,
     },
     /// Enter what they met into the masks of the cells that they start in.
-    DvfWrite,
+    DvfWrite {
+        /// Rays that asked for bricks wait: they are noted from this word on, a bit each, and ended. Else all are answered.
+        waiting: Option<u32>,
+        /// Whether what the others met is entered.
+        enters: bool,
+    },
     /// Label so many cells, after masks have been widened, if they are to be.
     DvfFinish {
         /// How many.

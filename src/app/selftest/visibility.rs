@@ -5,7 +5,7 @@ use super::lab::{Lab, Stage, settings};
 use crate::kernel::dvf::{Areas, DvfMaps, directions, sum};
 use crate::kernel::layout::{DVF_HIT, DvfTriangle, NONE, Params, Ray};
 use crate::kernel::{Directions, Lamps, View};
-use crate::render::{Dvf, Equirectangular, Region, environment};
+use crate::render::{Dvf, DvfTracing, Equirectangular, Region, environment};
 use crate::scene::Camera;
 use crate::schedule::{Lamp, Pass, Step};
 use crate::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse, Shape, mask};
@@ -184,7 +184,7 @@ pub fn closed_box(lab: &mut Lab) -> Result<Checks> {
     renderer.light.lamps = Arc::new(Lamps::new(Some(environment(image, 1.0, 0.0).0), Vec::new(), 1.0));
     // The front of the cube is outside.
     let plan = DvfSettings { points: 4000, rays: 64, both: true, cells: Cells::Longest(4), ..DvfSettings::default() };
-    let made = renderer.make_dvf(&plan, &Region::scene(file.resident()), 64, &mut |_, _| true)?;
+    let made = renderer.make_dvf(&plan, &Region::scene(file.resident()), DvfTracing::over(64), &mut |_, _| true)?;
     checks.at_least("points", made.points, 4000);
     for doubt in [false, true] {
         renderer.dvf = Dvf::new(Arc::new(made.field.clone()), DvfUse { doubt, ..DvfUse::default() });

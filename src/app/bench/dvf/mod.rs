@@ -235,7 +235,7 @@ impl<'a> View<'a> {
             RegionKind::View => self.renderer.visible_region(&[self.place.camera])?,
         };
         let settings = options.dvf.settings();
-        let (made, seconds) = field::make(&mut self.renderer, &settings, &region, options.dvf.dvf_lanes)?;
+        let (made, seconds) = field::make(&mut self.renderer, &settings, &region, options.dvf.tracing())?;
         let known = made.field.known_cells();
         let longest = made.field.shape.size.into_iter().max().unwrap_or(0);
         self.renderer.dvf = Dvf::new(Arc::new(made.field), options.dvf.how());
@@ -272,7 +272,11 @@ impl<'a> View<'a> {
 /// What is seen, with a small cache and with all resident: values of the first, and how many pixels of both differ.
 fn memory(place: &Place, args: &DvfBenchArgs, options: &str) -> Result<Values> {
     let (mut values, out_of_core) = View::open(place, args, &args.cache.to_string())?.measure(options)?;
-    let (_, in_core) = View::open(place, args, "100%")?.measure(options)?;
+    let mut resident = View::open(place, args, "100%")?;
+    resident.renderer.settings.tracing.measure_needed = true;
+    let (of_resident, in_core) = resident.measure(options)?;
+    // Which bricks rays need is known where all are resident.
+    values.extend(of_resident.into_iter().filter(|(name, _)| name == "bricks_needed"));
     let differ = out_of_core.rgb.iter().zip(&in_core.rgb).filter(|(a, b)| a.map(f32::to_bits) != b.map(f32::to_bits));
     values.insert("differ_from_in_core".into(), differ.count() as f64);
     Ok(values)
