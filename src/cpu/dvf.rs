@@ -284,7 +284,8 @@ pub fn write(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
                 return;
             }
         }
-        if bound.params.dvf_count == 0 || !(ray.t_min <= ray.t_max) {
+        let is_ray = ray.t_min <= ray.t_max;
+        if bound.params.dvf_count == 0 || !is_ray {
             return;
         }
         if let Some(cell) = cell_of(grid, ray.origin) {
