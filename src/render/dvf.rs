@@ -15,6 +15,7 @@ use crate::visibility::dvf::field::best;
 use crate::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse, MOST_TRIAL_BYTES, Shape, TRIAL_CELLS, Trial};
 use glam::DVec3;
 use std::sync::Arc;
+use std::time::Instant;
 
 pub use super::dvf_source::Region;
 
@@ -96,6 +97,8 @@ pub struct DvfMade {
     pub trials: Vec<Trial>,
     /// What the passes of its rays did, one record.
     pub record: Record,
+    /// Seconds of the paper's compute shaders 1 to 3 (areas and their sums), 4 (points and rays, those of trials too) and 5 (widening and labels).
+    pub seconds: [f64; 3],
 }
 
 /// What a field is made of.
@@ -188,7 +191,9 @@ impl Renderer {
             ..DvfMaps::to_make(&shape, &place, settings, lanes, &plan.areas, &plan.directions)
         };
         self.executor.set_dvf(&empty)?;
+        let start = Instant::now();
         let triangles = self.sum_areas(&mut plan, &shape)?;
+        let areas = start.elapsed().as_secs_f64();
         let mut records = FrameRecords::new(0);
         let mut points = 0;
         let mut stopped = false;
@@ -210,14 +215,16 @@ impl Renderer {
             let chosen = Arc::new(field.clone());
             self.executor.set_dvf(&DvfMaps::to_answer(&chosen, &place, DvfUse::default()))?;
         }
+        let before = start.elapsed().as_secs_f64();
         let finish = Step::DvfFinish { cells: field.shape.cells() as u32, dilate: settings.dilate };
         self.executor.run(PASS, &[finish], &self.cache.states)?;
         (field.masks, field.labels) = self.executor.read_dvf()?;
+        let seconds = [areas, before - areas, start.elapsed().as_secs_f64() - before];
         // The masks on the device are no field's any more.
         self.executor.set_dvf(&empty)?;
         let bricks_read = 2 * plan.groups.iter().map(Group::bricks).sum::<u64>();
         let record = records.finish(self).pop().unwrap_or_default();
-        Ok(DvfMade { field, points, triangles, bricks_read, trials, record })
+        Ok(DvfMade { field, points, triangles, bricks_read, trials, record, seconds })
     }
 
     /// Sums the areas of all triangles of the plan; their number.
