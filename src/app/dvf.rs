@@ -18,7 +18,7 @@ use std::time::Instant;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Raised when the same settings make other bits.
-const MAKING: u64 = 1;
+const MAKING: u64 = 2;
 /// Most frames whose views make a region.
 const MOST_VIEWS: u32 = 5;
 /// Most bytes of the masks of a field that is read.
