@@ -79,16 +79,7 @@ fn ray_of(slot: u32) -> Ray {
     }
     let local = dvf_directions[turn].xyz;
     let around = dvf_directions[dvf.rays + words.z % DVF_CIRCLE_POINTS].xy;
-    let x = barrier(barrier(around.x * local.x) - barrier(around.y * local.y));
-    let y = barrier(barrier(around.y * local.x) + barrier(around.x * local.y));
-    // Two directions across the normal (Duff et al. 2017).
-    let n = start.n;
-    let side = select(-1.0, 1.0, n.z >= 0.0);
-    let a = -divide(1.0, barrier(side + n.z));
-    let b = barrier(barrier(n.x * n.y) * a);
-    let across = vec3<f32>(barrier(1.0 + barrier(barrier(side * barrier(n.x * n.x)) * a)), side * b, -side * n.x);
-    let up = vec3<f32>(b, barrier(side + barrier(barrier(n.y * n.y) * a)), -n.y);
-    ray.direction = barrier3(barrier3(barrier3(x * across) + barrier3(y * up)) + barrier3(local.z * n));
+    ray.direction = dvf_around(around, local, start.n);
     ray.t_min = 0.0;
     ray.t_max = T_INFINITE;
     return ray;

@@ -26,7 +26,7 @@ pub struct DvfArgs {
     #[arg(long, value_name = "N", default_value = "512M", value_parser = |s: &str| ranged(s, 1, 1_000_000_000))]
     pub dvf_pool: u32,
     /// With --secondary dvf: cells along the longest side of the field's region, 1 to 512; auto: of 4 to 128 cells by powers of two those that trace
-    /// the fewest of some trial rays and answer at most 0.05 % of them wrongly
+    /// the fewest of some trial rays and answer at most 0.1 % of them wrongly
     #[arg(long, value_name = "CELLS", default_value = "auto", value_parser = cells)]
     pub dvf_cells: Cells,
     /// With --secondary dvf: texels of a cell's masks of directions on both axes: 8, 16 or 32; of 16, a cell takes 64 bytes

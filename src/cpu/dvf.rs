@@ -1,12 +1,13 @@
 //! Discrete visibility fields: twins of `shaders/dvf_areas.wgsl`, `dvf_counts.wgsl`, `dvf_up.wgsl`, `dvf_down.wgsl`, `dvf_rays.wgsl`,
 //! `dvf_write.wgsl`, `dvf_dilate.wgsl`, `dvf_labels.wgsl` and `dvf_sift.wgsl`.
 
+use super::generate::{for_each_leaving, leaving};
 use super::lamps::unit;
 use super::rays::{RaySet, is_traced, start_hit};
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, most3};
 use crate::kernel::dispatch::{DVF_AREAS, DVF_COUNTS, DVF_DILATE, DVF_DOWN, DVF_LABELS, DVF_UP};
-use crate::kernel::dvf::{CIRCLE, DvfMaps, sum, sweep_elements};
+use crate::kernel::dvf::{CIRCLE, DvfMaps, TILE, sum, sweep_elements};
 use crate::kernel::layout::{
     COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_HIT, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid,
     DvfTriangle, GBuffer, INSTANCE_MIRRORED, NONE, Params, Ray, T_INFINITE,
@@ -14,7 +15,7 @@ use crate::kernel::layout::{
 use crate::math::exact::{
     TriangleHit, barrier, diffprod, divide, length_of, offset_origin, scaled, square_root, surface_point,
 };
-use crate::math::sampling::random4;
+use crate::math::sampling::{pcg, random4};
 use crate::visibility::dvf::mask::{self, OCCLUDED, UNKNOWN};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -191,6 +192,18 @@ fn is_made(tables: &DvfTables, params: &Params, index: usize) -> bool {
 /// No ray.
 const NO_RAY: Ray = Ray { origin: [0.0; 3], t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 };
 
+/// Direction `local` about z, turned by the point `around` of the unit circle, about the unit vector `n` instead.
+fn turned(around: [f32; 2], local: Vec3, n: Vec3) -> Vec3 {
+    let x = barrier(barrier(around[0] * local[0]) - barrier(around[1] * local[1]));
+    let y = barrier(barrier(around[1] * local[0]) + barrier(around[0] * local[1]));
+    let side = if n[2] >= 0.0 { 1.0 } else { -1.0 };
+    let a = -divide(1.0, barrier(side + n[2]));
+    let b = barrier(barrier(n[0] * n[1]) * a);
+    let across = [barrier(1.0 + barrier(barrier(side * barrier(n[0] * n[0])) * a)), side * b, -side * n[0]];
+    let up = [b, barrier(side + barrier(barrier(n[1] * n[1]) * a)), -n[1]];
+    each(|k| barrier(barrier(barrier(x * across[k]) + barrier(y * up[k])) + barrier(local[2] * n[k])))
+}
+
 /// The ray of lane `slot` of the block, and the triangle that it starts from.
 fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> (Ray, u32) {
     let grid = &tables.maps.grid;
@@ -232,15 +245,7 @@ fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> (Ray, u32) {
     }
     let local = tables.maps.directions[turn as usize];
     let around = tables.maps.directions[(grid.rays + words[2] % CIRCLE) as usize];
-    let x = barrier(barrier(around[0] * local[0]) - barrier(around[1] * local[1]));
-    let y = barrier(barrier(around[1] * local[0]) + barrier(around[0] * local[1]));
-    let n = start.n;
-    let side = if n[2] >= 0.0 { 1.0 } else { -1.0 };
-    let a = -divide(1.0, barrier(side + n[2]));
-    let b = barrier(barrier(n[0] * n[1]) * a);
-    let across = [barrier(1.0 + barrier(barrier(side * barrier(n[0] * n[0])) * a)), side * b, -side * n[0]];
-    let up = [b, barrier(side + barrier(barrier(n[1] * n[1]) * a)), -n[1]];
-    let direction = each(|k| barrier(barrier(barrier(x * across[k]) + barrier(y * up[k])) + barrier(local[2] * n[k])));
+    let direction = turned([around[0], around[1]], [local[0], local[1], local[2]], start.n);
     (Ray { origin, t_min: 0.0, direction, t_max: T_INFINITE }, t.id)
 }
 
@@ -255,6 +260,27 @@ pub fn rays(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
             (*ray, source) = ray_of(tables, bound.params, bound.params.dvf_first + index as u32);
         }
         (*hit, *surface) = start_hit(ray.t_max, source);
+    });
+}
+
+/// By which the rays of a pixel are turned: a point of the unit circle.
+fn turn_of(tables: &DvfTables, params: &Params, index: usize) -> [f32; 2] {
+    let moved = pcg(params.seed);
+    let pixel = [index as u32 % params.width, index as u32 / params.width];
+    let [x, y] = [pixel[0].wrapping_add(moved) % TILE, pixel[1].wrapping_add(moved >> 8) % TILE];
+    let place = (y * TILE + x) as usize;
+    let (first, directions) = (tables.maps.grid.rays as usize, &tables.maps.directions);
+    let number = directions[first + CIRCLE as usize + place / 4][place % 4] as usize;
+    [directions[first + number][0], directions[first + number][1]]
+}
+
+/// Makes a ray from every primary hit, about its normal.
+pub fn cosine(bound: &Bound, tables: &DvfTables, own: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer]) {
+    let around = bound.params.around;
+    for_each_leaving(own, seen, |index, surface| {
+        let turn = turn_of(tables, bound.params, index);
+        let direction = turned(turn, [around[0], around[1], around[2]], gbuffer[index].normal);
+        leaving(surface, direction, T_INFINITE)
     });
 }
 

@@ -144,7 +144,7 @@ fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
 }
 
 /// A ray from a hit in `direction`, up to `t_max`; none where that leads below the surface.
-fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
+pub fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
     let above = dot(surface.normal, direction) > 0.0;
     let (t_min, t_max) = if above { (0.0, t_max) } else { (1.0, 0.0) };
     Ray { origin: surface.point, t_min, direction, t_max }
@@ -156,7 +156,7 @@ fn none(origin: Vec3) -> Ray {
 }
 
 /// Makes a ray from every hit of the shaded set; where there is none, none.
-fn for_each_leaving(own: &mut RaySet, seen: &RaySet, make: impl Fn(usize, &Surface) -> Ray + Sync) {
+pub fn for_each_leaving(own: &mut RaySet, seen: &RaySet, make: impl Fn(usize, &Surface) -> Ray + Sync) {
     for_each_new(own, |index| {
         let surface = &seen.surfaces[index];
         let ray = if surface.leaf == NONE { none(surface.point) } else { make(index, surface) };

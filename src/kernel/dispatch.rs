@@ -189,11 +189,13 @@ pub const DVF_WRITE: &str = "dvf_write";
 pub const DVF_DILATE: &str = "dvf_dilate";
 /// The kernel that labels cells.
 pub const DVF_LABELS: &str = "dvf_labels";
+/// The kernel that makes rays as the paper has them.
+pub const DVF_COSINE: &str = "dvf_cosine";
 /// The kernel that answers rays by a field.
 pub const DVF_SIFT: &str = "dvf_sift";
 /// All kernels over fields of visibility.
-pub const DVF_KERNELS: [&str; 9] =
-    [DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_SIFT];
+pub const DVF_KERNELS: [&str; 10] =
+    [DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_COSINE, DVF_SIFT];
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -405,8 +407,7 @@ pub fn dispatches(
         }
         Step::DvfCosine => {
             let [x, y, z] = direction_around(params.sample);
-            let around = [x, y, z, std::f32::consts::TAU];
-            vec![shading("generate_occlusion", Params { around, length: layout::T_INFINITE, ..params }, false)]
+            vec![dvf(DVF_COSINE, Params { around: [x, y, z, 0.0], ..params }, per_ray)]
         }
         Step::DvfLight => vec![shading("dvf_light", params, false)],
         Step::DvfSift => vec![dvf(DVF_SIFT, params, per_ray)],

@@ -2,12 +2,16 @@
 
 use super::frame::Frame;
 use super::layout::{DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid};
+use crate::math::blue_noise;
 use crate::visibility::dvf::{DvfField, DvfSettings, DvfUse, Shape};
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Points of the unit circle by which the directions of a point are turned.
 pub const CIRCLE: u32 = 1024;
+
+/// Pixels of the tile of turns on both axes.
+pub const TILE: u32 = blue_noise::SIDE as u32;
 
 /// A field in a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,7 +22,8 @@ pub struct DvfMaps {
     pub field: Option<Arc<DvfField>>,
     /// Without `field`: masks and labels are emptied; so they are, too, where there are not as many.
     pub is_new: bool,
-    /// Directions of rays about z, then [`CIRCLE`] points of the unit circle.
+    /// Directions of rays about z, then [`CIRCLE`] points of the unit circle, then, to answer as in the paper, numbers of these for a tile of
+    /// [`TILE`]² pixels, row by row, four to an element.
     pub directions: Arc<Vec<[f32; 4]>>,
     /// Words in which rays that wait for bricks are noted; where there are as many or more already, these keep what was noted.
     pub waiting_words: usize,
@@ -61,6 +66,20 @@ pub fn directions(rays: u32) -> Vec<[f32; 4]> {
     (0..rays).map(around).chain((0..CIRCLE).map(turn)).collect()
 }
 
+/// Pixels of the tile for each point of the circle.
+const RANKS_A_POINT: u16 = (TILE * TILE / CIRCLE) as u16;
+
+/// The circle, then the tile of turns: each point as often, and by blue noise.
+fn turns() -> Arc<Vec<[f32; 4]>> {
+    static TURNS: OnceLock<Arc<Vec<[f32; 4]>>> = OnceLock::new();
+    let made = TURNS.get_or_init(|| {
+        let number = |rank: u16| f32::from(rank / RANKS_A_POINT);
+        let tile = blue_noise::ranks().as_chunks::<4>().0.iter().map(|ranks| ranks.map(number));
+        Arc::new(directions(0).into_iter().chain(tile).collect())
+    });
+    made.clone()
+}
+
 /// The grid of `shape` in `frame`.
 fn placed(shape: &Shape, frame: &Frame) -> DvfGrid {
     DvfGrid {
@@ -76,7 +95,9 @@ impl DvfMaps {
     /// A field by which rays are answered.
     pub fn to_answer(field: &Arc<DvfField>, frame: &Frame, how: DvfUse) -> Self {
         let flags = if how.doubt { DVF_DOUBT } else { 0 } | if how.paper { DVF_PAPER } else { 0 };
-        Self { grid: DvfGrid { flags, ..placed(&field.shape, frame) }, field: Some(field.clone()), ..Self::default() }
+        let directions = if how.paper { turns() } else { Arc::default() };
+        let grid = DvfGrid { flags, ..placed(&field.shape, frame) };
+        Self { grid, field: Some(field.clone()), is_new: false, directions, waiting_words: 0 }
     }
 
     /// A field that is being made, of `lanes` to a point. Masks are those that the executor has.

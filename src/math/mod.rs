@@ -1,6 +1,7 @@
 //! Arithmetic that the rest builds on: the exact ray-triangle test, sampling patterns, encodings of directions.
 
 pub mod alias;
+pub mod blue_noise;
 pub mod exact;
 pub mod octahedral;
 pub mod sampling;

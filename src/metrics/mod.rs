@@ -18,6 +18,7 @@
 mod color;
 mod compare;
 mod filter;
+mod flicker;
 mod flip;
 mod hdr;
 mod image;
@@ -28,6 +29,7 @@ mod pixel;
 mod oracle_tests;
 
 pub use compare::{CompareError, Comparison, FlipKind, compare, count_differing};
+pub use flicker::{Change, flicker};
 pub use flip::{FlipMap, PIXELS_PER_DEGREE, flip_ldr};
 pub use hdr::{Exposures, exposures, flip_hdr};
 pub use image::{Image, ImageError, check_same_size};

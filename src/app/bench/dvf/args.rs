@@ -8,11 +8,15 @@ use crate::app::sizes::{CacheSize, ImageSize};
 use clap::Args;
 use std::path::PathBuf;
 
+/// What begins the options of a field that is made anew in every frame, as in the paper.
+pub const ANEW: &str = "anew ";
+
 /// Options of `bench dvf`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct DvfBenchArgs {
-    /// Converted scenes; a box with two blocks in it, open to one side, is measured beside them
+    /// Converted scenes; a Cornell box in which a box orbits (`scene cornell`) is measured beside them. Where S.motion.json lies beside a scene its flicker is
+    /// measured
     #[arg(value_name = "S.bricks")]
     pub scenes: Vec<PathBuf>,
     /// Folder for the results: dvf.json, dvf.md, report.html, a CSV a table, and rows.jsonl, which grows with every measurement. Started
@@ -26,8 +30,9 @@ pub struct DvfBenchArgs {
     #[arg(long, value_name = "FILE")]
     pub environment: Option<PathBuf>,
     /// What to measure in this run, separated by commas: points (figure 13 and table 2: points, rounding, hash and Hammersley), grid (figure 14), rays
-    /// (figure 15), lanes (figure 16), masks (their resolution, dilation, which answers count), modes (same-sample and the paper's), memory (a cache
-    /// of --cache, the field of what is seen) [default: all]
+    /// (figure 15), lanes (figure 16), masks (their resolution, dilation, which answers count), modes (same-sample and the paper's), flicker (of scenes in
+    /// which something moves: what pictures change from frame to frame that exact rays do not), memory (a cache of --cache, the field of what is seen)
+    /// [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub stages: Vec<Stage>,
     /// Begin no measurement after so many minutes; the results hold what is measured until then [default: no limit]
@@ -45,6 +50,9 @@ pub struct DvfBenchArgs {
     /// Rays of a point
     #[arg(long, value_name = "N", default_value = "128", value_parser = |s: &str| ranged(s, 1, 1024))]
     pub rays: u32,
+    /// Turns of a measurement in which a picture without a field and one with it are timed, one after the other, 1 to 100: times are medians
+    #[arg(long, value_name = "N", default_value = "3", value_parser = |s: &str| ranged(s, 1, 100))]
+    pub repeat: u32,
     /// The cache of memory, as --cache of walk
     #[arg(long, value_name = "SIZE|P%", default_value = "15%")]
     pub cache: CacheSize,
@@ -69,6 +77,8 @@ named_values! {
         Masks = "masks",
         /// Modes.
         Modes = "modes",
+        /// Flicker.
+        Flicker = "flicker",
         /// Out of core.
         Memory = "memory",
     } later &[]
@@ -76,8 +86,8 @@ named_values! {
 
 impl Stage {
     /// All of them, in the order of the paper.
-    pub const ALL: [Self; 7] =
-        [Self::Points, Self::Grid, Self::Rays, Self::Lanes, Self::Masks, Self::Modes, Self::Memory];
+    pub const ALL: [Self; 8] =
+        [Self::Points, Self::Grid, Self::Rays, Self::Lanes, Self::Masks, Self::Modes, Self::Flicker, Self::Memory];
 
     /// Its heading.
     pub fn title(self) -> &'static str {
@@ -88,6 +98,7 @@ impl Stage {
             Self::Lanes => "Lanes, figure 16",
             Self::Masks => "Masks, and which answers count",
             Self::Modes => "Modes",
+            Self::Flicker => "Flicker, section 4.4",
             Self::Memory => "What is seen, out of core",
         }
     }
@@ -126,6 +137,13 @@ impl DvfBenchArgs {
             .map(|options| of(&format!("--dvf-cells 40 {options}")))
             .to_vec(),
             Stage::Modes => ["same-sample", "paper"].map(|mode| of(&format!("--dvf-cells 40 --dvf-mode {mode}"))).to_vec(),
+            // The paper's cells of the Cornell box.
+            Stage::Flicker => ["--dvf-mode same-sample", "--dvf-mode paper", "anew --dvf-mode same-sample", "anew --dvf-mode paper"]
+                .map(|way| {
+                    let (anew, mode) = way.strip_prefix(ANEW).map_or(("", way), |mode| (ANEW, mode));
+                    format!("{anew}--dvf-points {} --dvf-rays {rays} --dvf-cells 16 {mode}", (points / 25).max(100))
+                })
+                .to_vec(),
             Stage::Memory => vec![of("--dvf-region view --dvf-cells 40")],
         }
     }

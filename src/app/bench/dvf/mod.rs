@@ -4,11 +4,14 @@
 //! Each finished measurement is a line of `rows.jsonl`, from which alone tables and pages are made.
 
 pub mod args;
+mod flicker;
 mod output;
+mod plots;
 
 use super::cells::Header;
 use super::measure::walk_args;
 use super::roma::rows::{Row, Rows};
+use crate::app::args::{Cli, WalkArgs};
 use crate::app::device::Device;
 use crate::app::dvf as field;
 use crate::app::dvf_args::RegionKind;
@@ -18,34 +21,47 @@ use crate::app::session::{Session, open_scene};
 use crate::app::walk;
 use crate::kernel::{DeviceInfo, Extent};
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
-use crate::render::{Dvf, Region, Renderer};
+use crate::render::{Dvf, DvfMade, Region, Renderer};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use anyhow::{Context, Result, bail};
 use args::{DvfBenchArgs, Stage};
-use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
-use brickwalk_convert::source::Primitive;
-use brickwalk_scenes::one_mesh;
-use glam::DVec3;
+use clap::Parser;
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Raised when a value changes its meaning.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// The box's name.
 const BOX: &str = "cornell";
+
+/// Its triangles, and those of a brick, so that shares of the cache hold several.
+const BOX_SIZE: [&str; 4] = ["--triangles", "10K", "--brick-triangles", "100"];
 
 /// A scene with its path.
 struct Place {
     name: String,
     scene: PathBuf,
     camera: Camera,
+    /// How something in it moves.
+    motion: Option<PathBuf>,
+}
+
+/// A picture, and what its rays to the environment were.
+struct Picture {
+    image: Image,
+    /// Ids of the triangles that are seen.
+    ids: Vec<u32>,
+    traced: f64,
+    answered: f64,
+    ms: f64,
 }
 
 /// Pictures of a scene.
@@ -53,8 +69,10 @@ struct View<'a> {
     place: &'a Place,
     args: &'a DvfBenchArgs,
     renderer: Renderer,
-    /// Without a field: the picture, its rays, its milliseconds.
-    exact: (Image, f64, f64),
+    /// Without a field.
+    exact: Picture,
+    /// Of the scene in motion, once it was asked for: by exact rays, and by those of the paper's mode.
+    truth: [Option<flicker::Truth>; 2],
 }
 
 /// Runs the command.
@@ -71,6 +89,7 @@ pub fn run(args: &DvfBenchArgs) -> Result<()> {
     let jobs: Vec<(&Place, Stage, String)> = places
         .iter()
         .flat_map(|place| stages.iter().map(move |&stage| (place, stage)))
+        .filter(|(place, stage)| *stage != Stage::Flicker || place.motion.is_some())
         .flat_map(|(place, stage)| args.measurements(stage).into_iter().map(move |options| (place, stage, options)))
         .collect();
     let progress = Progress::new();
@@ -97,7 +116,11 @@ pub fn run(args: &DvfBenchArgs) -> Result<()> {
                     None => View::open(place, args, "100%")?,
                 };
                 let open = view.insert(open);
-                rows.push(Row { key, values: open.measure(options)?.0 })?;
+                let values = match stage {
+                    Stage::Flicker => flicker::measure(open, options)?,
+                    _ => open.measure(*stage, options)?.0,
+                };
+                rows.push(Row { key, values })?;
             }
         }
         progress.advance(1);
@@ -127,6 +150,7 @@ fn header(args: &DvfBenchArgs, places: &[Place]) -> Result<Header> {
             "samples": args.samples,
             "points": args.points,
             "rays": args.rays,
+            "repeat": args.repeat,
             "environment": args.environment.as_ref().map(|file| file.display().to_string()),
         }),
         adapter: json!({ "name": name, "driver": driver, "driver_info": driver_info, "backend": backend }),
@@ -146,51 +170,26 @@ fn places(args: &DvfBenchArgs) -> Result<Vec<Place>> {
             None => path_from_bounds(file.resident().manifest.min, file.resident().manifest.max),
         };
         let name = scene.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        places.push(Place { name, scene: scene.clone(), camera: path.frame(0, 1) });
+        places.push(Place::of(name, scene.clone(), path.frame(0, 1)));
     }
     let scene = args.output.join(format!("{BOX}.bricks"));
-    if open_scene(&scene).is_err() {
-        build(one_mesh(BOX, cornell()), &BuildSettings::default(), &scene, &Progress::hidden())?;
+    let near = scene.with_extension("near.json");
+    // Paths are written after the scene.
+    if !scene.with_extension("motion.json").exists() || open_scene(&scene).is_err() {
+        let words = ["brickwalk", "scene", BOX].into_iter().chain(BOX_SIZE).chain(["-o"]);
+        let words = words.map(OsString::from).chain([scene.clone().into()]);
+        let cli = Cli::try_parse_from(words).context("the bench's own scene")?;
+        crate::app::run(&cli.command).with_context(|| scene.display().to_string())?;
     }
-    let camera = Camera {
-        position: DVec3::new(0.0, 1.0, 3.2),
-        target: DVec3::new(0.0, 0.95, 0.0),
-        up: DVec3::Y,
-        fov_y: 40f64.to_radians(),
-    };
-    places.push(Place { name: BOX.into(), scene, camera });
+    places.push(Place::of(BOX.into(), scene, CameraPath::read(&near)?.frame(0, 1)));
     Ok(places)
 }
 
-/// A box of side 2 on the floor, open to +Z, with two blocks in it; fronts face what is free.
-fn cornell() -> Primitive {
-    let mut all = Primitive::default();
-    let mut quad = |corner: DVec3, u: DVec3, v: DVec3| {
-        let first = all.positions.len() as u32;
-        all.positions.extend([corner, corner + u, corner + u + v, corner + v].map(|p| p.to_array()));
-        all.indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
-    };
-    let (x, y, z) = (DVec3::X * 2.0, DVec3::Y * 2.0, DVec3::Z * 2.0);
-    let low = DVec3::new(-1.0, 0.0, -1.0);
-    // Floor, ceiling, back, left and right.
-    quad(low, z, x);
-    quad(low + y, x, z);
-    quad(low, x, y);
-    quad(low, y, z);
-    quad(low + x, z, y);
-    for (middle, size, turn) in
-        [(DVec3::new(-0.35, 0.0, -0.35), [0.6, 1.2, 0.6], 0.3f64), (DVec3::new(0.35, 0.0, 0.3), [0.6, 0.6, 0.6], -0.3)]
-    {
-        let (s, c) = turn.sin_cos();
-        let (a, b, up) = (DVec3::new(c, 0.0, -s) * size[0], DVec3::new(s, 0.0, c) * size[2], DVec3::Y * size[1]);
-        let corner = middle - 0.5 * (a + b);
-        quad(corner + up, b, a);
-        quad(corner, up, a);
-        quad(corner + b, a, up);
-        quad(corner, b, up);
-        quad(corner + a, up, b);
+impl Place {
+    fn of(name: String, scene: PathBuf, camera: Camera) -> Self {
+        let motion = Some(scene.with_extension("motion.json")).filter(|motion| motion.exists());
+        Self { name, scene, camera, motion }
     }
-    all
 }
 
 type Values = BTreeMap<String, f64>;
@@ -199,7 +198,7 @@ impl<'a> View<'a> {
     fn open(place: &'a Place, args: &'a DvfBenchArgs, cache: &str) -> Result<Self> {
         let environment = args.environment.as_ref().map(|file| format!(" --environment {}", file.display()));
         let line = format!(
-            "--size {} --tile 16 --spp {} --sun-intensity 0 --effects environment --cache {cache}{}",
+            "--size {} --tile 16 --spp {} --sun-intensity 0 --effects environment --aov --cache {cache}{}",
             args.size,
             args.samples,
             environment.unwrap_or_default()
@@ -208,103 +207,121 @@ impl<'a> View<'a> {
         let extent = Extent { width: args.size.width, height: args.size.height, tile: 16 };
         let session = Session::open(open_scene(&place.scene)?, &place.scene, &options.stream, extent)?;
         let renderer = walk::renderer(session, &options)?;
-        let nothing = Image { width: 0, height: 0, rgb: Vec::new() };
-        let mut view = Self { place, args, renderer, exact: (nothing, 0.0, 0.0) };
-        let (image, rays, _, ms) = view.picture()?;
-        view.exact = (image, rays, ms);
+        let image = Image { width: 0, height: 0, rgb: Vec::new() };
+        let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, ms: 0.0 };
+        let mut view = Self { place, args, renderer, exact: nothing, truth: [None, None] };
+        view.exact = view.picture(0)?;
         Ok(view)
     }
 
-    /// A picture, the rays to the environment that were traced, those answered, and their milliseconds.
-    fn picture(&mut self) -> Result<(Image, f64, f64, f64)> {
+    /// A picture; `frame` says by which rays.
+    fn picture(&mut self, frame: u32) -> Result<Picture> {
         let output =
-            self.renderer.frame(0, &self.place.camera).with_context(|| self.place.scene.display().to_string())?;
+            self.renderer.frame(frame, &self.place.camera).with_context(|| self.place.scene.display().to_string())?;
         let record = output.records.iter().find(|record| record.pass == "environment");
         let record = record.context("no rays lead to the environment")?;
         let (width, height) = (self.renderer.size.0 as usize, self.renderer.size.1 as usize);
+        let (traced, answered, ms) = (record.rays as f64, record.rays_answered as f64, record.ms);
         let image = Image { width, height, rgb: output.pixels.radiance };
-        Ok((image, record.rays as f64, record.rays_answered as f64, record.ms))
+        Ok(Picture { image, ids: output.pixels.id, traced, answered, ms })
     }
 
-    /// Makes the field that `options` ask for, and a picture by it; the values, and the picture.
-    fn measure(&mut self, options: &str) -> Result<(Values, Image)> {
-        let options = walk_args(options, &self.place.scene, &self.args.adapter)?;
-        self.renderer.dvf = Dvf::default();
+    /// Makes the field that `options` ask for, which are those of a walk.
+    fn make(&mut self, options: &WalkArgs) -> Result<(DvfMade, f64)> {
         let region = match options.dvf.dvf_region {
             RegionKind::Scene => Region::scene(self.renderer.scene.resident()),
             RegionKind::View => self.renderer.visible_region(&[self.place.camera])?,
         };
-        let settings = options.dvf.settings();
-        let (made, seconds) = field::make(&mut self.renderer, &settings, &region, options.dvf.tracing())?;
+        field::make(&mut self.renderer, &options.dvf.settings(), &region, options.dvf.tracing())
+    }
+
+    /// Makes the field that `options` ask for, and a picture by it; the values, and the picture.
+    fn measure(&mut self, stage: Stage, options: &str) -> Result<(Values, Image)> {
+        let options = walk_args(options, &self.place.scene, &self.args.adapter)?;
+        self.renderer.dvf = Dvf::default();
+        let (made, seconds) = self.make(&options)?;
         let known = made.field.known_cells();
         let longest = made.field.shape.size.into_iter().max().unwrap_or(0);
-        self.renderer.dvf = Dvf::new(Arc::new(made.field), options.dvf.how());
-        let (image, traced, answered, ms) = self.picture()?;
+        let field = Arc::new(made.field);
+        self.renderer.dvf = Dvf::new(field.clone(), options.dvf.how());
+        let picture = self.picture(0)?;
+        let mut times = [vec![self.exact.ms], vec![picture.ms]];
+        for _ in 1..self.args.repeat {
+            self.renderer.dvf = Dvf::default();
+            times[0].push(self.picture(0)?.ms);
+            self.renderer.dvf = Dvf::new(field.clone(), options.dvf.how());
+            times[1].push(self.picture(0)?.ms);
+        }
         self.renderer.dvf = Dvf::default();
-        let (exact, rays, exact_ms) = &self.exact;
-        let errors = pixel_errors(&image, exact)?;
-        let flip = flip_ldr(&image, exact, PIXELS_PER_DEGREE)?;
-        let differ = image.rgb.iter().zip(&exact.rgb).filter(|(a, b)| a.map(f32::to_bits) != b.map(f32::to_bits));
+        let [exact_ms, ms] = times.map(median);
+        let exact = &self.exact;
+        let errors = pixel_errors(&picture.image, &exact.image)?;
+        let flip = flip_ldr(&picture.image, &exact.image, PIXELS_PER_DEGREE)?;
+        let [areas, rays, labels] = made.seconds;
         let values = [
             ("points", made.points as f64),
             ("longest", f64::from(longest)),
             ("known_cells", known as f64),
             ("rays_of_field", made.record.rays as f64),
             ("seconds", seconds),
-            ("rays", *rays),
-            ("traced", traced),
-            ("answered", answered),
-            ("fewer", rays / traced.max(1.0)),
+            ("seconds_areas", areas),
+            ("seconds_rays", rays),
+            ("seconds_labels", labels),
+            ("exact_ms", exact_ms),
+            ("ms", ms),
+            ("rays", exact.traced),
+            ("traced", picture.traced),
+            ("answered", picture.answered),
+            ("fewer", exact.traced / picture.traced.max(1.0)),
             ("faster", exact_ms / ms.max(1e-9)),
             ("flip", flip.mean()),
             ("rmse", errors.rmse),
             ("bias", errors.bias),
-            ("pixels_that_differ", differ.count() as f64 / exact.rgb.len().max(1) as f64),
+            (
+                "pixels_that_differ",
+                differing(&picture.image, &exact.image) as f64 / exact.image.rgb.len().max(1) as f64,
+            ),
             ("bricks_loaded", made.record.bricks_loaded as f64),
             ("bricks_needed", made.record.bricks_needed as f64),
             ("bricks_read", made.bricks_read as f64),
         ];
-        let values = values.map(|(name, value)| (name.to_string(), value)).into();
-        Ok((values, image))
+        let mut values: Values = values.map(|(name, value)| (name.to_string(), value)).into();
+        if stage == Stage::Modes {
+            // The paper's mode has rays of its own: what other rays make alone.
+            let other = self.picture(1)?.image;
+            values.insert("noise_flip".into(), flip_ldr(&other, &self.exact.image, PIXELS_PER_DEGREE)?.mean());
+            values.insert("noise_rmse".into(), pixel_errors(&other, &self.exact.image)?.rmse);
+        }
+        Ok((values, picture.image))
     }
+}
+
+/// The middle one of values, of an even number the mean of two.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}
+
+/// Pixels whose bits are not the same.
+fn differing(a: &Image, b: &Image) -> usize {
+    a.rgb.iter().zip(&b.rgb).filter(|(a, b)| a.map(f32::to_bits) != b.map(f32::to_bits)).count()
 }
 
 /// What is seen, with a small cache and with all resident: values of the first, and how many pixels of both differ.
 fn memory(place: &Place, args: &DvfBenchArgs, options: &str) -> Result<Values> {
-    let (mut values, out_of_core) = View::open(place, args, &args.cache.to_string())?.measure(options)?;
+    let (mut values, out_of_core) =
+        View::open(place, args, &args.cache.to_string())?.measure(Stage::Memory, options)?;
     let mut resident = View::open(place, args, "100%")?;
     resident.renderer.settings.tracing.measure_needed = true;
-    let (of_resident, in_core) = resident.measure(options)?;
+    let (of_resident, in_core) = resident.measure(Stage::Memory, options)?;
     // Which bricks rays need is known where all are resident.
     values.extend(of_resident.into_iter().filter(|(name, _)| name == "bricks_needed"));
-    let differ = out_of_core.rgb.iter().zip(&in_core.rgb).filter(|(a, b)| a.map(f32::to_bits) != b.map(f32::to_bits));
-    values.insert("differ_from_in_core".into(), differ.count() as f64);
+    values.insert("differ_from_in_core".into(), differing(&out_of_core, &in_core) as f64);
     Ok(values)
 }
 
 /// A file of the results.
 fn file(folder: &Path, name: &str) -> PathBuf {
     folder.join(name)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn fronts_of_the_box_face_what_is_free() {
-        let all = cornell();
-        let corner = |i: usize| DVec3::from_array(all.positions[all.indices[i] as usize]);
-        for t in 0..all.indices.len() / 3 {
-            let [a, b, c] = [0, 1, 2].map(|k| corner(3 * t + k));
-            let (middle, n) = ((a + b + c) / 3.0, (b - a).cross(c - a));
-            // Of the box toward its middle, of a block away from its own.
-            let away = match t {
-                0..10 => middle - DVec3::new(0.0, 1.0, 0.0),
-                10..20 => DVec3::new(-0.35, 0.6, -0.35) - middle,
-                _ => DVec3::new(0.35, 0.3, 0.3) - middle,
-            };
-            assert!(n.dot(away) < 0.0, "triangle {t}");
-        }
-    }
 }

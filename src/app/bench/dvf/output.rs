@@ -1,7 +1,7 @@
 //! What the bench writes: one JSON file, a CSV a table, Markdown and an offline page, all of the same tables.
 
 use super::args::{DvfBenchArgs, Stage};
-use super::{FORMAT, file, key};
+use super::{FORMAT, file, key, plots};
 use crate::app::bench::roma::rows::Rows;
 use crate::app::output::atomic;
 use crate::app::sizes::human_count;
@@ -12,8 +12,15 @@ use std::fmt::Write;
 
 const TITLE: &str = "The experiments of discrete visibility fields";
 const READING: &str = "Fewer rays: rays to the environment without a field over those that are traced with it; all of them are the same rays, so \
-                       errors are those of the field alone (in the mode of the paper: of other rays, too). Errors are those of linear radiance; FLIP at 67 \
-                       pixels per degree. Paper: Günay and Akyüz 2025, Sponza, 128 rays a pixel, an RTX 4060.";
+                       errors are those of the field alone (in the mode of the paper: of other rays, too). Faster: the time of these rays without a field over \
+                       that with it, medians of turns. Errors are those of linear radiance; FLIP at 67 pixels per degree. Paper: Günay and Akyüz 2025, Sponza, \
+                       128 rays a pixel, an RTX 4060.";
+const MAKING: &str = "Times in ratios: what making the field takes over the time of the rays of a picture without one; a picture with a field made for \
+                      it over one without. Shares of making: areas and their sums are the paper's compute shaders 1 to 3, points and rays its 4, labels its 5, whose \
+                      tables 3 and 4 are left out as ratios to rays: they say 2e12 rays a second.";
+const FLICKERING: &str = "Of pixels all rays of which have the same answers in both frames, what pictures by a field change by from frame to frame. \
+                          Noise: the difference of two pictures by brute force, by other rays. A pixel jumps where it changes by more than 99 of 100 pixels differ by noise. Anew: the \
+                          field is made anew in every frame, as in the paper; else it is that of the first frame, and knows what has moved.";
 
 /// What the paper has of Sponza: options, then RMSE and FLIP. Figure 13 has 80K and 400K points of 77 cells, figure 14 10M points.
 const PAPER: [(&str, f64, f64); 11] = [
@@ -28,6 +35,21 @@ const PAPER: [(&str, f64, f64); 11] = [
     ("--dvf-cells 40", 0.001072, 0.000357),
     ("--dvf-cells 21", 0.000423, 0.000082),
     ("--dvf-cells 12", 0.000120, 0.000010),
+];
+
+/// The table of [`making`].
+const MAKING_TABLE: &str = "making";
+const MAKING_TITLE: &str = "Making fields, tables 2 to 4";
+
+/// A scene, its points, the columns of [`making`].
+type PaperMaking = (&'static str, Option<u32>, [Option<f64>; 5]);
+
+/// What the paper's tables 2 to 4 have of a scene: making over a picture by brute force (9 and 44 a second), a picture with its field over that, and the
+/// shares of making of compute shaders 1 to 3, 4 and 5. Sponza with 80K and 400K points and shares of 10M, the Cornell box with 100K, whose frames have no time there.
+const PAPER_MAKING: [PaperMaking; 3] = [
+    ("sponza", Some(80_000), [Some(0.035), Some(0.155), Some(0.330), Some(0.180), Some(0.490)]),
+    ("sponza", Some(400_000), [Some(0.035), Some(0.161), Some(0.330), Some(0.180), Some(0.490)]),
+    ("cornell", None, [Some(0.041), None, Some(0.017), Some(0.977), Some(0.006)]),
 ];
 
 /// What the paper has of a measurement of Sponza: RMSE and FLIP.
@@ -48,9 +70,14 @@ fn paper(stage: Stage, scene: &str, options: &str) -> [Option<f64>; 2] {
 /// # Errors
 /// The folder cannot be written.
 pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) -> Result<String> {
+    let of_stage = |stage: Stage| match stage {
+        Stage::Points => vec![table(args, scenes, stage, rows), making(args, scenes, rows)],
+        Stage::Flicker => vec![flickering(args, scenes, rows)],
+        _ => vec![table(args, scenes, stage, rows)],
+    };
     let tables: Vec<(Stage, Table)> = Stage::ALL
         .into_iter()
-        .map(|stage| (stage, table(args, scenes, stage, rows)))
+        .flat_map(|stage| of_stage(stage).into_iter().map(move |table| (stage, table)))
         .filter(|(_, table)| !table.rows.is_empty())
         .collect();
     let header = rows.header();
@@ -75,6 +102,7 @@ pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) 
         ("Resolution", args.size.to_string()),
         ("Rays a pixel", args.samples.to_string()),
         ("Most points", human_count(args.points.into())),
+        ("Turns", args.repeat.to_string()),
     ]
     .map(|(name, value)| (name.to_string(), value))
     .to_vec();
@@ -84,15 +112,22 @@ pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) 
         let _ = writeln!(page, "- {name}: {value}");
     }
     for (stage, table) in &tables {
-        let _ = write!(page, "\n## {}\n\n{}", stage.title(), table.to_markdown());
+        let title = if table.name == MAKING_TABLE { MAKING_TITLE } else { stage.title() };
+        let _ = write!(page, "\n## {title}\n\n{}", table.to_markdown());
     }
     atomic::write(&file(folder, "dvf.md"), page.as_bytes())?;
-    let section = |(stage, table): (Stage, Table)| Section {
-        title: stage.title().into(),
-        tables: vec![table],
-        ..Section::default()
-    };
-    let mut sections: Vec<Section> = tables.into_iter().map(section).collect();
+    let mut sections: Vec<Section> = Vec::new();
+    for (stage, table) in tables {
+        match sections.last_mut().filter(|section| section.title == stage.title()) {
+            Some(section) => section.tables.push(table),
+            None => sections.push(Section {
+                title: stage.title().into(),
+                tables: vec![table],
+                plots: plots::of(stage, args, scenes, rows),
+                ..Section::default()
+            }),
+        }
+    }
     if let Some(first) = sections.first_mut() {
         first.reading = READING.into();
     }
@@ -104,7 +139,7 @@ pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) 
 }
 
 /// What a measurement is called in its row: its options without those that all have.
-fn short(options: &str) -> String {
+pub fn short(options: &str) -> String {
     options.replace("--dvf-", "")
 }
 
@@ -118,11 +153,13 @@ fn table(args: &DvfBenchArgs, scenes: &[&str], stage: Stage, rows: &Rows) -> Tab
         "faster",
         "FLIP",
         "RMSE",
+        "bias",
         "pixels that differ, %",
         "field, s",
     ];
     match stage {
         Stage::Points | Stage::Grid => columns.extend(["RMSE, paper", "FLIP, paper"]),
+        Stage::Modes => columns.extend(["FLIP of other rays alone", "RMSE of other rays alone"]),
         Stage::Memory => {
             columns.extend(["bricks loaded", "needed", "loaded ÷ needed", "read", "pixels other than in core"])
         }
@@ -145,11 +182,13 @@ fn table(args: &DvfBenchArgs, scenes: &[&str], stage: Stage, rows: &Rows) -> Tab
                 Value::ratio(value("faster")),
                 Value::number(value("flip")),
                 Value::number(value("rmse")),
+                Value::number(value("bias")),
                 Value::number(value("pixels_that_differ").map(|share| 100.0 * share)),
                 Value::number(value("seconds")),
             ];
             match stage {
                 Stage::Points | Stage::Grid => line.extend(paper(stage, scene, &options).map(Value::number)),
+                Stage::Modes => line.extend(["noise_flip", "noise_rmse"].map(|name| Value::number(value(name)))),
                 Stage::Memory => line.extend([
                     Value::number(value("bricks_loaded")),
                     Value::number(value("bricks_needed")),
@@ -164,4 +203,94 @@ fn table(args: &DvfBenchArgs, scenes: &[&str], stage: Stage, rows: &Rows) -> Tab
     }
     let columns = columns.into_iter().map(String::from).collect();
     Table { name: stage.name().into(), caption: READING.into(), columns, rows: lines }
+}
+
+/// What making the fields of the points takes.
+fn making(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Table {
+    let columns = [
+        "scene",
+        "options",
+        "points",
+        "making ÷ exact",
+        "making and picture ÷ exact",
+        "areas and sums, %",
+        "points and rays, %",
+        "labels, %",
+        "making ÷ exact, paper",
+        "making and picture ÷ exact, paper",
+        "areas and sums, %, paper",
+        "points and rays, %, paper",
+        "labels, %, paper",
+    ];
+    let mut lines = Vec::new();
+    for scene in scenes {
+        for options in args.measurements(Stage::Points) {
+            let key = key(scene, Stage::Points, &options);
+            if !rows.has(&key) {
+                continue;
+            }
+            let value = |name: &str| rows.value(&key, name).unwrap_or(0.0);
+            let (making, exact) = (value("seconds"), (1e-3 * value("exact_ms")).max(f64::MIN_POSITIVE));
+            let share = |name: &str| 100.0 * value(name) / making.max(f64::MIN_POSITIVE);
+            let own = [
+                making / exact,
+                (making + 1e-3 * value("ms")) / exact,
+                share("seconds_areas"),
+                share("seconds_rays"),
+                share("seconds_labels"),
+            ];
+            let is_of = |points: &Option<u32>| points.is_none_or(|n| options.contains(&format!("--dvf-points {n} ")));
+            let found = PAPER_MAKING.iter().find(|(name, points, _)| scene.contains(name) && is_of(points));
+            let [making, both, shares @ ..] = found.map_or([None; 5], |(.., values)| *values);
+            let hundredths = shares.map(|share| share.map(|share| 100.0 * share));
+            let mut line = vec![
+                Value::Text(scene.to_string()),
+                Value::Text(short(&options)),
+                Value::number(rows.value(&key, "points")),
+            ];
+            line.extend([Value::ratio(Some(own[0])), Value::ratio(Some(own[1]))]);
+            line.extend(own[2..].iter().map(|&share| Value::number(Some(share))));
+            line.extend([Value::ratio(making), Value::ratio(both)]);
+            line.extend(hundredths.map(Value::number));
+            lines.push(line);
+        }
+    }
+    let columns = columns.map(String::from).to_vec();
+    Table { name: MAKING_TABLE.into(), caption: MAKING.into(), columns, rows: lines }
+}
+
+/// How pictures of what moves flicker.
+fn flickering(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Table {
+    let columns = [
+        "scene",
+        "options",
+        "points",
+        "cells",
+        "fewer rays",
+        "mean change ÷ mean noise",
+        "greatest change ÷ noise",
+        "pixels that jump in the worst frame, %",
+    ];
+    let mut lines = Vec::new();
+    for scene in scenes {
+        for options in args.measurements(Stage::Flicker) {
+            let key = key(scene, Stage::Flicker, &options);
+            if !rows.has(&key) {
+                continue;
+            }
+            let value = |name: &str| rows.value(&key, name);
+            lines.push(vec![
+                Value::Text(scene.to_string()),
+                Value::Text(short(&options)),
+                Value::number(value("points")),
+                Value::number(value("longest")),
+                Value::ratio(value("fewer")),
+                Value::number(value("mean_to_noise")),
+                Value::number(value("greatest_to_noise")),
+                Value::number(value("jumps").map(|share| 100.0 * share)),
+            ]);
+        }
+    }
+    let columns = columns.map(String::from).to_vec();
+    Table { name: Stage::Flicker.name().into(), caption: FLICKERING.into(), columns, rows: lines }
 }
