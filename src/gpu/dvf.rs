@@ -1,10 +1,9 @@
 //! Discrete visibility fields on the device, and the kernels that make them and answer rays by them; made when a walk first asks for them.
 
 use super::device::Gpu;
-use super::groups::numbered;
 use super::kernels::{self, Kernels};
+use super::method::{Method, check_bindings, check_bytes, grow};
 use super::rays::storage;
-use super::roma::grow;
 use crate::kernel::dispatch::DVF_KERNELS;
 use crate::kernel::dvf::{DvfMaps, sweep_elements};
 use crate::kernel::layout::{DvfGrid, DvfTriangle};
@@ -15,10 +14,12 @@ use std::sync::Arc;
 /// Storage buffers of the kernels: 7 of the scene, 5 of the rays, 7 of their own, 8 of shading; one more with opacity.
 const STORAGE_BUFFERS: u32 = 27;
 
+const WHAT: &str = "fields of visibility";
+const REMEDY: &str = "give fewer --dvf-cells or a smaller --dvf-octahedral";
+
 /// Pipelines and buffers.
 pub struct Dvf {
-    layout: wgpu::BindGroupLayout,
-    pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
+    method: Method,
     grid: wgpu::Buffer,
     masks: wgpu::Buffer,
     labels: wgpu::Buffer,
@@ -37,50 +38,26 @@ impl Dvf {
     /// # Errors
     /// The device binds too few buffers.
     pub fn new(gpu: &Gpu, kernels: &Kernels) -> Result<Self, ExecutorError> {
-        let (most, needed) =
-            (gpu.limits.max_storage_buffers_per_shader_stage, STORAGE_BUFFERS + u32::from(kernels.pages.opacity));
-        if most < needed {
-            return Err(ExecutorError::Device(format!(
-                "{:?} binds {most} buffers a kernel, fields of visibility need {needed}; use --secondary exact, or another --adapter",
-                gpu.info.name
-            )));
-        }
-        let layout = kernels::dvf_layout(&gpu.device);
-        let groups = [Some(&kernels.scene), Some(&kernels.rays), Some(&layout), Some(&kernels.shading)];
-        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("dvf"),
-            bind_group_layouts: &groups,
-            immediate_size: 0,
-        });
-        let pipeline = |name: &str| {
-            let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(kernels::source(name, kernels.pages).into()),
-            });
-            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(name),
-                layout: Some(&pipeline_layout),
-                module: &module,
-                entry_point: Some("main"),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        };
-        let pipelines = DVF_KERNELS.map(|name| (name, pipeline(name))).into();
-        let strides = [size_of::<DvfGrid>(), 4, 4, size_of::<DvfTriangle>(), 8, 16, 4];
-        let labels =
-            ["dvf grid", "dvf masks", "dvf labels", "dvf triangles", "dvf sums", "dvf directions", "dvf waiting"];
-        let mut buffers = labels.into_iter().zip(strides).map(|(label, stride)| storage(gpu, label, 1, stride));
-        let [grid, masks, labels, triangles, sums, directions, waiting] =
-            std::array::from_fn(|_| buffers.next().expect("seven of them"));
-        let group = group(gpu, &layout, [&grid, &masks, &labels, &triangles, &sums, &directions, &waiting]);
+        check_bindings(gpu, kernels, STORAGE_BUFFERS, WHAT)?;
+        let method = Method::new(gpu, kernels, "dvf", kernels::dvf_layout(&gpu.device), &DVF_KERNELS);
+        let [grid, masks, labels, triangles, sums, directions, waiting] = [
+            ("dvf grid", size_of::<DvfGrid>()),
+            ("dvf masks", 4),
+            ("dvf labels", 4),
+            ("dvf triangles", size_of::<DvfTriangle>()),
+            ("dvf sums", 8),
+            ("dvf directions", 16),
+            ("dvf waiting", 4),
+        ]
+        .map(|(label, stride)| storage(gpu, label, 1, stride));
+        let group = method.group(gpu, [&grid, &masks, &labels, &triangles, &sums, &directions, &waiting]);
         let maps = DvfMaps::default();
-        Ok(Self { layout, pipelines, grid, masks, labels, triangles, sums, directions, waiting, maps, group })
+        Ok(Self { method, grid, masks, labels, triangles, sums, directions, waiting, maps, group })
     }
 
     /// The pipeline of a kernel, if it is one of these.
     pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
-        self.pipelines.iter().find(|(own, _)| *own == name).map(|(_, pipeline)| pipeline)
+        self.method.pipeline(name)
     }
 
     /// Places a field; see [`crate::kernel::FrameExecutor::set_dvf`].
@@ -89,7 +66,7 @@ impl Dvf {
     /// More than a buffer holds, with how much it does.
     pub fn set(&mut self, gpu: &Gpu, maps: &DvfMaps) -> Result<(), ExecutorError> {
         let (words, cells) = (maps.mask_words(), maps.cells());
-        check(gpu, 4 * words as u64)?;
+        check_bytes(gpu, 4 * words as u64, WHAT, REMEDY)?;
         let is_same = match (&maps.field, &self.maps.field) {
             (Some(one), Some(other)) => Arc::ptr_eq(one, other),
             (None, _) => !maps.is_new && (self.maps.mask_words(), self.maps.cells()) == (words, cells),
@@ -135,7 +112,7 @@ impl Dvf {
         triangles: &[DvfTriangle],
         point_count: u32,
     ) -> Result<(), ExecutorError> {
-        check(gpu, size_of_val(triangles) as u64)?;
+        check_bytes(gpu, size_of_val(triangles) as u64, WHAT, REMEDY)?;
         let elements = sweep_elements(triangles.len() as u32) as usize;
         let grown = [
             grow(gpu, &mut self.triangles, "dvf triangles", triangles.len(), size_of::<DvfTriangle>()),
@@ -165,23 +142,6 @@ impl Dvf {
     fn rebind(&mut self, gpu: &Gpu) {
         let buffers =
             [&self.grid, &self.masks, &self.labels, &self.triangles, &self.sums, &self.directions, &self.waiting];
-        self.group = group(gpu, &self.layout, buffers);
+        self.group = self.method.group(gpu, buffers);
     }
-}
-
-fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, buffers: [&wgpu::Buffer; 7]) -> wgpu::BindGroup {
-    let entries = numbered(buffers, 0);
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("dvf"), layout, entries: &entries })
-}
-
-/// Refuses fields of more bytes than the device binds.
-fn check(gpu: &Gpu, bytes: u64) -> Result<(), ExecutorError> {
-    let most = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
-    if bytes <= most {
-        return Ok(());
-    }
-    Err(ExecutorError::Device(format!(
-        "{:?} holds fields of visibility of at most {most} bytes, this one has {bytes}; give fewer --dvf-cells or a smaller --dvf-octahedral",
-        gpu.info.name
-    )))
 }

@@ -8,6 +8,7 @@ pub mod field;
 pub mod groups;
 pub mod kernels;
 pub mod lamps;
+mod method;
 pub mod pages;
 pub mod probe;
 pub mod rays;

@@ -1,9 +1,9 @@
 //! Reflective shadow maps on the device, and the kernels that write them and light by them; made when a walk first asks for them.
 
 use super::device::Gpu;
-use super::groups::numbered;
 use super::kernels::{self, Kernels};
 use super::lamps::LampBuffers;
+use super::method::{Method, check_bindings, most_bytes};
 use super::rays::storage;
 use crate::kernel::dispatch::{RSM_LIGHT, RSM_WRITE};
 use crate::kernel::layout::{RsmMap, RsmTexel};
@@ -15,9 +15,7 @@ const STORAGE_BUFFERS: u32 = 26;
 
 /// Pipelines and buffers.
 pub struct Rsm {
-    layout: wgpu::BindGroupLayout,
-    write: wgpu::ComputePipeline,
-    light: wgpu::ComputePipeline,
+    method: Method,
     map_records: wgpu::Buffer,
     /// Texels of all maps.
     pub texels: wgpu::Buffer,
@@ -33,48 +31,17 @@ impl Rsm {
     /// # Errors
     /// The device binds too few buffers.
     pub fn new(gpu: &Gpu, kernels: &Kernels, lamps: &LampBuffers) -> Result<Self, ExecutorError> {
-        let (most, needed) =
-            (gpu.limits.max_storage_buffers_per_shader_stage, STORAGE_BUFFERS + u32::from(kernels.pages.opacity));
-        if most < needed {
-            return Err(ExecutorError::Device(format!(
-                "{:?} binds {most} buffers a kernel, diffuse light by occupancy maps needs {needed}; use --secondary exact, or another --adapter",
-                gpu.info.name
-            )));
-        }
-        let layout = kernels::rsm_layout(&gpu.device);
-        let groups = [Some(&kernels.scene), Some(&kernels.rays), Some(&layout), Some(&kernels.shading)];
-        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("rsm"),
-            bind_group_layouts: &groups,
-            immediate_size: 0,
-        });
-        let [write, light] = [RSM_WRITE, RSM_LIGHT].map(|name| {
-            let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(kernels::source(name, kernels.pages).into()),
-            });
-            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(name),
-                layout: Some(&pipeline_layout),
-                module: &module,
-                entry_point: Some("main"),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        });
+        check_bindings(gpu, kernels, STORAGE_BUFFERS, "diffuse light by occupancy maps")?;
+        let method = Method::new(gpu, kernels, "rsm", kernels::rsm_layout(&gpu.device), &[RSM_WRITE, RSM_LIGHT]);
         let map_records = storage(gpu, "rsm maps", 1, size_of::<RsmMap>());
         let texels = storage(gpu, "rsm texels", 1, size_of::<RsmTexel>());
-        let group = group(gpu, &layout, lamps, [&map_records, &texels]);
-        Ok(Self { layout, write, light, map_records, texels, maps: 0, group })
+        let group = method.group(gpu, lamps.buffers().into_iter().chain([&map_records, &texels]));
+        Ok(Self { method, map_records, texels, maps: 0, group })
     }
 
     /// The pipeline of a kernel, if it is one of these.
     pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
-        match name {
-            RSM_WRITE => Some(&self.write),
-            RSM_LIGHT => Some(&self.light),
-            _ => None,
-        }
+        self.method.pipeline(name)
     }
 
     /// Takes maps; as many texels as before keep what they hold.
@@ -83,7 +50,7 @@ impl Rsm {
     /// More texels than a buffer holds, with how many it does.
     pub fn set(&mut self, gpu: &Gpu, lamps: &LampBuffers, maps: &RsmMaps) -> Result<(), ExecutorError> {
         let size = size_of::<RsmTexel>() as u64;
-        let most = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size) / size;
+        let most = most_bytes(gpu) / size;
         let texels = u64::from(maps.texels);
         if texels > most {
             return Err(ExecutorError::Device(format!(
@@ -109,11 +76,7 @@ impl Rsm {
 
     /// Binds the lamps, which are new ones.
     pub fn rebind(&mut self, gpu: &Gpu, lamps: &LampBuffers) {
-        self.group = group(gpu, &self.layout, lamps, [&self.map_records, &self.texels]);
+        let own = [&self.map_records, &self.texels];
+        self.group = self.method.group(gpu, lamps.buffers().into_iter().chain(own));
     }
-}
-
-fn group(gpu: &Gpu, layout: &wgpu::BindGroupLayout, lamps: &LampBuffers, own: [&wgpu::Buffer; 2]) -> wgpu::BindGroup {
-    let entries = numbered(lamps.buffers().into_iter().chain(own), 0);
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("rsm"), layout, entries: &entries })
 }
