@@ -1,5 +1,5 @@
 // Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those that no base map holds are
-// traced whole.
+// traced whole. Where there are pilots only these are traced.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -8,6 +8,7 @@
 #include "shared/roma.wgsl"
 #include "shared/levels.wgsl"
 #include "shared/roma_start.wgsl"
+#include "shared/roma_pilot.wgsl"
 
 // One thread a ray.
 @compute @workgroup_size(8, 8)
@@ -17,7 +18,13 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     let ray = rays[index];
-    if ray.t_min <= ray.t_max {
+    if !(ray.t_min <= ray.t_max) {
+        return;
+    }
+    if params.roma_near != NONE {
         hits[index].t = min(ray.t_max, near_end(index, ray, params.roma_near));
+    }
+    if params.roma_pilots != 0u && !is_pilot(index) {
+        hits[index].t = ANSWERED;
     }
 }

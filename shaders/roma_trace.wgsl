@@ -1,5 +1,5 @@
 // Answers the pass's rays by ray-aligned occupancy maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that
-// meet nothing are ended, and others are traced up to roma_near cells from their start.
+// meet nothing are ended, and others are traced up to roma_near cells from their start. Where pilots have been traced, these count for what maps get wrong.
 // Where the closest is asked for, with the point, against the direction travelled as its normal, and the level's lift as its area: such a hit is known
 // to a cell.
 #include "shared/types.wgsl"
@@ -21,16 +21,25 @@ fn sift(index: u32, ray: Ray, found: Answer) {
         }
         return;
     }
-    if !is_chosen(index) {
-        hits[index] = Hit(ANSWERED, ROMA_HIT, 0.0, 0.0);
-        return;
-    }
-    // What it brings counts for those that are not, too.
-    hits[index].u = f32(params.roma_one_in - 1u);
     if params.roma_near == 0u {
         hits[index].t = WAITING;
     } else if params.roma_near != NONE {
         hits[index].t = min(ray.t_max, near_end(index, ray, params.roma_near));
+    }
+}
+
+// Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or 0. So the mean is that of
+// traced rays, and its noise that of what maps get wrong (a control variate).
+fn correct(index: u32, found: Answer) {
+    if params.roma_levels == 0u {
+        return;
+    }
+    let n = f32(params.roma_pilots);
+    let is_free = hits[index].id == NONE;
+    if is_free && found.t >= 0.0 {
+        hits[index].u = n - 1.0;
+    } else if !is_free && found.t < 0.0 {
+        hits[index] = Hit(hits[index].t, NONE, -n, 0.0);
     }
 }
 
@@ -63,6 +72,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
             let found = answer(index, ray, select(ray.t_min, hits[index].t, is_far), is_sifted);
             if is_sifted {
                 sift(index, ray, found);
+            } else if params.roma_part == ROMA_CORRECT && is_pilot(index) {
+                correct(index, found);
             } else {
                 write(index, found);
             }

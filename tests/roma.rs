@@ -161,37 +161,56 @@ fn traced_near_its_start_a_ray_is_nearer_to_the_exact_one() {
     assert_eq!(apart(&of("--secondary roma --roma-near 256"), &exact), 0.0);
 }
 
+/// Rays of ao of a frame: those that maps answer and those that are traced.
+fn rays_of_ao(scene: &Path, options: &str) -> u64 {
+    let output = renderer(scene, &format!("--effects ao {options}")).frame(0, &eye()).expect("a frame");
+    output.records.iter().filter(|r| r.pass == "ao").map(|r| r.rays).sum()
+}
+
 #[test]
 fn rays_that_maps_find_free_are_not_traced() {
     let folder = folder();
     let scene = scene(folder.path(), true);
     let of = |options: &str| openness(folder.path(), true, &format!("--spp 16 {options}"));
-    let (exact, roma, auto, fewer) = (
-        of(""),
-        of("--secondary roma"),
-        of("--secondary auto --auto-error off --auto-one-in 1"),
-        of("--secondary auto --auto-error off"),
-    );
-    let mean = |pixels: &[(f64, f64)]| pixels.iter().map(|p| p.1).sum::<f64>() / pixels.len() as f64;
-    let bias = |pixels: &[(f64, f64)]| mean(pixels) - mean(&exact);
+    let (exact, roma, auto) = (of(""), of("--secondary roma"), of("--secondary auto --auto-error off"));
     let (error_of_maps, error) = (apart(&roma, &exact), apart(&auto, &exact));
-    println!("maps alone {error_of_maps:.4}, all in doubt traced {error:.4}, of four one {:.4}", apart(&fewer, &exact));
+    println!("maps alone {error_of_maps:.4}, all in doubt traced {error:.4}");
     assert!(error < 0.5 * error_of_maps, "{error} is not half of {error_of_maps}");
-    // What is left out by chance is noise, no bias.
-    println!("bias: {:.5}, {:.5}, {:.5}", bias(&roma), bias(&auto), bias(&fewer));
-    assert!((bias(&fewer) - bias(&auto)).abs() < 0.004 && apart(&fewer, &exact) > error);
     // What is counted: rays that maps were asked about, and those that were traced after that.
-    let rays = |options: &str| -> u64 {
-        let output = renderer(&scene, &format!("--effects ao {options}")).frame(0, &eye()).expect("a frame");
-        output.records.iter().filter(|r| r.pass == "ao").map(|r| r.rays).sum()
-    };
-    let [all, doubt, some] =
-        ["", "--secondary auto --auto-error off --auto-one-in 1", "--secondary auto --auto-error off"].map(rays);
+    let [all, doubt] = ["", "--secondary auto --auto-error off"].map(|options| rays_of_ao(&scene, options));
     assert_eq!(all, (SIZE * SIZE * 16) as u64);
-    let share = |rays: u64| (rays - all) as f64 / all as f64;
-    println!("traced: {:.3}, of those in doubt one in four {:.3}", share(doubt), share(some));
-    assert!(share(doubt) > 0.1 && share(doubt) < 0.8, "{}", share(doubt));
-    assert!((share(some) / share(doubt) - 0.25).abs() < 0.02, "{} of {}", share(some), share(doubt));
+    let share = (doubt - all) as f64 / all as f64;
+    println!("traced: {share:.3}");
+    assert!(share > 0.1 && share < 0.8, "{share}");
+}
+
+#[test]
+fn traced_rays_correct_what_maps_get_wrong() {
+    let folder = folder();
+    let scene = scene(folder.path(), true);
+    let of = |options: &str| openness(folder.path(), true, &format!("--spp 64 {options}"));
+    let exact = of("");
+    let mean = |pixels: &[(f64, f64)]| pixels.iter().map(|p| p.1).sum::<f64>() / pixels.len() as f64;
+    let measured = |options: &str| {
+        let found = of(options);
+        ((mean(&found) - mean(&exact)).abs(), apart(&found, &exact))
+    };
+    let (bias_of_maps, error_of_maps) = measured("--secondary roma");
+    println!("maps alone: bias {bias_of_maps:.5}, error {error_of_maps:.4}");
+    let mut before = 0.0;
+    for one_in in [2, 4, 16] {
+        let (bias, error) = measured(&format!("--secondary auto --auto-one-in {one_in}"));
+        println!("one in {one_in}: bias {bias:.5}, error {error:.4}");
+        // Control: maps alone are too dark or too bright.
+        assert!(bias < 0.2 * bias_of_maps, "one in {one_in}");
+        assert!(error < error_of_maps || one_in == 16, "one in {one_in}");
+        // The fewer are traced the noisier.
+        assert!(error > before, "one in {one_in}: {error}");
+        before = error;
+        let all = (SIZE * SIZE * 16) as f64;
+        let traced = rays_of_ao(&scene, &format!("--secondary auto --auto-one-in {one_in}")) as f64 - all;
+        assert!((traced / all * f64::from(one_in) - 1.0).abs() < 0.05, "one in {one_in}: {traced} of {all}");
+    }
 }
 
 #[test]
@@ -209,7 +228,7 @@ fn maps_answer_what_measured_errors_allow() {
     let ([_, alone], _) = walk("--secondary roma --roma-unsnapped all --roma-steps 64 --roma-samples 4");
     let mut before = f64::INFINITY;
     for (percent, least_trust) in [(50.0, Trust::Beyond(0)), (2.0, Trust::Beyond(32)), (0.1, Trust::Nothing)] {
-        let options = format!("--secondary auto --auto-one-in 1 --auto-error {percent}");
+        let options = format!("--secondary auto --auto-error {percent}");
         let ([_, output], measured) = walk(&options);
         let trust = measured.trust((1e4 * percent) as u32);
         let wrong = measured.share_wrong(trust);
@@ -241,7 +260,7 @@ fn rays_too_short_for_maps_are_traced() {
     let scene = scene(folder.path(), true);
     // Cells of bricks are 1/32 m and 1/16 m wide.
     let frame = |length: f64, secondary: &str| {
-        let mut renderer = renderer(&scene, &format!("--effects ao --secondary {secondary} --auto-one-in 1"));
+        let mut renderer = renderer(&scene, &format!("--effects ao --secondary {secondary}"));
         renderer.settings.effects.occlusion.as_mut().expect("ao").length = length;
         let output = renderer.frame(0, &eye()).expect("a frame");
         let rays: u64 = output.records.iter().filter(|r| r.pass == "ao").map(|r| r.rays).sum();
@@ -331,6 +350,9 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     }
     let hybrid = picture("--cache 100% --secondary auto", "1");
     assert!(hybrid != one && picture("--cache 20% --secondary auto --schedule demand", "3") == hybrid);
+    let corrected = picture("--cache 100% --secondary auto --auto-one-in 3", "1");
+    assert!(corrected != one && corrected != hybrid);
+    assert!(picture("--cache 20% --secondary auto --auto-one-in 3 --schedule demand", "3") == corrected);
     let near = picture("--cache 100% --roma-near 2", "1");
     assert!(near != one && near != hybrid && picture("--cache 20% --roma-near 2", "3") == near);
     for other in ["--seed 1", "--roma-k 8", "--roma-size 64", "--roma-samples 1", "--roma-unsnapped all"] {

@@ -50,7 +50,7 @@ struct Params {
     roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced; NONE: to its end. roma_measure: in one of a map
     roma_part: u32,       // which part of rays roma_trace answers, ROMA_*
     roma_is_part: u32,    // 1: rays that leave the coarsest base map are not answered, 0: it holds the scene
-    roma_one_in: u32,     // of rays that roma_trace sifts and does not find free one in so many is traced
+    roma_pilots: u32,     // of rays that maps answer one in so many is traced to its end; 0: none
     field_cells: u32,     // cells of a distance field's base map on each axis
     field_levels: u32,    // distance fields, one a base map
     field_level: u32,     // which of them is made
@@ -67,10 +67,6 @@ struct Params {
     dvf_next: u32,        // sweeps: first element of the level above; dvf_rays, dvf_write: first word of the block's bits of waiting rays, NONE: none may wait
     dvf_count: u32,       // sweeps: elements of the level; dvf_write: 0: nothing is entered into masks
     dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
-    roma_pilots: u32,     // of rays that are sifted one in so many is traced to its end all the same; 0: none
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }

@@ -6,7 +6,6 @@ use super::walk::lit_renderer;
 use crate::kernel::{Extent, Keep, opacity, reflectance};
 use crate::render::{Light, Renderer};
 use crate::scene::Camera;
-use crate::visibility::roma::Role;
 use anyhow::Result;
 use bricks::SceneFile;
 use serde_json::{Map, Value, json};
@@ -81,11 +80,11 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
     all.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, one)| one).collect()
 }
 
-/// Whether maps would have sifted rays of ao that are too short for it.
+/// Whether maps would have spared rays of ao that are too short for it.
 fn has_short_rays(renderer: &mut Renderer) -> bool {
-    let is_sifted = renderer.settings.roma.is_some_and(|roma| matches!(roma.occlusion.role, Role::Sift { .. }));
+    let is_help = renderer.settings.roma.is_some_and(|roma| roma.occlusion.role.is_help());
     let length = renderer.settings.effects.occlusion.map(|occlusion| occlusion.length);
-    is_sifted && length.is_some_and(|length| renderer.roma.is_short(&renderer.scene, length))
+    is_help && length.is_some_and(|length| renderer.roma.is_short(&renderer.scene, length))
 }
 
 /// As the summary lists them, with what `measured` found.

@@ -46,10 +46,10 @@ pub struct RomaArgs {
     /// With --secondary roma: the same of rays of shadow
     #[arg(long, value_name = "CELLS", default_value = "0", value_parser = |s: &str| ranged(s, 0, MOST_NEAR.into()))]
     pub roma_shadow_near: u32,
-    /// With --secondary auto: of N rays of ao that maps do not find free one is traced, and counts for all of them, 1 to 16: more take less time and
-    /// are noisier; the mean is the same
-    #[arg(long, value_name = "N", default_value = "4", value_parser = |s: &str| ranged(s, 1, MOST_ONE_IN.into()))]
-    pub auto_one_in: u32,
+    /// With --secondary auto: maps answer rays of ao, and one in N, 2 to 16, is traced, too, and counts for what maps get wrong of all N: the mean is that
+    /// of exact rays, and where few are summed radiance may lie below 0; more take less time and are noisier. off: --auto-error says which are traced
+    #[arg(long, value_name = "N|off", default_value = "off", value_parser = |s: &str| one_in(s))]
+    pub auto_one_in: OneIn,
     /// With --secondary auto: of a hundred rays of ao or shadow, how many maps may answer otherwise than exact rays would, 0.1 to 50: rays that maps do not find
     /// free are traced up to 0, 2, 4, 8, 16 or 32 cells of a map from their start, or to their end, the least that keeps to it, and maps say what is
     /// beyond. It is measured by one ray in 16, traced to its end; while too little is measured, and where even rays found free err more, all are. off:
@@ -101,29 +101,44 @@ impl RomaArgs {
         }
     }
 
-    /// How rays are answered; with `is_auto` all that maps do not find free are traced, or of those of ao some.
+    /// How rays are answered; with `is_auto` exact ones are traced as far as `auto_error` or `auto_one_in` have it.
     pub fn settings(&self, is_auto: bool) -> RomaSettings {
-        let pass = |k, is_unsnapped, near, one_in, stride| {
-            let role = match near {
-                _ if is_auto => Role::Sift { one_in, most_wrong: self.auto_error },
-                0 => Role::Answer,
-                cells => Role::Far(cells),
+        let pass = |k, is_unsnapped, near, one_in: OneIn, stride| {
+            let role = match (is_auto, one_in, near) {
+                (true, Some(one_in), _) => Role::Correct(one_in),
+                (true, None, _) => Role::Sift { most_wrong: self.auto_error },
+                (false, _, 0) => Role::Answer,
+                (false, _, cells) => Role::Far(cells),
             };
-            let steps = if is_auto { MOST_STEPS } else { self.roma_steps };
-            let grid = Grid { k, size: self.roma_size, samples: 1 }.with_stride(if is_auto { CLOSED } else { stride });
+            let is_sifted = matches!(role, Role::Sift { .. });
+            let steps = if is_sifted { MOST_STEPS } else { self.roma_steps };
+            let stride = if is_sifted { CLOSED } else { stride };
+            let grid = Grid { k, size: self.roma_size, samples: 1 }.with_stride(stride);
             RomaPass {
                 grid: Grid { samples: self.roma_samples.unwrap_or(grid.samples), ..grid },
-                steps: if is_unsnapped || is_auto { steps } else { 0 },
+                steps: if is_unsnapped || is_sifted { steps } else { 0 },
                 role,
             }
         };
         let keeps = |rays| self.roma_unsnapped.iter().any(|named| [rays, Unsnapped::All].contains(named));
         RomaSettings {
             occlusion: pass(self.roma_k, keeps(Unsnapped::Ao), self.roma_near, self.auto_one_in, THIN),
-            shadow: pass(self.roma_shadow_k, keeps(Unsnapped::Shadow), self.roma_shadow_near, 1, CLOSED),
-            diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), 0, 1, CLOSED)),
+            shadow: pass(self.roma_shadow_k, keeps(Unsnapped::Shadow), self.roma_shadow_near, None, CLOSED),
+            diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), 0, None, CLOSED)),
             rsm: RsmSettings { size: self.rsm_size, lamps: self.rsm_lamps },
         }
+    }
+}
+
+/// As of [`Role::Correct`]; `None`: as of [`Role::Sift`].
+type OneIn = Option<u32>;
+
+fn one_in(text: &str) -> Result<OneIn, String> {
+    let found = text.parse().ok().filter(|n| (2..=MOST_ONE_IN).contains(n));
+    match (text, found) {
+        ("off", _) => Ok(None),
+        (_, Some(n)) => Ok(Some(n)),
+        _ => Err(format!("it must be from 2 to {MOST_ONE_IN}, or off")),
     }
 }
 

@@ -220,7 +220,7 @@ fn memory() -> Value {
 
 /// What was measured of rays that maps sift: shares of all, 0 to 1, that would be answered otherwise than exact ones, by how far rays in doubt are traced.
 fn handover(role: Role, measured: &Handover) -> Option<Value> {
-    let Role::Sift { most_wrong: Some(most_wrong), .. } = role else { return None };
+    let Role::Sift { most_wrong: Some(most_wrong) } = role else { return None };
     let ways = Trust::all().map(|trust| json!({ "trust": trust.to_string(), "wrong": measured.share_wrong(trust) }));
     Some(json!({
         "pilots": measured.pilots(),
@@ -243,8 +243,8 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
             "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
             "near": near(roma.occlusion.role),
-            "one_in": if let Role::Sift { one_in, .. } = roma.occlusion.role { one_in } else { 1 },
-            "most_wrong": if let Role::Sift { most_wrong: Some(n), .. } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
+            "one_in": if let Role::Correct(one_in) = roma.occlusion.role { one_in } else { 1 },
+            "most_wrong": if let Role::Sift { most_wrong: Some(n) } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
             "shadow_near": near(roma.shadow.role),
             "ao_handover": handover(roma.occlusion.role, &renderer.roma.handovers()[0]),
             "shadow_handover": handover(roma.shadow.role, &renderer.roma.handovers()[1]),

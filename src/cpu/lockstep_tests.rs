@@ -231,7 +231,7 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 /// Small maps, of both numbers of directions.
 fn roma((steps, role): (u32, Role)) -> RomaSettings {
     let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 4 }, steps, role };
-    let diffuse = (!matches!(role, Role::Sift { .. })).then(|| RomaPass { role: Role::Answer, ..pass(4) });
+    let diffuse = (!role.is_help()).then(|| RomaPass { role: Role::Answer, ..pass(4) });
     RomaSettings { occlusion: pass(4), shadow: pass(8), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
 }
 
@@ -384,11 +384,13 @@ fn twins_agree_with_their_kernels() {
         Variant { roma: Some((0, Role::Answer)), ..VARIANT },
         Variant { roma: Some((3, Role::Answer)), ..VARIANT },
         Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
-        Variant { roma: Some((64, Role::Sift { one_in: 1, most_wrong: None })), ..VARIANT },
-        Variant { roma: Some((3, Role::Sift { one_in: 3, most_wrong: None })), schedule: Schedule::Demand, ..VARIANT },
-        Variant { roma: Some((64, Role::Sift { one_in: 1, most_wrong: Some(100_000) })), ..VARIANT },
-        Variant { roma: Some((3, Role::Sift { one_in: 2, most_wrong: Some(500_000) })), ..VARIANT },
-        Variant { roma: Some((64, Role::Sift { one_in: 1, most_wrong: Some(1000) })), ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { most_wrong: None })), ..VARIANT },
+        Variant { roma: Some((3, Role::Sift { most_wrong: None })), schedule: Schedule::Demand, ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { most_wrong: Some(100_000) })), ..VARIANT },
+        Variant { roma: Some((3, Role::Sift { most_wrong: Some(500_000) })), ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { most_wrong: Some(1000) })), ..VARIANT },
+        Variant { roma: Some((0, Role::Correct(4))), ..VARIANT },
+        Variant { roma: Some((3, Role::Correct(2))), schedule: Schedule::Demand, ..VARIANT },
         Variant { field: Some(64), ..VARIANT },
         Variant { field: Some(3), ..VARIANT },
         Variant { dvf: Some(visibility(8)), ..VARIANT },

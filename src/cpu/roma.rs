@@ -4,8 +4,8 @@ use super::rays::RaySet;
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
-    COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_FAR, ROMA_HIT,
-    ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+    COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_CORRECT,
+    ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -25,7 +25,7 @@ pub(super) const BLEND: f32 = 1.0 / 16.0;
 /// Share of a level's lift by which rays start that are sifted.
 const SIFTED_LIFT: f32 = 0.4;
 
-/// What hits of rays that are sifted have in place of a distance: answered.
+/// What hits of rays have in place of a distance that are not traced: answered.
 const ANSWERED: f32 = -1.0;
 
 /// The same: waiting for maps to answer them.
@@ -214,24 +214,14 @@ fn margin_of(p: &Params, index: u32) -> f32 {
     BLEND * (p.roma_cells as f32 * random2(index, !p.stream, p.seed)[0])
 }
 
-/// Random numbers of a ray's workgroup, whose rays go together.
-fn workgroup_words(p: &Params, index: u32) -> [f32; 2] {
-    let workgroup = index / p.width / 8 * p.width + index % p.width / 8;
-    random2(workgroup, !p.stream, p.seed)
-}
-
-/// Whether a ray in doubt is traced: of the directions of a pixel one in so many, evenly, the first at random.
-fn is_chosen(p: &Params, index: u32) -> bool {
-    let first = (workgroup_words(p, index)[1] * p.roma_one_in as f32) as u32;
-    (first + p.direction).is_multiple_of(p.roma_one_in)
-}
-
-/// Whether a ray is traced to its end, whatever maps say of it, and shows what they would have got wrong.
+/// Whether a ray is traced to its end, whatever maps say of it, and shows what they get wrong: of the directions of a pixel one in so many, evenly, the
+/// first at random. Those of a workgroup go together.
 fn is_pilot(p: &Params, index: u32) -> bool {
     if p.roma_pilots == 0 {
         return false;
     }
-    let first = (workgroup_words(p, index)[0] * p.roma_pilots as f32) as u32;
+    let workgroup = index / p.width / 8 * p.width + index % p.width / 8;
+    let first = (random2(workgroup, !p.stream, p.seed)[0] * p.roma_pilots as f32) as u32;
     (first + p.direction).is_multiple_of(p.roma_pilots)
 }
 
@@ -405,7 +395,7 @@ fn near_end(p: &Params, levels: &[RomaLevel], index: u32, ray: &Ray, normal: Vec
 }
 
 /// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those that no base map holds are
-/// traced whole.
+/// traced whole. Where there are pilots only these are traced.
 pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let (p, levels) = (bound.params, &tables.maps.levels);
     if levels.is_empty() {
@@ -414,14 +404,20 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
     own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
         for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
             let index = run * RUN + i;
-            let end = near_end(p, levels, index as u32, ray, normal_of(seen, index), p.roma_near);
-            hit.t = least(ray.t_max, end);
+            if p.roma_near != NONE {
+                let end = near_end(p, levels, index as u32, ray, normal_of(seen, index), p.roma_near);
+                hit.t = least(ray.t_max, end);
+            }
+            if p.roma_pilots != 0 && !is_pilot(p, index as u32) {
+                hit.t = ANSWERED;
+            }
         }
     });
 }
 
 /// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing
-/// are ended, and others are traced up to `roma_near` cells from their start. Where the closest is asked for, with what is known of its surface.
+/// are ended, and others are traced up to `roma_near` cells from their start. Where pilots have been traced, these count for what maps get wrong. Where the
+/// closest is asked for, with what is known of its surface.
 pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let RomaMaps { levels, maps, .. } = &tables.maps;
     let p = bound.params;
@@ -448,6 +444,8 @@ pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &R
             tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
             if is_sifted {
                 of.sift(index as u32, ray, normal, &found, hit);
+            } else if p.roma_part == ROMA_CORRECT && is_pilot(p, index as u32) {
+                correct(p, found.met.is_some(), hit);
             } else if let Some(Met { t, point, direction, lift }) = found.met {
                 *hit = Hit { t, id: ROMA_HIT, u: 0.0, v: 0.0 };
                 if !bound.has(PARAM_ANY_HIT) {
@@ -457,6 +455,17 @@ pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &R
         }
         bound.counters.add(&tally);
     });
+}
+
+/// Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or 0. So the mean is that of traced
+/// rays, and its noise that of what maps get wrong (a control variate).
+fn correct(p: &Params, is_met: bool, hit: &mut Hit) {
+    let n = p.roma_pilots as f32;
+    match (hit.id == NONE, is_met) {
+        (true, true) => hit.u = n - 1.0,
+        (false, false) => *hit = Hit { id: NONE, u: -n, v: 0.0, ..*hit },
+        _ => {}
+    }
 }
 
 impl Maps<'_> {
@@ -469,12 +478,6 @@ impl Maps<'_> {
             }
             return;
         }
-        if !is_chosen(p, index) {
-            *hit = Hit { t: ANSWERED, id: ROMA_HIT, u: 0.0, v: 0.0 };
-            return;
-        }
-        // What it brings counts for those that are not, too.
-        hit.u = (p.roma_one_in - 1) as f32;
         if p.roma_near == 0 {
             hit.t = WAITING;
         } else if p.roma_near != NONE {

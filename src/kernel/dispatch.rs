@@ -354,26 +354,20 @@ pub fn dispatches(
             vec![roma(ROMA_ROTATE, params, across(columns.div_ceil(64)), 0)]
         }
         Step::RomaNear { cells } => vec![roma(ROMA_NEAR, Params { roma_near: cells, ..params }, per_ray, 0)],
+        Step::RomaPilots { one_in } => {
+            let params = Params { roma_near: layout::NONE, roma_pilots: one_in, ..params };
+            vec![roma(ROMA_NEAR, params, per_ray, 0)]
+        }
         Step::RomaTrace { steps, part } => {
-            let (part, sift) = match part {
-                RomaPart::Whole => (layout::ROMA_WHOLE, None),
-                RomaPart::Far => (layout::ROMA_FAR, None),
-                RomaPart::Sift(sift) => (layout::ROMA_SIFT, Some(sift)),
+            let (roma_part, Sift { near, pilots }) = match part {
+                RomaPart::Whole => (layout::ROMA_WHOLE, Sift::default()),
+                RomaPart::Far => (layout::ROMA_FAR, Sift::default()),
+                RomaPart::Sift(sift) => (layout::ROMA_SIFT, sift),
+                RomaPart::Correct { one_in } => (layout::ROMA_CORRECT, Sift { near: None, pilots: one_in }),
             };
-            let Sift { one_in, near, pilots } = sift.unwrap_or_default();
-            vec![roma(
-                ROMA_TRACE,
-                Params {
-                    roma_steps: steps,
-                    roma_part: part,
-                    roma_one_in: one_in,
-                    roma_near: near.unwrap_or(layout::NONE),
-                    roma_pilots: pilots,
-                    ..params
-                },
-                per_ray,
-                2,
-            )]
+            let roma_near = near.unwrap_or(layout::NONE);
+            let params = Params { roma_steps: steps, roma_part, roma_near, roma_pilots: pilots, ..params };
+            vec![roma(ROMA_TRACE, params, per_ray, 2)]
         }
         Step::RomaMeasure { steps, pilots, cell } => {
             let params = Params { roma_steps: steps, roma_pilots: pilots, roma_near: cell, ..params };

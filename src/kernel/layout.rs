@@ -63,6 +63,7 @@ pub const ROMA_HIT: u32 = 0xffff_fffe;
 pub const ROMA_WHOLE: u32 = 0;
 pub const ROMA_FAR: u32 = 1;
 pub const ROMA_SIFT: u32 = 2;
+pub const ROMA_CORRECT: u32 = 3;
 /// Distances up to which rays in doubt may be traced: 0, 2, 4, 8, 16 and 32 cells of a map.
 pub const HANDOVERS: u32 = 6;
 pub const FIELD_HIT: u32 = 0xffff_fffd;
@@ -115,12 +116,11 @@ mirror! {
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
         emitter_density: f32, diffuse_count: f32, roma_k: u32, roma_size: u32,
         roma_cells: u32, roma_levels: u32, roma_samples: u32, roma_steps: u32,
-        roma_near: u32, roma_part: u32, roma_is_part: u32, roma_one_in: u32,
+        roma_near: u32, roma_part: u32, roma_is_part: u32, roma_pilots: u32,
         field_cells: u32, field_levels: u32, field_level: u32, field_mip: u32,
         field_step: u32, field_half: u32, field_steps: u32, field_hit: f32,
         rsm_maps: u32, rsm_map: u32, rsm_x: u32, rsm_y: u32,
         dvf_first: u32, dvf_next: u32, dvf_count: u32, dvf_turn: u32,
-        roma_pilots: u32, padding_0: u32, padding_1: u32, padding_2: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

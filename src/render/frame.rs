@@ -334,7 +334,7 @@ impl Renderer {
         };
         let is_short = |r: &mut Self| r.roma.is_short(&r.scene, length);
         let mut is_measured = false;
-        if let Some(roma) = roma.filter(|roma| !matches!(roma.role, Role::Sift { .. }) || !is_short(self)) {
+        if let Some(roma) = roma.filter(|roma| !roma.role.is_help() || !is_short(self)) {
             let RomaPass { grid, steps, role } = roma;
             first.extend(self.roma.prepare(&mut *self.executor, &self.scene, roma, length)?);
             let trace = |part| Step::RomaTrace { steps, part };
@@ -348,10 +348,12 @@ impl Renderer {
                     first.push(Step::RomaNear { cells: cells * grid.base_per_cell() });
                     last.push(trace(RomaPart::Far));
                 }
-                Role::Sift { one_in, most_wrong: None } => {
-                    first.push(trace(RomaPart::Sift(Sift { one_in, ..Sift::default() })));
+                Role::Correct(one_in) => {
+                    first.push(Step::RomaPilots { one_in });
+                    last.push(trace(RomaPart::Correct { one_in }));
                 }
-                Role::Sift { one_in, most_wrong: Some(most_wrong) } => {
+                Role::Sift { most_wrong: None } => first.push(trace(RomaPart::Sift(Sift::default()))),
+                Role::Sift { most_wrong: Some(most_wrong) } => {
                     is_measured = true;
                     let trust = self.roma.handover(pass).trust(most_wrong);
                     let near = match trust {
@@ -359,7 +361,7 @@ impl Renderer {
                         Trust::Free | Trust::Nothing => None,
                     };
                     if trust != Trust::Nothing {
-                        first.push(trace(RomaPart::Sift(Sift { one_in, near, pilots: PILOTS })));
+                        first.push(trace(RomaPart::Sift(Sift { near, pilots: PILOTS })));
                     }
                     last.push(Step::RomaMeasure { steps, pilots: PILOTS, cell: grid.base_per_cell() });
                     if near.is_some() {

@@ -145,6 +145,11 @@ pub enum Step {
         /// Cells.
         cells: u32,
     },
+    /// End those of the pass's rays, not traced yet, that are no pilots.
+    RomaPilots {
+        /// One ray in so many is one.
+        one_in: u32,
+    },
     /// Answer the pass's rays by them, and count them: phase 3.
     RomaTrace {
         /// Columns that a ray passes before it is finished along the map's direction; 0: it takes that direction from the start.
@@ -247,26 +252,22 @@ pub enum RomaPart {
     Whole,
     /// Of those that have met nothing where [`Step::RomaNear`] ended them, what lies beyond: they have been traced.
     Far,
-    /// Whether they meet anything. Those that do not are answered; of the others one in so many is still to be traced and counts for them
-    /// all, and the rest are taken for occluded.
+    /// Whether they meet anything. Those that do not are answered; the others are still to be traced.
     Sift(Sift),
+    /// All of them, after the pilots of [`Step::RomaPilots`] were traced; each of these counts for what maps get wrong of so many.
+    Correct {
+        /// One ray in so many is a pilot.
+        one_in: u32,
+    },
 }
 
 /// How rays are sifted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sift {
-    /// Of those in doubt one in so many is traced.
-    pub one_in: u32,
-    /// Up to so many cells of the base map that holds their start from it; `None`: to their ends.
+    /// Those in doubt are traced up to so many cells of the base map that holds their start from it; `None`: to their ends.
     pub near: Option<u32>,
     /// One ray in so many is a pilot: it is not sifted; 0: none.
     pub pilots: u32,
-}
-
-impl Default for Sift {
-    fn default() -> Self {
-        Self { one_in: 1, near: None, pilots: 0 }
-    }
 }
 
 /// Rays that are traced to their ends though they could be sifted, and what maps would have answered.

@@ -27,12 +27,12 @@ fn split(radiance: [f32; 3], direct: [f32; 3], albedo: [f32; 3], emission: [f32;
             around[k] = radiance[k];
             continue;
         }
-        // Where samples of a pixel see different things light may come out negative: that part goes around, too.
+        // Where samples of a pixel see different things the lamps' light may come out negative: that part goes around, too. Other light is negative
+        // where traced rays take back what maps gave (`Role::Correct`), and only the mean of neighbours is right.
         let lamps = direct[k] - emission[k];
-        let other = radiance[k] - direct[k];
-        around[k] = emission[k] + lamps.min(0.0) + other.min(0.0);
+        around[k] = emission[k] + lamps.min(0.0);
         layers[0][k] = lamps.max(0.0) / albedo[k];
-        layers[1][k] = other.max(0.0) / albedo[k];
+        layers[1][k] = (radiance[k] - direct[k]) / albedo[k];
     }
     (around, layers)
 }
@@ -79,6 +79,6 @@ mod tests {
             assert!((around[k] + light - radiance[k]).abs() < 1e-6, "{k}");
         }
         assert!(lamps[0] == 0.5 && (other[0] - 0.8).abs() < 1e-6, "{lamps:?} {other:?}");
-        assert!(lamps.iter().chain(&other).all(|&x| x >= 0.0));
+        assert!(lamps.iter().all(|&x| x >= 0.0) && other[1] < 0.0, "what is taken back is filtered, too");
     }
 }

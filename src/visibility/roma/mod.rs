@@ -77,12 +77,20 @@ pub enum Role {
     Far(u32),
     /// They say which rays meet nothing, and answer what lies so far from their start that they err little.
     Sift {
-        /// Of the rays that meet something one in so many is traced and counts for them all (Russian roulette).
-        one_in: u32,
         /// Of a million rays, how many may be answered otherwise than exact ones, as far as it is measured; `None`: nothing is, and rays that meet something
         /// are traced to their ends.
         most_wrong: Option<u32>,
     },
+    /// They answer them, and one ray in so many is traced, too, and counts for what they get wrong of all of these: the mean is that of traced rays, and its noise
+    /// that of what maps get wrong (a control variate).
+    Correct(u32),
+}
+
+impl Role {
+    /// Whether they spare tracing part of the rays, with which all could be traced.
+    pub fn is_help(self) -> bool {
+        matches!(self, Self::Sift { .. } | Self::Correct(_))
+    }
 }
 
 /// Cells of a map by which rays start off their surface. What marks a plane reaches one cell of a base map above it, 0.29 of a map of half as many
@@ -125,7 +133,7 @@ pub const MOST_CELLS: u32 = 256;
 /// Cells of bricks than which no ray of use is shorter (spec §2).
 pub const LEAST_CELLS: f64 = 3.0;
 
-/// Most rays of which one is traced.
+/// Most rays of which one is traced to correct maps by.
 pub const MOST_ONE_IN: u32 = 16;
 
 /// Most cells up to which a ray may be traced exactly.

@@ -90,8 +90,10 @@ pub enum Way {
         /// Cells.
         cells: u32,
     },
-    /// By tracing those that maps do not find free, or one of so many of them.
-    Sifted {
+    /// By tracing those that maps do not find free.
+    Sifted,
+    /// By maps, and one of so many is traced to correct them by.
+    Corrected {
         /// How many.
         one_in: u32,
     },
@@ -115,7 +117,8 @@ impl fmt::Display for Way {
                 write!(f, "roma {size} K={k}{}", if *is_unsnapped { " unsnapped" } else { "" })
             }
             Self::Handed { cells } => write!(f, "roma beyond {cells} cells"),
-            Self::Sifted { one_in } => write!(f, "auto, one in {one_in}"),
+            Self::Sifted => f.write_str("auto, in doubt traced"),
+            Self::Corrected { one_in } => write!(f, "auto, one in {one_in}"),
             Self::Bounded { percent } => write!(f, "auto, {percent} % wrong"),
             Self::Field { size } => write!(f, "df {size}"),
         }
@@ -134,15 +137,16 @@ impl Way {
                 )
             }
             Self::Handed { cells } => format!("--secondary roma --roma-near {cells}"),
-            Self::Sifted { one_in } => format!("--secondary auto --auto-error off --auto-one-in {one_in}"),
-            Self::Bounded { percent } => format!("--secondary auto --auto-error {percent} --auto-one-in 1"),
+            Self::Sifted => "--secondary auto --auto-error off".into(),
+            Self::Corrected { one_in } => format!("--secondary auto --auto-one-in {one_in}"),
+            Self::Bounded { percent } => format!("--secondary auto --auto-error {percent}"),
             Self::Field { size } => format!("--secondary df --df-size {size}"),
         }
     }
 
     /// Whether bricks are asked.
     pub fn is_traced(&self) -> bool {
-        matches!(self, Self::Exact | Self::Handed { .. } | Self::Sifted { .. } | Self::Bounded { .. })
+        !matches!(self, Self::Roma { .. } | Self::Field { .. })
     }
 
     /// The distance field of as many cells on each axis, which with K = 4 takes as much memory as the maps.
@@ -271,10 +275,10 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
     jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
     let handed = [1, 2, 4, 8, 16].map(|cells| Way::Handed { cells });
-    let sifted = [1, 2, 4, 8].map(|one_in| Way::Sifted { one_in });
+    let corrected = [2, 4, 6, 8].map(|one_in| Way::Corrected { one_in });
     let bounded = [2, 5, 10].map(|percent| Way::Bounded { percent });
     for length in [length, 4.0 * length] {
-        let ways = with_exact(&[&[USUAL][..], &handed, &sifted, &bounded].concat());
+        let ways = with_exact(&[&[USUAL][..], &corrected, &handed, &[Way::Sifted], &bounded].concat());
         let own = job(Stage::Handover, SceneId::City, format!("rays of {length}, cache 15 %"), length, ways);
         // As many rays a sample as make the maps a small part, and as are chosen among.
         let options = own.options.replace("--ao-rays 1", "--ao-rays 16");
