@@ -243,7 +243,10 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     for &scene in &scenes {
         let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
         let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped, FIELD]);
-        jobs.push(job(Stage::Ao, scene, format!("rays of {length}"), length, ways));
+        // Rays that end in a room, too.
+        for length in [length, length / 4.0] {
+            jobs.push(job(Stage::Ao, scene, format!("rays of {length}"), length, ways.clone()));
+        }
     }
     jobs.push(job(Stage::Resolution, SceneId::City, format!("rays of {length}"), length, with_exact(&all)));
     for halvings in 0..6 {
