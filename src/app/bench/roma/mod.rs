@@ -23,11 +23,12 @@ use args::{RomaBenchArgs, Settings};
 use brickwalk_convert::progress::Progress;
 use plan::{Job, Stage, Way};
 use rows::{Row, Rows};
+use seams::Seams;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-use view::{Picture, View};
+use view::{Picture, SEAM_FRAMES, View};
 
 /// Runs the command.
 ///
@@ -147,7 +148,9 @@ fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings) -> Result<Vec<(
             values.extend(medians(&turns));
         }
     }
-    if job.errors {
+    if job.stage == Stage::Seams {
+        measure_seams(&mut view, &mut all, settings)?;
+    } else if job.errors {
         let exact = view.picture(&Way::Exact, settings.samples, 0)?;
         // What the reference's own noise is: another one, of other samples.
         let other = view.picture(&Way::Exact, settings.samples, 1)?;
@@ -158,15 +161,31 @@ fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings) -> Result<Vec<(
             }
             let converged: Picture = view.picture(way, settings.samples, 0)?;
             values.extend(view.errors("converged", &converged, &exact)?);
-            if job.stage == Stage::Seams {
-                values.extend(view.seams(&converged, &exact));
-                continue;
-            }
             let single = view.picture(way, 1, 0)?;
             values.extend(view.errors("single", &single, &exact)?);
         }
     }
     Ok(all)
+}
+
+/// Errors by the distance from seams, of several frames together.
+fn measure_seams(view: &mut View, all: &mut [(Way, Values)], settings: &Settings) -> Result<()> {
+    let mut found = vec![Seams::default(); all.len()];
+    for frame in SEAM_FRAMES {
+        view.look(frame);
+        let exact = view.picture(&Way::Exact, settings.samples, 0)?;
+        for ((way, _), seams) in all.iter().zip(&mut found).filter(|((way, _), _)| *way != Way::Exact) {
+            let picture = view.picture(way, settings.samples, 0)?;
+            view.add_seams(seams, &picture, &exact);
+        }
+    }
+    for ((_, values), seams) in all.iter_mut().zip(found) {
+        for (bin, (count, bias, size)) in seams.errors() {
+            let own = [("pixels", count as f64), ("bias", bias), ("error", size)];
+            values.extend(own.map(|(name, x)| (format!("{name} at {bin}"), x)));
+        }
+    }
+    Ok(())
 }
 
 /// The median of every value over the turns.

@@ -345,7 +345,8 @@ fn seams_table(jobs: &[&Job], rows: &Rows) -> Table {
         }
     }
     let caption = "Occlusion of what is near a side of the cube of a map, beyond which cells are twice as large; cells are 128ths of that cube's side, \
-                   distances the middles of bins two cells wide. Differences from the exact picture and their magnitudes, relative to its mean there.";
+                   distances the middles of bins two cells wide. Differences from the exact picture and their magnitudes, relative to its mean there, of six frames \
+                   along the path together.";
     Table { name: "seams".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: lines }
 }
 

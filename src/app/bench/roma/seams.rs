@@ -30,28 +30,31 @@ fn bin_of(levels: &[Bom], point: [f64; 3]) -> Option<i32> {
     })
 }
 
-/// Of every bin how many pixels show a point in it, the mean of their differences and that of their magnitudes, relative to the mean of the reference
-/// there; `points` are what pixels show.
-pub fn errors(
-    levels: &[Bom],
-    points: &[Option<[f64; 3]>],
-    image: &Image,
-    reference: &Image,
-) -> BTreeMap<i32, (u64, f64, f64)> {
-    let mut sums: BTreeMap<i32, (u64, [f64; 3])> = BTreeMap::new();
-    for ((point, one), other) in points.iter().zip(&image.rgb).zip(&reference.rgb) {
-        let Some(bin) = point.and_then(|point| bin_of(levels, point)) else { continue };
-        let [one, other] = [one, other].map(|rgb| rgb.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0);
-        let (count, sum) = sums.entry(bin).or_default();
-        *count += 1;
-        for (sum, x) in sum.iter_mut().zip([one - other, (one - other).abs(), other]) {
-            *sum += x;
+/// Sums over the pixels that show a point in a bin, bin by bin: how many there are, their differences, the magnitudes of these, and the reference.
+#[derive(Clone, Debug, Default)]
+pub struct Seams(BTreeMap<i32, (u64, [f64; 3])>);
+
+impl Seams {
+    /// Adds the pixels of a picture; `points` are what they show.
+    pub fn add(&mut self, levels: &[Bom], points: &[Option<[f64; 3]>], image: &Image, reference: &Image) {
+        for ((point, one), other) in points.iter().zip(&image.rgb).zip(&reference.rgb) {
+            let Some(bin) = point.and_then(|point| bin_of(levels, point)) else { continue };
+            let [one, other] = [one, other].map(|rgb| rgb.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0);
+            let (count, sum) = self.0.entry(bin).or_default();
+            *count += 1;
+            for (sum, x) in sum.iter_mut().zip([one - other, (one - other).abs(), other]) {
+                *sum += x;
+            }
         }
     }
-    let relative = |(bin, (count, [bias, size, mean])): (i32, (u64, [f64; 3]))| {
-        (mean > 0.0).then(|| (bin, (count, bias / mean, size / mean)))
-    };
-    sums.into_iter().filter_map(relative).collect()
+
+    /// Of every bin its pixels, the mean of their differences and that of their magnitudes, relative to the mean of the reference there.
+    pub fn errors(&self) -> BTreeMap<i32, (u64, f64, f64)> {
+        let relative = |(&bin, &(count, [bias, size, mean])): (&i32, &(u64, [f64; 3]))| {
+            (mean > 0.0).then(|| (bin, (count, bias / mean, size / mean)))
+        };
+        self.0.iter().filter_map(relative).collect()
+    }
 }
 
 #[cfg(test)]
@@ -68,8 +71,12 @@ mod tests {
         assert_eq!([at(23.0), at(40.1), at(64.1), at(-24.0)], [None, None, None, Some(-15)]);
         let image = |x: f32| Image { width: 2, height: 1, rgb: vec![[x; 3], [1.0; 3]] };
         let points = [Some([0.0, 32.1, 0.0]), None];
-        let found = errors(&levels, &points, &image(0.75), &image(0.5));
-        assert_eq!(found.into_iter().collect::<Vec<_>>(), [(1, (1, 0.5, 0.5))]);
+        let mut found = Seams::default();
+        found.add(&levels, &points, &image(0.75), &image(0.5));
+        assert_eq!(found.errors().into_iter().collect::<Vec<_>>(), [(1, (1, 0.5, 0.5))]);
+        // Pixels of another picture, as many: means are those of both.
+        found.add(&levels, &points, &image(0.25), &image(0.5));
+        assert_eq!(found.errors().into_iter().collect::<Vec<_>>(), [(1, (2, 0.0, 0.5))]);
         assert_eq!(bins().collect::<Vec<_>>(), (-15..16).step_by(2).collect::<Vec<_>>());
     }
 }

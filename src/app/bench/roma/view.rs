@@ -2,7 +2,7 @@
 
 use super::args::Settings;
 use super::plan::{Job, Way};
-use super::seams;
+use super::seams::Seams;
 use crate::app::bench::measure::walk_args;
 use crate::app::bench::plan::View as Path;
 use crate::app::bench::scenes::Place;
@@ -12,7 +12,7 @@ use crate::app::walk;
 use crate::kernel::Extent;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::render::{Field, Renderer, Rsm, Schedule};
-use crate::scene::Camera;
+use crate::scene::{Camera, CameraPath};
 use crate::schedule::cache::Cache;
 use crate::stats::Record;
 use crate::stream::Residency;
@@ -23,11 +23,15 @@ use std::path::PathBuf;
 /// A frame of the near path that is measured, of thirty.
 const FRAME: u32 = 10;
 
+/// Those in which seams are looked at.
+pub const SEAM_FRAMES: [u32; 6] = [0, 5, 10, 15, 20, 25];
+
 /// A scene, a light, a cache and a camera.
 pub struct View<'a> {
     job: &'a Job,
     scene: PathBuf,
     renderer: Renderer,
+    path: CameraPath,
     camera: Camera,
     settings: &'a Settings,
     adapter: &'a Adapter,
@@ -54,8 +58,14 @@ impl<'a> View<'a> {
         let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
         let session = Session::open(open_scene(&scene)?, &scene, &args.stream, extent)?;
         let renderer = walk::renderer(session, &args)?;
-        let camera = place.path(Path::Near)?.frame(FRAME, 30);
-        Ok(Self { job, scene, renderer, camera, settings, adapter })
+        let path = place.path(Path::Near)?;
+        let camera = path.frame(FRAME, 30);
+        Ok(Self { job, scene, renderer, path, camera, settings, adapter })
+    }
+
+    /// Takes the camera of another of thirty frames of the path.
+    pub fn look(&mut self, frame: u32) {
+        self.camera = self.path.frame(frame, 30);
     }
 
     /// A picture of `samples` a pixel with the seed `seed`.
@@ -123,8 +133,8 @@ impl<'a> View<'a> {
         Ok(Picture { image, depth, values: values.map(|(name, value)| (name.to_string(), value)).into() })
     }
 
-    /// Errors by the distance from sides of the base maps that a picture was made with: its own, and its pixels, by bins.
-    pub fn seams(&self, one: &Picture, reference: &Picture) -> Vec<(String, f64)> {
+    /// Adds the errors of the picture that was made last by the distance from sides of its base maps.
+    pub fn add_seams(&self, seams: &mut Seams, one: &Picture, reference: &Picture) {
         let (width, height) = self.renderer.size;
         let basis = self.camera.ray_basis(width, height);
         let point = |(i, &depth): (usize, &f32)| {
@@ -133,11 +143,7 @@ impl<'a> View<'a> {
             depth.is_finite().then(|| (self.camera.position + along * f64::from(depth)).to_array())
         };
         let points: Vec<Option<[f64; 3]>> = one.depth.iter().enumerate().map(point).collect();
-        let found = seams::errors(self.renderer.roma.levels(), &points, &one.image, &reference.image);
-        let values = |(bin, (count, bias, size)): (i32, (u64, f64, f64))| {
-            [("pixels", count as f64), ("bias", bias), ("error", size)].map(|(name, x)| (format!("{name} at {bin}"), x))
-        };
-        found.into_iter().flat_map(values).collect()
+        seams.add(self.renderer.roma.levels(), &points, &one.image, &reference.image);
     }
 
     /// Errors of a picture against another, named after what it is.
