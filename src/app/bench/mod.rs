@@ -12,7 +12,9 @@ mod output;
 mod paper;
 mod plan;
 mod plots;
+mod results;
 mod roma;
+mod rows;
 mod scenes;
 mod tables;
 

@@ -10,7 +10,7 @@ mod plots;
 
 use super::cells::Header;
 use super::measure::walk_args;
-use super::roma::rows::{Row, Rows};
+use super::rows::{Row, Rows};
 use crate::app::args::{Cli, WalkArgs};
 use crate::app::device::Device;
 use crate::app::dvf as field;
@@ -31,7 +31,7 @@ use clap::Parser;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -319,9 +319,4 @@ fn memory(place: &Place, args: &DvfBenchArgs, options: &str) -> Result<Values> {
     values.extend(of_resident.into_iter().filter(|(name, _)| name == "bricks_needed"));
     values.insert("differ_from_in_core".into(), differing(&out_of_core, &in_core) as f64);
     Ok(values)
-}
-
-/// A file of the results.
-fn file(folder: &Path, name: &str) -> PathBuf {
-    folder.join(name)
 }

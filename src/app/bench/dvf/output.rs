@@ -1,14 +1,12 @@
-//! What the bench writes: one JSON file, a CSV a table, Markdown and an offline page, all of the same tables.
+//! The tables of the bench.
 
 use super::args::{DvfBenchArgs, Stage};
-use super::{FORMAT, file, key, plots};
-use crate::app::bench::roma::rows::Rows;
-use crate::app::output::atomic;
+use super::{key, plots};
+use crate::app::bench::results::Results;
+use crate::app::bench::rows::Rows;
 use crate::app::sizes::human_count;
 use anyhow::Result;
-use brickwalk_report::{Section, Sheet, Table, Value, write_sheet};
-use serde_json::json;
-use std::fmt::Write;
+use brickwalk_report::{Section, Table, Value};
 
 const TITLE: &str = "The experiments of discrete visibility fields";
 const READING: &str = "Fewer rays: rays to the environment without a field over those that are traced with it; all of them are the same rays, so \
@@ -37,8 +35,6 @@ const PAPER: [(&str, f64, f64); 11] = [
     ("--dvf-cells 12", 0.000120, 0.000010),
 ];
 
-/// The table of [`making`].
-const MAKING_TABLE: &str = "making";
 const MAKING_TITLE: &str = "Making fields, tables 2 to 4";
 
 /// A scene, its points, the columns of [`making`].
@@ -70,72 +66,26 @@ fn paper(stage: Stage, scene: &str, options: &str) -> [Option<f64>; 2] {
 /// # Errors
 /// The folder cannot be written.
 pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) -> Result<String> {
-    let of_stage = |stage: Stage| match stage {
-        Stage::Points => vec![table(args, scenes, stage, rows), making(args, scenes, rows)],
-        Stage::Flicker => vec![flickering(args, scenes, rows)],
-        _ => vec![table(args, scenes, stage, rows)],
+    let section = |stage: Stage| {
+        let table = match stage {
+            Stage::Flicker => flickering(args, scenes, rows),
+            _ => table(args, scenes, stage, rows),
+        };
+        let plots = plots::of(stage, args, scenes, rows);
+        let own = Section { title: stage.title().into(), tables: vec![table], plots, ..Section::default() };
+        let tables = (stage == Stage::Points).then(|| vec![making(args, scenes, rows)]);
+        let making = tables.map(|tables| Section { title: MAKING_TITLE.into(), tables, ..Section::default() });
+        [Some(own), making].into_iter().flatten()
     };
-    let tables: Vec<(Stage, Table)> = Stage::ALL
-        .into_iter()
-        .flat_map(|stage| of_stage(stage).into_iter().map(move |table| (stage, table)))
-        .filter(|(_, table)| !table.rows.is_empty())
-        .collect();
-    let header = rows.header();
-    let json = json!({
-        "format": FORMAT,
-        "version": env!("CARGO_PKG_VERSION"),
-        "commit": header.commit,
-        "adapter": header.adapter,
-        "settings": header.settings,
-        "tables": tables.iter().map(|(_, table)| table).collect::<Vec<_>>(),
-        "rows": rows.all(),
-    });
-    let folder = &args.output;
-    atomic::write(&file(folder, "dvf.json"), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
-    for (_, table) in &tables {
-        atomic::write(&file(folder, &format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
-    }
-    let text = |value: &serde_json::Value| value.as_str().unwrap_or("unknown").to_string();
-    let facts: Vec<(String, String)> = [
-        ("Adapter", format!("{} ({})", text(&header.adapter["name"]), text(&header.adapter["backend"]))),
-        ("Commit", header.commit.clone()),
+    let sections: Vec<Section> = Stage::ALL.into_iter().flat_map(section).collect();
+    let sections = sections.into_iter().filter(|section| !section.tables[0].rows.is_empty()).collect();
+    let facts = vec![
         ("Resolution", args.size.to_string()),
         ("Rays a pixel", args.samples.to_string()),
         ("Most points", human_count(args.points.into())),
         ("Turns", args.repeat.to_string()),
-    ]
-    .map(|(name, value)| (name.to_string(), value))
-    .to_vec();
-    let mut page = format!("# {TITLE}\n\n{READING}\n\n");
-    // Writing to a string does not fail.
-    for (name, value) in &facts {
-        let _ = writeln!(page, "- {name}: {value}");
-    }
-    for (stage, table) in &tables {
-        let title = if table.name == MAKING_TABLE { MAKING_TITLE } else { stage.title() };
-        let _ = write!(page, "\n## {title}\n\n{}", table.to_markdown());
-    }
-    atomic::write(&file(folder, "dvf.md"), page.as_bytes())?;
-    let mut sections: Vec<Section> = Vec::new();
-    for (stage, table) in tables {
-        match sections.last_mut().filter(|section| section.title == stage.title()) {
-            Some(section) => section.tables.push(table),
-            None => sections.push(Section {
-                title: stage.title().into(),
-                tables: vec![table],
-                plots: plots::of(stage, args, scenes, rows),
-                ..Section::default()
-            }),
-        }
-    }
-    if let Some(first) = sections.first_mut() {
-        first.reading = READING.into();
-    }
-    let done = rows.all().len();
-    let verdicts = vec![(format!("{done} measurements; {planned} were asked for"), done < planned)];
-    let sheet = Sheet { kicker: "brickwalk · bench dvf".into(), title: TITLE.into(), verdicts, facts, sections };
-    write_sheet(folder, &sheet)?;
-    Ok(page)
+    ];
+    Results { name: "dvf", title: TITLE, reading: READING, facts, sections, rows, planned }.write(&args.output)
 }
 
 /// What a measurement is called in its row: its options without those that all have.
@@ -256,7 +206,7 @@ fn making(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Table {
         }
     }
     let columns = columns.map(String::from).to_vec();
-    Table { name: MAKING_TABLE.into(), caption: MAKING.into(), columns, rows: lines }
+    Table { name: "making".into(), caption: MAKING.into(), columns, rows: lines }
 }
 
 /// How pictures of what moves flicker.

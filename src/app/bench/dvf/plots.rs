@@ -3,7 +3,7 @@
 use super::args::{DvfBenchArgs, Stage};
 use super::flicker::FRAMES;
 use super::key;
-use crate::app::bench::roma::rows::Rows;
+use crate::app::bench::rows::Rows;
 use brickwalk_report::{Graph, GraphShape, Line, Unit};
 
 /// A plot of the measurements of a stage: a line for each set of options but the one that runs along the axis.

@@ -8,11 +8,11 @@ pub mod args;
 mod leaks;
 mod output;
 mod plan;
-pub(in crate::app::bench) mod rows;
 mod seams;
 mod view;
 
 use super::cells::Header;
+use super::rows::{Row, Rows};
 use super::scenes;
 use crate::app::device::Device;
 use crate::app::interrupt;
@@ -22,13 +22,15 @@ use anyhow::{Result, bail};
 use args::{RomaBenchArgs, Settings};
 use brickwalk_convert::progress::Progress;
 use plan::{Job, Stage, Way};
-use rows::{Row, Rows};
 use seams::Seams;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use view::{Picture, SEAM_FRAMES, View};
+
+/// Raised when a value changes its meaning.
+const FORMAT: u32 = 1;
 
 /// Runs the command.
 ///
@@ -91,7 +93,7 @@ pub fn run(args: &RomaBenchArgs) -> Result<()> {
 fn header(args: &RomaBenchArgs, settings: &Settings) -> Result<Header> {
     let DeviceInfo { name, driver, driver_info, backend, .. } = Device::open(&args.adapter)?.info();
     Ok(Header {
-        format: rows::FORMAT,
+        format: FORMAT,
         settings: json!({
             "triangles": settings.triangles,
             "size": settings.size.to_string(),

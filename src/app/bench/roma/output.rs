@@ -1,15 +1,13 @@
-//! What the bench writes: one JSON file, a CSV a table, Markdown and an offline page, all of the same tables.
+//! The tables and plots of the bench.
 
 use super::args::Settings;
 use super::plan::{FIELD, Job, Stage, USUAL, Way, jobs};
-use super::rows::{FORMAT, Rows};
 use super::{LEAKS, leak_key, leak_name, leaks, seams};
-use crate::app::output::atomic;
+use crate::app::bench::results::Results;
+use crate::app::bench::rows::Rows;
 use crate::app::sizes::human_count;
 use anyhow::Result;
-use brickwalk_report::{Graph, GraphShape, Section, Sheet, Table, Unit, Value, write_sheet};
-use serde_json::json;
-use std::fmt::Write;
+use brickwalk_report::{Graph, GraphShape, Section, Table, Unit, Value};
 use std::path::Path;
 
 const TITLE: &str = "The experiments of ROMA";
@@ -39,68 +37,30 @@ const PAPER_SHADOWS: [f64; 2] = [3.6, 1.7];
 /// The folder cannot be written.
 pub fn write(folder: &Path, settings: &Settings, rows: &Rows, planned: usize) -> Result<String> {
     let all = jobs(settings, true);
-    let tables: Vec<(Stage, Table)> = Stage::ALL
-        .into_iter()
-        .filter_map(|stage| {
-            let of_stage: Vec<&Job> = all.iter().filter(|job| job.stage == stage).collect();
-            let table = match stage {
-                Stage::Speed => speed(&of_stage, rows),
-                Stage::Seams => seams_table(&of_stage, rows),
-                Stage::Leaks => leaks_table(rows),
-                _ => errors(stage, &of_stage, rows),
-            };
-            (!table.rows.is_empty()).then_some((stage, table))
-        })
-        .collect();
-    let header = rows.header();
-    let json = json!({
-        "format": FORMAT,
-        "version": env!("CARGO_PKG_VERSION"),
-        "commit": header.commit,
-        "adapter": header.adapter,
-        "settings": header.settings,
-        "measured": rows.all().len(),
-        "tables": tables.iter().map(|(_, table)| table).collect::<Vec<_>>(),
-        "rows": rows.all(),
-    });
-    atomic::write(&folder.join("roma.json"), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
-    for (_, table) in &tables {
-        atomic::write(&folder.join(format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
-    }
-    let facts = facts(settings, rows);
-    let mut text = format!("# {TITLE}\n\n{READING}\n\n");
-    // Writing to a string does not fail.
-    for (name, value) in &facts {
-        let _ = writeln!(text, "- {name}: {value}");
-    }
-    for (stage, table) in &tables {
-        let _ = write!(text, "\n## {}\n\n{}\n\n{}", title(*stage), table.caption, table.to_markdown());
-    }
-    atomic::write(&folder.join("roma.md"), text.as_bytes())?;
-    let mut sections: Vec<Section> = tables
-        .into_iter()
-        .map(|(stage, table)| Section {
+    let section = |stage| {
+        let of_stage: Vec<&Job> = all.iter().filter(|job| job.stage == stage).collect();
+        let table = match stage {
+            Stage::Speed => speed(&of_stage, rows),
+            Stage::Seams => seams_table(&of_stage, rows),
+            Stage::Leaks => leaks_table(rows),
+            _ => errors(stage, &of_stage, rows),
+        };
+        (!table.rows.is_empty()).then(|| Section {
             title: title(stage).into(),
             tables: vec![table],
             plots: plots(stage, &all, rows),
             ..Section::default()
         })
-        .collect();
-    if let Some(first) = sections.first_mut() {
-        first.reading = READING.into();
-    }
-    let done = rows.all().len();
-    let verdict = if done < planned {
-        format!("{done} measurements; {planned} were asked for")
-    } else {
-        format!("{done} measurements")
     };
-    let verdicts = vec![(verdict, done < planned)];
-    write_sheet(
-        folder,
-        &Sheet { kicker: "brickwalk · bench roma".into(), title: TITLE.into(), verdicts, facts, sections },
-    )?;
-    Ok(text)
+    let facts = vec![
+        ("Triangles of generated scenes", human_count(settings.triangles)),
+        ("Resolution", settings.size.to_string()),
+        ("Occlusion rays", format!("one a pixel and sample, {} long", settings.ao_length)),
+        ("Turns", settings.repeat.to_string()),
+        ("Samples of converged pictures", settings.samples.to_string()),
+    ];
+    let sections = Stage::ALL.into_iter().filter_map(section).collect();
+    Results { name: "roma", title: TITLE, reading: READING, facts, sections, rows, planned }.write(folder)
 }
 
 fn title(stage: Stage) -> &'static str {
@@ -116,24 +76,6 @@ fn title(stage: Stage) -> &'static str {
         Stage::Seams => "Seams between maps",
         Stage::Leaks => "Single sheets that leak",
     }
-}
-
-fn facts(settings: &Settings, rows: &Rows) -> Vec<(String, String)> {
-    let header = rows.header();
-    let text = |value: &serde_json::Value| value.as_str().unwrap_or("unknown").to_string();
-    let driver = format!("{} {}", text(&header.adapter["driver"]), text(&header.adapter["driver_info"]));
-    [
-        ("Adapter", format!("{} ({})", text(&header.adapter["name"]), text(&header.adapter["backend"]))),
-        ("Driver", driver.trim().to_string()),
-        ("Commit", header.commit.clone()),
-        ("Triangles of generated scenes", human_count(settings.triangles)),
-        ("Resolution", settings.size.to_string()),
-        ("Occlusion rays", format!("one a pixel and sample, {} long", settings.ao_length)),
-        ("Turns", settings.repeat.to_string()),
-        ("Samples of converged pictures", settings.samples.to_string()),
-    ]
-    .map(|(name, value)| (name.to_string(), value))
-    .to_vec()
 }
 
 /// `a` over `b`, where both are above zero.

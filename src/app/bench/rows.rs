@@ -1,13 +1,10 @@
 //! `rows.jsonl`: what has been measured, a line a measurement, and the line of settings before them.
 
-use crate::app::bench::cells::{Header, Journal};
+use super::cells::{Header, Journal};
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Raised when a value changes its meaning.
-pub const FORMAT: u32 = 1;
 
 /// A measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
