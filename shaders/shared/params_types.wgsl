@@ -63,9 +63,9 @@ struct Params {
     rsm_map: u32,         // rsm_write: the one that is written,
     rsm_x: u32,           // and its texel that ray 0 of the pass is for
     rsm_y: u32,
-    dvf_first: u32,       // dvf_rays: number of the first ray of the block; sweeps: first element of the level
+    dvf_first: u32,       // dvf_rays: number of the first ray of the block; dvf_points: first side of a point; sweeps: first element of the level
     dvf_next: u32,        // sweeps: first element of the level above; dvf_rays, dvf_write: first word of the block's bits of waiting rays, NONE: none may wait
-    dvf_count: u32,       // sweeps: elements of the level; dvf_write: 0: nothing is entered into masks
+    dvf_count: u32,       // sweeps: elements of the level; dvf_points: sides of points; dvf_write: 0: nothing is entered into masks
     dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
     roma_pilots: u32,     // of rays that are sifted one in so many is traced to its end all the same; 0: none
     padding_0: u32,

@@ -1,7 +1,7 @@
 //! A field, and what it says of rays.
 
 use super::mask::{self, OCCLUDED, UNKNOWN, VISIBLE};
-use super::{DvfUse, Shape};
+use super::{Areas, DvfUse, Shape};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -14,6 +14,15 @@ pub struct DvfField {
     pub masks: Vec<u32>,
     /// Of each cell: [`VISIBLE`], [`OCCLUDED`] or [`UNKNOWN`].
     pub labels: Vec<u32>,
+}
+
+/// A field as it is kept: what it can be finished, and made anew in some of its cells, from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DvfKept {
+    /// With masks that are not widened.
+    pub field: DvfField,
+    /// What its points were shared out by.
+    pub areas: Areas,
 }
 
 /// What a field says of a ray.
@@ -36,6 +45,15 @@ pub struct Trial {
     pub traced: f64,
     /// Share of all rays that are answered wrongly.
     pub wrong: f64,
+}
+
+impl DvfKept {
+    /// The field, its masks widened if they are to be.
+    pub fn finished(&self, dilate: bool) -> DvfField {
+        let mut field = self.field.clone();
+        field.finish(dilate);
+        field
+    }
 }
 
 impl DvfField {
