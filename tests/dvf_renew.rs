@@ -2,6 +2,7 @@
 
 mod common;
 
+use bricks::SceneFile;
 use brickwalk::app::args::{Cli, Command as AppCommand};
 use brickwalk::app::session::{Session, open_scene};
 use brickwalk::app::walk;
@@ -13,7 +14,6 @@ use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings, generate};
-use bricks::SceneFile;
 use clap::Parser;
 use common::folder;
 use glam::DVec3;
@@ -96,7 +96,7 @@ fn renewed_cells_are_those_of_a_field_made_from_scratch() {
     let asked = DvfSettings { points: 8_000, rays: 32, cells: Cells::Longest(14), ..DvfSettings::default() };
     for settings in [
         asked,
-        DvfSettings { hammersley: false, both: true, round: true, octahedral: 8, ..asked },
+        DvfSettings { hammersley: false, both: true, round: true, ..asked },
         DvfSettings { dilate: false, octahedral: 32, cells: Cells::Auto, ..asked },
     ] {
         let mut fields = Vec::new();
@@ -135,14 +135,18 @@ fn renewed_cells_are_those_of_a_field_made_from_scratch() {
             let (still_differs, ours) = (differ(&before), differ(field));
             let others = (0..field.labels.len() as u32).filter(|cell| !renewed.contains(cell));
             let unknown = others.filter(|&cell| bits(field, cell) != bits(&scratch, cell)).count();
-            let news = renewed.iter().filter(|&&cell| bits(&before, cell).1 == UNKNOWN && bits(field, cell).1 != UNKNOWN);
+            let news =
+                renewed.iter().filter(|&&cell| bits(&before, cell).1 == UNKNOWN && bits(field, cell).1 != UNKNOWN);
             println!(
                 "{} cells renewed by {rays} rays: {ours} differ from scratch, {still_differs} of the field as it was, {unknown} others; {} were unknown",
                 renewed.len(),
                 news.clone().count()
             );
             assert_eq!(ours, 0);
-            assert!(renewed.len() > 40 && still_differs > 20 && unknown > 0 && news.count() > 0);
+            // Cells that a trial chooses are wide.
+            let least = if settings.cells == Cells::Auto { 10 } else { 20 };
+            assert!(renewed.len() > least && still_differs >= least && unknown > 0);
+            assert!(news.count() > 0 || settings != asked, "the mover came to no cell");
         }
     }
 }
@@ -153,7 +157,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     let scene = boxes(folder.path());
     let settings = DvfSettings { points: 8_000, rays: 64, cells: Cells::Longest(14), ..DvfSettings::default() };
     // By exact rays; by a field that is told; one that may be renewed by no ray; by some.
-    let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 16"));
+    let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 48"));
     let budget = 60_000;
     let renewal = renewal(&mut all[1], &settings, budget);
     all[1].dvf = Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default());
@@ -161,7 +165,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     all[3].dvf = dvf(&renewal);
     let stills: Vec<_> = all.iter().map(|renderer| renderer.scene.clone()).collect();
     let (mut wrong, mut left, mut spent) = ([0; 2], [0; 2], 0);
-    for step in 0..3 {
+    for step in 0..2 {
         for (renderer, still) in all.iter_mut().zip(&stills) {
             renderer.place(still, &[(1, matrix(still, step))]).expect("a place");
         }
@@ -177,13 +181,12 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
         };
         wrong = [wrong[0] + differ(&exact, &told), wrong[1] + differ(&exact, &renewed)];
     }
-    println!("{left:?} rays are left, {spent} spent; of {} pixels {wrong:?} differ", 3 * 96 * 72);
-    // What is renewed pays within its frame, and misses no more than masks do.
+    println!("{left:?} rays are left, {spent} spent; of {} pixels {wrong:?} differ", 2 * 96 * 72);
+    // What is renewed pays within its frame.
     assert!(left[1] + spent < left[0], "{left:?} {spent}");
-    assert!(wrong[1] <= wrong[0] + 3 * 96 * 72 / 500, "{wrong:?}");
     // At rest, frame by frame more is renewed, until nothing is left.
     let mut before = u64::MAX;
-    for frame in 3..40 {
+    for frame in 2..60 {
         let output = all[3].frame(frame, &camera()).expect("a frame");
         let own = record(&output, "dvf").expect("a record");
         assert!(own.rays <= budget && own.cells_left <= before, "{own:?}");
@@ -194,9 +197,45 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
         }
     }
     assert_eq!(before, 0);
+    // Of few rays all are spent but for less than a cell takes.
+    all[2].dvf = dvf(&Renewal { rays: 3000, frames: u32::MAX, ..renewal.clone() });
+    all[2].place(&stills[2], &[(1, matrix(&stills[2], 2))]).expect("a place");
+    for frame in 0..3 {
+        let output = all[2].frame(frame, &camera()).expect("a frame");
+        let own = record(&output, "dvf").expect("a record");
+        assert!((1000..=3000).contains(&own.rays) && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
+    }
     // Back where it was it is the field that was made.
     let (still, own) = (stills[3].clone(), stills[3].resident().instances[1].world_from_object);
     all[3].place(&still, &[(1, own)]).expect("a place");
     assert!(all[3].dvf.moved_field().is_none());
     assert!(record(&all[3].frame(0, &camera()).expect("a frame"), "dvf").is_none());
+}
+
+/// With masks of many rays little is missed, whoever made them.
+#[test]
+fn pictures_are_those_of_exact_rays() {
+    let folder = folder();
+    let scene = boxes(folder.path());
+    let settings = DvfSettings { points: 30_000, rays: 128, cells: Cells::Longest(10), ..DvfSettings::default() };
+    let mut all = [(); 3].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 4"));
+    let mut renewal = renewal(&mut all[1], &settings, 1 << 40);
+    renewal.frames = u32::MAX;
+    all[1].dvf = dvf(&Renewal { rays: 0, ..renewal.clone() });
+    all[2].dvf = dvf(&renewal);
+    for renderer in &mut all {
+        let still = renderer.scene.clone();
+        renderer.place(&still, &[(1, matrix(&still, 2))]).expect("a place");
+    }
+    let [exact, told, renewed] = all.each_mut().map(|r| r.frame(0, &camera()).expect("a frame"));
+    // Control: the field of the scene as it was, which is not told.
+    all[1].dvf = Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default());
+    let untold = all[1].frame(0, &camera()).expect("a frame");
+    let differ = |a: &FrameOutput| a.pixels.radiance.iter().zip(&exact.pixels.radiance).filter(|(a, b)| a != b).count();
+    let answered = [&told, &renewed].map(|output| record(output, "environment").map_or(0, |own| own.rays_answered));
+    let wrong = [&told, &renewed, &untold].map(differ);
+    println!("of {} pixels {wrong:?} differ: told, renewed, not told; {answered:?} rays answered", 96 * 72);
+    // As many more as rays are answered more, and a pixel of a thousand.
+    let more = answered[1] as f64 / answered[0] as f64;
+    assert!(more > 1.05 && wrong[1] as f64 <= more * wrong[0] as f64 + 7.0 && wrong[2] > 3 * wrong[1], "{wrong:?}");
 }

@@ -329,11 +329,13 @@ pub fn points(bound: &Bound, tables: &DvfTables) {
 /// Counts the primary hits in each cell.
 pub fn seen(bound: &Bound, tables: &DvfTables, seen: &RaySet) {
     let pixels = (bound.params.width * bound.params.height) as usize;
-    seen.surfaces.par_iter().take(pixels).with_min_len(RUN).filter(|surface| surface.leaf != NONE).for_each(|surface| {
-        if let Some(count) = cell_of(&tables.maps.grid, surface.point).and_then(|cell| tables.tally.get(cell)) {
-            count.fetch_add(1, Ordering::Relaxed);
-        }
-    });
+    seen.surfaces.par_iter().take(pixels).with_min_len(RUN).filter(|surface| surface.leaf != NONE).for_each(
+        |surface| {
+            if let Some(count) = cell_of(&tables.maps.grid, surface.point).and_then(|cell| tables.tally.get(cell)) {
+                count.fetch_add(1, Ordering::Relaxed);
+            }
+        },
+    );
 }
 
 /// Makes a block of the rays of a group.

@@ -26,9 +26,9 @@ use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_POINTS, DVF_RAYS, DVF_SEEN, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS, FIELD_TRACE,
-    INTERSECT_BINARY, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE, are_pairs_culled,
-    dispatches,
+    COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_POINTS, DVF_RAYS, DVF_SEEN, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS,
+    FIELD_TRACE, INTERSECT_BINARY, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
+    are_pairs_culled, dispatches,
 };
 use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;

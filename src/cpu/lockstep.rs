@@ -288,7 +288,12 @@ impl Lockstep {
             findings.words("sums over triangles", context, &self.gpu.read_dvf_sums()?, &self.cpu.read_dvf_sums()?);
         }
         if steps.iter().any(|step| matches!(step, Step::DvfSeen | Step::DvfPoints { .. })) {
-            findings.words("hits and points in cells", context, &self.gpu.read_dvf_tally()?, &self.cpu.read_dvf_tally()?);
+            findings.words(
+                "hits and points in cells",
+                context,
+                &self.gpu.read_dvf_tally()?,
+                &self.cpu.read_dvf_tally()?,
+            );
         }
         if steps.iter().any(|step| matches!(step, Step::DvfRays { .. })) {
             findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);

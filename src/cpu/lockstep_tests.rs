@@ -17,8 +17,8 @@ use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
 use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Dvf, DvfTracing, Effects, Equirectangular, Field, Light, Moved, Occlusion, Region, RenderSettings, Renderer, Renewal, Roma,
-    Rsm, Schedule, emissive_triangles, environment,
+    Dvf, DvfTracing, Effects, Equirectangular, Field, Light, Moved, Occlusion, Region, RenderSettings, Renderer,
+    Renewal, Roma, Rsm, Schedule, emissive_triangles, environment,
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;

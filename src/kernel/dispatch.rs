@@ -199,8 +199,8 @@ pub const DVF_SEEN: &str = "dvf_seen";
 pub const DVF_POINTS: &str = "dvf_points";
 /// All kernels over fields of visibility.
 pub const DVF_KERNELS: [&str; 12] = [
-    DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_COSINE, DVF_SIFT, DVF_SEEN,
-    DVF_POINTS,
+    DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_COSINE, DVF_SIFT,
+    DVF_SEEN, DVF_POINTS,
 ];
 
 /// Most workgroups of a dispatch in one dimension.

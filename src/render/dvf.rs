@@ -34,11 +34,11 @@ pub(super) const PASS: Pass = Pass::Shadow(Lamp::Environment);
 /// The field of visibility of a walk.
 #[derive(Default)]
 pub struct Dvf {
-    field: Option<Arc<DvfField>>,
+    pub(super) field: Option<Arc<DvfField>>,
     /// The same, with what has moved since it was made; `None`: nothing has.
     pub(super) marked: Option<Marked>,
     pub(super) renewal: Option<Renewal>,
-    how: DvfUse,
+    pub(super) how: DvfUse,
     frame: Option<Frame>,
 }
 

@@ -5,7 +5,7 @@
 //!
 //! *What we changed.* Only cells in which primary hits of the frame lie are made anew, and in each only directions that what moves concerns
 //! ([`Fresh`]). Which come first, and whether at all, is decided by counts: those with the most primary hits, and only where the rays that this saves are as many as
-//! it takes, as far as hits and texels tell: a cell that is at rest for n frames more may take n times as many, so that never more than about
+//! it takes, as far as hits and what the field answered before tell: a cell that is at rest for n frames more may take n times as many, so that never more than about
 //! twice the rays are spent that waiting would have cost (the ski rental: Karlin et al. 1988). So pictures depend on the frame and on how many frames ago something moved last alone,
 //! never on time, cache or threads.
 //!
@@ -33,6 +33,9 @@ const MOST_TRIANGLES: u64 = 1 << 20;
 
 /// How often the budget is looked for among cells, by the mean number of points a cell: those with fewer make room for more.
 const LOOKED_FOR: f64 = 2.0;
+
+/// Share of the rays that are saved in cells of which nothing was known: of half of all directions, which lead above surfaces, half are answered.
+const NEW: f64 = 0.25;
 
 /// How a field is kept up in a scene in which something moves.
 #[derive(Clone, Debug)]
@@ -87,6 +90,8 @@ struct Candidate {
     seen: u32,
     /// Directions that what moves concerns.
     texels: Vec<u32>,
+    /// Share of the rays of these hits that are saved, if they are drawn evenly from all directions: as many as were answered when nothing had moved.
+    saves: f64,
 }
 
 impl Candidate {
@@ -156,11 +161,9 @@ impl Renderer {
         };
         let empty = plan.maps(&shape, &view.frame, settings, 1);
         self.executor.set_dvf(&DvfMaps { is_new: true, ..empty })?;
-        // Rays of a primary hit, whatever lamp's part of the sphere they are drawn by, are taken to be even.
         let frames = f64::from(marked.frames) + f64::from(renewal.frames.max(1));
         let hits = frames * f64::from(self.settings.samples);
-        let saves = candidates.iter().map(|candidate| hits * f64::from(candidate.seen) * candidate.share());
-        let saves: Vec<f64> = saves.collect();
+        let saves: Vec<f64> = candidates.iter().map(|of| hits * f64::from(of.seen) * of.saves).collect();
         let choose = |costs: &[u64]| within(renewal.rays, costs, &saves);
         let chosen = Strewing::new(self, &plan, &shape, stats, &mut |_| true).renew(&fresh, choose)?;
         let (met, _) = self.executor.read_dvf()?;
@@ -175,14 +178,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// The cells in which primary hits of the frame lie and that what has moved concerns, but for those that are renewed: first those with the most hits, then by
-    /// number.
-    fn candidates(
-        &mut self,
-        view: &View,
-        kept: &DvfKept,
-        marked: &Marked,
-    ) -> Result<Vec<Candidate>, ExecutorError> {
+    /// The cells in which primary hits of the frame lie and that what has moved concerns, but for those that are renewed and those in which nothing would be saved:
+    /// first those with the most hits, then by number.
+    fn candidates(&mut self, view: &View, kept: &DvfKept, marked: &Marked) -> Result<Vec<Candidate>, ExecutorError> {
         self.executor.set_dvf(&DvfMaps::to_answer(&marked.field, &view.frame, DvfUse::default()))?;
         self.executor.set_dvf_tally(&vec![0; kept.field.labels.len()])?;
         self.executor.run(PASS, &[Step::DvfSeen], &self.cache.states)?;
@@ -190,9 +188,14 @@ impl Renderer {
         let is_open = |(cell, seen): &(u32, u32)| *seen > 0 && !marked.renewed.contains(cell);
         let (cells, counts): (Vec<u32>, Vec<u32>) = (0..).zip(counts).filter(is_open).unzip();
         let texels = kept.field.concerned(&cells, &marked.boxes);
-        let all = cells.into_iter().zip(counts).zip(texels);
-        let mut all: Vec<Candidate> =
-            all.filter_map(|((cell, seen), texels)| Some(Candidate { cell, seen, texels: texels? })).collect();
+        let (field, how) = (self.dvf.field.clone(), self.dvf.how);
+        let candidate = |((cell, seen), texels): ((u32, u32), Option<Vec<u32>>)| {
+            let mut candidate = Candidate { cell, seen, texels: texels?, saves: 0.0 };
+            let answered = field.as_ref().and_then(|field| field.answered(cell, &candidate.texels, how));
+            candidate.saves = answered.unwrap_or(NEW * candidate.share());
+            (candidate.saves > 0.0).then_some(candidate)
+        };
+        let mut all: Vec<Candidate> = cells.into_iter().zip(counts).zip(texels).filter_map(candidate).collect();
         all.sort_by_key(|candidate| (Reverse(candidate.seen), candidate.cell));
         Ok(all)
     }
@@ -231,12 +234,12 @@ impl Renderer {
 /// Which of cells that take `costs` rays and save `saves` are made anew, in their order, for at most `rays` rays in all.
 fn within(rays: u64, costs: &[u64], saves: &[f64]) -> Vec<bool> {
     let mut left = rays;
-    let mut takes = |(&cost, &saves): (&u64, &f64)| {
+    let takes = |(&cost, &saves): (&u64, &f64)| {
         let is_taken = cost <= left && cost as f64 <= saves;
         left -= if is_taken { cost } else { 0 };
         is_taken
     };
-    costs.iter().zip(saves).map(|of| takes(of)).collect()
+    costs.iter().zip(saves).map(takes).collect()
 }
 
 #[cfg(test)]

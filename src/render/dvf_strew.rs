@@ -186,7 +186,8 @@ impl<'a> Strewing<'a> {
         }
         let chosen = choose(&costs);
         for (site, points) in found {
-            let listed: Vec<u32> = points.into_iter().filter(|(_, entry)| chosen[*entry]).map(|(side, _)| side).collect();
+            let listed: Vec<u32> =
+                points.into_iter().filter(|(_, entry)| chosen[*entry]).map(|(side, _)| side).collect();
             if !listed.is_empty() {
                 self.share(site, listed.len() as u32);
                 self.state.sites[site].listed = Some(listed);

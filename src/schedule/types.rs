@@ -554,7 +554,7 @@ pub struct PassStats {
     pub batches: u64,
     /// Cells of a field of visibility that were made anew.
     pub cells_renewed: u64,
-    /// Cells that are seen and were not, although something that moves concerns them.
+    /// Cells that are seen and were not, although that would save rays.
     pub cells_left: u64,
 }
 

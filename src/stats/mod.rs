@@ -18,7 +18,7 @@ pub struct Record {
     pub rays_answered: u64,
     /// Of `dvf`: cells of the field of visibility that were made anew for what moves.
     pub cells_renewed: u64,
-    /// Cells that primary hits lie in and that what moves concerns, and that were not: directions toward it are traced there.
+    /// Cells that primary hits lie in, and that were not although it would save rays: directions toward what moves are traced there.
     pub cells_left: u64,
     /// Wall time from first submission to last fence, ms.
     pub ms: f64,

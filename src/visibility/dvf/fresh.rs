@@ -85,8 +85,8 @@ impl Fresh {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mask::{OCCLUDED, VISIBLE};
     use super::super::Areas;
+    use super::super::mask::{OCCLUDED, VISIBLE};
     use super::*;
     use glam::DVec3;
 
