@@ -1,26 +1,18 @@
 // A block of the rays of a group: points on its triangles, and around their normals the directions of the table, turned at random (Günay, Akyüz,
-// compute shader 4, and the rays of Algorithm 2). Points are numbered over all triangles and found by the sums of their numbers, so that large
-// triangles are shared out as small ones are; the rays of a point are shared out over lanes. Every operation is rounded by itself.
+// compute shader 4, and the rays of Algorithm 2). Points are numbered over all triangles, so that large triangles are shared out as small ones are;
+// the rays of a point are shared out over lanes. Where cells are made anew, the points are those that are listed, each on one side, and rays are
+// made in the texels that are.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/surface.wgsl"
 #include "shared/sampling_words.wgsl"
 #include "shared/dvf.wgsl"
 #include "shared/dvf_triangle.wgsl"
+#include "shared/dvf_point.wgsl"
 
-// The triangle that point `point` of the group lies on: the last before which there are no more.
-fn triangle_of(point: u32) -> u32 {
-    var low = 0u;
-    var high = dvf.triangles;
-    while high - low > 1u {
-        let middle = (low + high) / 2u;
-        if dvf_sums[middle].x <= point {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
+struct Made {
+    ray: Ray,
+    source: u32, // id of the triangle that it starts from
 }
 
 // Whether a ray is made: all, or those that wait.
@@ -32,57 +24,47 @@ fn is_made(index: u32) -> bool {
 }
 
 // No ray.
-fn no_ray() -> Ray {
-    return Ray(vec3<f32>(0.0), 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0);
+fn no_ray() -> Made {
+    return Made(Ray(vec3<f32>(0.0), 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0), NONE);
 }
 
 // The ray of lane `slot` of the block.
-fn ray_of(slot: u32) -> Ray {
-    var ray = no_ray();
-    let point = slot / dvf.lanes;
+fn ray_of(slot: u32) -> Made {
+    var made = no_ray();
+    var point = slot / dvf.lanes;
     var turn = slot % dvf.lanes + params.dvf_turn * dvf.lanes;
     let is_both = (dvf.flags & DVF_BOTH) != 0u;
-    let all_rays = select(dvf.rays, 2u * dvf.rays, is_both);
-    if point >= dvf.point_count || turn >= all_rays {
-        return ray;
+    var is_behind = false;
+    if dvf_renews() {
+        if point >= dvf.listed || turn >= dvf.rays {
+            return made;
+        }
+        let sides = select(1u, 2u, is_both);
+        let listed = atomicLoad(&dvf_tally[point]);
+        point = listed / sides;
+        is_behind = listed % sides == 1u;
+    } else {
+        let all_rays = select(dvf.rays, 2u * dvf.rays, is_both);
+        if point >= dvf.point_count || turn >= all_rays {
+            return made;
+        }
+        is_behind = turn >= dvf.rays;
+        if is_behind {
+            turn -= dvf.rays;
+        }
     }
-    let is_behind = turn >= dvf.rays;
-    if is_behind {
-        turn -= dvf.rays;
+    let start = start_of(point, is_behind);
+    if start.cell == NONE {
+        return made;
     }
-    let number = triangle_of(point);
-    let t = dvf_triangles[number];
-    var end = dvf.point_count;
-    if number + 1u < dvf.triangles {
-        end = dvf_sums[number + 1u].x;
+    let direction = direction_of(start, turn);
+    if dvf_renews() {
+        let entry = entry_of(start.cell);
+        if entry == NONE || !is_fresh(entry, direction) {
+            return made;
+        }
     }
-    let first = dvf_sums[number].x;
-    let count = max(end - first, 1u);
-    let own = point - first;
-    let words = random4(own, t.id, dvf.seed);
-    var r = vec2<f32>(unit_of(words.x), unit_of(words.y));
-    if (dvf.flags & DVF_HAMMERSLEY) != 0u {
-        r = vec2<f32>(divide(barrier(f32(own) + 0.5), f32(count)), unit_of(reverseBits(own)));
-    }
-    // P = (1 - sqrt(r1)) A + sqrt(r1) (1 - r2) B + sqrt(r1) r2 C (eq. 2); the set's first number may round to 1.
-    let s = square_root(min(r.x, 0x1.fffffep-1));
-    let weights = vec3<f32>(barrier(1.0 - s), barrier(s * barrier(1.0 - r.y)), barrier(s * r.y));
-    let back = back_of(t);
-    let m = abs(back);
-    if max(m.x, max(m.y, m.z)) == 0.0 {
-        return ray;
-    }
-    let start = surface_point(t.a, t.b, t.c, weights.x, weights.y, weights.z, 1.0, scaled(select(back, -back, is_behind)).x);
-    ray.origin = offset_origin(start);
-    if dvf_cell(ray.origin) == NONE {
-        return ray;
-    }
-    let local = dvf_directions[turn].xyz;
-    let around = dvf_directions[dvf.rays + words.z % DVF_CIRCLE_POINTS].xy;
-    ray.direction = dvf_around(around, local, start.n);
-    ray.t_min = 0.0;
-    ray.t_max = T_INFINITE;
-    return ray;
+    return Made(Ray(start.origin, 0.0, direction, T_INFINITE), start.source);
 }
 
 // One thread a ray.
@@ -92,15 +74,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let index = global.y * params.width + global.x;
-    let slot = params.dvf_first + index;
-    var ray = no_ray();
+    var made = no_ray();
     if is_made(index) {
-        ray = ray_of(slot);
+        made = ray_of(params.dvf_first + index);
     }
-    var source = NONE;
-    if ray.t_min <= ray.t_max {
-        source = dvf_triangles[triangle_of(slot / dvf.lanes)].id;
-    }
-    rays[index] = ray;
-    start_hit(index, ray.t_max, source);
+    rays[index] = made.ray;
+    start_hit(index, made.ray.t_max, made.source);
 }

@@ -29,7 +29,11 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if !(ray.t_min <= ray.t_max) {
         return;
     }
-    let cell = dvf_cell(ray.origin);
+    var cell = dvf_cell(ray.origin);
+    if cell != NONE && (dvf.flags & DVF_RENEW) != 0u {
+        // Its entry has the masks.
+        cell = dvf_fresh[cell];
+    }
     if cell == NONE {
         return;
     }

@@ -50,7 +50,7 @@ fn all_stages_are_measured_once_and_their_files_agree() {
         ("lanes", 4),
         ("masks", 8),
         ("modes", 2),
-        ("flicker", 4),
+        ("flicker", 6),
         ("memory", 1),
     ];
     for (name, count) in counts {
@@ -105,11 +105,16 @@ fn only_the_papers_mode_flickers() {
     for name in [mean, greatest, jumps, "fewer rays"] {
         println!("{name}: {:?}, {:?}", of("same-sample", name), of("paper", name));
     }
-    // A field of the scene as it was that knows of what has moved, and one made anew in every frame.
-    for way in 0..2 {
+    // A field of the scene as it was that knows of what has moved, one of which cells are made anew, and one made anew in every frame.
+    for way in 0..3 {
         assert!(of("same-sample", jumps)[way] == 0.0 && of("same-sample", greatest)[way] < 0.5);
         assert!(of("same-sample", mean)[way] < 0.002);
     }
+    // Cells made anew leave fewer rays to be traced and take no more than that; all of it made anew leaves fewer still.
+    let rays = |name: &str| of("same-sample", name);
+    let (traced, spent) = (rays("rays traced"), rays("rays of fields"));
+    println!("{traced:?} rays are traced, {spent:?} are of fields");
+    assert!(traced[0] > traced[1] + spent[1] && traced[1] > traced[2] && spent[0] == 0.0 && spent[2] > spent[1]);
     // Control: where the light of a cell is found by its label, what the mover touches changes by its label, some of it by more than the noise.
     assert!(of("paper", jumps)[0] > 0.0 && of("paper", greatest)[0] > 1.0);
     let [same, paper] = ["same-sample", "paper"].map(|mode| of(mode, mean)[0]);

@@ -9,6 +9,10 @@
 @group(2) @binding(5) var<storage, read> dvf_directions: array<vec4<f32>>;    // dvf.rays of rays about z, then points of the unit circle, then
                                                                               // numbers of these for a tile of pixels, four to an element
 @group(2) @binding(6) var<storage, read_write> dvf_waiting: array<atomic<u32>>; // a bit for each ray of some blocks: whether it waits for bricks
+@group(2) @binding(7) var<storage, read> dvf_fresh: array<u32>;               // with DVF_RENEW: of each cell the number of its entry, NONE where it is
+                                                                              // not made anew; then of each entry the texels that are
+@group(2) @binding(8) var<storage, read_write> dvf_tally: array<atomic<u32>>; // dvf_seen: hits in each cell; dvf_points: entry and rays of each side of
+                                                                              // each point; dvf_rays: numbers of those whose rays are made
 
 const DVF_VISIBLE_LABEL: u32 = 0u;  // more directions miss than hit
 const DVF_OCCLUDED_LABEL: u32 = 1u;

@@ -63,9 +63,9 @@ struct Params {
     rsm_map: u32,         // rsm_write: the one that is written,
     rsm_x: u32,           // and its texel that ray 0 of the pass is for
     rsm_y: u32,
-    dvf_first: u32,       // dvf_rays: number of the first ray of the block; sweeps: first element of the level
+    dvf_first: u32,       // dvf_rays: number of the first ray of the block; dvf_points: first side of a point; sweeps: first element of the level
     dvf_next: u32,        // sweeps: first element of the level above; dvf_rays, dvf_write: first word of the block's bits of waiting rays, NONE: none may wait
-    dvf_count: u32,       // sweeps: elements of the level; dvf_write: 0: nothing is entered into masks
+    dvf_count: u32,       // sweeps: elements of the level; dvf_points: sides of points; dvf_write: 0: nothing is entered into masks
     dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)

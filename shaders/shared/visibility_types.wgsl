@@ -49,9 +49,9 @@ struct DvfGrid {          // a discrete visibility field in the frame: point p l
     triangles: u32,       // of the group at hand
     point_count: u32,     // on these
     seed: u32,
+    listed: u32,          // words of dvf_tally; where cells are made anew and rays are made: points that these are
     padding0: u32,
     padding1: u32,
-    padding2: u32,
 }
 
 struct DvfTriangle {      // in the frame, device units
@@ -96,4 +96,5 @@ const DVF_ROUND: u32 = 2u;         // numbers of points are rounded, else raised
 const DVF_BOTH: u32 = 4u;          // rays start from both sides of triangles, else from their front
 const DVF_DOUBT: u32 = 8u;         // rays are traced where a mask says both or neither, else by the label
 const DVF_PAPER: u32 = 16u;        // what the masks do not know is not traced, and the label is noted with the hit's attributes
+const DVF_RENEW: u32 = 32u;        // cells are made anew: masks are those of their entries, and rays are those of some points and texels
 const DVF_WALK: u32 = 512u;        // elements of a sweep that a workgroup has

@@ -3,10 +3,11 @@
 use super::args::WalkArgs;
 use super::dvf_args::RegionKind;
 use super::output::atomic;
-use crate::render::{Dvf, DvfMade, DvfTracing, Region, RenderError, Renderer};
+use crate::render::{DVF_EFFECT, Dvf, DvfMade, DvfTracing, Region, RenderError, Renderer, Renewal};
 use crate::scene::path::CameraPath;
+use crate::stats::Record;
 use crate::visibility::dvf::file::{FileError, decode, encode};
-use crate::visibility::dvf::{Cells, DvfField, DvfSettings};
+use crate::visibility::dvf::{Cells, DvfKept, DvfSettings};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use serde_json::{Value, json};
@@ -59,18 +60,28 @@ pub fn prepare(renderer: &mut Renderer, args: &WalkArgs, path: &CameraPath) -> R
     let extension = if args.dvf.dvf_region == RegionKind::View { "view.dvf" } else { "dvf" };
     let file = args.dvf.dvf_file.clone().unwrap_or_else(|| args.scene.with_extension(extension));
     let key = key(renderer.scene.checksum(), &settings, &region);
-    let (field, made) = match read(&file, key) {
-        Some(field) => (field, None),
+    let (kept, made) = match read(&file, key) {
+        Some(kept) => (kept, None),
         None => {
             let (made, seconds) = make(renderer, &settings, &region, args.dvf.tracing()).with_context(|| name)?;
-            if let Err(error) = atomic::write(&file, &encode(&made.field, key)) {
+            if let Err(error) = atomic::write(&file, &encode(&made.kept, key)) {
                 warn(&format!("the field of visibility is not kept: {error:#}"));
             }
-            (made.field.clone(), Some((made, seconds)))
+            (made.kept.clone(), Some((made, seconds)))
         }
     };
-    renderer.dvf = Dvf::new(Arc::new(field), args.dvf.how());
+    renderer.dvf = Dvf::new(Arc::new(kept.finished(settings.dilate)), args.dvf.how());
+    if args.motion.is_some() && args.dvf.dvf_renew > 0 {
+        let renewal = renewal(args, Arc::new(kept), region);
+        renderer.dvf = std::mem::take(&mut renderer.dvf).renewed_by(renewal);
+    }
     Ok(Some(Note { file, made }))
+}
+
+/// How the options of a walk have cells of a field made anew.
+pub fn renewal(args: &WalkArgs, kept: Arc<DvfKept>, region: Region) -> Renewal {
+    let (settings, tracing) = (args.dvf.settings(), args.dvf.tracing());
+    Renewal { kept, settings, region, tracing, rays: args.dvf.dvf_renew.into(), frames: 1 }
 }
 
 fn warn(text: &str) {
@@ -93,10 +104,10 @@ fn key(scene: u64, settings: &DvfSettings, region: &Region) -> u64 {
 }
 
 /// The field in `file`, if it is what `key` says; otherwise it is said why it is made anew, unless there is none.
-fn read(file: &Path, key: u64) -> Option<DvfField> {
+fn read(file: &Path, key: u64) -> Option<DvfKept> {
     let found = std::fs::read(file).map_err(FileError::from).and_then(|bytes| decode(&bytes, key, MOST_BYTES));
     match found {
-        Ok(field) => Some(field),
+        Ok(kept) => Some(kept),
         Err(FileError::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => None,
         Err(error) => {
             warn(&format!("{}: the field of visibility {error}; it is made anew", file.display()));
@@ -140,8 +151,10 @@ pub fn make(
 
 impl Note {
     /// As summaries have it.
-    pub fn report(&self, renderer: &Renderer, args: &WalkArgs) -> Value {
+    pub fn report(&self, renderer: &Renderer, args: &WalkArgs, records: &[Record]) -> Value {
         let Some(field) = renderer.dvf.field() else { return Value::Null };
+        let own = || records.iter().filter(|record| record.pass == DVF_EFFECT);
+        let sum = |of: &dyn Fn(&Record) -> u64| own().map(of).sum::<u64>();
         let settings = args.dvf.settings();
         json!({
             "file": self.file.file_name().map(|name| name.to_string_lossy()),
@@ -159,6 +172,12 @@ impl Note {
             "region": args.dvf.dvf_region.name(),
             "mode": args.dvf.dvf_mode.name(),
             "trust": args.dvf.dvf_trust.name(),
+            "renew": args.motion.as_ref().map(|_| json!({
+                "rays_a_frame": args.dvf.dvf_renew,
+                "rays": sum(&|record| record.rays),
+                "cells": sum(&|record| record.cells_renewed),
+                "cells_left": sum(&|record| record.cells_left),
+            })),
             "made": self.made.as_ref().map(|(made, seconds)| json!({
                 "seconds": seconds,
                 "points": made.points,

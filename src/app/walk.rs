@@ -153,7 +153,7 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         None => Vec::new(),
     };
     let left_out = left_out::listed(&left_out, &measured);
-    let visibility = note.map(|note| note.report(&renderer, args));
+    let visibility = note.map(|note| note.report(&renderer, args, &records));
     let mut summary =
         summary::of_walk(args, &mut renderer, (&pictures, &lighting, &resolve), &records, finished, left_out);
     summary["settings"]["dvf"] = visibility.into();

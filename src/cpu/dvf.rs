@@ -1,5 +1,5 @@
 //! Discrete visibility fields: twins of `shaders/dvf_areas.wgsl`, `dvf_counts.wgsl`, `dvf_up.wgsl`, `dvf_down.wgsl`, `dvf_rays.wgsl`,
-//! `dvf_write.wgsl`, `dvf_dilate.wgsl`, `dvf_labels.wgsl` and `dvf_sift.wgsl`.
+//! `dvf_write.wgsl`, `dvf_dilate.wgsl`, `dvf_labels.wgsl`, `dvf_sift.wgsl`, `dvf_seen.wgsl` and `dvf_points.wgsl`.
 
 use super::generate::{for_each_leaving, leaving};
 use super::lamps::unit;
@@ -39,6 +39,8 @@ pub struct DvfTables {
     pub sums: Vec<[u32; 2]>,
     /// A bit for each ray of some blocks: whether it waits for bricks.
     pub waiting: Vec<AtomicU32>,
+    /// Hits in cells, points in cells that are made anew, or those of these that rays start from.
+    tally: Vec<AtomicU32>,
 }
 
 impl DvfTables {
@@ -73,6 +75,17 @@ impl DvfTables {
         self.triangles = triangles.to_vec();
         (self.maps.grid.triangles, self.maps.grid.point_count) = (triangles.len() as u32, point_count);
         self.sums.resize(sweep_elements(triangles.len() as u32) as usize, [0; 2]);
+    }
+
+    /// Takes what kernels count on, or the points that are listed.
+    pub fn set_tally(&mut self, words: &[u32]) {
+        self.tally = words.iter().map(|&word| AtomicU32::new(word)).collect();
+        self.maps.grid.listed = words.len() as u32;
+    }
+
+    /// What they have counted.
+    pub fn tally(&self) -> Vec<u32> {
+        self.tally.iter().map(|word| word.load(Ordering::Relaxed)).collect()
     }
 
     /// The masks.
@@ -204,20 +217,21 @@ fn turned(around: [f32; 2], local: Vec3, n: Vec3) -> Vec3 {
     each(|k| barrier(barrier(barrier(x * across[k]) + barrier(y * up[k])) + barrier(local[2] * n[k])))
 }
 
-/// The ray of lane `slot` of the block, and the triangle that it starts from.
-fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> (Ray, u32) {
+/// Where the rays of a point start.
+struct Start {
+    origin: Vec3,
+    cell: usize,
+    /// Unit normal on the side of the rays.
+    n: Vec3,
+    /// Id of the triangle.
+    source: u32,
+    /// Point of the unit circle by which directions are turned.
+    around: [f32; 2],
+}
+
+/// Where the rays of a point start, on the front of its triangle or behind it; `None`: no ray does.
+fn start_of(tables: &DvfTables, point: u32, is_behind: bool) -> Option<Start> {
     let grid = &tables.maps.grid;
-    let none = NO_RAY;
-    let point = slot / grid.lanes;
-    let mut turn = slot % grid.lanes + params.dvf_turn * grid.lanes;
-    let all_rays = if grid.flags & DVF_BOTH != 0 { 2 * grid.rays } else { grid.rays };
-    if point >= grid.point_count || turn >= all_rays {
-        return (none, NONE);
-    }
-    let is_behind = turn >= grid.rays;
-    if is_behind {
-        turn -= grid.rays;
-    }
     let sums = &tables.sums[..tables.triangles.len()];
     let number = sums.partition_point(|sum| sum[0] <= point).max(1) - 1;
     let t = &tables.triangles[number];
@@ -234,19 +248,94 @@ fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> (Ray, u32) {
     let (u, v, w) = (barrier(1.0 - s), barrier(s * barrier(1.0 - r[1])), barrier(s * r[1]));
     let back = back_of(t);
     if most3(back.map(f32::abs)) == 0.0 {
-        return (none, NONE);
+        return None;
     }
     let toward = scaled(if is_behind { back.map(|x| -x) } else { back }).0;
     let weights = TriangleHit { u, v, w, det: 1.0, ..TriangleHit::default() };
     let start = surface_point(t.a, t.b, t.c, &weights, toward);
     let origin = offset_origin(&start);
-    if cell_of(grid, origin).is_none() {
-        return (none, NONE);
+    let cell = cell_of(grid, origin)?;
+    let [x, y, ..] = tables.maps.directions[(grid.rays + words[2] % CIRCLE) as usize];
+    Some(Start { origin, cell, n: start.n, source: t.id, around: [x, y] })
+}
+
+/// Direction `turn` of the rays that start there.
+fn direction_of(tables: &DvfTables, start: &Start, turn: u32) -> Vec3 {
+    let [x, y, z, _] = tables.maps.directions[turn as usize];
+    turned(start.around, [x, y, z], start.n)
+}
+
+/// The ray of lane `slot` of the block, and the triangle that it starts from.
+fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> Option<(Ray, u32)> {
+    let grid = &tables.maps.grid;
+    let mut point = slot / grid.lanes;
+    let mut turn = slot % grid.lanes + params.dvf_turn * grid.lanes;
+    let sides = sides_of(grid);
+    let is_behind;
+    if tables.maps.fresh.is_some() {
+        if point >= grid.listed || turn >= grid.rays {
+            return None;
+        }
+        let listed = tables.tally[point as usize].load(Ordering::Relaxed);
+        (point, is_behind) = (listed / sides, listed % sides == 1);
+    } else {
+        if point >= grid.point_count || turn >= sides * grid.rays {
+            return None;
+        }
+        is_behind = turn >= grid.rays;
+        if is_behind {
+            turn -= grid.rays;
+        }
     }
-    let local = tables.maps.directions[turn as usize];
-    let around = tables.maps.directions[(grid.rays + words[2] % CIRCLE) as usize];
-    let direction = turned([around[0], around[1]], [local[0], local[1], local[2]], start.n);
-    (Ray { origin, t_min: 0.0, direction, t_max: T_INFINITE }, t.id)
+    let start = start_of(tables, point, is_behind)?;
+    let direction = direction_of(tables, &start, turn);
+    if let Some(fresh) = &tables.maps.fresh {
+        let entry = fresh.entry(start.cell)?;
+        if !fresh.has(entry, mask::texel(direction, grid.octahedral)) {
+            return None;
+        }
+    }
+    Some((Ray { origin: start.origin, t_min: 0.0, direction, t_max: T_INFINITE }, start.source))
+}
+
+/// Sides of triangles that rays start from.
+fn sides_of(grid: &DvfGrid) -> u32 {
+    if grid.flags & DVF_BOTH != 0 { 2 } else { 1 }
+}
+
+/// Finds of every side of every point of a group the cell that its rays start in, if that is made anew, and how many of them are made.
+pub fn points(bound: &Bound, tables: &DvfTables) {
+    let Some(fresh) = &tables.maps.fresh else { return };
+    let grid = &tables.maps.grid;
+    let (sides, params) = (sides_of(grid), bound.params);
+    let all = tables.tally.as_chunks::<2>().0.par_iter().enumerate().with_min_len(RUN);
+    all.take(params.dvf_count as usize).for_each(|(i, [found, count])| {
+        let number = params.dvf_first + i as u32;
+        let start = start_of(tables, number / sides, number % sides == 1);
+        let start = start.and_then(|start| Some((fresh.entry(start.cell)?, start)));
+        let texel = |start: &Start, turn: u32| mask::texel(direction_of(tables, start, turn), grid.octahedral);
+        let (entry, rays) = match start {
+            Some((entry, start)) => {
+                let is_made = |turn: &u32| fresh.has(entry, texel(&start, *turn));
+                (entry as u32, (0..grid.rays).filter(is_made).count() as u32)
+            }
+            None => (NONE, 0),
+        };
+        found.store(entry, Ordering::Relaxed);
+        count.store(rays, Ordering::Relaxed);
+    });
+}
+
+/// Counts the primary hits in each cell.
+pub fn seen(bound: &Bound, tables: &DvfTables, seen: &RaySet) {
+    let pixels = (bound.params.width * bound.params.height) as usize;
+    seen.surfaces.par_iter().take(pixels).with_min_len(RUN).filter(|surface| surface.leaf != NONE).for_each(
+        |surface| {
+            if let Some(count) = cell_of(&tables.maps.grid, surface.point).and_then(|cell| tables.tally.get(cell)) {
+                count.fetch_add(1, Ordering::Relaxed);
+            }
+        },
+    );
 }
 
 /// Makes a block of the rays of a group.
@@ -254,11 +343,10 @@ pub fn rays(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
     let RaySet { rays, hits, surfaces } = own;
     let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
     all.enumerate().with_min_len(RUN).for_each(|(index, ((ray, hit), surface))| {
-        let mut source = NONE;
-        *ray = NO_RAY;
-        if is_made(tables, bound.params, index) {
-            (*ray, source) = ray_of(tables, bound.params, bound.params.dvf_first + index as u32);
-        }
+        let is_made = is_made(tables, bound.params, index);
+        let made = is_made.then(|| ray_of(tables, bound.params, bound.params.dvf_first + index as u32)).flatten();
+        let source;
+        (*ray, source) = made.unwrap_or((NO_RAY, NONE));
         (*hit, *surface) = start_hit(ray.t_max, source);
     });
 }
@@ -314,7 +402,10 @@ pub fn write(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
         if bound.params.dvf_count == 0 || !is_ray {
             return;
         }
-        if let Some(cell) = cell_of(grid, ray.origin) {
+        // The masks of a cell that is made anew are those of its entry.
+        let fresh = tables.maps.fresh.as_ref();
+        let cell = cell_of(grid, ray.origin).and_then(|cell| fresh.map_or(Some(cell), |fresh| fresh.entry(cell)));
+        if let Some(cell) = cell {
             let texel = mask::texel(ray.direction, grid.octahedral);
             let mask = 2 * cell + usize::from(hit.id != NONE);
             tables.masks[mask * words + texel as usize / 32].fetch_or(1 << (texel % 32), Ordering::Relaxed);

@@ -26,9 +26,9 @@ use super::tile_bounds::tile_bounds;
 use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
-    COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_RAYS, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS, FIELD_TRACE,
-    INTERSECT_BINARY, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE, are_pairs_culled,
-    dispatches,
+    COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_POINTS, DVF_RAYS, DVF_SEEN, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS,
+    FIELD_TRACE, INTERSECT_BINARY, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
+    are_pairs_culled, dispatches,
 };
 use crate::kernel::dvf::DvfMaps;
 use crate::kernel::field::FieldMaps;
@@ -257,6 +257,8 @@ fn run_kernel(
         RSM_WRITE => rsm_write(bound, rsm, pixels, seen, materials),
         RSM_LIGHT => rsm_light(bound, rsm, pixels, seen),
         DVF_COSINE => dvf::cosine(bound, visibility, own, seen, &pixels.gbuffers[shaded]),
+        DVF_SEEN => dvf::seen(bound, visibility, seen),
+        DVF_POINTS => dvf::points(bound, visibility),
         DVF_RAYS => dvf::rays(bound, visibility, own),
         DVF_WRITE => dvf::write(bound, visibility, own),
         DVF_SIFT => dvf::sift(bound, visibility, own, &mut pixels.gbuffers[shaded]),
@@ -425,6 +427,15 @@ impl FrameExecutor for CpuExecutor {
     fn set_dvf_triangles(&mut self, triangles: &[layout::DvfTriangle], points: u32) -> Result<(), ExecutorError> {
         self.buffers.dvf.set_triangles(triangles, points);
         Ok(())
+    }
+
+    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
+        self.buffers.dvf.set_tally(words);
+        Ok(())
+    }
+
+    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        Ok(self.buffers.dvf.tally())
     }
 
     fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {

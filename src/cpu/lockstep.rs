@@ -287,6 +287,14 @@ impl Lockstep {
         if steps.iter().any(|step| matches!(step, Step::DvfAreas { .. } | Step::DvfCounts { .. })) {
             findings.words("sums over triangles", context, &self.gpu.read_dvf_sums()?, &self.cpu.read_dvf_sums()?);
         }
+        if steps.iter().any(|step| matches!(step, Step::DvfSeen | Step::DvfPoints { .. })) {
+            findings.words(
+                "hits and points in cells",
+                context,
+                &self.gpu.read_dvf_tally()?,
+                &self.cpu.read_dvf_tally()?,
+            );
+        }
         if steps.iter().any(|step| matches!(step, Step::DvfRays { .. })) {
             findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);
         }
@@ -498,6 +506,15 @@ impl FrameExecutor for Lockstep {
     fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError> {
         self.gpu.set_dvf_triangles(triangles, points)?;
         self.cpu.set_dvf_triangles(triangles, points)
+    }
+
+    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf_tally(words)?;
+        self.cpu.set_dvf_tally(words)
+    }
+
+    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        self.gpu.read_dvf_tally()
     }
 
     fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {

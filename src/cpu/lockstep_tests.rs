@@ -17,8 +17,8 @@ use crate::kernel::lamps::{Emitter, Lamps, Shape};
 use crate::kernel::layout::{FIELD_HIT, NONE, Params, Ray};
 use crate::kernel::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::render::{
-    Dvf, DvfTracing, Effects, Equirectangular, Field, Light, Moved, Occlusion, Region, RenderSettings, Renderer, Roma,
-    Rsm, Schedule, emissive_triangles, environment,
+    Dvf, DvfTracing, Effects, Equirectangular, Field, Light, Moved, Occlusion, Region, RenderSettings, Renderer,
+    Renewal, Roma, Rsm, Schedule, emissive_triangles, environment,
 };
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
@@ -340,13 +340,19 @@ fn render(
         assert_eq!(made.trials.is_empty(), settings.cells != Cells::Auto);
         // Rays wait, so that blocks are made again.
         assert_eq!(made.drains > 0, variant.schedule != Schedule::Plain);
-        renderer.dvf = Dvf::new(
-            Arc::new(made.field),
-            DvfUse {
-                doubt: settings.octahedral == 8,
-                paper: settings.hammersley && settings.dilate && settings.octahedral == 16,
-            },
-        );
+        let how = DvfUse {
+            doubt: settings.octahedral == 8,
+            paper: settings.hammersley && settings.dilate && settings.octahedral == 16,
+        };
+        let renewal = Renewal {
+            kept: Arc::new(made.kept),
+            settings: *settings,
+            region: Region::scene(scene.resident()),
+            tracing: DvfTracing::over(4),
+            rays: 2000,
+            frames: u32::MAX,
+        };
+        renderer.dvf = Dvf::new(Arc::new(made.field), how).renewed_by(renewal);
     }
     for frame in 0..2 {
         // The second frame scatters directions, and an instance has moved.
@@ -356,7 +362,11 @@ fn render(
             matrix[3] += 0.1 * (manifest.max[0] - manifest.min[0]);
             assert_eq!(renderer.place(scene, &[(1, matrix)]), Ok(vec![1]));
         }
-        renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
+        let output = renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
+        let renewed = output.records.iter().find(|record| record.pass == "dvf");
+        if renderer.dvf.moved_field().is_some() {
+            assert!(renewed.is_some_and(|record| record.cells_renewed > 0 && record.rays > 0), "{renewed:?}");
+        }
     }
 }
 

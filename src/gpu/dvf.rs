@@ -11,8 +11,8 @@ use crate::schedule::ExecutorError;
 use crate::visibility::dvf::mask::UNKNOWN;
 use std::sync::Arc;
 
-/// Storage buffers of the kernels: 7 of the scene, 5 of the rays, 7 of their own, 8 of shading; one more with opacity.
-const STORAGE_BUFFERS: u32 = 27;
+/// Storage buffers of the kernels: 7 of the scene, 5 of the rays, 9 of their own, 8 of shading; one more with opacity.
+const STORAGE_BUFFERS: u32 = 29;
 
 const WHAT: &str = "fields of visibility";
 const REMEDY: &str = "give fewer --dvf-cells or a smaller --dvf-octahedral";
@@ -27,6 +27,8 @@ pub struct Dvf {
     sums: wgpu::Buffer,
     directions: wgpu::Buffer,
     waiting: wgpu::Buffer,
+    fresh: wgpu::Buffer,
+    tally: wgpu::Buffer,
     maps: DvfMaps,
     /// Group 2 of all kernels.
     pub group: wgpu::BindGroup,
@@ -40,7 +42,7 @@ impl Dvf {
     pub fn new(gpu: &Gpu, kernels: &Kernels) -> Result<Self, ExecutorError> {
         check_bindings(gpu, kernels, STORAGE_BUFFERS, WHAT)?;
         let method = Method::new(gpu, kernels, "dvf", kernels::dvf_layout(&gpu.device), &DVF_KERNELS);
-        let [grid, masks, labels, triangles, sums, directions, waiting] = [
+        let [grid, masks, labels, triangles, sums, directions, waiting, fresh, tally] = [
             ("dvf grid", size_of::<DvfGrid>()),
             ("dvf masks", 4),
             ("dvf labels", 4),
@@ -48,11 +50,14 @@ impl Dvf {
             ("dvf sums", 8),
             ("dvf directions", 16),
             ("dvf waiting", 4),
+            ("dvf fresh", 4),
+            ("dvf tally", 4),
         ]
         .map(|(label, stride)| storage(gpu, label, 1, stride));
-        let group = method.group(gpu, [&grid, &masks, &labels, &triangles, &sums, &directions, &waiting]);
+        let buffers = [&grid, &masks, &labels, &triangles, &sums, &directions, &waiting, &fresh, &tally];
+        let group = method.group(gpu, buffers);
         let maps = DvfMaps::default();
-        Ok(Self { method, grid, masks, labels, triangles, sums, directions, waiting, maps, group })
+        Ok(Self { method, grid, masks, labels, triangles, sums, directions, waiting, fresh, tally, maps, group })
     }
 
     /// The pipeline of a kernel, if it is one of these.
@@ -77,6 +82,7 @@ impl Dvf {
             grow(gpu, &mut self.labels, "dvf labels", cells, 4),
             grow(gpu, &mut self.directions, "dvf directions", maps.directions.len(), 16),
             grow(gpu, &mut self.waiting, "dvf waiting", maps.waiting_words, 4),
+            grow(gpu, &mut self.fresh, "dvf fresh", maps.fresh.as_ref().map_or(0, |fresh| fresh.words().len()), 4),
         ];
         if grown.contains(&true) {
             self.rebind(gpu);
@@ -94,6 +100,11 @@ impl Dvf {
         }
         if !maps.directions.is_empty() {
             gpu.queue.write_buffer(&self.directions, 0, bytemuck::cast_slice(&maps.directions));
+        }
+        if let Some(fresh) = &maps.fresh
+            && self.maps.fresh.as_ref().is_none_or(|before| !Arc::ptr_eq(before, fresh))
+        {
+            gpu.queue.write_buffer(&self.fresh, 0, bytemuck::cast_slice(fresh.words()));
         }
         let triangles = self.maps.grid.triangles;
         self.maps = maps.clone();
@@ -127,6 +138,26 @@ impl Dvf {
         Ok(())
     }
 
+    /// Takes what kernels count on, or the points that are listed.
+    ///
+    /// # Errors
+    /// More than a buffer holds.
+    pub fn set_tally(&mut self, gpu: &Gpu, words: &[u32]) -> Result<(), ExecutorError> {
+        check_bytes(gpu, size_of_val(words) as u64, WHAT, REMEDY)?;
+        if grow(gpu, &mut self.tally, "dvf tally", words.len(), 4) {
+            self.rebind(gpu);
+        }
+        gpu.queue.write_buffer(&self.tally, 0, bytemuck::cast_slice(words));
+        self.maps.grid.listed = words.len() as u32;
+        gpu.queue.write_buffer(&self.grid, 0, bytemuck::bytes_of(&self.maps.grid));
+        Ok(())
+    }
+
+    /// The buffer of these, and how many words of it are in use.
+    pub fn tally(&self) -> (&wgpu::Buffer, usize) {
+        (&self.tally, self.maps.grid.listed as usize)
+    }
+
     /// The buffers of masks, labels and sums, and how many words of them are in use.
     pub fn results(&self) -> [(&wgpu::Buffer, usize); 3] {
         let elements = sweep_elements(self.maps.grid.triangles) as usize;
@@ -140,8 +171,8 @@ impl Dvf {
     }
 
     fn rebind(&mut self, gpu: &Gpu) {
-        let buffers =
-            [&self.grid, &self.masks, &self.labels, &self.triangles, &self.sums, &self.directions, &self.waiting];
+        let Self { grid, masks, labels, triangles, sums, directions, waiting, fresh, tally, .. } = self;
+        let buffers = [&*grid, masks, labels, triangles, sums, directions, waiting, fresh, tally];
         self.group = self.method.group(gpu, buffers);
     }
 }

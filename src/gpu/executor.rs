@@ -508,6 +508,15 @@ impl FrameExecutor for GpuExecutor {
         dvf.as_mut().map_or(Ok(()), |dvf| dvf.set_triangles(gpu, triangles, points))
     }
 
+    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
+        let Self { gpu, dvf, .. } = self;
+        dvf.as_mut().map_or(Ok(()), |dvf| dvf.set_tally(gpu, words))
+    }
+
+    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        self.dvf.as_ref().map_or(Ok(Vec::new()), |dvf| self.read_words(dvf.tally()))
+    }
+
     fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
         let Some(dvf) = &self.dvf else { return Ok(Default::default()) };
         let [masks, labels, _] = dvf.results();

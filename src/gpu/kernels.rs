@@ -235,7 +235,7 @@ pub(super) fn rsm_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 /// The layout of group 2 of kernels over discrete visibility fields.
 pub(super) fn dvf_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     use Bound::{Read, Write};
-    layout(device, "dvf", &[Read, Write, Write, Read, Write, Read, Write])
+    layout(device, "dvf", &[Read, Write, Write, Read, Write, Read, Write, Read, Write])
 }
 
 /// The layout of a group of `count` storage buffers that are read.

@@ -193,9 +193,15 @@ pub const DVF_LABELS: &str = "dvf_labels";
 pub const DVF_COSINE: &str = "dvf_cosine";
 /// The kernel that answers rays by a field.
 pub const DVF_SIFT: &str = "dvf_sift";
+/// The kernel that counts primary hits in cells.
+pub const DVF_SEEN: &str = "dvf_seen";
+/// The kernel that finds points in cells that are made anew.
+pub const DVF_POINTS: &str = "dvf_points";
 /// All kernels over fields of visibility.
-pub const DVF_KERNELS: [&str; 10] =
-    [DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_COSINE, DVF_SIFT];
+pub const DVF_KERNELS: [&str; 12] = [
+    DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_COSINE, DVF_SIFT,
+    DVF_SEEN, DVF_POINTS,
+];
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -405,6 +411,11 @@ pub fn dispatches(
         }
         Step::DvfLight => vec![shading("dvf_light", params, false)],
         Step::DvfSift => vec![dvf(DVF_SIFT, params, per_ray)],
+        Step::DvfSeen => vec![dvf(DVF_SEEN, params, per_ray)],
+        Step::DvfPoints { first, count } => {
+            let params = Params { dvf_first: first, dvf_count: count, ..params };
+            vec![dvf(DVF_POINTS, params, across(count.div_ceil(64)))]
+        }
         Step::RsmWrite { map, corner: [x, y] } => {
             let params = Params { rsm_map: map, rsm_x: x, rsm_y: y, ..params };
             vec![Dispatch { third: Third::Rsm, ..shading(RSM_WRITE, params, false) }]

@@ -1,9 +1,9 @@
 //! Discrete visibility fields as kernels see them: placed in a frame.
 
 use super::frame::Frame;
-use super::layout::{DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid};
+use super::layout::{DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_RENEW, DVF_ROUND, DVF_WALK, DvfGrid};
 use crate::math::blue_noise;
-use crate::visibility::dvf::{DvfField, DvfSettings, DvfUse, Shape};
+use crate::visibility::dvf::{Areas, DvfField, DvfSettings, DvfUse, Fresh, Shape};
 use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 
@@ -25,31 +25,10 @@ pub struct DvfMaps {
     /// Directions of rays about z, then [`CIRCLE`] points of the unit circle, then, to answer as in the paper, numbers of these for a tile of
     /// [`TILE`]² pixels, row by row, four to an element.
     pub directions: Arc<Vec<[f32; 4]>>,
+    /// Cells that are made anew while others are not: masks are those of their entries.
+    pub fresh: Option<Arc<Fresh>>,
     /// Words in which rays that wait for bricks are noted; where there are as many or more already, these keep what was noted.
     pub waiting_words: usize,
-}
-
-/// What is summed over all triangles of a region.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Areas {
-    /// Steps in which areas are summed, a device unit of area.
-    pub scale: f32,
-    /// Twice the area of all, device units.
-    pub total: f32,
-}
-
-impl Areas {
-    /// Of so many triangles, none of which has twice an area of `most` device units or more, nothing yet; sums stay below 2^62 and areas below 2^40.
-    pub fn of(triangles: u64, most: f64) -> Self {
-        let bits = (most.log2().ceil() as i32).clamp(-80, 80);
-        let count = 64 - triangles.max(1).leading_zeros() as i32;
-        Self { scale: f64::from((62 - count).min(40) - bits).exp2() as f32, total: 0.0 }
-    }
-
-    /// With the sum of all.
-    pub fn with_sum(self, sum: u64) -> Self {
-        Self { total: (sum as f64 / f64::from(self.scale)) as f32, ..self }
-    }
 }
 
 /// The cosine-weighted directions of `rays` rays about z (Hammersley; Malley), then the circle.
@@ -97,7 +76,7 @@ impl DvfMaps {
         let flags = if how.doubt { DVF_DOUBT } else { 0 } | if how.paper { DVF_PAPER } else { 0 };
         let directions = if how.paper { turns() } else { Arc::default() };
         let grid = DvfGrid { flags, ..placed(&field.shape, frame) };
-        Self { grid, field: Some(field.clone()), is_new: false, directions, waiting_words: 0 }
+        Self { grid, field: Some(field.clone()), directions, ..Self::default() }
     }
 
     /// A field that is being made, of `lanes` to a point. Masks are those that the executor has.
@@ -125,6 +104,12 @@ impl DvfMaps {
         Self { grid, directions: directions.clone(), ..Self::default() }
     }
 
+    /// The same, of some cells.
+    pub fn of_cells(self, fresh: &Arc<Fresh>) -> Self {
+        let flags = self.grid.flags | DVF_RENEW;
+        Self { grid: DvfGrid { flags, ..self.grid }, fresh: Some(fresh.clone()), ..self }
+    }
+
     /// Cells.
     pub fn cells(&self) -> usize {
         self.grid.size.iter().map(|&n| n as usize).product()
@@ -132,7 +117,8 @@ impl DvfMaps {
 
     /// Words of all masks.
     pub fn mask_words(&self) -> usize {
-        self.cells() * 2 * (self.grid.octahedral * self.grid.octahedral / 32) as usize
+        let cells = self.fresh.as_ref().map_or(self.cells(), |fresh| fresh.entries());
+        cells * 2 * (self.grid.octahedral * self.grid.octahedral / 32) as usize
     }
 }
 
@@ -182,15 +168,5 @@ mod tests {
             assert!((mean - 2.0 / 3.0).abs() < 0.1 / f64::from(rays), "{mean}");
             assert_eq!(all.len(), (rays + CIRCLE) as usize);
         }
-    }
-
-    #[test]
-    fn sums_of_areas_have_room() {
-        for (triangles, most) in [(1, 1.0), (3_000_000, 1e6), (4_000_000_000, 4e6), (12, 1e-12)] {
-            let areas = Areas::of(triangles, most);
-            assert!(f64::from(areas.scale) * most * triangles as f64 <= 2f64.powi(62), "{triangles} {most}");
-            assert!(f64::from(areas.scale) * most <= 2f64.powi(40));
-        }
-        assert_eq!(Areas { scale: 4.0, total: 0.0 }.with_sum(10).total, 2.5);
     }
 }

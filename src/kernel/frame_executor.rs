@@ -110,7 +110,20 @@ pub trait FrameExecutor: Executor {
     /// As of [`FrameExecutor::set_dvf`], which has been called.
     fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError>;
 
-    /// Reads the masks and labels of all cells back.
+    /// Takes what [`crate::schedule::Step::DvfSeen`] and [`crate::schedule::Step::DvfPoints`] count on, or the numbers of the points that rays of cells
+    /// that are made anew start from ([`crate::visibility::dvf::Fresh`]).
+    ///
+    /// # Errors
+    /// As of [`FrameExecutor::set_dvf`], which has been called.
+    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError>;
+
+    /// Reads what these steps have made of them.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError>;
+
+    /// Reads the masks and labels of all cells back; where some cells are made anew, the masks of these.
     ///
     /// # Errors
     /// The device's.

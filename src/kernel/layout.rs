@@ -74,6 +74,7 @@ pub const DVF_ROUND: u32 = 2;
 pub const DVF_BOTH: u32 = 4;
 pub const DVF_DOUBT: u32 = 8;
 pub const DVF_PAPER: u32 = 16;
+pub const DVF_RENEW: u32 = 32;
 pub const DVF_WALK: u32 = 512;
 pub const BINARY_LEAF: u32 = 0x8000_0000;
 /// Samples that are summed in f32 before the sum begins anew, see `render::Accumulation`.
@@ -186,7 +187,7 @@ mirror! {
         first: [f32; 3], scale: f32, size: [u32; 3], octahedral: u32,
         flags: u32, points: f32, total: f32, area_scale: f32,
         rays: u32, lanes: u32, triangles: u32, point_count: u32,
-        seed: u32, padding0: u32, padding1: u32, padding2: u32,
+        seed: u32, listed: u32, padding0: u32, padding1: u32,
     }
     struct DvfTriangle { a: [f32; 3], id: u32, b: [f32; 3], flags: u32, c: [f32; 3], padding: u32 }
     struct RsmTexel { flux: [f32; 3], depth: f32, normal: [f32; 3], facing: f32 }

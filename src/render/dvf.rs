@@ -1,11 +1,12 @@
 //! Fields of visibility: how they are made, by passes of their own, and which rays of frames they answer.
 
 use super::Renderer;
-use super::dvf_source::{Group, groups, triangles};
+use super::dvf_renew::{Marked, Renewal};
+use super::dvf_source::{Group, groups, groups_of_moved, triangles};
 use super::dvf_strew::{Strewing, Strewn, Traced};
 use super::frame::{RenderError, Schedule};
 use super::pass_record::FrameRecords;
-use crate::kernel::dvf::{Areas, DvfMaps, directions, sum};
+use crate::kernel::dvf::{DvfMaps, directions, sum};
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::NONE;
 use crate::kernel::{FrameExecutor, View};
@@ -13,7 +14,11 @@ use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, demand, plain};
 use crate::stats::Record;
 use crate::visibility::dvf::field::best;
-use crate::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse, MOST_TRIAL_BYTES, Shape, TRIAL_CELLS, Trial};
+use crate::visibility::dvf::mask;
+use crate::visibility::dvf::{
+    Areas, Cells, DvfField, DvfKept, DvfSettings, DvfUse, Fresh, MOST_TRIAL_BYTES, Shape, TRIAL_CELLS, Trial,
+};
+use bricks::SceneFile;
 use glam::DVec3;
 use std::sync::Arc;
 use std::time::Instant;
@@ -29,10 +34,11 @@ pub(super) const PASS: Pass = Pass::Shadow(Lamp::Environment);
 /// The field of visibility of a walk.
 #[derive(Default)]
 pub struct Dvf {
-    field: Option<Arc<DvfField>>,
+    pub(super) field: Option<Arc<DvfField>>,
     /// The same, with what has moved since it was made; `None`: nothing has.
-    marked: Option<Arc<DvfField>>,
-    how: DvfUse,
+    pub(super) marked: Option<Marked>,
+    pub(super) renewal: Option<Renewal>,
+    pub(super) how: DvfUse,
     frame: Option<Frame>,
 }
 
@@ -42,15 +48,31 @@ impl Dvf {
         Self { field: Some(field), how, ..Self::default() }
     }
 
+    /// Has cells that what moves concerns be made anew; the field is that of the renewal.
+    pub fn renewed_by(self, renewal: Renewal) -> Self {
+        Self { renewal: Some(renewal), ..self }
+    }
+
     /// The field.
     pub fn field(&self) -> Option<&Arc<DvfField>> {
         self.field.as_ref()
     }
 
-    /// Notes that what was in some of `boxes`, world units, when the field was made is in others of them now.
-    pub fn scene_has_moved(&mut self, boxes: &[[DVec3; 2]]) {
-        let marked = self.field.as_ref().filter(|_| !boxes.is_empty()).map(|field| Arc::new(field.with_movers(boxes)));
-        self.marked = marked;
+    /// The field with what has moved, where something has.
+    pub fn moved_field(&self) -> Option<&DvfField> {
+        self.marked.as_ref().map(|marked| &*marked.field)
+    }
+
+    /// The cells of it that have been made anew since, ascending.
+    pub fn renewed_cells(&self) -> impl Iterator<Item = u32> {
+        self.marked.iter().flat_map(|marked| marked.renewed.iter().copied())
+    }
+
+    /// Notes that the instances `displaced`, ascending, stand elsewhere than in `still`, where the field was made, and that what was in some of `boxes`, world
+    /// units, then is in others of them now.
+    pub fn scene_has_moved(&mut self, still: &Arc<SceneFile>, displaced: &[u32], boxes: &[[DVec3; 2]]) {
+        let field = self.field.as_ref().filter(|_| !boxes.is_empty());
+        self.marked = field.map(|field| Marked::new(field, still, displaced, boxes));
     }
 
     /// Begins a sample.
@@ -66,7 +88,8 @@ impl Dvf {
         let is_of_pass = matches!(pass, Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment));
         let (Some(field), Some(frame), true) = (&self.field, &self.frame, is_of_pass) else { return Ok(None) };
         let how = DvfUse { paper: self.is_paper(pass), ..self.how };
-        executor.set_dvf(&DvfMaps::to_answer(self.marked.as_ref().unwrap_or(field), frame, how))?;
+        let field = self.marked.as_ref().map_or(field, |marked| &marked.field);
+        executor.set_dvf(&DvfMaps::to_answer(field, frame, how))?;
         Ok(Some(Step::DvfSift))
     }
 
@@ -81,6 +104,8 @@ impl Dvf {
 pub struct DvfMade {
     /// The field.
     pub field: DvfField,
+    /// As it is kept.
+    pub kept: DvfKept,
     /// Points that rays started from.
     pub points: u64,
     /// Triangles that they lie on, parts of triangles that were cut apart each.
@@ -123,12 +148,25 @@ pub(super) struct Plan {
     pub areas: Areas,
     /// That meet the region.
     pub triangles: u64,
+    /// Which cells are made; `None`: all.
+    pub fresh: Option<Arc<Fresh>>,
+    /// In which frame.
+    pub frame: u32,
 }
 
 impl Plan {
-    /// Rays of a point.
+    /// Rays of a point that lanes share, where cells are made anew those of one of its sides.
     pub fn all_rays(&self) -> u32 {
-        if self.settings.both { 2 * self.settings.rays } else { self.settings.rays }
+        if self.settings.both && self.fresh.is_none() { 2 * self.settings.rays } else { self.settings.rays }
+    }
+
+    /// A site of it as it is being made in `frame`, by so many lanes a point.
+    pub fn maps(&self, shape: &Shape, frame: &Frame, settings: &DvfSettings, lanes: u32) -> DvfMaps {
+        let maps = DvfMaps::to_make(shape, frame, settings, lanes, &self.areas, &self.directions);
+        match &self.fresh {
+            Some(fresh) => maps.of_cells(fresh),
+            None => maps,
+        }
     }
 
     /// Whether rays from other points try grids.
@@ -197,46 +235,87 @@ impl Renderer {
             directions: Arc::new(directions(settings.rays)),
             areas: Areas { scale: 1.0, total: 0.0 },
             triangles: 0,
+            fresh: None,
+            frame: 0,
         };
         let place = Frame::near(self.scene.resident(), 0.5 * (region.min + region.max));
-        let empty = DvfMaps {
-            is_new: true,
-            ..DvfMaps::to_make(&shape, &place, settings, tracing.lanes, &plan.areas, &plan.directions)
-        };
+        let empty = DvfMaps { is_new: true, ..plan.maps(&shape, &place, settings, tracing.lanes) };
         self.executor.set_dvf(&empty)?;
         let start = Instant::now();
         self.sum_areas(&mut plan, &shape)?;
         let areas = start.elapsed().as_secs_f64();
-        let mut records = FrameRecords::new(0);
+        let (strewn, record) = self.strew(&plan, &shape, watch)?;
+        let mut trials = Vec::new();
+        let mut kept = DvfField { shape, masks: self.executor.read_dvf()?.0, labels: Vec::new() };
+        if settings.cells == Cells::Auto {
+            kept = choose(kept, &strewn.trials, settings.dilate, &mut trials);
+            let chosen = Arc::new(kept.clone());
+            self.executor.set_dvf(&DvfMaps::to_answer(&chosen, &place, DvfUse::default()))?;
+        }
+        let before = start.elapsed().as_secs_f64();
+        let finish = Step::DvfFinish { cells: kept.shape.cells() as u32, dilate: settings.dilate };
+        self.executor.run(PASS, &[finish], &self.cache.states)?;
+        let (masks, labels) = self.executor.read_dvf()?;
+        let seconds = [areas, before - areas, start.elapsed().as_secs_f64() - before];
+        // The masks on the device are no field's any more.
+        self.executor.set_dvf(&empty)?;
+        let field = DvfField { shape: kept.shape, masks, labels };
+        kept.labels = vec![mask::UNKNOWN; field.labels.len()];
+        kept.finish(false);
+        let kept = DvfKept { field: kept, areas: plan.areas };
+        let bricks_read = 2 * plan.groups.iter().map(Group::bricks).sum::<u64>();
+        let Strewn { points, drains, .. } = strewn;
+        Ok(DvfMade { field, kept, points, triangles: plan.triangles, bricks_read, drains, trials, record, seconds })
+    }
+
+    /// Makes all of the field of a renewal for the scene as it stands now, some of whose instances stand elsewhere than in `still`, in which it was made: what each of
+    /// its cells is that is made anew.
+    ///
+    /// # Errors
+    /// A brick that cannot be read, the device's.
+    pub fn remake_dvf(&mut self, renewal: &Renewal, still: &SceneFile) -> Result<DvfField, RenderError> {
+        let Renewal { kept, settings, region, tracing, .. } = renewal;
+        let (shape, resident) = (kept.field.shape, self.scene.resident());
+        let displaced = super::moved::displaced(still.resident(), resident);
+        let plan = Plan {
+            settings: DvfSettings { cells: Cells::Longest(1), ..*settings },
+            tracing: *tracing,
+            region: region.clone(),
+            groups: groups_of_moved(&groups(still.resident(), region), resident, region, &displaced),
+            directions: Arc::new(directions(settings.rays)),
+            areas: kept.areas,
+            triangles: 0,
+            fresh: None,
+            frame: 0,
+        };
+        let place = Frame::near(resident, 0.5 * (region.min + region.max));
+        self.executor.set_dvf(&DvfMaps { is_new: true, ..plan.maps(&shape, &place, settings, 1) })?;
+        self.strew(&plan, &shape, &mut |_, _| true)?;
+        let finish = Step::DvfFinish { cells: shape.cells() as u32, dilate: settings.dilate };
+        self.executor.run(PASS, &[finish], &self.cache.states)?;
+        let (masks, labels) = self.executor.read_dvf()?;
+        Ok(DvfField { shape, masks, labels })
+    }
+
+    /// Strews the points of a plan, traces their rays and enters them; what that did.
+    fn strew(
+        &mut self,
+        plan: &Plan,
+        shape: &Shape,
+        watch: &mut dyn FnMut(u64, u64) -> bool,
+    ) -> Result<(Strewn, Record), RenderError> {
+        let mut records = FrameRecords::new(plan.frame);
         let mut strewn = Strewn::default();
         records.pass(self, EFFECT, |r, stats| {
-            let about = u64::from(settings.points).max(plan.triangles) * u64::from(plan.all_rays());
+            let about = u64::from(plan.settings.points).max(plan.triangles) * u64::from(plan.all_rays());
             let mut watch = |rays: u64| watch(rays, about);
-            strewn = Strewing::new(r, &plan, &shape, stats, &mut watch).run()?;
+            strewn = Strewing::new(r, plan, shape, stats, &mut watch).run()?;
             Ok(())
         })?;
         if strewn.stopped {
             return Err(RenderError::Interrupted);
         }
-        let mut trials = Vec::new();
-        let mut field = DvfField { shape, masks: Vec::new(), labels: Vec::new() };
-        if settings.cells == Cells::Auto {
-            field.masks = self.executor.read_dvf()?.0;
-            field = choose(field, &strewn.trials, settings.dilate, &mut trials);
-            let chosen = Arc::new(field.clone());
-            self.executor.set_dvf(&DvfMaps::to_answer(&chosen, &place, DvfUse::default()))?;
-        }
-        let before = start.elapsed().as_secs_f64();
-        let finish = Step::DvfFinish { cells: field.shape.cells() as u32, dilate: settings.dilate };
-        self.executor.run(PASS, &[finish], &self.cache.states)?;
-        (field.masks, field.labels) = self.executor.read_dvf()?;
-        let seconds = [areas, before - areas, start.elapsed().as_secs_f64() - before];
-        // The masks on the device are no field's any more.
-        self.executor.set_dvf(&empty)?;
-        let bricks_read = 2 * plan.groups.iter().map(Group::bricks).sum::<u64>();
-        let record = records.finish(self).pop().unwrap_or_default();
-        let Strewn { points, drains, .. } = strewn;
-        Ok(DvfMade { field, points, triangles: plan.triangles, bricks_read, drains, trials, record, seconds })
+        Ok((strewn, records.finish(self).pop().unwrap_or_default()))
     }
 
     /// Sums the areas of all triangles of the plan, and counts them.
@@ -248,13 +327,11 @@ impl Renderer {
         plan.areas = Areas::of(plan.groups.iter().map(|group| group.triangles).sum(), most);
         let (mut total, mut count) = (0u64, 0);
         for group in &plan.groups {
-            let frame = Frame::near(self.scene.resident(), group.middle);
-            let triangles = triangles(&self.scene, group, &plan.region, &frame).map_err(unread)?;
+            let triangles = triangles(&self.scene, group, &plan.region, &|_| true).map_err(unread)?;
             if triangles.is_empty() {
                 continue;
             }
-            let maps = DvfMaps::to_make(shape, &frame, &plan.settings, 1, &plan.areas, &plan.directions);
-            self.executor.set_dvf(&maps)?;
+            self.executor.set_dvf(&plan.maps(shape, &group.frame, &plan.settings, 1))?;
             self.executor.set_dvf_triangles(&triangles, 0)?;
             let step = Step::DvfAreas { triangles: triangles.len() as u32 };
             self.executor.run(PASS, &[step], &self.cache.states)?;

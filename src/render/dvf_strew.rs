@@ -7,20 +7,21 @@ use super::Renderer;
 use super::dvf::{EFFECT, PASS, Plan, unread};
 use super::dvf_source::{Group, triangles};
 use super::frame::Schedule;
-use crate::kernel::dvf::DvfMaps;
 use crate::kernel::frame::Frame;
 use crate::kernel::layout::{DvfTriangle, Hit, NONE, Params, Ray};
 use crate::kernel::{Directions, View};
 use crate::schedule::chc::measure_needed;
 use crate::schedule::pool::Pool;
 use crate::schedule::{ExecutorError, PassStats, Report, Step, plain};
-use crate::visibility::dvf::{DvfSettings, Shape};
+use crate::visibility::dvf::{DvfSettings, Fresh, Shape};
 use glam::DVec3;
 
 /// Most triangles that are kept of groups in which rays wait: 192 MiB.
 const MOST_KEPT: usize = 1 << 22;
 /// Most rays by which grids are tried.
 const MOST_TRIAL_RAYS: u64 = 1 << 20;
+/// Sides of points that are looked at together where cells are made anew: 32 MiB.
+const SIDES_AT_ONCE: usize = 1 << 22;
 /// Seed of their points, beside that of the field's.
 const TRIAL_SEED: u32 = 0x9e37_79b9;
 /// Turns of the directions that they take, of [`DvfSettings::rays`].
@@ -60,6 +61,8 @@ struct Site {
     count: u32,
     /// Of a point.
     lanes: u32,
+    /// Where cells are made anew: the numbers of the sides of points that rays start from.
+    listed: Option<Vec<u32>>,
 }
 
 /// A block of the rays of a site.
@@ -161,10 +164,74 @@ impl<'a> Strewing<'a> {
         Ok(self.state.strewn)
     }
 
+    /// Strews the points of cells that are made anew. `choose` is told how many rays each entry takes, and says which are made; what it said.
+    ///
+    /// # Errors
+    /// A brick that cannot be read, the device's.
+    pub fn renew(
+        mut self,
+        fresh: &Fresh,
+        choose: impl FnOnce(&[u64]) -> Vec<bool>,
+    ) -> Result<Vec<bool>, ExecutorError> {
+        let shape = self.shape;
+        let counts = |bounds: [DVec3; 2]| shape.cells_of(bounds).any(|cell| fresh.entry(cell as usize).is_some());
+        let mut costs = vec![0u64; fresh.entries()];
+        let mut found = Vec::new();
+        for group in &self.plan.groups {
+            let triangles = triangles(&self.renderer.scene, group, &self.plan.region, &counts).map_err(unread)?;
+            if !triangles.is_empty() {
+                let site = self.site(group.frame, triangles)?;
+                found.push((site, self.points(site, &mut costs)?));
+            }
+        }
+        let chosen = choose(&costs);
+        for (site, points) in found {
+            let listed: Vec<u32> =
+                points.into_iter().filter(|(_, entry)| chosen[*entry]).map(|(side, _)| side).collect();
+            if !listed.is_empty() {
+                self.share(site, listed.len() as u32);
+                self.state.sites[site].listed = Some(listed);
+                self.blocks(site, Kind::Masks)?;
+            }
+        }
+        self.drain()?;
+        Ok(chosen)
+    }
+
+    /// The sides of points of a site from which rays are made, and the entries of their cells; adds how many rays these take.
+    fn points(&mut self, site: usize, costs: &mut [u64]) -> Result<Vec<(u32, usize)>, ExecutorError> {
+        // The executor is to know how many points there are.
+        self.state.at = None;
+        self.place(site, Kind::Masks)?;
+        let Renderer { executor, cache, .. } = &mut *self.renderer;
+        let sides = if self.plan.settings.both { 2 } else { 1 } * self.state.sites[site].count;
+        let mut found = Vec::new();
+        for first in (0..sides).step_by(SIDES_AT_ONCE) {
+            let count = (sides - first).min(SIDES_AT_ONCE as u32);
+            executor.set_dvf_tally(&vec![0; 2 * count as usize])?;
+            executor.run(PASS, &[Step::DvfPoints { first, count }], &cache.states)?;
+            let tally = executor.read_dvf_tally()?;
+            for (side, [entry, rays]) in (first..).zip(tally.as_chunks::<2>().0).filter(|(_, [_, rays])| *rays > 0) {
+                costs[*entry as usize] += u64::from(*rays);
+                found.push((side, *entry as usize));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Takes triangles and shares points out over them; the number of the site.
+    fn site(&mut self, frame: Frame, triangles: Vec<DvfTriangle>) -> Result<usize, ExecutorError> {
+        let site = self.state.sites.len();
+        self.state.sites.push(Site { frame, triangles, count: 0, lanes: 1, listed: None });
+        self.place(site, Kind::Masks)?;
+        let count = self.renderer.executor.read_dvf_sums()?.last().map_or(0, |words| words[0]);
+        self.state.sites[site].count = count;
+        Ok(site)
+    }
+
     /// Strews the points of a group; whether to go on.
     fn group(&mut self, group: &Group) -> Result<bool, ExecutorError> {
-        let frame = Frame::near(self.renderer.scene.resident(), group.middle);
-        let triangles = triangles(&self.renderer.scene, group, &self.plan.region, &frame).map_err(unread)?;
+        let triangles = triangles(&self.renderer.scene, group, &self.plan.region, &|_| true).map_err(unread)?;
         if triangles.is_empty() {
             return Ok(true);
         }
@@ -172,12 +239,10 @@ impl<'a> Strewing<'a> {
         if kept + triangles.len() > MOST_KEPT && !self.make_room(None)? {
             return Ok(false);
         }
-        let site = self.state.sites.len();
-        self.state.sites.push(Site { frame, triangles, count: 0, lanes: 1 });
-        self.place(site, Kind::Masks)?;
-        let count = self.renderer.executor.read_dvf_sums()?.last().map_or(0, |words| words[0]);
+        let site = self.site(group.frame, triangles)?;
+        let count = self.state.sites[site].count;
         if count > 0 {
-            self.count(site, count);
+            self.share(site, count);
             let kinds = [Some(Kind::Masks), self.plan.has_trials().then_some(Kind::Trial)];
             for kind in kinds.into_iter().flatten() {
                 if !self.blocks(site, kind)? {
@@ -192,13 +257,11 @@ impl<'a> Strewing<'a> {
         Ok(true)
     }
 
-    /// Notes how many points lie on a site, which the executor has.
-    fn count(&mut self, site: usize, count: u32) {
+    /// Shares the rays of each of so many points of a site out over lanes.
+    fn share(&mut self, site: usize, points: u32) {
         // A block holds a point's lanes, and all lanes of a group can be counted.
-        let most = self.plan.all_rays().min(self.capacity()).min(u32::MAX / count);
-        let lanes = self.plan.tracing.lanes.min(most).max(1);
-        let Site { count: own_count, lanes: own_lanes, .. } = &mut self.state.sites[site];
-        (*own_count, *own_lanes) = (count, lanes);
+        let most = self.plan.all_rays().min(self.capacity()).min(u32::MAX / points);
+        self.state.sites[site].lanes = self.plan.tracing.lanes.min(most).max(1);
         self.state.at = None;
     }
 
@@ -208,7 +271,7 @@ impl<'a> Strewing<'a> {
             return Ok(());
         }
         let Self { renderer, plan, shape, state, .. } = self;
-        let Site { frame, triangles, count, lanes } = &state.sites[site];
+        let Site { frame, triangles, count, lanes, listed } = &state.sites[site];
         let (settings, lanes) = match kind {
             Kind::Masks => (plan.settings, *lanes),
             Kind::Trial => {
@@ -218,12 +281,15 @@ impl<'a> Strewing<'a> {
         };
         let executor = &mut renderer.executor;
         executor.begin_frame(&view(*frame, settings.seed));
-        let mut maps = DvfMaps::to_make(shape, frame, &settings, lanes, &plan.areas, &plan.directions);
+        let mut maps = plan.maps(shape, frame, &settings, lanes);
         maps.waiting_words = state.waiting_words;
         executor.set_dvf(&maps)?;
         executor.set_dvf_triangles(triangles, *count)?;
         let counts = Step::DvfCounts { triangles: triangles.len() as u32 };
         executor.run(PASS, &[counts], &renderer.cache.states)?;
+        if let Some(listed) = listed {
+            executor.set_dvf_tally(listed)?;
+        }
         state.at = Some((site, kind));
         Ok(())
     }
@@ -231,7 +297,8 @@ impl<'a> Strewing<'a> {
     /// Makes all blocks of a kind; whether to go on.
     fn blocks(&mut self, site: usize, kind: Kind) -> Result<bool, ExecutorError> {
         let (settings, capacity) = (&self.plan.settings, self.capacity());
-        let Site { count, lanes, .. } = self.state.sites[site];
+        let Site { count, lanes, ref listed, .. } = self.state.sites[site];
+        let count = listed.as_ref().map_or(count, |listed| listed.len() as u32);
         let (lanes, turns): (u32, Vec<u32>) = match kind {
             Kind::Masks => (lanes, (0..self.plan.all_rays().div_ceil(lanes)).collect()),
             Kind::Trial => (1, TRIAL_TURNS.iter().map(|(n, of)| n * settings.rays / of).collect()),
@@ -343,9 +410,11 @@ impl<'a> Strewing<'a> {
         if !self.drain()? {
             return Ok(false);
         }
-        let sites = self.state.sites.iter_mut().enumerate().filter(|(other, _)| Some(*other) != site);
+        // Points of cells that are made anew have been found on all sites before.
+        let are_done = self.plan.fresh.is_none();
+        let sites = self.state.sites.iter_mut().enumerate().filter(|(other, _)| are_done && Some(*other) != site);
         sites.for_each(|(_, site)| site.triangles = Vec::new());
-        self.renderer.cache.begin_pass(EFFECT, 0);
+        self.renderer.cache.begin_pass(EFFECT, self.plan.frame);
         self.state.resident = self.renderer.cache.resident_geometry();
         Ok(true)
     }

@@ -206,6 +206,9 @@ impl Renderer {
                     Shading { sun: !effects.shadow, sky, emission: true, miss: true, environment: false, gloss: false };
                 r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
+            if sample == 0 {
+                self.renew_dvf(&mut records, &view)?;
+            }
             self.light(&mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
             if let Some(guides) = &mut guides {
                 guides.lamps(&mut *self.executor, sample)?;

@@ -5,6 +5,7 @@ mod accumulate;
 mod capture;
 pub mod denoise;
 mod dvf;
+mod dvf_renew;
 mod dvf_source;
 mod dvf_strew;
 mod effects;
@@ -27,7 +28,8 @@ mod view;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};
 pub use capture::{Captures, EffectError};
-pub use dvf::{Dvf, DvfMade, DvfTracing, Region};
+pub use dvf::{Dvf, DvfMade, DvfTracing, EFFECT as DVF_EFFECT, Region};
+pub use dvf_renew::Renewal;
 pub use effects::{Effects, Occlusion};
 pub use emissive::{MOST_TRIANGLES, ShiningTriangles, emissive_triangles};
 pub use environment::{EnvironmentNotes, Equirectangular, environment};

@@ -56,6 +56,17 @@ fn boxes(resident: &Resident, instances: &[u32]) -> Vec<[DVec3; 2]> {
     leaves.map(|leaf| resident.leaf_box(leaf).map(|p| DVec3::from_array(p.map(|x| x as f64)) * step)).collect()
 }
 
+/// Whether an instance stands elsewhere in one scene than in another.
+fn stands_elsewhere(one: &Resident, other: &Resident, instance: u32) -> bool {
+    let matrix = |of: &Resident| of.instances[instance as usize].world_from_object;
+    matrix(one) != matrix(other)
+}
+
+/// The instances that stand elsewhere now than in `still`, ascending.
+pub(super) fn displaced(still: &Resident, now: &Resident) -> Vec<u32> {
+    (0..now.instances.len() as u32).filter(|&instance| stands_elsewhere(still, now, instance)).collect()
+}
+
 impl Renderer {
     /// Places instances by new matrices, world_from_object, for the frames to come; `still` is the scene as it was opened. What was made of where
     /// those were that have moved is made anew when it is asked for. Returns which have moved, ascending. Lamps that move along are the caller's.
@@ -109,11 +120,10 @@ impl Renderer {
         let mut displaced: Vec<u32> = places.iter().map(|(instance, _)| *instance).collect();
         displaced.sort_unstable();
         let own = still.resident();
-        let matrix = |of: &Resident, instance: u32| of.instances[instance as usize].world_from_object;
-        displaced.retain(|&instance| matrix(own, instance) != matrix(resident, instance));
+        displaced.retain(|&instance| stands_elsewhere(own, resident, instance));
         let mut elsewhere = boxes(own, &displaced);
         elsewhere.extend(boxes(resident, &displaced));
-        self.dvf.scene_has_moved(&elsewhere);
+        self.dvf.scene_has_moved(still, &displaced, &elsewhere);
         self.roma.scene_has_moved();
         self.rsm.scene_has_moved(&touched);
         Ok(moving)

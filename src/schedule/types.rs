@@ -219,6 +219,15 @@ pub enum Step {
     DvfLight,
     /// Answer the pass's rays, not traced yet, that the field tells, and count them: they are not traced.
     DvfSift,
+    /// Count the primary hits in each cell of a field of visibility.
+    DvfSeen,
+    /// Find which of the points that the executor was given last lie in cells that are made anew, and how many of their rays are made.
+    DvfPoints {
+        /// The first side of a point that rays start from.
+        first: u32,
+        /// How many of them.
+        count: u32,
+    },
     /// Add what the hits of the set before that [`Step::RomaTrace`] gave reflect of the lamps, by their reflective shadow maps: phase 3.
     RsmLight,
 }
@@ -544,6 +553,10 @@ pub struct PassStats {
     pub bytes_textures: u64,
     /// Batches of loads.
     pub batches: u64,
+    /// Cells of a field of visibility that were made anew.
+    pub cells_renewed: u64,
+    /// Cells that are seen and were not, although that would save rays.
+    pub cells_left: u64,
 }
 
 impl PassStats {

@@ -10,12 +10,16 @@ pub struct Record {
     pub frame: u32,
     /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `mirror`, `glossy`, and of the rays to lamps from the hits of
     /// bounces `diffuse-shadow`, `diffuse-environment`, `mirror-shadow`, `mirror-environment`,
-    /// `glossy-shadow`, `glossy-environment`.
+    /// `glossy-shadow`, `glossy-environment`; `dvf`, where the cells of a field of visibility are made anew for what moves.
     pub pass: &'static str,
     /// Rays traced.
     pub rays: u64,
     /// Rays besides that a field of visibility answered: they were not traced.
     pub rays_answered: u64,
+    /// Of `dvf`: cells of the field of visibility that were made anew for what moves.
+    pub cells_renewed: u64,
+    /// Cells that primary hits lie in, and that were not although it would save rays: directions toward what moves are traced there.
+    pub cells_left: u64,
     /// Wall time from first submission to last fence, ms.
     pub ms: f64,
     /// Device time of intersecting what was resident, ms; with ROMA and distance fields, of making these.
@@ -144,6 +148,8 @@ impl Record {
             pass,
             rays: r.rays,
             rays_answered: r.rays_answered,
+            cells_renewed: stats.cells_renewed,
+            cells_left: stats.cells_left,
             ms: stats.ms,
             ms_phase1: r.ms_phases[0],
             ms_phase2: r.ms_phases[1],

@@ -297,6 +297,14 @@ impl FrameExecutor for Faulty {
         self.inner.set_dvf_triangles(triangles, points)
     }
 
+    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
+        self.inner.set_dvf_tally(words)
+    }
+
+    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        self.inner.read_dvf_tally()
+    }
+
     fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
         self.inner.read_dvf()
     }

@@ -2,13 +2,13 @@
 
 use super::case::Checks;
 use super::lab::{Lab, Stage, settings};
-use crate::kernel::dvf::{Areas, DvfMaps, directions, sum};
+use crate::kernel::dvf::{DvfMaps, directions, sum};
 use crate::kernel::layout::{DVF_HIT, DvfTriangle, NONE, Params, Ray};
 use crate::kernel::{Directions, Lamps, View};
 use crate::render::{Dvf, DvfTracing, Equirectangular, Region, environment};
 use crate::scene::Camera;
 use crate::schedule::{Lamp, Pass, Step};
-use crate::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse, Shape, mask};
+use crate::visibility::dvf::{Areas, Cells, DvfField, DvfSettings, DvfUse, Shape, mask};
 use anyhow::Result;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Stiff, one_mesh, stiff};

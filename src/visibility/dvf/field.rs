@@ -1,7 +1,7 @@
 //! A field, and what it says of rays.
 
 use super::mask::{self, OCCLUDED, UNKNOWN, VISIBLE};
-use super::{DvfUse, Shape};
+use super::{Areas, DvfUse, Shape};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -14,6 +14,15 @@ pub struct DvfField {
     pub masks: Vec<u32>,
     /// Of each cell: [`VISIBLE`], [`OCCLUDED`] or [`UNKNOWN`].
     pub labels: Vec<u32>,
+}
+
+/// A field as it is kept: what it can be finished, and made anew in some of its cells, from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DvfKept {
+    /// With masks that are not widened.
+    pub field: DvfField,
+    /// What its points were shared out by.
+    pub areas: Areas,
 }
 
 /// What a field says of a ray.
@@ -36,6 +45,20 @@ pub struct Trial {
     pub traced: f64,
     /// Share of all rays that are answered wrongly.
     pub wrong: f64,
+}
+
+/// Whether answers of a kind count in a cell with a label.
+fn counts(label: u32, which: u32, how: DvfUse) -> bool {
+    label == which || (how.doubt && label != UNKNOWN)
+}
+
+impl DvfKept {
+    /// The field, its masks widened if they are to be.
+    pub fn finished(&self, dilate: bool) -> DvfField {
+        let mut field = self.field.clone();
+        field.finish(dilate);
+        field
+    }
 }
 
 impl DvfField {
@@ -76,10 +99,22 @@ impl DvfField {
         let masks = &self.masks[cell as usize * self.shape.words()..][..self.shape.words()];
         let (missed, hit) = masks.split_at(masks.len() / 2);
         match (mask::has(missed, texel), mask::has(hit, texel), self.labels[cell as usize]) {
-            (true, false, label) if label == VISIBLE || (how.doubt && label != UNKNOWN) => Answer::Free,
-            (false, true, label) if label == OCCLUDED || (how.doubt && label != UNKNOWN) => Answer::Met,
+            (true, false, label) if counts(label, VISIBLE, how) => Answer::Free,
+            (false, true, label) if counts(label, OCCLUDED, how) => Answer::Met,
             _ => Answer::Trace,
         }
+    }
+
+    /// Share of all directions in which rays from a cell are answered, of those in `texels`, a mask; `None`: nothing is known of the cell.
+    pub fn answered(&self, cell: u32, texels: &[u32], how: DvfUse) -> Option<f64> {
+        let (label, words) = (self.labels[cell as usize], texels.len());
+        let (missed, hit) = self.masks[2 * words * cell as usize..][..2 * words].split_at(words);
+        let of = |own: &[u32], other: &[u32], which: u32| -> u32 {
+            let bits = own.iter().zip(other).zip(texels).map(|((own, other), texels)| own & !other & texels);
+            if counts(label, which, how) { bits.map(u32::count_ones).sum() } else { 0 }
+        };
+        let answered = of(missed, hit, VISIBLE) + of(hit, missed, OCCLUDED);
+        (label != UNKNOWN).then_some(f64::from(answered) / (32 * words) as f64)
     }
 
     /// How it does on rays from points of the world of which it is known whether they meet anything.
@@ -141,6 +176,11 @@ mod tests {
             [(DVec3::ONE, up, false), (DVec3::ONE, up, true), (DVec3::ONE, down, true), (DVec3::ONE, aside, true)];
         let trial = field.trial(&rays, label);
         assert_eq!((trial.traced, trial.wrong), (0.5, 0.25));
+        // Of 64 texels one is free and one met, and the cell is mostly visible.
+        let cell = field.shape.cell(DVec3::ONE).unwrap();
+        let of = |texels: [u32; 2], how| field.answered(cell, &texels, how);
+        assert_eq!((of([u32::MAX; 2], label), of([u32::MAX; 2], doubt)), (Some(1.0 / 64.0), Some(2.0 / 64.0)));
+        assert_eq!((of([0; 2], doubt), field.answered(0, &[u32::MAX; 2], doubt)), (Some(0.0), None));
     }
 
     #[test]

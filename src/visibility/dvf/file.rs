@@ -1,9 +1,23 @@
 //! The file of a field, beside its scene: what it was made of, then the cells of which something is known.
 //!
-//! Little-endian: [`MAGIC`], [`VERSION`], the key, the shape, the number of known cells; of each its number and masks; xxh3-64 of all before.
+//! Little-endian; bytes from the first:
+//!
+//! | at | bytes | what |
+//! | --- | --- | --- |
+//! | 0 | 8 | [`MAGIC`] |
+//! | 8 | 4 | [`VERSION`] |
+//! | 12 | 4 | texels of a mask on both axes |
+//! | 16 | 8 | the key: what it was made of |
+//! | 24 | 24 + 8 | corner of cell 0 and side of a cell, world units, f64 |
+//! | 56 | 12 | cells on each axis |
+//! | 68 | 4 + 4 | steps of sums a device unit of area, and twice the sum of all areas, f32 ([`Areas`]) |
+//! | 76 | 4 | known cells |
+//! | 80 | | of each its number (4) and both masks, before they are widened |
+//! | | 8 | xxh3-64 of all before |
+//!
 //! Nothing is used before the checksum is found right.
 
-use super::{DvfField, Shape, mask};
+use super::{Areas, DvfField, DvfKept, Shape, mask};
 use glam::DVec3;
 use std::io;
 use thiserror::Error;
@@ -12,10 +26,10 @@ use xxhash_rust::xxh3::xxh3_64;
 /// First bytes.
 pub const MAGIC: [u8; 8] = *b"BWDVF\x1a\n\0";
 /// The version of the format.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
-/// Bytes before the cells: magic, version, texels of a mask, key, corner, side, cells, number of known ones.
-const HEAD: usize = 8 + 4 + 4 + 8 + 24 + 8 + 12 + 4;
+/// Bytes before the cells.
+const HEAD: usize = 8 + 4 + 4 + 8 + 24 + 8 + 12 + 8 + 4;
 
 /// Why a file is of no use.
 #[derive(Debug, Error)]
@@ -38,7 +52,8 @@ pub enum FileError {
 }
 
 /// The bytes of `field`; `key` says what it was made of.
-pub fn encode(field: &DvfField, key: u64) -> Vec<u8> {
+pub fn encode(kept: &DvfKept, key: u64) -> Vec<u8> {
+    let DvfKept { field, areas } = kept;
     let shape = &field.shape;
     let words = shape.words();
     let known: Vec<usize> = (0..field.labels.len()).filter(|&cell| field.labels[cell] != mask::UNKNOWN).collect();
@@ -51,7 +66,8 @@ pub fn encode(field: &DvfField, key: u64) -> Vec<u8> {
     for value in [shape.corner.x, shape.corner.y, shape.corner.z, shape.side] {
         bytes.extend(value.to_le_bytes());
     }
-    for word in shape.size.into_iter().chain([known.len() as u32]) {
+    let areas = [areas.scale, areas.total].map(f32::to_bits);
+    for word in shape.size.into_iter().chain(areas).chain([known.len() as u32]) {
         bytes.extend(word.to_le_bytes());
     }
     for cell in known {
@@ -69,7 +85,7 @@ pub fn encode(field: &DvfField, key: u64) -> Vec<u8> {
 ///
 /// # Errors
 /// Other bytes than [`encode`] gives for that key.
-pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfField, FileError> {
+pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfKept, FileError> {
     if bytes.get(..8) != Some(&MAGIC[..]) {
         return Err(FileError::Foreign);
     }
@@ -93,14 +109,16 @@ pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfField, FileError> 
     let value = |at: usize| array(at).map_or(0.0, f64::from_le_bytes);
     let octahedral = word(12);
     let size = [56, 60, 64].map(word);
+    let [scale, total] = [68, 72].map(|at| f32::from_bits(word(at)));
     let shape = Shape { corner: DVec3::new(value(24), value(32), value(40)), side: value(48), size, octahedral };
     let is_sound = [8, 16, 32].contains(&octahedral)
         && shape.side > 0.0
         && shape.side.is_finite()
         && shape.corner.is_finite()
+        && [scale, total].iter().all(|x| *x > 0.0 && x.is_finite())
         && size.iter().all(|n| (1..=1 << 16).contains(n))
         && shape.cells().checked_mul(4 * shape.words() as u64).is_some_and(|bytes| bytes <= most);
-    let (count, words) = (word(68) as usize, if is_sound { shape.words() } else { 0 });
+    let (count, words) = (word(76) as usize, if is_sound { shape.words() } else { 0 });
     if !is_sound || body.len() - HEAD != count * 4 * (1 + words) {
         return Err(FileError::Damaged("its numbers cannot be"));
     }
@@ -114,7 +132,7 @@ pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfField, FileError> 
         field.masks[cell * words..(cell + 1) * words].copy_from_slice(&entry[1..]);
         field.labels[cell] = mask::label(&entry[1..]);
     }
-    Ok(field)
+    Ok(DvfKept { field, areas: Areas { scale, total } })
 }
 
 #[cfg(test)]
@@ -122,25 +140,25 @@ mod tests {
     use super::*;
     use crate::math::sampling::pcg;
 
-    fn field() -> DvfField {
+    fn kept() -> DvfKept {
         let mut field = DvfField::unknown(Shape::new(DVec3::ZERO, DVec3::new(3.0, 2.0, 1.0), 6, 8));
         let words = field.shape.words();
         for (cell, masks) in field.masks.chunks_exact_mut(words).enumerate().filter(|(cell, _)| cell % 3 == 0) {
             masks.iter_mut().enumerate().for_each(|(i, word)| *word = pcg((cell * 16 + i) as u32));
         }
-        field.finish(true);
-        field
+        field.finish(false);
+        DvfKept { field, areas: Areas { scale: 0.5, total: 3.25 } }
     }
 
     #[test]
     fn what_is_written_is_read() {
-        let field = field();
-        assert_eq!(decode(&encode(&field, 7), 7, 1 << 20).unwrap(), field);
+        let kept = kept();
+        assert_eq!(decode(&encode(&kept, 7), 7, 1 << 20).unwrap(), kept);
     }
 
     #[test]
     fn every_byte_that_is_damaged_is_found() {
-        let bytes = encode(&field(), 7);
+        let bytes = encode(&kept(), 7);
         for at in 0..bytes.len() {
             let mut damaged = bytes.clone();
             damaged[at] ^= 1 << (at % 8);

@@ -12,16 +12,21 @@
 //! triangles and found by binary search, so that large triangles are shared out over lanes by themselves; hashes take the triangle's id rather than
 //! its vertices' numbers, which repeat in simple scenes.
 //!
-//! *Practice.* [`mask`] has the masks, [`shape`] the grid, [`field`] a whole field and what is said of it, [`mod@file`] its file.
+//! *Practice.* [`mask`] has the masks, [`shape`] the grid, [`field`] a whole field and what is said of it, [`mod@file`] its file, [`Fresh`] what of it is
+//! made anew when something has moved.
 //! Kernels: `shaders/dvf_*.wgsl`.
 
+mod areas;
 pub mod field;
 pub mod file;
+mod fresh;
 pub mod mask;
 mod movers;
 pub mod shape;
 
-pub use field::{Answer, DvfField, Trial};
+pub use areas::Areas;
+pub use field::{Answer, DvfField, DvfKept, Trial};
+pub use fresh::Fresh;
 pub use shape::Shape;
 
 /// Which cells a field has.

@@ -3,13 +3,13 @@
 //! The paper makes the whole field anew in every frame (Günay, Akyüz 2025). A field stays of use where nothing moves: what has moved can only change the
 //! answers of rays that lead to where it was or is, and those are traced.
 
-use super::DvfField;
 use super::mask::UNKNOWN;
+use super::{DvfField, Shape};
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// By how much of their sides cells are taken to be wider, on every side: what kernels round a point's cell by.
-const MARGIN: f64 = 1.0 / 64.0;
+pub const MARGIN: f64 = 1.0 / 64.0;
 
 /// Radians by which cones are taken to be wider: what kernels round a ray's texel by.
 const ROUNDING: f64 = 1e-3;
@@ -32,39 +32,79 @@ fn reach(side: u32) -> f64 {
     18f64.sqrt() / f64::from(side)
 }
 
+/// What boxes concern of the cells of a grid.
+struct Cones {
+    shape: Shape,
+    middles: Vec<DVec3>,
+    /// Half a cell, made wider.
+    half: DVec3,
+    /// Greatest angle between the middle of a texel and a direction that a kernel may take for one of it.
+    reach: f64,
+}
+
+impl Cones {
+    fn new(shape: Shape) -> Self {
+        let side = shape.octahedral;
+        let half = DVec3::splat(shape.side * (0.5 + MARGIN));
+        Self { shape, middles: middles(side), half, reach: reach(side) + ROUNDING }
+    }
+
+    /// Calls `mark` with all texels that may lead from a cell into boxes, with some again; `false`: one that meets the cell was found, and the rest is left.
+    fn mark(&self, cell: u32, boxes: &[[DVec3; 2]], mut mark: impl FnMut(usize)) -> bool {
+        let [sx, sy, _] = self.shape.size;
+        let at = DVec3::from_array([cell % sx, cell / sx % sy, cell / (sx * sy)].map(|n| f64::from(n) + 0.5));
+        let middle = self.shape.corner + self.shape.side * at;
+        for [min, max] in boxes {
+            // Ways from a point of one box to one of the other lie in a box, and that in a ball.
+            let way = 0.5 * (*min + *max) - middle;
+            let radius = (0.5 * (*max - *min) + self.half).length();
+            if way.length() <= radius {
+                return false;
+            }
+            let widest = (radius / way.length()).asin() + self.reach;
+            let (axis, least) = (way.normalize(), widest.min(std::f64::consts::PI).cos());
+            let texels = self.middles.iter().enumerate().filter(|(_, middle)| middle.dot(axis) >= least);
+            texels.for_each(|(texel, _)| mark(texel));
+        }
+        true
+    }
+}
+
 impl DvfField {
     /// The field for a scene in which what lay in some of `boxes`, world units, lies in others of them: rays from elsewhere that may lead into one are traced,
     /// and all those of the cells that one meets.
     pub fn with_movers(&self, boxes: &[[DVec3; 2]]) -> Self {
         let mut marked = self.clone();
-        let (shape, words) = (self.shape, self.shape.words());
-        let (middles, reach) = (middles(shape.octahedral), reach(shape.octahedral) + ROUNDING);
-        let half = DVec3::splat(shape.side * (0.5 + MARGIN));
-        let [sx, sy, _] = shape.size;
+        let (cones, words) = (Cones::new(self.shape), self.shape.words());
         let cells = marked.masks.par_chunks_exact_mut(words).zip(&mut marked.labels);
         cells.enumerate().filter(|(_, (_, label))| **label != UNKNOWN).for_each(|(cell, (masks, label))| {
-            let cell = cell as u32;
-            let at = DVec3::from_array([cell % sx, cell / sx % sy, cell / (sx * sy)].map(|n| f64::from(n) + 0.5));
-            let middle = shape.corner + shape.side * at;
             let (missed, hit) = masks.split_at_mut(words / 2);
-            for [min, max] in boxes {
-                // Ways from a point of one box to one of the other lie in a box, and that in a ball.
-                let way = 0.5 * (*min + *max) - middle;
-                let radius = (0.5 * (*max - *min) + half).length();
-                if way.length() <= radius {
-                    *label = UNKNOWN;
-                    return;
+            let mark = |texel: usize| {
+                for mask in [&mut *missed, &mut *hit] {
+                    mask[texel / 32] |= 1 << (texel % 32);
                 }
-                let widest = (radius / way.length()).asin() + reach;
-                let (axis, least) = (way.normalize(), widest.min(std::f64::consts::PI).cos());
-                for (texel, _) in middles.iter().enumerate().filter(|(_, middle)| middle.dot(axis) >= least) {
-                    for mask in [&mut *missed, &mut *hit] {
-                        mask[texel / 32] |= 1 << (texel % 32);
-                    }
-                }
+            };
+            if !cones.mark(cell as u32, boxes, mark) {
+                *label = UNKNOWN;
             }
         });
         marked
+    }
+
+    /// Of some cells of the scene's field, the texels in which rays may answer otherwise, as a mask has them, where there are any: all where a box meets
+    /// the cell.
+    pub fn concerned(&self, cells: &[u32], boxes: &[[DVec3; 2]]) -> Vec<Option<Vec<u32>>> {
+        let (cones, words) = (Cones::new(self.shape), self.shape.words() / 2);
+        let of_cell = |&cell: &u32| {
+            let mut texels = vec![0u32; words];
+            if !cones.mark(cell, boxes, |texel| texels[texel / 32] |= 1 << (texel % 32)) {
+                return Some(vec![u32::MAX; words]);
+            }
+            // Nothing starts in a cell of which nothing is known and that no mover has come to.
+            let is_known = self.labels[cell as usize] != UNKNOWN;
+            (is_known && texels.iter().any(|&word| word != 0)).then_some(texels)
+        };
+        cells.par_iter().map(of_cell).collect()
     }
 }
 
@@ -129,6 +169,18 @@ mod tests {
             }
         }
         assert!(toward > 2000 && free > 120_000, "{toward} {free}");
+        // What is made anew is what is traced.
+        let cells: Vec<u32> = (0..shape.cells() as u32).collect();
+        for (cell, texels) in cells.iter().zip(field.concerned(&cells, &boxes)) {
+            let words = shape.words() / 2;
+            let [before, after] =
+                [&field, &marked].map(|field| &field.masks[2 * words * *cell as usize..][words..2 * words]);
+            match (texels, marked.labels[*cell as usize]) {
+                (texels, UNKNOWN) => assert_eq!(texels, Some(vec![u32::MAX; words])),
+                (Some(texels), _) => assert!(before.iter().zip(&texels).zip(after).all(|((a, b), c)| a | b == *c)),
+                (None, _) => assert_eq!(before, after),
+            }
+        }
         assert_eq!(field.with_movers(&[]), field);
     }
 }

@@ -1,6 +1,7 @@
 //! The grid of a field.
 
 use super::mask;
+use super::movers::MARGIN;
 use glam::DVec3;
 
 /// Where the cells of a field lie.
@@ -60,6 +61,21 @@ impl Shape {
         let [x, y, z] = at.to_array().map(|x| x as u32);
         inside.then(|| (z * self.size[1] + y) * self.size[0] + x)
     }
+
+    /// The cells that a box of the world meets, by the roundings of kernels.
+    pub fn cells_of(&self, [min, max]: [DVec3; 2]) -> impl Iterator<Item = u32> + use<> {
+        let Self { corner, side, size, .. } = *self;
+        let range = |k: usize| {
+            let at = |x: f64| (x - corner[k]) / side;
+            // A float-to-integer cast saturates.
+            let (first, end) = ((at(min[k]) - MARGIN).max(0.0), (at(max[k]) + MARGIN).floor() + 1.0);
+            first as u32..(end.max(0.0) as u32).min(size[k])
+        };
+        let (y, z) = (range(1), range(2));
+        let rows = z.flat_map(move |z| y.clone().map(move |y| (z * size[1] + y) * size[0]));
+        let x = range(0);
+        rows.flat_map(move |row| x.clone().map(move |x| row + x))
+    }
 }
 
 #[cfg(test)]
@@ -80,6 +96,26 @@ mod tests {
             assert_eq!(shape.cell(min - shape.side), None);
         }
         assert_eq!(Shape::new(DVec3::ONE, DVec3::ONE, 16, 8).cells(), 1);
+    }
+
+    #[test]
+    fn the_cells_of_a_box_hold_its_points() {
+        let shape = Shape::new(DVec3::ZERO, DVec3::new(10.0, 3.0, 7.0), 21, 8);
+        let bounds = [DVec3::new(-1.0, 0.7, 2.0), DVec3::new(4.0, 1.1, 2.0)];
+        let cells: Vec<u32> = shape.cells_of(bounds).collect();
+        let mut found: Vec<u32> = (0..1000u32)
+            .filter_map(|i| {
+                let [a, b] = crate::math::sampling::random2(i, 0, 0).map(f64::from);
+                shape.cell(bounds[0] + (bounds[1] - bounds[0]) * DVec3::new(a, b, 0.0))
+            })
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        assert_eq!(cells, found);
+        let whole = [DVec3::splat(-1e30), DVec3::splat(1e30)];
+        assert_eq!(shape.cells_of(whole).count() as u64, shape.cells());
+        assert_eq!(shape.cells_of([DVec3::splat(-9.0), DVec3::splat(-8.0)]).count(), 0);
+        assert_eq!(shape.cells_of([DVec3::splat(80.0), DVec3::splat(90.0)]).count(), 0);
     }
 
     #[test]

@@ -13,8 +13,9 @@ const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 const NONE: &str = "–";
 
 /// What a field of the records means, with its unit. Fields that are not listed are shown without.
-const MEANINGS: [(&str, &str); 47] = [
+const MEANINGS: [(&str, &str); 50] = [
     ("rays", "rays traced"),
+    ("rays_answered", "rays besides that a field of visibility answered"),
     ("ms", "wall time from submission to fence, ms"),
     ("ms_phase1", "device time of phase 1: what was known and resident, ms"),
     ("ms_phase2", "device time of phase 2: queries, ms"),
@@ -45,6 +46,8 @@ const MEANINGS: [(&str, &str); 47] = [
     ("bricks_resident_start", "payloads resident at the start"),
     ("bricks_resident_end", "payloads resident at the end"),
     ("rays_capped", "rays that ROMA finished along their map's direction, after as many columns as they may pass"),
+    ("cells_renewed", "cells of the field of visibility made anew for what moves"),
+    ("cells_left", "cells in sight that were not, although it concerns them"),
     ("load_batches", "batches of loads"),
     ("bytes_needed", "bytes of BVH and geometry of the needed bricks, where measured"),
     ("bytes_needed_missing", "of these, bytes not resident when the pass began"),
@@ -64,8 +67,8 @@ const MEANINGS: [(&str, &str); 47] = [
 ];
 
 /// Fields that tell a state, not an amount: their sum over the frames means nothing.
-const STATES: [&str; 5] =
-    ["bricks_resident_start", "bricks_resident_end", "cache_bytes", "cache_used_bytes", "cache_passes"];
+const STATES: [&str; 6] =
+    ["bricks_resident_start", "bricks_resident_end", "cache_bytes", "cache_used_bytes", "cache_passes", "cells_left"];
 
 fn meaning(field: &str) -> &'static str {
     MEANINGS.iter().find(|(name, _)| *name == field).map_or("", |(_, text)| text)

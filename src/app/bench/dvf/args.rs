@@ -11,6 +11,9 @@ use std::path::PathBuf;
 /// What begins the options of a field that is made anew in every frame, as in the paper.
 pub const ANEW: &str = "anew ";
 
+/// What begins the options of a field whose cells are made anew for what moves, within a budget of rays a frame.
+pub const RENEWED: &str = "renewed ";
+
 /// Options of `bench dvf`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
@@ -138,12 +141,14 @@ impl DvfBenchArgs {
             .to_vec(),
             Stage::Modes => ["same-sample", "paper"].map(|mode| of(&format!("--dvf-cells 40 --dvf-mode {mode}"))).to_vec(),
             // The paper's cells of the Cornell box.
-            Stage::Flicker => ["--dvf-mode same-sample", "--dvf-mode paper", "anew --dvf-mode same-sample", "anew --dvf-mode paper"]
-                .map(|way| {
-                    let (anew, mode) = way.strip_prefix(ANEW).map_or(("", way), |mode| (ANEW, mode));
-                    format!("{anew}--dvf-points {} --dvf-rays {rays} --dvf-cells 16 {mode}", (points / 25).max(100))
+            Stage::Flicker => ["", RENEWED, ANEW]
+                .into_iter()
+                .flat_map(|way| ["same-sample", "paper"].map(|mode| (way, mode)))
+                .map(|(way, mode)| {
+                    let points = (points / 25).max(100);
+                    format!("{way}--dvf-points {points} --dvf-rays {rays} --dvf-cells 16 --dvf-mode {mode}")
                 })
-                .to_vec(),
+                .collect(),
             Stage::Memory => vec![of("--dvf-region view --dvf-cells 40")],
         }
     }

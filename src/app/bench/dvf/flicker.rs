@@ -7,12 +7,13 @@
 //! scene by other rays. A pixel *jumps* where it changes by more than 99 of 100 pixels differ by noise. The paper's mode draws rays otherwise
 //! than exact ones are, so it has a brute force of its own.
 
-use super::args::ANEW;
+use super::args::{ANEW, RENEWED};
 use super::{Picture, Values, View};
 use crate::app::args::WalkArgs;
 use crate::app::bench::measure::walk_args;
+use crate::app::dvf::renewal;
 use crate::kernel::layout::NONE;
-use crate::metrics::{Change, Image, flicker};
+use crate::metrics::{Change, Image, PIXELS_PER_DEGREE, flicker, flip_ldr};
 use crate::render::Dvf;
 use crate::scene::motion::{Motion, Movers};
 use crate::visibility::dvf::{DvfField, DvfUse, Shape, mask};
@@ -106,42 +107,67 @@ fn time(frame: u32) -> f64 {
     STEP * f64::from(frame)
 }
 
-/// The flicker of the field that `options` ask for: of the scene as it is at first, which knows of what moves, or made anew in every frame.
+/// What becomes of a field while something moves.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// It is that of the scene as it is at first, and knows of what has moved.
+    Told,
+    /// Of it, cells are made anew.
+    Renewed,
+    /// All of it is made anew in every frame.
+    Anew,
+}
+
+/// The flicker of the field that `options` ask for, and which rays are traced.
 ///
 /// # Errors
 /// As of [`Truth`], and those of making fields.
 pub fn measure(view: &mut View, options: &str) -> Result<Values> {
-    let (is_anew, options) = options.strip_prefix(ANEW).map_or((false, options), |options| (true, options));
+    let ways = [(Way::Anew, ANEW), (Way::Renewed, RENEWED), (Way::Told, "")];
+    let of_way = ways.into_iter().find_map(|(way, prefix)| Some((way, options.strip_prefix(prefix)?)));
+    let (way, options) = of_way.unwrap_or((Way::Told, options));
     let options = walk_args(options, &view.place.scene, &view.args.adapter)?;
     let of_mode = usize::from(options.dvf.how().paper);
     let truth = match view.truth[of_mode].take() {
         Some(truth) => truth,
         None => Truth::of(view, options.dvf.how())?,
     };
-    let values = of_truth(view, &options, is_anew, &truth);
+    let values = of_truth(view, &options, way, &truth);
     view.renderer.place(&truth.still, &truth.movers.at(0.0))?;
     view.renderer.dvf = Dvf::default();
     view.truth[of_mode] = Some(truth);
     values
 }
 
-fn of_truth(view: &mut View, options: &WalkArgs, is_anew: bool, truth: &Truth) -> Result<Values> {
+fn of_truth(view: &mut View, options: &WalkArgs, way: Way, truth: &Truth) -> Result<Values> {
     let how = options.dvf.how();
     let noise = truth.noise.p99;
     let mut values = Values::from([("noise_p99".into(), noise), ("noise_mean".into(), truth.noise.mean)]);
     let (mut rays, mut traced, mut points, mut longest) = (0.0, 0.0, 0, 0);
+    let (mut of_fields, mut cells, mut flip) = (0.0, 0.0, 0.0);
     let (mut jumps, mut greatest, mut mean) = (0.0f64, 0.0f64, 0.0);
     let mut before: Option<Picture> = None;
     for (frame, brute) in (0..FRAMES).zip(&truth.frames) {
         view.renderer.place(&truth.still, &truth.movers.at(time(frame)))?;
-        if is_anew || frame == 0 {
+        if way == Way::Anew || frame == 0 {
             view.renderer.dvf = Dvf::default();
+            let region = view.region(options)?;
             let (made, _) = view.make(options)?;
             (points, longest) = (made.points, made.field.shape.size.into_iter().max().unwrap_or(0));
             view.renderer.dvf = Dvf::new(Arc::new(made.field), how);
+            match way {
+                Way::Anew => of_fields += made.record.rays as f64,
+                Way::Renewed => {
+                    let renewal = renewal(options, Arc::new(made.kept), region);
+                    view.renderer.dvf = std::mem::take(&mut view.renderer.dvf).renewed_by(renewal);
+                }
+                Way::Told => {}
+            }
         }
         let picture = view.picture(0)?;
         (rays, traced) = (rays + brute.picture.traced, traced + picture.traced);
+        (of_fields, cells) = (of_fields + picture.renewal[0], cells + picture.renewal[1]);
+        flip += flip_ldr(&picture.image, &brute.picture.image, PIXELS_PER_DEGREE)?.mean();
         if let Some(before) = &before {
             let brute_before = &truth.frames[frame as usize - 1].picture.image;
             let pictures = [[&before.image, brute_before], [&picture.image, &brute.picture.image]];
@@ -165,6 +191,10 @@ fn of_truth(view: &mut View, options: &WalkArgs, is_anew: bool, truth: &Truth) -
         ("rays".into(), rays),
         ("traced".into(), traced),
         ("fewer".into(), rays / traced.max(1.0)),
+        ("of_fields".into(), of_fields),
+        ("fewer_with_fields".into(), rays / (traced + of_fields).max(1.0)),
+        ("cells_renewed".into(), cells),
+        ("flip".into(), flip / f64::from(FRAMES)),
         ("jumps".into(), jumps),
         ("greatest_to_noise".into(), greatest / noise.max(f64::MIN_POSITIVE)),
         ("mean_to_noise".into(), mean / f64::from(FRAMES - 1) / truth.noise.mean.max(f64::MIN_POSITIVE)),

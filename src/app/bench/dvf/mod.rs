@@ -21,7 +21,7 @@ use crate::app::session::{Session, open_scene};
 use crate::app::walk;
 use crate::kernel::{DeviceInfo, Extent};
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
-use crate::render::{Dvf, DvfMade, Region, Renderer};
+use crate::render::{DVF_EFFECT, Dvf, DvfMade, Region, Renderer};
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use anyhow::{Context, Result, bail};
@@ -37,7 +37,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Raised when a value changes its meaning.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// The box's name.
 const BOX: &str = "cornell";
@@ -61,6 +61,8 @@ struct Picture {
     ids: Vec<u32>,
     traced: f64,
     answered: f64,
+    /// Rays by which cells of the field were made anew, and these cells.
+    renewal: [f64; 2],
     ms: f64,
 }
 
@@ -208,7 +210,7 @@ impl<'a> View<'a> {
         let session = Session::open(open_scene(&place.scene)?, &place.scene, &options.stream, extent)?;
         let renderer = walk::renderer(session, &options)?;
         let image = Image { width: 0, height: 0, rgb: Vec::new() };
-        let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, ms: 0.0 };
+        let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, renewal: [0.0; 2], ms: 0.0 };
         let mut view = Self { place, args, renderer, exact: nothing, truth: [None, None] };
         view.exact = view.picture(0)?;
         Ok(view)
@@ -220,18 +222,25 @@ impl<'a> View<'a> {
             self.renderer.frame(frame, &self.place.camera).with_context(|| self.place.scene.display().to_string())?;
         let record = output.records.iter().find(|record| record.pass == "environment");
         let record = record.context("no rays lead to the environment")?;
+        let renewal = output.records.iter().find(|record| record.pass == DVF_EFFECT);
+        let renewal = renewal.map_or([0.0; 2], |record| [record.rays as f64, record.cells_renewed as f64]);
         let (width, height) = (self.renderer.size.0 as usize, self.renderer.size.1 as usize);
         let (traced, answered, ms) = (record.rays as f64, record.rays_answered as f64, record.ms);
         let image = Image { width, height, rgb: output.pixels.radiance };
-        Ok(Picture { image, ids: output.pixels.id, traced, answered, ms })
+        Ok(Picture { image, ids: output.pixels.id, traced, answered, renewal, ms })
+    }
+
+    /// Where the field is that `options` ask for.
+    fn region(&mut self, options: &WalkArgs) -> Result<Region> {
+        Ok(match options.dvf.dvf_region {
+            RegionKind::Scene => Region::scene(self.renderer.scene.resident()),
+            RegionKind::View => self.renderer.visible_region(&[self.place.camera])?,
+        })
     }
 
     /// Makes the field that `options` ask for, which are those of a walk.
     fn make(&mut self, options: &WalkArgs) -> Result<(DvfMade, f64)> {
-        let region = match options.dvf.dvf_region {
-            RegionKind::Scene => Region::scene(self.renderer.scene.resident()),
-            RegionKind::View => self.renderer.visible_region(&[self.place.camera])?,
-        };
+        let region = self.region(options)?;
         field::make(&mut self.renderer, &options.dvf.settings(), &region, options.dvf.tracing())
     }
 

@@ -1,6 +1,6 @@
 //! Plots of the bench: what its figures show, of every scene that was measured.
 
-use super::args::{DvfBenchArgs, Stage};
+use super::args::{ANEW, DvfBenchArgs, RENEWED, Stage};
 use super::flicker::FRAMES;
 use super::key;
 use crate::app::bench::rows::Rows;
@@ -109,7 +109,8 @@ fn over_frames(args: &DvfBenchArgs, scene: &str, rows: &Rows) -> Option<Graph> {
         let at =
             |frame: u32| Some((f64::from(frame), rows.value(&key, &format!("change_greatest at {frame}"))? / noise));
         let name = options.split("--dvf-mode ").last().unwrap_or_default();
-        let name = if options.starts_with(super::args::ANEW) { format!("{name}, anew") } else { name.into() };
+        let way = [ANEW, RENEWED].into_iter().find(|way| options.starts_with(way));
+        let name = way.map_or_else(|| name.to_string(), |way| format!("{name}, {}", way.trim_end()));
         Some((name, (1..FRAMES).filter_map(at).collect()))
     };
     let lines: Vec<Line> = args.measurements(Stage::Flicker).into_iter().filter_map(line).collect();
