@@ -93,7 +93,8 @@ fn record<'a>(output: &'a FrameOutput, pass: &str) -> Option<&'a brickwalk::stat
 fn renewed_cells_are_those_of_a_field_made_from_scratch() {
     let folder = folder();
     let scene = boxes(folder.path());
-    let asked = DvfSettings { points: 8_000, rays: 32, cells: Cells::Longest(14), ..DvfSettings::default() };
+    let asked =
+        DvfSettings { points: 8_000, rays: 32, cells: Cells::Longest(14), octahedral: 16, ..DvfSettings::default() };
     for settings in [
         asked,
         DvfSettings { hammersley: false, both: true, round: true, ..asked },
@@ -155,7 +156,8 @@ fn renewed_cells_are_those_of_a_field_made_from_scratch() {
 fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     let folder = folder();
     let scene = boxes(folder.path());
-    let settings = DvfSettings { points: 8_000, rays: 64, cells: Cells::Longest(14), ..DvfSettings::default() };
+    let settings =
+        DvfSettings { points: 8_000, rays: 64, cells: Cells::Longest(14), octahedral: 16, ..DvfSettings::default() };
     // By exact rays; by a field that is told; one that may be renewed by no ray; by some.
     let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 48"));
     let budget = 60_000;
@@ -184,19 +186,26 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     println!("{left:?} rays are left, {spent} spent; of {} pixels {wrong:?} differ", 2 * 96 * 72);
     // What is renewed pays within its frame.
     assert!(left[1] + spent < left[0], "{left:?} {spent}");
-    // At rest, frame by frame more is renewed, until nothing is left.
-    let mut before = u64::MAX;
-    for frame in 2..60 {
-        let output = all[3].frame(frame, &camera()).expect("a frame");
-        let own = record(&output, "dvf").expect("a record");
-        assert!(own.rays <= budget && own.cells_left <= before, "{own:?}");
-        before = own.cells_left;
-        if before == 0 {
-            println!("nothing is left in frame {frame}");
-            break;
+    // At rest, frame by frame more is renewed; where what it takes does not matter, until nothing is left.
+    let mut rest = |step: u32, horizon: u32| {
+        all[3].dvf = dvf(&Renewal { frames: horizon, ..renewal.clone() });
+        all[3].place(&stills[3], &[(1, matrix(&stills[3], step))]).expect("a place");
+        let mut left = Vec::new();
+        for frame in 0..30 {
+            let output = all[3].frame(frame, &camera()).expect("a frame");
+            let own = record(&output, "dvf").expect("a record");
+            assert!(own.rays <= budget && left.last().is_none_or(|before| own.cells_left <= *before), "{own:?}");
+            left.push(own.cells_left);
+            if own.cells_left == 0 {
+                break;
+            }
         }
-    }
-    assert_eq!(before, 0);
+        println!("cells left at rest, frame by frame: {left:?}");
+        (left[0], left[left.len() - 1])
+    };
+    let (first, last) = rest(2, 1);
+    assert!(last > 0 && 2 * last < first, "{last} of {first}");
+    assert_eq!(rest(3, u32::MAX).1, 0);
     // Of few rays all are spent but for less than a cell takes.
     all[2].dvf = dvf(&Renewal { rays: 3000, frames: u32::MAX, ..renewal.clone() });
     all[2].place(&stills[2], &[(1, matrix(&stills[2], 2))]).expect("a place");
@@ -217,7 +226,8 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
 fn pictures_are_those_of_exact_rays() {
     let folder = folder();
     let scene = boxes(folder.path());
-    let settings = DvfSettings { points: 30_000, rays: 128, cells: Cells::Longest(10), ..DvfSettings::default() };
+    let settings =
+        DvfSettings { points: 30_000, rays: 128, cells: Cells::Longest(10), octahedral: 16, ..DvfSettings::default() };
     let mut all = [(); 3].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 4"));
     let mut renewal = renewal(&mut all[1], &settings, 1 << 40);
     renewal.frames = u32::MAX;

@@ -29,8 +29,8 @@ pub struct DvfArgs {
     /// the fewest of some trial rays and answer at most 0.1 % of them wrongly
     #[arg(long, value_name = "CELLS", default_value = "auto", value_parser = cells)]
     pub dvf_cells: Cells,
-    /// With --secondary dvf: texels of a cell's masks of directions on both axes: 8, 16 or 32; of 16, a cell takes 64 bytes
-    #[arg(long, value_name = "TEXELS", default_value = "16", value_parser = |s: &str| of(s, &[8, 16, 32]))]
+    /// With --secondary dvf: texels of a cell's masks of directions on both axes: 8, 16 or 32; of 32, a cell takes 256 bytes
+    #[arg(long, value_name = "TEXELS", default_value = "32", value_parser = |s: &str| of(s, &[8, 16, 32]))]
     pub dvf_octahedral: u32,
     /// With --secondary dvf: whether masks are widened by a texel to all sides: on traces more rays and answers fewer wrongly
     #[arg(long, value_name = "on|off", default_value = "on")]

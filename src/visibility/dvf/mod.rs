@@ -88,7 +88,7 @@ impl Default for DvfSettings {
             points: 400_000,
             rays: 128,
             cells: Cells::Auto,
-            octahedral: 16,
+            octahedral: 32,
             dilate: true,
             hammersley: true,
             round: false,

@@ -140,13 +140,13 @@ impl DvfBenchArgs {
             .map(|options| of(&format!("--dvf-cells 40 {options}")))
             .to_vec(),
             Stage::Modes => ["same-sample", "paper"].map(|mode| of(&format!("--dvf-cells 40 --dvf-mode {mode}"))).to_vec(),
-            // The paper's cells of the Cornell box.
+            // The paper's cells of the Cornell box, and masks so coarse that what labels do is to be seen.
             Stage::Flicker => ["", RENEWED, ANEW]
                 .into_iter()
                 .flat_map(|way| ["same-sample", "paper"].map(|mode| (way, mode)))
                 .map(|(way, mode)| {
                     let points = (points / 25).max(100);
-                    format!("{way}--dvf-points {points} --dvf-rays {rays} --dvf-cells 16 --dvf-mode {mode}")
+                    format!("{way}--dvf-points {points} --dvf-rays {rays} --dvf-cells 16 --dvf-octahedral 16 --dvf-mode {mode}")
                 })
                 .collect(),
             Stage::Memory => vec![of("--dvf-region view --dvf-cells 40")],
