@@ -40,6 +40,12 @@ fn case_of(defect: Defect) -> u32 {
 }
 
 #[test]
+fn every_case_passes_on_the_processor() {
+    let report = test(&args("--adapter cpu")).expect("the processor");
+    assert!(failed(&report).is_empty(), "{:#?}", report.rows);
+}
+
+#[test]
 fn every_planted_defect_is_noticed() {
     let Some(adapter) = candidates().into_iter().find(|candidate| candidate.flaw.is_none()) else {
         println!("skipped: no graphics adapter");

@@ -92,20 +92,27 @@ fn patterns(words: u32) -> Vec<Pattern> {
     all
 }
 
-/// Where the ray from depth `from` to `to` meets the first cell of a pattern, as far along as its middle lies; `None`: nowhere.
+/// Where the ray from depth `from` to `to` meets the first cell of a pattern of those between its first and its last whose middles it passes, as far
+/// along as that middle lies; `None`: nowhere.
 fn first_met(pattern: &Pattern, size: u32, from: f32, to: f32, is_upward: bool) -> Option<f32> {
-    let (low, high) = (from.min(to).floor() as i64, from.max(to).floor() as i64);
+    let middle = |z: i64| if is_upward { z as f32 + 0.5 - from } else { from - z as f32 - 0.5 };
+    // The ray is in the maps from the first of these distances on, up to the second or its end.
+    let side = |z: f32| if is_upward { z - from } else { from - z };
+    let (near, far) = if is_upward { (0.0, size as f32) } else { (size as f32, 0.0) };
+    let length = (to - from).abs();
+    let first = side(near).max(0.0) + 0.5;
+    let last = if side(far) < length { side(far) } else { length - 0.5 };
+    if first > last {
+        return None;
+    }
+    let depth = |t: f32| (if is_upward { from + t } else { from - t }).floor() as i64;
+    let (low, high) = (depth(first).min(depth(last)), depth(first).max(depth(last)));
     let mut cells: Vec<i64> = (low.max(0)..=high.min(i64::from(size) - 1)).collect();
     if !is_upward {
         cells.reverse();
     }
-    let middle = |z: i64| if is_upward { z as f32 + 0.5 - from } else { from - z as f32 - 0.5 };
-    // The ray is in the maps from the first of these distances on, up to its end.
-    let side = |z: f32| if is_upward { z - from } else { from - z };
-    let (near, far) = if is_upward { (0.0, size as f32) } else { (size as f32, 0.0) };
-    let length = (to - from).abs();
     let cell = cells.into_iter().find(|&z| pattern(z as u32))?;
-    Some(middle(cell).max(side(near).max(0.0)).min(side(far).min(length)))
+    Some(middle(cell).max(first).min(last))
 }
 
 /// Case 41: rays along columns from every depth to every other, both ways, of one word, of two, of four and of eight.
@@ -169,9 +176,8 @@ pub fn bits(lab: &mut Lab) -> Result<Checks> {
     Ok(checks)
 }
 
-/// When a ray is in a box, `grown` by so much to all sides.
-fn within(ray: &Ray, [low, high]: [DVec3; 2], grown: f64) -> Option<[f64; 2]> {
-    let mut range = [f64::from(ray.t_min), f64::from(ray.t_max)];
+/// When a ray is in a box, `grown` by so much to all sides, in a range of t.
+fn within(ray: &Ray, [low, high]: [DVec3; 2], grown: f64, mut range: [f64; 2]) -> Option<[f64; 2]> {
     for k in 0..3 {
         let (o, d) = (f64::from(ray.origin[k]), f64::from(ray.direction[k]));
         let sides = [low[k] - grown - o, high[k] + grown - o];
@@ -187,13 +193,36 @@ fn within(ray: &Ray, [low, high]: [DVec3; 2], grown: f64) -> Option<[f64; 2]> {
     (range[0] <= range[1]).then_some(range)
 }
 
-/// Whether an answer is that of brute force over the boxes of all occupied cells; what is closer to a border than [`CLOSE`] may be decided
+/// Ranges of t in which a ray counts for certain, and at most: from where it is half a cell in the maps, up to half a cell before its end, of the level that
+/// has this. Levels have 32 cells from 0 on, of side 1, and where there are two 32 of side 2 from -16 on. Rays leave the first one up to two cells before its
+/// sides; `None`: it is in none.
+fn counted(ray: &Ray, levels: usize) -> Option<[[f64; 2]; 2]> {
+    let (low, side) = if levels == 1 { (0.0, 32.0) } else { (-16.0, 64.0) };
+    let direction = DVec3::from(ray.direction.map(f64::from));
+    let half = 0.5 / direction.length();
+    let end = f64::from(ray.t_max);
+    let [from, to] = within(ray, of_cell([low; 3], side), 0.0, [f64::from(ray.t_min), end])?;
+    let last = DVec3::from(ray.origin.map(f64::from)) + end * direction;
+    let is_in = |low: f64, high: f64| last.min_element() >= low && last.max_element() <= high;
+    let less = match levels {
+        _ if to < end => [0.0; 2],
+        1 => [half; 2],
+        _ if is_in(2.0, 30.0) => [half; 2],
+        _ if is_in(0.0, 32.0) => [2.0 * half, 0.0],
+        _ => [2.0 * half; 2],
+    };
+    Some(less.map(|less| [from + half, to - less]))
+}
+
+/// Whether an answer is that of brute force over the boxes of all occupied cells, of so many levels; what is closer to a border than [`CLOSE`] may be decided
 /// either way.
-fn is_right(ray: &Ray, hit: &Hit, boxes: &[[DVec3; 2]]) -> bool {
+fn is_right(ray: &Ray, hit: &Hit, boxes: &[[DVec3; 2]], levels: usize) -> bool {
     let t = f64::from(hit.t);
     let slack = CLOSE / DVec3::from(ray.direction.map(f64::from)).length();
+    let Some([certain, most]) = counted(ray, levels) else { return hit.id == NONE };
+    let (certain, most) = ([certain[0] + slack, certain[1] - slack], [most[0] - slack, most[1] + slack]);
     // Of the cells that it may meet, when it is there, and whether it meets them for certain.
-    let met = |b: &[DVec3; 2]| Some((within(ray, *b, CLOSE)?, within(ray, *b, -CLOSE).is_some()));
+    let met = |b: &[DVec3; 2]| Some((within(ray, *b, CLOSE, most)?, within(ray, *b, -CLOSE, certain).is_some()));
     let met: Vec<([f64; 2], bool)> = boxes.iter().filter_map(met).collect();
     let is_in_one = || met.iter().any(|([from, to], _)| from - slack <= t && t <= to + slack);
     // It may not have passed through another.
@@ -240,7 +269,7 @@ pub fn leaving(lab: &mut Lab) -> Result<Checks> {
         let rays = anywhere(&mut rng, count, [-8.0, 40.0]);
         let hits = answers(&mut stage, &rays, MOST_STEPS)?;
         let wrong =
-            |boxes: &[[DVec3; 2]]| rays.iter().zip(&hits).filter(|(r, h)| !is_right(r, h, boxes)).count() as u64;
+            |boxes: &[[DVec3; 2]]| rays.iter().zip(&hits).filter(|(r, h)| !is_right(r, h, boxes, 1)).count() as u64;
         checks.none(&format!("answers unlike brute force, columns along axis {axis}"), wrong(&boxes), count as u64);
         let met = hits.iter().filter(|hit| hit.id == ROMA_HIT).count() as u64;
         checks.at_least("rays that meet something", met, count as u64 / 20);
@@ -264,7 +293,7 @@ pub fn leaving(lab: &mut Lab) -> Result<Checks> {
     make(&mut stage, levels, &aligned(cells, &[(1.0, 0.0), (0.5, 8.0)], 1))?;
     let rays = anywhere(&mut rng, count, [2.0, 30.0]);
     let hits = answers(&mut stage, &rays, MOST_STEPS)?;
-    let wrong = |boxes: &[[DVec3; 2]]| rays.iter().zip(&hits).filter(|(r, h)| !is_right(r, h, boxes)).count() as u64;
+    let wrong = |boxes: &[[DVec3; 2]]| rays.iter().zip(&hits).filter(|(r, h)| !is_right(r, h, boxes, 2)).count() as u64;
     checks.none("answers unlike brute force where rays go on in the next level", wrong(&boxes), count as u64);
     let inner: Vec<[DVec3; 2]> = boxes.iter().filter(|[low, high]| (*high - *low).x < 1.5).copied().collect();
     checks.at_least("answers unlike those of the first level alone", wrong(&inner), count as u64 / 50);

@@ -183,7 +183,9 @@ pub fn closed_box(lab: &mut Lab) -> Result<Checks> {
     let image = Equirectangular::of(32, 16, |[x, y, z]| [1e4 * (1.1 + x), 1e4 * (1.1 + y), 1e4 * (1.1 + z)]);
     renderer.light.lamps = Arc::new(Lamps::new(Some(environment(image, 1.0, 0.0).0), Vec::new(), 1.0));
     // The front of the cube is outside.
-    let plan = DvfSettings { points: 4000, rays: 64, both: true, cells: Cells::Longest(4), ..DvfSettings::default() };
+    // So coarse that as few rays reach every texel.
+    let plan = DvfSettings { octahedral: 16, points: 4000, rays: 64, both: true, ..DvfSettings::default() };
+    let plan = DvfSettings { cells: Cells::Longest(4), ..plan };
     let made = renderer.make_dvf(&plan, &Region::scene(file.resident()), DvfTracing::over(64), &mut |_, _| true)?;
     checks.at_least("points", made.points, 4000);
     for doubt in [false, true] {
