@@ -2,21 +2,14 @@
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command as AppCommand};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk;
-use brickwalk::kernel::{Extent, Lamps};
-use brickwalk::render::{
-    Dvf, DvfMade, DvfTracing, Equirectangular, FrameOutput, Region, RenderError, Renderer, environment,
-};
+use brickwalk::render::{Dvf, DvfMade, DvfTracing, FrameOutput, Region, RenderError, Renderer};
 use brickwalk::scene::Camera;
 use brickwalk::scene::path::CameraPath;
 use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings, generate};
-use clap::Parser;
-use common::{city, folder};
+use common::{city, converted, folder};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -24,29 +17,7 @@ use std::sync::Arc;
 
 /// A renderer of a scene in an environment that is 1 everywhere.
 fn renderer(scene: &Path, options: &str) -> Renderer {
-    let options =
-        if options.contains("--effects") { options.into() } else { format!("{options} --effects environment") };
-    let words =
-        format!("brickwalk walk {} -o o --tile 16 --adapter cpu --aov --sun-intensity 0 {options}", scene.display());
-    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
-        panic!("a walk")
-    };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    let mut renderer = walk::renderer(session, &args).expect("lamps");
-    let even = Equirectangular::of(16, 8, |_| [1.0; 3]);
-    renderer.light.lamps = Arc::new(Lamps::new(Some(environment(even, 1.0, 0.0).0), Vec::new(), 1.0));
-    renderer
-}
-
-/// A scene of an OBJ file.
-fn converted(folder: &Path, shape: &str) -> PathBuf {
-    let input = folder.join("shape.obj");
-    std::fs::write(&input, shape).expect("a shape");
-    let scene = folder.join("shape.bricks");
-    let words = ["--brick-triangles", "64"].map(AsRef::as_ref);
-    common::succeed(["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()].into_iter().chain(words));
-    scene
+    common::evenly_lit(scene, "environment", options)
 }
 
 /// A cube of `n` x `n` squares a side from -1 to 1, its front outside or inside.
@@ -70,7 +41,7 @@ fn cube(folder: &Path, n: usize, is_inside_out: bool) -> PathBuf {
         }
         count += (n + 1) * (n + 1);
     }
-    converted(folder, &text)
+    converted(folder, &text, "--brick-triangles 64")
 }
 
 fn settings(points: u32, longest: u32) -> DvfSettings {
@@ -188,8 +159,7 @@ fn rays_that_are_not_answered_are_those_without_a_field() {
     let (differ, ..) = compared(&mut renderer, Some((&flipped(&many), MASKS)), &camera);
     assert!(differ > pixels / 10, "{differ} pixels differ by a field that is wrong");
     // Hits of bounces ask, too.
-    let mut renderer =
-        self::renderer(&scene, "--size 32x32 --cache 100% --effects environment,diffuse --diffuse-rays 2");
+    let mut renderer = common::evenly_lit(&scene, "environment,diffuse", "--size 32x32 --cache 100% --diffuse-rays 2");
     renderer.dvf = Dvf::new(Arc::new(many), LABEL);
     let records = renderer.frame(0, &camera).expect("a frame").records;
     let of_bounces = records.iter().find(|record| record.pass == "diffuse-environment").expect("a record");

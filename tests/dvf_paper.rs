@@ -2,15 +2,11 @@
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command as AppCommand};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk;
-use brickwalk::kernel::{Extent, Lamps};
+use brickwalk::kernel::Lamps;
 use brickwalk::render::{Dvf, DvfTracing, Equirectangular, Region, Renderer, environment};
 use brickwalk::scene::Camera;
 use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
-use clap::Parser;
-use common::folder;
+use common::{converted, folder, sheet};
 use glam::DVec3;
 use std::path::Path;
 use std::sync::Arc;
@@ -23,38 +19,18 @@ const HEIGHT: f64 = 1.0;
 
 /// A floor of squares in the plane y = 0 from x = 0 to 4, and, if there is one, a wall in the plane x = 0 that is so high and, as good as, endless.
 fn renderer(folder: &Path, has_wall: bool, options: &str) -> Renderer {
-    let (mut text, mut count) = (String::new(), 1);
-    let mut sheet = |from: [f64; 3], u: [f64; 3], v: [f64; 3], [columns, rows]: [usize; 2]| {
-        for (i, j) in (0..=rows).flat_map(|j| (0..=columns).map(move |i| (i, j))) {
-            let at = |k: usize| from[k] + u[k] * i as f64 / columns as f64 + v[k] * j as f64 / rows as f64;
-            text += &format!("v {} {} {}\n", at(0), at(1), at(2));
-        }
-        for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
-            let a = count + i + j * (columns + 1);
-            let [b, c, d] = [a + 1, a + columns + 2, a + columns + 1];
-            text += &format!("f {a} {b} {c} {d}\n");
-        }
-        count += (columns + 1) * (rows + 1);
-    };
-    sheet([0.0, 0.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0], [16, 16]);
+    let (mut text, mut count) = (String::new(), 0);
+    let mut add = |corner, edges, squares| sheet(&mut text, &mut count, corner, edges, squares);
+    add(DVec3::new(0.0, 0.0, -2.0), [DVec3::Z * 4.0, DVec3::X * 4.0], [16, 16]);
     if has_wall {
-        sheet([0.0, 0.0, 60.0], [0.0, 0.0, -120.0], [0.0, HEIGHT, 0.0], [480, 4]);
+        add(DVec3::new(0.0, 0.0, 60.0), [DVec3::Z * -120.0, DVec3::Y * HEIGHT], [480, 4]);
     }
-    let input = folder.join("floor.obj");
-    std::fs::write(&input, text).expect("a shape");
-    let scene = folder.join("floor.bricks");
-    common::succeed(["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()]);
+    let scene = converted(folder, &text, "");
     let size = format!("{}x{}", SIZE[0], SIZE[1]);
-    let words = format!(
-        "brickwalk walk {} -o o --tile 8 --adapter cpu --aov --sun-intensity 0 --size {size} --cache 100% --effects environment {options}",
-        scene.display()
-    );
-    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
-        panic!("a walk")
-    };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(&scene).expect("a scene"), &scene, &args.stream, extent).expect("a session");
-    walk::renderer(session, &args).expect("lamps")
+    common::renderer(
+        &scene,
+        &format!("--tile 8 --aov --sun-intensity 0 --size {size} --cache 100% --effects environment {options}"),
+    )
 }
 
 fn shine(renderer: &mut Renderer, radiance: impl Fn([f64; 3]) -> [f64; 3]) {

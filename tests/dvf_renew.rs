@@ -3,18 +3,13 @@
 mod common;
 
 use bricks::SceneFile;
-use brickwalk::app::args::{Cli, Command as AppCommand};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk;
-use brickwalk::kernel::{Extent, Lamps};
-use brickwalk::render::{Dvf, DvfTracing, Equirectangular, FrameOutput, Region, Renderer, Renewal, environment};
+use brickwalk::render::{Dvf, DvfTracing, FrameOutput, Region, Renderer, Renewal};
 use brickwalk::scene::Camera;
 use brickwalk::visibility::dvf::mask::UNKNOWN;
 use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings, generate};
-use clap::Parser;
 use common::folder;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -33,19 +28,7 @@ fn boxes(folder: &Path) -> PathBuf {
 
 /// A renderer of it in an environment that is 1 everywhere.
 fn renderer(scene: &Path, options: &str) -> Renderer {
-    let words = format!(
-        "brickwalk walk {} -o o --tile 16 --adapter cpu --aov --sun-intensity 0 --effects environment {options}",
-        scene.display()
-    );
-    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
-        panic!("a walk")
-    };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    let mut renderer = walk::renderer(session, &args).expect("lamps");
-    let even = Equirectangular::of(16, 8, |_| [1.0; 3]);
-    renderer.light.lamps = Arc::new(Lamps::new(Some(environment(even, 1.0, 0.0).0), Vec::new(), 1.0));
-    renderer
+    common::evenly_lit(scene, "environment", options)
 }
 
 fn camera() -> Camera {

@@ -2,15 +2,10 @@
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk;
-use brickwalk::kernel::Extent;
 use brickwalk::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr};
 use brickwalk::render::denoise::{Denoiser, Guides, Taa};
 use brickwalk::render::{FrameOutput, Light, Renderer};
 use brickwalk::scene::Camera;
-use clap::Parser;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
@@ -61,17 +56,8 @@ fn renderer(scene: &Path, options: &str) -> Renderer {
 }
 
 fn renderer_of(scene: &Path, options: &str) -> Renderer {
-    let words = format!(
-        "brickwalk walk {} -o o --size {WIDTH}x{HEIGHT} --tile 32 --cache 100% --schedule plain --adapter cpu \
-         {options}",
-        scene.display()
-    );
-    let Command::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
-        panic!("a walk")
-    };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    walk::renderer(session, &args).expect("lamps")
+    let own = format!("--size {WIDTH}x{HEIGHT} --tile 32 --cache 100% --schedule plain");
+    common::renderer(scene, &format!("{own} {options}"))
 }
 
 /// Frame `k` of a walk sideways, past the colonnade.

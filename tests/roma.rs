@@ -2,38 +2,18 @@
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command as AppCommand};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk;
-use brickwalk::kernel::Extent;
+use brickwalk::app::session::open_scene;
 use brickwalk::reference::Truth;
 use brickwalk::render::{FrameOutput, Renderer, Trust};
 use brickwalk::scene::Camera;
 use brickwalk::visibility::bom::{Settings, assemble};
-use clap::Parser;
-use common::{city, folder, frames};
+use common::{city, converted, folder, frames, sheet};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const SIZE: usize = 48;
-
-/// A sheet of squares of side `side`: its corner, its two edges, and how many squares along them.
-fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3; 2], squares: [usize; 2]) {
-    for j in 0..=squares[1] {
-        for i in 0..=squares[0] {
-            let p = corner + edges[0] * (i as f64 / squares[0] as f64) + edges[1] * (j as f64 / squares[1] as f64);
-            *text += &format!("v {} {} {}\n", p.x, p.y, p.z);
-        }
-    }
-    let row = squares[0] + 1;
-    for (i, j) in (0..squares[0]).flat_map(|i| (0..squares[1]).map(move |j| (i, j))) {
-        let p = *count + 1 + i + j * row;
-        *text += &format!("f {p} {} {}\nf {p} {} {}\n", p + 1, p + row + 1, p + row + 1, p + row);
-    }
-    *count += row * (squares[1] + 1);
-}
 
 /// A floor of 8 m by 8 m and, 2 m high, a wall along its middle, all in squares of 1/4 m; bricks of 64 triangles have resident cells of 1/8 m.
 fn scene(folder: &Path, wall: bool) -> PathBuf {
@@ -42,28 +22,14 @@ fn scene(folder: &Path, wall: bool) -> PathBuf {
     if wall {
         sheet(&mut text, &mut count, DVec3::new(-4.0, 0.0, 0.0), [DVec3::X * 8.0, DVec3::Y * HEIGHT], [32, 8]);
     }
-    let input = folder.join("scene.obj");
-    std::fs::write(&input, text).expect("a shape");
-    let scene = folder.join("scene.bricks");
-    let words = ["--brick-triangles", "64"].map(AsRef::as_ref);
-    common::succeed(["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()].into_iter().chain(words));
-    scene
+    converted(folder, &text, "--brick-triangles 64")
 }
 
 const HEIGHT: f64 = 2.0;
 
 fn renderer(scene: &Path, options: &str) -> Renderer {
-    let words = format!(
-        "brickwalk walk {} -o o --size {SIZE}x{SIZE} --tile 16 --cache 100% --schedule plain --adapter cpu --aov \
-         --sun-intensity 0 --ao-length 100 --ao-rays 16 --rotation full {options}",
-        scene.display()
-    );
-    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
-        panic!("a walk")
-    };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    walk::renderer(session, &args).expect("lamps")
+    let own = format!("--size {SIZE}x{SIZE} --tile 16 --cache 100% --schedule plain --aov --sun-intensity 0");
+    common::renderer(scene, &format!("{own} --ao-length 100 --ao-rays 16 --rotation full {options}"))
 }
 
 /// Above the floor, looking down on the part of it before the wall.

@@ -3,15 +3,10 @@
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command as AppCommand};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk;
-use brickwalk::kernel::Extent;
 use brickwalk::kernel::lamps::{Emitter, Lamps, Shape};
 use brickwalk::render::{FrameOutput, Renderer};
 use brickwalk::scene::Camera;
-use clap::Parser;
-use common::{city, folder};
+use common::{city, converted, folder, sheet};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -19,35 +14,14 @@ use std::sync::Arc;
 
 const SIZE: usize = 48;
 
-/// A sheet of squares of side 1/4: its corner and its two edges.
-fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3; 2]) {
-    let squares = edges.map(|edge| (4.0 * edge.length()).round() as usize);
-    for j in 0..=squares[1] {
-        for i in 0..=squares[0] {
-            let p = corner + edges[0] * (i as f64 / squares[0] as f64) + edges[1] * (j as f64 / squares[1] as f64);
-            *text += &format!("v {} {} {}\n", p.x, p.y, p.z);
-        }
-    }
-    let row = squares[0] + 1;
-    for (i, j) in (0..squares[0]).flat_map(|i| (0..squares[1]).map(move |j| (i, j))) {
-        let p = *count + 1 + i + j * row;
-        *text += &format!("f {p} {} {}\nf {p} {} {}\n", p + 1, p + row + 1, p + row + 1, p + row);
-    }
-    *count += row * (squares[1] + 1);
-}
-
-/// Sheets as a scene; bricks of 64 triangles have resident cells of 1/8 m.
+/// Sheets of squares of side 1/4, by corner and edges, as a scene; bricks of 64 triangles have resident cells of 1/8 m.
 fn scene_of(folder: &Path, sheets: &[(DVec3, [DVec3; 2])]) -> PathBuf {
     let (mut text, mut count) = (String::new(), 0);
     for (corner, edges) in sheets {
-        sheet(&mut text, &mut count, *corner, *edges);
+        let squares = edges.map(|edge| (4.0 * edge.length()).round() as usize);
+        sheet(&mut text, &mut count, *corner, *edges, squares);
     }
-    let input = folder.join("scene.obj");
-    std::fs::write(&input, text).expect("a shape");
-    let scene = folder.join("scene.bricks");
-    let words = ["--brick-triangles", "64"].map(AsRef::as_ref);
-    common::succeed(["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()].into_iter().chain(words));
-    scene
+    converted(folder, &text, "--brick-triangles 64")
 }
 
 const HEIGHT: f64 = 2.0;
@@ -69,16 +43,8 @@ fn room(folder: &Path) -> PathBuf {
 }
 
 fn renderer(scene: &Path, options: &str) -> Renderer {
-    let words = format!(
-        "brickwalk walk {} -o o --size {SIZE}x{SIZE} --tile 16 --adapter cpu --aov --sky-intensity 0 --sun-angle 0 --diffuse-rays 16 --rotation full {options}",
-        scene.display()
-    );
-    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
-        panic!("a walk")
-    };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    walk::renderer(session, &args).expect("lamps")
+    let own = format!("--size {SIZE}x{SIZE} --tile 16 --aov --sky-intensity 0 --sun-angle 0 --diffuse-rays 16");
+    common::renderer(scene, &format!("{own} --rotation full {options}"))
 }
 
 /// A view of a scene in a light.

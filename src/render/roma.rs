@@ -159,9 +159,14 @@ impl Roma {
         *self.usual_log2.get_or_insert_with(|| usual_cell_log2(scene.resident()))
     }
 
+    /// Side of the cells that bricks have, world units: those of three in four are no larger. `None` where there are no bricks.
+    pub fn brick_cell(&mut self, scene: &SceneFile) -> Option<f64> {
+        self.usual_log2(scene).map(|cell_log2| f64::from(cell_log2).exp2())
+    }
+
     /// Whether rays of a length, world units, are too short for maps to help tracing them: what they meet is as near as what is overlooked.
     pub fn is_short(&mut self, scene: &SceneFile, length: f64) -> bool {
-        self.usual_log2(scene).is_some_and(|cell_log2| length < LEAST_CELLS * f64::from(cell_log2).exp2())
+        self.brick_cell(scene).is_some_and(|cell| length < LEAST_CELLS * cell)
     }
 
     /// The base maps around the camera, as wide as `size` cells would be of which bricks have all, of `cells` on each axis, once or twice as

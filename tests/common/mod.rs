@@ -1,8 +1,15 @@
 //! What the integration tests share: the command as a user runs it, scenes made once, folders that vanish.
 #![allow(dead_code)]
 
+use brickwalk::app::args::{Cli, Command as AppCommand};
+use brickwalk::app::session::{Session, open_scene};
+use brickwalk::kernel::{Extent, Lamps};
+use brickwalk::render::{Equirectangular, Renderer, environment};
+use clap::Parser;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Arc;
 
 /// Runs `brickwalk` with the given words.
 pub fn brickwalk<S: AsRef<std::ffi::OsStr>>(words: impl IntoIterator<Item = S>) -> Output {
@@ -44,6 +51,50 @@ pub fn city(folder: &Path, triangles: &str, brick_triangles: &str) -> PathBuf {
     let words = ["scene", "city", "--triangles", triangles, "--brick-triangles", brick_triangles, "-o"];
     succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
     scene
+}
+
+/// The scene of an OBJ file, with options of `convert`.
+pub fn converted(folder: &Path, shape: &str, options: &str) -> PathBuf {
+    let (input, scene) = (folder.join("shape.obj"), folder.join("shape.bricks"));
+    std::fs::write(&input, shape).expect("a shape");
+    let words = ["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()];
+    succeed(words.into_iter().chain(options.split_whitespace().map(std::ffi::OsStr::new)));
+    scene
+}
+
+/// Adds a sheet of squares to the text of an OBJ file of `count` vertices: its corner, its two edges, and how many squares along them.
+pub fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3; 2], squares: [usize; 2]) {
+    for j in 0..=squares[1] {
+        for i in 0..=squares[0] {
+            let p = corner + edges[0] * (i as f64 / squares[0] as f64) + edges[1] * (j as f64 / squares[1] as f64);
+            *text += &format!("v {} {} {}\n", p.x, p.y, p.z);
+        }
+    }
+    let row = squares[0] + 1;
+    for (i, j) in (0..squares[0]).flat_map(|i| (0..squares[1]).map(move |j| (i, j))) {
+        let p = *count + 1 + i + j * row;
+        *text += &format!("f {p} {} {}\nf {p} {} {}\n", p + 1, p + row + 1, p + row + 1, p + row);
+    }
+    *count += row * (squares[1] + 1);
+}
+
+/// The renderer of a walk on the processor with these options.
+pub fn renderer(scene: &Path, options: &str) -> Renderer {
+    let words = format!("brickwalk walk {} -o o --adapter cpu {options}", scene.display());
+    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
+        panic!("a walk")
+    };
+    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
+    brickwalk::app::walk::renderer(session, &args).expect("lamps")
+}
+
+/// One of these effects where an environment is the only light, and 1 everywhere.
+pub fn evenly_lit(scene: &Path, effects: &str, options: &str) -> Renderer {
+    let mut renderer = renderer(scene, &format!("--tile 16 --aov --sun-intensity 0 --effects {effects} {options}"));
+    let even = Equirectangular::of(16, 8, |_| [1.0; 3]);
+    renderer.light.lamps = Arc::new(Lamps::new(Some(environment(even, 1.0, 0.0).0), Vec::new(), 1.0));
+    renderer
 }
 
 /// Options of a walk beside scene and output.

@@ -27,10 +27,10 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-use view::{Picture, SEAM_FRAMES, View};
+use view::{Picture, View};
 
 /// Raised when a value changes its meaning.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Runs the command.
 ///
@@ -151,29 +151,42 @@ fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings) -> Result<Vec<(
         }
     }
     if job.stage == Stage::Seams {
-        measure_seams(&mut view, &mut all, settings)?;
+        measure_seams(&mut view, &mut all, job, settings)?;
     } else if job.errors {
-        let exact = view.picture(&Way::Exact, settings.samples, 0)?;
-        // What the reference's own noise is: another one, of other samples.
-        let other = view.picture(&Way::Exact, settings.samples, 1)?;
-        for (way, values) in &mut all {
-            if let Way::Exact = way {
-                values.extend(view.errors("converged", &other, &exact)?);
-                continue;
-            }
-            let converged: Picture = view.picture(way, settings.samples, 0)?;
-            values.extend(view.errors("converged", &converged, &exact)?);
-            let single = view.picture(way, 1, 0)?;
-            values.extend(view.errors("single", &single, &exact)?);
-        }
+        measure_errors(&mut view, &mut all, job, settings)?;
     }
     Ok(all)
 }
 
+/// Errors, means over the frames.
+fn measure_errors(view: &mut View, all: &mut [(Way, Values)], job: &Job, settings: &Settings) -> Result<()> {
+    let mut found = vec![Vec::new(); all.len()];
+    for &frame in job.frames {
+        view.look(frame);
+        let exact = view.picture(&Way::Exact, settings.samples, 0)?;
+        for ((way, _), found) in all.iter().zip(&mut found) {
+            // What the reference's own noise is: another one, of other samples.
+            let seed = u32::from(*way == Way::Exact);
+            let converged: Picture = view.picture(way, settings.samples, seed)?;
+            let mut errors: Values = view.errors("converged", &converged, &exact)?.into_iter().collect();
+            errors.extend(view.cells());
+            if *way != Way::Exact {
+                let single = view.picture(way, 1, 0)?;
+                errors.extend(view.errors("single", &single, &exact)?);
+            }
+            found.push(errors);
+        }
+    }
+    for ((_, values), found) in all.iter_mut().zip(found) {
+        values.extend(by_name(&found, |values| Some(values.iter().sum::<f64>() / values.len() as f64)));
+    }
+    Ok(())
+}
+
 /// Errors by the distance from seams, of several frames together.
-fn measure_seams(view: &mut View, all: &mut [(Way, Values)], settings: &Settings) -> Result<()> {
+fn measure_seams(view: &mut View, all: &mut [(Way, Values)], job: &Job, settings: &Settings) -> Result<()> {
     let mut found = vec![Seams::default(); all.len()];
-    for frame in SEAM_FRAMES {
+    for &frame in job.frames {
         view.look(frame);
         let exact = view.picture(&Way::Exact, settings.samples, 0)?;
         for ((way, _), seams) in all.iter().zip(&mut found).filter(|((way, _), _)| *way != Way::Exact) {
@@ -190,12 +203,16 @@ fn measure_seams(view: &mut View, all: &mut [(Way, Values)], settings: &Settings
     Ok(())
 }
 
+/// What `of` makes of the values of each name.
+fn by_name(all: &[Values], of: impl Fn(Vec<f64>) -> Option<f64>) -> Values {
+    let names: std::collections::BTreeSet<&String> = all.iter().flat_map(BTreeMap::keys).collect();
+    let named = |name: &String| of(all.iter().filter_map(|values| values.get(name).copied()).collect());
+    names.into_iter().filter_map(|name| Some((name.clone(), named(name)?))).collect()
+}
+
 /// The median of every value over the turns.
 fn medians(turns: &[Values]) -> Values {
-    let names: std::collections::BTreeSet<&String> = turns.iter().flat_map(BTreeMap::keys).collect();
-    let of =
-        |name: &String| super::cells::median(turns.iter().filter_map(|values| values.get(name).copied()).collect());
-    names.into_iter().filter_map(|name| Some((name.clone(), of(name)?))).collect()
+    by_name(turns, super::cells::median)
 }
 
 #[cfg(test)]
@@ -212,5 +229,7 @@ mod tests {
         let all = medians(&[turn(3.0, None), turn(1.0, Some(7.0)), turn(2.0, None)]);
         assert_eq!(all, turn(2.0, Some(7.0)));
         assert!(medians(&[]).is_empty());
+        let sums = by_name(&[turn(3.0, None), turn(1.0, Some(7.0))], |values| Some(values.iter().sum()));
+        assert_eq!(sums, turn(4.0, Some(7.0)));
     }
 }

@@ -20,12 +20,6 @@ use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// A frame of the near path that is measured, of thirty.
-const FRAME: u32 = 10;
-
-/// Those in which seams are looked at.
-pub const SEAM_FRAMES: [u32; 6] = [0, 5, 10, 15, 20, 25];
-
 /// A scene, a light, a cache and a camera.
 pub struct View<'a> {
     job: &'a Job,
@@ -59,7 +53,7 @@ impl<'a> View<'a> {
         let session = Session::open(open_scene(&scene)?, &scene, &args.stream, extent)?;
         let renderer = walk::renderer(session, &args)?;
         let path = place.path(Path::Near)?;
-        let camera = path.frame(FRAME, 30);
+        let camera = path.frame(job.frames[0], 30);
         Ok(Self { job, scene, renderer, path, camera, settings, adapter })
     }
 
@@ -131,6 +125,13 @@ impl<'a> View<'a> {
         let image = Image { width, height, rgb: output.pixels.radiance };
         let depth = output.pixels.depth;
         Ok(Picture { image, depth, values: values.map(|(name, value)| (name.to_string(), value)).into() })
+    }
+
+    /// Length of rays of occlusion, in cells that bricks have; of other effects none.
+    pub fn cells(&mut self) -> Option<(String, f64)> {
+        let renderer = &mut self.renderer;
+        let cell = renderer.roma.brick_cell(&renderer.scene).filter(|_| self.job.effect == "ao");
+        cell.map(|cell| ("cells".into(), self.job.length / cell))
     }
 
     /// Adds the errors of the picture that was made last by the distance from sides of its base maps.
