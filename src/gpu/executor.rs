@@ -1,5 +1,8 @@
 //! The wgpu executor: turns steps into dispatches, one submission and one readback a round trip.
 
+#[cfg(test)]
+mod peek;
+
 use super::binary::BinaryTrees;
 use super::device::Gpu;
 use super::dvf::Dvf;
@@ -40,10 +43,6 @@ const MOST_DISPATCHES: usize = 96;
 const INDIRECT_BYTES: u64 = 12;
 /// Entries per tile that the lists start with.
 const LIST_ENTRIES_PER_TILE: u32 = 64;
-
-/// Bounds, lists, entries and selection of all tiles.
-#[cfg(test)]
-pub(crate) type TilesRead = (Vec<layout::TileBounds>, Vec<layout::TileList>, Vec<layout::Entry>, Vec<u32>);
 
 /// Renders one scene on one device.
 pub struct GpuExecutor {
@@ -183,55 +182,6 @@ impl GpuExecutor {
     /// The pipelines.
     pub fn kernels(&self) -> &Arc<Kernels> {
         &self.kernels
-    }
-
-    /// Reads the tiles back, for tests: bounds, lists, entries, selection.
-    #[cfg(test)]
-    pub(crate) fn read_tiles(&mut self) -> Result<TilesRead, ExecutorError> {
-        Ok((
-            self.read(|s| &s.buffers.tiles.bounds)?,
-            self.read(|s| &s.buffers.tiles.lists)?,
-            self.read(|s| &s.buffers.tiles.list)?,
-            self.read(|s| &s.buffers.tiles.selection)?,
-        ))
-    }
-
-    /// The G-buffer of the hits of a set, for tests.
-    #[cfg(test)]
-    pub(crate) fn read_gbuffer_of(&mut self, set: usize) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read(|s| &s.buffers.pixels.gbuffers[set])
-    }
-
-    /// The columns of the ray-aligned maps that were made last, for tests.
-    #[cfg(test)]
-    pub(crate) fn read_columns(&mut self) -> Result<Vec<u32>, ExecutorError> {
-        let Some(Roma { columns, maps, .. }) = &self.roma else { return Ok(Vec::new()) };
-        let bytes = self.readback.read(&self.gpu, columns)?;
-        let columns: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-        Ok(columns[..maps.words() as usize].to_vec())
-    }
-
-    /// The words of the distance fields that were made last, for tests.
-    #[cfg(test)]
-    pub(crate) fn read_distances(&mut self) -> Result<Vec<u32>, ExecutorError> {
-        let Some(Field { distances, maps, .. }) = &self.field else { return Ok(Vec::new()) };
-        let bytes = self.readback.read(&self.gpu, distances)?;
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-        Ok(words[..maps.distance_words() as usize].to_vec())
-    }
-
-    /// The texels of reflective shadow maps, for tests.
-    #[cfg(test)]
-    pub(crate) fn read_rsm_texels(&mut self) -> Result<Vec<layout::RsmTexel>, ExecutorError> {
-        let Some(rsm) = &self.rsm else { return Ok(Vec::new()) };
-        let bytes = self.readback.read(&self.gpu, &rsm.texels)?;
-        Ok(bytemuck::pod_collect_to_vec(&bytes))
-    }
-
-    /// The bits of rays that wait for bricks, for tests.
-    #[cfg(test)]
-    pub(crate) fn read_dvf_waiting(&mut self) -> Result<Vec<u32>, ExecutorError> {
-        self.dvf.as_ref().map_or(Ok(Vec::new()), |dvf| self.read_words(dvf.waiting()))
     }
 
     fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
