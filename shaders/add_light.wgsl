@@ -35,8 +35,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
     } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
         let drawn = environment_sample(lamp_words(index));
-        light = drawn.light * max(dot(g.normal, d), 0.0) / PI;
-        density = drawn.density;
+        light = drawn_light(drawn) * max(dot(g.normal, d), 0.0) / PI;
+        density = drawn_density(drawn);
     } else {
         light = sunlight(g.normal);
         if params.sun_radius > 0.0 {

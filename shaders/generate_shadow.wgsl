@@ -62,7 +62,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
             let drawn = environment_sample(lamp_words(index));
             ray.direction = drawn.direction;
-            faces = any(drawn.light > vec3<f32>(0.0));
+            // What lies behind is not looked up.
+            faces = dot(surface.normal, ray.direction) > 0.0 && any(drawn_light(drawn) > vec3<f32>(0.0));
         } else if params.sun_radius > 0.0 {
             let d = params.sun.xyz;
             let disc = disc_point(r) * params.sun_radius;

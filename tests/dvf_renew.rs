@@ -142,7 +142,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     let settings =
         DvfSettings { points: 8_000, rays: 64, cells: Cells::Longest(14), octahedral: 16, ..DvfSettings::default() };
     // By exact rays; by a field that is told; one that may be renewed by no ray; by some.
-    let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 48"));
+    let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 160"));
     let budget = 60_000;
     let renewal = renewal(&mut all[1], &settings, budget);
     all[1].dvf = Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default());

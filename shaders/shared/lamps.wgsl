@@ -105,8 +105,9 @@ fn environment_density(d: vec3<f32>) -> f32 {
 
 struct EnvironmentSample {
     direction: vec3<f32>,
-    light: vec3<f32>, // radiance over the density of directions; zero where none was drawn
-    density: f32,
+    place: vec2<f32>, // in texels
+    texel: u32,
+    level: f32, // sine of the angle from +Y
 }
 
 // A direction drawn by the density that the texels state: a texel by their table, a place in it evenly over both angles.
@@ -126,12 +127,21 @@ fn environment_sample(words: vec4<u32>) -> EnvironmentSample {
     let z = -level * cos(around);
     let turn = params.environment_turn;
     let direction = vec3<f32>(turn.x * x + turn.y * z, cos(down), turn.x * z - turn.y * x);
-    let density = environment[texel].w;
-    var light = vec3<f32>(0.0);
+    return EnvironmentSample(direction, place, texel, level);
+}
+
+// Radiance along a direction that was drawn over its density; zero where none is to be drawn.
+fn drawn_light(drawn: EnvironmentSample) -> vec3<f32> {
+    let density = environment[drawn.texel].w;
     if density > 0.0 {
-        light = environment_lookup(place) * (max(level, 0.0) / density);
+        return environment_lookup(drawn.place) * (max(drawn.level, 0.0) / density);
     }
-    return EnvironmentSample(direction, light, density / max(level, 1.0e-7));
+    return vec3<f32>(0.0);
+}
+
+// The density by which a direction was drawn.
+fn drawn_density(drawn: EnvironmentSample) -> f32 {
+    return environment[drawn.texel].w / max(drawn.level, 1.0e-7);
 }
 
 // The emitter that the ray of a pixel leads to.

@@ -2,7 +2,7 @@
 //! `generate_mirror.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
 
 use super::gloss::Gloss;
-use super::lamps::{emitter_of, environment_sample, lamp_words, shines};
+use super::lamps::{drawn_light, emitter_of, environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
 use super::rays::{RaySet, start_hit};
 use super::scene::Bound;
@@ -106,7 +106,8 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
             } else if bound.has(PARAM_ENVIRONMENT) {
                 let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
                 ray.direction = drawn.direction;
-                faces = drawn.light.iter().any(|&c| c > 0.0);
+                // What lies behind is not looked up.
+                faces = dot(surface.normal, ray.direction) > 0.0 && drawn_light(bound, &drawn).iter().any(|&c| c > 0.0);
             } else if p.sun_radius > 0.0 {
                 let disc = disc_point(r).map(|x| x * p.sun_radius);
                 let x = tangent(sun);

@@ -145,14 +145,15 @@ pub fn outweighs(own: f32, other: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// A direction, and its radiance over the density of directions; zero where none was drawn.
+/// A direction to the environment that was drawn.
 pub struct EnvironmentSample {
     /// A unit vector.
     pub direction: Vec3,
-    /// Radiance over density.
-    pub light: Vec3,
-    /// The density.
-    pub density: f32,
+    /// Where it leads, in texels.
+    place: [f32; 2],
+    texel: u32,
+    /// Sine of the angle from +Y.
+    level: f32,
 }
 
 /// A direction drawn by the density that the texels state: a texel by their table, a place in it evenly over both angles.
@@ -174,13 +175,22 @@ pub fn environment_sample(bound: &Bound, words: [u32; 4]) -> EnvironmentSample {
     let z = -level * around.cos();
     let turn = p.environment_turn;
     let direction = [turn[0] * x + turn[1] * z, down.cos(), turn[0] * z - turn[1] * x];
-    let density = bound.lamps.lamps.texels()[texel as usize][3];
-    let mut light = [0.0; 3];
+    EnvironmentSample { direction, place, texel, level }
+}
+
+/// Radiance along a direction that was drawn over its density; zero where none is to be drawn.
+pub fn drawn_light(bound: &Bound, drawn: &EnvironmentSample) -> Vec3 {
+    let density = bound.lamps.lamps.texels()[drawn.texel as usize][3];
     if density > 0.0 {
-        let weight = most(level, 0.0) / density;
-        light = environment_lookup(bound, place).map(|c| c * weight);
+        let weight = most(drawn.level, 0.0) / density;
+        return environment_lookup(bound, drawn.place).map(|c| c * weight);
     }
-    EnvironmentSample { direction, light, density: density / most(level, 1.0e-7) }
+    [0.0; 3]
+}
+
+/// The density by which a direction was drawn.
+pub fn drawn_density(bound: &Bound, drawn: &EnvironmentSample) -> f32 {
+    bound.lamps.lamps.texels()[drawn.texel as usize][3] / most(drawn.level, 1.0e-7)
 }
 
 /// The emitter that the ray of a pixel leads to.

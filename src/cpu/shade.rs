@@ -2,7 +2,10 @@
 //! `add_occlusion.wgsl` and `hit_demand.wgsl`.
 
 use super::gloss::Gloss;
-use super::lamps::{emitter_of, environment_density, environment_sample, lamp_words, outweighs, shines, sun_density};
+use super::lamps::{
+    drawn_density, drawn_light, emitter_of, environment_density, environment_sample, lamp_words, outweighs, shines,
+    sun_density,
+};
 use super::light::{add_light as add, ambient, background, sunlight};
 use super::rays::RaySet;
 use super::scene::{Bound, Tally};
@@ -236,8 +239,8 @@ pub fn add_light(
             each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / e.probability)
         } else if bound.has(PARAM_ENVIRONMENT) {
             let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
-            density = drawn.density;
-            drawn.light.map(|c| c * cosine / PI)
+            density = drawn_density(bound, &drawn);
+            drawn_light(bound, &drawn).map(|c| c * cosine / PI)
         } else {
             if bound.params.sun_radius > 0.0 {
                 density = sun_density(bound.params, d);

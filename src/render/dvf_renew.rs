@@ -1,38 +1,33 @@
 //! Fields of visibility in scenes in which something moves: cells that this concerns are made anew in every frame, within a budget of rays.
 //!
-//! *Theory.* Günay and Akyüz (2025) make all of a field anew for every frame. A field that is told what has moved stays right without ([`DvfField::with_movers`]), but has
+//! *Theory.* Günay and Akyüz (2025) make all of a field anew for every frame. A field that is told what has moved stays right without ([`DvfField::marked`]), but has
 //! rays traced that it would answer. Of these, the ones in the cells that the camera sees count.
 //!
 //! *What we changed.* Only cells in which primary hits of the frame lie are made anew, and in each only directions that what moves concerns
-//! ([`Fresh`]). Which come first, and whether at all, is decided by counts: those with the most primary hits, and only where the rays that this saves are as many as
-//! it takes, as far as hits and what the field answered before tell: a cell that is at rest for n frames more may take n times as many, so that never more than about
-//! twice the rays are spent that waiting would have cost (the ski rental: Karlin et al. 1988). So pictures depend on the frame and on how many frames ago something moved last alone,
+//! ([`Fresh`]). Which come first, and whether at all, is decided by counts: those with the most primary hits, and only where what this saves is as much as
+//! it takes, in rays traced meanwhile, as far as hits and what the field answered before tell: a cell that is at rest for n frames more may take n times as much, so that never more than about
+//! twice is spent what waiting would have cost (the ski rental: Karlin et al. 1988). So pictures depend on the frame and on how many frames ago something moved last alone,
 //! never on time, cache or threads.
 //!
-//! *Practice.* Rays are counted before a cell is accepted: the budget is never exceeded. Rays of points are made, wait for bricks and are entered as those of
+//! *Practice.* What a cell takes is first expected from the numbers of triangles of bricks, so that neither is a brick read nor a point looked at where that cannot pay
+//! ([`super::dvf_worth`]). Then rays are counted before a cell is accepted: the budget is never exceeded. Rays of points are made, wait for bricks and are entered as those of
 //! a whole field are ([`super::dvf_strew`]).
 
 use super::dvf::{DvfTracing, EFFECT, PASS, Plan, Region};
-use super::dvf_source::{Group, groups, groups_of_moved};
+use super::dvf_source::{groups, groups_of_moved};
 use super::dvf_strew::Strewing;
+use super::dvf_worth::{Candidate, MADE, Worth};
 use super::pass_record::FrameRecords;
 use super::{Dvf, Renderer};
 use crate::kernel::View;
 use crate::kernel::dvf::{DvfMaps, directions};
-use crate::kernel::layout::NONE;
 use crate::schedule::{ExecutorError, PassStats, Step};
-use crate::visibility::dvf::{Cells, DvfField, DvfKept, DvfSettings, DvfUse, Fresh};
+use crate::visibility::dvf::{Cells, Concerned, DvfField, DvfKept, DvfSettings, DvfUse, Fresh};
 use bricks::SceneFile;
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::sync::Arc;
-
-/// Most triangles of bricks that a frame reads for it, but for those of the first cell: 48 MiB.
-const MOST_TRIANGLES: u64 = 1 << 20;
-
-/// How often the budget is looked for among cells, by the mean number of points a cell: those with fewer make room for more.
-const LOOKED_FOR: f64 = 2.0;
 
 /// Share of the rays that are saved in cells of which nothing was known: of half of all directions, which lead above surfaces, half are answered.
 const NEW: f64 = 0.25;
@@ -62,8 +57,8 @@ pub(super) struct Marked {
     still: Arc<SceneFile>,
     /// Instances that stand elsewhere, ascending.
     displaced: Vec<u32>,
-    /// Where they stood and stand, world units.
-    boxes: Vec<[DVec3; 2]>,
+    /// What that concerns.
+    concerned: Concerned,
     /// Cells made anew.
     pub renewed: BTreeSet<u32>,
     /// Frames rendered since.
@@ -72,33 +67,15 @@ pub(super) struct Marked {
 
 impl Marked {
     pub fn new(field: &DvfField, still: &Arc<SceneFile>, displaced: &[u32], boxes: &[[DVec3; 2]]) -> Self {
+        let concerned = field.concerned(boxes);
         Self {
-            field: Arc::new(field.with_movers(boxes)),
+            field: Arc::new(field.marked(&concerned)),
             still: still.clone(),
             displaced: displaced.to_vec(),
-            boxes: boxes.to_vec(),
+            concerned,
             renewed: BTreeSet::new(),
             frames: 0,
         }
-    }
-}
-
-/// A cell that may be made anew.
-struct Candidate {
-    cell: u32,
-    /// Primary hits that lie in it.
-    seen: u32,
-    /// Directions that what moves concerns.
-    texels: Vec<u32>,
-    /// Share of the rays of these hits that are saved, if they are drawn evenly from all directions: as many as were answered when nothing had moved.
-    saves: f64,
-}
-
-impl Candidate {
-    /// Share of all directions.
-    fn share(&self) -> f64 {
-        let texels: u32 = self.texels.iter().map(|word| word.count_ones()).sum();
-        f64::from(texels) / (32 * self.texels.len()) as f64
     }
 }
 
@@ -134,13 +111,16 @@ impl Renderer {
     ) -> Result<(), ExecutorError> {
         let Renewal { kept, settings, .. } = renewal;
         let shape = kept.field.shape;
-        let mut candidates = self.candidates(view, kept, marked)?;
+        let frames = f64::from(marked.frames) + f64::from(renewal.frames.max(1));
+        let hits = frames * f64::from(self.settings.samples);
+        let candidates = self.candidates(view, kept, marked, hits)?;
         let all = candidates.len() as u64;
         stats.cells_left = all;
         let resident = self.scene.resident();
         let still = groups(marked.still.resident(), &renewal.region);
         let groups = groups_of_moved(&still, resident, &renewal.region, &marked.displaced);
-        candidates.truncate(self.looked_at(renewal, &groups, &candidates));
+        let leaves: Vec<_> = groups.iter().flat_map(|group| group.boxes(resident)).collect();
+        let Worth { candidates, read } = Worth::of(renewal, &leaves, candidates);
         if candidates.is_empty() {
             return Ok(());
         }
@@ -161,10 +141,8 @@ impl Renderer {
         };
         let empty = plan.maps(&shape, &view.frame, settings, 1);
         self.executor.set_dvf(&DvfMaps { is_new: true, ..empty })?;
-        let frames = f64::from(marked.frames) + f64::from(renewal.frames.max(1));
-        let hits = frames * f64::from(self.settings.samples);
-        let saves: Vec<f64> = candidates.iter().map(|of| hits * f64::from(of.seen) * of.saves).collect();
-        let choose = |costs: &[u64]| within(renewal.rays, costs, &saves);
+        let saves: Vec<f64> = candidates.iter().map(|candidate| candidate.saves).collect();
+        let choose = |costs: &[u64]| within(renewal.rays.saturating_sub(read), costs, &saves);
         let chosen = Strewing::new(self, &plan, &shape, stats, &mut |_| true).renew(&fresh, choose)?;
         let (met, _) = self.executor.read_dvf()?;
         let (field, words) = (Arc::make_mut(&mut marked.field), shape.words());
@@ -179,63 +157,38 @@ impl Renderer {
     }
 
     /// The cells in which primary hits of the frame lie and that what has moved concerns, but for those that are renewed and those in which nothing would be saved:
-    /// first those with the most hits, then by number.
-    fn candidates(&mut self, view: &View, kept: &DvfKept, marked: &Marked) -> Result<Vec<Candidate>, ExecutorError> {
+    /// first those with the most hits, then by number. Each primary hit stands for `hits` rays.
+    fn candidates(
+        &mut self,
+        view: &View,
+        kept: &DvfKept,
+        marked: &Marked,
+        hits: f64,
+    ) -> Result<Vec<Candidate>, ExecutorError> {
         self.executor.set_dvf(&DvfMaps::to_answer(&marked.field, &view.frame, DvfUse::default()))?;
         self.executor.set_dvf_tally(&vec![0; kept.field.labels.len()])?;
         self.executor.run(PASS, &[Step::DvfSeen], &self.cache.states)?;
         let counts = self.executor.read_dvf_tally()?;
         let is_open = |(cell, seen): &(u32, u32)| *seen > 0 && !marked.renewed.contains(cell);
-        let (cells, counts): (Vec<u32>, Vec<u32>) = (0..).zip(counts).filter(is_open).unzip();
-        let texels = kept.field.concerned(&cells, &marked.boxes);
         let (field, how) = (self.dvf.field.clone(), self.dvf.how);
-        let candidate = |((cell, seen), texels): ((u32, u32), Option<Vec<u32>>)| {
-            let mut candidate = Candidate { cell, seen, texels: texels?, saves: 0.0 };
+        let candidate = |(cell, seen): (u32, u32)| {
+            let texels = marked.concerned.texels(cell)?.to_vec();
+            let mut candidate = Candidate { cell, seen, texels, saves: 0.0, takes: 0.0 };
             let answered = field.as_ref().and_then(|field| field.answered(cell, &candidate.texels, how));
-            candidate.saves = answered.unwrap_or(NEW * candidate.share());
+            candidate.saves = hits * f64::from(seen) * answered.unwrap_or(NEW * candidate.share());
             (candidate.saves > 0.0).then_some(candidate)
         };
-        let mut all: Vec<Candidate> = cells.into_iter().zip(counts).zip(texels).filter_map(candidate).collect();
+        let mut all: Vec<Candidate> = (0..).zip(counts).filter(is_open).filter_map(candidate).collect();
         all.sort_by_key(|candidate| (Reverse(candidate.seen), candidate.cell));
         Ok(all)
     }
-
-    /// How many of the candidates are looked at: as many as there may be rays for, and triangles are read for.
-    fn looked_at(&self, renewal: &Renewal, groups: &[Group], candidates: &[Candidate]) -> usize {
-        let Renewal { kept, settings, .. } = renewal;
-        let shape = kept.field.shape;
-        let sides = if settings.both { 2.0 } else { 1.0 };
-        let points = sides * f64::from(settings.points) / kept.field.known_cells().max(1) as f64;
-        let mut rays = 0.0;
-        let enough = candidates.iter().take_while(|candidate| {
-            let is_enough = rays >= LOOKED_FOR * renewal.rays as f64;
-            rays += points * f64::from(settings.rays) * candidate.share();
-            !is_enough
-        });
-        let count = enough.count();
-        let mut rank = vec![NONE; kept.field.labels.len()];
-        (0..).zip(&candidates[..count]).for_each(|(i, candidate)| rank[candidate.cell as usize] = i);
-        // Of each candidate, the triangles of bricks that no one before it takes.
-        let mut triangles = vec![0u64; count];
-        for (bounds, own) in groups.iter().flat_map(|group| group.boxes(self.scene.resident())) {
-            if let Some(first) = shape.cells_of(bounds).map(|cell| rank[cell as usize]).filter(|&i| i != NONE).min() {
-                triangles[first as usize] += own;
-            }
-        }
-        let mut read = 0;
-        let fits = triangles.iter().enumerate().take_while(|(i, own)| {
-            read += **own;
-            *i == 0 || read <= MOST_TRIANGLES
-        });
-        fits.count()
-    }
 }
 
-/// Which of cells that take `costs` rays and save `saves` are made anew, in their order, for at most `rays` rays in all.
+/// Which of cells that take `costs` rays and save `saves` are made anew, in their order, for at most `rays` rays in all: those that save more than they take.
 fn within(rays: u64, costs: &[u64], saves: &[f64]) -> Vec<bool> {
     let mut left = rays;
     let takes = |(&cost, &saves): (&u64, &f64)| {
-        let is_taken = cost <= left && cost as f64 <= saves;
+        let is_taken = cost <= left && MADE * cost as f64 <= saves;
         left -= if is_taken { cost } else { 0 };
         is_taken
     };
@@ -248,8 +201,8 @@ mod tests {
 
     #[test]
     fn no_more_rays_are_taken_than_there_are_and_none_that_save_fewer() {
-        assert_eq!(within(10, &[4, 7, 3, 3, 1], &[9.0; 5]), [true, false, true, true, false]);
-        assert_eq!(within(10, &[4, 0, 3], &[3.9, 0.0, 3.0]), [false, true, true]);
+        assert_eq!(within(10, &[4, 7, 3, 3, 1], &[9.0 * MADE; 5]), [true, false, true, true, false]);
+        assert_eq!(within(10, &[4, 0, 3], &[3.9 * MADE, 0.0, 3.0 * MADE]), [false, true, true]);
         assert_eq!(within(0, &[1, 0], &[9.0; 2]), [false, true]);
     }
 }

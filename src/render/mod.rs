@@ -8,6 +8,7 @@ mod dvf;
 mod dvf_renew;
 mod dvf_source;
 mod dvf_strew;
+mod dvf_worth;
 mod effects;
 mod emissive;
 mod environment;

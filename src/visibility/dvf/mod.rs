@@ -27,6 +27,7 @@ pub mod shape;
 pub use areas::Areas;
 pub use field::{Answer, DvfField, DvfKept, Trial};
 pub use fresh::Fresh;
+pub use movers::Concerned;
 pub use shape::Shape;
 
 /// Which cells a field has.
