@@ -28,13 +28,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
         if ray.t_min <= ray.t_max && is_pilot(index) {
             atomicAdd(&counted[0], 1u);
             let is_free = hits[index].id == NONE;
-            let found = answer(index, ray, ray.t_min, true);
+            let taken = nearest(index, ray);
+            let found = answer(index, ray, taken, ray.t_min, true);
             if !is_free && found.t < 0.0 && found.is_known {
                 atomicAdd(&counted[1], 1u);
             }
             for (var i = 0u; i < HANDOVERS && is_free && found.t >= 0.0; i++) {
                 let begin = near_end(index, ray, handover_cells(i) * params.roma_near);
-                if begin < ray.t_max && answer(index, ray, begin, false).t >= 0.0 {
+                if begin < ray.t_max && answer(index, ray, taken, begin, false).t >= 0.0 {
                     atomicAdd(&counted[2u + i], 1u);
                 }
             }

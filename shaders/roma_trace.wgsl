@@ -1,7 +1,7 @@
 // Answers the pass's rays by ray-aligned occupancy maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that
 // meet nothing are ended, and others are traced up to roma_near cells from their start. Where pilots have been traced, these count for what maps get wrong.
 // Where the closest is asked for, with the point, against the direction travelled as its normal, and the level's lift as its area: such a hit is known
-// to a cell.
+// to a cell. Rays whose map is drawn go on in its direction.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -11,6 +11,7 @@
 #include "shared/levels.wgsl"
 #include "shared/roma_start.wgsl"
 #include "shared/roma_walk.wgsl"
+#include "shared/roma_cosine.wgsl"
 #include "shared/roma_pilot.wgsl"
 
 // Ends a ray that maps find free; what they do not is traced.
@@ -56,6 +57,14 @@ fn write(index: u32, found: Answer) {
     }
 }
 
+// Gives a ray the direction that it was answered in.
+fn turn(index: u32, direction: vec3<f32>) {
+    rays[index].direction = direction;
+    if (params.flags & PARAM_ANY_HIT) == 0u {
+        densities[index] = params.diffuse_count * max(dot(gbuffer[index].normal, direction), 0.0) * 0.31830987; // 1 / pi
+    }
+}
+
 var<workgroup> counted: atomic<u32>; // rays, and in the upper half those that were capped
 
 // One thread a ray.
@@ -66,10 +75,18 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
         let ray = rays[index];
         let is_far = params.roma_part == ROMA_FAR;
         let is_sifted = params.roma_part == ROMA_SIFT;
+        let is_drawn = params.roma_part == ROMA_COSINE;
         // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
         let is_done = hits[index].id != NONE || hits[index].t == ANSWERED || hits[index].t >= ray.t_max;
         if ray.t_min <= ray.t_max && !(is_far && is_done) && !(is_sifted && is_pilot(index)) {
-            let found = answer(index, ray, select(ray.t_min, hits[index].t, is_far), is_sifted);
+            var taken: Taken;
+            if is_drawn {
+                taken = drawn(index, ray);
+                turn(index, taken.direction);
+            } else {
+                taken = nearest(index, ray);
+            }
+            let found = answer(index, ray, taken, select(ray.t_min, hits[index].t, is_far), is_sifted);
             if is_sifted {
                 sift(index, ray, found);
             } else if params.roma_part == ROMA_CORRECT && is_pilot(index) {

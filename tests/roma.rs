@@ -3,9 +3,11 @@
 mod common;
 
 use brickwalk::app::session::open_scene;
+use brickwalk::kernel::layout::NONE;
 use brickwalk::reference::Truth;
 use brickwalk::render::{FrameOutput, Renderer, Trust};
 use brickwalk::scene::Camera;
+use brickwalk::schedule::{Pass, RomaPart, Step};
 use brickwalk::visibility::bom::{Settings, assemble};
 use common::{city, converted, folder, frames, sheet};
 use glam::DVec3;
@@ -102,6 +104,79 @@ fn occlusion_before_a_wall_is_that_of_the_closed_form_but_for_cells() {
     }
     // Control: it is the wall that is seen.
     assert!(mean(&roma, 0.6) < 0.85 && mean(&roma, 3.0) > mean(&roma, 0.6) + 0.1);
+}
+
+/// Half the width of a courtyard, and the height of its walls, metres.
+const COURTYARD: [f64; 2] = [8.0, 3.0];
+
+/// What a point of a courtyard's floor, so far from the four walls of height `h`, sees of the sky: the form factors of the four parts of the opening (Howell, B-3).
+fn truth_in_courtyard(distances: [f64; 4], h: f64) -> f64 {
+    let part = |x: f64, z: f64| {
+        let (a, b) = (x / h, z / h);
+        let term = |a: f64, b: f64| a / (1.0 + a * a).sqrt() * (b / (1.0 + a * a).sqrt()).atan();
+        (term(a, b) + term(b, a)) / std::f64::consts::TAU
+    };
+    let [left, right, back, front] = distances;
+    part(left, back) + part(left, front) + part(right, back) + part(right, front)
+}
+
+/// Rays near the horizon, which low walls meet, are few: in a stratum of 40 degrees an evenly drawn direction has them twice as often as the cosine.
+#[test]
+fn low_walls_occlude_by_the_cosine() {
+    let folder = folder();
+    let (mut text, mut count) = (String::new(), 0);
+    let [half, height] = COURTYARD;
+    let up = DVec3::Y * height;
+    sheet(&mut text, &mut count, DVec3::new(-half, 0.0, -half), [DVec3::Z, DVec3::X].map(|x| 2.0 * half * x), [64; 2]);
+    for (x, z) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+        let along = DVec3::new(-z - x, 0.0, x - z) * half;
+        sheet(&mut text, &mut count, DVec3::new(x, 0.0, z) * half, [along, up], [64, 12]);
+    }
+    let scene = converted(folder.path(), &text, "--brick-triangles 64");
+    let mut renderer = renderer(&scene, "--effects ao --secondary roma");
+    let eye = Camera { position: DVec3::new(0.0, 9.0, 0.0), target: DVec3::ZERO, up: -DVec3::Z, fov_y: 0.7 };
+    // All by the maps of the same samples.
+    let ways = [(0, RomaPart::Cosine), (64, RomaPart::Whole), (0, RomaPart::Whole)];
+    let mut free = [0u64; 3];
+    let (mut asked, mut expected, mut pixels) = (0u64, [0.0; 3], 0);
+    for seed in 0..96 {
+        renderer.settings.seed = seed;
+        let output = renderer.frame(0, &eye).expect("a frame");
+        let floor: Vec<usize> =
+            (0..SIZE * SIZE).filter(|&i| output.pixels.normal[i][1] > 0.9 && output.pixels.depth[i] > 8.0).collect();
+        assert_eq!(floor.len(), SIZE * SIZE, "nothing else is seen");
+        for i in 0..16 {
+            let pass = Pass::Occlusion(i);
+            for (free, (steps, part)) in free.iter_mut().zip(ways) {
+                let steps = [Step::Generate, Step::RomaTrace { steps, part }];
+                renderer.executor.run(pass, &steps, &renderer.cache.states).expect("rays");
+                let hits = renderer.executor.read_hits(pass).expect("hits");
+                *free += floor.iter().filter(|&&i| hits[i].id == NONE).count() as u64;
+            }
+            asked += floor.len() as u64;
+        }
+    }
+    let cell = 1.0 / 8.0;
+    let edge = 2.0 * 9.0 * 0.35f64.tan() / SIZE as f64;
+    for i in 0..SIZE * SIZE {
+        let place = |i: usize| (i as f64 + 0.5 - SIZE as f64 / 2.0) * edge;
+        let (x, z) = (place(i % SIZE), place(i / SIZE));
+        let at = |nearer: f64, h: f64| truth_in_courtyard([x, -x, z, -z].map(|x| half + x - nearer), h);
+        // The bounds of the wall above.
+        let bounds = [(0.0, height), (2.75 * cell, height + 2.75 * cell), (-1.75 * cell, height - 2.25 * 1.75 * cell)];
+        bounds.iter().zip(&mut expected).for_each(|(&(nearer, h), sum)| *sum += at(nearer, h));
+        pixels += 1;
+    }
+    let [expected, darkest, brightest] = expected.map(|sum| sum / f64::from(pixels));
+    let [drawn, unsnapped, nearest] = free.map(|free| free as f64 / asked as f64);
+    println!(
+        "closed form {expected:.4}, {darkest:.4} to {brightest:.4} with cells: drawn by the cosine {drawn:.4}, rays as they are {unsnapped:.4}, \
+         the map of the ray's stratum {nearest:.4}"
+    );
+    assert!(drawn > darkest && drawn < brightest, "{drawn} is not in {darkest} to {brightest}");
+    assert!((drawn - unsnapped).abs() < 0.01, "{drawn} instead of {unsnapped}");
+    // Control: the direction of the nearest map is not drawn by the cosine.
+    assert!((nearest - unsnapped).abs() > 0.03 && nearest < darkest, "{nearest}");
 }
 
 /// Root mean square difference of what pixels see of the sky.

@@ -81,25 +81,40 @@ struct Answer {
     is_known: bool,   // it meets something, or all of it lies in the levels
 }
 
+// The map that a ray takes, among those of a level.
+struct Taken {
+    map: u32,
+    direction: vec3<f32>, // the one travelled
+    steps: u32,           // columns that are passed before it is that of the map; 0: it is
+}
+
+fn length_of(d: vec3<f32>) -> f32 {
+    return square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
+}
+
+// The map of the stratum that a ray lies in. A snapped ray takes its direction, unless that leads below the surface.
+fn nearest(index: u32, ray: Ray) -> Taken {
+    let d = ray.direction;
+    let map = stratum_of(d);
+    if params.roma_steps > 0u {
+        return Taken(map, d, params.roma_steps);
+    }
+    let normal = seen_surfaces[index].normal;
+    let length = length_of(d);
+    let snapped = barrier3(select(-length, length, d.z >= 0.0) * roma_maps[map].direction.xyz);
+    let above = barrier(barrier(snapped.x * normal.x) + barrier(snapped.y * normal.y)) + barrier(snapped.z * normal.z);
+    if above >= 0.0 {
+        return Taken(map, snapped, 0u);
+    }
+    return Taken(map, d, GRAZING_STEPS);
+}
+
 // Asks for a ray from t = `begin` on: in the finest level that holds its start, then in the next where it leaves one. Rays are off their surface by
 // the level's lift where they enter it, so that no level meets what they leave; with `is_sifted` by less, and must be free to their own ends.
-fn answer(index: u32, ray: Ray, begin: f32, is_sifted: bool) -> Answer {
+fn answer(index: u32, ray: Ray, taken: Taken, begin: f32, is_sifted: bool) -> Answer {
     let normal = seen_surfaces[index].normal;
     let maps = params.roma_k * params.roma_k;
-    let stratum = stratum_of(ray.direction);
-    var direction = ray.direction;
-    var steps = params.roma_steps;
-    if steps == 0u {
-        let d = ray.direction;
-        let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
-        let snapped = barrier3(select(-length, length, d.z >= 0.0) * roma_maps[stratum].direction.xyz);
-        let above = barrier(barrier(snapped.x * normal.x) + barrier(snapped.y * normal.y)) + barrier(snapped.z * normal.z);
-        if above >= 0.0 {
-            direction = snapped;
-        } else {
-            steps = GRAZING_STEPS;
-        }
-    }
+    let direction = taken.direction;
     let side = f32(params.roma_cells);
     let margin = margin_of(index);
     let start_level = start_level_of(ray.origin, normal, margin);
@@ -121,12 +136,12 @@ fn answer(index: u32, ray: Ray, begin: f32, is_sifted: bool) -> Answer {
         range = clipped(range, at.y, speed.y, low, high);
         range = clipped(range, at.z, speed.z, low, high);
         if range.x <= range.y {
-            let map = l * maps + stratum;
+            let map = l * maps + taken.map;
             let rows = roma_maps[map].cell_from_point;
             let cell = vec3<f32>(affine(rows[0], start), affine(rows[1], start), affine(rows[2], start));
             let cells = vec3<f32>(linear(rows[0], direction), linear(rows[1], direction), linear(rows[2], direction));
             let ends = vec2<bool>(l == start_level, range.y >= end);
-            let found = through(map, cell, cells, select(trimmed(range, cells, ends), range, is_sifted), steps);
+            let found = through(map, cell, cells, select(trimmed(range, cells, ends), range, is_sifted), taken.steps);
             is_capped = is_capped || found.is_capped;
             if found.t >= 0.0 {
                 return Answer(found.t, barrier3(start + barrier3(found.t * direction)), direction, level.lift, is_capped, true);

@@ -250,7 +250,7 @@ fn run_kernel(
         "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
         ROMA_ROTATE => roma_rotate(bound, roma),
         ROMA_NEAR => roma_near(bound, roma, own, seen),
-        ROMA_TRACE => roma_trace(bound, roma, own, seen),
+        ROMA_TRACE => roma_trace(bound, roma, own, seen, (pixels, shaded)),
         ROMA_MEASURE => roma_measure(bound, roma, own, seen),
         FIELD_TRACE => field_trace(bound, field, own, seen),
         making if FIELD_KERNELS.contains(&making) => make_field(making, bound, field),

@@ -391,6 +391,7 @@ fn twins_agree_with_their_kernels() {
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
         Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
+        // Maps drawn by the cosine; by the rays' own strata.
         Variant { roma: Some((0, Role::Answer)), ..VARIANT },
         Variant { roma: Some((3, Role::Answer)), ..VARIANT },
         Variant { roma: Some((0, Role::Far(2))), ..VARIANT },

@@ -44,6 +44,7 @@ mod random;
 mod rays;
 mod resolve;
 mod roma;
+mod roma_cosine;
 mod rsm;
 mod sample;
 mod scene;

@@ -1,11 +1,13 @@
 //! Ray-aligned occupancy maps: twins of `shaders/roma_rotate.wgsl` and `roma_trace.wgsl`.
 
 use super::rays::RaySet;
+use super::roma_cosine::{drawn_map, drawn_number, length_of, upward};
 use super::scene::{Bound, Tally};
-use super::vector::{Vec3, each, least, most};
+use super::shade::Pixels;
+use super::vector::{Vec3, dot, each, least, most};
 use crate::kernel::layout::{
     COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_CORRECT,
-    ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+    ROMA_COSINE, ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -14,6 +16,7 @@ use crate::visibility::bom::{BLOCK_CELLS, Cascades};
 use crate::visibility::roma::bits::{cells_between, first_cell};
 use crate::visibility::roma::directions::stratum_of;
 use rayon::prelude::*;
+use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 /// Steps of a column along an axis of the base map that are too short to bound it by.
@@ -165,9 +168,20 @@ struct Found {
     is_capped: bool,
 }
 
+/// The map that a ray takes, among those of a level.
+struct Taken {
+    map: u32,
+    /// The direction that is travelled.
+    direction: Vec3,
+    /// Columns that are passed before it is that of the map; 0: it is.
+    steps: u32,
+}
+
 /// What is known of a whole ray.
 struct Answer {
     met: Option<Met>,
+    /// The direction that was travelled.
+    direction: Vec3,
     /// It was capped in some level.
     is_capped: bool,
     /// It meets something, or all of it lies in the levels.
@@ -178,8 +192,6 @@ struct Answer {
 struct Met {
     t: f32,
     point: Vec3,
-    /// The direction that was travelled.
-    direction: Vec3,
     /// Of the level.
     lift: f32,
 }
@@ -325,27 +337,38 @@ impl Maps<'_> {
         Found { t: hit, is_capped: steps > 0 }
     }
 
+    /// The map of the stratum that a ray lies in. A snapped ray takes its direction, unless that leads below the surface.
+    fn nearest(&self, ray: &Ray, normal: Vec3) -> Taken {
+        let p = self.params;
+        let (map, is_upper) = stratum_of(ray.direction, p.roma_k);
+        if p.roma_steps == 0 {
+            let signed = if is_upper { length_of(ray.direction) } else { -length_of(ray.direction) };
+            let snapped = each(|k| signed * self.maps[map as usize].direction[k]);
+            let above = snapped[0] * normal[0] + snapped[1] * normal[1] + snapped[2] * normal[2];
+            if above >= 0.0 {
+                return Taken { map, direction: snapped, steps: 0 };
+            }
+        }
+        Taken { map, direction: ray.direction, steps: if p.roma_steps == 0 { GRAZING_STEPS } else { p.roma_steps } }
+    }
+
+    /// The map that is drawn by the cosine to normals, as of [`drawn_map`]; the nearest where there is none to draw.
+    fn drawn(&self, index: u32, ray: &Ray, normals: [Vec3; 2]) -> Taken {
+        let maps = &self.maps[..(self.params.roma_k * self.params.roma_k) as usize];
+        let Some(map) = drawn_map(maps, drawn_number(self.params, index), normals) else {
+            return self.nearest(ray, normals[1]);
+        };
+        let (length, direction) = (length_of(ray.direction), upward(&maps[map], normals[1]));
+        Taken { map: map as u32, direction: each(|k| length * direction[k]), steps: 0 }
+    }
+
     /// Asks for a ray from t = `from` on: in the finest level that holds its start, then in the next where it leaves one. Rays are off their surface by
     /// the level's lift where they enter it, so that no level meets what they leave; with `is_sifted` by less, and must be free to their own
     /// ends.
-    fn answer(&self, index: u32, ray: &Ray, normal: Vec3, from: f32, is_sifted: bool) -> Answer {
+    fn answer(&self, index: u32, ray: &Ray, taken: &Taken, normal: Vec3, from: f32, is_sifted: bool) -> Answer {
         let p = self.params;
         let maps = p.roma_k * p.roma_k;
-        let (stratum, is_upper) = stratum_of(ray.direction, p.roma_k);
-        let mut direction = ray.direction;
-        let mut steps = p.roma_steps;
-        if steps == 0 {
-            let d = ray.direction;
-            let length = square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-            let signed = if is_upper { length } else { -length };
-            let snapped = each(|k| signed * self.maps[stratum as usize].direction[k]);
-            let above = snapped[0] * normal[0] + snapped[1] * normal[1] + snapped[2] * normal[2];
-            if above >= 0.0 {
-                direction = snapped;
-            } else {
-                steps = GRAZING_STEPS;
-            }
-        }
+        let &Taken { map: stratum, direction, steps } = taken;
         let side = p.roma_cells as f32;
         let margin = margin_of(p, index);
         let start_level = start_level_of(p, self.levels, ray.origin, normal, margin);
@@ -373,8 +396,8 @@ impl Maps<'_> {
                 is_capped |= found.is_capped;
                 if found.t >= 0.0 {
                     let point = each(|k| start[k] + found.t * direction[k]);
-                    let met = Met { t: found.t, point, direction, lift: level.lift };
-                    return Answer { met: Some(met), is_capped, is_known: true };
+                    let met = Met { t: found.t, point, lift: level.lift };
+                    return Answer { met: Some(met), direction, is_capped, is_known: true };
                 }
                 t = range[1];
                 if t >= end {
@@ -382,7 +405,7 @@ impl Maps<'_> {
                 }
             }
         }
-        Answer { met: None, is_capped, is_known: p.roma_is_part == 0 || t >= ray.t_max }
+        Answer { met: None, direction, is_capped, is_known: p.roma_is_part == 0 || t >= ray.t_max }
     }
 }
 
@@ -417,17 +440,25 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
 
 /// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing
 /// are ended, and others are traced up to `roma_near` cells from their start. Where pilots have been traced, these count for what maps get wrong. Where the
-/// closest is asked for, with what is known of its surface.
-pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
+/// closest is asked for, with what is known of its surface. Rays whose map is drawn go on in its direction.
+pub fn roma_trace(
+    bound: &Bound,
+    tables: &RomaTables,
+    own: &mut RaySet,
+    seen: &RaySet,
+    (pixels, shaded): (&mut Pixels, usize),
+) {
     let RomaMaps { levels, maps, .. } = &tables.maps;
     let p = bound.params;
     let of = Maps { params: p, levels, maps, columns: &tables.columns };
-    let (is_far, is_sifted) = (p.roma_part == ROMA_FAR, p.roma_part == ROMA_SIFT);
+    let (is_far, is_sifted, is_drawn) = (p.roma_part == ROMA_FAR, p.roma_part == ROMA_SIFT, p.roma_part == ROMA_COSINE);
+    let Pixels { gbuffers, densities, .. } = pixels;
+    let gbuffer = &gbuffers[shaded];
     let RaySet { rays, hits, surfaces } = own;
-    let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
+    let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks_mut(RUN));
     all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();
-        for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
+        for (i, ray) in rays.iter_mut().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
             let (hit, surface, index) = (&mut hits[i], &mut surfaces[i], run * RUN + i);
             // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
             let is_done = hit.id != NONE || hit.t == ANSWERED || hit.t >= ray.t_max;
@@ -439,22 +470,35 @@ pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &R
                 continue;
             }
             let normal = normal_of(seen, index);
+            let taken = if is_drawn {
+                of.drawn(index as u32, ray, [gbuffer[index].normal, normal])
+            } else {
+                of.nearest(ray, normal)
+            };
             let from = if is_far { hit.t } else { ray.t_min };
-            let found = of.answer(index as u32, ray, normal, from, is_sifted);
+            let found = of.answer(index as u32, ray, &taken, normal, from, is_sifted);
             tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
+            if is_drawn {
+                ray.direction = found.direction;
+            }
             if is_sifted {
                 of.sift(index as u32, ray, normal, &found, hit);
             } else if p.roma_part == ROMA_CORRECT && is_pilot(p, index as u32) {
                 correct(p, found.met.is_some(), hit);
-            } else if let Some(Met { t, point, direction, lift }) = found.met {
+            } else if let Some(Met { t, point, lift }) = found.met {
                 *hit = Hit { t, id: ROMA_HIT, u: 0.0, v: 0.0 };
                 if !bound.has(PARAM_ANY_HIT) {
-                    (surface.point, surface.normal, surface.area) = (point, direction.map(|x| -x), lift);
+                    (surface.point, surface.normal, surface.area) = (point, found.direction.map(|x| -x), lift);
                 }
             }
         }
         bound.counters.add(&tally);
     });
+    if is_drawn && !bound.has(PARAM_ANY_HIT) {
+        for ((density, ray), g) in densities.iter_mut().zip(rays).zip(gbuffer) {
+            *density = p.diffuse_count * most(dot(g.normal, ray.direction), 0.0) * FRAC_1_PI;
+        }
+    }
 }
 
 /// Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or 0. So the mean is that of traced
@@ -501,13 +545,14 @@ pub fn roma_measure(bound: &Bound, tables: &RomaTables, own: &RaySet, seen: &Ray
             }
             tally.add(COUNTER_PILOTS, 1);
             let (is_free, normal) = (hit.id == NONE, normal_of(seen, index as usize));
-            let found = of.answer(index, ray, normal, ray.t_min, true);
+            let taken = of.nearest(ray, normal);
+            let found = of.answer(index, ray, &taken, normal, ray.t_min, true);
             let is_met = found.met.is_some();
             tally.add(COUNTER_PILOTS + 1, u32::from(!is_free && !is_met && found.is_known));
             for i in 0..if is_free && is_met { HANDOVERS } else { 0 } {
                 let cells = if i == 0 { 0 } else { 1 << i };
                 let from = near_end(p, levels, index, ray, normal, cells * p.roma_near);
-                let is_wrong = from < ray.t_max && of.answer(index, ray, normal, from, false).met.is_some();
+                let is_wrong = from < ray.t_max && of.answer(index, ray, &taken, normal, from, false).met.is_some();
                 tally.add(COUNTER_PILOTS + 2 + i, u32::from(is_wrong));
             }
         }

@@ -367,6 +367,7 @@ pub fn dispatches(
         Step::RomaTrace { steps, part } => {
             let (roma_part, Sift { near, pilots }) = match part {
                 RomaPart::Whole => (layout::ROMA_WHOLE, Sift::default()),
+                RomaPart::Cosine => (layout::ROMA_COSINE, Sift::default()),
                 RomaPart::Far => (layout::ROMA_FAR, Sift::default()),
                 RomaPart::Sift(sift) => (layout::ROMA_SIFT, sift),
                 RomaPart::Correct { one_in } => (layout::ROMA_CORRECT, Sift { near: None, pilots: one_in }),

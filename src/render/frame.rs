@@ -343,7 +343,7 @@ impl Renderer {
             let trace = |part| Step::RomaTrace { steps, part };
             match role {
                 Role::Answer => {
-                    first.extend([trace(RomaPart::Whole), add]);
+                    first.extend([trace(RomaPart::answering(pass, steps)), add]);
                     stats.add(self.executor.run(pass, &first, &self.cache.states)?);
                     return Ok(());
                 }

@@ -212,9 +212,10 @@ impl Renderer {
     ) -> Result<(), ExecutorError> {
         records.pass(self, names[0], |r, stats| {
             let rotate = r.roma.prepare(&mut *r.executor, &r.scene, roma, f64::INFINITY)?;
-            let trace = Step::RomaTrace { steps: roma.steps, part: RomaPart::Whole };
+            let pass = Pass::Diffuse(index);
+            let trace = Step::RomaTrace { steps: roma.steps, part: RomaPart::answering(pass, roma.steps) };
             let steps: Vec<Step> = std::iter::once(Step::Generate).chain(rotate).chain([trace]).collect();
-            stats.add(r.executor.run(Pass::Diffuse(index), &steps, &r.cache.states)?);
+            stats.add(r.executor.run(pass, &steps, &r.cache.states)?);
             let shading = Shading { miss: true, environment: r.draws_environment(), ..Shading::default() };
             r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats)
         })?;

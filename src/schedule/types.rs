@@ -257,8 +257,11 @@ impl Pilots {
 /// Which part of rays occupancy maps answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RomaPart {
-    /// All of them.
+    /// All of them, by the map of the stratum that they lie in.
     Whole,
+    /// All of them, which are snapped, by the maps that are drawn in proportion to the cosines between their directions and the normals of the set before;
+    /// they go on in these directions.
+    Cosine,
     /// Of those that have met nothing where [`Step::RomaNear`] ended them, what lies beyond: they have been traced.
     Far,
     /// Whether they meet anything. Those that do not are answered; the others are still to be traced.
@@ -268,6 +271,14 @@ pub enum RomaPart {
         /// One ray in so many is a pilot.
         one_in: u32,
     },
+}
+
+impl RomaPart {
+    /// The one that answers all rays of a pass; with no `steps` they are snapped.
+    pub fn answering(pass: Pass, steps: u32) -> Self {
+        let is_around_normal = matches!(pass, Pass::Occlusion(_) | Pass::Diffuse(_));
+        if is_around_normal && steps == 0 { Self::Cosine } else { Self::Whole }
+    }
 }
 
 /// How rays are sifted.
