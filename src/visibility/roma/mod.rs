@@ -7,7 +7,8 @@
 //!
 //! *What we changed.* The paper's Algorithms 1 and 2 as corrected in [`bits`]. Base maps are conservative, and are looked up at steps of at most
 //! one of their cells, so that sheets leak little. Cells of a map are moved by up to half a cell and maps are turned about their
-//! direction, at random, in place of jittered geometry. There is an array for each of the [`super::bom::Cascades`]: a ray goes on in the next
+//! direction, at random, in place of jittered geometry. Rays around normals draw their map by the cosine of its own direction, in place of the stratum that
+//! they lie in: within one the cosine would be lost. There is an array for each of the [`super::bom::Cascades`]: a ray goes on in the next
 //! where it leaves one.
 //!
 //! *Practice.* Snapped rays take their map's direction: for rays that go everywhere. Others pass from column to column (Amanatides, Woo
