@@ -146,7 +146,8 @@ fn low_walls_occlude_by_the_cosine() {
             (0..SIZE * SIZE).filter(|&i| output.pixels.normal[i][1] > 0.9 && output.pixels.depth[i] > 8.0).collect();
         assert_eq!(floor.len(), SIZE * SIZE, "nothing else is seen");
         for i in 0..16 {
-            let pass = Pass::Occlusion(i);
+            // Other directions in every sample, as those of a walk are.
+            let pass = Pass::Occlusion(16 * seed + i);
             for (free, (steps, part)) in free.iter_mut().zip(ways) {
                 let steps = [Step::Generate, Step::RomaTrace { steps, part }];
                 renderer.executor.run(pass, &steps, &renderer.cache.states).expect("rays");
@@ -174,9 +175,11 @@ fn low_walls_occlude_by_the_cosine() {
          the map of the ray's stratum {nearest:.4}"
     );
     assert!(drawn > darkest && drawn < brightest, "{drawn} is not in {darkest} to {brightest}");
-    assert!((drawn - unsnapped).abs() < 0.01, "{drawn} instead of {unsnapped}");
+    // Rays that keep their direction meet the same cells, but for those beside the one column that snapped ones look at.
+    let off = |free: f64| (1.0 - free) / (1.0 - unsnapped) - 1.0;
+    assert!(off(drawn).abs() < 0.15, "{drawn} instead of {unsnapped}");
     // Control: the direction of the nearest map is not drawn by the cosine.
-    assert!((nearest - unsnapped).abs() > 0.03 && nearest < darkest, "{nearest}");
+    assert!(off(nearest) > 0.2, "{nearest} instead of {unsnapped}");
 }
 
 /// Root mean square difference of what pixels see of the sky.
