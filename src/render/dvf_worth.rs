@@ -8,7 +8,8 @@ use glam::DVec3;
 /// Most triangles of bricks that are read for a frame: 48 MiB.
 const MOST_TRIANGLES: u64 = 1 << 20;
 
-/// Rays to the environment that are traced in the time in which anything is made anew at all, one ray of a cell is, and a triangle of a brick is read (`benches/results/dvf.md`).
+/// What is counted in rays to the environment: to make anything anew at all, one ray of a cell, a triangle of a brick that is read. Where packets trace rays to the environment several
+/// are traced in that time (`benches/results/dvf.md`).
 const BEGUN: f64 = 2000.0;
 pub(super) const MADE: f64 = 1.5;
 const READ: f64 = 0.25;
