@@ -142,7 +142,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     let settings =
         DvfSettings { points: 8_000, rays: 64, cells: Cells::Longest(14), octahedral: 16, ..DvfSettings::default() };
     // By exact rays; by a field that is told; one that may be renewed by no ray; by some.
-    let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 160"));
+    let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 640"));
     let budget = 60_000;
     let renewal = renewal(&mut all[1], &settings, budget);
     all[1].dvf = Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default());
@@ -170,12 +170,14 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     // What is renewed pays within its frame.
     assert!(left[1] + spent < left[0], "{left:?} {spent}");
     // At rest, frame by frame more is renewed; where what it takes does not matter, until nothing is left.
+    let mut resting = renderer(&scene, "--size 96x72 --cache 100% --spp 160");
+    let still = resting.scene.clone();
     let mut rest = |step: u32, horizon: u32| {
-        all[3].dvf = dvf(&Renewal { frames: horizon, ..renewal.clone() });
-        all[3].place(&stills[3], &[(1, matrix(&stills[3], step))]).expect("a place");
+        resting.dvf = dvf(&Renewal { frames: horizon, ..renewal.clone() });
+        resting.place(&still, &[(1, matrix(&still, step))]).expect("a place");
         let mut left = Vec::new();
         for frame in 0..30 {
-            let output = all[3].frame(frame, &camera()).expect("a frame");
+            let output = resting.frame(frame, &camera()).expect("a frame");
             let own = record(&output, "dvf").expect("a record");
             assert!(own.rays <= budget && left.last().is_none_or(|before| own.cells_left <= *before), "{own:?}");
             left.push(own.cells_left);
@@ -198,10 +200,10 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
         assert!((1000..=3000).contains(&own.rays) && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
     }
     // Back where it was it is the field that was made.
-    let (still, own) = (stills[3].clone(), stills[3].resident().instances[1].world_from_object);
-    all[3].place(&still, &[(1, own)]).expect("a place");
-    assert!(all[3].dvf.moved_field().is_none());
-    assert!(record(&all[3].frame(0, &camera()).expect("a frame"), "dvf").is_none());
+    let own = still.resident().instances[1].world_from_object;
+    resting.place(&still, &[(1, own)]).expect("a place");
+    assert!(resting.dvf.moved_field().is_none());
+    assert!(record(&resting.frame(0, &camera()).expect("a frame"), "dvf").is_none());
 }
 
 /// With masks of many rays little is missed, whoever made them.

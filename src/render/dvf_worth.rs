@@ -8,10 +8,10 @@ use glam::DVec3;
 /// Most triangles of bricks that are read for a frame: 48 MiB.
 const MOST_TRIANGLES: u64 = 1 << 20;
 
-/// What is counted in rays to the environment: to make anything anew at all, one ray of a cell, a triangle of a brick that is read. Where packets trace rays to the environment several
-/// are traced in that time (`benches/results/dvf.md`).
-const BEGUN: f64 = 2000.0;
-pub(super) const MADE: f64 = 1.5;
+/// What is counted in rays to the environment: to make anything anew at all, one ray of a cell, a triangle of a brick that is read. Rays of a cell go everywhere and those of a pixel
+/// go in packets: as measured in larger scenes (`benches/results/dvf.md`).
+const BEGUN: f64 = 10_000.0;
+pub(super) const MADE: f64 = 4.0;
 const READ: f64 = 0.25;
 
 /// How often the budget is looked for among cells by what they are expected to take: those that take less make room for more.
@@ -53,7 +53,7 @@ impl Worth {
     /// Of candidates those that are expected to save more than they take, and of these, in their order, as many as save most beyond what is read for all together, within
     /// the budget.
     pub fn of(renewal: &Renewal, leaves: &[LeafBox], mut candidates: Vec<Candidate>) -> Self {
-        expect(renewal, leaves, &mut candidates);
+        estimate(renewal, leaves, &mut candidates);
         candidates.retain(|candidate| MADE * candidate.takes <= candidate.saves);
         let read_by = leaves_of(renewal, leaves, &candidates);
         let mut is_read = vec![false; leaves.len()];
@@ -81,7 +81,7 @@ impl Worth {
 
 /// Expects what candidates take: that points by area are as many in every known cell, and what raising their numbers to whole ones adds to those of a leaf's triangles as many in
 /// every known cell of its box; in all of them where none is known.
-fn expect(renewal: &Renewal, leaves: &[LeafBox], candidates: &mut [Candidate]) {
+fn estimate(renewal: &Renewal, leaves: &[LeafBox], candidates: &mut [Candidate]) {
     let Renewal { kept, settings, .. } = renewal;
     let (shape, labels) = (kept.field.shape, &kept.field.labels);
     let triangles: u64 = leaves.iter().map(|(_, own)| own).sum();
@@ -203,7 +203,7 @@ mod tests {
                 kept.field.labels[1] = UNKNOWN;
             }
             let mut candidates = vec![candidate(0, 1.0), candidate(1, 1.0), candidate(2, 1.0)];
-            expect(&renewal, &[leaf(0, 3, triangles)], &mut candidates);
+            estimate(&renewal, &[leaf(0, 3, triangles)], &mut candidates);
             candidates.iter().map(|candidate| candidate.takes / 32.0).collect::<Vec<_>>()
         };
         let even = 100.0 / 9.0;
