@@ -1,7 +1,7 @@
 // Answers the pass's rays by ray-aligned occupancy maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that
 // meet nothing are ended, and others are traced up to roma_near cells from their start. Where pilots have been traced, these count for what maps get wrong.
 // Where the closest is asked for, with the point, against the direction travelled as its normal, and the level's lift as its area: such a hit is known
-// to a cell. Rays whose map is drawn go on in its direction.
+// to a cell, and rays whose map is drawn go on in its direction.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -57,10 +57,10 @@ fn write(index: u32, found: Answer) {
     }
 }
 
-// Gives a ray the direction that it was answered in.
+// Gives a ray the direction that it was answered in, unless nothing is asked of what is met there.
 fn turn(index: u32, direction: vec3<f32>) {
-    rays[index].direction = direction;
     if (params.flags & PARAM_ANY_HIT) == 0u {
+        rays[index].direction = direction;
         densities[index] = params.diffuse_count * max(dot(gbuffer[index].normal, direction), 0.0) * 0.31830987; // 1 / pi
     }
 }

@@ -1,7 +1,7 @@
 //! Ray-aligned occupancy maps: twins of `shaders/roma_rotate.wgsl` and `roma_trace.wgsl`.
 
 use super::rays::RaySet;
-use super::roma_cosine::{drawn_map, drawn_number, length_of, upward};
+use super::roma_cosine::{drawn_map, drawn_word, length_of, upward};
 use super::scene::{Bound, Tally};
 use super::shade::Pixels;
 use super::vector::{Vec3, dot, each, least, most};
@@ -352,10 +352,10 @@ impl Maps<'_> {
         Taken { map, direction: ray.direction, steps: if p.roma_steps == 0 { GRAZING_STEPS } else { p.roma_steps } }
     }
 
-    /// The map that is drawn by the cosine to normals, as of [`drawn_map`]; the nearest where there is none to draw.
+    /// The map that is drawn by the cosine to normals, as of [`drawn_map`]; the nearest where all are refused.
     fn drawn(&self, index: u32, ray: &Ray, normals: [Vec3; 2]) -> Taken {
         let maps = &self.maps[..(self.params.roma_k * self.params.roma_k) as usize];
-        let Some(map) = drawn_map(maps, drawn_number(self.params, index), normals) else {
+        let Some(map) = drawn_map(maps, drawn_word(self.params, index), normals) else {
             return self.nearest(ray, normals[1]);
         };
         let (length, direction) = (length_of(ray.direction), upward(&maps[map], normals[1]));
@@ -440,7 +440,7 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
 
 /// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing
 /// are ended, and others are traced up to `roma_near` cells from their start. Where pilots have been traced, these count for what maps get wrong. Where the
-/// closest is asked for, with what is known of its surface. Rays whose map is drawn go on in its direction.
+/// closest is asked for, with what is known of its surface, and rays whose map is drawn go on in its direction.
 pub fn roma_trace(
     bound: &Bound,
     tables: &RomaTables,
@@ -452,6 +452,8 @@ pub fn roma_trace(
     let p = bound.params;
     let of = Maps { params: p, levels, maps, columns: &tables.columns };
     let (is_far, is_sifted, is_drawn) = (p.roma_part == ROMA_FAR, p.roma_part == ROMA_SIFT, p.roma_part == ROMA_COSINE);
+    // Where nothing is asked of what is met, nothing is of where it is.
+    let is_turned = is_drawn && !bound.has(PARAM_ANY_HIT);
     let Pixels { gbuffers, densities, .. } = pixels;
     let gbuffer = &gbuffers[shaded];
     let RaySet { rays, hits, surfaces } = own;
@@ -478,7 +480,7 @@ pub fn roma_trace(
             let from = if is_far { hit.t } else { ray.t_min };
             let found = of.answer(index as u32, ray, &taken, normal, from, is_sifted);
             tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
-            if is_drawn {
+            if is_turned {
                 ray.direction = found.direction;
             }
             if is_sifted {
@@ -494,7 +496,7 @@ pub fn roma_trace(
         }
         bound.counters.add(&tally);
     });
-    if is_drawn && !bound.has(PARAM_ANY_HIT) {
+    if is_turned {
         for ((density, ray), g) in densities.iter_mut().zip(rays).zip(gbuffer) {
             *density = p.diffuse_count * most(dot(g.normal, ray.direction), 0.0) * FRAC_1_PI;
         }

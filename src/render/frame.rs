@@ -343,7 +343,8 @@ impl Renderer {
             let trace = |part| Step::RomaTrace { steps, part };
             match role {
                 Role::Answer => {
-                    first.extend([trace(RomaPart::answering(pass, steps)), add]);
+                    let is_long = self.roma.is_long(&self.scene, length);
+                    first.extend([trace(RomaPart::answering(pass, steps, is_long)), add]);
                     stats.add(self.executor.run(pass, &first, &self.cache.states)?);
                     return Ok(());
                 }

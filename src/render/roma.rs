@@ -7,7 +7,7 @@ use crate::kernel::roma::RomaMaps;
 use crate::kernel::{FrameExecutor, View};
 use crate::schedule::{ExecutorError, Lamp, Pass, Step};
 use crate::visibility::bom::{Assembler, Bom, BomError, Cascades, Settings, Source};
-use crate::visibility::roma::{Grid, LEAST_CELLS, LIFT, MOST_LEVELS, Role, RomaPass, RomaSettings};
+use crate::visibility::roma::{Grid, LEAST_CELLS, LIFT, LONG_CELLS, MOST_LEVELS, Role, RomaPass, RomaSettings};
 use bricks::{Leaf, Resident, SceneFile};
 use glam::DVec3;
 use std::sync::Arc;
@@ -167,6 +167,11 @@ impl Roma {
     /// Whether rays of a length, world units, are too short for maps to help tracing them: what they meet is as near as what is overlooked.
     pub fn is_short(&mut self, scene: &SceneFile, length: f64) -> bool {
         self.brick_cell(scene).is_some_and(|cell| length < LEAST_CELLS * cell)
+    }
+
+    /// Whether rays of a length, world units, go so far that which way they go within a stratum counts for more than what cells add to things.
+    pub fn is_long(&mut self, scene: &SceneFile, length: f64) -> bool {
+        self.brick_cell(scene).is_none_or(|cell| length >= LONG_CELLS * cell)
     }
 
     /// The base maps around the camera, as wide as `size` cells would be of which bricks have all, of `cells` on each axis, once or twice as

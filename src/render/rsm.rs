@@ -213,7 +213,7 @@ impl Renderer {
         records.pass(self, names[0], |r, stats| {
             let rotate = r.roma.prepare(&mut *r.executor, &r.scene, roma, f64::INFINITY)?;
             let pass = Pass::Diffuse(index);
-            let trace = Step::RomaTrace { steps: roma.steps, part: RomaPart::answering(pass, roma.steps) };
+            let trace = Step::RomaTrace { steps: roma.steps, part: RomaPart::answering(pass, roma.steps, true) };
             let steps: Vec<Step> = std::iter::once(Step::Generate).chain(rotate).chain([trace]).collect();
             stats.add(r.executor.run(pass, &steps, &r.cache.states)?);
             let shading = Shading { miss: true, environment: r.draws_environment(), ..Shading::default() };

@@ -274,10 +274,11 @@ pub enum RomaPart {
 }
 
 impl RomaPart {
-    /// The one that answers all rays of a pass; with no `steps` they are snapped.
-    pub fn answering(pass: Pass, steps: u32) -> Self {
+    /// The one that answers all rays of a pass; with no `steps` they are snapped. `is_long`: so far do they go that what the cosine is within a stratum
+    /// counts.
+    pub fn answering(pass: Pass, steps: u32, is_long: bool) -> Self {
         let is_around_normal = matches!(pass, Pass::Occlusion(_) | Pass::Diffuse(_));
-        if is_around_normal && steps == 0 { Self::Cosine } else { Self::Whole }
+        if is_around_normal && steps == 0 && is_long { Self::Cosine } else { Self::Whole }
     }
 }
 

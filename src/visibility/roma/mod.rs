@@ -7,8 +7,8 @@
 //!
 //! *What we changed.* The paper's Algorithms 1 and 2 as corrected in [`bits`]. Base maps are conservative, and are looked up at steps of at most
 //! one of their cells, so that sheets leak little. Cells of a map are moved by up to half a cell and maps are turned about their
-//! direction, at random, in place of jittered geometry. Rays around normals draw their map by the cosine of its own direction, in place of the stratum that
-//! they lie in: within one the cosine would be lost. There is an array for each of the [`super::bom::Cascades`]: a ray goes on in the next
+//! direction, at random, in place of jittered geometry. Long rays around normals draw their map by the cosine of its own direction, in place of the stratum
+//! that they lie in: within one the cosine would be lost. There is an array for each of the [`super::bom::Cascades`]: a ray goes on in the next
 //! where it leaves one.
 //!
 //! *Practice.* Snapped rays take their map's direction: for rays that go everywhere. Others pass from column to column (Amanatides, Woo
@@ -133,6 +133,10 @@ pub const MOST_CELLS: u32 = 256;
 
 /// Cells of bricks than which no ray of use is shorter (spec §2).
 pub const LEAST_CELLS: f64 = 3.0;
+
+/// Rays around a normal as long as this, in cells that bricks have, draw their map by the cosine. Of shorter ones cells add more to what is met than the
+/// cosine in a stratum takes away, and to draw it takes up to half of the time (`benches/results/roma-errors.md`).
+pub const LONG_CELLS: f64 = 32.0;
 
 /// Most rays of which one is traced to correct maps by.
 pub const MOST_ONE_IN: u32 = 16;
