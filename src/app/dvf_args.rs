@@ -60,7 +60,7 @@ pub struct DvfArgs {
     #[arg(long, value_name = "MODE", default_value = "same-sample")]
     pub dvf_mode: Mode,
     /// With --secondary dvf and --motion: rays by which cells of the field are made anew in a frame, 0 to 1G (0: none): those that the camera sees and that what
-    /// moves concerns, the most seen first, as far as that is expected to save more than it takes; 4 triangles that are read for it count as a ray. In all others directions toward what moves are traced
+    /// moves concerns, the most seen first, as far as that is expected to save four times as many; 4 triangles that are read for it count as one of the rays. In all other cells directions toward what moves are traced
     #[arg(long, value_name = "RAYS", default_value = "1M", value_parser = |s: &str| ranged(s, 0, 1_000_000_000))]
     pub dvf_renew: u32,
     /// With --secondary dvf: the field's file; it is made anew where it is missing, damaged, or of another scene or other options

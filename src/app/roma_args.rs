@@ -32,8 +32,8 @@ pub struct RomaArgs {
     /// every sample: thinner, with holes, and slow)
     #[arg(long, value_name = "SOURCE", default_value = "bricks")]
     pub bom: BomSource,
-    /// With --secondary roma: which rays keep their direction rather than to take that of a map (of ao and diffuse one drawn by the cosine to
-    /// the surface, of shadow the nearest), separated by commas: none, shadow, ao, diffuse, all
+    /// With --secondary roma: which rays keep their direction rather than to take that of a map (of diffuse, and of ao as long as 32 cells of bricks, one
+    /// drawn by the cosine to the surface; of others the nearest), separated by commas: none, shadow, ao, diffuse, all
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "shadow")]
     pub roma_unsnapped: Vec<Unsnapped>,
     /// With --secondary roma: columns of cells, 1 to 64, that a ray with a direction of its own passes before it goes on in that of its map;

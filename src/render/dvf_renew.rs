@@ -5,7 +5,7 @@
 //!
 //! *What we changed.* Only cells in which primary hits of the frame lie are made anew, and in each only directions that what moves concerns
 //! ([`Fresh`]). Which come first, and whether at all, is decided by counts: those with the most primary hits, and only where what this saves is as much as
-//! it takes, in rays traced meanwhile, as far as hits and what the field answered before tell: a cell that is at rest for n frames more may take n times as much, so that never more than about
+//! it takes, weighed in rays traced meanwhile, as far as hits and what the field answered before tell: a cell that is at rest for n frames more may take n times as much, so that never more than about
 //! twice is spent what waiting would have cost (the ski rental: Karlin et al. 1988). So pictures depend on the frame and on how many frames ago something moved last alone,
 //! never on time, cache or threads.
 //!
@@ -45,7 +45,7 @@ pub struct Renewal {
     pub tracing: DvfTracing,
     /// Most rays a frame; 0: no cell is made anew.
     pub rays: u64,
-    /// A cell is made anew if that saves as many rays as it takes within so many frames like this one, 1 or more.
+    /// A cell is made anew if that saves what it takes within so many frames like this one, 1 or more.
     pub frames: u32,
 }
 
