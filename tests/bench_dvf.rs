@@ -96,7 +96,7 @@ fn all_stages_are_measured_once_and_their_files_agree() {
 fn only_the_papers_mode_flickers() {
     let folder = folder();
     let output = folder.path().join("out");
-    run(&output, "--size 64x48 --samples 64 --points 100K --rays 32 --stages flicker");
+    run(&output, "--size 64x48 --samples 160 --points 100K --rays 32 --stages flicker");
     let json = results(&output);
     let flicker = table(&json, "flicker");
     let of = |mode: &str, name: &str| entries(flicker, &[&format!("mode {mode}")], name);
