@@ -1,7 +1,6 @@
-// Answers the pass's rays by ray-aligned occupancy maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that
-// meet nothing are ended, and others are traced up to roma_near cells from their start. Where pilots have been traced, these count for what maps get wrong.
-// Where the closest is asked for, with the point, against the direction travelled as its normal, and the level's lift as its area: such a hit is known
-// to a cell, and rays whose map is drawn go on in its direction.
+// Answers the pass's rays by ray-aligned occupancy maps, each by that of its stratum. What is met is written as a hit of no triangle, but where rays are
+// sifted: there, those that meet nothing are ended, and others are traced up to roma_near cells from their start. Where pilots have been traced, these
+// count for what maps get wrong.
 #include "shared/types.wgsl"
 #include "shared/bindings.wgsl"
 #include "shared/shading.wgsl"
@@ -11,8 +10,8 @@
 #include "shared/levels.wgsl"
 #include "shared/roma_start.wgsl"
 #include "shared/roma_walk.wgsl"
-#include "shared/roma_cosine.wgsl"
 #include "shared/roma_pilot.wgsl"
+#include "shared/roma_write.wgsl"
 
 // Ends a ray that maps find free; what they do not is traced.
 fn sift(index: u32, ray: Ray, found: Answer) {
@@ -44,29 +43,6 @@ fn correct(index: u32, found: Answer) {
     }
 }
 
-// Writes what a ray meets.
-fn write(index: u32, found: Answer) {
-    if found.t < 0.0 {
-        return;
-    }
-    hits[index] = Hit(found.t, ROMA_HIT, 0.0, 0.0);
-    if (params.flags & PARAM_ANY_HIT) == 0u {
-        surfaces[index].point = found.point;
-        surfaces[index].normal = -found.direction;
-        surfaces[index].area = found.lift;
-    }
-}
-
-// Gives a ray the direction that it was answered in, unless nothing is asked of what is met there.
-fn turn(index: u32, direction: vec3<f32>) {
-    if (params.flags & PARAM_ANY_HIT) == 0u {
-        rays[index].direction = direction;
-        densities[index] = params.diffuse_count * max(dot(gbuffer[index].normal, direction), 0.0) * 0.31830987; // 1 / pi
-    }
-}
-
-var<workgroup> counted: atomic<u32>; // rays, and in the upper half those that were capped
-
 // One thread a ray.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -75,18 +51,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
         let ray = rays[index];
         let is_far = params.roma_part == ROMA_FAR;
         let is_sifted = params.roma_part == ROMA_SIFT;
-        let is_drawn = params.roma_part == ROMA_COSINE;
         // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
         let is_done = hits[index].id != NONE || hits[index].t == ANSWERED || hits[index].t >= ray.t_max;
         if ray.t_min <= ray.t_max && !(is_far && is_done) && !(is_sifted && is_pilot(index)) {
-            var taken: Taken;
-            if is_drawn {
-                taken = drawn(index, ray);
-                turn(index, taken.direction);
-            } else {
-                taken = nearest(index, ray);
-            }
-            let found = answer(index, ray, taken, select(ray.t_min, hits[index].t, is_far), is_sifted);
+            let found = answer(index, ray, nearest(index, ray), select(ray.t_min, hits[index].t, is_far), is_sifted);
             if is_sifted {
                 sift(index, ray, found);
             } else if params.roma_part == ROMA_CORRECT && is_pilot(index) {
@@ -94,13 +62,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
             } else {
                 write(index, found);
             }
-            atomicAdd(&counted, select(1u, 65537u, found.is_capped));
+            count(found.is_capped);
         }
     }
-    workgroupBarrier();
-    if lane == 0u {
-        let sum = atomicLoad(&counted);
-        atomicAdd(&counters[COUNTER_RAYS], sum & 0xffffu);
-        atomicAdd(&counters[COUNTER_ROMA_CAPPED], sum >> 16u);
-    }
+    sum_up(lane);
 }

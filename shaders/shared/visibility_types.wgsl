@@ -88,7 +88,6 @@ const ROMA_WHOLE: u32 = 0u; // all of them
 const ROMA_FAR: u32 = 1u;   // from where they have been traced to
 const ROMA_SIFT: u32 = 2u;  // those alone that meet nothing
 const ROMA_CORRECT: u32 = 3u; // all of them, and pilots, which have been traced, count for what maps get wrong
-const ROMA_COSINE: u32 = 4u; // all of them, which are snapped, by maps drawn by the cosine to their normals
 const HANDOVERS: u32 = 6u;    // distances up to which rays may be traced, roma_measure
 const FIELD_HIT: u32 = 0xfffffffdu;  // id of what is met in a distance field, which is no triangle
 const DVF_HIT: u32 = 0xfffffffcu;    // id of what a discrete visibility field says is met, which is no triangle

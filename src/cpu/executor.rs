@@ -18,6 +18,7 @@ use super::query_pairs::query_pairs;
 use super::rays::{RaySet, Work};
 use super::resolve::{AttributeView, resolve};
 use super::roma::{RomaTables, roma_measure, roma_near, roma_rotate, roma_trace};
+use super::roma_cosine::roma_draw;
 use super::rsm::{RsmTables, rsm_light, rsm_write};
 use super::sample::{Sampling, Texels, TileDemand, sample};
 use super::scene::{Bound, Counters, Demand, Scene};
@@ -27,7 +28,7 @@ use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_se
 use super::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernel::dispatch::{
     COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_POINTS, DVF_RAYS, DVF_SEEN, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS,
-    FIELD_TRACE, INTERSECT_BINARY, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
+    FIELD_TRACE, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
     are_pairs_culled, dispatches,
 };
 use crate::kernel::dvf::DvfMaps;
@@ -250,7 +251,8 @@ fn run_kernel(
         "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
         ROMA_ROTATE => roma_rotate(bound, roma),
         ROMA_NEAR => roma_near(bound, roma, own, seen),
-        ROMA_TRACE => roma_trace(bound, roma, own, seen, (pixels, shaded)),
+        ROMA_TRACE => roma_trace(bound, roma, own, seen),
+        ROMA_DRAW => roma_draw(bound, roma, own, seen, (pixels, shaded)),
         ROMA_MEASURE => roma_measure(bound, roma, own, seen),
         FIELD_TRACE => field_trace(bound, field, own, seen),
         making if FIELD_KERNELS.contains(&making) => make_field(making, bound, field),

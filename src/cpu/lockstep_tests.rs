@@ -8,8 +8,8 @@ use crate::gpu::kernels::{self, Kernels};
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernel::dispatch::{
-    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT,
-    RSM_WRITE,
+    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE,
+    RSM_LIGHT, RSM_WRITE,
 };
 use crate::kernel::field::FieldMaps;
 use crate::kernel::frame::Frame;
@@ -430,7 +430,7 @@ fn twins_agree_with_their_kernels() {
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
     let all = kernels::names()
-        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_MEASURE, RSM_WRITE, RSM_LIGHT])
+        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE, RSM_WRITE, RSM_LIGHT])
         .chain(FIELD_KERNELS)
         .chain(DVF_KERNELS);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();

@@ -1,13 +1,12 @@
 //! Ray-aligned occupancy maps: twins of `shaders/roma_rotate.wgsl` and `roma_trace.wgsl`.
 
 use super::rays::RaySet;
-use super::roma_cosine::{drawn_map, drawn_word, length_of, upward};
+use super::roma_cosine::length_of;
 use super::scene::{Bound, Tally};
-use super::shade::Pixels;
-use super::vector::{Vec3, dot, each, least, most};
+use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
     COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_CORRECT,
-    ROMA_COSINE, ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+    ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
@@ -16,7 +15,6 @@ use crate::visibility::bom::{BLOCK_CELLS, Cascades};
 use crate::visibility::roma::bits::{cells_between, first_cell};
 use crate::visibility::roma::directions::stratum_of;
 use rayon::prelude::*;
-use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 /// Steps of a column along an axis of the base map that are too short to bound it by.
@@ -44,7 +42,7 @@ const UNBOUNDED: f32 = f32::from_bits((127 + 40) << 23);
 const LEAST_SPEED: f32 = f32::from_bits((127 - 60) << 23);
 
 /// Rays that a task traces in a row.
-const RUN: usize = 256;
+pub(super) const RUN: usize = 256;
 
 /// The maps.
 #[derive(Default)]
@@ -169,23 +167,35 @@ struct Found {
 }
 
 /// The map that a ray takes, among those of a level.
-struct Taken {
-    map: u32,
+pub(super) struct Taken {
+    pub map: u32,
     /// The direction that is travelled.
-    direction: Vec3,
+    pub direction: Vec3,
     /// Columns that are passed before it is that of the map; 0: it is.
-    steps: u32,
+    pub steps: u32,
 }
 
 /// What is known of a whole ray.
-struct Answer {
+pub(super) struct Answer {
     met: Option<Met>,
     /// The direction that was travelled.
-    direction: Vec3,
+    pub direction: Vec3,
     /// It was capped in some level.
-    is_capped: bool,
+    pub is_capped: bool,
     /// It meets something, or all of it lies in the levels.
     is_known: bool,
+}
+
+impl Answer {
+    /// Writes what the ray meets, and where it is asked for what is known of its surface: the point, against the direction travelled as its normal, and the
+    /// level's lift as its area.
+    pub fn write(&self, hit: &mut Hit, surface: Option<&mut Surface>) {
+        let Some(Met { t, point, lift }) = self.met else { return };
+        *hit = Hit { t, id: ROMA_HIT, u: 0.0, v: 0.0 };
+        if let Some(surface) = surface {
+            (surface.point, surface.normal, surface.area) = (point, self.direction.map(|x| -x), lift);
+        }
+    }
 }
 
 /// A hit of a ray, known to a cell.
@@ -276,16 +286,23 @@ fn start_level_of(p: &Params, levels: &[RomaLevel], origin: Vec3, normal: Vec3, 
     levels.iter().position(holds).unwrap_or(levels.len() - usize::from(p.roma_is_part == 0))
 }
 
-fn normal_of(seen: &RaySet, index: usize) -> Vec3 {
+pub(super) fn normal_of(seen: &RaySet, index: usize) -> Vec3 {
     seen.surfaces.get(index).map_or([0.0; 3], |surface: &Surface| surface.normal)
 }
 
 /// What rays are traced against.
-struct Maps<'a> {
-    params: &'a Params,
-    levels: &'a [RomaLevel],
-    maps: &'a [RomaMap],
+pub(super) struct Maps<'a> {
+    pub params: &'a Params,
+    pub levels: &'a [RomaLevel],
+    pub maps: &'a [RomaMap],
     columns: &'a [u32],
+}
+
+impl RomaTables {
+    pub(super) fn maps_of<'a>(&'a self, params: &'a Params) -> Maps<'a> {
+        let RomaMaps { levels, maps, .. } = &self.maps;
+        Maps { params, levels, maps, columns: &self.columns }
+    }
 }
 
 impl Maps<'_> {
@@ -338,7 +355,7 @@ impl Maps<'_> {
     }
 
     /// The map of the stratum that a ray lies in. A snapped ray takes its direction, unless that leads below the surface.
-    fn nearest(&self, ray: &Ray, normal: Vec3) -> Taken {
+    pub fn nearest(&self, ray: &Ray, normal: Vec3) -> Taken {
         let p = self.params;
         let (map, is_upper) = stratum_of(ray.direction, p.roma_k);
         if p.roma_steps == 0 {
@@ -352,20 +369,10 @@ impl Maps<'_> {
         Taken { map, direction: ray.direction, steps: if p.roma_steps == 0 { GRAZING_STEPS } else { p.roma_steps } }
     }
 
-    /// The map that is drawn by the cosine to normals, as of [`drawn_map`]; the nearest where all are refused.
-    fn drawn(&self, index: u32, ray: &Ray, normals: [Vec3; 2]) -> Taken {
-        let maps = &self.maps[..(self.params.roma_k * self.params.roma_k) as usize];
-        let Some(map) = drawn_map(maps, drawn_word(self.params, index), normals) else {
-            return self.nearest(ray, normals[1]);
-        };
-        let (length, direction) = (length_of(ray.direction), upward(&maps[map], normals[1]));
-        Taken { map: map as u32, direction: each(|k| length * direction[k]), steps: 0 }
-    }
-
     /// Asks for a ray from t = `from` on: in the finest level that holds its start, then in the next where it leaves one. Rays are off their surface by
     /// the level's lift where they enter it, so that no level meets what they leave; with `is_sifted` by less, and must be free to their own
     /// ends.
-    fn answer(&self, index: u32, ray: &Ray, taken: &Taken, normal: Vec3, from: f32, is_sifted: bool) -> Answer {
+    pub fn answer(&self, index: u32, ray: &Ray, taken: &Taken, normal: Vec3, from: f32, is_sifted: bool) -> Answer {
         let p = self.params;
         let maps = p.roma_k * p.roma_k;
         let &Taken { map: stratum, direction, steps } = taken;
@@ -439,28 +446,16 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
 }
 
 /// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are sifted: there, those that meet nothing
-/// are ended, and others are traced up to `roma_near` cells from their start. Where pilots have been traced, these count for what maps get wrong. Where the
-/// closest is asked for, with what is known of its surface, and rays whose map is drawn go on in its direction.
-pub fn roma_trace(
-    bound: &Bound,
-    tables: &RomaTables,
-    own: &mut RaySet,
-    seen: &RaySet,
-    (pixels, shaded): (&mut Pixels, usize),
-) {
-    let RomaMaps { levels, maps, .. } = &tables.maps;
+/// are ended, and others are traced up to `roma_near` cells from their start. Where pilots have been traced, these count for what maps get wrong.
+pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
     let p = bound.params;
-    let of = Maps { params: p, levels, maps, columns: &tables.columns };
-    let (is_far, is_sifted, is_drawn) = (p.roma_part == ROMA_FAR, p.roma_part == ROMA_SIFT, p.roma_part == ROMA_COSINE);
-    // Where nothing is asked of what is met, nothing is of where it is.
-    let is_turned = is_drawn && !bound.has(PARAM_ANY_HIT);
-    let Pixels { gbuffers, densities, .. } = pixels;
-    let gbuffer = &gbuffers[shaded];
+    let of = tables.maps_of(p);
+    let (is_far, is_sifted) = (p.roma_part == ROMA_FAR, p.roma_part == ROMA_SIFT);
     let RaySet { rays, hits, surfaces } = own;
-    let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks_mut(RUN));
+    let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
     all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();
-        for (i, ray) in rays.iter_mut().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
+        for (i, ray) in rays.iter().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
             let (hit, surface, index) = (&mut hits[i], &mut surfaces[i], run * RUN + i);
             // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
             let is_done = hit.id != NONE || hit.t == ANSWERED || hit.t >= ray.t_max;
@@ -468,39 +463,24 @@ pub fn roma_trace(
                 continue;
             }
             tally.add(COUNTER_RAYS, 1);
-            if levels.is_empty() {
+            if of.levels.is_empty() {
                 continue;
             }
             let normal = normal_of(seen, index);
-            let taken = if is_drawn {
-                of.drawn(index as u32, ray, [gbuffer[index].normal, normal])
-            } else {
-                of.nearest(ray, normal)
-            };
+            let taken = of.nearest(ray, normal);
             let from = if is_far { hit.t } else { ray.t_min };
             let found = of.answer(index as u32, ray, &taken, normal, from, is_sifted);
             tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
-            if is_turned {
-                ray.direction = found.direction;
-            }
             if is_sifted {
                 of.sift(index as u32, ray, normal, &found, hit);
             } else if p.roma_part == ROMA_CORRECT && is_pilot(p, index as u32) {
                 correct(p, found.met.is_some(), hit);
-            } else if let Some(Met { t, point, lift }) = found.met {
-                *hit = Hit { t, id: ROMA_HIT, u: 0.0, v: 0.0 };
-                if !bound.has(PARAM_ANY_HIT) {
-                    (surface.point, surface.normal, surface.area) = (point, found.direction.map(|x| -x), lift);
-                }
+            } else {
+                found.write(hit, (!bound.has(PARAM_ANY_HIT)).then_some(surface));
             }
         }
         bound.counters.add(&tally);
     });
-    if is_turned {
-        for ((density, ray), g) in densities.iter_mut().zip(rays).zip(gbuffer) {
-            *density = p.diffuse_count * most(dot(g.normal, ray.direction), 0.0) * FRAC_1_PI;
-        }
-    }
 }
 
 /// Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or 0. So the mean is that of traced
@@ -535,9 +515,8 @@ impl Maps<'_> {
 /// Counts, of the pilots, which were traced to their ends, how many maps would have answered wrongly: those that meet something though they were found
 /// free, and for each of several distances up to which rays in doubt may be traced, those that are free and meet something in the maps from there on.
 pub fn roma_measure(bound: &Bound, tables: &RomaTables, own: &RaySet, seen: &RaySet) {
-    let RomaMaps { levels, maps, .. } = &tables.maps;
     let p = bound.params;
-    let of = Maps { params: p, levels, maps, columns: &tables.columns };
+    let of = tables.maps_of(p);
     own.hits.par_chunks(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
         let mut tally = Tally::default();
         for (i, (hit, ray)) in hits.iter().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
@@ -553,7 +532,7 @@ pub fn roma_measure(bound: &Bound, tables: &RomaTables, own: &RaySet, seen: &Ray
             tally.add(COUNTER_PILOTS + 1, u32::from(!is_free && !is_met && found.is_known));
             for i in 0..if is_free && is_met { HANDOVERS } else { 0 } {
                 let cells = if i == 0 { 0 } else { 1 << i };
-                let from = near_end(p, levels, index, ray, normal, cells * p.roma_near);
+                let from = near_end(p, of.levels, index, ray, normal, cells * p.roma_near);
                 let is_wrong = from < ray.t_max && of.answer(index, ray, &taken, normal, from, false).met.is_some();
                 tally.add(COUNTER_PILOTS + 2 + i, u32::from(is_wrong));
             }

@@ -1,4 +1,4 @@
-//! Maps that are drawn by the cosine to a normal: twin of `shaders/shared/roma_cosine.wgsl`.
+//! Maps that are drawn by the cosine to a normal: twins of `shaders/shared/roma_cosine.wgsl` and `shaders/roma_draw.wgsl`.
 //!
 //! *Theory.* A ray around a normal, drawn by the cosine, takes the map of the stratum that it lies in (Zeng et al., §4), whose direction is drawn evenly
 //! from the stratum. Of 4 x 4 strata each is some 40 degrees wide, and within it the cosine is lost: surfaces have light from where they hardly look.
@@ -7,10 +7,16 @@
 //! Neumann 1951), another one where it is not. As directions are spread evenly over the sphere, one in each stratum, those that are travelled are drawn by
 //! the cosine. Two tries are made on the average, however many maps there are; of some 200 rays one is refused by all, and takes the nearest map.
 
-use super::vector::Vec3;
-use crate::kernel::layout::{Params, RomaMap};
+use super::rays::RaySet;
+use super::roma::{Maps, RUN, RomaTables, Taken, normal_of};
+use super::scene::{Bound, Tally};
+use super::shade::Pixels;
+use super::vector::{Vec3, dot, each, most};
+use crate::kernel::layout::{COUNTER_RAYS, COUNTER_ROMA_CAPPED, PARAM_ANY_HIT, Params, Ray, RomaMap};
 use crate::math::exact::square_root;
 use crate::math::sampling::{pcg, random4};
+use rayon::prelude::*;
+use std::f32::consts::FRAC_1_PI;
 
 /// The golden section of 2³².
 const GOLDEN: u32 = 0x9e37_79b9;
@@ -48,6 +54,60 @@ pub(super) fn drawn_map(maps: &[RomaMap], first: u32, [shading, normal]: [Vec3; 
         (at - (map as f32) < product(upward(&maps[map], normal), shading)).then_some(map)
     };
     std::iter::successors(Some(first), |&word| Some(pcg(word))).take(TRIES).find_map(tried)
+}
+
+impl Maps<'_> {
+    /// The map that is drawn by the cosine to normals, as of [`drawn_map`]; the nearest where all are refused.
+    fn drawn(&self, index: u32, ray: &Ray, normals: [Vec3; 2]) -> Taken {
+        let maps = &self.maps[..(self.params.roma_k * self.params.roma_k) as usize];
+        let Some(map) = drawn_map(maps, drawn_word(self.params, index), normals) else {
+            return self.nearest(ray, normals[1]);
+        };
+        let (length, direction) = (length_of(ray.direction), upward(&maps[map], normals[1]));
+        Taken { map: map as u32, direction: each(|k| length * direction[k]), steps: 0 }
+    }
+}
+
+/// Answers the pass's rays, which are snapped, by maps that are drawn. Where the closest is asked for they go on in the direction they were answered in.
+pub fn roma_draw(
+    bound: &Bound,
+    tables: &RomaTables,
+    own: &mut RaySet,
+    seen: &RaySet,
+    (pixels, shaded): (&mut Pixels, usize),
+) {
+    let p = bound.params;
+    let of = tables.maps_of(p);
+    // Where nothing is asked of what is met, nothing is of where it is.
+    let is_turned = !bound.has(PARAM_ANY_HIT);
+    let Pixels { gbuffers, densities, .. } = pixels;
+    let gbuffer = &gbuffers[shaded];
+    let RaySet { rays, hits, surfaces } = own;
+    let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks_mut(RUN));
+    all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
+        let mut tally = Tally::default();
+        for (i, ray) in rays.iter_mut().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
+            let index = run * RUN + i;
+            tally.add(COUNTER_RAYS, 1);
+            if of.levels.is_empty() {
+                continue;
+            }
+            let normal = normal_of(seen, index);
+            let taken = of.drawn(index as u32, ray, [gbuffer[index].normal, normal]);
+            let found = of.answer(index as u32, ray, &taken, normal, ray.t_min, false);
+            tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
+            if is_turned {
+                ray.direction = found.direction;
+            }
+            found.write(&mut hits[i], is_turned.then_some(&mut surfaces[i]));
+        }
+        bound.counters.add(&tally);
+    });
+    if is_turned {
+        for ((density, ray), g) in densities.iter_mut().zip(rays).zip(gbuffer) {
+            *density = p.diffuse_count * most(dot(g.normal, ray.direction), 0.0) * FRAC_1_PI;
+        }
+    }
 }
 
 #[cfg(test)]

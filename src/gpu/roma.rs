@@ -4,7 +4,7 @@ use super::device::Gpu;
 use super::kernels::{self, Kernels};
 use super::method::{Method, check_bytes, grow};
 use super::rays::storage;
-use crate::kernel::dispatch::{ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernel::dispatch::{ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernel::layout::{RomaLevel, RomaMap};
 use crate::kernel::roma::RomaMaps;
 use crate::schedule::ExecutorError;
@@ -33,7 +33,7 @@ pub struct Roma {
 impl Roma {
     /// Of nothing.
     pub fn new(gpu: &Gpu, kernels: &Kernels) -> Self {
-        let names = [ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_MEASURE];
+        let names = [ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE];
         let method = Method::new(gpu, kernels, "roma", kernels::roma_layout(&gpu.device), &names);
         let [levels, map_records, boms, columns] =
             [("roma levels", size_of::<RomaLevel>()), ("roma maps", size_of::<RomaMap>()), ("boms", 4), ("columns", 4)]

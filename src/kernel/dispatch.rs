@@ -150,6 +150,8 @@ pub const ROMA_ROTATE: &str = "roma_rotate";
 pub const ROMA_NEAR: &str = "roma_near";
 /// The kernel that traces them.
 pub const ROMA_TRACE: &str = "roma_trace";
+/// The kernel that draws and traces them.
+pub const ROMA_DRAW: &str = "roma_draw";
 /// The kernel that counts what they get wrong.
 pub const ROMA_MEASURE: &str = "roma_measure";
 /// The kernel that writes reflective shadow maps.
@@ -366,15 +368,15 @@ pub fn dispatches(
         }
         Step::RomaTrace { steps, part } => {
             let (roma_part, Sift { near, pilots }) = match part {
-                RomaPart::Whole => (layout::ROMA_WHOLE, Sift::default()),
-                RomaPart::Cosine => (layout::ROMA_COSINE, Sift::default()),
+                RomaPart::Whole | RomaPart::Cosine => (layout::ROMA_WHOLE, Sift::default()),
                 RomaPart::Far => (layout::ROMA_FAR, Sift::default()),
                 RomaPart::Sift(sift) => (layout::ROMA_SIFT, sift),
                 RomaPart::Correct { one_in } => (layout::ROMA_CORRECT, Sift { near: None, pilots: one_in }),
             };
             let roma_near = near.unwrap_or(layout::NONE);
             let params = Params { roma_steps: steps, roma_part, roma_near, roma_pilots: pilots, ..params };
-            vec![roma(ROMA_TRACE, params, per_ray, 2)]
+            let kernel = if part == RomaPart::Cosine { ROMA_DRAW } else { ROMA_TRACE };
+            vec![roma(kernel, params, per_ray, 2)]
         }
         Step::RomaMeasure { steps, pilots, cell } => {
             let params = Params { roma_steps: steps, roma_pilots: pilots, roma_near: cell, ..params };

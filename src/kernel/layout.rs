@@ -64,7 +64,6 @@ pub const ROMA_WHOLE: u32 = 0;
 pub const ROMA_FAR: u32 = 1;
 pub const ROMA_SIFT: u32 = 2;
 pub const ROMA_CORRECT: u32 = 3;
-pub const ROMA_COSINE: u32 = 4;
 /// Distances up to which rays in doubt may be traced: 0, 2, 4, 8, 16 and 32 cells of a map.
 pub const HANDOVERS: u32 = 6;
 pub const FIELD_HIT: u32 = 0xffff_fffd;

@@ -171,7 +171,7 @@ impl Roma {
 
     /// Whether rays of a length, world units, go so far that which way they go within a stratum counts for more than what cells add to things.
     pub fn is_long(&mut self, scene: &SceneFile, length: f64) -> bool {
-        self.brick_cell(scene).is_none_or(|cell| length >= LONG_CELLS * cell)
+        self.brick_cell(scene).is_some_and(|cell| length >= LONG_CELLS * cell)
     }
 
     /// The base maps around the camera, as wide as `size` cells would be of which bricks have all, of `cells` on each axis, once or twice as
