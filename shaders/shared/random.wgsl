@@ -1,5 +1,7 @@
 // Random numbers by hashing (pixel, sample, seed): the same on every device and in every run.
 
+const GOLDEN: u32 = 0x9e3779b9u; // the golden section of 2^32
+
 fn pcg(x: u32) -> u32 {
     let state = x * 747796405u + 2891336453u;
     let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;

@@ -1,6 +1,5 @@
 // Maps that are drawn by the cosine to a normal. Twin: src/cpu/roma_cosine.rs.
 
-const GOLDEN: u32 = 0x9e3779b9u; // the golden section of 2^32
 const TRIES: u32 = 8u;
 
 // The word by which a ray first tries a map: the directions of a pixel, those of all samples, go on by the golden section, so that any

@@ -48,7 +48,8 @@ pub struct RomaArgs {
     #[arg(long, value_name = "CELLS", default_value = "0", value_parser = |s: &str| ranged(s, 0, MOST_NEAR.into()))]
     pub roma_shadow_near: u32,
     /// With --secondary auto: maps answer rays of ao, and one in N, 2 to 16, is traced, too, and counts for what maps get wrong of all N: the mean is that
-    /// of exact rays, and where few are summed radiance may lie below 0; more take less time and are noisier. off: --auto-error says which are traced
+    /// of exact rays, and where few are summed radiance may lie below 0; more take less time and are noisier. Blocks of 64 pixels go
+    /// together, which shows in few rays but with --rotation full, --denoise or --taa. off: --auto-error says which are traced
     #[arg(long, value_name = "N|off", default_value = "off", value_parser = |s: &str| one_in(s))]
     pub auto_one_in: OneIn,
     /// With --secondary auto: of a hundred rays of ao or shadow, how many maps may answer otherwise than exact rays would, 0.1 to 50: rays that maps do not find

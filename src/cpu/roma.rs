@@ -1,7 +1,7 @@
 //! Ray-aligned occupancy maps: twins of `shaders/roma_rotate.wgsl` and `roma_trace.wgsl`.
 
 use super::rays::RaySet;
-use super::roma_cosine::length_of;
+use super::roma_cosine::{GOLDEN, length_of};
 use super::scene::{Bound, Tally};
 use super::vector::{Vec3, each, least, most};
 use crate::kernel::layout::{
@@ -10,7 +10,7 @@ use crate::kernel::layout::{
 };
 use crate::kernel::roma::RomaMaps;
 use crate::math::exact::{barrier, divide, square_root};
-use crate::math::sampling::random2;
+use crate::math::sampling::{random2, random4};
 use crate::visibility::bom::{BLOCK_CELLS, Cascades};
 use crate::visibility::roma::bits::{cells_between, first_cell};
 use crate::visibility::roma::directions::stratum_of;
@@ -236,15 +236,22 @@ fn margin_of(p: &Params, index: u32) -> f32 {
     BLEND * (p.roma_cells as f32 * random2(index, !p.stream, p.seed)[0])
 }
 
-/// Whether a ray is traced to its end, whatever maps say of it, and shows what they get wrong: of the directions of a pixel one in so many, evenly, the
-/// first at random. Those of a workgroup go together.
+/// Whether a ray is traced to its end, whatever maps say of it, and shows what they get wrong: of the directions of a pixel one in so many, the first at
+/// random, and those of a workgroup together. Where pilots alone are traced, those of as many pixels as a tile mostly has are together, since for tiles
+/// without any no query is made; which one of so many directions goes on by the golden section, so that over samples all have their turn.
 fn is_pilot(p: &Params, index: u32) -> bool {
-    if p.roma_pilots == 0 {
+    let n = p.roma_pilots;
+    if n == 0 {
         return false;
     }
-    let workgroup = index / p.width / 8 * p.width + index % p.width / 8;
-    let first = (random2(workgroup, !p.stream, p.seed)[0] * p.roma_pilots as f32) as u32;
-    (first + p.direction).is_multiple_of(p.roma_pilots)
+    let block = |side: u32| index / p.width / side * p.width + index % p.width / side;
+    if p.roma_part == ROMA_CORRECT {
+        let first = random4(block(64), !p.stream.wrapping_sub(p.sample), p.seed)[2];
+        let word = first.wrapping_add((p.direction / n).wrapping_mul(GOLDEN));
+        return p.direction % n == ((word >> 8) as f32 / 16_777_216.0 * n as f32) as u32;
+    }
+    let first = (random2(block(8), !p.stream, p.seed)[0] * n as f32) as u32;
+    (first + p.direction).is_multiple_of(n)
 }
 
 /// What is missing to a level's lift of a ray that is `height` off its surface.

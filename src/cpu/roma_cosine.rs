@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 
 /// The golden section of 2³².
-const GOLDEN: u32 = 0x9e37_79b9;
+pub(super) const GOLDEN: u32 = 0x9e37_79b9;
 
 const TRIES: usize = 8;
 

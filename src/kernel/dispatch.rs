@@ -363,7 +363,8 @@ pub fn dispatches(
         }
         Step::RomaNear { cells } => vec![roma(ROMA_NEAR, Params { roma_near: cells, ..params }, per_ray, 0)],
         Step::RomaPilots { one_in } => {
-            let params = Params { roma_near: layout::NONE, roma_pilots: one_in, ..params };
+            let roma_part = layout::ROMA_CORRECT;
+            let params = Params { roma_part, roma_near: layout::NONE, roma_pilots: one_in, ..params };
             vec![roma(ROMA_NEAR, params, per_ray, 0)]
         }
         Step::RomaTrace { steps, part } => {
