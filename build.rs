@@ -15,17 +15,13 @@ fn main() {
     println!("cargo::rustc-env=BRICKWALK_COMMIT={}", commit());
     let shaders = Path::new("shaders");
     let read = |name: &str| match name {
-        "shared/binary.wgsl" => Some(wgsl::binary_accessors(2, 64)),
+        "trace/binary.wgsl" => Some(wgsl::binary_accessors(2, 64)),
         _ => fs::read_to_string(shaders.join(name)).ok(),
     };
-    let mut names: Vec<String> = fs::read_dir(shaders)
-        .expect("the folder shaders/")
-        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| name.ends_with(".wgsl"))
-        .collect();
-    names.sort();
+    let files = files(shaders);
+    let is_kernel = |name: &&String| fs::read_to_string(shaders.join(name)).is_ok_and(|text| text.contains("@compute"));
     let mut structures = None;
-    for name in &names {
+    for name in files.iter().filter(is_kernel) {
         for pages in [
             wgsl::Pages { cache: 1, texels: 1, opacity: false, gloss: false },
             wgsl::Pages { cache: 3, texels: 2, opacity: true, gloss: true },
@@ -37,15 +33,15 @@ fn main() {
             naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default())
                 .validate(&module)
                 .unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(&text)));
-            if name == "resolve.wgsl" {
+            if name == "shade/resolve.wgsl" {
                 structures = Some(module);
             }
         }
     }
     let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out = Path::new(&out);
-    fs::write(out.join("shaders.rs"), embedded(&names)).expect("write shaders.rs");
-    let module = structures.expect("shaders/resolve.wgsl declares every shared structure");
+    fs::write(out.join("shaders.rs"), embedded(&files)).expect("write shaders.rs");
+    let module = structures.expect("shaders/shade/resolve.wgsl declares every shared structure");
     fs::write(out.join("layout_checks.rs"), layout_checks(&module)).expect("write layout_checks.rs");
 }
 
@@ -55,7 +51,8 @@ fn commit() -> String {
         let output = std::process::Command::new("git").arg("rev-parse").args(arguments).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
     };
-    // The log of HEAD grows with every commit, checkout and rebase. A file that does not exist would make every build run anew.
+    // The log of HEAD grows with every commit, checkout and rebase. A file that does not exist would make every build
+    // run anew.
     for file in ["HEAD", "logs/HEAD"] {
         if let Some(path) = git(&["--git-path", file]).filter(|path| Path::new(path).exists()) {
             println!("cargo::rerun-if-changed={path}");
@@ -64,13 +61,23 @@ fn commit() -> String {
     git(&["--short=12", "HEAD"]).unwrap_or_else(|| "unknown".to_string())
 }
 
-/// A table of all shader files, kernels and shared ones.
-fn embedded(names: &[String]) -> String {
-    let mut files: Vec<String> = names.to_vec();
-    for entry in fs::read_dir("shaders/shared").expect("the folder shaders/shared").flatten() {
-        files.push(format!("shared/{}", entry.file_name().to_string_lossy()));
-    }
-    files.sort();
+/// The names of all shader files, each with its family: `trace/leaf.wgsl`.
+fn files(shaders: &Path) -> Vec<String> {
+    let folder = |path: &Path| -> Vec<String> {
+        let entries = fs::read_dir(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect()
+    };
+    let of_family = |family: String| {
+        let names = folder(&shaders.join(&family));
+        names.into_iter().filter(|name| name.ends_with(".wgsl")).map(move |name| format!("{family}/{name}"))
+    };
+    let mut all: Vec<String> = folder(shaders).into_iter().flat_map(of_family).collect();
+    all.sort();
+    all
+}
+
+/// A table of all shader files.
+fn embedded(files: &[String]) -> String {
     let mut s = String::from("const FILES: &[(&str, &str)] = &[\n");
     for file in files {
         let _ = writeln!(s, "({file:?}, include_str!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/shaders/{file}\"))),");
@@ -115,7 +122,7 @@ fn layout_checks(module: &naga::Module) -> String {
     for name in mirrored {
         let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
         let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
-            panic!("shaders/shared/types.wgsl lacks the structure {name}");
+            panic!("shaders/common/types.wgsl lacks the structure {name}");
         };
         let _ = writeln!(s, "const _: () = assert!(size_of::<layout::{name}>() == {span}, \"size of {name}\");");
         for member in members {

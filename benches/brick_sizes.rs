@@ -1,16 +1,16 @@
-//! Bricks of 4K to 256K triangles: what a frame asks, loads and takes. Prints a table a scene and, with `--record DIR`, writes
-//! them there. The default of `--brick-triangles` comes from this table.
+//! Bricks of 4K to 256K triangles: what a frame asks, loads and takes. Prints a table a scene and, with `--record DIR`,
+//! writes them there. The default of `--brick-triangles` comes from this table.
 //!
-//! Scenes: a generated city and the interior of generated pipes on their near paths, and Sponza where `BRICKWALK_SCENES` is set.
-//! Options (after `--`): `--triangles COUNT` (2M) of the generated scenes, `--size WxH` (480x270), `--frames N` (10),
-//! `--repeat N` (3), `--bricks LIST` (4K,…,256K), `--record DIR`. The walks of all sizes are interleaved; the first 2 frames of
-//! each are left out of its times. A cache holds two bricks at least: sizes of which a fifth of the scene holds no two are walked in
-//! core only.
+//! Scenes: a generated city and the interior of generated pipes on their near paths, and Sponza where
+//! `BRICKWALK_SCENES` is set. Options (after `--`): `--triangles COUNT` (2M) of the generated scenes, `--size WxH`
+//! (480x270), `--frames N` (10), `--repeat N` (3), `--bricks LIST` (4K,…,256K), `--record DIR`. The walks of all sizes
+//! are interleaved; the first 2 frames of each are left out of its times. A cache holds two bricks at least: sizes of
+//! which a fifth of the scene holds no two are walked in core only.
 
 mod common;
 
-use brickwalk::app::output::atomic;
-use brickwalk::app::session::{brick_bytes, open_scene};
+use brickwalk::output::atomic;
+use brickwalk::session::open::{brick_bytes, open_scene};
 use clap::Parser;
 use common::{brickwalk, bytes_moved, device_ms, median, number, records, summary, walk};
 use std::fmt::Write;
@@ -44,8 +44,8 @@ struct Cut {
     file: PathBuf,
     /// Whether a fifth of the scene holds the two largest bricks.
     is_walked_out_of_core: bool,
-    /// Device time of primary rays and their queries, ms a frame, of every repetition: out of core, in core by `chc` and by
-    /// `plain`.
+    /// Device time of primary rays and their queries, ms a frame, of every repetition: out of core, in core by `chc`
+    /// and by `plain`.
     ms: [Vec<f64>; 3],
 }
 

@@ -1,15 +1,16 @@
-//! What each optimisation saves or costs in time, queries and bytes moved: walks along the near path of a generated city with one
-//! switched off (or on, where it is off by itself) against walks with all as they are. Prints tables and, with `--record DIR`,
-//! writes them there.
+//! What each optimisation saves or costs in time, queries and bytes moved: walks along the near path of a generated
+//! city with one switched off (or on, where it is off by itself) against walks with all as they are. Prints tables and,
+//! with `--record DIR`, writes them there.
 //!
-//! Options (after `--`): `--triangles COUNT` (500K), `--brick-triangles COUNT` (4K), `--size WxH` (320x180), `--frames N` (12),
-//! `--effects LIST` (shadow,ao; one ray of ao and diffuse a pixel), `--repeat N` (5), `--tile PIXELS` (32), `--cache P%` (20%),
-//! `--record DIR`. Walks are interleaved; of every frame the least time of all repetitions counts, so that what else the machine does
-//! shows least, and the first 5 frames are left out. Counters are those of one walk, all frames.
+//! Options (after `--`): `--triangles COUNT` (500K), `--brick-triangles COUNT` (4K), `--size WxH` (320x180), `--frames
+//! N` (12), `--effects LIST` (shadow,ao; one ray of ao and diffuse a pixel), `--repeat N` (5), `--tile PIXELS` (32),
+//! `--cache P%` (20%), `--record DIR`. Walks are interleaved; of every frame the least time of all repetitions counts,
+//! so that what else the machine does shows least, and the first 5 frames are left out. Counters are those of one walk,
+//! all frames.
 
 mod common;
 
-use brickwalk::app::output::atomic;
+use brickwalk::output::atomic;
 use clap::Parser;
 use common::{bytes_moved, number, records, summary};
 use serde_json::Value;

@@ -1,12 +1,14 @@
-//! The targets of the foundation on the near path of a generated city: bytes moved against bytes needed (cold and steady),
-//! round trips, memory, and `chc` ÷ `plain` in core, near and far. Prints a table and, with `--record DIR`, writes it there.
+//! The targets of the foundation on the near path of a generated city: bytes moved against bytes needed (cold and
+//! steady), round trips, memory, and `chc` ÷ `plain` in core, near and far. Prints a table and, with `--record DIR`,
+//! writes it there.
 //!
-//! Options (after `--`): `--triangles COUNT` (3M), `--size WxH` (640x360), `--frames N` (16), `--repeat N` (5), `--tile PIXELS`
-//! (64), `--record DIR`. Walks that are compared are interleaved; the first 5 frames of a timed walk are left out.
+//! Options (after `--`): `--triangles COUNT` (3M), `--size WxH` (640x360), `--frames N` (16), `--repeat N` (5), `--tile
+//! PIXELS` (64), `--record DIR`. Walks that are compared are interleaved; the first 5 frames of a timed walk are left
+//! out.
 
 mod common;
 
-use brickwalk::app::output::atomic;
+use brickwalk::output::atomic;
 use clap::Parser;
 use common::{bytes_moved, device_ms, median, number, records, summary};
 use std::fmt::Write;

@@ -1,21 +1,21 @@
-//! The processor's kernels against Embree: the same triangles and the same rays, dumped, in turns. `tools/peer.sh` builds the other
-//! side (`benches/peer/embree.cpp`) and runs this.
+//! The processor's kernels against Embree: the same triangles and the same rays, dumped, in turns. `tools/peer.sh`
+//! builds the other side (`benches/peer/embree.cpp`) and runs this.
 //!
-//! Camera rays of the first view of the near path; from every hit a ray 4 m long that any hit ends (AO), and one that looks for
-//! the closest (diffuse), their directions distributed by the cosine and random by pixel. Everything is resident. Rates are rays
-//! by processor time of all threads, the best of the repetitions: of ours with the walk from the root (`plain`) and with tiles'
-//! lists (`chc`), of Embree with single rays and with packets of 4, 8 and 16.
+//! Camera rays of the first view of the near path; from every hit a ray 4 m long that any hit ends (AO), and one that
+//! looks for the closest (diffuse), their directions distributed by the cosine and random by pixel. Everything is
+//! resident. Rates are rays by processor time of all threads, the best of the repetitions: of ours with the walk from
+//! the root (`plain`) and with tiles' lists (`chc`), of Embree with single rays and with packets of 4, 8 and 16.
 
 use bricks::Payload;
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::cpu::brick::BrickView;
-use brickwalk::cpu::leaf::rows_point;
-use brickwalk::kernel::frame::{Frame, Placement};
-use brickwalk::kernel::layout::{Hit, NONE, Params, Ray, Surface, T_INFINITE};
-use brickwalk::kernel::{Directions, Extent, View};
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::kernels::frame::{Frame, Placement};
+use brickwalk::kernels::layout::{Hit, NONE, Params, Ray, Surface, T_INFINITE};
+use brickwalk::kernels::trace::brick::BrickView;
+use brickwalk::kernels::trace::leaf::rows_point;
+use brickwalk::kernels::{Directions, Extent, View};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::{Lamp, Pass, PassStats, Step, plain};
+use brickwalk::session::open::{Session, open_scene};
 use clap::Parser;
 use glam::DVec3;
 use std::ffi::OsString;
@@ -56,7 +56,7 @@ fn city(triangles: &str) -> PathBuf {
     if !path.exists() {
         let words = ["brickwalk", "scene", "city", "--triangles", triangles, "-o"].map(OsString::from);
         let cli = Cli::parse_from(words.into_iter().chain([path.clone().into()]));
-        brickwalk::app::run(&cli.command).expect("a city");
+        brickwalk::cli::run(&cli.command).expect("a city");
     }
     path
 }

@@ -1,12 +1,12 @@
 //! Streaming of a warm file into device pages against one thread's memcpy + xxh3 of the same map into an equally mapped
-//! buffer: the physical limit of a verified copy by one thread. The upload path is named. The indices in a payload are checked
-//! when it is loaded for the first time, which is in the warm-up.
+//! buffer: the physical limit of a verified copy by one thread. The upload path is named. The indices in a payload are
+//! checked when it is loaded for the first time, which is in the warm-up.
 
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::session::{Session, brick_bytes, open_scene};
+use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::gpu::device::Gpu;
-use brickwalk::kernel::Extent;
+use brickwalk::kernels::Extent;
 use brickwalk::schedule::Load;
+use brickwalk::session::open::{Session, brick_bytes, open_scene};
 use brickwalk::stream::{Item, Slot};
 use clap::Parser;
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
@@ -19,7 +19,7 @@ fn scene() -> PathBuf {
     if !path.exists() {
         let words = ["brickwalk", "scene", "city", "--triangles", "6M", "-o"].map(std::ffi::OsString::from);
         let cli = Cli::parse_from(words.into_iter().chain([path.clone().into()]));
-        brickwalk::app::run(&cli.command).expect("a city");
+        brickwalk::cli::run(&cli.command).expect("a city");
     }
     path
 }

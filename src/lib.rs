@@ -1,17 +1,21 @@
 //! brickwalk walks by ray tracing through scenes that do not fit in GPU memory.
 //!
-//! See `ARCHITECTURE.md` for the house: math → scene → stream → visibility → schedule → kernel → cpu, gpu → render → app.
+//! See `ARCHITECTURE.md` for the house.
 
-pub mod app;
+pub mod cli;
+pub mod counters;
 pub mod cpu;
+pub mod frame;
 pub mod gpu;
-pub mod kernel;
+pub mod kernels;
+pub mod lab;
 pub mod math;
 pub mod metrics;
+pub mod output;
+pub mod picture;
 pub mod reference;
-pub mod render;
 pub mod scene;
 pub mod schedule;
-pub mod stats;
+pub mod secondary;
+pub mod session;
 pub mod stream;
-pub mod visibility;

@@ -3,9 +3,8 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // Mesa's device-select layer only reorders adapters, which brickwalk does itself, and complains on standard error where
-    // there is no desktop session.
-    // SAFETY: no other thread has been started yet.
+    // Mesa's device-select layer only reorders adapters, which brickwalk does itself, and complains on standard error
+    // where there is no desktop session. SAFETY: no other thread has been started yet.
     unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
-    brickwalk::app::main()
+    brickwalk::cli::main()
 }

@@ -1,10 +1,11 @@
-//! The EXR layers of a walk against truth: rays made here in f64 from the camera path's definition, hits by exact predicates.
+//! The EXR layers of a walk against truth: rays made here in f64 from the camera path's definition, hits by exact
+//! predicates.
 
 mod common;
 
-use brickwalk::app::session::open_scene;
 use brickwalk::metrics::{Channel, load};
 use brickwalk::reference::{Truth, TruthRay};
+use brickwalk::session::open::open_scene;
 use glam::DVec3;
 
 const WIDTH: usize = 64;
@@ -70,8 +71,9 @@ fn layers_hold_what_the_rays_of_the_path_meet() {
         hits += 1;
         let n = normal(truth.vertices(hit.id).expect("a triangle"));
         let cosine = n.dot(direction).abs();
-        // A component of the device's direction b + x dx + y dy is off by at most 13 u of its length, three of them by 23 u;
-        // vertices and origin by 3 u of their distance from the reference point, which is within the scene's size here.
+        // A component of the device's direction b + x dx + y dy is off by at most 13 u of its length, three of them by
+        // 23 u; vertices and origin by 3 u of their distance from the reference point, which is within the scene's size
+        // here.
         let bound = (23.0 * hit.t + 6.0 * 600.0) * U / cosine + U * hit.t;
         let error = (f64::from(depth[pixel]) - hit.t).abs();
         assert!(error <= bound, "pixel {pixel}: depth {} is not {} within {bound:e}", depth[pixel], hit.t);
@@ -82,7 +84,8 @@ fn layers_hold_what_the_rays_of_the_path_meet() {
     }
     println!("{hits} hits, {misses} misses, {different} different");
     assert!(hits > WIDTH * HEIGHT / 2 && misses > 20, "the view shows city and sky");
-    // f32 rays pass edges on the other side: some of the distant pixels, whose triangles are smaller than the rays' error.
+    // f32 rays pass edges on the other side: some of the distant pixels, whose triangles are smaller than the rays'
+    // error.
     assert!(different * 100 <= WIDTH * HEIGHT, "{different} pixels show another triangle");
     assert!(shifted * 2 > WIDTH * HEIGHT, "control: neighbours differ in {shifted} pixels only");
 }

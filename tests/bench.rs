@@ -1,5 +1,5 @@
-//! `bench chc` and `bench roma` as a user runs them, on tiny scenes: their files agree with each other and with what was measured, and a
-//! run that was bounded is gone on with.
+//! `bench chc` and `bench roma` as a user runs them, on tiny scenes: their files agree with each other and with what
+//! was measured, and a run that was bounded is gone on with.
 
 mod common;
 

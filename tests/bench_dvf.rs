@@ -1,5 +1,5 @@
-//! `bench dvf` as a user runs it, on a tiny Cornell box: its files agree with each other, what is measured is not measured again, and pictures of what
-//! moves flicker in the paper's mode alone.
+//! `bench dvf` as a user runs it, on a tiny Cornell box: its files agree with each other, what is measured is not
+//! measured again, and pictures of what moves flicker in the paper's mode alone.
 
 mod common;
 
@@ -91,7 +91,8 @@ fn all_stages_are_measured_once_and_their_files_agree() {
     assert_eq!(results(&output)["rows"], json["rows"]);
 }
 
-/// Pixels whose light has not changed do not change where rays are answered; where light is added as in the paper, by the labels of cells, they do.
+/// Pixels whose light has not changed do not change where rays are answered; where light is added as in the paper, by
+/// the labels of cells, they do.
 #[test]
 fn only_the_papers_mode_flickers() {
     let folder = folder();
@@ -105,7 +106,8 @@ fn only_the_papers_mode_flickers() {
     for name in [mean, greatest, jumps, "fewer rays"] {
         println!("{name}: {:?}, {:?}", of("same-sample", name), of("paper", name));
     }
-    // A field of the scene as it was that knows of what has moved, one of which cells are made anew, and one made anew in every frame.
+    // A field of the scene as it was that knows of what has moved, one of which cells are made anew, and one made anew
+    // in every frame.
     for way in 0..3 {
         assert!(of("same-sample", jumps)[way] == 0.0 && of("same-sample", greatest)[way] < 0.5);
         assert!(of("same-sample", mean)[way] < 0.002);
@@ -115,7 +117,8 @@ fn only_the_papers_mode_flickers() {
     let (traced, spent) = (rays("rays traced"), rays("rays of fields"));
     println!("{traced:?} rays are traced, {spent:?} are of fields");
     assert!(traced[0] > traced[1] + spent[1] && traced[1] > traced[2] && spent[0] == 0.0 && spent[2] > spent[1]);
-    // Control: where the light of a cell is found by its label, what the mover touches changes by its label, some of it by more than the noise.
+    // Control: where the light of a cell is found by its label, what the mover touches changes by its label, some of it
+    // by more than the noise.
     assert!(of("paper", jumps)[0] > 0.0 && of("paper", greatest)[0] > 1.0);
     let [same, paper] = ["same-sample", "paper"].map(|mode| of(mode, mean)[0]);
     assert!(paper > 5.0 * same, "{paper} of the noise by the paper's mode, {same} where rays are answered");

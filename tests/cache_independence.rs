@@ -1,5 +1,5 @@
-//! The invariant that everything hangs on: pixels, ids and depths do not depend on schedule, cache size, eviction, fronts,
-//! tile size, threads or run; ids and depths not on brick size.
+//! The invariant that everything hangs on: pixels, ids and depths do not depend on schedule, cache size, eviction,
+//! fronts, tile size, threads or run; ids and depths not on brick size.
 
 mod common;
 

@@ -1,11 +1,13 @@
-//! Fields of visibility (`walk --secondary dvf`): closed forms, equality with exact rays where masks cover, files, independence of cache, picture and lanes.
+//! Fields of visibility (`walk --secondary dvf`): closed forms, equality with exact rays where masks cover, files,
+//! independence of cache, picture and lanes.
 
 mod common;
 
-use brickwalk::render::{Dvf, DvfMade, DvfTracing, FrameOutput, Region, RenderError, Renderer};
+use brickwalk::frame::{FrameOutput, RenderError, Renderer};
 use brickwalk::scene::Camera;
 use brickwalk::scene::path::CameraPath;
-use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
+use brickwalk::secondary::dvf::answer::{Dvf, DvfMade, DvfTracing, Region};
+use brickwalk::secondary::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings, generate};
@@ -103,8 +105,8 @@ fn a_convex_body_sees_all_of_its_hemisphere() {
         assert_eq!(traced + answered, of);
         assert!(answered >= 9 * traced, "{answered} answered, {traced} traced");
     }
-    // E = pi, so it shows its base colour, on average: rays are drawn over the sphere, so cosines scatter by 0.29 of their mean 0.25 of twice that;
-    // 16 rays of some 1000 pixels.
+    // E = pi, so it shows its base colour, on average: rays are drawn over the sphere, so cosines scatter by 0.29 of
+    // their mean 0.25 of twice that; 16 rays of some 1000 pixels.
     let frame = renderer.frame(0, &camera).expect("a frame");
     let seen: Vec<f64> = (0..frame.pixels.id.len())
         .filter(|&i| frame.pixels.id[i] != u32::MAX)

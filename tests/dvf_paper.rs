@@ -1,11 +1,13 @@
-//! `--dvf-mode paper` against closed forms: a plane under an even sky, a plane beside a wall, a sky that spherical harmonics of order 2 hold.
+//! `--dvf-mode paper` against closed forms: a plane under an even sky, a plane beside a wall, a sky that spherical
+//! harmonics of order 2 hold.
 
 mod common;
 
-use brickwalk::kernel::Lamps;
-use brickwalk::render::{Dvf, DvfTracing, Equirectangular, Region, Renderer, environment};
+use brickwalk::frame::{Equirectangular, Renderer, environment};
+use brickwalk::kernels::Lamps;
 use brickwalk::scene::Camera;
-use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
+use brickwalk::secondary::dvf::answer::{Dvf, DvfTracing, Region};
+use brickwalk::secondary::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use common::{converted, folder, sheet};
 use glam::DVec3;
 use std::path::Path;
@@ -17,7 +19,8 @@ const SIZE: [usize; 2] = [96, 8];
 /// Of the wall.
 const HEIGHT: f64 = 1.0;
 
-/// A floor of squares in the plane y = 0 from x = 0 to 4, and, if there is one, a wall in the plane x = 0 that is so high and, as good as, endless.
+/// A floor of squares in the plane y = 0 from x = 0 to 4, and, if there is one, a wall in the plane x = 0 that is so
+/// high and, as good as, endless.
 fn renderer(folder: &Path, has_wall: bool, options: &str) -> Renderer {
     let (mut text, mut count) = (String::new(), 0);
     let mut add = |corner, edges, squares| sheet(&mut text, &mut count, corner, edges, squares);
@@ -48,7 +51,8 @@ fn made(renderer: &mut Renderer) -> DvfField {
     renderer.make_dvf(&settings, &region, DvfTracing::over(32), &mut |_, _| true).expect("a field").field
 }
 
-/// Of each column of pixels: x of what is seen of the floor, and what it shows over its base colour, the mean over the column.
+/// Of each column of pixels: x of what is seen of the floor, and what it shows over its base colour, the mean over the
+/// column.
 fn columns(renderer: &mut Renderer) -> Vec<[f64; 2]> {
     let camera = Camera {
         position: DVec3::new(2.0, 6.0, 0.0),
@@ -73,7 +77,8 @@ fn columns(renderer: &mut Renderer) -> Vec<[f64; 2]> {
     (0..SIZE[0]).map(column).collect()
 }
 
-/// Spherical harmonics of order 2 hold what is even, and what grows along an axis; then a plane in the open needs no ray: E / pi of a + b y is a + 2 b / 3.
+/// Spherical harmonics of order 2 hold what is even, and what grows along an axis; then a plane in the open needs no
+/// ray: E / pi of a + b y is a + 2 b / 3.
 #[test]
 fn a_plane_in_the_open_has_its_irradiance_without_a_ray() {
     let folder = folder();
@@ -87,7 +92,8 @@ fn a_plane_in_the_open_has_its_irradiance_without_a_ray() {
         let worst = columns(&mut renderer).iter().map(|[_, light]| (light - expected).abs()).fold(0.0, f64::max);
         assert!(worst < 0.004 * expected, "{worst} of {expected}");
     }
-    // Control: a cone of 10 degrees around the zenith brings (1 - cos^2) = 0.03 of its radiance, which order 2 does not hold.
+    // Control: a cone of 10 degrees around the zenith brings (1 - cos^2) = 0.03 of its radiance, which order 2 does not
+    // hold.
     let (radiance, edge) = (100.0, 10f64.to_radians().cos());
     shine(&mut renderer, |d| [if d[1] > edge { radiance } else { 0.0 }; 3]);
     renderer.dvf = Dvf::new(Arc::new(field), PAPER);
@@ -96,7 +102,8 @@ fn a_plane_in_the_open_has_its_irradiance_without_a_ray() {
     assert!((found - expected).abs() > 0.03 * expected, "{found}, without the error of order 2: {expected}");
 }
 
-/// An endless wall of height h takes (1 - d / (d^2 + h^2)^0.5) / 2 of the light of an even sky from a floor at distance d.
+/// An endless wall of height h takes (1 - d / (d^2 + h^2)^0.5) / 2 of the light of an even sky from a floor at distance
+/// d.
 #[test]
 fn a_plane_beside_a_wall_has_the_light_of_the_rest_of_the_sky() {
     let folder = folder();
@@ -111,7 +118,8 @@ fn a_plane_beside_a_wall_has_the_light_of_the_rest_of_the_sky() {
     };
     let (columns, worst) = worst_of(&field);
     assert!(columns > 50, "{columns} columns");
-    // 64 directions that are evenly spread miss an edge by a direction or two, turned by 8 angles of the tile: less than two of 64.
+    // 64 directions that are evenly spread miss an edge by a direction or two, turned by 8 angles of the tile: less
+    // than two of 64.
     assert!(worst < 2.0 / 64.0, "{worst}");
     // Control: hits for misses.
     let mut flipped = field.clone();

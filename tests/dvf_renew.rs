@@ -1,12 +1,15 @@
-//! Cells of fields of visibility that are made anew for what moves: the bits of a field made from scratch, pictures, rays, the budget.
+//! Cells of fields of visibility that are made anew for what moves: the bits of a field made from scratch, pictures,
+//! rays, the budget.
 
 mod common;
 
 use bricks::SceneFile;
-use brickwalk::render::{Dvf, DvfTracing, FrameOutput, Region, Renderer, Renewal};
+use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::scene::Camera;
-use brickwalk::visibility::dvf::mask::UNKNOWN;
-use brickwalk::visibility::dvf::{Cells, DvfField, DvfSettings, DvfUse};
+use brickwalk::secondary::dvf::answer::{Dvf, DvfTracing, Region};
+use brickwalk::secondary::dvf::mask::UNKNOWN;
+use brickwalk::secondary::dvf::renew::Renewal;
+use brickwalk::secondary::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings, generate};
@@ -68,7 +71,7 @@ fn bits(field: &DvfField, cell: u32) -> (&[u32], u32) {
     (&field.masks[cell as usize * words..][..words], field.labels[cell as usize])
 }
 
-fn record<'a>(output: &'a FrameOutput, pass: &str) -> Option<&'a brickwalk::stats::Record> {
+fn record<'a>(output: &'a FrameOutput, pass: &str) -> Option<&'a brickwalk::counters::Record> {
     output.records.iter().find(|record| record.pass == pass)
 }
 

@@ -1,21 +1,22 @@
-//! Exact means exact: hits of primary and shadow rays of a walk, and of `trace`, against f64 truth over the lattice-rounded
-//! triangles and the very f32 rays that the kernels used. Unexcused mismatches: none. Excused ones are counted and printed.
+//! Exact means exact: hits of primary and shadow rays of a walk, and of `trace`, against f64 truth over the
+//! lattice-rounded triangles and the very f32 rays that the kernels used. Unexcused mismatches: none. Excused ones are
+//! counted and printed.
 
 mod common;
 
 use bricks::SceneFile;
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::output::npy;
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::trace::{EXTENT, device_ray, trace};
-use brickwalk::app::walk::renderer;
-use brickwalk::kernel::Extent;
-use brickwalk::kernel::frame::Frame;
-use brickwalk::kernel::layout::{Hit, NONE, Ray, T_INFINITE};
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::cli::trace::{EXTENT, device_ray, trace};
+use brickwalk::cli::walk::renderer;
+use brickwalk::frame::Effects;
+use brickwalk::kernels::Extent;
+use brickwalk::kernels::frame::Frame;
+use brickwalk::kernels::layout::{Hit, NONE, Ray, T_INFINITE};
+use brickwalk::output::npy;
 use brickwalk::reference::{Tally, Truth, TruthRay, Verdict, judge, judge_any};
-use brickwalk::render::Effects;
 use brickwalk::scene::path::{CameraPath, path_from_bounds};
 use brickwalk::schedule::{Lamp, Pass};
+use brickwalk::session::open::{Session, open_scene};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{SourceScene, SourceTexture};
@@ -52,7 +53,8 @@ fn report(name: &str, tally: &Tally, least_hits: usize, hits: usize) {
     println!("{name}: {tally}");
     assert_eq!(tally.mismatches, 0, "{name}: {tally}");
     assert!(hits >= least_hits, "{name}: only {hits} hits; the view shows nothing");
-    // A third of the given rays are aimed at edges and vertices, where f32 may not tell; Sponza has sheets in one plane.
+    // A third of the given rays are aimed at edges and vertices, where f32 may not tell; Sponza has sheets in one
+    // plane.
     assert!(tally.excused() * 5 <= tally.total() * 2, "{name}: {tally}");
 }
 
@@ -109,7 +111,8 @@ fn check_walk(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, si
     assert!(spoiled.mismatches * 2 > spoiled.total(), "the judge must notice wrong hits: {spoiled}");
 }
 
-/// Frames along a path with one effect after the other: every ray of the last direction, and of the shadows at what it hits.
+/// Frames along a path with one effect after the other: every ray of the last direction, and of the shadows at what it
+/// hits.
 fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
     let file = open_scene(scene).expect("the scene");
     let truth = Truth::load(&file).expect("truth");
@@ -162,7 +165,8 @@ fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
     }
 }
 
-/// Rays between random points of the scene's bounds, half of them aimed at points of triangles: inside, on edges, at vertices.
+/// Rays between random points of the scene's bounds, half of them aimed at points of triangles: inside, on edges, at
+/// vertices.
 fn check_trace(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, rays: usize) {
     let Command::Trace(args) =
         Cli::parse_from("brickwalk trace s --rays r -o h --cache 35%".split_whitespace()).command

@@ -83,7 +83,8 @@ fn lights_of_the_file_shine_as_their_units_say() {
     let shed =
         |name: &str, light: &str, node: &str, options: &str| radiance(&gltf(folder, name, &[(light, node)]), options);
 
-    // A point of 40 cd (20 in green) at a distance of 5, over the plane at a cosine of 0.8: I / d^2 * cos * albedo / pi.
+    // A point of 40 cd (20 in green) at a distance of 5, over the plane at a cosine of 0.8: I / d^2 * cos * albedo /
+    // pi.
     let point = r#""type": "point", "color": [1, 0.5, 0], "intensity": 40"#;
     let truth = 40.0 / 25.0 * 0.8 * 0.5 / PI;
     let [red, green] = shed("point", point, r#""translation": [3, 4, 0]"#, "");

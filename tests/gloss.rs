@@ -1,5 +1,5 @@
-//! What metals, polished and coated surfaces reflect: against closed forms and integrals in f64, in furnaces, and by two ways to draw the
-//! same light.
+//! What metals, polished and coated surfaces reflect: against closed forms and integrals in f64, in furnaces, and by
+//! two ways to draw the same light.
 
 mod common;
 
@@ -129,7 +129,8 @@ fn white_objects_vanish_in_a_uniform_environment_whatever_their_gloss() {
     {
         let scene = converted(folder, &format!("white-{i}"), &white(metallic, roughness, coat), &cube());
         let what = format!("metallic {metallic}, roughness {roughness}, coat {coat}");
-        // Some 500 pixels times 256 samples of what varies by about its mean where light is drawn by the environment: 0.3 %.
+        // Some 500 pixels times 256 samples of what varies by about its mean where light is drawn by the environment:
+        // 0.3 %.
         let ways = [
             ("glossy,diffuse --diffuse-rays 1 --rotation full --spp 256", 0.005),
             ("environment,glossy --spp 512", 0.005),
@@ -155,8 +156,9 @@ fn white_objects_vanish_in_a_uniform_environment_whatever_their_gloss() {
     assert!(found < 0.6, "a grey metal does not vanish: {found}");
 }
 
-/// What a white metal reflects of light from `d`, times its cosine, in f64: Trowbridge–Reitz with Smith's masking, correlated, over what
-/// that reflects of light from everywhere (Turquin 2019: the rest leaves after more bounces between facets, spread alike).
+/// What a white metal reflects of light from `d`, times its cosine, in f64: Trowbridge–Reitz with Smith's masking,
+/// correlated, over what that reflects of light from everywhere (Turquin 2019: the rest leaves after more bounces
+/// between facets, spread alike).
 fn reflected(roughness: f64, view: [f64; 3], d: [f64; 3]) -> f64 {
     let (rows, columns) = (800, 400);
     let direction = |i: i32| {

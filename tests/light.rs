@@ -1,14 +1,15 @@
-//! Effects against closed forms: what a surface reflects of a sky behind a wall, inside an emissive box, in a mirror, under
-//! rectangular lights, surfaces that emit, points, spots and distant lights, in uniform environments and under a single bright texel.
+//! Effects against closed forms: what a surface reflects of a sky behind a wall, inside an emissive box, in a mirror,
+//! under rectangular lights, surfaces that emit, points, spots and distant lights, in uniform environments and under a
+//! single bright texel.
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk::renderer;
-use brickwalk::kernel::Extent;
-use brickwalk::kernel::lamps::{Emitter, Lamps, Shape};
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::cli::walk::renderer;
+use brickwalk::kernels::Extent;
+use brickwalk::kernels::lamps::{Emitter, Lamps, Shape};
 use brickwalk::scene::path::CameraPath;
+use brickwalk::session::open::{Session, open_scene};
 use clap::Parser;
 use exr::prelude::*;
 use glam::DVec3;
@@ -70,10 +71,11 @@ fn occlusion_by_a_wall_is_its_form_factor() {
     let light = "--sun-intensity 0 --effects";
     let open = mean(&render(&scene, &path, &format!("{light} primary")));
     let share = |options: &str| mean(&render(&scene, &path, &format!("{light} ao --spp 4 {options}"))) / open;
-    // A strip of height h that begins at distance d hides (1 - d / sqrt(d^2 + h^2)) / 2 of the cosine-weighted hemisphere.
+    // A strip of height h that begins at distance d hides (1 - d / sqrt(d^2 + h^2)) / 2 of the cosine-weighted
+    // hemisphere.
     let truth = 1.0 - 0.5 * (1.0 - 0.5f64.sqrt());
-    // 256 directions of the Halton sequence, turned by 256 pixels: its discrepancy is of the order of ln(n)^2 / n = 0.1, and much
-    // less after turning; the wall ends after 200.
+    // 256 directions of the Halton sequence, turned by 256 pixels: its discrepancy is of the order of ln(n)^2 / n =
+    // 0.1, and much less after turning; the wall ends after 200.
     let measured = share("--ao-rays 64 --ao-length 400 --rotation full");
     assert!((measured - truth).abs() < 0.01, "{measured} of the sky's light, not {truth}");
     // Rays that end before the wall find nothing.
@@ -131,7 +133,8 @@ fn a_rectangular_light_gives_its_form_factor() {
     let open = converted(folder, "open", white, &format!("{FLOOR}usemtl white\nf 1 2 3 4\n"));
     let path = down_on(folder, 0.0);
     let light = |v: &str| format!("--sun-intensity 0 --sky-intensity 0 --rect-light -0.5,1,-0.5,1,0,0,{v} --spp 16");
-    // Hamilton and Morgan's factor of a point below the middle of a square of twice its height's half: four quarters of x = y = 1/2.
+    // Hamilton and Morgan's factor of a point below the middle of a square of twice its height's half: four quarters of
+    // x = y = 1/2.
     let x = 0.5 / 1.25f64.sqrt();
     let truth = 10.0 * 4.0 / std::f64::consts::PI * x * x.atan();
     // 4096 points, of which the irradiance varies by a quarter: 0.4 %, five times that is allowed.
@@ -150,7 +153,8 @@ fn a_rectangular_light_gives_its_form_factor() {
     assert!(shadowed < 0.5 * unshadowed && shadowed > 0.0, "{shadowed} of {unshadowed}");
 }
 
-/// Radiance and vertices of a polygon: what it sheds on a white floor at the origin, by Lambert's formula. It does not reach below.
+/// Radiance and vertices of a polygon: what it sheds on a white floor at the origin, by Lambert's formula. It does not
+/// reach below.
 fn polygon(radiance: f64, corners: &[DVec3]) -> f64 {
     let edge = |i: usize| {
         let (a, b) = (corners[i].normalize(), corners[(i + 1) % corners.len()].normalize());
@@ -193,7 +197,8 @@ fn surfaces_that_emit_light_others_by_lamberts_formula() {
     let corners = corners.map(DVec3::from_array);
     let truth = polygon(10.0, &corners[..4]) + polygon(10.0, &corners[4..]);
     let dark = "--sun-intensity 0 --sky-intensity 0 --diffuse-rays 4 --rotation full --spp 64 --effects";
-    // 16384 points, of which the light varies by less than all of it: 0.8 %; of four times as many rays that meet it by chance, 2.5 %.
+    // 16384 points, of which the light varies by less than all of it: 0.8 %; of four times as many rays that meet it by
+    // chance, 2.5 %.
     for (effects, bound) in [("shadow", 0.03), ("shadow,diffuse", 0.03), ("diffuse", 0.08)] {
         let measured = mean(&render(&scene, &path, &format!("{dark} {effects}")));
         assert!((measured / truth - 1.0).abs() < bound, "{effects}: {measured}, not {truth}");

@@ -1,14 +1,14 @@
-//! The textures of materials beside the base colour's, against closed forms: normals with their tangents on turned and mirrored things,
-//! metal, occlusion, emission, second coordinates and transformations; surfaces that are unlit.
+//! The textures of materials beside the base colour's, against closed forms: normals with their tangents on turned and
+//! mirrored things, metal, occlusion, emission, second coordinates and transformations; surfaces that are unlit.
 
 mod common;
 
 use bricks::{MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, Material};
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk::renderer;
-use brickwalk::kernel::Extent;
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::cli::walk::renderer;
+use brickwalk::kernels::Extent;
 use brickwalk::scene::Camera;
+use brickwalk::session::open::{Session, open_scene};
 use brickwalk_convert::build::{BuildSettings, TextureEncoding, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene, SourceTexture};
@@ -133,7 +133,8 @@ fn normals_are_turned_by_their_texture_on_either_side_and_on_mirrored_things() {
     assert!((found - truth).abs() < 2e-4 && (truth / straight - SUN[1]).abs() > 0.01, "{found} instead of {truth}");
 }
 
-/// As blocks, normals lose their length and half a step of 1 / 127.5 in x and y, and z follows: within 0.01 along any direction here.
+/// As blocks, normals lose their length and half a step of 1 / 127.5 in x and y, and z follows: within 0.01 along any
+/// direction here.
 #[test]
 fn normals_of_blocks_are_those_of_their_texels() {
     let plain = sheet(WHITE, texture([255; 3], [255; 3]));

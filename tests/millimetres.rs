@@ -2,8 +2,8 @@
 
 mod common;
 
-use brickwalk::app::session::open_scene;
 use brickwalk::reference::Truth;
+use brickwalk::session::open::open_scene;
 use common::{folder, succeed};
 use std::fmt::Write;
 use std::path::Path;
@@ -14,7 +14,8 @@ const BASE: [f64; 3] = [10_000_000.123, 512.25, -9_999_999.376];
 /// Squares along a side of the mesh.
 const SIDE: usize = 16;
 
-/// Local positions in metres: a sheet whose heights differ by whole millimetres. They are sums of f32 values as they stand.
+/// Local positions in metres: a sheet whose heights differ by whole millimetres. They are sums of f32 values as they
+/// stand.
 fn local() -> Vec<[f32; 3]> {
     let point = |at: usize| {
         let (i, j) = (at % (SIDE + 1), at / (SIDE + 1));
@@ -176,8 +177,8 @@ fn far_meshes_keep_their_millimetres() {
         let found = traced(&scene, folder.path(), &inner);
         for (t, [_, y, _]) in found.iter().zip(&inner) {
             let expected = BASE[1] + 1.0 - y;
-            // Beside the lattice: the ray is moved by as much sideways, where the sheet rises by 9 mm in 62 at most; f32
-            // rounds distances of a few metres.
+            // Beside the lattice: the ray is moved by as much sideways, where the sheet rises by 9 mm in 62 at most;
+            // f32 rounds distances of a few metres.
             assert!((t - expected).abs() < 2.0 * step + 1e-6, "{input}: {t}, not {expected}");
         }
         let distinct = found.windows(2).filter(|pair| (pair[0] - pair[1]).abs() > 9e-4).count();

@@ -1,20 +1,21 @@
-//! Instances that move in walks: every frame has the bits of a still walk of a scene that was converted with the instance where it is, whatever the
-//! schedule and cache, on both executors; a scene whose trees are not fitted to its instances does not.
+//! Instances that move in walks: every frame has the bits of a still walk of a scene that was converted with the
+//! instance where it is, whatever the schedule and cache, on both executors; a scene whose trees are not fitted to its
+//! instances does not.
 
 mod common;
 
 use bricks::layout::{DirectoryEntry, Header, PAGE_BYTES, Section};
 use bricks::{Instance, SceneFile};
-use brickwalk::app::args::{Cli, Command, WalkArgs};
-use brickwalk::app::lighting::lighting;
-use brickwalk::app::motion::WalkMotion;
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk::lit_renderer;
-use brickwalk::kernel::Extent;
-use brickwalk::render::denoise::Resolve;
-use brickwalk::render::{Moved, Pixels, Renderer};
+use brickwalk::cli::motion::WalkMotion;
+use brickwalk::cli::options::args::{Cli, Command, WalkArgs};
+use brickwalk::cli::walk::lit_renderer;
+use brickwalk::frame::{Moved, Pixels, Renderer};
+use brickwalk::kernels::Extent;
+use brickwalk::picture::denoise::Resolve;
 use brickwalk::scene::motion::Motion;
 use brickwalk::scene::{Camera, CameraPath};
+use brickwalk::session::lighting::lighting;
+use brickwalk::session::open::{Session, open_scene};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;

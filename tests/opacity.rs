@@ -2,10 +2,10 @@
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::output::npy;
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::trace::{EXTENT, trace};
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::cli::trace::{EXTENT, trace};
+use brickwalk::output::npy;
+use brickwalk::session::open::{Session, open_scene};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene, SourceTexture};

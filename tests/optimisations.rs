@@ -1,18 +1,18 @@
-//! The optimisations of CHC+RT: each acts and is counted, none nor any of their combinations changes a hit; the fronts partition
-//! rays and bricks after every frame; a cut of the camera is a cold start.
+//! The optimisations of CHC+RT: each acts and is counted, none nor any of their combinations changes a hit; the fronts
+//! partition rays and bricks after every frame; a cut of the camera is a cold start.
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk::renderer;
-use brickwalk::kernel::Extent;
-use brickwalk::kernel::layout::{Hit, NONE};
-use brickwalk::render::{Effects, FrameOutput, Pixels, Renderer, Schedule};
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::cli::walk::renderer;
+use brickwalk::counters::Record;
+use brickwalk::frame::{Effects, FrameOutput, Pixels, Renderer, Schedule};
+use brickwalk::kernels::Extent;
+use brickwalk::kernels::layout::{Hit, NONE};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::fronts::Fronts;
 use brickwalk::schedule::{Optimisation, Optimisations, PartOf, Pass};
-use brickwalk::stats::Record;
+use brickwalk::session::open::{Session, open_scene};
 use clap::Parser;
 use std::path::Path;
 
@@ -208,8 +208,8 @@ fn fronts_partition_rays_and_bricks_after_every_frame() {
     }
 }
 
-/// Renders `frames` of `path`, then those after a cut to another, in one renderer; and the latter in a fresh one. Returns both, and
-/// the last frame before the cut.
+/// Renders `frames` of `path`, then those after a cut to another, in one renderer; and the latter in a fresh one.
+/// Returns both, and the last frame before the cut.
 fn cut(scene: &Path, options: &str) -> (Vec<FrameOutput>, Vec<FrameOutput>, FrameOutput) {
     const BEFORE: u32 = 5;
     const AFTER: u32 = 3;
@@ -244,9 +244,10 @@ fn a_cut_is_a_cold_start() {
         for (was, (now, cold)) in before.records.iter().zip(after[0].records.iter().zip(&cold[0].records)) {
             assert_eq!((was.pass, now.pass), (now.pass, cold.pass));
             println!("fronts {fronts}, cache {cache}, {}: {} queries, cold {}", now.pass, now.queries, cold.queries);
-            // Beyond what a cold start asks, each stale invisible pair is asked for once (in a multi-query that fails one and a half
-            // times at most), each stale visible one once, and, while its brick is missing, before every batch. Which bricks are
-            // resident changes what a batch holds, so no closed bound: 1.32 is the most that was measured.
+            // Beyond what a cold start asks, each stale invisible pair is asked for once (in a multi-query that fails
+            // one and a half times at most), each stale visible one once, and, while its brick is missing, before every
+            // batch. Which bricks are resident changes what a batch holds, so no closed bound: 1.32 is the most that
+            // was measured.
             assert!(
                 2 * now.queries <= 3 * cold.queries,
                 "{}: {} queries, cold {}",

@@ -212,7 +212,8 @@ fn many_samples_are_summed_in_batches() {
         walk(&scene, &out, &format!("{dark} --path {} {options}", inside.display()));
         red(&out.join("frames/0000.exr"))
     };
-    // Emission and the reflected half of it, whatever the number of samples: one batch, a whole number of them, and a part of one.
+    // Emission and the reflected half of it, whatever the number of samples: one batch, a whole number of them, and a
+    // part of one.
     for samples in [64, 65, 128, 130] {
         let seen = render("many", &format!("--effects diffuse --diffuse-rays 2 --spp {samples}"));
         assert!(seen.iter().all(|x| (x - 0.15).abs() < 1e-6), "{samples}: {seen:?}");

@@ -87,8 +87,8 @@ impl Picture {
             return Some(format!("{hits} of {pixels} pixels show something"));
         }
         let [min, max] = self.bounds;
-        // Depth and direction are f32, the vertices lie half a step beyond the source's bounds at most: both are below a
-        // thousandth of what is seen.
+        // Depth and direction are f32, the vertices lie half a step beyond the source's bounds at most: both are below
+        // a thousandth of what is seen.
         let slack = 1e-3 * ((max - min).length() + (self.camera.position - 0.5 * (min + max)).length());
         for (pixel, direction) in self.hits() {
             let [n, radiance] = [&self.normals, &self.radiance].map(|c| c.each_ref().map(|c| f64::from(c[pixel])));
@@ -160,8 +160,8 @@ fn every_file_shows_what_it_holds() {
     assert_eq!((shown, empty), (45, 8), "points and lines show nothing, everything else does");
 }
 
-/// Vertices of all triangles of a small glTF file with one buffer and no strides, read here: in the world, in their order,
-/// by node, with the determinant of the node's matrix.
+/// Vertices of all triangles of a small glTF file with one buffer and no strides, read here: in the world, in their
+/// order, by node, with the determinant of the node's matrix.
 fn triangles(path: &Path) -> Vec<([DVec3; 3], f64)> {
     let json: serde_json::Value =
         serde_json::from_slice(&std::fs::read(path).expect("the file")).expect("a glTF file of the asset generator");
@@ -202,8 +202,8 @@ fn triangles(path: &Path) -> Vec<([DVec3; 3], f64)> {
     found
 }
 
-/// The side from which a triangle of a node is seen: counter-clockwise in the mesh, so that a negative determinant reverses
-/// it (glTF 2.0, section 3.7.4).
+/// The side from which a triangle of a node is seen: counter-clockwise in the mesh, so that a negative determinant
+/// reverses it (glTF 2.0, section 3.7.4).
 fn front([a, b, c]: [DVec3; 3], determinant: f64) -> DVec3 {
     (b - a).cross(c - a).normalize() * determinant.signum()
 }
@@ -223,8 +223,8 @@ fn mirrored_nodes_show_their_front() {
         for (pixel, direction) in picture.hits() {
             let (corners, determinant) = source[picture.ids[pixel] as usize];
             let front = front(corners, determinant);
-            // The depth is that of the source's own plane: f32 depths below 64, vertices half a step of 2^-16 off, seen at
-            // no less than a twentieth of a right angle.
+            // The depth is that of the source's own plane: f32 depths below 64, vertices half a step of 2^-16 off, seen
+            // at no less than a twentieth of a right angle.
             let depth = (corners[0] - picture.camera.position).dot(front) / direction.dot(front);
             if direction.dot(front).abs() > 0.08 {
                 let found = f64::from(picture.depth[pixel]);

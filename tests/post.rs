@@ -2,9 +2,9 @@
 
 mod common;
 
+use brickwalk::frame::{FrameOutput, Light, Renderer};
 use brickwalk::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr};
-use brickwalk::render::denoise::{Denoiser, Guides, Taa};
-use brickwalk::render::{FrameOutput, Light, Renderer};
+use brickwalk::picture::denoise::{Denoiser, Guides, Taa};
 use brickwalk::scene::Camera;
 use glam::DVec3;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! Caches much smaller than what a pass works on: every frame is finished, in as many fillings of the cache as it takes, and the
-//! records say how many.
+//! Caches much smaller than what a pass works on: every frame is finished, in as many fillings of the cache as it
+//! takes, and the records say how many.
 
 mod common;
 

@@ -1,25 +1,25 @@
-//! What records claim, counted anew: a spy between the schedules and the executor sees every load and every submission, keeps a
-//! cache of its own by the addresses written to, takes sizes from the scene file, and truth in f64 says which bricks hold hits and
-//! which could be needed. A record that is off by one is noticed.
+//! What records claim, counted anew: a spy between the schedules and the executor sees every load and every submission,
+//! keeps a cache of its own by the addresses written to, takes sizes from the scene file, and truth in f64 says which
+//! bricks hold hits and which could be needed. A record that is off by one is noticed.
 
 mod common;
 
 use bricks::{AttributeLayout, GeometryLayout, INSTANCE_IDENTITY, Node, Payload, SceneFile, TOP_LEAF};
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk::renderer;
-use brickwalk::kernel::Extent;
-use brickwalk::kernel::frame::Frame;
-use brickwalk::kernel::layout::{NONE, Ray, T_INFINITE};
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::cli::walk::renderer;
+use brickwalk::counters::Record;
+use brickwalk::frame::{Renderer, camera_view};
+use brickwalk::kernels::Extent;
+use brickwalk::kernels::frame::Frame;
+use brickwalk::kernels::layout::{NONE, Ray, T_INFINITE};
 use brickwalk::reference::{Truth, TruthRay, Verdict, judge};
-use brickwalk::render::{Renderer, camera_view};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::auto::Fixed;
 use brickwalk::schedule::{
     BrickStates, Executor, ExecutorError, Load, Optimisations, PairQuery, Pass, PassStats, Report, Step, Tracing,
     attributes, chc, demand,
 };
-use brickwalk::stats::Record;
+use brickwalk::session::open::{Session, open_scene};
 use brickwalk::stream::{Item, Kind, Slot};
 use clap::Parser;
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,14 +1,16 @@
-//! `walk --secondary roma` and `--secondary df`, the baseline: pictures against closed forms, what it loads and records, that it is the same again and again.
+//! `walk --secondary roma` and `--secondary df`, the baseline: pictures against closed forms, what it loads and
+//! records, that it is the same again and again.
 
 mod common;
 
-use brickwalk::app::session::open_scene;
-use brickwalk::kernel::layout::NONE;
+use brickwalk::frame::{FrameOutput, Renderer};
+use brickwalk::kernels::layout::NONE;
 use brickwalk::reference::Truth;
-use brickwalk::render::{FrameOutput, Renderer, Trust};
 use brickwalk::scene::Camera;
 use brickwalk::schedule::{Pass, RomaPart, Step};
-use brickwalk::visibility::bom::{Settings, assemble};
+use brickwalk::secondary::occupancy::{Settings, assemble};
+use brickwalk::secondary::roma::handover::Trust;
+use brickwalk::session::open::open_scene;
 use common::{city, converted, folder, frames, sheet};
 use glam::DVec3;
 use serde_json::Value;
@@ -17,7 +19,8 @@ use std::process::Command;
 
 const SIZE: usize = 48;
 
-/// A floor of 8 m by 8 m and, 2 m high, a wall along its middle, all in squares of 1/4 m; bricks of 64 triangles have resident cells of 1/8 m.
+/// A floor of 8 m by 8 m and, 2 m high, a wall along its middle, all in squares of 1/4 m; bricks of 64 triangles have
+/// resident cells of 1/8 m.
 fn scene(folder: &Path, wall: bool) -> PathBuf {
     let (mut text, mut count) = (String::new(), 0);
     sheet(&mut text, &mut count, DVec3::new(-4.0, 0.0, -4.0), [DVec3::X * 8.0, DVec3::Z * 8.0], [32, 32]);
@@ -50,7 +53,8 @@ fn before_wall(pixel: usize) -> f64 {
     1.7 + (row / SIZE as f64 - 0.5) * 2.0 * 3.5 * 26f64.to_radians().tan()
 }
 
-/// Occlusion, 0 to 1, of the pixels that show the floor, by their distance from the wall: unoccluded light by the picture without.
+/// Occlusion, 0 to 1, of the pixels that show the floor, by their distance from the wall: unoccluded light by the
+/// picture without.
 fn openness(folder: &Path, wall: bool, options: &str) -> Vec<(f64, f64)> {
     let scene = scene(folder, wall);
     let bare = renderer(&scene, "--effects primary").frame(0, &eye()).expect("a frame");
@@ -61,8 +65,8 @@ fn openness(folder: &Path, wall: bool, options: &str) -> Vec<(f64, f64)> {
     floor.map(|i| (before_wall(i), of(i))).collect()
 }
 
-/// What a point `d` before the middle of a wall of height `h` and width 8 sees of the sky: the form factors of the halves of the wall (Howell,
-/// "A Catalog of Radiation Heat Transfer Configuration Factors", B-4).
+/// What a point `d` before the middle of a wall of height `h` and width 8 sees of the sky: the form factors of the
+/// halves of the wall (Howell, "A Catalog of Radiation Heat Transfer Configuration Factors", B-4).
 fn truth(d: f64, h: f64) -> f64 {
     let half = 4.0;
     let (x, y) = (h / half, d / half);
@@ -94,8 +98,8 @@ fn occlusion_before_a_wall_is_that_of_the_closed_form_but_for_cells() {
             "{d} m before the wall: closed form {expected:.4}, exact {exact:.4}, roma {roma:.4}, unsnapped {unsnapped:.4}"
         );
         assert!((exact - expected).abs() < 0.02, "{exact} instead of {expected}");
-        // Cells mark what is up to one of theirs aside, maps see them up to one of their own, 1.75 as long, aside, and rays start 1.25 of these
-        // above the floor, which hides as much of the wall.
+        // Cells mark what is up to one of theirs aside, maps see them up to one of their own, 1.75 as long, aside, and
+        // rays start 1.25 of these above the floor, which hides as much of the wall.
         let darkest = truth(d - 2.75 * cell, HEIGHT + 2.75 * cell);
         let brightest = truth(d + 1.75 * cell, HEIGHT - (1.25 + 1.0) * 1.75 * cell);
         for found in [roma, unsnapped] {
@@ -109,7 +113,8 @@ fn occlusion_before_a_wall_is_that_of_the_closed_form_but_for_cells() {
 /// Half the width of a courtyard, and the height of its walls, metres.
 const COURTYARD: [f64; 2] = [8.0, 3.0];
 
-/// What a point of a courtyard's floor, so far from the four walls of height `h`, sees of the sky: the form factors of the four parts of the opening (Howell, B-3).
+/// What a point of a courtyard's floor, so far from the four walls of height `h`, sees of the sky: the form factors of
+/// the four parts of the opening (Howell, B-3).
 fn truth_in_courtyard(distances: [f64; 4], h: f64) -> f64 {
     let part = |x: f64, z: f64| {
         let (a, b) = (x / h, z / h);
@@ -120,7 +125,8 @@ fn truth_in_courtyard(distances: [f64; 4], h: f64) -> f64 {
     part(left, back) + part(left, front) + part(right, back) + part(right, front)
 }
 
-/// Rays near the horizon, which low walls meet, are few: in a stratum of 40 degrees an evenly drawn direction has them twice as often as the cosine.
+/// Rays near the horizon, which low walls meet, are few: in a stratum of 40 degrees an evenly drawn direction has them
+/// twice as often as the cosine.
 #[test]
 fn low_walls_occlude_by_the_cosine() {
     let folder = folder();
@@ -175,7 +181,8 @@ fn low_walls_occlude_by_the_cosine() {
          the map of the ray's stratum {nearest:.4}"
     );
     assert!(drawn > darkest && drawn < brightest, "{drawn} is not in {darkest} to {brightest}");
-    // Rays that keep their direction meet the same cells, but for those beside the one column that snapped ones look at.
+    // Rays that keep their direction meet the same cells, but for those beside the one column that snapped ones look
+    // at.
     let off = |free: f64| (1.0 - free) / (1.0 - unsnapped) - 1.0;
     assert!(off(drawn).abs() < 0.15, "{drawn} instead of {unsnapped}");
     // Control: the direction of the nearest map is not drawn by the cosine.
@@ -404,7 +411,8 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     }
 }
 
-/// Points of all triangles that lie in a level's cube and in an empty cell of it, of so many, and the share of cells that are occupied.
+/// Points of all triangles that lie in a level's cube and in an empty cell of it, of so many, and the share of cells
+/// that are occupied.
 fn unmarked(scene: &Path, camera: DVec3) -> (usize, usize, f64) {
     let file = open_scene(scene).expect("a scene");
     let truth = Truth::load(&file).expect("triangles");
@@ -476,8 +484,8 @@ fn occlusion_by_distance_fields_is_that_of_the_closed_form_but_for_cells() {
     for d in [0.6, 1.0, 1.5, 2.0, 3.0] {
         let (expected, found) = (truth(d, HEIGHT), mean(d));
         println!("{d} m before the wall: closed form {expected:.4}, df {found:.4}");
-        // The middle of a cell that is marked is at most one aside or above, and is hit from half of one away; rays start 3/2 above the floor,
-        // which hides as much of the wall.
+        // The middle of a cell that is marked is at most one aside or above, and is hit from half of one away; rays
+        // start 3/2 above the floor, which hides as much of the wall.
         let darkest = truth(d - 1.5 * cell, HEIGHT + 1.5 * cell);
         let brightest = truth(d, HEIGHT - 1.5 * cell);
         assert!(found > darkest - 0.02 && found < brightest + 0.02, "{found} is not in {darkest} to {brightest}");

@@ -1,10 +1,10 @@
-//! Diffuse light by `walk --secondary roma`, whose hits reflective shadow maps light: against closed forms and exact rays, what it loads, that it is
-//! the same again and again.
+//! Diffuse light by `walk --secondary roma`, whose hits reflective shadow maps light: against closed forms and exact
+//! rays, what it loads, that it is the same again and again.
 
 mod common;
 
-use brickwalk::kernel::lamps::{Emitter, Lamps, Shape};
-use brickwalk::render::{FrameOutput, Renderer};
+use brickwalk::frame::{FrameOutput, Renderer};
+use brickwalk::kernels::lamps::{Emitter, Lamps, Shape};
 use brickwalk::scene::Camera;
 use common::{city, converted, folder, sheet};
 use glam::DVec3;
@@ -88,8 +88,8 @@ fn before_wall(pixel: usize) -> f64 {
     1.7 + (row / SIZE as f64 - 0.5) * 2.0 * 3.5 * 26f64.to_radians().tan()
 }
 
-/// The form factor of a wall of height `h` and width 8 from a point `d` before its middle: those of its halves (Howell, "A Catalog of Radiation Heat
-/// Transfer Configuration Factors", B-4).
+/// The form factor of a wall of height `h` and width 8 from a point `d` before its middle: those of its halves (Howell,
+/// "A Catalog of Radiation Heat Transfer Configuration Factors", B-4).
 fn form_factor(d: f64, h: f64) -> f64 {
     let half = 4.0;
     let (x, y) = (h / half, d / half);
@@ -125,15 +125,16 @@ fn a_sunlit_wall_lights_the_floor_as_the_closed_form_says_but_for_cells() {
         let [exact, roma, unsnapped] = [&exact, &roma, &unsnapped].map(|(light, frame)| near(light, frame, d));
         println!("{d} m: closed form {expected:.5}, exact {exact:.5}, roma {roma:.5}, unsnapped {unsnapped:.5}");
         assert!((exact / expected - 1.0).abs() < 0.05, "{exact} instead of {expected}");
-        // As occlusion by it (tests/roma.rs): cells are thicker than the wall, and rays start above the floor; points that are looked up, moved by half a
-        // cell, leave it at its upper edge.
+        // As occlusion by it (tests/roma.rs): cells are thicker than the wall, and rays start above the floor; points
+        // that are looked up, moved by half a cell, leave it at its upper edge.
         let brightest = shown * form_factor(d - 2.75 / 8.0, HEIGHT + 2.75 / 8.0);
         let darkest = shown * form_factor(d + 1.0 * cell, HEIGHT - 3.0 * cell);
         for found in [roma, unsnapped] {
             assert!(found > darkest && found < brightest, "{found} is not in {darkest} to {brightest}");
         }
     }
-    // Controls: a wall that is lit from behind is dark before, though its lit side lies in the same cells; without one there is no light.
+    // Controls: a wall that is lit from behind is dark before, though its lit side lies in the same cells; without one
+    // there is no light.
     let (behind, frame) = indirect(&view(BEHIND), "--secondary roma --spp 2");
     let [behind, before] = [(&behind, &frame), (&roma.0, &roma.1)].map(|(light, frame)| near(light, frame, 1.0));
     assert!(before > 0.01 && behind < 0.02 * before, "{behind} beside {before}");
@@ -162,14 +163,15 @@ fn points_and_spots_light_a_room_as_exact_rays_do_but_for_cells() {
         cone: [0.5 * outer, outer],
     };
     let mean = |light: &[f64]| light.iter().sum::<f64>() / light.len() as f64;
-    // What is seen of a cell is up to 1.9 of its sides from where the lamp is asked, and of that 1.5 count: so some light is lost, in small spots of it
-    // more, where part of the points that are asked for lie in the dark.
+    // What is seen of a cell is up to 1.9 of its sides from where the lamp is asked, and of that 1.5 count: so some
+    // light is lost, in small spots of it more, where part of the points that are asked for lie in the dark.
     for (name, shape, bound) in [("point", point, 0.05), ("spot", spot(0.6), 0.2), ("wide spot", spot(1.3), 0.2)] {
         let emitters = vec![Emitter { shape, two_sided: false, radiance }];
         let view = View { scene: &scene, camera: inside(), light: "--sun-intensity 0", emitters };
         let exact = mean(&indirect(&view, "--spp 4").0);
         assert!(exact > 0.01);
-        // Of snapped rays all pixels share 16 directions a sample: the mean of four samples is off by 4 % (one deviation), of 64 by 1 %.
+        // Of snapped rays all pixels share 16 directions a sample: the mean of four samples is off by 4 % (one
+        // deviation), of 64 by 1 %.
         for options in ["--secondary roma --spp 64", "--secondary roma --roma-unsnapped all --roma-steps 64 --spp 4"] {
             let bias = mean(&indirect(&view, options).0) / exact - 1.0;
             println!("{name}, {options}: exact {exact:.5}, bias {:+.1} %", 100.0 * bias);

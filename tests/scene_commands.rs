@@ -1,5 +1,5 @@
-//! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that appear
-//! complete or not at all.
+//! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that
+//! appear complete or not at all.
 
 use brickwalk::reference::Truth;
 use std::path::Path;

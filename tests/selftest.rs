@@ -2,13 +2,13 @@
 
 mod common;
 
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::device::Device;
-use brickwalk::app::selftest::args::SelftestArgs;
-use brickwalk::app::selftest::case::Status;
-use brickwalk::app::selftest::defects::{ALL, Defect};
-use brickwalk::app::selftest::{Report, test};
+use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::gpu::device::candidates;
+use brickwalk::lab::selftest::args::SelftestArgs;
+use brickwalk::lab::selftest::case::Status;
+use brickwalk::lab::selftest::defects::{ALL, Defect};
+use brickwalk::lab::selftest::{Report, test};
+use brickwalk::session::device::Device;
 use clap::Parser;
 
 fn args(options: &str) -> SelftestArgs {

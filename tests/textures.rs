@@ -1,4 +1,5 @@
-//! Textures out of core: pictures do not depend on which tiles fit into the cache, records count what is loaded, damage is named.
+//! Textures out of core: pictures do not depend on which tiles fit into the cache, records count what is loaded, damage
+//! is named.
 
 mod common;
 
@@ -8,7 +9,8 @@ use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// A floor of 40 x 40 metres with four pictures of 600 x 400 texels, a texel to 10 or 15 centimetres, and a camera path low over it.
+/// A floor of 40 x 40 metres with four pictures of 600 x 400 texels, a texel to 10 or 15 centimetres, and a camera path
+/// low over it.
 fn floor(folder: &Path) -> PathBuf {
     let (mut obj, mut mtl) = (String::from("mtllib f.mtl\n"), String::new());
     for at in 0..9 * 9 {

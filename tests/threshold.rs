@@ -1,5 +1,5 @@
-//! What `--query-threshold` costs, as `--measure-error` records it: nothing at 0; else what a comparison of the pictures of two walks
-//! finds; and the walk itself is as without the measurement.
+//! What `--query-threshold` costs, as `--measure-error` records it: nothing at 0; else what a comparison of the
+//! pictures of two walks finds; and the walk itself is as without the measurement.
 
 mod common;
 

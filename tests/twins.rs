@@ -1,5 +1,6 @@
-//! The processor renders what software Vulkan renders: ids and depths bit for bit, pictures but for the last level of a few pixels, the
-//! same bricks loaded by the same queries; and it does so whatever the number of its threads, and where there is no driver.
+//! The processor renders what software Vulkan renders: ids and depths bit for bit, pictures but for the last level of a
+//! few pixels, the same bricks loaded by the same queries; and it does so whatever the number of its threads, and where
+//! there is no driver.
 
 mod common;
 

@@ -1,9 +1,10 @@
-//! What denoising is worth: frames of one sample a pixel along a camera path, against pictures of many samples. Prints tables and, with
-//! `--record FILE`, writes them there. `--help` lists the options.
+//! What denoising is worth: frames of one sample a pixel along a camera path, against pictures of many samples. Prints
+//! tables and, with `--record FILE`, writes them there. `--help` lists the options.
 //!
-//! Everything is measured on what a display shows: radiance times 2^EV, the EV that brings the first reference to middle grey, through
-//! the tone map, cut off at 0 and 1, linear. *RMSE* is over pixels and channels, *FLIP* the mean, *temporal error* the root of the mean squared
-//! error over all frames of the steady state, *flicker* the mean over pixels, channels and these frames of
+//! Everything is measured on what a display shows: radiance times 2^EV, the EV that brings the first reference to
+//! middle grey, through the tone map, cut off at 0 and 1, linear. *RMSE* is over pixels and channels, *FLIP* the mean,
+//! *temporal error* the root of the mean squared error over all frames of the steady state, *flicker* the mean over
+//! pixels, channels and these frames of
 //! |(A[k] - A[k-1]) - (R[k] - R[k-1])|: how far the change of the picture A is from the change of the reference R. The steady state
 //! is the last frames of the walk.
 
@@ -11,8 +12,10 @@ mod measures;
 mod references;
 mod report;
 
-use brickwalk::render::denoise::{Denoiser, Guides, Taa};
-use brickwalk::render::{Exposure, Meter, Renderer, ToneMap};
+use brickwalk::frame::Renderer;
+use brickwalk::picture::denoise::{Denoiser, Guides, Taa};
+use brickwalk::picture::exposure::{Exposure, Meter};
+use brickwalk::picture::tone_map::ToneMap;
 use brickwalk::scene::Camera;
 use brickwalk::scene::path::CameraPath;
 use clap::Parser;
@@ -155,7 +158,8 @@ fn frame(renderer: &mut Renderer, jittered: &mut Renderer, going: &mut Going, k:
     Frame { pictures: [noisy, taa, alone, denoised, both], new }
 }
 
-/// A walk, shown: of every frame the pictures in every way, of those that are measured the reference and the halves of its samples.
+/// A walk, shown: of every frame the pictures in every way, of those that are measured the reference and the halves of
+/// its samples.
 pub struct Walk {
     pictures: Vec<[Shown; 5]>,
     truth: BTreeMap<usize, Shown>,
@@ -206,7 +210,8 @@ fn main() {
 
     let mut changes = Vec::new();
     let shown = |frame: &Frame| [Way::Denoised, Way::Both].map(|way| display.show(&frame.pictures[way as usize]));
-    // Still, until histories are long, at either end of the walk; then at its last frame. What either lacks is new there.
+    // Still, until histories are long, at either end of the walk; then at its last frame. What either lacks is new
+    // there.
     let (mut still, mut jump) = (Going::default(), Going::default());
     let (mut steady, mut after, mut new) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..24 + 10 {
@@ -246,7 +251,7 @@ fn main() {
     let text = report::text(&options, &display, &walk, &changes);
     print!("{text}");
     if let Some(file) = &options.record {
-        brickwalk::app::output::atomic::write(file, text.as_bytes()).expect("the results");
+        brickwalk::output::atomic::write(file, text.as_bytes()).expect("the results");
     }
     if let Some(folder) = &options.pictures {
         report::pictures(folder, &display, &walk);

@@ -1,7 +1,7 @@
 //! How far pictures are from references, one by one and from frame to frame.
 
 use brickwalk::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr};
-use brickwalk::render::ToneMap;
+use brickwalk::picture::tone_map::ToneMap;
 
 /// What a display shows: radiance times 2^EV through a tone map, cut off at 0 and 1.
 #[derive(Clone, Copy)]
@@ -43,8 +43,8 @@ pub fn errors(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
     a.iter().zip(b).map(of).collect()
 }
 
-/// Flicker from one frame to the next: the mean over pixels and channels of |(a₁ − a₀) − (b₁ − b₀)|, how far the change of the
-/// picture is from the change of the reference.
+/// Flicker from one frame to the next: the mean over pixels and channels of |(a₁ − a₀) − (b₁ − b₀)|, how far the change
+/// of the picture is from the change of the reference.
 pub fn flicker([a0, a1]: [&[[f32; 3]]; 2], [b0, b1]: [&[[f32; 3]]; 2]) -> f64 {
     let change = |x: &[[f32; 3]], y: &[[f32; 3]]| -> Vec<[f32; 3]> {
         x.iter().zip(y).map(|(x, y)| [0, 1, 2].map(|k| y[k] - x[k])).collect()

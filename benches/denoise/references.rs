@@ -1,13 +1,13 @@
 //! Pictures of many samples, kept on disk and not made twice.
 
 use super::Options;
-use brickwalk::app::args::{Cli, Command};
-use brickwalk::app::output::atomic;
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::app::walk;
-use brickwalk::kernel::Extent;
-use brickwalk::render::Renderer;
+use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::cli::walk;
+use brickwalk::frame::Renderer;
+use brickwalk::kernels::Extent;
+use brickwalk::output::atomic;
 use brickwalk::scene::Camera;
+use brickwalk::session::open::{Session, open_scene};
 use clap::Parser;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,7 @@
 
 use super::measures::{Display, average, flicker, mse};
 use super::{Change, Options, ROWS, Walk, Way};
-use brickwalk::app::output::{atomic, png, srgb};
+use brickwalk::output::{atomic, png, srgb};
 use std::fmt::Write;
 use std::path::Path;
 

@@ -16,8 +16,8 @@
 //! | second coordinates | 8 v | [`AttributeDetail::uv`], with [`BRICK_DETAIL`] |
 //!
 //! Vertices are numbered in the order of their first use, so an index is either the next new one, distance 0, or one of
-//! few before it. With h = 0 at first, an index i is stored as d = h - i, in the modulus of its 16 or 32 bits, and d = 0
-//! makes h one more: any indices in any order can be stored so.
+//! few before it. With h = 0 at first, an index i is stored as d = h - i, in the modulus of its 16 or 32 bits, and d =
+//! 0 makes h one more: any indices in any order can be stored so.
 
 use crate::pack::{UnpackError, pack, unpack};
 use crate::records::{
@@ -60,8 +60,8 @@ impl Columns {
     }
 }
 
-/// Encodes the attributes of `brick`, laid out as [`AttributeLayout`] says; padding is not looked at. The same attributes
-/// give the same bytes.
+/// Encodes the attributes of `brick`, laid out as [`AttributeLayout`] says; padding is not looked at. The same
+/// attributes give the same bytes.
 ///
 /// # Panics
 ///
@@ -97,9 +97,10 @@ pub fn encode(brick: &Brick, loaded: &[u8]) -> Vec<u8> {
     pack(&bytes)
 }
 
-/// Decodes what [`encode`] made of attributes as long as `loaded` into it, padding included. Whatever `stored` holds, it
-/// does not panic; the indices and materials that come out may be any. `scratch` grows to the length of the columns, which
-/// the counts of `brick` say, and is of use for the next call. After an error the contents of `loaded` are of no use.
+/// Decodes what [`encode`] made of attributes as long as `loaded` into it, padding included. Whatever `stored` holds,
+/// it does not panic; the indices and materials that come out may be any. `scratch` grows to the length of the columns,
+/// which the counts of `brick` say, and is of use for the next call. After an error the contents of `loaded` are of no
+/// use.
 ///
 /// # Errors
 ///

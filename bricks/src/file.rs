@@ -77,8 +77,8 @@ impl SceneFile {
         Self::load(path, Arc::new(ReadSource::new(file)), source)
     }
 
-    /// Opens a scene file that is part of the program, or otherwise in memory; `name` stands for its path in messages. As
-    /// [`Self::open`].
+    /// Opens a scene file that is part of the program, or otherwise in memory; `name` stands for its path in messages.
+    /// As [`Self::open`].
     pub fn from_bytes(name: impl Into<PathBuf>, bytes: impl Into<Cow<'static, [u8]>>) -> Result<SceneFile, Error> {
         let bytes: Arc<dyn Source> = Arc::new(Arc::new(bytes.into()));
         Self::load(name.into(), bytes.clone(), bytes)
@@ -188,9 +188,9 @@ impl SceneFile {
         }
     }
 
-    /// Copies a payload to `out`, decoded if it is encoded in the file, and checks the copy: its checksum, then every index
-    /// in it (see [`validate::payload`]), so that whoever traverses or shades with it may index freely. Indices are checked
-    /// the first time; after that the checksum says that they are the same.
+    /// Copies a payload to `out`, decoded if it is encoded in the file, and checks the copy: its checksum, then every
+    /// index in it (see [`validate::payload`]), so that whoever traverses or shades with it may index freely. Indices
+    /// are checked the first time; after that the checksum says that they are the same.
     ///
     /// `out` must be [`Self::loaded_bytes`] long; it needs no alignment. After an error its contents are of no use.
     pub fn copy(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
@@ -388,8 +388,8 @@ impl Reader<'_> {
         Err(Error::Corrupt { path: self.path.to_owned(), part, found, expected })
     }
 
-    /// Reads the header of a file of `length` bytes. Nothing in it is used before its checksum is found right, except the
-    /// magic and the version, which have their place in every version.
+    /// Reads the header of a file of `length` bytes. Nothing in it is used before its checksum is found right, except
+    /// the magic and the version, which have their place in every version.
     pub(crate) fn header(&self, length: u64) -> Result<Header, Error> {
         let mut page = [0; PAGE_BYTES as usize];
         let start = length.min(PAGE_BYTES) as usize;
@@ -433,8 +433,8 @@ impl Reader<'_> {
         Ok(header)
     }
 
-    /// Reads the directory that `header`, found right, points to. Its entries are the sections in their order and tile the
-    /// rest of the file.
+    /// Reads the directory that `header`, found right, points to. Its entries are the sections in their order and tile
+    /// the rest of the file.
     pub(crate) fn directory(&self, header: &Header) -> Result<Directory, Error> {
         let mut directory: Directory = bytemuck::Zeroable::zeroed();
         self.bytes(Part::Directory, header.directory_offset, bytemuck::bytes_of_mut(&mut directory))?;
@@ -522,7 +522,8 @@ impl Reader<'_> {
         self.corrupt(part, xxh3_64(out), span.checksum)
     }
 
-    /// Decodes the attributes of `brick` to `out`, [`AttributeLayout::bytes`] long, from a copy whose checksum was compared.
+    /// Decodes the attributes of `brick` to `out`, [`AttributeLayout::bytes`] long, from a copy whose checksum was
+    /// compared.
     pub(crate) fn attributes(
         &self,
         payload: Payload,

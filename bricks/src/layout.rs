@@ -1,8 +1,8 @@
 //! Byte map of the file as a whole: header, directory, sections. See `FORMAT.md`.
 //!
 //! The parts of a file follow each other without gaps but for zero padding up to the next multiple of an alignment:
-//! header page, payloads (each on a multiple of [`PAGE_BYTES`]), directory (on a multiple of [`PAGE_BYTES`]), sections in
-//! the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
+//! header page, payloads (each on a multiple of [`PAGE_BYTES`]), directory (on a multiple of [`PAGE_BYTES`]), sections
+//! in the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
 
 use crate::occupancy::Occupancy;
 use crate::records::{

@@ -5,8 +5,8 @@
 //!
 //! * [`SceneFile::open`] checks the header, the directory and every section of the resident part (checksums, then
 //!   [`validate::resident`]). Its cost does not depend on the payloads.
-//! * [`SceneFile::copy`] checks a payload while it is copied out: its checksum, then every index in it. Geometry and texels
-//!   are used as they lie in the file, attributes are decoded ([`attributes`]).
+//! * [`SceneFile::copy`] checks a payload while it is copied out: its checksum, then every index in it. Geometry and
+//!   texels are used as they lie in the file, attributes are decoded ([`attributes`]).
 //! * [`verify_file`] reads every byte of the file, padding included, and lists all that is wrong.
 //!
 //! Numbers on disk are little-endian and of fixed width; offsets and lengths are `u64`.

@@ -51,7 +51,8 @@ pub struct Manifest {
     pub instance_scale_ratio: f64,
     /// Warnings of the conversion, one line each.
     pub warnings: Vec<String>,
-    /// Which nodes were kept as instances of their own, as the conversion was asked: names, with * and ? for any characters and one.
+    /// Which nodes were kept as instances of their own, as the conversion was asked: names, with * and ? for any
+    /// characters and one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub movable: Vec<String>,
     /// Where ranges of global triangle ids come from, ascending, covering all ids; for `info --id`.

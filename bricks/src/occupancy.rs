@@ -19,7 +19,8 @@ pub const RESIDENT_LEVEL: u32 = 2;
 /// Bytes of all levels, one after the other.
 pub const OCCUPANCY_BYTES: usize = level_start(OCCUPANCY_LEVELS);
 
-/// Largest magnitude of a lattice coordinate of a brick with an occupancy map: cells may be as small as a 32nd of a step.
+/// Largest magnitude of a lattice coordinate of a brick with an occupancy map: cells may be as small as a 32nd of a
+/// step.
 pub const OCCUPANCY_LIMIT: i64 = LATTICE_LIMIT >> 5;
 
 /// Bytes before level `level`.
@@ -62,9 +63,9 @@ pub struct OccupancyGrid {
 }
 
 impl OccupancyGrid {
-    /// The grid of a brick with bounds `min` to `max` in steps of 2^`step_log2` object units, within ±[`OCCUPANCY_LIMIT`]: of the cells whose
-    /// sides are powers of two, the smallest of which 63 span the brick on every axis. From the cell that `min` lies in, 64
-    /// hold it.
+    /// The grid of a brick with bounds `min` to `max` in steps of 2^`step_log2` object units, within
+    /// ±[`OCCUPANCY_LIMIT`]: of the cells whose sides are powers of two, the smallest of which 63 span the brick on
+    /// every axis. From the cell that `min` lies in, 64 hold it.
     pub fn of(step_log2: i32, min: [i64; 3], max: [i64; 3]) -> Self {
         let extent = (0..3).map(|k| i128::from(max[k]) - i128::from(min[k])).max().unwrap_or(0);
         let spans = |steps_log2: &i32| extent << 5 <= i128::from(OCCUPANCY_CELLS - 1) << (5 + steps_log2);
@@ -78,8 +79,8 @@ impl OccupancyGrid {
         self.cell_log2 - step_log2
     }
 
-    /// The cell of the finest level that a point of the object's lattice lies in, or the one that starts there: 0 to 63 on
-    /// each axis if the point lies within the bounds of the brick.
+    /// The cell of the finest level that a point of the object's lattice lies in, or the one that starts there: 0 to 63
+    /// on each axis if the point lies within the bounds of the brick.
     pub fn cell(&self, step_log2: i32, point: [i64; 3]) -> [i64; 3] {
         std::array::from_fn(|k| self.cell_at(self.steps_log2(step_log2), point[k]) - self.origin[k])
     }
@@ -124,8 +125,8 @@ impl OccupancyMap {
         pack::pack(&self.bytes)
     }
 
-    /// The bits of a level less than [`OCCUPANCY_LEVELS`]: of n = 64 >> `level` cells on each axis, cell (x, y, z) is bit
-    /// z + n (x + n y), the lowest of a byte first.
+    /// The bits of a level less than [`OCCUPANCY_LEVELS`]: of n = 64 >> `level` cells on each axis, cell (x, y, z) is
+    /// bit z + n (x + n y), the lowest of a byte first.
     pub fn level(&self, level: u32) -> &[u8] {
         &self.bytes[level_start(level)..][..level_bytes(level)]
     }

@@ -2,12 +2,14 @@
 
 use std::fmt;
 
-/// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`], tile or [`crate::OpacityMap`].
+/// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`], tile or
+/// [`crate::OpacityMap`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Payload {
     /// What traversal of a brick reads, laid out as [`crate::GeometryLayout`] says.
     Geometry(u32),
-    /// What shading of hits in a brick reads, loaded as [`crate::AttributeLayout`] says, stored as [`crate::attributes`] says.
+    /// What shading of hits in a brick reads, loaded as [`crate::AttributeLayout`] says, stored as
+    /// [`crate::attributes`] says.
     Attributes(u32),
     /// The [`crate::OccupancyMap`] of a brick, packed.
     Proxies(u32),

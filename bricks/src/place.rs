@@ -1,7 +1,7 @@
 //! Instances placed anew in an open scene: their matrices, and the top-level trees fitted to the boxes of their bricks.
 //!
-//! Boxes are those that a conversion with the same matrices finds, bit for bit; the trees keep their topology, which was chosen for
-//! other places and may cost rays time.
+//! Boxes are those that a conversion with the same matrices finds, bit for bit; the trees keep their topology, which
+//! was chosen for other places and may cost rays time.
 
 use crate::records::{INSTANCE_MIRRORED, Instance, Leaf, NODE_WIDTH, TOP_LEAF, TopNode2, TopNode8};
 use crate::resident::Resident;
@@ -12,11 +12,12 @@ const UNIT: f64 = f64::EPSILON / 2.0;
 /// Largest coordinate of a grid.
 const GRID_END: i64 = 255;
 
-/// Largest magnitude of a coordinate of the top level, in steps of the world's lattice: offsets of bricks from the reference point of any frame
-/// are exact (FORMAT.md, "Lattices").
+/// Largest magnitude of a coordinate of the top level, in steps of the world's lattice: offsets of bricks from the
+/// reference point of any frame are exact (FORMAT.md, "Lattices").
 pub const REACH_STEPS: i64 = 1 << 44;
 
-/// log2 of the largest extent of the top level in device units, for which the range of every intermediate of the triangle test is proved.
+/// log2 of the largest extent of the top level in device units, for which the range of every intermediate of the
+/// triangle test is proved.
 pub const EXTENT_UNITS_LOG2: i32 = 30;
 
 /// Least and greatest coordinates, lattice steps.
@@ -79,8 +80,8 @@ pub fn image_bounds(m: &[f64; 12], min: [f64; 3], max: [f64; 3]) -> ([f64; 3], [
     out
 }
 
-/// The box of a brick of an instance in steps of the world's lattice, outward: that of the image of the brick's box `own`, in steps of
-/// its object's lattice. Steps are given by their log2 in the units of object and world.
+/// The box of a brick of an instance in steps of the world's lattice, outward: that of the image of the brick's box
+/// `own`, in steps of its object's lattice. Steps are given by their log2 in the units of object and world.
 pub fn world_box(own: Bounds, object_step_log2: i32, matrix: &[f64; 12], world_step_log2: i32) -> Bounds {
     let [min, max] = own.map(|corner| corner.map(|x| x as f64 * pow2(object_step_log2)));
     let (min, max) = image_bounds(matrix, min, max);
@@ -106,8 +107,9 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// On the finest grids with steps of powers of two from `origin`, which is at most any child's least corner, to `end`, which is at least any
-    /// child's greatest one. Outward. Absent children are inverted, so that they are neutral to unions and entered by no ray.
+    /// On the finest grids with steps of powers of two from `origin`, which is at most any child's least corner, to
+    /// `end`, which is at least any child's greatest one. Outward. Absent children are inverted, so that they are
+    /// neutral to unions and entered by no ray.
     pub fn over(children: &[Option<Bounds>; NODE_WIDTH], origin: [i64; 3], end: [i64; 3]) -> Self {
         let mut grid = Self { exponent: [0; 3], lo: [[GRID_END as u8; NODE_WIDTH]; 3], hi: [[0; NODE_WIDTH]; 3] };
         for k in 0..3 {
@@ -146,8 +148,8 @@ impl Resident {
         }
     }
 
-    /// Places instances by new matrices, world_from_object, row-major 3x4, and fits both top-level trees and the scene's bounds to them. All else
-    /// stays as it is. After an error nothing has changed.
+    /// Places instances by new matrices, world_from_object, row-major 3x4, and fits both top-level trees and the
+    /// scene's bounds to them. All else stays as it is. After an error nothing has changed.
     ///
     /// # Errors
     /// An instance that does not exist or is the world, a matrix without an inverse, a place that is too far out.

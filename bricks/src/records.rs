@@ -278,8 +278,8 @@ pub const EMISSIVE: usize = 4;
 
 /// A glTF metallic-roughness material. Texture fields are indices of [`Texture`], or [`NONE`].
 ///
-/// Its dielectric part reflects `specular` along the normal and `specular_weight` at grazing angles: 0.04 and 1 by default
-/// (KHR_materials_ior, KHR_materials_specular), and both 0 make it Lambertian.
+/// Its dielectric part reflects `specular` along the normal and `specular_weight` at grazing angles: 0.04 and 1 by
+/// default (KHR_materials_ior, KHR_materials_specular), and both 0 make it Lambertian.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Material {
@@ -325,8 +325,8 @@ pub struct Material {
     pub uv_sets: u32,
     /// Zero.
     pub _reserved: u32,
-    /// Two rows a texture: of the set's coordinates (s, t) the coordinate is a s + b t + c by a row (a, b, c, d). The fourth of the first
-    /// row is the absolute determinant, by which areas grow; of the second row it is zero.
+    /// Two rows a texture: of the set's coordinates (s, t) the coordinate is a s + b t + c by a row (a, b, c, d). The
+    /// fourth of the first row is the absolute determinant, by which areas grow; of the second row it is zero.
     pub uv_from_set: [[f32; 4]; 2 * MATERIAL_TEXTURES],
 }
 
@@ -414,7 +414,8 @@ pub const TEXTURE_BC5: u32 = 2;
 /// [`Texture::flags`]: red, green and blue are sRGB; else they are linear. Alpha always is.
 pub const TEXTURE_SRGB: u32 = 1;
 
-/// A texture: an image with a full chain of mip levels, rows top to bottom, cut into tiles and a tail; see [`crate::texture`].
+/// A texture: an image with a full chain of mip levels, rows top to bottom, cut into tiles and a tail; see
+/// [`crate::texture`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Texture {
@@ -438,8 +439,8 @@ pub struct Texture {
     pub tail: Span,
 }
 
-/// The alpha of a base colour texture, where rays ask for it: 8 bits a texel (255 is 1), rows top to bottom, tightly packed, in full
-/// resolution. It is resident throughout, so that what a ray meets does not depend on what is loaded.
+/// The alpha of a base colour texture, where rays ask for it: 8 bits a texel (255 is 1), rows top to bottom, tightly
+/// packed, in full resolution. It is resident throughout, so that what a ray meets does not depend on what is loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct OpacityMap {
@@ -462,8 +463,9 @@ impl OpacityMap {
     }
 }
 
-/// What decides whether a ray passes through a triangle: the alpha of its material there, which is that of its base colour factor
-/// times [`OpacityMap`] times vertex colour. With MASK a ray passes below the cutoff, with BLEND with a probability of 1 - alpha.
+/// What decides whether a ray passes through a triangle: the alpha of its material there, which is that of its base
+/// colour factor times [`OpacityMap`] times vertex colour. With MASK a ray passes below the cutoff, with BLEND with a
+/// probability of 1 - alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct OpacityTriangle {
@@ -494,7 +496,8 @@ pub struct PunctualLight {
     pub position: [f64; 3],
     /// Unit vector along the light, world space; of no meaning for points.
     pub direction: [f64; 3],
-    /// Linear RGB: luminous intensity in candela (lm/sr) of points and spots, illuminance in lux (lm/m²) of distant lights.
+    /// Linear RGB: luminous intensity in candela (lm/sr) of points and spots, illuminance in lux (lm/m²) of distant
+    /// lights.
     pub color: [f32; 3],
     /// Angles from the axis where a spot begins to fall off, and where it ends, radians, in order, 0..=π/2.
     pub cone: [f32; 2],
@@ -518,8 +521,8 @@ pub struct AttributeVertex {
     pub color: u32,
 }
 
-/// What a vertex of the attributes has besides, 16 bytes, in bricks with [`BRICK_DETAIL`]: where a normal texture or a second set of
-/// texture coordinates is looked up.
+/// What a vertex of the attributes has besides, 16 bytes, in bricks with [`BRICK_DETAIL`]: where a normal texture or a
+/// second set of texture coordinates is looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct AttributeDetail {
@@ -537,8 +540,8 @@ const fn pad16(bytes: u64) -> u64 {
 }
 
 /// Byte offsets of the arrays in a brick's geometry payload, each 16-aligned, in this order: [`Node`]s; vertices (f32
-/// x y z in device units of the object relative to the brick's origin; wide: high x y z, low x y z); mesh-local triangle
-/// ids (u32); indices (three u16 or u32 a triangle, lexicographically smallest position first, winding kept).
+/// x y z in device units of the object relative to the brick's origin; wide: high x y z, low x y z); mesh-local
+/// triangle ids (u32); indices (three u16 or u32 a triangle, lexicographically smallest position first, winding kept).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GeometryLayout {
     /// Offset of the vertices.
@@ -547,7 +550,8 @@ pub struct GeometryLayout {
     pub ids: u64,
     /// Offset of the indices.
     pub indices: u64,
-    /// Offset of the number of each triangle's [`OpacityTriangle`], u32, [`NONE`] where no ray passes; with [`BRICK_OPACITY`].
+    /// Offset of the number of each triangle's [`OpacityTriangle`], u32, [`NONE`] where no ray passes; with
+    /// [`BRICK_OPACITY`].
     pub opacity_of: u64,
     /// Offset of the [`OpacityTriangle`]s; with [`BRICK_OPACITY`].
     pub opacities: u64,
@@ -576,10 +580,11 @@ pub const SURFACE_MATERIAL: u32 = (1 << 30) - 1;
 /// Shift of the rotation in a triangle's surface word.
 pub const SURFACE_ROTATION_SHIFT: u32 = 30;
 
-/// Byte offsets of the arrays in a brick's attributes as they are loaded, each 16-aligned, in this order: [`AttributeVertex`]s;
-/// surface words (u32 a triangle: the material in the low 30 bits, above it the rotation r, such that stored vertex i is
-/// source vertex (i + r) mod 3); indices of attribute vertices (three u16 or u32 a triangle, in stored, rotated order;
-/// u32 under the same flag as the geometry's indices); with [`BRICK_DETAIL`] [`AttributeDetail`]s.
+/// Byte offsets of the arrays in a brick's attributes as they are loaded, each 16-aligned, in this order:
+/// [`AttributeVertex`]s; surface words (u32 a triangle: the material in the low 30 bits, above it the rotation r, such
+/// that stored vertex i is source vertex (i + r) mod 3); indices of attribute vertices (three u16 or u32 a triangle, in
+/// stored, rotated order; u32 under the same flag as the geometry's indices); with [`BRICK_DETAIL`]
+/// [`AttributeDetail`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AttributeLayout {
     /// Offset of the surface words.

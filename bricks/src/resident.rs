@@ -125,7 +125,8 @@ impl Resident {
         (own < texture.tile_count).then(|| (index as u32, texture.place_of(own)))
     }
 
-    /// The texture, by its name in the source, that a payload is part of, and which part, in words; `None` if it is of a brick.
+    /// The texture, by its name in the source, that a payload is part of, and which part, in words; `None` if it is of
+    /// a brick.
     pub fn texture_of(&self, payload: Payload) -> Option<String> {
         let named = |texture: u32| {
             let name = self.manifest.texture_names.get(texture as usize).map_or("", String::as_str);

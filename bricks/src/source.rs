@@ -83,9 +83,9 @@ impl Source for MapSource {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         // SAFETY: `offset .. offset + out.len()` lies within the map (checked above), which stays mapped and readable
-        // while `self` lives and, the file having been long enough just now, is backed by the file. `out` is exclusively
-        // borrowed memory of its own, so the two do not overlap. Bytes have no invalid values, and no reference to the
-        // mapped bytes is formed.
+        // while `self` lives and, the file having been long enough just now, is backed by the file. `out` is
+        // exclusively borrowed memory of its own, so the two do not overlap. Bytes have no invalid values, and no
+        // reference to the mapped bytes is formed.
         unsafe {
             std::ptr::copy_nonoverlapping(self.map.as_ptr().add(offset as usize), out.as_mut_ptr(), out.len());
         }

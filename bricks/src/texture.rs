@@ -1,12 +1,13 @@
 //! How the levels of a texture lie in its payloads.
 //!
-//! A level with a side above [`TILE_TEXELS`] is cut into square *tiles* of that side, row by row, the levels one after the other:
-//! each tile is a payload of its own ([`crate::Payload::Tile`]), read on demand. Tiles at the right and lower edges go on with
-//! repetitions of the last column and row, so that every tile is whole. The levels that are left are the *tail*, one payload
-//! ([`crate::Payload::Texture`]) that is meant to stay resident: whatever tiles are missing, there is a coarsest answer.
+//! A level with a side above [`TILE_TEXELS`] is cut into square *tiles* of that side, row by row, the levels one after
+//! the other: each tile is a payload of its own ([`crate::Payload::Tile`]), read on demand. Tiles at the right and
+//! lower edges go on with repetitions of the last column and row, so that every tile is whole. The levels that are left
+//! are the *tail*, one payload ([`crate::Payload::Texture`]) that is meant to stay resident: whatever tiles are
+//! missing, there is a coarsest answer.
 //!
-//! Texels of a tile, and of a level of the tail, lie on a grid of whole blocks of [`BLOCK_TEXELS`] each way: [`crate::TEXTURE_RGBA8`]
-//! row by row, [`TEXTURE_BC7`] and [`TEXTURE_BC5`] block row by block row.
+//! Texels of a tile, and of a level of the tail, lie on a grid of whole blocks of [`BLOCK_TEXELS`] each way:
+//! [`crate::TEXTURE_RGBA8`] row by row, [`TEXTURE_BC7`] and [`TEXTURE_BC5`] block row by block row.
 
 use crate::records::{TEXTURE_BC5, TEXTURE_BC7, Texture};
 

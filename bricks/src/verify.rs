@@ -265,7 +265,8 @@ fn check_payload(
     Ok(())
 }
 
-/// The occupancy that the vertices of a geometry payload lie in. None if it cannot be read: that is found where it is checked.
+/// The occupancy that the vertices of a geometry payload lie in. None if it cannot be read: that is found where it is
+/// checked.
 fn map_of(reader: &Reader, resident: &Resident, payload: Payload) -> Option<OccupancyMap> {
     let Payload::Geometry(index) = payload else { return None };
     let proxies = Payload::Proxies(index);

@@ -17,8 +17,8 @@ use xxhash_rust::xxh3::xxh3_64;
 const BUFFER_BYTES: usize = 1 << 20;
 
 /// Writes a scene file under a temporary name in the folder of its own: payloads first, then the resident part. Only
-/// [`Self::finish`] gives it its name, in one step and after everything is on the disk. If the writer is dropped before,
-/// the temporary file is removed; whatever had the name keeps it.
+/// [`Self::finish`] gives it its name, in one step and after everything is on the disk. If the writer is dropped
+/// before, the temporary file is removed; whatever had the name keeps it.
 ///
 /// A writer that began with [`Self::reserve`] can instead leave its temporary file, to be continued by another process.
 #[derive(Debug)]
@@ -45,8 +45,8 @@ impl Writer {
         Partial { path, target, temporary }.start()
     }
 
-    /// Reserves the temporary file `.NAME.partial` for a file that will be called `path`, for this process alone. Its folder
-    /// must exist. A file that an earlier process left there is kept until [`Partial::start`].
+    /// Reserves the temporary file `.NAME.partial` for a file that will be called `path`, for this process alone. Its
+    /// folder must exist. A file that an earlier process left there is kept until [`Partial::start`].
     pub fn reserve(path: impl AsRef<Path>) -> Result<Partial, Error> {
         let (path, target, name) = names(path.as_ref())?;
         let partial = folder_of(&target).join(format!("{name}.partial"));
@@ -69,8 +69,8 @@ impl Writer {
         }
     }
 
-    /// Hands everything written to the operating system, so that it outlives this process, and returns how many bytes that
-    /// is: what [`Partial::resume`] takes.
+    /// Hands everything written to the operating system, so that it outlives this process, and returns how many bytes
+    /// that is: what [`Partial::resume`] takes.
     pub fn checkpoint(&mut self) -> Result<u64, Error> {
         self.file.flush().map_err(|source| self.write_error(source))?;
         Ok(self.position)
@@ -244,8 +244,8 @@ impl Partial {
         Ok(writer)
     }
 
-    /// Continues after `position` bytes with the payloads `spans`, in the order in which they were written. Their bytes are
-    /// checked; `progress` is called with the length of each.
+    /// Continues after `position` bytes with the payloads `spans`, in the order in which they were written. Their bytes
+    /// are checked; `progress` is called with the length of each.
     ///
     /// # Errors
     /// The file is not what it was at that checkpoint; it is left as it is.

@@ -1,8 +1,8 @@
-//! The payloads that are resident: verified bytes in host memory, shared with the host cache, and the places that they take of the
-//! budget.
+//! The payloads that are resident: verified bytes in host memory, shared with the host cache, and the places that they
+//! take of the budget.
 
-use super::brick::BrickView;
-use super::resolve::AttributeView;
+use crate::kernels::shade::resolve::AttributeView;
+use crate::kernels::trace::brick::BrickView;
 use crate::schedule::{BrickStates, ExecutorError, Load};
 use crate::stream::{Destination, Item, Slot, Workers};
 use bricks::{Resident, SceneFile};
@@ -45,8 +45,8 @@ impl BrickCache {
         Self { held: (0..rows).map(|_| None).collect(), places: BTreeMap::new() }
     }
 
-    /// Has the workers bring payloads. What lay at their places is given up first, so that never more is held than the budget
-    /// says.
+    /// Has the workers bring payloads. What lay at their places is given up first, so that never more is held than the
+    /// budget says.
     ///
     /// # Errors
     /// The first payload that cannot be read or verified; none of `loads` is resident then.
@@ -84,7 +84,8 @@ impl BrickCache {
         }
     }
 
-    /// Every brick's geometry, with the table `opacity` ([`crate::kernel::opacity`]); of bricks that are not resident, nothing.
+    /// Every brick's geometry, with the table `opacity` ([`crate::kernels::opacity`]); of bricks that are not resident,
+    /// nothing.
     ///
     /// # Errors
     /// A brick that `bricks` says is resident and was never loaded; with `all`, a brick that is not resident.

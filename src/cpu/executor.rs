@@ -1,49 +1,52 @@
-//! The CPU executor: runs the kernels that a step consists of one after the other, each over all rays or tiles in parallel.
+//! The CPU executor: runs the kernels that a step consists of one after the other, each over all rays or tiles in
+//! parallel.
 
 use super::cache::{BrickCache, Shared};
-use super::dvf::{self, DvfTables};
-use super::field::{FieldTables, field_trace, make_field};
-use super::generate::{
-    generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
-    start_hits,
-};
-use super::intersect_all::intersect_all;
-use super::intersect_binary::{BinaryTrees, intersect_binary};
-use super::intersect_list::intersect_list;
-use super::isa::Best;
-use super::lamps::LampTables;
-use super::query::query;
-use super::query_all::{count_pairs, query_all};
-use super::query_pairs::query_pairs;
-use super::rays::{RaySet, Work};
-use super::resolve::{AttributeView, resolve};
-use super::roma::{RomaTables, roma_measure, roma_near, roma_rotate, roma_trace};
-use super::roma_cosine::roma_draw;
-use super::rsm::{RsmTables, rsm_light, rsm_write};
-use super::sample::{Sampling, Texels, TileDemand, sample};
-use super::scene::{Bound, Counters, Demand, Scene};
-use super::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, dvf_light, hit_demand, shade};
-use super::tile_bounds::tile_bounds;
-use super::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
-use super::tile_walk::{tile_walk_count, tile_walk_write};
-use crate::kernel::dispatch::{
+use crate::kernels::bound::{Bound, Counters, Demand, Scene};
+use crate::kernels::dispatch::{
     COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_POINTS, DVF_RAYS, DVF_SEEN, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS,
     FIELD_TRACE, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
     are_pairs_culled, dispatches,
 };
-use crate::kernel::dvf::DvfMaps;
-use crate::kernel::field::FieldMaps;
-use crate::kernel::layout::{self, Params};
-use crate::kernel::roma::RomaMaps;
-use crate::kernel::rsm::RsmMaps;
-use crate::kernel::{
+use crate::kernels::layout;
+use crate::kernels::layout::Params;
+use crate::kernels::query::query::query;
+use crate::kernels::query::query_all::{count_pairs, query_all};
+use crate::kernels::query::query_pairs::query_pairs;
+use crate::kernels::query::tile_bounds::tile_bounds;
+use crate::kernels::query::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
+use crate::kernels::query::tile_walk::{tile_walk_count, tile_walk_write};
+use crate::kernels::rays::{RaySet, Work};
+use crate::kernels::shade::generate::{
+    generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
+    start_hits,
+};
+use crate::kernels::shade::lamps::LampTables;
+use crate::kernels::shade::resolve::{AttributeView, resolve};
+use crate::kernels::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, dvf_light, hit_demand, shade};
+use crate::kernels::simd::isa::Best;
+use crate::kernels::texture::sample::{Sampling, Texels, TileDemand, sample};
+use crate::kernels::trace::intersect_all::intersect_all;
+use crate::kernels::trace::intersect_binary::{BinaryTrees, intersect_binary};
+use crate::kernels::trace::intersect_list::intersect_list;
+use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::stream::{PayloadSource, WorkerPool, Workers};
-use crate::visibility::bom::{Cascades, clearance};
 #[cfg(test)]
-use crate::visibility::distance_field::DistanceField;
+use crate::secondary::df::DistanceField;
+use crate::secondary::df::maps::FieldMaps;
+use crate::secondary::df::twin::{FieldTables, field_trace, make_field};
+use crate::secondary::dvf::maps::DvfMaps;
+use crate::secondary::dvf::twin as dvf;
+use crate::secondary::dvf::twin::DvfTables;
+use crate::secondary::occupancy::{Cascades, clearance};
+use crate::secondary::roma::cosine::roma_draw;
+use crate::secondary::roma::maps::RomaMaps;
+use crate::secondary::roma::twin::{RomaTables, roma_measure, roma_near, roma_rotate, roma_trace};
+use crate::secondary::rsm::maps::RsmMaps;
+use crate::secondary::rsm::twin::{RsmTables, rsm_light, rsm_write};
+use crate::stream::{PayloadSource, WorkerPool, Workers};
 use bricks::SceneFile;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -73,7 +76,7 @@ pub struct CpuExecutor {
     cache: BrickCache,
     scene: Scene,
     texels: Texels,
-    /// [`crate::kernel::opacity::table`].
+    /// [`crate::kernels::opacity::table`].
     opacity: Vec<[u32; 4]>,
     lamps: LampTables,
     buffers: Buffers,
@@ -155,37 +158,37 @@ impl CpuExecutor {
 
     /// The G-buffer of the hits of a set, for tests.
     #[cfg(test)]
-    pub(super) fn gbuffer_of(&mut self, set: usize) -> &mut Vec<layout::GBuffer> {
+    pub(crate) fn gbuffer_of(&mut self, set: usize) -> &mut Vec<layout::GBuffer> {
         &mut self.buffers.pixels.gbuffers[set]
     }
 
     /// The columns of the ray-aligned maps that were made last, for tests.
     #[cfg(test)]
-    pub(super) fn columns(&self) -> &[u32] {
+    pub(crate) fn columns(&self) -> &[u32] {
         &self.buffers.roma.columns
     }
 
     /// The distance fields that were made last, for tests.
     #[cfg(test)]
-    pub(super) fn fields(&self) -> &[DistanceField] {
+    pub(crate) fn fields(&self) -> &[DistanceField] {
         &self.buffers.field.fields
     }
 
     /// The texels of reflective shadow maps, for tests.
     #[cfg(test)]
-    pub(super) fn rsm_texels(&mut self) -> &mut Vec<layout::RsmTexel> {
+    pub(crate) fn rsm_texels(&mut self) -> &mut Vec<layout::RsmTexel> {
         &mut self.buffers.rsm.texels
     }
 
     /// The bits of rays that wait for bricks, for tests.
     #[cfg(test)]
-    pub(super) fn dvf_waiting(&self) -> Vec<u32> {
+    pub(crate) fn dvf_waiting(&self) -> Vec<u32> {
         self.buffers.dvf.waiting.iter().map(|word| word.load(Ordering::Relaxed)).collect()
     }
 
     /// The tiles and their lists, for tests.
     #[cfg(test)]
-    pub(super) fn tiles(&self) -> &TileLists {
+    pub(crate) fn tiles(&self) -> &TileLists {
         &self.buffers.tiles
     }
 }

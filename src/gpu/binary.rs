@@ -1,14 +1,16 @@
-//! Binary trees of all bricks on the device, for the baseline `plain-bvh2`: nodes in pages of their own, beside the cache.
+//! Binary trees of all bricks on the device, for the baseline `plain-bvh2`: nodes in pages of their own, beside the
+//! cache.
 
 use super::device::Gpu;
 use super::groups::numbered;
-use super::kernels::{self, Kernels};
+use super::kernels;
+use super::kernels::Kernels;
 use super::pages::device_error;
 use super::rays::storage;
 use super::wgsl;
-use crate::kernel::binary_tree::{Tree, top_height, tree_of};
-use crate::kernel::dispatch::INTERSECT_BINARY;
-use crate::kernel::layout::BinaryNode;
+use crate::kernels::dispatch::INTERSECT_BINARY;
+use crate::kernels::layout::BinaryNode;
+use crate::kernels::trace::binary_tree::{Tree, top_height, tree_of};
 use crate::schedule::ExecutorError;
 use bricks::SceneFile;
 use rayon::prelude::*;
@@ -31,8 +33,8 @@ pub struct BinaryTrees {
 }
 
 impl BinaryTrees {
-    /// Makes the trees of all bricks of `scene` from their geometry, and a pipeline for as many pages of the cache as `kernels`
-    /// have. The host holds one page of nodes at a time.
+    /// Makes the trees of all bricks of `scene` from their geometry, and a pipeline for as many pages of the cache as
+    /// `kernels` have. The host holds one page of nodes at a time.
     ///
     /// # Errors
     /// A brick that cannot be read; nodes beyond what the device holds, with how much is needed.
@@ -143,7 +145,7 @@ impl Pages<'_> {
 
 /// Layout of group 3 and the pipeline, for so many pages of nodes and a stack of so many entries.
 fn pipeline(gpu: &Gpu, kernels: &Kernels, pages: usize, stack: u32) -> (wgpu::BindGroupLayout, wgpu::ComputePipeline) {
-    let binary = |name: &str| (name == "shared/binary.wgsl").then(|| wgsl::binary_accessors(pages, stack.max(1)));
+    let binary = |name: &str| (name == "trace/binary.wgsl").then(|| wgsl::binary_accessors(pages, stack.max(1)));
     let device = &gpu.device;
     let group = kernels::read_layout(device, "binary", 1 + pages);
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {

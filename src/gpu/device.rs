@@ -1,7 +1,7 @@
 //! The adapter, its limits, and the device made from it.
 
 use super::wgsl::Pages;
-use crate::kernel::DeviceInfo;
+use crate::kernels::DeviceInfo;
 use thiserror::Error;
 
 /// Why there is no device to work with.
@@ -80,7 +80,8 @@ fn adapters(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
 }
 
-/// Storage buffers a kernel needs besides cache pages: 7 of the scene, 5 of the rays, 8 of the tiles of rays or of shading.
+/// Storage buffers a kernel needs besides cache pages: 7 of the scene, 5 of the rays, 8 of the tiles of rays or of
+/// shading.
 const FIXED_STORAGE_BUFFERS: u32 = 20;
 /// Storage buffers of the lamps, in place of pages of the cache.
 const LAMP_STORAGE_BUFFERS: usize = 4;

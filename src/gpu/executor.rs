@@ -5,35 +5,36 @@ mod peek;
 
 use super::binary::BinaryTrees;
 use super::device::Gpu;
-use super::dvf::Dvf;
-use super::field::Field;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
 use super::lamps::LampBuffers;
 use super::pages::{CachePages, MappedRange};
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
 use super::readback::Readback;
-use super::roma::Roma;
-use super::rsm::Rsm;
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::kernel::dispatch::{
+use crate::kernels::dispatch::{
     COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Third, Workgroups, are_pairs_culled, dispatches,
 };
-use crate::kernel::dvf::DvfMaps;
-use crate::kernel::field::FieldMaps;
-use crate::kernel::layout::{self, Params};
-use crate::kernel::roma::RomaMaps;
-use crate::kernel::rsm::RsmMaps;
-use crate::kernel::{
+use crate::kernels::layout;
+use crate::kernels::layout::Params;
+use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
     report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::secondary::df::device::Field;
+use crate::secondary::df::maps::FieldMaps;
+use crate::secondary::dvf::device::Dvf;
+use crate::secondary::dvf::maps::DvfMaps;
+use crate::secondary::occupancy::Cascades;
+use crate::secondary::roma::device::Roma;
+use crate::secondary::roma::maps::RomaMaps;
+use crate::secondary::rsm::device::Rsm;
+use crate::secondary::rsm::maps::RsmMaps;
 use crate::stream::{Item, WorkerPool, Workers};
-use crate::visibility::bom::Cascades;
 use bricks::SceneFile;
 use std::sync::Arc;
 
@@ -103,7 +104,8 @@ impl GpuExecutor {
         Self::with_kernels(gpu, kernels, scene, workers, page_sizes, setup)
     }
 
-    /// Sets up buffers for pipelines that exist, made for at least as many pages as there are. [`Setup::count`] is theirs.
+    /// Sets up buffers for pipelines that exist, made for at least as many pages as there are. [`Setup::count`] is
+    /// theirs.
     ///
     /// # Errors
     /// Textures that cannot be read; a picture beyond the device's limits, with what it allows.

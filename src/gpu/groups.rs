@@ -8,7 +8,7 @@ use super::rays::{PixelBuffers, RayBuffers, TileBuffers};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::wgsl::TEXEL_BINDING;
-use crate::kernel::layout::Params;
+use crate::kernels::layout::Params;
 
 /// What kernels read and write.
 pub struct Buffers {
@@ -26,7 +26,7 @@ pub struct Buffers {
     pub pixels: PixelBuffers,
     /// Tiles and their lists.
     pub tiles: TileBuffers,
-    /// [`crate::kernel::layout::Demand`] of every brick.
+    /// [`crate::kernels::layout::Demand`] of every brick.
     pub demand: wgpu::Buffer,
     /// Counters, and the work of indirect dispatches.
     pub counters: wgpu::Buffer,
@@ -120,10 +120,7 @@ fn filled(pages: &[wgpu::Buffer], count: usize) -> impl Iterator<Item = &wgpu::B
 }
 
 /// Whole buffers as entries from binding `first` on.
-pub(super) fn numbered<'a>(
-    buffers: impl IntoIterator<Item = &'a wgpu::Buffer>,
-    first: u32,
-) -> Vec<wgpu::BindGroupEntry<'a>> {
+pub fn numbered<'a>(buffers: impl IntoIterator<Item = &'a wgpu::Buffer>, first: u32) -> Vec<wgpu::BindGroupEntry<'a>> {
     let entry = |(binding, buffer): (u32, &'a wgpu::Buffer)| wgpu::BindGroupEntry {
         binding,
         resource: buffer.as_entire_binding(),

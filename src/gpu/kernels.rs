@@ -1,7 +1,8 @@
 //! Bind group layouts and pipelines: one pipeline a kernel, named as its file.
 
 use super::device::Gpu;
-use super::wgsl::{self, Pages};
+use super::wgsl;
+use super::wgsl::Pages;
 use std::collections::HashMap;
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -12,11 +13,13 @@ pub fn source(name: &str, pages: Pages) -> String {
 }
 
 /// [`source`] with the files that `generated` gives in place of the shipped ones.
-pub(super) fn source_with(name: &str, pages: Pages, generated: &dyn Fn(&str) -> Option<String>) -> String {
+pub(crate) fn source_with(name: &str, pages: Pages, generated: &dyn Fn(&str) -> Option<String>) -> String {
     let shipped = |name: &str| FILES.iter().find(|f| f.0 == name).map(|f| f.1.to_string());
     let file = |name: &str| generated(name).or_else(|| shipped(name));
     // The build has assembled every kernel from the same table.
-    wgsl::assemble(&format!("{name}.wgsl"), pages, &file).unwrap_or_default()
+    let stem = |path: &str| path.rsplit('/').next().and_then(|file| file.strip_suffix(".wgsl")) == Some(name);
+    let path = FILES.iter().map(|f| f.0).find(|path| stem(path)).unwrap_or_default();
+    wgsl::assemble(path, pages, &file).unwrap_or_default()
 }
 
 /// What a binding of a layout is.
@@ -217,29 +220,29 @@ fn layout(device: &wgpu::Device, label: &str, bindings: &[Bound]) -> wgpu::BindG
 }
 
 /// The layout of group 2 of kernels over occupancy maps.
-pub(super) fn roma_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+pub fn roma_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "roma", &[Bound::Read, Bound::Read, Bound::Read, Bound::Write])
 }
 
 /// The layout of group 2 of kernels over distance fields.
-pub(super) fn field_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+pub fn field_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "field", &[Bound::Read, Bound::Read, Bound::Write, Bound::Write])
 }
 
 /// The layout of group 2 of kernels over reflective shadow maps: the lamps, the maps and their texels.
-pub(super) fn rsm_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+pub fn rsm_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     use Bound::{Read, Write};
     layout(device, "rsm", &[Read, Read, Read, Read, Read, Write])
 }
 
 /// The layout of group 2 of kernels over discrete visibility fields.
-pub(super) fn dvf_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+pub fn dvf_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     use Bound::{Read, Write};
     layout(device, "dvf", &[Read, Write, Write, Read, Write, Read, Write, Read, Write])
 }
 
 /// The layout of a group of `count` storage buffers that are read.
-pub(super) fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
+pub fn read_layout(device: &wgpu::Device, label: &str, count: usize) -> wgpu::BindGroupLayout {
     layout(device, label, &vec![Bound::Read; count])
 }
 

@@ -2,9 +2,9 @@
 
 use super::device::Gpu;
 use super::rays::storage;
-use crate::kernel::frame::Frame;
-use crate::kernel::reflectance::REFLECTANCES;
-use crate::kernel::{Lamps, layout};
+use crate::kernels::frame::Frame;
+use crate::kernels::reflectance::REFLECTANCES;
+use crate::kernels::{Lamps, layout};
 use crate::schedule::ExecutorError;
 use std::sync::Arc;
 

@@ -1,8 +1,10 @@
-//! What the kernels of a method of visibility share: pipelines, and group 2, buffers of their own. Made when a walk first asks for the method.
+//! What the kernels of a method of visibility share: pipelines, and group 2, buffers of their own. Made when a walk
+//! first asks for the method.
 
 use super::device::Gpu;
 use super::groups::numbered;
-use super::kernels::{self, Kernels};
+use super::kernels;
+use super::kernels::Kernels;
 use super::rays::storage;
 use crate::schedule::ExecutorError;
 
@@ -86,8 +88,8 @@ pub fn check_bytes(gpu: &Gpu, bytes: u64, what: &str, remedy: &str) -> Result<()
     Err(ExecutorError::Device(format!("{name:?} holds {what} of at most {most} bytes, this takes {bytes}; {remedy}")))
 }
 
-/// Refuses `what` where its kernels need more storage buffers than the device binds: `own`, those of the scene, rays and shading among them, and one more
-/// with opacity.
+/// Refuses `what` where its kernels need more storage buffers than the device binds: `own`, those of the scene, rays
+/// and shading among them, and one more with opacity.
 ///
 /// # Errors
 /// It binds fewer.

@@ -2,19 +2,15 @@
 
 pub mod binary;
 pub mod device;
-mod dvf;
 pub mod executor;
-pub mod field;
 pub mod groups;
 pub mod kernels;
 pub mod lamps;
-mod method;
+pub mod method;
 pub mod pages;
 pub mod probe;
 pub mod rays;
 pub mod readback;
-pub mod roma;
-mod rsm;
 pub mod scene;
 pub mod texels;
 pub mod timing;

@@ -50,7 +50,8 @@ impl CachePages {
         &self.pages
     }
 
-    /// Copies payloads to their slots: workers write straight into mapped memory, of the pages or of the staging buffer.
+    /// Copies payloads to their slots: workers write straight into mapped memory, of the pages or of the staging
+    /// buffer.
     ///
     /// # Errors
     /// The first payload that could not be read or verified; a device that does not map.

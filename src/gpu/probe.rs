@@ -1,12 +1,13 @@
 //! The start-up probe: does this device compute what exact rendering needs?
 //!
-//! WGSL promises little about floats: compilers may contract, division and square root may be off by some ulps. The kernels
-//! are built to give equal bits all the same (`shaders/shared/exact.wgsl`), provided that + - * round to nearest and
-//! nothing sees through `barrier`. The probe runs them on fixed cases, those made to tell included, and compares every
-//! result with the twin in [`crate::math::exact`] bit for bit. The pipelines that trace rays are then compared with each
-//! other, see [`compare_pipelines`].
+//! WGSL promises little about floats: compilers may contract, division and square root may be off by some ulps. The
+//! kernels are built to give equal bits all the same (`shaders/common/exact.wgsl`), provided that + - * round to
+//! nearest and nothing sees through `barrier`. The probe runs them on fixed cases, those made to tell included, and
+//! compares every result with the twin in [`crate::math::exact`] bit for bit. The pipelines that trace rays are then
+//! compared with each other, see [`compare_pipelines`].
 
-use super::wgsl::{self, Pages};
+use super::wgsl;
+use super::wgsl::Pages;
 use crate::math::exact;
 use bricks::SceneFile;
 use cases::{ArithmeticCase, TriangleCase};
@@ -66,8 +67,8 @@ pub fn failures(checks: &[Check]) -> Vec<String> {
     checks.iter().filter(|c| c.different > 0).map(line).collect()
 }
 
-/// The scene that the traversal pipelines are compared with: several bricks, one of them wide; sheets in one plane, some
-/// twice; slivers; turned and mirrored instances. `scene_tests.rs` says how it is made.
+/// The scene that the traversal pipelines are compared with: several bricks, one of them wide; sheets in one plane,
+/// some twice; slivers; turned and mirrored instances. `scene_tests.rs` says how it is made.
 pub(crate) fn scene() -> Result<SceneFile, bricks::Error> {
     SceneFile::from_bytes("the probe's scene", include_bytes!("probe/scene.bricks"))
 }
@@ -76,8 +77,8 @@ pub(crate) fn scene() -> Result<SceneFile, bricks::Error> {
 #[cfg(test)]
 pub(crate) fn adverse_rays(
     scene: &SceneFile,
-    frame: &crate::kernel::frame::Frame,
-) -> Result<Vec<crate::kernel::layout::Ray>, bricks::Error> {
+    frame: &crate::kernels::frame::Frame,
+) -> Result<Vec<crate::kernels::layout::Ray>, bricks::Error> {
     Ok(rays::rays(&twin::Twin::new(scene, frame)?, frame.unit))
 }
 
@@ -121,17 +122,18 @@ pub fn run(device: &wgpu::Device, queue: &wgpu::Queue) -> ProbeReport {
     run_source(device, queue, &source())
 }
 
-/// The text of `shaders/probe.wgsl` with what it includes.
+/// The text of `shaders/probe/probe.wgsl` with what it includes.
 pub fn source() -> String {
     let file = |name: &str| match name {
-        "probe.wgsl" => Some(include_str!("../../shaders/probe.wgsl").to_string()),
-        "shared/exact.wgsl" => Some(include_str!("../../shaders/shared/exact.wgsl").to_string()),
-        "shared/triangle.wgsl" => Some(include_str!("../../shaders/shared/triangle.wgsl").to_string()),
-        "shared/surface.wgsl" => Some(include_str!("../../shaders/shared/surface.wgsl").to_string()),
+        "probe/probe.wgsl" => Some(include_str!("../../shaders/probe/probe.wgsl").to_string()),
+        "common/exact.wgsl" => Some(include_str!("../../shaders/common/exact.wgsl").to_string()),
+        "trace/triangle.wgsl" => Some(include_str!("../../shaders/trace/triangle.wgsl").to_string()),
+        "trace/surface.wgsl" => Some(include_str!("../../shaders/trace/surface.wgsl").to_string()),
         _ => None,
     };
     // All files are embedded, so that assembly cannot fail.
-    wgsl::assemble("probe.wgsl", Pages { cache: 1, texels: 1, opacity: false, gloss: false }, &file).unwrap_or_default()
+    wgsl::assemble("probe/probe.wgsl", Pages { cache: 1, texels: 1, opacity: false, gloss: false }, &file)
+        .unwrap_or_default()
 }
 
 /// [`run`] with another text of the kernels.

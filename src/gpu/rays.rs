@@ -1,7 +1,7 @@
 //! Buffers of a frame: rays and hits of all sets, tiles and their lists, what shading keeps.
 
 use super::device::Gpu;
-use crate::kernel::{Extent, layout};
+use crate::kernels::{Extent, layout};
 
 /// Most rays that buffers on this device hold.
 pub fn most_rays(gpu: &Gpu) -> u64 {

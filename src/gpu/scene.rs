@@ -2,8 +2,8 @@
 
 use super::device::Gpu;
 use super::pages::device_error;
-use crate::kernel::frame::{Frame, Placement, brick_record};
-use crate::kernel::{layout, opacity};
+use crate::kernels::frame::{Frame, Placement, brick_record};
+use crate::kernels::{layout, opacity};
 use crate::schedule::ExecutorError;
 use bricks::{Resident, SceneFile};
 

@@ -1,10 +1,10 @@
-//! Textures on the device: their records, their tails, which are resident throughout, as words in pages, each a binding; where
-//! their tiles lie in the cache, and what is asked of these.
+//! Textures on the device: their records, their tails, which are resident throughout, as words in pages, each a
+//! binding; where their tiles lie in the cache, and what is asked of these.
 
 use super::device::Gpu;
 use super::pages::device_error;
 use super::rays::storage;
-use crate::kernel::{layout, textures};
+use crate::kernels::{layout, textures};
 use crate::schedule::ExecutorError;
 use bricks::{Payload, SceneFile};
 
@@ -70,7 +70,8 @@ impl Texels {
     }
 }
 
-/// Sizes of the pages, and page and offset of each texture's tail, filled in order. A tail is less than 88 KiB, a page more.
+/// Sizes of the pages, and page and offset of each texture's tail, filled in order. A tail is less than 88 KiB, a page
+/// more.
 fn place(scene: &SceneFile, page_bytes: u64) -> (Vec<u64>, Vec<(usize, u64)>) {
     let mut sizes: Vec<u64> = Vec::new();
     let mut places = Vec::new();

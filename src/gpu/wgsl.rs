@@ -1,5 +1,6 @@
 //! Assembly of WGSL: `#include "shared/x.wgsl"` lines are replaced by the file, each file once; the accessors of paged
-//! buffers are generated for the number of pages at hand, so that one page costs no branch, and so is what a scene does not need.
+//! buffers are generated for the number of pages at hand, so that one page costs no branch, and so is what a scene does
+//! not need.
 //!
 //! The build script includes this file to check every kernel; it must not depend on the rest of the crate.
 
@@ -41,10 +42,10 @@ fn append(
     }
     seen.push(name.to_string());
     let text = match name {
-        "shared/cache.wgsl" => cache_accessors(pages.cache),
-        "shared/texels.wgsl" => texel_accessors(pages.texels),
-        "shared/opacity.wgsl" if !pages.opacity => OPAQUE.into(),
-        "shared/gloss.wgsl" if !pages.gloss => MATT.into(),
+        "trace/cache.wgsl" => cache_accessors(pages.cache),
+        "texture/texels.wgsl" => texel_accessors(pages.texels),
+        "trace/opacity.wgsl" if !pages.opacity => OPAQUE.into(),
+        "shade/gloss.wgsl" if !pages.gloss => MATT.into(),
         _ => file(name)?,
     };
     for line in text.lines() {
@@ -94,7 +95,8 @@ fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
 }
 ";
 
-/// Accessors of the brick cache: group 2, binding k is page k. A word is a component of a vector, so that a page is bound once.
+/// Accessors of the brick cache: group 2, binding k is page k. A word is a component of a vector, so that a page is
+/// bound once.
 fn cache_accessors(pages: usize) -> String {
     let mut s = String::new();
     for k in 0..pages {
@@ -116,8 +118,8 @@ fn texel_accessors(pages: usize) -> String {
     s
 }
 
-/// What kernels over binary trees include as `shared/binary.wgsl`: group 3, the root of each brick and, from binding 1, the
-/// nodes in so many pages; and how many entries a traversal's stack has.
+/// What kernels over binary trees include as `shared/binary.wgsl`: group 3, the root of each brick and, from binding 1,
+/// the nodes in so many pages; and how many entries a traversal's stack has.
 pub fn binary_accessors(pages: usize, stack: u32) -> String {
     let mut s = format!("const BINARY_STACK: u32 = {stack}u;\n");
     s.push_str("@group(3) @binding(0) var<storage, read> binary_roots: array<vec2<u32>>;\n");

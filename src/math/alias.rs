@@ -42,7 +42,8 @@ impl AliasTable {
         Some(table)
     }
 
-    /// As kernels read it: an index stays where a random number of 32 bits is below the first word, else goes to the second.
+    /// As kernels read it: an index stays where a random number of 32 bits is below the first word, else goes to the
+    /// second.
     pub fn words(&self) -> Vec<[u32; 2]> {
         // A float-to-integer cast saturates; what stays with 2^32 - 1 of 2^32 and gives way to itself stays.
         let threshold = |stays: &f64| (stays * 4_294_967_296.0).round() as u32;

@@ -1,7 +1,9 @@
-//! A tile of blue noise: numbers that differ most between neighbours, so that what is drawn by them errs at high frequencies only.
+//! A tile of blue noise: numbers that differ most between neighbours, so that what is drawn by them errs at high
+//! frequencies only.
 //!
-//! Void and cluster (Ulichney, "The void-and-cluster method for dither array generation", SPIE 1993): pixels are ranked so that the first n of them are spread
-//! evenly over the tile, whatever n is; the tile repeats without a seam. Energies are whole numbers, so that ranks do not depend on the machine.
+//! Void and cluster (Ulichney, "The void-and-cluster method for dither array generation", SPIE 1993): pixels are ranked
+//! so that the first n of them are spread evenly over the tile, whatever n is; the tile repeats without a seam.
+//! Energies are whole numbers, so that ranks do not depend on the machine.
 
 use std::sync::OnceLock;
 

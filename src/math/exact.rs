@@ -1,12 +1,14 @@
-//! Twin of `shaders/shared/exact.wgsl`, `triangle.wgsl` and `surface.wgsl`: watertight, deterministic f32 ray-triangle arithmetic.
+//! Twin of `shaders/common/exact.wgsl`, `triangle.wgsl` and `surface.wgsl`: watertight, deterministic f32 ray-triangle
+//! arithmetic.
 //!
 //! Woop, Benthin, Wald 2013 ("Watertight Ray/Triangle Intersection", JCGT 2). Their f64 fallback is replaced by
 //! [`diffprod`] in integers, because WGSL has no f64, and the kernel rounds every product before it is added
-//! ([`barrier`]), because WGSL allows contraction. Edge values then have their exact signs, so that of two triangles that
-//! share an edge at least one is hit by a ray through it.
+//! ([`barrier`]), because WGSL allows contraction. Edge values then have their exact signs, so that of two triangles
+//! that share an edge at least one is hit by a ray through it.
 //!
 //! Names and the order of operations are those of the kernel; the results are equal bit for bit while the dominant
-//! component of a direction lies in 2^-40..2^40 and coordinates are 0 or 2^-60..2^31 in magnitude. Vectors are `[x, y, z]`.
+//! component of a direction lies in 2^-40..2^40 and coordinates are 0 or 2^-60..2^31 in magnitude. Vectors are `[x, y,
+//! z]`.
 
 const SIGN: u32 = 0x8000_0000;
 const LEAST_NORMAL: u32 = 0x0080_0000;
@@ -52,7 +54,8 @@ pub fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// f32 of sign, significand in 2^23..=2^24 and biased exponent; beyond the normal range `under` or the greatest finite value.
+/// f32 of sign, significand in 2^23..=2^24 and biased exponent; beyond the normal range `under` or the greatest finite
+/// value.
 fn compose(sign: u32, significand: u32, exponent: i32, under: u32) -> f32 {
     let e = exponent + (significand >> 24) as i32;
     let magnitude = if e < 1 {
@@ -107,7 +110,8 @@ fn divide_by_integers(a: f32, b: f32) -> f32 {
     let n = (y & 0x007f_ffff) | 0x0080_0000;
     let low = u32::from(m < n);
     let m = m << low;
-    // 25 bits of quotient, 8 below the estimate: the true remainder is in 0..16 n < 2^28, so its low 32 bits are all of it.
+    // 25 bits of quotient, 8 below the estimate: the true remainder is in 0..16 n < 2^28, so its low 32 bits are all of
+    // it.
     let estimate = (m as f32 / n as f32 * 16_777_216.0) as u32 - 8;
     let qr = (estimate, (m << 24).wrapping_sub(estimate.wrapping_mul(n)));
     let (q, _) = quotient_step(quotient_step(quotient_step(quotient_step(qr, n, 8), n, 4), n, 2), n, 1);
@@ -153,12 +157,12 @@ fn shift_down_sticky(x: u64, n: u32) -> u64 {
 }
 
 /// a*b - c*d, correctly rounded, in integers. Zero only when the products are equal; a difference too small for f32
-/// becomes the least normal number of its sign, so that the sign is always right; one too large the greatest finite value.
-/// A denormal factor counts as 0.
+/// becomes the least normal number of its sign, so that the sign is always right; one too large the greatest finite
+/// value. A denormal factor counts as 0.
 #[inline]
 pub fn diffprod(a: f32, b: f32, c: f32, d: f32) -> f32 {
-    // In f64 the products are exact. Their difference is rounded to odd (Boldo, Melquiond 2008), so that rounding it once more
-    // gives what rounding it once would.
+    // In f64 the products are exact. Their difference is rounded to odd (Boldo, Melquiond 2008), so that rounding it
+    // once more gives what rounding it once would.
     let (p, q) = (f64::from(a) * f64::from(b), f64::from(c) * f64::from(d));
     let sum = p - q;
     let back = sum - p;
@@ -200,8 +204,8 @@ fn diffprod_by_integers(a: f32, b: f32, c: f32, d: f32) -> f32 {
         std::mem::swap(&mut sign, &mut other);
         std::mem::swap(&mut ep, &mut eq);
     }
-    // p moves up by at most 15 bits (below 2^63); what q still lacks moves it down, and bits that fall out leave a sticky one:
-    // the difference is then above 2^60, so that they only matter for rounding.
+    // p moves up by at most 15 bits (below 2^63); what q still lacks moves it down, and bits that fall out leave a
+    // sticky one: the difference is then above 2^60, so that they only matter for rounding.
     let apart = ep - eq;
     let up = apart.min(15) as u32;
     p <<= up;
@@ -272,8 +276,8 @@ pub fn ray_frame(d: [f32; 3]) -> RayFrame {
     RayFrame { kx: kx as u32, ky: ky as u32, kz: kz as u32, sx: shear(d[kx]), sy: shear(d[ky]), iz, inv }
 }
 
-/// A candidate hit. u, v, w weight the vertices a, b, c and are not divided by det = u + v + w; all have the sign of det or
-/// are 0. A triangle that is counter-clockwise seen from the ray's origin has `det * iz > 0`.
+/// A candidate hit. u, v, w weight the vertices a, b, c and are not divided by det = u + v + w; all have the sign of
+/// det or are 0. A triangle that is counter-clockwise seen from the ray's origin has `det * iz > 0`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TriangleHit {
     /// Whether the triangle is met; if not, all else is 0.
@@ -303,7 +307,8 @@ pub fn shear(f: &RayFrame, v: [f32; 3]) -> [f32; 3] {
 }
 
 /// Closest-hit candidate of the ray (0, d), f = ray_frame(d), with a triangle whose vertices are relative to the ray's
-/// origin. Closed on its edges, two-sided, t >= t_min >= 0. Accept it when t < best.t, or t == best.t and its id is lower.
+/// origin. Closed on its edges, two-sided, t >= t_min >= 0. Accept it when t < best.t, or t == best.t and its id is
+/// lower.
 #[inline(always)]
 pub fn intersect_triangle(f: &RayFrame, a: [f32; 3], b: [f32; 3], c: [f32; 3], t_min: f32) -> TriangleHit {
     let miss = TriangleHit::default();
@@ -397,8 +402,8 @@ fn weighted(weights: [f32; 3], a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3
     [0, 1, 2].map(|k| dot(weights, [a[k], b[k], c[k]]))
 }
 
-/// Where on the triangle a hit lies. `a`, `b`, `c` are relative to the frame's reference point (not to the ray), `hit` is
-/// that of [`intersect_triangle`], `d` the ray's direction in the frame. The barycentrics are inset so that the
+/// Where on the triangle a hit lies. `a`, `b`, `c` are relative to the frame's reference point (not to the ray), `hit`
+/// is that of [`intersect_triangle`], `d` the ray's direction in the frame. The barycentrics are inset so that the
 /// point stays inside by more than its error, and `delta` is 32 u times the terms of the plane equation at the point.
 pub fn surface_point(a: [f32; 3], b: [f32; 3], c: [f32; 3], hit: &TriangleHit, d: [f32; 3]) -> SurfacePoint {
     let minus = |x: f32, y: f32| barrier(x - y);

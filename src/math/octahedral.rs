@@ -5,10 +5,10 @@ fn side(x: f64) -> f64 {
     if x >= 0.0 { 1.0 } else { -1.0 }
 }
 
-/// Octahedral coordinates of a direction of any length, x in the low and y in the high 16 bits. Of the four codes around
-/// the exact coordinates the nearest is taken; [`octahedral_decode`] gives the direction back to within 4.4e-5 rad: codes
-/// form a triangular lattice of step 2^0.5 / 32767 on a face, of which every point is within 3^-0.5 steps, and the middle
-/// of a face is 3^-0.5 from the centre. The zero vector and vectors that are not finite give +z.
+/// Octahedral coordinates of a direction of any length, x in the low and y in the high 16 bits. Of the four codes
+/// around the exact coordinates the nearest is taken; [`octahedral_decode`] gives the direction back to within 4.4e-5
+/// rad: codes form a triangular lattice of step 2^0.5 / 32767 on a face, of which every point is within 3^-0.5 steps,
+/// and the middle of a face is 3^-0.5 from the centre. The zero vector and vectors that are not finite give +z.
 pub fn octahedral_encode(n: [f32; 3]) -> u32 {
     let [x, y, z] = n.map(f64::from);
     let sum = x.abs() + y.abs() + z.abs();

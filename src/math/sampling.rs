@@ -2,8 +2,8 @@
 
 /// Radical inverse of `index` in `base`: the digits mirrored at the point, in [0, 1). `base` is at least 2.
 ///
-/// Computed in integers and divided once, so that it is exact to rounding; never 1 (Pharr, Jakob, Humphreys, "Physically
-/// Based Rendering", 8.6.1).
+/// Computed in integers and divided once, so that it is exact to rounding; never 1 (Pharr, Jakob, Humphreys,
+/// "Physically Based Rendering", 8.6.1).
 pub fn radical_inverse(base: u32, index: u32) -> f64 {
     let (base, mut index) = (u64::from(base), u64::from(index));
     let (mut mirrored, mut power) = (0u64, 1u64);
@@ -32,9 +32,10 @@ pub fn hammersley(index: u32, count: u32) -> [f32; 2] {
     [below_one(x), below_one(radical_inverse(2, index))]
 }
 
-/// Point `index` of the R2 sequence in the unit square, [0, 1): the centre moved by multiples of 1/p and 1/p², p^3 = p + 1, p the
-/// plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018). In step with any dimensions of [`halton`] it is
-/// spread evenly over the product of both, because p is irrational, while two points of the same dimensions of [`halton`] depend on one another.
+/// Point `index` of the R2 sequence in the unit square, [0, 1): the centre moved by multiples of 1/p and 1/p², p^3 = p
+/// + 1, p the plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018). In step with
+/// any dimensions of [`halton`] it is spread evenly over the product of both, because p is irrational, while two points
+/// of the same dimensions of [`halton`] depend on one another.
 pub fn r2(index: u32) -> [f32; 2] {
     const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     STEPS.map(|step| below_one((0.5 + f64::from(index) * step).fract()))
@@ -71,8 +72,8 @@ pub fn uniform_hemisphere(square: [f32; 2]) -> [f32; 3] {
     [x * across, y * across, z]
 }
 
-/// 32 random bits from 32: the output function of PCG on one step of its generator (O'Neill 2014; Jarzynski, Olano 2020).
-/// The kernels' `pcg` in `shaders/shared/random.wgsl`.
+/// 32 random bits from 32: the output function of PCG on one step of its generator (O'Neill 2014; Jarzynski, Olano
+/// 2020). The kernels' `pcg` in `shaders/common/random.wgsl`.
 pub fn pcg(x: u32) -> u32 {
     let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);

@@ -17,9 +17,10 @@ pub struct Change {
     pub above: f64,
 }
 
-/// Of the pixels that `of` has: |(a_t − b_t) − (a_{t−1} − b_{t−1})|, the greatest over the channels, for pictures `before` and `now` of a sequence a, of
-/// which b is the truth: how much its error changes. A picture that has the same error in every frame does not flicker, however wrong it is. `above` counts those that
-/// change by more than `limit`. Pixels that are not finite somewhere are left out.
+/// Of the pixels that `of` has: |(a_t − b_t) − (a_{t−1} − b_{t−1})|, the greatest over the channels, for pictures
+/// `before` and `now` of a sequence a, of which b is the truth: how much its error changes. A picture that has the same
+/// error in every frame does not flicker, however wrong it is. `above` counts those that change by more than `limit`.
+/// Pixels that are not finite somewhere are left out.
 ///
 /// # Errors
 /// Pictures of different sizes.

@@ -1,7 +1,7 @@
 //! FLIP against the authors' implementations: `nv-flip` (their C++) in the test itself for pictures of low dynamic
 //! range, and recorded results of their Python package for HDR-FLIP.
 
-use super::*;
+use crate::metrics::*;
 
 /// A reproducible stream of values in 0..1 (splitmix64).
 struct Random(u64);

@@ -55,13 +55,13 @@
 //!
 //! *Identity.* abs(δa) ≤ u (V + A) and δS ≤ 2u, so that 4 ε_edge ≤ 4 · 1.6181 · u (2.42 V + 9.1 A) < 16u V + 64u A.
 //!
-//! *Instances.* In object units, with the Frobenius norms s of A and m of M and κ = s m ≥ 3: abs(a) ≤ m A. The reference
-//! point R′ of the instance is the lattice point nearest to M (R − T), held per component to an interval around the
-//! object, which p is in; so abs(v) and abs(c′) are at most m V + √3/2 cell. With abs(o) ≤ V + A,
-//! abs(δa) ≤ u (m (8 V + 6 A) + 2.6 cell). The dominant component of d in the object is at least abs(d) / (√3 s) of the
-//! world's, so that δd / d_z ≤ 4√3 u κ plus √3 `NOISE` κ²; be this at most φ; then δS ≤ 2 φ / (1 − φ) + 2u. Times s
-//! gives world units, and 4 ε_edge is below u κ (128 V + 144 A) + 20 κ φ / (1 − φ) A + 48 u s cell, plus what f64
-//! rounds: 4 · 1.6181 · (1 + √2) · √3 `NOISE` (κ² (abs(R) + abs(T) + abs(o) + s abs(p)) + s abs(R′)).
+//! *Instances.* In object units, with the Frobenius norms s of A and m of M and κ = s m ≥ 3: abs(a) ≤ m A. The
+//! reference point R′ of the instance is the lattice point nearest to M (R − T), held per component to an interval
+//! around the object, which p is in; so abs(v) and abs(c′) are at most m V + √3/2 cell. With abs(o) ≤ V + A, abs(δa) ≤
+//! u (m (8 V + 6 A) + 2.6 cell). The dominant component of d in the object is at least abs(d) / (√3 s) of the world's,
+//! so that δd / d_z ≤ 4√3 u κ plus √3 `NOISE` κ²; be this at most φ; then δS ≤ 2 φ / (1 − φ) + 2u. Times s gives world
+//! units, and 4 ε_edge is below u κ (128 V + 144 A) + 20 κ φ / (1 − φ) A + 48 u s cell, plus what f64 rounds: 4 ·
+//! 1.6181 · (1 + √2) · √3 `NOISE` (κ² (abs(R) + abs(T) + abs(o) + s abs(p)) + s abs(R′)).
 //!
 //! A point of the boundary within 4 ε_edge across an axis has a point of the ray at the same height, so no farther than
 //! that; this point of the ray is in the box grown by as much. And a kernel's hit, clamped, is within the perturbed

@@ -1,7 +1,7 @@
 //! Truth of files that the converter writes: every source triangle is there, within half a lattice step, under its id,
 //! whatever the size of the bricks.
 
-use super::*;
+use crate::reference::*;
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;

@@ -371,12 +371,12 @@ impl<'a> Nearby<'a> {
 /// A triangle out of a patch that covers the ray however its vertices are rounded, if there is one among triangles of
 /// one instance, all that are within 4E of the ray among them.
 ///
-/// E, here `e`, is the greatest ε_edge among the triangles near the ray. The patch is the largest set of triangles in which
-/// every edge within 4E of the ray has a triangle of certain winding on either side. Suppose that the ray is not on the
-/// patch as the kernel has it, but a triangle of the patch is within E. Then the nearest point of the patch is within
-/// 2E and lies on an edge that in truth is within 3E. Not within an edge: there is a triangle on the other side. Not at
-/// a vertex: all edges of the patch that meet there are within 3E, each with triangles on both sides, so that they go
-/// all the way round. So the kernel must have met a triangle of the patch.
+/// E, here `e`, is the greatest ε_edge among the triangles near the ray. The patch is the largest set of triangles in
+/// which every edge within 4E of the ray has a triangle of certain winding on either side. Suppose that the ray is not
+/// on the patch as the kernel has it, but a triangle of the patch is within E. Then the nearest point of the patch is
+/// within 2E and lies on an edge that in truth is within 3E. Not within an edge: there is a triangle on the other side.
+/// Not at a vertex: all edges of the patch that meet there are within 3E, each with triangles on both sides, so that
+/// they go all the way round. So the kernel must have met a triangle of the patch.
 fn covering(truth: &Truth, candidates: &[&Candidate], e: f64) -> Option<usize> {
     let near = |c: &&&Candidate| c.at.edge_distance <= 4.0 * e && c.at.winding_is_certain(e);
     let mut patch: Vec<&Candidate> = candidates.iter().filter(near).copied().collect();

@@ -43,8 +43,8 @@ impl Opacities {
         Ok(Self { materials: resident.materials.clone(), maps })
     }
 
-    /// Whether a ray that meets `triangle` at a point of these weights, of the stored vertices, passes: by the cutoff, or, where that
-    /// is left to chance, never.
+    /// Whether a ray that meets `triangle` at a point of these weights, of the stored vertices, passes: by the cutoff,
+    /// or, where that is left to chance, never.
     pub fn passes(&self, triangle: &OpacityTriangle, weights: [f64; 3]) -> bool {
         let material = &self.materials[triangle.material as usize];
         material.flags & MATERIAL_BLEND == 0

@@ -1,8 +1,8 @@
 //! Truth against itself, and the judge over f32 hits of the kernels' triangle test.
 
 use super::bounds::assess;
-use super::*;
 use crate::math::exact::{intersect_triangle, ray_frame};
+use crate::reference::*;
 use bricks::ORIGIN_STEPS;
 use glam::{DMat3, DVec3};
 

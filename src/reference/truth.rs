@@ -2,7 +2,8 @@
 
 use super::bounds::{Assessment, Extremes};
 use super::bvh::{Bounds, Bvh, Padding};
-use super::decode::{self, DecodeError, TruthObject, TruthTriangle};
+use super::decode;
+use super::decode::{DecodeError, TruthObject, TruthTriangle};
 use super::opacity::{Opacities, Passing};
 use super::predicate::{Crossing, crossing, order};
 use super::ray::TruthRay;
@@ -70,7 +71,8 @@ impl Truth {
         Ok(Self { opacities: Opacities::load(file)?, ..truth })
     }
 
-    /// The truth of these objects and instances, whose indices into `objects` must be valid, and whose triangles stop all rays.
+    /// The truth of these objects and instances, whose indices into `objects` must be valid, and whose triangles stop
+    /// all rays.
     ///
     /// # Errors
     /// An id given twice or beyond the greatest.
@@ -142,8 +144,8 @@ impl Truth {
         })
     }
 
-    /// The closest hit in the ray's closed interval but for the excluded triangle, the lowest id at equal distance; both decided exactly.
-    /// `None` for an invalid ray.
+    /// The closest hit in the ray's closed interval but for the excluded triangle, the lowest id at equal distance;
+    /// both decided exactly. `None` for an invalid ray.
     pub fn closest(&self, ray: &TruthRay) -> Option<TruthHit> {
         if !ray.is_valid() {
             return None;

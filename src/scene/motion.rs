@@ -1,9 +1,10 @@
 //! Motions: where instances of a scene are at a time, from keyframes in a JSON file.
 //!
-//! A motion is rigid, with one scale for all axes, and is applied to where the scene has the instance: a point p of it goes to
-//! pivot + translation + scale · rotation (p − pivot). Translations lie on the spline of camera paths ([`super::path`]), rotations turn the
-//! shorter way at constant speed (Shoemake, "Animating Rotation with Quaternion Curves", SIGGRAPH 1985), scales grow by equal factors in
-//! equal times. Before the first keyframe and after the last it rests there.
+//! A motion is rigid, with one scale for all axes, and is applied to where the scene has the instance: a point p of it
+//! goes to pivot + translation + scale · rotation (p − pivot). Translations lie on the spline of camera paths
+//! ([`super::path`]), rotations turn the shorter way at constant speed (Shoemake, "Animating Rotation with Quaternion
+//! Curves", SIGGRAPH 1985), scales grow by equal factors in equal times. Before the first keyframe and after the last
+//! it rests there.
 
 use super::path::spline;
 use bricks::{Instance, Resident};
@@ -345,7 +346,8 @@ impl Mover {
 }
 
 impl Pose {
-    /// What takes an instance, by world_from_object where the scene has it, to where it is; about `pivot`. No motion leaves it as it is, bit for bit.
+    /// What takes an instance, by world_from_object where the scene has it, to where it is; about `pivot`. No motion
+    /// leaves it as it is, bit for bit.
     pub fn place(&self, world_from_object: &[f64; 12], pivot: DVec3) -> [f64; 12] {
         let m = world_from_object;
         let turn = DMat3::from_quat(self.rotation) * self.scale;

@@ -1,6 +1,6 @@
 //! Files, interpolation and matrices of motions.
 
-use super::*;
+use crate::scene::motion::*;
 
 fn parse(text: &str) -> Result<Motion, MotionError> {
     Motion::parse(text, Path::new("m.json"))
@@ -47,7 +47,7 @@ fn keyframes_are_met_and_ways_between_them_are_those_of_camera_paths() {
         let pose = mover.at(time);
         assert_eq!((pose.translation, pose.scale), (translation.into(), scale), "{time}");
     }
-    let path = super::super::CameraPath::parse(
+    let path = crate::scene::CameraPath::parse(
         r#"{"keyframes": [{"time": 1, "position": [0,0,0], "target": [0,0,9]},
             {"time": 2, "position": [1,0,0], "target": [1,0,9]}, {"time": 4, "position": [1,2,0], "target": [1,2,9]}]}"#,
         Path::new("p.json"),

@@ -2,8 +2,8 @@
 //!
 //! The spline is the one of Barry and Goldman (SIGGRAPH 1988) with the keyframes' times as knots, in Hermite form: the
 //! tangent at an inner keyframe is that of the parabola through it and its two neighbours, at the first and the last
-//! one-sided. Quadratic motion is therefore reproduced exactly between inner keyframes, and two keyframes make a line at
-//! constant speed.
+//! one-sided. Quadratic motion is therefore reproduced exactly between inner keyframes, and two keyframes make a line
+//! at constant speed.
 
 use super::camera::{Camera, CameraError, check_fov_y_degrees};
 use glam::DVec3;
@@ -100,7 +100,8 @@ impl CameraPath {
         Self::parse(&text, file)
     }
 
-    /// Parses the text of a path file; `file` names it in errors. `fov_y_degrees` (60) and `up` ([0, 1, 0]) may be absent.
+    /// Parses the text of a path file; `file` names it in errors. `fov_y_degrees` (60) and `up` ([0, 1, 0]) may be
+    /// absent.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -260,12 +261,12 @@ pub(super) fn spline<K>(
 ///
 /// - flatter than a quarter of its width (a city, a landscape): a flight inward above it, looking at the middle;
 /// - longer than wide, not taller than long, and in metres of a size to walk in, 10 long, 2.5 wide, 2.5 to 50 high (a
-///   hall, a street, a nave): a walk inside, along the longer horizontal axis from 1/5 to 4/5 of it, at a quarter of the
-///   height, looking ahead;
+///   hall, a street, a nave): a walk inside, along the longer horizontal axis from 1/5 to 4/5 of it, at a quarter of
+///   the height, looking ahead;
 /// - else (an object): a quarter turn around it from outside, a third of the height above the middle.
 ///
-/// Bounds that are empty (`min > max`), not finite or a single point are taken as a unit cube around their middle or the
-/// origin.
+/// Bounds that are empty (`min > max`), not finite or a single point are taken as a unit cube around their middle or
+/// the origin.
 pub fn path_from_bounds(min: [f64; 3], max: [f64; 3]) -> CameraPath {
     let (mut min, mut max) = (DVec3::from(min), DVec3::from(max));
     if !(min.is_finite() && max.is_finite() && min.cmple(max).all() && (max - min).is_finite()) {

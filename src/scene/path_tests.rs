@@ -1,4 +1,4 @@
-use super::*;
+use crate::scene::path::*;
 
 fn key(time: f64, position: [f64; 3], target: [f64; 3]) -> Keyframe {
     Keyframe { time, position, target }

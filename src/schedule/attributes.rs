@@ -1,7 +1,7 @@
-//! Attributes and textures of what was hit. Attributes are asked for once a pass and loaded in batches as large as the cache
-//! allows. Then lookups name the tiles that they need: each of a hit's textures is looked up once all of its tiles are resident together, so
-//! that what it gives does not depend on what else is, and the hit waits for the last. Where a frame may load so many bytes of tiles only,
-//! coarser levels stand for the tiles that it does not load.
+//! Attributes and textures of what was hit. Attributes are asked for once a pass and loaded in batches as large as the
+//! cache allows. Then lookups name the tiles that they need: each of a hit's textures is looked up once all of its
+//! tiles are resident together, so that what it gives does not depend on what else is, and the hit waits for the last.
+//! Where a frame may load so many bytes of tiles only, coarser levels stand for the tiles that it does not load.
 
 use super::cache::Cache;
 use super::{Executor, ExecutorError, Lamp, Pass, PassStats, Report, Step, TileDemand};
@@ -47,10 +47,12 @@ pub fn resolve(
     Ok(())
 }
 
-/// Loads the tiles that hits wait for, and looks these hits up, until none waits. `report`: of the first [`Step::Sample`].
+/// Loads the tiles that hits wait for, and looks these hits up, until none waits. `report`: of the first
+/// [`Step::Sample`].
 ///
-/// A batch takes tiles in the order of the rays that need them and then of their numbers, resident ones as well, which then stay: all
-/// tiles of one texture of the first hit are in it, so every batch brings at least that lookup to an end.
+/// A batch takes tiles in the order of the rays that need them and then of their numbers, resident ones as well, which
+/// then stay: all tiles of one texture of the first hit are in it, so every batch brings at least that lookup to an
+/// end.
 fn sample(
     executor: &mut dyn Executor,
     cache: &mut Cache,
@@ -77,8 +79,8 @@ fn sample(
     }
 }
 
-/// Loads the tiles that most hits wait for, as many as `allowance` bytes are, and has coarser levels stand for the others. What was not
-/// used of it is left to the passes that follow. `report`: of the first [`Step::Sample`].
+/// Loads the tiles that most hits wait for, as many as `allowance` bytes are, and has coarser levels stand for the
+/// others. What was not used of it is left to the passes that follow. `report`: of the first [`Step::Sample`].
 fn sample_within(
     allowance: u64,
     executor: &mut dyn Executor,

@@ -1,13 +1,14 @@
 //! The schedule `auto`: of the fixed schedules the one that costs least, by measurement, for every kind of pass apart.
 //!
-//! Each candidate is tried in turn, and the cheapest stays; every so often one of the others has another try, because views
-//! change, and measurements err. All schedules find the same hits, so clocks may decide: they change times and counters, never pictures.
+//! Each candidate is tried in turn, and the cheapest stays; every so often one of the others has another try, because
+//! views change, and measurements err. All schedules find the same hits, so clocks may decide: they change times and
+//! counters, never pictures.
 
 use super::Pass;
 use std::collections::BTreeMap;
 
-/// What tries of schedules that are not the cheapest cost in the long run, as a share of the cheapest's cost: one that costs k times as much
-/// is tried again after (k - 1) / share passes.
+/// What tries of schedules that are not the cheapest cost in the long run, as a share of the cheapest's cost: one that
+/// costs k times as much is tried again after (k - 1) / share passes.
 const TRIES_SHARE: f64 = 0.04;
 /// Passes between two tries at least.
 const TRIES_APART: f64 = 6.0;
@@ -50,8 +51,8 @@ pub struct Auto {
 }
 
 impl Auto {
-    /// The schedule for the next pass like `pass`. `is_resident`: everything is resident, so that `plain` may be chosen; `demand`
-    /// is then the same as it.
+    /// The schedule for the next pass like `pass`. `is_resident`: everything is resident, so that `plain` may be
+    /// chosen; `demand` is then the same as it.
     pub fn choose(&mut self, pass: Pass, is_resident: bool) -> Fixed {
         let costs = self.kinds.entry(kind(pass)).or_default();
         let candidates = if is_resident { [Fixed::Chc, Fixed::Plain] } else { [Fixed::Chc, Fixed::Demand] };

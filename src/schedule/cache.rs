@@ -101,8 +101,8 @@ impl Cache {
         }
     }
 
-    /// Marks what is resident as done, its intersection being under way, and notes the use of the bricks that rays entered.
-    /// `ahead`: some bricks are missing, which are asked for only now.
+    /// Marks what is resident as done, its intersection being under way, and notes the use of the bricks that rays
+    /// entered. `ahead`: some bricks are missing, which are asked for only now.
     pub fn finish_resident(&mut self, used: &[u32], ahead: bool, stats: &mut PassStats) {
         self.states.finish_resident();
         self.touch_geometry(used, ahead, stats);
@@ -119,8 +119,8 @@ impl Cache {
         stats.bricks_intersected.extend(used);
     }
 
-    /// Loads as many of `items` as fit without evicting each other, at least one and at most `most` and 64 MiB; returns how
-    /// many, from the front. Those that are resident stay, and count among them.
+    /// Loads as many of `items` as fit without evicting each other, at least one and at most `most` and 64 MiB; returns
+    /// how many, from the front. Those that are resident stay, and count among them.
     ///
     /// # Errors
     /// What the executor says; nothing of the batch is resident then.

@@ -61,8 +61,8 @@ impl<'a> Batches<'a> {
         Self { pass, intersect, on: optimisations }
     }
 
-    /// Asks for what is wanted. Where what is loaded is asked for again, and nearest first, a ray need not know what lies behind the
-    /// next that it enters.
+    /// Asks for what is wanted. Where what is loaded is asked for again, and nearest first, a ray need not know what
+    /// lies behind the next that it enters.
     pub fn query(&self) -> Step {
         let Self { intersect, on, .. } = *self;
         Step::Query(Query {
@@ -72,10 +72,10 @@ impl<'a> Batches<'a> {
         })
     }
 
-    /// Loads of what the queries in `report` want, nearest first, those bricks that some ray enters before any other that it
-    /// wants: what lies behind them may turn out to be hidden. Each batch is intersected and the rest asked for again, until
-    /// nothing is wanted. Without the re-query what was wanted at first is loaded whole: hits only move nearer,
-    /// so no ray wants anything else later.
+    /// Loads of what the queries in `report` want, nearest first, those bricks that some ray enters before any other
+    /// that it wants: what lies behind them may turn out to be hidden. Each batch is intersected and the rest asked for
+    /// again, until nothing is wanted. Without the re-query what was wanted at first is loaded whole: hits only move
+    /// nearer, so no ray wants anything else later.
     ///
     /// # Errors
     /// What the executor says.
@@ -142,8 +142,8 @@ pub fn measure_needed(
     Ok(())
 }
 
-/// The wanted bricks' geometry by number; or nearest entry first, then by number, those ahead that some ray enters next. Also
-/// how many of them to load before the next query: only what some ray enters next.
+/// The wanted bricks' geometry by number; or nearest entry first, then by number, those ahead that some ray enters
+/// next. Also how many of them to load before the next query: only what some ray enters next.
 fn in_order(demand: &[Demand], nearest_first: bool) -> (Vec<Item>, usize) {
     let mut wanted = demand.to_vec();
     let mut most = BATCH_BRICKS;

@@ -1,9 +1,9 @@
-//! The schedule `demand`: every ray from the root, over what is resident; then each asks for the missing bricks that it enters
-//! before its hit. The nearest are loaded, a few at a time, and met by the rays that asked for any, and what is still pending
-//! asks again.
+//! The schedule `demand`: every ray from the root, over what is resident; then each asks for the missing bricks that it
+//! enters before its hit. The nearest are loaded, a few at a time, and met by the rays that asked for any, and what is
+//! still pending asks again.
 //!
-//! An occlusion query for a tile is answered here by the traversal itself: no lists, no pairs. A ray that asked for nothing needs
-//! no brick that is missing, as hits only move nearer, so batches leave it out.
+//! An occlusion query for a tile is answered here by the traversal itself: no lists, no pairs. A ray that asked for
+//! nothing needs no brick that is missing, as hits only move nearer, so batches leave it out.
 
 use super::cache::Cache;
 use super::chc::{Batches, measure_needed};

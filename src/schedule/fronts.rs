@@ -1,9 +1,9 @@
 //! The schedule `chc` with `--fronts on`: Algorithm 1 of CHC+RT with temporal visible and invisible fronts.
 //!
-//! *Changed*: the pairs of one round of queries are evaluated in one dispatch; newly visible pairs are intersected before
-//! the next round instead of after every 16; visible pairs whose brick is missing wait, and at the end of the traversal are
-//! queried, loaded nearest first and intersected as without fronts. Invisible pairs are queried in every frame and a pair
-//! is only ever left out by a query against present hits, so the final hits are exact.
+//! *Changed*: the pairs of one round of queries are evaluated in one dispatch; newly visible pairs are intersected
+//! before the next round instead of after every 16; visible pairs whose brick is missing wait, and at the end of the
+//! traversal are queried, loaded nearest first and intersected as without fronts. Invisible pairs are queried in every
+//! frame and a pair is only ever left out by a query against present hits, so the final hits are exact.
 
 use super::cache::Cache;
 use super::chc::{Batches, measure_needed};
@@ -115,9 +115,9 @@ impl Fronts {
         self.finish(executor, cache, setup, &resident_before, stats)
     }
 
-    /// A visibility state, a ray (column, row) and a leaf of the top level that are not together in exactly one leaf pair of the
-    /// state's fronts; `None` if all fronts partition rays x leaves, as they must. For tests: takes time and memory in
-    /// proportion to both.
+    /// A visibility state, a ray (column, row) and a leaf of the top level that are not together in exactly one leaf
+    /// pair of the state's fronts; `None` if all fronts partition rays x leaves, as they must. For tests: takes time
+    /// and memory in proportion to both.
     pub fn partition_defect(&self, resident: &Resident) -> Option<(Pass, [u32; 3])> {
         let defect = |tree: &PairTree| tree.partition_defect(&resident.top2, resident.leaves.len());
         self.trees.iter().find_map(|(&state, (tree, _))| defect(tree).map(|at| (state, at)))
@@ -204,8 +204,8 @@ impl Found<'_> {
         run(executor, self.setup.pass, &steps, &cache.states, &self.setup.tracing.optimisations, stats)
     }
 
-    /// Asks how many rays see each of `pairs`, after the steps so far. Pairs of `is_front`, the invisible ones of the frame before,
-    /// are asked for by multi-queries where that is on, and are put in the order of these.
+    /// Asks how many rays see each of `pairs`, after the steps so far. Pairs of `is_front`, the invisible ones of the
+    /// frame before, are asked for by multi-queries where that is on, and are put in the order of these.
     fn query(
         &mut self,
         executor: &mut dyn Executor,

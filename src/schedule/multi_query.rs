@@ -1,5 +1,5 @@
-//! Multi-queries (CHC+RT §5.1, after CHC++): invisible pairs of one tile that will probably stay invisible are asked for in one
-//! query; when it fails, each is asked for by itself.
+//! Multi-queries (CHC+RT §5.1, after CHC++): invisible pairs of one tile that will probably stay invisible are asked
+//! for in one query; when it fails, each is asked for by itself.
 
 use super::PairQuery;
 
@@ -11,15 +11,15 @@ fn keeps(frames: u32) -> f64 {
     0.99 - 0.7 * (-f64::from(frames)).exp()
 }
 
-/// What a query over `nodes` nodes is worth that holds with probability `holds`: queries saved over the expected number of
-/// queries, one and, where it fails, one a node.
+/// What a query over `nodes` nodes is worth that holds with probability `holds`: queries saved over the expected number
+/// of queries, one and, where it fails, one a node.
 fn value(nodes: usize, holds: f64) -> f64 {
     let nodes = nodes as f64;
     nodes / (1.0 + (1.0 - holds) * nodes)
 }
 
-/// Cuts pairs of one tile, the longest invisible first, into batches of the greatest value, each taken greedily from the front;
-/// `frames` says for how many frames each has been invisible. Returns the sizes of the batches.
+/// Cuts pairs of one tile, the longest invisible first, into batches of the greatest value, each taken greedily from
+/// the front; `frames` says for how many frames each has been invisible. Returns the sizes of the batches.
 pub fn batches(frames: &[u32]) -> Vec<usize> {
     let mut sizes = Vec::new();
     let mut rest = frames;

@@ -1,5 +1,5 @@
-//! The optimisations of CHC+RT, each of which can be switched off, or on, by itself. They change what is asked, loaded and
-//! intersected when, never a hit.
+//! The optimisations of CHC+RT, each of which can be switched off, or on, by itself. They change what is asked, loaded
+//! and intersected when, never a hit.
 
 use super::{BrickStates, Executor, ExecutorError, Pass, PassStats, Report, Step};
 
@@ -59,18 +59,18 @@ macro_rules! optimisations {
 optimisations! {
     /// Wanted bricks are taken nearest entry first; else in the order of their numbers (design of the load order).
     NearestFirst, nearest_first = "nearest-first", Loading, true;
-    /// Between two batches of loads everything not loaded yet is asked for again; else what the first query wanted is loaded
-    /// whole.
+    /// Between two batches of loads everything not loaded yet is asked for again; else what the first query wanted is
+    /// loaded whole.
     Requery, requery = "requery", Loading, true;
-    /// What is resident is intersected before missing bricks are asked for (CHC+RT §5.4); else all wanted bricks are taken in one
-    /// order, resident ones without a load.
+    /// What is resident is intersected before missing bricks are asked for (CHC+RT §5.4); else all wanted bricks are
+    /// taken in one order, resident ones without a load.
     ResidentFirst, resident_first = "resident-first", Loading, true;
     /// The leaves of a tile are intersected near to far (CHC+RT §5.2); else by number.
     FrontToBack, front_to_back = "front-to-back", Lists, true;
     /// A dispatch intersects all selected leaves of a tile (CHC+RT §5.2, which stops at 24); else one leaf a tile.
     ByTile, by_tile = "by-tile", Lists, true;
-    /// The rays of a tile whose list is long walk from the root instead, each by itself; else by the list whatever its length. In
-    /// force with `by-tile` and `front-to-back`.
+    /// The rays of a tile whose list is long walk from the root instead, each by itself; else by the list whatever its
+    /// length. In force with `by-tile` and `front-to-back`.
     RootWalk, root_walk = "root-walk", Lists, true;
     /// Invisible pairs of a tile that will probably stay so are asked for together (CHC+RT §5.1); else each by itself.
     MultiQueries, multi_queries = "multi-queries", Fronts, true;
@@ -78,10 +78,11 @@ optimisations! {
     TighterBounds, tighter_bounds = "tighter-bounds", Fronts, true;
     /// Visible pairs are asked for again every third frame (CHC+RT §5.1); else in every frame.
     LazyRequery, lazy_requery = "lazy-requery", Fronts, true;
-    /// Pairs whose children are all invisible become leaves, one level a frame (CHC+RT §5.1); else what was split stays so.
+    /// Pairs whose children are all invisible become leaves, one level a frame (CHC+RT §5.1); else what was split stays
+    /// so.
     PullUp, pull_up = "pull-up", Fronts, true;
-    /// Up to two groups of triangles that a ray found are postponed and tested together (CHC+RT §5.2); else each is tested where
-    /// it is found.
+    /// Up to two groups of triangles that a ray found are postponed and tested together (CHC+RT §5.2); else each is
+    /// tested where it is found.
     LeafCache, leaf_cache = "leaf-cache", Lists, false;
 }
 
@@ -95,8 +96,8 @@ impl Optimisation {
 /// Most dispatches with one leaf a tile that go into a submission.
 const MOST_SINGLE_LEAVES: usize = 24;
 
-/// Runs `steps`. Without [`Optimisations::by_tile`] each intersection of selected leaves becomes dispatches of one leaf a tile,
-/// and one round trip more, which says how many. What came back before the last submission is added to `stats`.
+/// Runs `steps`. Without [`Optimisations::by_tile`] each intersection of selected leaves becomes dispatches of one leaf
+/// a tile, and one round trip more, which says how many. What came back before the last submission is added to `stats`.
 ///
 /// # Errors
 /// What the executor says.

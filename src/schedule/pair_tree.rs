@@ -1,5 +1,5 @@
-//! The query-pair hierarchy of CHC+RT (§4.3): pairs (tile, node), split in screen or in object space, whose leaves are the
-//! visible and the invisible front.
+//! The query-pair hierarchy of CHC+RT (§4.3): pairs (tile, node), split in screen or in object space, whose leaves are
+//! the visible and the invisible front.
 
 use super::PairQuery;
 use bricks::{NONE, TopNode2};
@@ -128,9 +128,9 @@ impl PairTree {
         pair.square.log2 == 0 && top[pair.node as usize].right == NONE
     }
 
-    /// Splits a pair that is not terminal: in object space if the node's share of the root's area is larger than t_q times
-    /// the tile's share of the screen, else in screen space; where one is terminal, the other. Children start invisible, since
-    /// `frame`. Squares beyond the picture are left out.
+    /// Splits a pair that is not terminal: in object space if the node's share of the root's area is larger than t_q
+    /// times the tile's share of the screen, else in screen space; where one is terminal, the other. Children start
+    /// invisible, since `frame`. Squares beyond the picture are left out.
     pub fn split(&mut self, index: u32, top: &[TopNode2], frame: u32) -> Vec<u32> {
         let Pair { square, node, .. } = *self.pair(index);
         let n = &top[node as usize];
@@ -169,8 +169,8 @@ impl PairTree {
         (first..first + count).collect()
     }
 
-    /// Collapses pairs whose children are all invisible leaves, one level (CHC+RT §5.1); they have been invisible for as long as
-    /// the youngest child. Returns how many.
+    /// Collapses pairs whose children are all invisible leaves, one level (CHC+RT §5.1); they have been invisible for
+    /// as long as the youngest child. Returns how many.
     pub fn pull_up(&mut self) -> u64 {
         let mut pulled = 0;
         let mut stack = vec![0u32];
@@ -198,8 +198,9 @@ impl PairTree {
         pulled
     }
 
-    /// A ray (column, row) and a leaf of the top level, of `leaf_count`, that are not together in exactly one leaf pair; `None` if
-    /// the leaf pairs partition rays x leaves, as they must (numerical case 31). Takes time and memory in proportion to both.
+    /// A ray (column, row) and a leaf of the top level, of `leaf_count`, that are not together in exactly one leaf
+    /// pair; `None` if the leaf pairs partition rays x leaves, as they must (numerical case 31). Takes time and memory
+    /// in proportion to both.
     pub fn partition_defect(&self, top: &[TopNode2], leaf_count: usize) -> Option<[u32; 3]> {
         let mut seen = vec![0u8; self.width as usize * self.height as usize * leaf_count];
         for index in self.leaves() {

@@ -1,10 +1,10 @@
-//! The schedule of blocks of any-hit rays that can be made anew, more of them than are traced at once. Each block is traced over what is resident
-//! when it is made first, and asks for what is missing; what its rays that wait ask for is added to what those of other blocks do. Only when there
-//! is no room for more that wait, or no more blocks, are bricks loaded, as many as the cache holds; all blocks in which rays wait are met with these, and
-//! ask again.
+//! The schedule of blocks of any-hit rays that can be made anew, more of them than are traced at once. Each block is
+//! traced over what is resident when it is made first, and asks for what is missing; what its rays that wait ask for is
+//! added to what those of other blocks do. Only when there is no room for more that wait, or no more blocks, are bricks
+//! loaded, as many as the cache holds; all blocks in which rays wait are met with these, and ask again.
 //!
-//! The invariant of the module above, over all these blocks in place of one pass: what was resident and what was loaded is done for all of them, so
-//! that any of it may be evicted and none is loaded twice until no ray waits.
+//! The invariant of the module above, over all these blocks in place of one pass: what was resident and what was loaded
+//! is done for all of them, so that any of it may be evicted and none is loaded twice until no ray waits.
 
 use super::cache::Cache;
 use super::{Executor, ExecutorError, PassStats, Query, Report, Step};
@@ -42,8 +42,8 @@ impl Pool {
         report.demand.iter().map(|demand| u64::from(demand.next)).sum()
     }
 
-    /// Loads what is asked for, what most rays ask for first, as much as the cache holds; whether any was. All blocks in which rays wait are to be
-    /// met with it, and noted, before the next.
+    /// Loads what is asked for, what most rays ask for first, as much as the cache holds; whether any was. All blocks
+    /// in which rays wait are to be met with it, and noted, before the next.
     ///
     /// # Errors
     /// What the executor says.

@@ -1,11 +1,11 @@
 //! Verified payloads in host memory, least recently used out first.
 //!
-//! The budget is exact to the byte in what is really held: room is reserved before a copy is allocated, and what a worker
-//! still copies into or reads from is not evicted. A batch larger than the budget keeps its first items, so what is cached
-//! depends on the order of requests alone, never on which thread finished first.
+//! The budget is exact to the byte in what is really held: room is reserved before a copy is allocated, and what a
+//! worker still copies into or reads from is not evicted. A batch larger than the budget keeps its first items, so what
+//! is cached depends on the order of requests alone, never on which thread finished first.
 //!
-//! What is brought in ahead of need is on sufferance: it takes the room of nothing that was used in the present round or
-//! the one before ([`HostCache::begin_round`]), and the statistics say what came of it.
+//! What is brought in ahead of need is on sufferance: it takes the room of nothing that was used in the present round
+//! or the one before ([`HostCache::begin_round`]), and the statistics say what came of it.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -131,8 +131,8 @@ impl HostCache {
 
     /// Reserves room for `item`, evicting the least recently used payloads that nobody is using.
     ///
-    /// `None` when it is held or reserved already, is larger than the budget, or does not fit beside what is in use: then
-    /// nothing is evicted and the payload is simply not cached.
+    /// `None` when it is held or reserved already, is larger than the budget, or does not fit beside what is in use:
+    /// then nothing is evicted and the payload is simply not cached.
     pub fn reserve(self: &Arc<Self>, item: Item, bytes: u64) -> Option<Reservation> {
         self.reserve_where(item, bytes, false)
     }
@@ -192,8 +192,8 @@ pub struct Reservation {
 }
 
 impl Reservation {
-    /// Puts a copy of `payload`, which must be verified and of the reserved length, into the cache. Of another length, it
-    /// is not put in.
+    /// Puts a copy of `payload`, which must be verified and of the reserved length, into the cache. Of another length,
+    /// it is not put in.
     pub fn fill(self, payload: &[u8]) {
         if payload.len() as u64 == self.bytes {
             self.share(Arc::from(payload));

@@ -1,8 +1,8 @@
 //! Prefetching: which bricks the camera's motion will bring into view next.
 //!
-//! Pure: views and boxes in, items out. The next view continues the motion between the last two; of the bricks whose boxes
-//! meet its frustum, the nearest that are not at hand are read into the host cache while the next frame renders. What
-//! hides what is not asked: a brick behind a wall is prefetched in vain, and nothing but time depends on it.
+//! Pure: views and boxes in, items out. The next view continues the motion between the last two; of the bricks whose
+//! boxes meet its frustum, the nearest that are not at hand are read into the host cache while the next frame renders.
+//! What hides what is not asked: a brick behind a wall is prefetched in vain, and nothing but time depends on it.
 
 use std::collections::HashSet;
 
@@ -43,9 +43,9 @@ impl BrickBox {
     }
 }
 
-/// The view that follows `before` and `now` when the camera goes on as it did between them: the same step, the same turn
-/// in world space, the field of view of `now`. `None` for a camera at rest, which asks for nothing new, and for a motion
-/// that leaves the range of f64.
+/// The view that follows `before` and `now` when the camera goes on as it did between them: the same step, the same
+/// turn in world space, the field of view of `now`. `None` for a camera at rest, which asks for nothing new, and for a
+/// motion that leaves the range of f64.
 pub fn predict(before: &Camera, now: &Camera) -> Option<Camera> {
     let axes = |camera: &Camera| {
         let (right, up, forward) = camera.frame();
@@ -81,8 +81,8 @@ impl Frustum {
         Self { apex: camera.position, normals }
     }
 
-    /// Whether a box meets the frustum. Conservative: each plane is asked alone, so a box across an edge of the pyramid may
-    /// be taken for one that meets it, and never the other way round.
+    /// Whether a box meets the frustum. Conservative: each plane is asked alone, so a box across an edge of the pyramid
+    /// may be taken for one that meets it, and never the other way round.
     pub fn meets(&self, min: DVec3, max: DVec3) -> bool {
         self.normals.iter().all(|&normal| {
             let farthest = DVec3::select(normal.cmpge(DVec3::ZERO), max, min);
@@ -91,8 +91,8 @@ impl Frustum {
     }
 }
 
-/// The bricks with a box that meets the frustum of `camera`, each once, by the distance of its nearest such box, then by
-/// number. `aspect` is width ÷ height.
+/// The bricks with a box that meets the frustum of `camera`, each once, by the distance of its nearest such box, then
+/// by number. `aspect` is width ÷ height.
 pub fn nearest_in_view(boxes: &[BrickBox], camera: &Camera, aspect: f64) -> Vec<u32> {
     let frustum = Frustum::new(camera, aspect);
     let mut seen: Vec<(f64, u32)> = boxes
@@ -125,9 +125,9 @@ impl Prefetcher {
         self.boxes = boxes;
     }
 
-    /// Takes the view of the frame just rendered and returns what to have ready for the next one, most urgent first: of the
-    /// bricks in the predicted view, near to far, the geometry and then the attributes, but for what is `at_hand`. Empty
-    /// after the first frame and while the camera rests.
+    /// Takes the view of the frame just rendered and returns what to have ready for the next one, most urgent first: of
+    /// the bricks in the predicted view, near to far, the geometry and then the attributes, but for what is `at_hand`.
+    /// Empty after the first frame and while the camera rests.
     pub fn after_frame(&mut self, camera: &Camera, at_hand: impl Fn(Item) -> bool) -> Vec<Item> {
         let next = self.last.replace(*camera).and_then(|before| predict(&before, camera));
         let Some(next) = next else { return Vec::new() };

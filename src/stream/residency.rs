@@ -190,8 +190,8 @@ impl Residency {
     /// An empty cache for bricks and tiles of `sizes` (multiples of 16).
     ///
     /// # Errors
-    /// [`ResidencyError::CacheTooSmall`] below [`Self::least_budget`]; [`ResidencyError::PageTooSmall`] when the first page
-    /// (`page_bytes`, or the budget if that is less) does not hold the largest item.
+    /// [`ResidencyError::CacheTooSmall`] below [`Self::least_budget`]; [`ResidencyError::PageTooSmall`] when the first
+    /// page (`page_bytes`, or the budget if that is less) does not hold the largest item.
     pub fn new(
         sizes: impl Into<Sizes>,
         budget_bytes: u64,
@@ -251,15 +251,15 @@ impl Residency {
         })
     }
 
-    /// The least budget in bytes: the two largest bricks, geometry and attributes, or, if that is more, what the tiles of a
-    /// texture lookup take ([`Sizes::tiles_of_a_lookup`]). Saturates.
+    /// The least budget in bytes: the two largest bricks, geometry and attributes, or, if that is more, what the tiles
+    /// of a texture lookup take ([`Sizes::tiles_of_a_lookup`]). Saturates.
     pub fn least_budget(sizes: impl Into<Sizes>) -> u64 {
         let sizes: Sizes = sizes.into();
         sizes.two_largest_bricks().max(sizes.tiles_of_a_lookup())
     }
 
-    /// A budget in bytes at which everything fits at once in pages of `page_bytes`: the sum of all items, plus what can be
-    /// left over at the ends of pages. Saturates.
+    /// A budget in bytes at which everything fits at once in pages of `page_bytes`: the sum of all items, plus what can
+    /// be left over at the ends of pages. Saturates.
     pub fn budget_for_all(sizes: impl Into<Sizes>, page_bytes: u64) -> u64 {
         let sizes: Sizes = sizes.into();
         let page_bytes = round_down(page_bytes.min(u32::MAX as u64)).max(ALIGN);
@@ -323,9 +323,9 @@ impl Residency {
         self.first_filling = self.filling;
     }
 
-    /// How many fillings of the cache the pass has taken so far. A filling ends, and the next begins, when an insertion evicts
-    /// what the same filling inserted or touched: 1 where all that a pass uses fits at once. What the fillings of a pass use has
-    /// at most as many bytes as so many caches.
+    /// How many fillings of the cache the pass has taken so far. A filling ends, and the next begins, when an insertion
+    /// evicts what the same filling inserted or touched: 1 where all that a pass uses fits at once. What the fillings
+    /// of a pass use has at most as many bytes as so many caches.
     pub fn fillings(&self) -> u64 {
         self.filling - self.first_filling + 1
     }
@@ -439,8 +439,8 @@ impl Residency {
         Ok(Placed { slot: self.space.slot(start), evicted })
     }
 
-    /// Takes back the insertion of `item` in this pass, because its bytes did not arrive: it is not resident, not pinned,
-    /// and not counted as loaded. What it evicted stays evicted. Returns whether it was resident.
+    /// Takes back the insertion of `item` in this pass, because its bytes did not arrive: it is not resident, not
+    /// pinned, and not counted as loaded. What it evicted stays evicted. Returns whether it was resident.
     pub fn withdraw(&mut self, item: Item) -> bool {
         if self.bytes(item) == 0 || self.place[item.index()] == NOWHERE {
             return false;
@@ -458,7 +458,8 @@ impl Residency {
         true
     }
 
-    /// Frees the room of a resident item and whatever was noted of it, but for the counters. `is_overwritten`: for another.
+    /// Frees the room of a resident item and whatever was noted of it, but for the counters. `is_overwritten`: for
+    /// another.
     fn release(&mut self, item: Item, is_overwritten: bool) {
         let (start, bytes) = (self.place[item.index()], self.bytes(item));
         self.space.free(start);

@@ -3,7 +3,8 @@
 use super::item::Item;
 use super::space::Space;
 
-/// So many more writes that brought back what was lost within a lap than others, of late, say that a cycle does not fit.
+/// So many more writes that brought back what was lost within a lap than others, of late, say that a cycle does not
+/// fit.
 const THRASHING: u32 = 16;
 /// While a cycle does not fit, the head moves on after one write in so many that bring something back.
 const MOVE_ON: u64 = 8;
@@ -12,8 +13,8 @@ const NEVER: u64 = u64::MAX;
 
 /// The paper's cache (CHC+RT, "Out of core"): write at the next position, wrap, evict what is overlapped.
 ///
-/// Changed: pages are not straddled, pinned items are skipped over instead of overwritten, and with [`Chances`] items that
-/// were used are, too.
+/// Changed: pages are not straddled, pinned items are skipped over instead of overwritten, and with [`Chances`] items
+/// that were used are, too.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ring {
     /// Where the next write begins; up to and including the total.
@@ -23,14 +24,14 @@ pub(super) struct Ring {
 
 /// What round robin with second chances knows.
 ///
-/// *Second chances* (as in the page replacement "clock"): an item that was used after it was written is marked, and a write
-/// passes over what is marked, which loses its mark thereby. Where everything is marked the marks do not count.
+/// *Second chances* (as in the page replacement "clock"): an item that was used after it was written is marked, and a
+/// write passes over what is marked, which loses its mark thereby. Where everything is marked the marks do not count.
 ///
-/// *A cycle that does not fit*: requests that go round through a little more than the cache holds find, by round robin or LRU,
-/// nothing of it. It shows in writes that bring back what was overwritten less than a lap (the cache's bytes written)
-/// ago. While they prevail, the head stays after most of them, so that the next write replaces this one and the rest of
-/// the cache, most of the cycle, is left alone (as bimodal insertion does for LRU: Qureshi et al. 2007, "Adaptive insertion
-/// policies for high performance caching").
+/// *A cycle that does not fit*: requests that go round through a little more than the cache holds find, by round robin
+/// or LRU, nothing of it. It shows in writes that bring back what was overwritten less than a lap (the cache's bytes
+/// written) ago. While they prevail, the head stays after most of them, so that the next write replaces this one and
+/// the rest of the cache, most of the cycle, is left alone (as bimodal insertion does for LRU: Qureshi et al. 2007,
+/// "Adaptive insertion policies for high performance caching").
 #[derive(Clone, Debug)]
 struct Chances {
     /// Per item: whether it was used since it was written or passed over.
@@ -85,17 +86,18 @@ impl Ring {
         }
     }
 
-    /// Where `bytes` > 0 are to be written, without touching a pinned item: at or after the head, within one cycle, at the
-    /// first address without a marked item if there is one, else at the first.
+    /// Where `bytes` > 0 are to be written, without touching a pinned item: at or after the head, within one cycle, at
+    /// the first address without a marked item if there is one, else at the first.
     pub fn place(&self, space: &Space, bytes: u64, pinned: impl Fn(Item) -> bool) -> Option<u64> {
         self.first_without(space, bytes, |item| pinned(item) || self.is_marked(item))
             .or_else(|| self.first_without(space, bytes, pinned))
     }
 
-    /// The first address at or after the head, within one cycle, with `bytes` in one page that hold nothing to be `kept`.
+    /// The first address at or after the head, within one cycle, with `bytes` in one page that hold nothing to be
+    /// `kept`.
     ///
-    /// A range that cannot begin one byte earlier begins at the head, at a page or behind an item that is kept, and those are
-    /// what is tried, in order.
+    /// A range that cannot begin one byte earlier begins at the head, at a page or behind an item that is kept, and
+    /// those are what is tried, in order.
     fn first_without(&self, space: &Space, bytes: u64, kept: impl Fn(Item) -> bool) -> Option<u64> {
         let mut wrapped = false;
         let mut start = self.head;
@@ -119,8 +121,8 @@ impl Ring {
         }
     }
 
-    /// Notes that `item` is written at `start`, where [`Self::place`] said, before anything is freed or occupied for it:
-    /// moves the head, and takes the marks of what was passed over.
+    /// Notes that `item` is written at `start`, where [`Self::place`] said, before anything is freed or occupied for
+    /// it: moves the head, and takes the marks of what was passed over.
     pub fn write(&mut self, space: &Space, item: Item, start: u64, bytes: u64) {
         let end = start + bytes;
         let head = std::mem::replace(&mut self.head, end);
@@ -150,8 +152,8 @@ impl Ring {
 }
 
 impl Chances {
-    /// Whether the next write is to replace that of `item`, which is about to be made. Within a batch it does not, as what is
-    /// loaded together is pinned.
+    /// Whether the next write is to replace that of `item`, which is about to be made. Within a batch it does not, as
+    /// what is loaded together is pinned.
     fn stay(&mut self, item: Item, lap: u64) -> bool {
         let lost_at = self.lost_at[item.index()];
         if lost_at == NEVER || self.written - lost_at >= lap {

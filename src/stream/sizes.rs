@@ -61,8 +61,9 @@ impl Sizes {
         first.saturating_add(second)
     }
 
-    /// What the tiles of any one texture lookup find room in, wherever those of them lie that are resident already: twice the
-    /// largest that a lookup may read, since between two tiles that stay less than one may be lost. Saturates.
+    /// What the tiles of any one texture lookup find room in, wherever those of them lie that are resident already:
+    /// twice the largest that a lookup may read, since between two tiles that stay less than one may be lost.
+    /// Saturates.
     pub fn tiles_of_a_lookup(&self) -> u64 {
         let mut largest = self.tiles.clone();
         largest.sort_unstable_by(|a, b| b.cmp(a));

@@ -5,8 +5,8 @@ use bricks::{Payload, SceneFile};
 use super::item::{Item, Kind};
 use super::sizes::Sizes;
 
-/// Why a payload could not be had: a corrupt, truncated or unreadable brick. The text names the item, what was found and
-/// what was expected.
+/// Why a payload could not be had: a corrupt, truncated or unreadable brick. The text names the item, what was found
+/// and what was expected.
 pub type SourceError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A scene file as the workers see it. Only they call [`Self::copy`].
@@ -24,8 +24,8 @@ pub trait PayloadSource: Send + Sync + 'static {
         item.number < if item.kind == Kind::Tile { self.tile_count() } else { self.brick_count() }
     }
 
-    /// Length of a payload as it is loaded in bytes, a multiple of 16, from the always-resident part: touches no payload.
-    /// There is such an item. The source may hold fewer bytes, from which it decodes the payload.
+    /// Length of a payload as it is loaded in bytes, a multiple of 16, from the always-resident part: touches no
+    /// payload. There is such an item. The source may hold fewer bytes, from which it decodes the payload.
     fn bytes(&self, item: Item) -> u64;
 
     /// Loads a payload into `out`, [`Self::bytes`] long, and verifies *the copy*: after `Ok` it can be indexed freely.

@@ -85,7 +85,8 @@ impl Space {
         self.occupied.remove(&start);
     }
 
-    /// The longest range around `extent`, within its page, made of `extent`, free bytes and extents that `counts_as_free`.
+    /// The longest range around `extent`, within its page, made of `extent`, free bytes and extents that
+    /// `counts_as_free`.
     pub fn run_around(&self, start: u64, end: u64, counts_as_free: impl Fn(Item) -> bool) -> (u64, u64) {
         let (page_start, page_end) = (self.page_start(start), self.page_end(start));
         let mut from = page_start;

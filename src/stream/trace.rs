@@ -7,14 +7,15 @@
 //! {"frame":0,"pass":"primary","requests":["g0","g1","a1","t0"],"batches":[1,3]}
 //! ```
 //!
-//! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick, as loaded, `tiles` those
-//! of the tiles of textures; `g1` is the geometry of brick 1, `a1` its attributes, `t1` tile 1. A request is one use of an item by a pass: of a resident one that rays met,
-//! or a load. `batches` are the positions in `requests` at which a batch of loads began: what a batch loads is not evicted
-//! before the next one begins.
+//! `passes` is the number of lines that follow; `sizes` are the bytes of geometry and attributes of every brick, as
+//! loaded, `tiles` those of the tiles of textures; `g1` is the geometry of brick 1, `a1` its attributes, `t1` tile 1. A
+//! request is one use of an item by a pass: of a resident one that rays met, or a load. `batches` are the positions in
+//! `requests` at which a batch of loads began: what a batch loads is not evicted before the next one begins.
 //!
-//! A pass meets what is resident before it loads, first geometry, then attributes; so does a replay, whatever the order of the
-//! lines. Tiles come last, and in their order: a lookup needs several at once, so a pass may ask for one again that it had and lost. Which missing bricks a pass asks for depends a little on what was resident, as hits hide what lies behind: a
-//! replay shows what another cache makes of these requests, which are nearly those of the same frames.
+//! A pass meets what is resident before it loads, first geometry, then attributes; so does a replay, whatever the order
+//! of the lines. Tiles come last, and in their order: a lookup needs several at once, so a pass may ask for one again
+//! that it had and lost. Which missing bricks a pass asks for depends a little on what was resident, as hits hide what
+//! lies behind: a replay shows what another cache makes of these requests, which are nearly those of the same frames.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufWriter, Write};
@@ -244,8 +245,9 @@ fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
 pub enum Replay {
     /// A [`Residency`] with this policy, pages and all.
     Cache(Policy),
-    /// Bélády's rule: evict what the pass furthest ahead uses. Sizes differ, so this is the greedy bound: the optimum when all
-    /// items have one size, else an estimate that an optimal choice may beat. Counts bytes alone: no pages, no fragmentation.
+    /// Bélády's rule: evict what the pass furthest ahead uses. Sizes differ, so this is the greedy bound: the optimum
+    /// when all items have one size, else an estimate that an optimal choice may beat. Counts bytes alone: no pages, no
+    /// fragmentation.
     Belady,
 }
 
@@ -294,7 +296,8 @@ impl ReplayResult {
     }
 }
 
-/// Replays `trace` against a cache that begins empty: bricks and tiles of `sizes`, `budget_bytes` in pages of `page_bytes`.
+/// Replays `trace` against a cache that begins empty: bricks and tiles of `sizes`, `budget_bytes` in pages of
+/// `page_bytes`.
 ///
 /// A cache with a policy pins batches as the walk did, and begins a new batch where one does not fit: with the recorded
 /// sizes, budget, pages and policy it does exactly what the recorded cache did.
@@ -339,7 +342,8 @@ pub fn replay(
     Ok(result)
 }
 
-/// The requests of one kind of one pass: what is resident of them is met first, then the rest is loaded; tiles come in order.
+/// The requests of one kind of one pass: what is resident of them is met first, then the rest is loaded; tiles come in
+/// order.
 struct Stage<'a> {
     pass: &'a PassRequests,
     kind: Kind,

@@ -1,8 +1,8 @@
 //! The worker threads: the only ones that touch the scene file.
 //!
 //! A load is answered from the host cache, else copied from the source, verified in the copy, and handed to its
-//! destination; only then is it kept in the host cache, so that caching is not on the way of a frame. Each worker copies
-//! into one buffer that it keeps, so a load neither allocates nor clears memory unless its payload is cached.
+//! destination; only then is it kept in the host cache, so that caching is not on the way of a frame. Each worker
+//! copies into one buffer that it keeps, so a load neither allocates nor clears memory unless its payload is cached.
 //!
 //! What is looked up and what room is reserved in the host cache is decided by the caller of [`Workers::load_each`], in
 //! the order of requests, before a worker sees any of them: without prefetching the counters do not depend on timing.
@@ -115,8 +115,8 @@ pub enum StreamError {
 pub struct Loaded<D> {
     /// What was requested.
     pub item: Item,
-    /// The destination given with it; `None` only if it was lost ([`StreamError::Lost`]). After an error its contents are
-    /// unspecified.
+    /// The destination given with it; `None` only if it was lost ([`StreamError::Lost`]). After an error its contents
+    /// are unspecified.
     pub destination: Option<D>,
     /// Whether the destination holds the payload.
     pub result: Result<(), StreamError>,
@@ -135,8 +135,8 @@ pub struct WorkersStats {
     pub cached_bytes: u64,
     /// Loads that failed.
     pub failed: u64,
-    /// Prefetches dropped: cancelled, a full queue, no room in the host cache, loaded meanwhile, or a payload that cannot
-    /// be had (a later load of which says why). The host cache counts those that arrived.
+    /// Prefetches dropped: cancelled, a full queue, no room in the host cache, loaded meanwhile, or a payload that
+    /// cannot be had (a later load of which says why). The host cache counts those that arrived.
     pub prefetch_dropped: u64,
 }
 

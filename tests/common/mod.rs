@@ -1,10 +1,10 @@
 //! What the integration tests share: the command as a user runs it, scenes made once, folders that vanish.
 #![allow(dead_code)]
 
-use brickwalk::app::args::{Cli, Command as AppCommand};
-use brickwalk::app::session::{Session, open_scene};
-use brickwalk::kernel::{Extent, Lamps};
-use brickwalk::render::{Equirectangular, Renderer, environment};
+use brickwalk::cli::options::args::{Cli, Command as AppCommand};
+use brickwalk::frame::{Equirectangular, Renderer, environment};
+use brickwalk::kernels::{Extent, Lamps};
+use brickwalk::session::open::{Session, open_scene};
 use clap::Parser;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,8 @@ pub fn converted(folder: &Path, shape: &str, options: &str) -> PathBuf {
     scene
 }
 
-/// Adds a sheet of squares to the text of an OBJ file of `count` vertices: its corner, its two edges, and how many squares along them.
+/// Adds a sheet of squares to the text of an OBJ file of `count` vertices: its corner, its two edges, and how many
+/// squares along them.
 pub fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3; 2], squares: [usize; 2]) {
     for j in 0..=squares[1] {
         for i in 0..=squares[0] {
@@ -86,7 +87,7 @@ pub fn renderer(scene: &Path, options: &str) -> Renderer {
     };
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
     let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    brickwalk::app::walk::renderer(session, &args).expect("lamps")
+    brickwalk::cli::walk::renderer(session, &args).expect("lamps")
 }
 
 /// One of these effects where an environment is the only light, and 1 everywhere.

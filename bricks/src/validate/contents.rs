@@ -9,10 +9,10 @@ use crate::records::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NEAR_STEP
 use crate::records::{TEXTURE_BC7, Texture, WIDE_HIGH_STEPS};
 use crate::resident::Resident;
 
-/// Checks the contents of a payload, as it is loaded, that [`super::payload`] found right. For geometry: quantisation grids of nodes are
-/// finite, every triangle is in exactly one leaf, the brick is as high as it says, vertices lie on the lattice within the
-/// brick's bounds and, if `map` is given, in occupied cells, every triangle starts with its smallest vertex.
-/// Blocks of textures have a mode.
+/// Checks the contents of a payload, as it is loaded, that [`super::payload`] found right. For geometry: quantisation
+/// grids of nodes are finite, every triangle is in exactly one leaf, the brick is as high as it says, vertices lie on
+/// the lattice within the brick's bounds and, if `map` is given, in occupied cells, every triangle starts with its
+/// smallest vertex. Blocks of textures have a mode.
 ///
 /// # Panics
 ///

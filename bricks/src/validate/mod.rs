@@ -1,9 +1,9 @@
 //! The rules of the format, checked once at the file's edge so that everything behind it indexes freely.
 //!
-//! * [`resident`]: the resident part by itself. Every index, range, count and length in it is right, both top-level trees
-//!   are trees over exactly the leaves, nothing is infinite or not a number.
-//! * [`payload`]: the bytes of one payload, as it is loaded, against the resident part: every index in it, and that the nodes of a brick
-//!   are a tree no higher than the brick says.
+//! * [`resident`]: the resident part by itself. Every index, range, count and length in it is right, both top-level
+//!   trees are trees over exactly the leaves, nothing is infinite or not a number.
+//! * [`payload`]: the bytes of one payload, as it is loaded, against the resident part: every index in it, and that the
+//!   nodes of a brick are a tree no higher than the brick says.
 //! * [`spans`]: payloads fill the file up to the directory and do not overlap.
 //! * [`contents`]: what is slower to check and cannot make an index wrong: vertices on the lattice within their bounds
 //!   and in occupied cells,

@@ -102,7 +102,8 @@ impl NodeView {
         let inner_right = (meta ^ INNER_META) & inner_lanes == 0;
         // Gathers the lowest bit of byte i into bit i: the product's top byte sums bit i shifted to 56 + i.
         let mask_right = (inner.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8 == self.inner_mask;
-        // The unary count of a leaf: bit 7 only with bit 6, bit 6 only with bit 5; without bit 5 the child is absent, 0.
+        // The unary count of a leaf: bit 7 only with bit 6, bit 6 only with bit 5; without bit 5 the child is absent,
+        // 0.
         let (one, two, three) = (meta >> 5 & ONES, meta >> 6 & ONES, meta >> 7 & ONES);
         let low = meta | meta >> 1 | meta >> 2 | meta >> 3 | meta >> 4;
         let unary_right = ((three & !two) | (two & !one) | (low & ONES & !one)) == 0;

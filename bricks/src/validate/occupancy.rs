@@ -54,8 +54,8 @@ fn proxies(index: u32) -> Part {
     Part::Payload(Payload::Proxies(index))
 }
 
-/// A proxies payload is a map whose levels agree with each other and with the resident one, with nothing beyond the bounds
-/// of the brick.
+/// A proxies payload is a map whose levels agree with each other and with the resident one, with nothing beyond the
+/// bounds of the brick.
 pub(super) fn map(resident: &Resident, index: u32, bytes: &[u8]) -> Result<(), Flaw> {
     let part = proxies(index);
     let map = OccupancyMap::unpack(bytes).map_err(|error| error.in_part(part))?;
@@ -77,8 +77,8 @@ pub(super) fn map(resident: &Resident, index: u32, bytes: &[u8]) -> Result<(), F
     rule(beyond.is_none(), part, || ("an occupied cell beyond the brick's bounds", format!("none after {last:?}")))
 }
 
-/// Checks that the cells of vertices are occupied. `vertices` are those of brick `index`, in lattice steps from its origin and
-/// within its bounds.
+/// Checks that the cells of vertices are occupied. `vertices` are those of brick `index`, in lattice steps from its
+/// origin and within its bounds.
 pub(super) fn vertices(resident: &Resident, index: u32, vertices: &[[i64; 3]], map: &OccupancyMap) -> Result<(), Flaw> {
     let brick = &resident.bricks[index as usize];
     let step_log2 = resident.objects[brick.object as usize].step_log2;

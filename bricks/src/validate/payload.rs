@@ -1,7 +1,7 @@
 //! Checks of a payload that has just been copied: every index in it, on the way from the disk to a cache.
 //!
-//! This lies on the path of every brick that is streamed, so it is one pass of a few instructions per node and a maximum
-//! per array of indices, which compilers vectorise.
+//! This lies on the path of every brick that is streamed, so it is one pass of a few instructions per node and a
+//! maximum per array of indices, which compilers vectorise.
 
 use super::node::NodeView;
 use super::{occupancy, rule};
@@ -13,9 +13,10 @@ use crate::records::{
 use crate::records::{NO_NORMAL, Node, OpacityTriangle, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use crate::resident::Resident;
 
-/// Checks the bytes of a payload, as it is loaded, against the resident part, which satisfies [`super::resident`]: every index that
-/// traversal or shading follows lies in its array, nodes form a tree no higher than the brick says with children after
-/// their parents, node 0 is the brick's root, padding is zero; of an occupancy map that all levels agree. `bytes` needs no alignment.
+/// Checks the bytes of a payload, as it is loaded, against the resident part, which satisfies [`super::resident`]:
+/// every index that traversal or shading follows lies in its array, nodes form a tree no higher than the brick says
+/// with children after their parents, node 0 is the brick's root, padding is zero; of an occupancy map that all levels
+/// agree. `bytes` needs no alignment.
 pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(), Flaw> {
     let part = Part::Payload(payload);
     let length = resident.loaded_bytes(payload);

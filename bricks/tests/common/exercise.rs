@@ -9,8 +9,8 @@ use bytemuck::Pod;
 use std::ops::Range;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Opens the file in `bytes`, copies every payload, follows its indices and verifies all of it; whether it opened, and how
-/// many payloads were copied.
+/// Opens the file in `bytes`, copies every payload, follows its indices and verifies all of it; whether it opened, and
+/// how many payloads were copied.
 ///
 /// # Panics
 /// The reader accepts what does not obey the format.
@@ -85,8 +85,8 @@ pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
     assert_eq!(visits, brick.node_count);
 }
 
-/// Makes every checksum right that can be found in `bytes`, so that the checks behind them are reached. What leads out of
-/// the file is left as it is.
+/// Makes every checksum right that can be found in `bytes`, so that the checks behind them are reached. What leads out
+/// of the file is left as it is.
 pub fn seal(bytes: &mut [u8]) {
     let Some(mut header) = read::<Header>(bytes, 0) else { return };
     if bytes.len() < PAGE_BYTES as usize {

@@ -256,8 +256,8 @@ fn top_node(children: &[(Triangle, u8)], child_base: u32, leaf_base: u32) -> Top
     }
 }
 
-/// Three bricks (near, wide, of an instanced object that rays pass through, with details), three instances, two textures, an opacity
-/// map, two lights; spans not yet known.
+/// Three bricks (near, wide, of an instanced object that rays pass through, with details), three instances, two
+/// textures, an opacity map, two lights; spans not yet known.
 pub fn scene() -> Scene {
     let object = |step_log2, unit_log2, first_brick, brick_count, triangle_ids, triangle_count| Object {
         step_log2,

@@ -1,10 +1,10 @@
 //! What tests of kernels read back of the device.
 
 use super::GpuExecutor;
-use crate::gpu::field::Field;
-use crate::gpu::roma::Roma;
-use crate::kernel::layout;
+use crate::kernels::layout;
 use crate::schedule::ExecutorError;
+use crate::secondary::df::device::Field;
+use crate::secondary::roma::device::Roma;
 
 /// Bounds, lists, entries and selection of all tiles.
 type TilesRead = (Vec<layout::TileBounds>, Vec<layout::TileList>, Vec<layout::Entry>, Vec<u32>);

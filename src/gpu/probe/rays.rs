@@ -2,7 +2,7 @@
 
 use super::cases::Rng;
 use super::twin::Twin;
-use crate::kernel::layout::{Ray, T_INFINITE};
+use crate::kernels::layout::{Ray, T_INFINITE};
 
 /// Number of rays.
 pub const RAYS: usize = 2048;

@@ -1,6 +1,7 @@
-//! The probe's scene file is what the converter makes of the scene below. `BRICKWALK_REGENERATE_PROBE=1` writes it anew.
+//! The probe's scene file is what the converter makes of the scene below. `BRICKWALK_REGENERATE_PROBE=1` writes it
+//! anew.
 
-use crate::kernel::layout::{BRICK_INDEX32, BRICK_WIDE};
+use crate::kernels::layout::{BRICK_INDEX32, BRICK_WIDE};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -26,7 +27,8 @@ fn mesh(name: &str, positions: Vec<[f64; 3]>, indices: Vec<u32>) -> Mesh {
     Mesh { name: name.into(), primitives: vec![Primitive { positions, indices, ..Primitive::default() }] }
 }
 
-/// A quad in the plane where axis `k` is `at`: two triangles over `low..high` of the other axes, cut along either diagonal.
+/// A quad in the plane where axis `k` is `at`: two triangles over `low..high` of the other axes, cut along either
+/// diagonal.
 fn quad(corners: &mut Vec<[f64; 3]>, k: usize, at: f64, low: [f64; 2], high: [f64; 2], other: bool) {
     let point = |x: f64, y: f64| {
         let mut p = [at; 3];

@@ -1,11 +1,12 @@
 //! The probe passes where it must and names what is broken on purpose.
 
-use super::*;
 use crate::gpu::device::Gpu;
 use crate::gpu::executor::GpuExecutor;
-use crate::gpu::kernels::{self, Kernels};
-use crate::kernel::frame::Frame;
-use crate::kernel::{Extent, Keep, Setup};
+use crate::gpu::kernels;
+use crate::gpu::kernels::Kernels;
+use crate::gpu::probe::*;
+use crate::kernels::frame::Frame;
+use crate::kernels::{Extent, Keep, Setup};
 use crate::stream::{HostCache, Workers};
 use std::sync::Arc;
 

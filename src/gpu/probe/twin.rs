@@ -1,10 +1,11 @@
 //! The twin of the intersection kernels: every ray with every triangle of a scene, in f32, with nothing left out.
 
-use crate::cpu::brick::BrickView;
-use crate::cpu::leaf::{BrickRay, rows_direction, rows_point};
-use crate::cpu::node::framed_ray;
-use crate::kernel::frame::{Frame, Placement};
-use crate::kernel::layout::{self, INSTANCE_IDENTITY, NONE};
+use crate::kernels::frame::{Frame, Placement};
+use crate::kernels::layout;
+use crate::kernels::layout::{INSTANCE_IDENTITY, NONE};
+use crate::kernels::trace::brick::BrickView;
+use crate::kernels::trace::leaf::{BrickRay, rows_direction, rows_point};
+use crate::kernels::trace::node::framed_ray;
 use crate::math::exact::{divide, intersect_triangle, ray_frame};
 use bricks::{Payload, SceneFile};
 

@@ -1,6 +1,6 @@
 //! Arithmetic against oracles, the triangle test against exact edge functions, and planted defects that must show.
 
-use super::*;
+use crate::math::exact::*;
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
 struct Rng(u64);
@@ -449,8 +449,9 @@ impl IntegerCase {
             return None;
         }
         let z = (u * a[2] + v * b[2] + w * c[2]) as f64 / det as f64;
-        // A rounded edge value p - q is off by u (|p| + |q| + |p - q|), which moves z by its share of z_i - z; the sum of
-        // three terms, the division and the scaling add 5 roundings of at most the largest |z_i|. The clamp only helps.
+        // A rounded edge value p - q is off by u (|p| + |q| + |p - q|), which moves z by its share of z_i - z; the sum
+        // of three terms, the division and the scaling add 5 roundings of at most the largest |z_i|. The clamp only
+        // helps.
         let term = |p: [i128; 3], q: [i128; 3]| {
             ((p[0] * q[1]).abs() + (p[1] * q[0]).abs() + edge(p, q).abs()) as f64 / (det as f64).abs()
         };
@@ -563,8 +564,8 @@ fn order_dependent(clamp: bool) -> usize {
     let mut rng = Rng(8);
     let mut changed = 0;
     for _ in 0..20_000 {
-        // Needles of no extent in y but a thousandth, in planes that hold the ray: along a needle t is ill-conditioned, while
-        // its y admits little; duplicates and rotations that differ among them.
+        // Needles of no extent in y but a thousandth, in planes that hold the ray: along a needle t is ill-conditioned,
+        // while its y admits little; duplicates and rotations that differ among them.
         let d = [1.0, 0.3 + 0.6 * rng.unit(), 0.1 + 0.8 * rng.unit()];
         let mut triangles: Vec<Triangle> = (0..8)
             .map(|_| {

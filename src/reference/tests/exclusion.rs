@@ -1,6 +1,6 @@
 //! Rays that leave a triangle do not meet it.
 
-use super::*;
+use crate::reference::tests::*;
 
 #[test]
 fn excluded_triangles_are_passed() {

@@ -1,8 +1,8 @@
 //! Boxes are grown enough, and no more are visited than the ray comes near.
 
-use super::super::bounds::{padding, stretch};
-use super::super::bvh::{Bounds, Padding};
-use super::*;
+use crate::reference::bounds::{padding, stretch};
+use crate::reference::bvh::{Bounds, Padding};
+use crate::reference::tests::*;
 
 /// `instanced`, every instance stretched by 60 along an axis of its own before it is turned.
 fn stretched(seed: u64) -> (Truth, [i64; 3]) {

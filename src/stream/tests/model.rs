@@ -113,7 +113,8 @@ impl Model {
         starts.find(|&start| self.fits(start, count, |cell| !cell.is_some_and(&kept)))
     }
 
-    /// Round robin with second chances: takes marks for a write of `item` at `start` and says where the head is after it.
+    /// Round robin with second chances: takes marks for a write of `item` at `start` and says where the head is after
+    /// it.
     fn head_after(&mut self, item: Item, start: usize, count: usize) -> usize {
         let all = self.cells.len();
         let marked = |item: Item| self.marked.contains(&item);

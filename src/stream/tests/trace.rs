@@ -117,8 +117,9 @@ fn a_cycle_longer_than_the_cache() {
 
 #[test]
 fn second_chances_keep_most_of_a_cycle_that_does_not_fit() {
-    // Room for 100 bricks, forty rounds through a few more. Bélády hits (100 - 1) of (n - 1) requests in the long run; second
-    // chances lose what its head still moves, every eighth write that brings something back: measured 1 to 6 points.
+    // Room for 100 bricks, forty rounds through a few more. Bélády hits (100 - 1) of (n - 1) requests in the long run;
+    // second chances lose what its head still moves, every eighth write that brings something back: measured 1 to 6
+    // points.
     for (n, below) in [(101, 0.02), (105, 0.02), (110, 0.03), (125, 0.045), (150, 0.07)] {
         let sizes = vec![(16, 0); n as usize];
         let cycle: Vec<u32> = (0..40 * n).map(|request| request % n).collect();

@@ -1,13 +1,15 @@
 //! Names with wildcards.
 
-/// Whether `pattern` names `name`: it is the same, or it is where `*` stands for any characters or none and `?` for any one.
+/// Whether `pattern` names `name`: it is the same, or it is where `*` stands for any characters or none and `?` for any
+/// one.
 pub fn names(pattern: &str, name: &str) -> bool {
     if pattern == name {
         return true;
     }
     let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
     let (mut at, mut from) = (0, 0);
-    // Behind the last star that was met, and what of the name it began with: it takes one character more where the rest does not fit.
+    // Behind the last star that was met, and what of the name it began with: it takes one character more where the rest
+    // does not fit.
     let mut retry = None;
     while from < name.len() {
         match pattern.get(at) {

@@ -10,8 +10,8 @@ pub const PART_TRIANGLES: u32 = 1 << 17;
 
 /// A scene that is read part by part.
 ///
-/// Its parts, in the order of meshes and of parts within them, hold the same triangles each time they are read, from any
-/// number of threads at once.
+/// Its parts, in the order of meshes and of parts within them, hold the same triangles each time they are read, from
+/// any number of threads at once.
 pub trait Source: Send + Sync {
     /// Everything but geometry and texels.
     fn outline(&self) -> &Outline;
@@ -31,17 +31,18 @@ pub trait Source: Send + Sync {
     /// The texels of texture `index`.
     ///
     /// # Errors
-    /// The image is missing or cannot be decoded. This is no reason not to convert: the builder warns and leaves it out.
+    /// The image is missing or cannot be decoded. This is no reason not to convert: the builder warns and leaves it
+    /// out.
     fn texture(&self, index: usize) -> Result<Cow<'_, SourceTexture>, SourceError>;
 
-    /// The file that part `part` of mesh `mesh` comes from, if any, and the number that vertex `vertex` of the part has there:
-    /// in its primitive, from 0. For messages; it may read the part again.
+    /// The file that part `part` of mesh `mesh` comes from, if any, and the number that vertex `vertex` of the part has
+    /// there: in its primitive, from 0. For messages; it may read the part again.
     fn origin(&self, _mesh: usize, _part: usize, vertex: u32) -> (Option<String>, u64) {
         (None, vertex.into())
     }
 
-    /// What was repaired in the parts that have been read, one line each: warnings that cannot be known before. Once every
-    /// part has been read they are the same whatever the order.
+    /// What was repaired in the parts that have been read, one line each: warnings that cannot be known before. Once
+    /// every part has been read they are the same whatever the order.
     fn repairs(&self) -> Vec<String> {
         Vec::new()
     }
@@ -183,7 +184,8 @@ impl Mesh {
     }
 }
 
-/// Triangles of one material. Per-vertex arrays, where present, have the length of `positions`, `tangents` that of `indices`.
+/// Triangles of one material. Per-vertex arrays, where present, have the length of `positions`, `tangents` that of
+/// `indices`.
 #[derive(Clone, Debug, Default)]
 pub struct Primitive {
     /// Index of the material.
@@ -196,8 +198,8 @@ pub struct Primitive {
     pub uvs: Option<Vec<[f32; 2]>>,
     /// Texture coordinates of set 1.
     pub uvs1: Option<Vec<[f32; 2]>>,
-    /// Of every corner, in the order of `indices`: a tangent in mesh space, not necessarily unit, and a sign, by which cross(normal,
-    /// tangent) times it is the bitangent. Wanted of materials with a normal texture.
+    /// Of every corner, in the order of `indices`: a tangent in mesh space, not necessarily unit, and a sign, by which
+    /// cross(normal, tangent) times it is the bitangent. Wanted of materials with a normal texture.
     pub tangents: Option<Vec<[f32; 4]>>,
     /// Linear RGBA colours in 0..=1.
     pub colors: Option<Vec<[f32; 4]>>,
@@ -231,8 +233,8 @@ pub struct SourceTexture {
     pub height: u32,
     /// `bricks::WRAP_*` of s in the low half, of t in the high half.
     pub wrap: u32,
-    /// RGBA8, rows top to bottom. Red, green and blue are sRGB where a material takes it for base colour or emission, linear where it
-    /// takes it otherwise.
+    /// RGBA8, rows top to bottom. Red, green and blue are sRGB where a material takes it for base colour or emission,
+    /// linear where it takes it otherwise.
     pub rgba: Vec<u8>,
 }
 

@@ -1,8 +1,8 @@
 //! One plot over the frames of a walk, or over sizes of a cache, drawn as SVG.
 //!
 //! The picture is scaled by its viewBox, so its text has to stay legible at the width of a phone: the box is narrow,
-//! and legend, title and reading aid are HTML beside it. Colours are written as plain SVG attributes, which the rules of
-//! [`colour_rules`] override where the reader prefers a dark page.
+//! and legend, title and reading aid are HTML beside it. Colours are written as plain SVG attributes, which the rules
+//! of [`colour_rules`] override where the reader prefers a dark page.
 
 use crate::{ReportError, format};
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};

@@ -1,8 +1,9 @@
 //! Turns the records of a walk, or the results of a replay, into one offline HTML page.
 //!
 //! The input is the folder that `brickwalk walk` writes: `records.jsonl` (one object per frame and pass),
-//! `summary.json` and `frames/*.png`. The output is `report.html` beside them: one file without scripts or references to anything
-//! outside the folder. Plots are SVG, a dozen frames are embedded, and the others are linked by relative paths.
+//! `summary.json` and `frames/*.png`. The output is `report.html` beside them: one file without scripts or references
+//! to anything outside the folder. Plots are SVG, a dozen frames are embedded, and the others are linked by relative
+//! paths.
 //!
 //! The page depends on field names only. A field that is missing, zero throughout or unknown does not stop it; the page
 //! says what it left out. Statistics are computed here from the records, not copied from the summary.
@@ -40,8 +41,8 @@ pub fn write(dir: &Path) -> Result<(), ReportError> {
     publish(dir.join("report.html"), html.as_bytes())
 }
 
-/// Writes the page of a replay, `path`, from what `brickwalk replay --json` prints: plots of loads, bytes and hits against
-/// the size of the cache, a curve a policy, and a table. `name` is that of the trace.
+/// Writes the page of a replay, `path`, from what `brickwalk replay --json` prints: plots of loads, bytes and hits
+/// against the size of the cache, a curve a policy, and a table. `name` is that of the trace.
 ///
 /// The page appears complete or not at all, and an older file is replaced.
 ///

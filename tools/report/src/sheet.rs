@@ -1,5 +1,5 @@
-//! A page of tables and plots whose contents the caller gives: the results of measurements. The same tables go into CSV and
-//! Markdown, so that all of them say the same.
+//! A page of tables and plots whose contents the caller gives: the results of measurements. The same tables go into CSV
+//! and Markdown, so that all of them say the same.
 
 use crate::chart::{Across, Chart, Drawing, INKS, LABEL_HEX, Series, Shape, Unit};
 use crate::walk::Statistics;

@@ -1,7 +1,8 @@
-//! Cornell box: a room of 4 m, open in front, with a lamp under the ceiling, two boxes on the floor, and a box that orbits above them.
+//! Cornell box: a room of 4 m, open in front, with a lamp under the ceiling, two boxes on the floor, and a box that
+//! orbits above them.
 //!
-//! The room is that of every such picture; its walls are flat. What triangles there are go into the boxes, whose sides have a relief, and most of
-//! them into the one that moves.
+//! The room is that of every such picture; its walls are flat. What triangles there are go into the boxes, whose sides
+//! have a relief, and most of them into the one that moves.
 
 use crate::Settings;
 use crate::material::{Tint, WHITE, material};
@@ -65,8 +66,8 @@ fn orbit(time: f64) -> DVec3 {
     DVec3::new(ORBIT * cos, HEIGHT + 0.12 * (2.0 * TAU * time / f64::from(STEPS)).sin(), ORBIT * sin)
 }
 
-/// A rectangle of `columns` x `rows` squares, from `corner` along `u` and `v`, whose outside is toward u × v, raised by `relief` of shares
-/// of both edges.
+/// A rectangle of `columns` x `rows` squares, from `corner` along `u` and `v`, whose outside is toward u × v, raised by
+/// `relief` of shares of both edges.
 fn rectangle(
     out: &mut Primitive,
     [corner, u, v]: [DVec3; 3],

@@ -1,7 +1,7 @@
 //! Scenes as glTF 2.0 for other programs, written part by part: what is held is a few parts and a record of each.
 //!
-//! A mesh of the scene is a mesh there, a part a primitive, a placement a node; all keep their order, and so do triangles.
-//! Positions are f32 relative to an anchor of their mesh, by which its nodes are moved.
+//! A mesh of the scene is a mesh there, a part a primitive, a placement a node; all keep their order, and so do
+//! triangles. Positions are f32 relative to an anchor of their mesh, by which its nodes are moved.
 
 use crate::{Error, output};
 use bricks::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK};
@@ -129,7 +129,8 @@ struct Written {
     records: Vec<Record>,
 }
 
-/// Where a part lies and what its accessors say. Positions, normals, colours and indices follow each other without gaps.
+/// Where a part lies and what its accessors say. Positions, normals, colours and indices follow each other without
+/// gaps.
 struct Record {
     start: u64,
     vertices: u64,

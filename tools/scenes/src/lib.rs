@@ -1,7 +1,7 @@
 //! Generated scenes of any size, and camera paths through them.
 //!
-//! A scene depends on its settings alone: not on the number of threads, nor on the machine's clock. The detail of a place is
-//! fixed; asking for more triangles adds more of it around the same centre.
+//! A scene depends on its settings alone: not on the number of threads, nor on the machine's clock. The detail of a
+//! place is fixed; asking for more triangles adds more of it around the same centre.
 
 mod block;
 mod building;
@@ -123,8 +123,8 @@ pub struct Settings {
     pub triangles: u64,
     /// Seed.
     pub seed: u64,
-    /// City: trees and vehicles as instances of shared meshes instead of copies within the blocks. The triangles are the
-    /// same. The other kinds always store once what they have many of.
+    /// City: trees and vehicles as instances of shared meshes instead of copies within the blocks. The triangles are
+    /// the same. The other kinds always store once what they have many of.
     pub instanced: bool,
     /// How often the whole is placed, at least once; [`Self::triangles`] are those of one copy.
     pub copies: u32,
@@ -137,8 +137,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The settings of the scene whose source is called `name`, as in "city seed=0 triangles=2000000"; [`Self::instanced`]
-    /// is not part of the name. `None` if no generated scene is called so.
+    /// The settings of the scene whose source is called `name`, as in "city seed=0 triangles=2000000";
+    /// [`Self::instanced`] is not part of the name. `None` if no generated scene is called so.
     pub fn of_source(name: &str) -> Option<Self> {
         let (kind, rest) = name.split_once(" seed=")?;
         let (seed, rest) = rest.split_once(" triangles=")?;
@@ -196,13 +196,14 @@ pub enum Error {
     Interrupted(#[from] Interrupted),
 }
 
-/// Generates a scene: what there is and how large, the geometry when it is read. The number of triangles is at most the one
-/// asked for and short of it by less than 5 %.
+/// Generates a scene: what there is and how large, the geometry when it is read. The number of triangles is at most the
+/// one asked for and short of it by less than 5 %.
 ///
-/// Each block of the city is one mesh, placed once with the identity; `settings.instanced` takes trees and vehicles out of
-/// the blocks. The city's first crossing is at the origin, the street at y = 0. Each bay of the plant and each tile of the
-/// terrain is one mesh, too; what grows and lies on the terrain is stored once. The stadium is whole in every size: more
-/// triangles go into its seats and into the teapot. So is the Cornell box: more of them go into the boxes in it.
+/// Each block of the city is one mesh, placed once with the identity; `settings.instanced` takes trees and vehicles out
+/// of the blocks. The city's first crossing is at the origin, the street at y = 0. Each bay of the plant and each tile
+/// of the terrain is one mesh, too; what grows and lies on the terrain is stored once. The stadium is whole in every
+/// size: more triangles go into its seats and into the teapot. So is the Cornell box: more of them go into the boxes in
+/// it.
 ///
 /// # Errors
 ///

@@ -31,7 +31,8 @@ macro_rules! materials {
     };
 }
 
-// Base colours are linear albedos. `Paint`, `CarPaint`, `Fabric`, `Soil` and `Ceramic` are near white: their tint is the colour.
+// Base colours are linear albedos. `Paint`, `CarPaint`, `Fabric`, `Soil` and `Ceramic` are near white: their tint is
+// the colour.
 materials! {
     Asphalt: [0.105, 0.105, 0.11], 0.95, 0;
     Marking: [0.72, 0.72, 0.70], 0.8, 0;

@@ -46,8 +46,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The wall from `a` to `b` (x, z) at height `y`, and its length. Its outside is to the right of the way from a to b
-    /// as seen from above.
+    /// The wall from `a` to `b` (x, z) at height `y`, and its length. Its outside is to the right of the way from a to
+    /// b as seen from above.
     pub fn wall(a: DVec2, b: DVec2, y: f64) -> (Self, f64) {
         let length = (b - a).length();
         let d = (b - a) / length;
@@ -201,8 +201,8 @@ impl Builder {
         self.polygon(m, points.iter().map(|p| (*p, tint)));
     }
 
-    /// A smooth surface of `rows` times `columns` vertices, whose outside is on the side of (next column) × (next row); `at`
-    /// gives position, normal and tint. Where two neighbours of a row coincide, a quad is a triangle.
+    /// A smooth surface of `rows` times `columns` vertices, whose outside is on the side of (next column) × (next row);
+    /// `at` gives position, normal and tint. Where two neighbours of a row coincide, a quad is a triangle.
     pub fn lattice(
         &mut self,
         m: Mat,
@@ -279,7 +279,8 @@ impl Builder {
         }
     }
 
-    /// A tapered tube from `a` (radius `ra`) to `b` (radius `rb`); a radius of 0 makes a cone. `cap` closes the end at b.
+    /// A tapered tube from `a` (radius `ra`) to `b` (radius `rb`); a radius of 0 makes a cone. `cap` closes the end at
+    /// b.
     pub fn tube(&mut self, m: Mat, tint: Tint, [a, b]: [DVec3; 2], [ra, rb]: [f64; 2], sides: u32, cap: bool) {
         let axis = (b - a).normalize();
         let x = axis.any_orthonormal_vector();
@@ -318,8 +319,8 @@ impl Builder {
         self.fan(m, tint, &ring);
     }
 
-    /// A convex profile of (n, v) pairs, counter-clockwise with n drawn to the right and v up, extruded from `u0` to `u1`;
-    /// `caps` closes both ends.
+    /// A convex profile of (n, v) pairs, counter-clockwise with n drawn to the right and v up, extruded from `u0` to
+    /// `u1`; `caps` closes both ends.
     pub fn extrude(&mut self, f: &Frame, m: Mat, tint: Tint, profile: &[[f64; 2]], [u0, u1]: [f64; 2], caps: bool) {
         let count = profile.len();
         for k in 0..count {
@@ -335,8 +336,8 @@ impl Builder {
     }
 }
 
-/// `polygon` (x, z; walls as [`Frame::wall`] has them) with edge k moved inward by `distances[k]`. The polygon must stay
-/// convex and keep its edges.
+/// `polygon` (x, z; walls as [`Frame::wall`] has them) with edge k moved inward by `distances[k]`. The polygon must
+/// stay convex and keep its edges.
 pub fn inset(polygon: &[DVec2], distances: &[f64]) -> Vec<DVec2> {
     let count = polygon.len();
     let line = |k: usize| {

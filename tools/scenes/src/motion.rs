@@ -30,8 +30,8 @@ struct Motion {
     instances: Vec<Mover>,
 }
 
-/// Writes how things of a scene move beside it, as long as its longest path: for `base` = `dir/S.bricks` the file `dir/S.motion.json`. Returns its
-/// name; `None` where nothing moves.
+/// Writes how things of a scene move beside it, as long as its longest path: for `base` = `dir/S.bricks` the file
+/// `dir/S.motion.json`. Returns its name; `None` where nothing moves.
 ///
 /// The file appears complete or not at all.
 ///

@@ -13,8 +13,8 @@ pub fn folder(file: &Path) -> &Path {
     }
 }
 
-/// A temporary file that [`publish`] can give the name `file`: `.NAME.tmp`, for this process alone. What a process left there
-/// that was killed is overwritten.
+/// A temporary file that [`publish`] can give the name `file`: `.NAME.tmp`, for this process alone. What a process left
+/// there that was killed is overwritten.
 pub fn temporary(file: &Path) -> io::Result<NamedTempFile> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let path = std::path::absolute(folder(file).join(format!(".{name}.tmp")))?;

@@ -106,8 +106,8 @@ pub fn around(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64) -> Ca
     arc(target, bounds, rise, start, std::f64::consts::TAU / 3.0)
 }
 
-/// An arc of `span` radians around `target`, `rise` above the horizon, all of `bounds` in view of a picture of 4:3 or wider in every
-/// keyframe.
+/// An arc of `span` radians around `target`, `rise` above the horizon, all of `bounds` in view of a picture of 4:3 or
+/// wider in every keyframe.
 pub fn arc(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64, span: f64) -> CameraPath {
     const KEYS: u32 = 13;
     let fov_y_degrees: f64 = 50.0;
@@ -136,8 +136,9 @@ pub fn arc(target: DVec3, bounds: &[[DVec3; 2]], rise: f64, start: f64, span: f6
     CameraPath { fov_y_degrees, up: UP, keyframes: keyframes.collect() }
 }
 
-/// Writes the paths of a scene beside it: for `base` = `dir/S.bricks`, `dir/S.glb`, `dir/S.gltf` or `dir/S` the files `dir/S.near.json` (a walk for 30
-/// frames), `dir/S.near-300.json` (the same walk, longer, for 300 frames) and `dir/S.far.json`. Returns their names.
+/// Writes the paths of a scene beside it: for `base` = `dir/S.bricks`, `dir/S.glb`, `dir/S.gltf` or `dir/S` the files
+/// `dir/S.near.json` (a walk for 30 frames), `dir/S.near-300.json` (the same walk, longer, for 300 frames) and
+/// `dir/S.far.json`. Returns their names.
 ///
 /// Each file appears complete or not at all.
 ///

@@ -1,7 +1,7 @@
 //! Growth in rings: the order in which cells around the origin are built, until a count of triangles is reached.
 //!
-//! A cell does not depend on what is built around it, so that the centre is the same in every size. The last one gets what
-//! is left of the count.
+//! A cell does not depend on what is built around it, so that the centre is the same in every size. The last one gets
+//! what is left of the count.
 
 use brickwalk_convert::progress::Progress;
 use rayon::prelude::*;
@@ -53,8 +53,8 @@ pub fn empty_cells(count: usize) -> Vec<(i64, i64)> {
 
 /// Takes cell after cell while it fits into `wanted` triangles; returns the budget and the plan of each.
 ///
-/// `plan` counts the triangles of the cell with a number within a budget, `around` those of what surrounds so many cells;
-/// `usual` is what a cell takes on average.
+/// `plan` counts the triangles of the cell with a number within a budget, `around` those of what surrounds so many
+/// cells; `usual` is what a cell takes on average.
 pub fn grow<P: Send>(
     wanted: u64,
     usual: u64,

@@ -67,7 +67,8 @@ impl Rng {
     }
 }
 
-/// Smooth noise in [0, 1] over the plane: random values at whole numbers, of the thing named by `key`, and cubics between.
+/// Smooth noise in [0, 1] over the plane: random values at whole numbers, of the thing named by `key`, and cubics
+/// between.
 pub fn noise(seed: u64, key: &[i64], q: glam::DVec2) -> f64 {
     let (fx, fz) = (q.x - q.x.floor(), q.y - q.y.floor());
     let smooth = |t: f64| t * t * (3.0 - 2.0 * t);

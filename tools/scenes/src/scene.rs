@@ -38,11 +38,11 @@ pub trait Recipe: Send + Sync {
 /// A mesh that is made while its parts are read.
 type Made = Arc<OnceLock<Vec<Primitive>>>;
 
-/// A generated scene: a [`Source`] whose parts are made when they are read. Metres, Y up, right-handed; vertex colours, no
-/// textures.
+/// A generated scene: a [`Source`] whose parts are made when they are read. Metres, Y up, right-handed; vertex colours,
+/// no textures.
 ///
-/// The meshes read last are kept, one for each thread of the pool in which the scene was generated, as the parts of a mesh
-/// are made together.
+/// The meshes read last are kept, one for each thread of the pool in which the scene was generated, as the parts of a
+/// mesh are made together.
 pub struct Scene {
     pub(crate) outline: Outline,
     pub(crate) recipe: Box<dyn Recipe>,
@@ -58,8 +58,8 @@ impl Scene {
         Self { outline, recipe, copies: Vec::new(), recent: Mutex::new(LruCache::new(kept)) }
     }
 
-    /// The path of `frames` frames (at least one) through the midst of the scene; a longer one begins with a shorter one,
-    /// and it does not depend on the number of triangles.
+    /// The path of `frames` frames (at least one) through the midst of the scene; a longer one begins with a shorter
+    /// one, and it does not depend on the number of triangles.
     pub fn near_path(&self, frames: u32) -> CameraPath {
         self.recipe.near(frames.max(1))
     }

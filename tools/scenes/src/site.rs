@@ -79,7 +79,8 @@ pub struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    /// An empty block that takes at most `budget` triangles. With `instanced`, shared meshes are listed instead of copied.
+    /// An empty block that takes at most `budget` triangles. With `instanced`, shared meshes are listed instead of
+    /// copied.
     pub fn new(cell: Cell, library: &'a Library, instanced: bool, budget: u64) -> Self {
         Self { cell, library, instanced, pieces: Pieces::new(Builder::new(), budget), uses: Vec::new() }
     }

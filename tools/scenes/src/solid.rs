@@ -127,8 +127,8 @@ pub fn pipe(b: &mut Builder, m: Mat, tint: Tint, points: &[DVec3], r: f64, bend:
     }
 }
 
-/// A profile of an arc of the ellipse with half axes `r` and `h` above height `y0`, from the rim to the pole, or from pole to
-/// rim below it for a negative `h`.
+/// A profile of an arc of the ellipse with half axes `r` and `h` above height `y0`, from the rim to the pole, or from
+/// pole to rim below it for a negative `h`.
 pub fn dome(r: f64, h: f64, y0: f64, count: u32) -> Vec<[f64; 2]> {
     let mut line: Vec<[f64; 2]> = (0..=count)
         .map(|k| {
@@ -142,8 +142,8 @@ pub fn dome(r: f64, h: f64, y0: f64, count: u32) -> Vec<[f64; 2]> {
     line
 }
 
-/// A closed surface around the origin of directions: `at` gives position and tint for a unit direction; `rows` from pole to
-/// pole. Normals are those of the surface, by differences.
+/// A closed surface around the origin of directions: `at` gives position and tint for a unit direction; `rows` from
+/// pole to pole. Normals are those of the surface, by differences.
 pub fn ball(b: &mut Builder, m: Mat, rows: u32, at: impl Fn(DVec3) -> (DVec3, Tint)) {
     let columns = 2 * rows;
     let direction = |row: u32, column: u32| {

@@ -1,4 +1,5 @@
-//! The ground of a cell: half of the four streets around it, markings, kerb, pavement; and the country outside the city.
+//! The ground of a cell: half of the four streets around it, markings, kerb, pavement; and the country outside the
+//! city.
 
 use crate::layout::{CORNER, Cell, KERB, Layout, PAVEMENT, Rect};
 use crate::material::{Mat, Tint, WHITE, shade};
@@ -33,8 +34,9 @@ pub fn flat(b: &mut Builder, m: Mat, tint: Tint, rect: Rect, y: f64) {
     b.fan(m, tint, &rect.polygon().map(|p| DVec3::new(p.x, y, p.y)));
 }
 
-/// One side of a cell seen from its street: u runs along the traffic of this half of the street, 0 at the cell's corner;
-/// w runs from the kerb-side block toward the centre line, 0 at the centre line, so that the kerb is at w = −half.
+/// One side of a cell seen from its street: u runs along the traffic of this half of the street, 0 at the cell's
+/// corner; w runs from the kerb-side block toward the centre line, 0 at the centre line, so that the kerb is at w =
+/// −half.
 struct Side {
     frame: Frame,
     length: f64,
@@ -352,8 +354,8 @@ pub fn along_kerb(cell: &Cell, back: f64, step: f64, mut place: impl FnMut(Frame
     }
 }
 
-/// Frames on the road: at `w` metres from the centre line of the streets around the cell, driving with the traffic, `u` as
-/// fraction of the stretch between the crossings; facing the direction of travel.
+/// Frames on the road: at `w` metres from the centre line of the streets around the cell, driving with the traffic, `u`
+/// as fraction of the stretch between the crossings; facing the direction of travel.
 pub fn on_road(cell: &Cell, k: usize, u: f64, w: f64) -> Frame {
     let side = Side::new(cell, k);
     let (from, to) = (side.ends[0] + CORNER + 7.5, side.length - side.ends[1] - CORNER - 7.5);

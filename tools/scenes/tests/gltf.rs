@@ -57,8 +57,8 @@ fn difference(a: &dyn Source, b: &dyn Source) -> Option<String> {
         }
         let low = all.iter().fold(DVec3::INFINITY, |low, c| low.min(c.0));
         let high = all.iter().fold(DVec3::NEG_INFINITY, |high, c| high.max(c.0));
-        // A coordinate relative to the anchor is at most the extent and half a unit, and is rounded by 2^-24 of it; turning
-        // and scaling (by less than 2) mix three of them. f64 adds nothing of this size.
+        // A coordinate relative to the anchor is at most the extent and half a unit, and is rounded by 2^-24 of it;
+        // turning and scaling (by less than 2) mix three of them. f64 adds nothing of this size.
         let tolerance = 2.0 * 3.0 * ((high - low).max_element() + 0.5) * (0.5f64).powi(24);
         for (k, (c, d)) in all.iter().zip(&others).enumerate() {
             if (c.1, c.2, c.3) != (d.1, d.2, d.3) {

@@ -1,4 +1,5 @@
-//! What holds for generated scenes of every kind: counts, parts, determinism, sound geometry, and the ways through them.
+//! What holds for generated scenes of every kind: counts, parts, determinism, sound geometry, and the ways through
+//! them.
 
 mod common;
 
@@ -123,7 +124,8 @@ fn geometry_is_sound() {
                     let n: DVec3 = t.iter().map(|&k| DVec3::from_array(normals[k as usize].map(f64::from))).sum();
                     (b - a).cross(c - a).dot(n) > 0.0
                 });
-                // Normals of smooth surfaces agree with the winding, but for creases that the division does not resolve.
+                // Normals of smooth surfaces agree with the winding, but for creases that the division does not
+                // resolve.
                 let (agree, all) = (agree.count(), p.indices.len() / 3);
                 assert!(agree as f64 >= 0.97 * all as f64, "{what}: {agree} of {all} normals are on the outside");
             }

@@ -1,6 +1,6 @@
 //! Where secondary rays start: no hit of the surface they leave, no way out of a closed box.
 
-use super::*;
+use crate::math::exact::tests::*;
 
 /// How a secondary ray leaves its surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

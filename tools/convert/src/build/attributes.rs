@@ -48,8 +48,8 @@ impl VertexBits {
     }
 }
 
-/// The attributes of vertex `vertex` of a placed part, which is corner `corner` (of all triangles of the part one after the other);
-/// `with_detail` if its material needs details.
+/// The attributes of vertex `vertex` of a placed part, which is corner `corner` (of all triangles of the part one after
+/// the other); `with_detail` if its material needs details.
 pub(super) fn vertex(placed: &Placed, vertex: u32, corner: usize, with_detail: bool) -> VertexBits {
     let primitive = placed.primitive;
     let normal = source_normal(placed, vertex).unwrap_or(NO_NORMAL);
@@ -72,8 +72,9 @@ fn coordinates(uvs: Option<&[[f32; 2]]>, vertex: u32) -> [u32; 2] {
     uv.map(|x| if x.is_finite() { (x + 0.0).to_bits() } else { 0 })
 }
 
-/// The octahedral tangent of a corner in object space, and the handedness there; `None` if the source has none that is usable.
-/// Tangents are vectors, so the matrix itself maps them; a mirror turns the handedness, since normals keep to the outside.
+/// The octahedral tangent of a corner in object space, and the handedness there; `None` if the source has none that is
+/// usable. Tangents are vectors, so the matrix itself maps them; a mirror turns the handedness, since normals keep to
+/// the outside.
 fn source_tangent(placed: &Placed, corner: usize) -> Option<(u32, f32)> {
     let [x, y, z, sign] = placed.primitive.tangents.as_ref()?[corner];
     let tangent = [x, y, z].map(f64::from);
@@ -113,8 +114,8 @@ fn exact_cross([a, b, c]: &[[i64; 3]; 3]) -> [i128; 3] {
     [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]
 }
 
-/// Octahedral encoding (Cigolle et al. 2014) with z as the axis of the fold: two snorm16, x in the low half. `None` for a
-/// vector without direction.
+/// Octahedral encoding (Cigolle et al. 2014) with z as the axis of the fold: two snorm16, x in the low half. `None` for
+/// a vector without direction.
 pub(super) fn octahedral(v: [f64; 3]) -> Option<u32> {
     let sum = v[0].abs() + v[1].abs() + v[2].abs();
     if !sum.is_finite() || sum == 0.0 {

@@ -62,7 +62,8 @@ pub(super) struct BinaryNode {
     pub right: u32,
 }
 
-/// Sum of the nodes' areas in areas of the root above which boxes are too crowded for reinsertion. It is about 50 for meshes.
+/// Sum of the nodes' areas in areas of the root above which boxes are too crowded for reinsertion. It is about 50 for
+/// meshes.
 const CROWDED: f64 = 4096.0;
 
 /// Boxes below which the square of their number does not matter.
@@ -79,8 +80,8 @@ pub(super) struct BinaryTree {
 }
 
 impl BinaryTree {
-    /// A tree of good quality, of any depth, over at least one box whose coordinates are small against the range of f32:
-    /// PLOC with reinsertion, on one thread; `is_fast` searches fewer neighbours and does not reinsert.
+    /// A tree of good quality, of any depth, over at least one box whose coordinates are small against the range of
+    /// f32: PLOC with reinsertion, on one thread; `is_fast` searches fewer neighbours and does not reinsert.
     pub fn by_obvhs(boxes: &[Box3], is_fast: bool) -> Self {
         let vector = |p: [i64; 3]| Vec3A::from_array(p.map(|x| x as f32));
         let aabbs: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(vector(b.min), vector(b.max))).collect();
@@ -168,9 +169,9 @@ impl BinaryTree {
     }
 }
 
-/// Whether PLOC would merge too few neighbours a round, of which it takes time in proportion to the square: duplicates, and
-/// boxes in a row of growing size. It merges mutual nearest neighbours, so along its Morton order there is a local minimum
-/// of the merged area for each; of scattered boxes that is every third.
+/// Whether PLOC would merge too few neighbours a round, of which it takes time in proportion to the square: duplicates,
+/// and boxes in a row of growing size. It merges mutual nearest neighbours, so along its Morton order there is a local
+/// minimum of the merged area for each; of scattered boxes that is every third.
 fn is_chain(boxes: &[Aabb]) -> bool {
     if boxes.len() < LEAST_CHAIN {
         return false;

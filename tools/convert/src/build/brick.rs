@@ -258,8 +258,8 @@ fn nearest_origin(x: i64) -> i64 {
     (x + ORIGIN_STEPS / 2).div_euclid(ORIGIN_STEPS) * ORIGIN_STEPS
 }
 
-/// Appends a vertex: three f32, or for a wide brick three high and three low parts. All are exact: 24 bits of steps times a
-/// power of two in the normal range.
+/// Appends a vertex: three f32, or for a wide brick three high and three low parts. All are exact: 24 bits of steps
+/// times a power of two in the normal range.
 fn push_vertex(bytes: &mut Vec<u8>, steps: [i64; 3], wide: bool, step_unit_log2: i32) {
     let scale = pow2(step_unit_log2);
     let mut push = |steps: i64| bytes.extend(((steps as f64 * scale) as f32).to_le_bytes());

@@ -221,8 +221,8 @@ pub(super) fn default_memory() -> u64 {
 pub(super) fn give_back() {
     /// Allocations from this size on go back when they are freed.
     const AT_ONCE_BYTES: i32 = 1 << 20;
-    // SAFETY: both functions may be called at any time from any thread; they change where memory comes from and goes to,
-    // not what is in it.
+    // SAFETY: both functions may be called at any time from any thread; they change where memory comes from and goes
+    // to, not what is in it.
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, AT_ONCE_BYTES);
         libc::malloc_trim(0);

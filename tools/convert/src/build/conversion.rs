@@ -289,7 +289,8 @@ impl Conversion<'_> {
     }
 }
 
-/// Brings triangles together on the disk as `T` and encodes them. Returns by object how many rounding leaves without area.
+/// Brings triangles together on the disk as `T` and encodes them. Returns by object how many rounding leaves without
+/// area.
 fn write_bricks<T: Stored>(
     bounded: &Bounded,
     (cuts, jobs, contexts): (&BoundedCuts, &[Job], &[BrickContext]),

@@ -248,7 +248,8 @@ impl Bounded<'_> {
     }
 }
 
-/// The records of a chunk and their occupancy from the journal; see [`super::journal::Journal::written`] for what comes before them.
+/// The records of a chunk and their occupancy from the journal; see [`super::journal::Journal::written`] for what comes
+/// before them.
 fn take_written(words: &[u64]) -> Option<(Vec<Brick>, Vec<Occupancy>)> {
     let mut words = WordReader(words);
     words.take()?;

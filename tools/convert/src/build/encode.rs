@@ -42,8 +42,8 @@ impl<'a> BrickWriter<'a> {
         Self { writer, records, occupancy, dropped: vec![0; objects], batch_triangles }
     }
 
-    /// Encodes and writes bricks. `encode` makes one, or none if no triangle of it has an area; it also returns how many
-    /// have none.
+    /// Encodes and writes bricks. `encode` makes one, or none if no triangle of it has an area; it also returns how
+    /// many have none.
     pub fn write(
         &mut self,
         jobs: &[Job],

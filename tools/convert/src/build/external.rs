@@ -100,8 +100,8 @@ pub(super) fn split(
     }
 }
 
-/// Appends the items for which `is_left` holds to the first file and the others to the second. Returns for both how many
-/// there are and the bounds of twice their centroids.
+/// Appends the items for which `is_left` holds to the first file and the others to the second. Returns for both how
+/// many there are and the bounds of twice their centroids.
 fn separate(
     blocks: &Blocks<PackedItem>,
     to: [&Spill<PackedItem>; 2],

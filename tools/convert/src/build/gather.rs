@@ -48,8 +48,8 @@ impl Gathered {
     }
 }
 
-/// Collects the boxes of a run of triangles, in order of slots; the index of an item is its slot. The first bad vertex is
-/// the error.
+/// Collects the boxes of a run of triangles, in order of slots; the index of an item is its slot. The first bad vertex
+/// is the error.
 pub(super) fn gather(
     reader: &Reader,
     run: &[Piece],

@@ -1,8 +1,9 @@
 //! The journal of a conversion: what has been done, step by step, so that one that was interrupted can be continued.
 //!
-//! The steps of a conversion follow from its source and settings alone. A conversion that is continued goes through them
-//! again and takes the results of those that the journal has from there. A result names all that the step left on the disk
-//! by lengths, and what lies there is checked when it is read, so nothing has to be synced before it is recorded.
+//! The steps of a conversion follow from its source and settings alone. A conversion that is continued goes through
+//! them again and takes the results of those that the journal has from there. A result names all that the step left on
+//! the disk by lengths, and what lies there is checked when it is read, so nothing has to be synced before it is
+//! recorded.
 
 use super::error::BuildError;
 use bricks::Span;
@@ -97,8 +98,8 @@ impl Journal {
         self.done.len()
     }
 
-    /// Up to which byte an earlier run wrote the scene file, and the payloads before that: what the results of the steps
-    /// that write begin with. `None` if there was no such step.
+    /// Up to which byte an earlier run wrote the scene file, and the payloads before that: what the results of the
+    /// steps that write begin with. `None` if there was no such step.
     pub fn written(&self) -> Result<Option<(u64, Vec<Span>)>, BuildError> {
         let (mut position, mut spans) = (None, Vec::new());
         let writes = |step: u64| [Step::Textures, Step::Opacity, Step::Encode].iter().any(|kind| *kind as u64 == step);

@@ -1,12 +1,13 @@
 //! The lattice of an object: which step, which device unit, and rounding to it (numerics.md, "Positions").
 //!
-//! The step follows from sizes alone, so a scene that is moved keeps it. It is coarsened only where it has to be: for the
-//! range of the arithmetic ([`REACH_STEPS`], [`DIAGONAL_STEPS_LOG2`]), and then the conversion says so.
+//! The step follows from sizes alone, so a scene that is moved keeps it. It is coarsened only where it has to be: for
+//! the range of the arithmetic ([`REACH_STEPS`], [`DIAGONAL_STEPS_LOG2`]), and then the conversion says so.
 
 use super::error::BuildError;
 
-/// Largest magnitude of a lattice coordinate of a vertex, in steps. Every vertex is then within `2^45` of every other; with
-/// a reference point near the camera the offset of a brick stays within the `2^44` steps in which it is an exact f32.
+/// Largest magnitude of a lattice coordinate of a vertex, in steps. Every vertex is then within `2^45` of every other;
+/// with a reference point near the camera the offset of a brick stays within the `2^44` steps in which it is an exact
+/// f32.
 pub(super) const REACH_STEPS: f64 = (1u64 << 44) as f64;
 
 /// log2 of the largest diagonal in steps: a device unit is `2^-10` of it or more, so a step is at least `2^-30` units.
@@ -96,8 +97,8 @@ impl Extents {
         Some(*chunks.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
 
-    /// Chooses the lattice. `requested` overrides the step and is an error if it is too fine; the step that follows from the
-    /// sizes is coarsened where it must be, which is said in `warnings`.
+    /// Chooses the lattice. `requested` overrides the step and is an error if it is too fine; the step that follows
+    /// from the sizes is coarsened where it must be, which is said in `warnings`.
     pub fn lattice(&self, requested: Option<i32>, warnings: &mut Vec<String>) -> Result<Lattice, BuildError> {
         if self.min[0] > self.max[0] {
             return Ok(Lattice { step_log2: requested.unwrap_or(-EXTENT_STEPS_LOG2), unit_log2: 0 });

@@ -1,13 +1,13 @@
 //! Cuts a scene into bricks and writes the scene file.
 //!
-//! The order of the work is what makes images independent of how a scene is cut (numerics.md, "Positions"): triangles are
-//! numbered in the order of the source (`objects`), a partition that ignores all settings gives the sizes from which each
-//! object's lattice follows (`partition`, `lattice`), every position is rounded to it once (`triangle`), and only then are
-//! bricks encoded (`brick`). Trees take their topology from floating-point builders (`binary`, `wide`), but their boxes are
-//! exact integers (`node`). Everything is the same for any number of threads.
+//! The order of the work is what makes images independent of how a scene is cut (numerics.md, "Positions"): triangles
+//! are numbered in the order of the source (`objects`), a partition that ignores all settings gives the sizes from
+//! which each object's lattice follows (`partition`, `lattice`), every position is rounded to it once (`triangle`), and
+//! only then are bricks encoded (`brick`). Trees take their topology from floating-point builders (`binary`, `wide`),
+//! but their boxes are exact integers (`node`). Everything is the same for any number of threads.
 //!
-//! A scene that does not fit in memory (`budget`) goes through the same steps by way of the disk (`scratch`, `spill`): its
-//! items are split there until they fit (`external`, `bounded`), then its triangles are brought together by bricks
+//! A scene that does not fit in memory (`budget`) goes through the same steps by way of the disk (`scratch`, `spill`):
+//! its items are split there until they fit (`external`, `bounded`), then its triangles are brought together by bricks
 //! (`distribute`). What depends on sets of triangles alone cannot differ, so neither does the file. Steps are recorded
 //! (`journal`), so that an interrupted conversion can be continued.
 

@@ -25,7 +25,8 @@ pub(super) fn floor_to_f32(x: i64) -> i64 {
     x >> shift << shift
 }
 
-/// A node of a brick. Its boxes are relative to the brick's origin, in lattice steps of `2^step_unit_log2` device units.
+/// A node of a brick. Its boxes are relative to the brick's origin, in lattice steps of `2^step_unit_log2` device
+/// units.
 pub(super) fn encode(node: &WideNode, step_unit_log2: i32) -> Node {
     let origin = node.bounds.min.map(floor_to_f32);
     let grid = quantise(node, origin);

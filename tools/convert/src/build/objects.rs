@@ -241,8 +241,8 @@ fn movable(scene: &Outline, invertible: &[bool], settings: &BuildSettings) -> Re
     Err(BuildError::NothingMovable { pattern: settings.movable[missing].clone(), known: known.join(", ") })
 }
 
-/// Which meshes are stored once and placed by instances: those that are movable, those with enough triangles that are placed twice or more,
-/// and smaller ones once the budget for copies of them is spent.
+/// Which meshes are stored once and placed by instances: those that are movable, those with enough triangles that are
+/// placed twice or more, and smaller ones once the budget for copies of them is spent.
 fn choose_instanced(
     scene: &Outline,
     counts: &[u64],

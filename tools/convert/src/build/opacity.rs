@@ -34,8 +34,8 @@ pub(super) struct MaterialOpacity {
 }
 
 impl Opacities {
-    /// Writes the map of every texture of `materials` that rays ask for; `read` are those of them, by index in the source, that could
-    /// be read before. One whose alpha is 1 throughout has none.
+    /// Writes the map of every texture of `materials` that rays ask for; `read` are those of them, by index in the
+    /// source, that could be read before. One whose alpha is 1 throughout has none.
     pub fn write(
         source: &dyn Source,
         materials: &[Material],

@@ -1,11 +1,11 @@
 //! Cuts the triangles of an object into bricks: top-down, binned SAH on the centroids of their boxes, each triangle in
 //! exactly one part.
 //!
-//! A few triangles that are much larger than the others of their part would make its box, and with it the number of rays
-//! that need it, as large as themselves. They are taken out of all parts and make up parts of their own.
+//! A few triangles that are much larger than the others of their part would make its box, and with it the number of
+//! rays that need it, as large as themselves. They are taken out of all parts and make up parts of their own.
 //!
-//! Where the cut goes depends on the triangles alone, not on how many a brick may hold, so parts for different limits are
-//! levels of one tree. That tree cut at [`CANONICAL_TRIANGLES`] gives the extents from which the lattice follows.
+//! Where the cut goes depends on the triangles alone, not on how many a brick may hold, so parts for different limits
+//! are levels of one tree. That tree cut at [`CANONICAL_TRIANGLES`] gives the extents from which the lattice follows.
 
 use rayon::prelude::*;
 use std::ops::Range;
@@ -97,14 +97,14 @@ impl Bounds {
 pub(super) struct Rule {
     /// Most items of a part, at least 1.
     pub limit: usize,
-    /// Whether the items are those of an object; otherwise they are the large ones that were taken out of its parts. From
-    /// an object its canonical extents are taken, and the items that are too large for their parts.
+    /// Whether the items are those of an object; otherwise they are the large ones that were taken out of its parts.
+    /// From an object its canonical extents are taken, and the items that are too large for their parts.
     pub is_object: bool,
 }
 
 impl Rule {
-    /// How the large items that were taken out of the parts are cut: into small parts, so that far apart ones do not share
-    /// one.
+    /// How the large items that were taken out of the parts are cut: into small parts, so that far apart ones do not
+    /// share one.
     pub fn of_large(self) -> Self {
         Self { limit: self.limit.div_ceil(LARGE_PARTS), is_object: false }
     }
@@ -172,7 +172,8 @@ struct Parts {
     extents: Vec<f64>,
 }
 
-/// Moves the items without which the others are at least [`LARGE_GAIN`] times cheaper to the end; returns how many stay.
+/// Moves the items without which the others are at least [`LARGE_GAIN`] times cheaper to the end; returns how many
+/// stay.
 fn move_large_to_end(items: &mut [Item]) -> usize {
     let most = items.len() / LEAST_SIDE;
     if most == 0 {
@@ -222,8 +223,8 @@ fn descend(items: &mut [Item], first: usize, limit: usize, mut is_brick: bool, m
     parts
 }
 
-/// Reorders at least two items so that a cut lies at the returned index, with at least `least_side` items (at most half)
-/// on either side: by SAH over bins, or at the median if that finds no cut or `median` is set.
+/// Reorders at least two items so that a cut lies at the returned index, with at least `least_side` items (at most
+/// half) on either side: by SAH over bins, or at the median if that finds no cut or `median` is set.
 #[inline(never)]
 pub(super) fn split(items: &mut [Item], least_side: usize, median: bool) -> usize {
     let (_, centroids) = bounds(items);

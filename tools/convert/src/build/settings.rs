@@ -30,14 +30,14 @@ pub struct BuildSettings {
     pub drop_non_finite: bool,
     /// Least triangles of a mesh that is placed more than once and stored once.
     pub instance_min_triangles: u32,
-    /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they too are stored
-    /// once.
+    /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they too are
+    /// stored once.
     pub bake_budget_triangles: u64,
-    /// Names of nodes, with wildcards ([`crate::pattern`]), whose meshes, and those of the nodes below them, are kept as objects with instances of
-    /// their own, however often they are placed.
+    /// Names of nodes, with wildcards ([`crate::pattern`]), whose meshes, and those of the nodes below them, are kept
+    /// as objects with instances of their own, however often they are placed.
     pub movable: Vec<String>,
-    /// Memory to get by with, in bytes, the source not counted if it lies in memory; `None`: a quarter of the machine's.
-    /// What does not fit goes to the scratch folder. Changes nothing but the time.
+    /// Memory to get by with, in bytes, the source not counted if it lies in memory; `None`: a quarter of the
+    /// machine's. What does not fit goes to the scratch folder. Changes nothing but the time.
     pub memory_bytes: Option<u64>,
     /// Builds the trees in bricks faster, for rays that take longer. Changes neither ids nor positions.
     pub fast: bool,
@@ -47,8 +47,8 @@ pub struct BuildSettings {
     pub textures: TextureEncoding,
     /// Folder for the scratch folder; `None`: that of the output.
     pub scratch: Option<PathBuf>,
-    /// Continues an interrupted conversion of the same source with the same settings, if there is one. Only a conversion
-    /// that did not fit in memory leaves something to continue.
+    /// Continues an interrupted conversion of the same source with the same settings, if there is one. Only a
+    /// conversion that did not fit in memory leaves something to continue.
     pub resume: bool,
 }
 

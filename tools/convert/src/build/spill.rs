@@ -1,5 +1,5 @@
-//! Files of records on the scratch disk: blocks of records, each with its number and a checksum. Any thread appends; what is
-//! read is checked.
+//! Files of records on the scratch disk: blocks of records, each with its number and a checksum. Any thread appends;
+//! what is read is checked.
 
 use super::error::BuildError;
 use bytemuck::Pod;

@@ -216,7 +216,8 @@ pub(super) fn sound_wrap(texture: &SourceTexture) -> u32 {
 
 /// Makes the mip chain of a texture and encodes it.
 ///
-/// As blocks, normals are BC5: unit vectors without the sign of z. See `benches/results/textures.md` for the angles that it costs.
+/// As blocks, normals are BC5: unit vectors without the sign of z. See `benches/results/textures.md` for the angles
+/// that it costs.
 pub(super) fn encode(
     source: &SourceTexture,
     content: Content,
@@ -342,7 +343,8 @@ struct Taps {
     weights: [f32; 3],
 }
 
-/// The taps of texel `i` of `to` over `from`; `to` is `from / 2`, or both are 1. The texel covers `from / to` ≤ 3 texels.
+/// The taps of texel `i` of `to` over `from`; `to` is `from / 2`, or both are 1. The texel covers `from / to` ≤ 3
+/// texels.
 fn taps(from: usize, to: usize, i: usize) -> Taps {
     // In units of 1 / to texels: the texel covers [i from, (i + 1) from], texel j of the source [j to, (j + 1) to].
     let (start, end) = (i * from, (i + 1) * from);
@@ -392,8 +394,8 @@ fn srgb(linear: f32) -> u8 {
 }
 
 impl Content {
-    /// What RGBA8 stands for: linear RGBA. Directions are numbers like others: their mean is that of the vectors, which lie in a cube
-    /// twice as large about its middle.
+    /// What RGBA8 stands for: linear RGBA. Directions are numbers like others: their mean is that of the vectors, which
+    /// lie in a cube twice as large about its middle.
     fn decode(self, rgba: &[u8]) -> Vec<[f32; 4]> {
         let table = &*LINEAR_OF_SRGB;
         let (texels, _) = rgba.as_chunks::<4>();
@@ -547,8 +549,8 @@ mod tests {
         rgba
     }
 
-    /// Angles between directions and what blocks make of them, in degrees: mean and greatest; the PSNR of red, green and blue;
-    /// milliseconds to encode.
+    /// Angles between directions and what blocks make of them, in degrees: mean and greatest; the PSNR of red, green
+    /// and blue; milliseconds to encode.
     fn loss(texture: &SourceTexture, variant: CompressionVariant) -> [f64; 4] {
         let size = [texture.width, texture.height];
         let mut texels = texture.rgba.clone();

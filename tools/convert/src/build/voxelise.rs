@@ -1,13 +1,13 @@
 //! Voxelises the triangles of a brick: the cells of its occupancy map that they touch, exactly.
 //!
-//! A triangle touches a closed box unless one of thirteen axes separates the two (Akenine-Möller 2001). The axes group into
-//! the box's own, the triangle's normal, and for each of the three projections along an axis the normals of the projected
-//! edges (Schwarz and Seidel 2010). Each is a linear inequality in the cell's integer coordinates:
+//! A triangle touches a closed box unless one of thirteen axes separates the two (Akenine-Möller 2001). The axes group
+//! into the box's own, the triangle's normal, and for each of the three projections along an axis the normals of the
+//! projected edges (Schwarz and Seidel 2010). Each is a linear inequality in the cell's integer coordinates:
 //!
 //! max over the box of m·x ≥ m·p ⇔ Σ m\[k\] i\[k\] ≥ ⌈m·p / side⌉ − Σ max(m\[k\], 0)
 //!
-//! for the cell from i·side to (i + 1)·side. So the cells along a line that satisfy one are a range, a mask of 64 bits, and a
-//! triangle costs a few masks for each column that it touches. All numbers are integers; nothing is rounded.
+//! for the cell from i·side to (i + 1)·side. So the cells along a line that satisfy one are a range, a mask of 64 bits,
+//! and a triangle costs a few masks for each column that it touches. All numbers are integers; nothing is rounded.
 
 use bricks::{OccupancyGrid, OccupancyMap};
 use std::ops::{Add, Mul, Neg, Sub};
@@ -15,8 +15,8 @@ use std::ops::{Add, Mul, Neg, Sub};
 /// Cells of a grid on each axis.
 const CELLS: u32 = bricks::OCCUPANCY_CELLS;
 
-/// log2 of the largest side of a cell with which 64 bits hold all values: corners are within 2^26 of each other, normals
-/// within 2^53, their products with cells within 2^61.
+/// log2 of the largest side of a cell with which 64 bits hold all values: corners are within 2^26 of each other,
+/// normals within 2^53, their products with cells within 2^61.
 const NARROW_SIDE_LOG2: u32 = 20;
 
 /// Cells in a row up to which trying each is faster than dividing.

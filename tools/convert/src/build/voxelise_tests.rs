@@ -256,8 +256,8 @@ fn other_rules_are_seen() {
     assert_eq!(differences(&slanted, &grid, &OccupancyMap::of_finest(&more)), (0, 1));
 }
 
-/// Points of triangles lie in occupied cells. A point in f64 is off by less than 2^-50 of the coordinates' 2^26 or so, so
-/// one within 2^-20 of a border is left out.
+/// Points of triangles lie in occupied cells. A point in f64 is off by less than 2^-50 of the coordinates' 2^26 or so,
+/// so one within 2^-20 of a border is left out.
 #[test]
 fn points_of_triangles_lie_in_occupied_cells() {
     let mut rng = rng();
@@ -285,8 +285,8 @@ fn points_of_triangles_lie_in_occupied_cells() {
             let sides = [-(2f64.powi(-20)), 2f64.powi(-20)];
             for corner in 0..8 {
                 let cell = std::array::from_fn(|k| both(point[k], sides[corner >> k & 1]));
-                // Where the signs matter the point is on a border as far as f64 tells: the cell need not be touched unless
-                // the plane itself is the border.
+                // Where the signs matter the point is on a border as far as f64 tells: the cell need not be touched
+                // unless the plane itself is the border.
                 let matters = (0..3).any(|k| both(point[k], sides[0]) != both(point[k], sides[1]));
                 let in_plane = (0..3).all(|k| {
                     both(point[k], sides[0]) == both(point[k], sides[1])

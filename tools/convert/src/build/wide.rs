@@ -1,9 +1,9 @@
 //! Collapses a binary tree to 8-wide nodes and places children in slots.
 //!
-//! Which nodes are pulled together follows Ylitie, Karras, Laine 2017, section 3.1: dynamic programming over the surface
-//! area cost of representing each binary subtree by up to seven roots. Slots follow their section 3.2: slot bit 2 is x, bit
-//! 1 y, bit 0 z, set for a child in the upper half, so that visiting slots in the order of `slot ^ octant` goes roughly from
-//! near to far. We assign greedily where they run an auction.
+//! Which nodes are pulled together follows Ylitie, Karras, Laine 2017, section 3.1: dynamic programming over the
+//! surface area cost of representing each binary subtree by up to seven roots. Slots follow their section 3.2: slot bit
+//! 2 is x, bit 1 y, bit 0 z, set for a child in the upper half, so that visiting slots in the order of `slot ^ octant`
+//! goes roughly from near to far. We assign greedily where they run an auction.
 
 use super::binary::{BinaryTree, Box3, LEAF};
 use bricks::NODE_WIDTH;
@@ -94,8 +94,8 @@ pub(super) fn collapse(tree: &BinaryTree, leaf_items: u32) -> WideTree {
     emit(tree, &decide(tree, leaf_items, cheapest))
 }
 
-/// Collapses `tree` with up to `leaf_items` (1 to 3) items a leaf, three binary levels to each wide one: the height is at
-/// most a third of the binary tree's, rounded up.
+/// Collapses `tree` with up to `leaf_items` (1 to 3) items a leaf, three binary levels to each wide one: the height is
+/// at most a third of the binary tree's, rounded up.
 pub(super) fn collapse_levels(tree: &BinaryTree, leaf_items: u32) -> WideTree {
     emit(tree, &decide(tree, leaf_items, three_levels))
 }
@@ -238,8 +238,8 @@ fn push_items(tree: &BinaryTree, node: u32, items: &mut Vec<u32>) {
     }
 }
 
-/// Places up to eight children: of the free slots and children left, the pair whose child lies farthest toward its slot's
-/// corner goes first.
+/// Places up to eight children: of the free slots and children left, the pair whose child lies farthest toward its
+/// slot's corner goes first.
 fn assign_slots(tree: &BinaryTree, parent: u32, children: &[u32]) -> [Option<u32>; NODE_WIDTH] {
     let bounds = &tree.nodes[parent as usize].bounds;
     let mut gains = [[0.0f64; NODE_WIDTH]; NODE_WIDTH];

@@ -176,7 +176,8 @@ fn write_all_at(file: &File, mut offset: u64, mut bytes: &[u8]) -> io::Result<()
     Ok(())
 }
 
-/// An unnamed temporary file that holds what was decoded; made when it is first written to, gone when nothing refers to it.
+/// An unnamed temporary file that holds what was decoded; made when it is first written to, gone when nothing refers to
+/// it.
 #[derive(Debug, Default)]
 pub(super) struct Spool {
     /// Where it is made; `None`: the system's folder for temporary files.

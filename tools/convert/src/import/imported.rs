@@ -22,8 +22,8 @@ struct Input {
 }
 
 impl Imported {
-    /// Appends an input, placed by each of `transforms`; the error says what is wrong with a placement. Each list of an input
-    /// is smaller than the bytes it was read from, so sums stay within u32 for everything that fits memory.
+    /// Appends an input, placed by each of `transforms`; the error says what is wrong with a placement. Each list of an
+    /// input is smaller than the bytes it was read from, so sums stay within u32 for everything that fits memory.
     pub(super) fn append(&mut self, opened: Opened, transforms: &[Affine]) -> Result<(), String> {
         let Opened { outline: mut part, parts } = opened;
         let whole = &mut self.outline;

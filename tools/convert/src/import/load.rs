@@ -4,8 +4,8 @@ use crate::source::{Mesh, Primitive, Source, SourceError, SourceScene};
 use bricks::NONE;
 use rayon::prelude::*;
 
-/// Reads every part and texture of `source`. Parts of a primitive are joined; textures that cannot be read are left out,
-/// with a warning.
+/// Reads every part and texture of `source`. Parts of a primitive are joined; textures that cannot be read are left
+/// out, with a warning.
 ///
 /// # Errors
 /// The first part, in their order, that cannot be read.

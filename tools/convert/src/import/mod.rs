@@ -1,9 +1,9 @@
 //! Importers: files of common formats as one [`Source`](crate::source::Source).
 //!
 //! Every byte of an input is untrusted: whatever it holds, importing ends with a scene or with one line that names the
-//! file, the thing in it and the remedy. Memory is only allocated for counts that the bytes of the input can hold, and for
-//! no more of the input than what is read at once: structure is checked on opening, geometry and images are read part by
-//! part. What cannot be read in parts is decoded into an unnamed temporary file first.
+//! file, the thing in it and the remedy. Memory is only allocated for counts that the bytes of the input can hold, and
+//! for no more of the input than what is read at once: structure is checked on opening, geometry and images are read
+//! part by part. What cannot be read in parts is decoded into an unnamed temporary file first.
 
 mod affine;
 mod bytes;
@@ -68,8 +68,8 @@ pub struct Input {
     pub path: PathBuf,
     /// The scene of a glTF file, by name or number; `None`: its default scene.
     pub scene: Option<String>,
-    /// The axis that points up in OBJ, PLY, STL and tilesets, whose frames are right-handed; `None`: Z in tilesets, else Y.
-    /// glTF states its own.
+    /// The axis that points up in OBJ, PLY, STL and tilesets, whose frames are right-handed; `None`: Z in tilesets,
+    /// else Y. glTF states its own.
     pub up: Option<Up>,
     /// Metres that a unit of length stands for in OBJ, PLY and STL, finite and positive; glTF states its own.
     pub metres: f64,
@@ -226,7 +226,8 @@ trait Parts: Send + Sync {
     /// The file as messages show it.
     fn label(&self) -> &str;
 
-    /// The number in the file of vertex `vertex` of a part: in its primitive, from 0. `None`: the part cannot be read again.
+    /// The number in the file of vertex `vertex` of a part: in its primitive, from 0. `None`: the part cannot be read
+    /// again.
     fn vertex(&self, mesh: usize, part: usize, vertex: u32) -> Option<u64>;
 
     /// The texels of texture `index`.

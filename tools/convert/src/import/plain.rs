@@ -1,5 +1,5 @@
-//! What the formats without a scene graph (OBJ, PLY, STL) have in common: one placement a mesh, plain materials, rows of
-//! numbers.
+//! What the formats without a scene graph (OBJ, PLY, STL) have in common: one placement a mesh, plain materials, rows
+//! of numbers.
 
 use super::bytes::Bytes;
 use super::error::{EXPORT_AGAIN, ImportError, show};
@@ -130,8 +130,8 @@ pub(super) fn linear(component: f64) -> f32 {
     (if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }) as f32
 }
 
-/// Replaces normals and texture coordinates that are not finite, and tells what it did. Colours are clamped where they are
-/// read; positions are for the builder to judge.
+/// Replaces normals and texture coordinates that are not finite, and tells what it did. Colours are clamped where they
+/// are read; positions are for the builder to judge.
 pub(super) fn repair(primitive: &mut Primitive, mut tell: impl FnMut(&'static str)) {
     let is_bad = |values: &[f32]| values.iter().any(|value| !value.is_finite());
     for normal in primitive.normals.iter_mut().flatten().filter(|normal| is_bad(&normal[..])) {

@@ -1,15 +1,16 @@
-//! Tangents of triangles that bring none: MikkTSpace (Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008), which normal
-//! textures are made for by convention (glTF 2.0, section 3.7.2.1).
+//! Tangents of triangles that bring none: MikkTSpace (Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008),
+//! which normal textures are made for by convention (glTF 2.0, section 3.7.2.1).
 //!
-//! They are made for each part of a source by itself, so that at the border of two parts of a large primitive they are those of one
-//! side. Where there are no normals those of the triangles are taken.
+//! They are made for each part of a source by itself, so that at the border of two parts of a large primitive they are
+//! those of one side. Where there are no normals those of the triangles are taken.
 
 use super::quietly;
 use crate::source::Primitive;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 
-/// The tangents of all corners of `primitive`: unit vectors with the sign of the bitangent, zero where there is none. The normal texture
-/// takes set `set` of the coordinates through `rows`, see [`bricks::Material::uv_from_set`]. `None`: it lacks the set.
+/// The tangents of all corners of `primitive`: unit vectors with the sign of the bitangent, zero where there is none.
+/// The normal texture takes set `set` of the coordinates through `rows`, see [`bricks::Material::uv_from_set`]. `None`:
+/// it lacks the set.
 pub(super) fn make(primitive: &Primitive, set: usize, rows: &[[f32; 4]; 2]) -> Option<Vec<[f32; 4]>> {
     let uvs = if set == 0 { &primitive.uvs } else { &primitive.uvs1 }.as_ref()?;
     let origin = primitive.indices.first().map_or([0.0; 3], |&index| primitive.positions[index as usize]);
@@ -85,7 +86,8 @@ mod tests {
 
     const SAME: [[f32; 4]; 2] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
 
-    /// A square in the plane of x and y, seen from +z, with coordinates of an image as it is seen: u along x, v along -y.
+    /// A square in the plane of x and y, seen from +z, with coordinates of an image as it is seen: u along x, v along
+    /// -y.
     fn square() -> Primitive {
         let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let uvs = positions.iter().map(|p: &[f64; 3]| [p[0] as f32, 1.0 - p[1] as f32]).collect();

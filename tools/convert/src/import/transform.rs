@@ -9,10 +9,10 @@ const FORMS: &str = "give 12 or 16 numbers (a matrix row by row), or steps: tran
 
 /// The placement that `text` describes, row-major 3x4.
 ///
-/// Either the 12 numbers of a 3x4 or the 16 of a 4x4 matrix, row by row, the translation last in each; or steps that are
-/// carried out in the order in which they are written: `translate X Y Z`, `scale S`, `scale X Y Z`, `rotate x|y|z DEGREES`
-/// (about the axis through the origin, counter-clockwise seen from its end). Words and numbers are separated by spaces or
-/// commas.
+/// Either the 12 numbers of a 3x4 or the 16 of a 4x4 matrix, row by row, the translation last in each; or steps that
+/// are carried out in the order in which they are written: `translate X Y Z`, `scale S`, `scale X Y Z`, `rotate x|y|z
+/// DEGREES` (about the axis through the origin, counter-clockwise seen from its end). Words and numbers are separated
+/// by spaces or commas.
 ///
 /// # Errors
 ///

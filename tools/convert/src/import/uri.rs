@@ -1,4 +1,5 @@
-//! References to other files. URIs of glTF: data URIs and percent-encoded relative paths (glTF 2.0, sections 2.8 and 3.6; RFC 2397, RFC 3986).
+//! References to other files. URIs of glTF: data URIs and percent-encoded relative paths (glTF 2.0, sections 2.8 and
+//! 3.6; RFC 2397, RFC 3986).
 
 use std::path::{Component, Path, PathBuf};
 
@@ -16,8 +17,8 @@ pub(super) fn is_data(uri: &str) -> bool {
     uri.as_bytes().get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case(b"data:"))
 }
 
-/// Resolves `uri`; the error says what is wrong with it. Only files in or below the folder of the glTF file are referred
-/// to: other schemes, absolute paths and paths that climb out of the folder are refused.
+/// Resolves `uri`; the error says what is wrong with it. Only files in or below the folder of the glTF file are
+/// referred to: other schemes, absolute paths and paths that climb out of the folder are refused.
 pub(super) fn resolve(uri: &str) -> Result<Target, &'static str> {
     resolve_from(Path::new(""), uri)
 }

@@ -1,5 +1,5 @@
-//! Which vertices a part of a mesh uses. Exporters may share one large vertex buffer among many primitives; copying it for
-//! each part would take memory out of proportion to the file, so only the vertices in use are read.
+//! Which vertices a part of a mesh uses. Exporters may share one large vertex buffer among many primitives; copying it
+//! for each part would take memory out of proportion to the file, so only the vertices in use are read.
 
 /// The vertices of some triangles.
 #[derive(Debug, PartialEq)]

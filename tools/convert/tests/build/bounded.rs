@@ -1,5 +1,5 @@
-//! Conversions that do not fit in memory: the same file as in memory, whatever the memory; within that memory; continued
-//! after an interruption.
+//! Conversions that do not fit in memory: the same file as in memory, whatever the memory; within that memory;
+//! continued after an interruption.
 
 use crate::scenes::*;
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
@@ -13,8 +13,8 @@ use std::path::Path;
 /// Triangles of a part.
 const PART: u32 = 2000;
 
-/// A scene that is computed part by part: mesh 0 is a soup with a few large triangles and some without area, mesh 1 a flat
-/// grid, mesh 2 small and placed often.
+/// A scene that is computed part by part: mesh 0 is a soup with a few large triangles and some without area, mesh 1 a
+/// flat grid, mesh 2 small and placed often.
 pub struct Computed {
     outline: Outline,
 }

@@ -13,7 +13,8 @@ fn texel(name: &str, rgba: [u8; 4]) -> SourceTexture {
     SourceTexture { name: name.to_owned(), width: 1, height: 1, wrap: 0, rgba: rgba.to_vec() }
 }
 
-/// A square in the plane of x and y whose texture runs along it, turned by a quarter, with the second coordinates halved.
+/// A square in the plane of x and y whose texture runs along it, turned by a quarter, with the second coordinates
+/// halved.
 fn square(material: u32, y: f64) -> Primitive {
     let positions = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, z]| [x, y + z, 0.0]).to_vec();
     let uvs: Vec<[f32; 2]> = positions.iter().map(|p| [p[1] as f32, p[0] as f32]).collect();

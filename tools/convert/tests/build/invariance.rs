@@ -1,5 +1,5 @@
-//! What must not change: bytes with the number of threads; ids and positions with the size of bricks; anything with where
-//! a scene lies.
+//! What must not change: bytes with the number of threads; ids and positions with the size of bricks; anything with
+//! where a scene lies.
 
 use crate::decode::decode;
 use crate::scenes::*;
@@ -97,7 +97,8 @@ fn scaling_by_a_power_of_two_changes_exponents_only() {
     assert!(third.bricks.iter().zip(&one.bricks).any(|(a, b)| a.vertices != b.vertices));
 }
 
-/// Expected cost of a ray that meets a brick, summed over bricks: areas of the boxes over those of the roots, a triangle at
+/// Expected cost of a ray that meets a brick, summed over bricks: areas of the boxes over those of the roots, a
+/// triangle at
 /// 0.3 of a node.
 fn surface_area_cost(path: &std::path::Path) -> f64 {
     let file = bricks::SceneFile::open(path).unwrap();

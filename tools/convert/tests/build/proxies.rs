@@ -8,8 +8,8 @@ use brickwalk_convert::build::{BuildSettings, build_source};
 use brickwalk_convert::progress::Progress;
 use std::path::Path;
 
-/// Draws points of triangles; returns how many were drawn and how many lie in cells of `map` that are empty. Points within
-/// 2^-10 of a cell of a border are left out: f64 is not that far off.
+/// Draws points of triangles; returns how many were drawn and how many lie in cells of `map` that are empty. Points
+/// within 2^-10 of a cell of a border are left out: f64 is not that far off.
 fn outside(scene: &Decoded, brick: &DecodedBrick, map: &OccupancyMap, random: &mut Random) -> (u32, u32) {
     let object = &scene.resident.objects[brick.record.object as usize];
     let index = scene.bricks.iter().position(|other| std::ptr::eq(other, brick)).unwrap();

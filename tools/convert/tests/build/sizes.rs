@@ -5,7 +5,8 @@ use bricks::{AttributeLayout, Resident, SceneFile};
 use brickwalk_convert::build::BuildSettings;
 use brickwalk_convert::source::Primitive;
 
-/// Most bytes of the file a triangle with a normal at each vertex, in meshes of at most [`SHARING`] vertices a triangle.
+/// Most bytes of the file a triangle with a normal at each vertex, in meshes of at most [`SHARING`] vertices a
+/// triangle.
 const MOST_BYTES: f64 = 32.0;
 
 /// Vertices a triangle of a mesh that is said to share its vertices, those on the edges of bricks counted in each.

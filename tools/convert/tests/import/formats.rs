@@ -370,8 +370,8 @@ fn scans() {
 /// The first difference of the corners of all triangles, in their order.
 ///
 /// The plain Sponza holds what another program decoded from the compressed one: integers times a step, plus the least
-/// coordinate, in f32. Coordinates are below 2^12, so an f32 is 2^-12 at most from the next; two roundings of each program
-/// make 2^-10, a hundredth of a step of the quantisation (4000 / 2^14).
+/// coordinate, in f32. Coordinates are below 2^12, so an f32 is 2^-12 at most from the next; two roundings of each
+/// program make 2^-10, a hundredth of a step of the quantisation (4000 / 2^14).
 fn sponza_difference(plain: &SourceScene, compressed: &SourceScene) -> Option<String> {
     let primitives = |scene: &SourceScene| scene.meshes.iter().map(|mesh| mesh.primitives.len()).sum::<usize>();
     if primitives(plain) != 103 || primitives(compressed) != 103 {

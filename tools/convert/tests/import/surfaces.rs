@@ -6,7 +6,8 @@ use brickwalk_convert::import::Input;
 use brickwalk_convert::source::{Primitive, SourceScene};
 use serde_json::{Value, json};
 
-/// Two triangles, a square of x and y, whose coordinates of set 0 run along x and down y, those of set 1 the other way round.
+/// Two triangles, a square of x and y, whose coordinates of set 0 run along x and down y, those of set 1 the other way
+/// round.
 fn square(material: Value) -> Writer {
     let mut file = Writer::new();
     let positions = file.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0]);

@@ -1,7 +1,7 @@
 //! Pipes: a plant like a power station's, an open frame of steel several floors high, full of pipes and equipment.
 //!
-//! Bays are built ring by ring around the origin until the count of triangles is reached. A bay depends on the seed and its
-//! place alone; the ways between the bays are at multiples of [`PITCH`].
+//! Bays are built ring by ring around the origin until the count of triangles is reached. A bay depends on the seed and
+//! its place alone; the ways between the bays are at multiples of [`PITCH`].
 
 mod bay;
 mod fitting;
@@ -91,8 +91,8 @@ impl Bay {
         Self { i, j, corner, levels, purpose }
     }
 
-    /// The side `k` as seen from its way: u along it from corner to corner, n toward the middle of the way, which is at 0, so
-    /// that the block begins at −[`AISLE`].
+    /// The side `k` as seen from its way: u along it from corner to corner, n toward the middle of the way, which is at
+    /// 0, so that the block begins at −[`AISLE`].
     pub fn side(&self, k: usize) -> Frame {
         let [x0, z0] = [self.corner.x, self.corner.z];
         let corners = [[x0, z0 + PITCH], [x0 + PITCH, z0 + PITCH], [x0 + PITCH, z0], [x0, z0]].map(DVec2::from_array);

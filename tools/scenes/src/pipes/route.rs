@@ -63,8 +63,8 @@ impl Grid {
         cube(half).all(|o| self.is_free(add(c, o)))
     }
 
-    /// A way from `start` in the direction `axis`, `sign` for a pipe that takes `half` cells on each side: the corners of a
-    /// line of at least two runs' length. Runs are at least `run` cells. What it takes, stays taken.
+    /// A way from `start` in the direction `axis`, `sign` for a pipe that takes `half` cells on each side: the corners
+    /// of a line of at least two runs' length. Runs are at least `run` cells. What it takes, stays taken.
     pub fn route(
         &mut self,
         rng: &mut Rng,

@@ -1,5 +1,5 @@
-//! The bowl: tiers of seats around the pitch, what is under and above them. Cut into sectors along the rounded rectangle of the
-//! pitch's surround.
+//! The bowl: tiers of seats around the pitch, what is under and above them. Cut into sectors along the rounded
+//! rectangle of the pitch's surround.
 
 use crate::material::{Mat, Tint, WHITE, shade};
 use crate::mesh::{Builder, Frame, face};
@@ -32,7 +32,8 @@ struct Tier {
     rise: f64,
 }
 
-/// The point of the line `out` metres outside the inner rectangle, and the direction outward there, at `t` in [0, 1) around.
+/// The point of the line `out` metres outside the inner rectangle, and the direction outward there, at `t` in [0, 1)
+/// around.
 fn line(t: f64, out: f64) -> (DVec3, DVec3) {
     // The division follows the inner line, so that rows are parallel.
     let arc = FRAC_PI_2 * CORNER;
@@ -66,7 +67,8 @@ fn frame(t: f64, out: f64, y: f64) -> Frame {
     Frame { o: p + DVec3::Y * y, u: DVec3::Y.cross(n), v: DVec3::Y, n }
 }
 
-/// A wall or floor between two lines around: from `t0` to `t1` in `count` pieces; the first line is the lower or inner one.
+/// A wall or floor between two lines around: from `t0` to `t1` in `count` pieces; the first line is the lower or inner
+/// one.
 fn strip(b: &mut Builder, m: Mat, tint: Tint, [t0, t1]: [f64; 2], count: u32, [a, c]: [[f64; 2]; 2]) {
     let at = |k: u32, [out, y]: [f64; 2]| line(t0 + (t1 - t0) * f64::from(k) / f64::from(count), out).0 + DVec3::Y * y;
     for k in 0..count {

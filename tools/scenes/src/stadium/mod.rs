@@ -1,7 +1,7 @@
 //! Stadium: an ornate teapot on a pedestal in the middle of a stadium.
 //!
-//! The stadium's size is fixed. Of the triangles, at most half go into seats, as finely moulded as that allows; the teapot gets
-//! the rest, in ever smaller triangles, so that sizes of 20 µm and of 200 m are in one scene.
+//! The stadium's size is fixed. Of the triangles, at most half go into seats, as finely moulded as that allows; the
+//! teapot gets the rest, in ever smaller triangles, so that sizes of 20 µm and of 200 m are in one scene.
 
 mod bowl;
 mod pitch;

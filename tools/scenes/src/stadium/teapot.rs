@@ -1,5 +1,5 @@
-//! An ornate teapot of porcelain: five smooth surfaces over squares, displaced by flutes, beads and waves, as finely divided as
-//! asked.
+//! An ornate teapot of porcelain: five smooth surfaces over squares, displaced by flutes, beads and waves, as finely
+//! divided as asked.
 
 use crate::material::{Mat, Tint};
 use crate::mesh::Builder;
@@ -281,8 +281,8 @@ fn lid(u: f64, v: f64) -> (DVec3, Tint) {
     (revolved(&LID, u, v, relief), tint)
 }
 
-/// A point of a tube in the plane z = 0 along `points` of (x, y, radius), displaced by `relief`; its section is `wide` times
-/// as wide as high.
+/// A point of a tube in the plane z = 0 along `points` of (x, y, radius), displaced by `relief`; its section is `wide`
+/// times as wide as high.
 fn swept(points: &[[f64; 3]], u: f64, v: f64, relief: f64, wide: f64) -> DVec3 {
     let e = 1e-4;
     let ([x, y, r], [x0, y0, _], [x1, y1, _]) =

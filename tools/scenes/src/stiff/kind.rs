@@ -11,10 +11,11 @@ pub enum Stiff {
     Shell,
     /// A closed double cone around the origin, radius 1, height 2: two fans of `n` triangles.
     Fans,
-    /// A closed cube around the origin, side 2, its faces `n` x `n` squares of two triangles; coordinates are multiples of 1/n.
+    /// A closed cube around the origin, side 2, its faces `n` x `n` squares of two triangles; coordinates are multiples
+    /// of 1/n.
     Cube,
-    /// `n` triangles a hundred million times longer than wide, in all directions within a cube of side 2; they need a lattice of
-    /// 2⁻³⁰ or finer.
+    /// `n` triangles a hundred million times longer than wide, in all directions within a cube of side 2; they need a
+    /// lattice of 2⁻³⁰ or finer.
     Slivers,
     /// Four times the same sheet of `n` x `n` squares, triangle by triangle, in a plane that no axis lies in.
     Sheets,
@@ -26,10 +27,11 @@ pub enum Stiff {
     Duplicates,
     /// Thirty-two triangles of size 200 through a cube of side 20 that holds `n` of size 0.3.
     Spanning,
-    /// `n` axis-aligned boxes of 12 triangles, two thirds of them flat on one axis, on multiples of 1/64 within a cube of side 8.
+    /// `n` axis-aligned boxes of 12 triangles, two thirds of them flat on one axis, on multiples of 1/64 within a cube
+    /// of side 8.
     FlatBoxes,
-    /// Closed bumpy spheres around the origin, one in the other, of sizes from 10⁻⁴ to 10⁶, a decade each; icosahedra divided `n` times.
-    /// They need a lattice of 2⁻¹⁹, the finest that there is for them.
+    /// Closed bumpy spheres around the origin, one in the other, of sizes from 10⁻⁴ to 10⁶, a decade each; icosahedra
+    /// divided `n` times. They need a lattice of 2⁻¹⁹, the finest that there is for them.
     ScaleMix,
     /// One triangle.
     Triangle,
@@ -114,7 +116,8 @@ impl Stiff {
         }
     }
 
-    /// Triangles of a brick that bring out what the scene is about: few, so that much is cut, or, with `None`, as many as usual.
+    /// Triangles of a brick that bring out what the scene is about: few, so that much is cut, or, with `None`, as many
+    /// as usual.
     pub fn brick_triangles(self) -> Option<u32> {
         match self {
             Self::Duplicates | Self::Series => None,
@@ -122,15 +125,16 @@ impl Stiff {
         }
     }
 
-    /// What [`super::stiff`] was given for the scene whose source is called `name`, as in "stiff slivers seed=0 n=4000". `None` if no
-    /// stiff scene is called so.
+    /// What [`super::stiff`] was given for the scene whose source is called `name`, as in "stiff slivers seed=0
+    /// n=4000". `None` if no stiff scene is called so.
     pub fn of_source(name: &str) -> Option<(Self, u32, u64)> {
         let (kind, rest) = name.strip_prefix("stiff ")?.split_once(" seed=")?;
         let (seed, n) = rest.split_once(" n=")?;
         Some((kind.parse().ok()?, n.parse().ok()?, seed.parse().ok()?))
     }
 
-    /// Binary logarithm of the lattice's step that the scene needs, if the one that follows from its bricks is too coarse.
+    /// Binary logarithm of the lattice's step that the scene needs, if the one that follows from its bricks is too
+    /// coarse.
     pub fn lattice_log2(self) -> Option<i32> {
         match self {
             Self::FarOrigin => Some(-14),

@@ -1,4 +1,5 @@
-//! Scenes that are hard for arithmetic or for builders: extremes of size, shape, place and depth, each one mesh placed once.
+//! Scenes that are hard for arithmetic or for builders: extremes of size, shape, place and depth, each one mesh placed
+//! once.
 
 mod kind;
 
@@ -62,8 +63,8 @@ pub fn one_mesh(name: &str, primitive: Primitive) -> SourceScene {
     scene(name.into(), vec![mesh], vec![placement])
 }
 
-/// The scene with every vertex moved to p · `scale` + `shift`, and moved onto multiples of `step` before, if that is not 0. Meant
-/// for scenes whose placements are all the identity.
+/// The scene with every vertex moved to p · `scale` + `shift`, and moved onto multiples of `step` before, if that is
+/// not 0. Meant for scenes whose placements are all the identity.
 pub fn moved(mut source: SourceScene, step: f64, scale: f64, shift: [f64; 3]) -> SourceScene {
     let snapped = |x: f64| if step > 0.0 { (x / step).round() * step } else { x };
     for primitive in source.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {

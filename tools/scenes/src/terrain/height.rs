@@ -1,8 +1,8 @@
 //! The shape and the colours of the land: a pond in a valley, mountains around it.
 //!
-//! Sums of smooth noise whose octaves fade where the land is already steep, which leaves valleys smooth and crests rough as
-//! erosion does (I. Quilez, "Value noise derivatives", 2008), and ridges for crests (Musgrave, in Ebert et al., "Texturing and
-//! Modeling", 3rd ed., ch. 16).
+//! Sums of smooth noise whose octaves fade where the land is already steep, which leaves valleys smooth and crests
+//! rough as erosion does (I. Quilez, "Value noise derivatives", 2008), and ridges for crests (Musgrave, in Ebert et
+//! al., "Texturing and Modeling", 3rd ed., ch. 16).
 
 use crate::material::Tint;
 use glam::{DVec2, DVec3};

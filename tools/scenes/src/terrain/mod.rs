@@ -1,5 +1,5 @@
-//! Terrain: a square of land around a pond, woods and meadows about it, mountains behind; what grows and lies on it is stored
-//! once and placed many times.
+//! Terrain: a square of land around a pond, woods and meadows about it, mountains behind; what grows and lies on it is
+//! stored once and placed many times.
 //!
 //! The land depends on the seed and the place alone: more triangles reach further out. Quads have edges of [`STEP`].
 

@@ -1,7 +1,7 @@
 //! OBJ with MTL (Wavefront, "Object files"): polygons, triangulated as fans.
 //!
-//! Each object or group with faces is a mesh; a primitive is a run of faces of one material, so that triangles keep their
-//! order in the file. The text is run through once; its numbers go to the spool.
+//! Each object or group with faces is a mesh; a primitive is a run of faces of one material, so that triangles keep
+//! their order in the file. The text is run through once; its numbers go to the spool.
 
 mod mtl;
 mod parse;
@@ -59,7 +59,8 @@ struct Texture {
 enum Picture {
     /// A picture.
     Whole(Result<Bytes, String>),
-    /// The grey pictures of roughness, which goes to green, and of being metal, which goes to blue; white where there is none.
+    /// The grey pictures of roughness, which goes to green, and of being metal, which goes to blue; white where there
+    /// is none.
     Grey([Option<Result<Bytes, String>>; 2]),
 }
 
@@ -287,8 +288,8 @@ impl Obj {
     }
 }
 
-/// The red of one picture as green and that of another as blue, white where there is none, in the size of the larger of them each way: the
-/// nearest texels are taken.
+/// The red of one picture as green and that of another as blue, white where there is none, in the size of the larger of
+/// them each way: the nearest texels are taken.
 fn combine(roughness: Option<SourceTexture>, metallic: Option<SourceTexture>) -> SourceTexture {
     let channels = [roughness, metallic];
     let size = |of: fn(&SourceTexture) -> u32| channels.iter().flatten().map(of).max().unwrap_or(1);

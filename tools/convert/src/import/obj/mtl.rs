@@ -1,8 +1,9 @@
 //! Materials of OBJ (Wavefront, "MTL material format"; the factors of "PBR extension to MTL" by Exocortex).
 //!
-//! Without `Ks`, or with `illum` 0 or 1, a material is Lambertian. With it, `Ks` is what is reflected along the normal and `Ns`, the
-//! exponent of Phong's lobe, gives the roughness: α = √(2 / (Ns + 2)) (Walter et al. 2007, section 5.2), of which glTF's roughness is the
-//! root. Beside `Pr` or `Pm` exporters write another `Ks`: then the reflectance is that of the index of refraction `Ni`, or 0.04.
+//! Without `Ks`, or with `illum` 0 or 1, a material is Lambertian. With it, `Ks` is what is reflected along the normal
+//! and `Ns`, the exponent of Phong's lobe, gives the roughness: α = √(2 / (Ns + 2)) (Walter et al. 2007, section 5.2),
+//! of which glTF's roughness is the root. Beside `Pr` or `Pm` exporters write another `Ks`: then the reflectance is
+//! that of the index of refraction `Ni`, or 0.04.
 
 use crate::import::plain;
 use crate::import::text::{Lines, number};

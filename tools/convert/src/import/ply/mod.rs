@@ -1,5 +1,5 @@
-//! PLY, ASCII and binary of both orders (G. Turk, "The PLY Polygon File Format", 1994): vertices with normals, colours and
-//! texture coordinates, faces of any number of vertices, triangulated as fans.
+//! PLY, ASCII and binary of both orders (G. Turk, "The PLY Polygon File Format", 1994): vertices with normals, colours
+//! and texture coordinates, faces of any number of vertices, triangulated as fans.
 //!
 //! The body is run through once; what is used of it goes to the spool.
 

@@ -1,0 +1,94 @@
+// Ray-aligned occupancy maps (Zeng et al., ROMA): bindings of group 2, cells of a column in words of 32 bits (depth t
+// at bit 31 - t % 32 of word t / 32), strata of directions. Twins: src/visibility/roma/bits.rs and directions.rs.
+
+@group(2) @binding(0) var<storage, read> roma_levels: array<RomaLevel>;
+@group(2) @binding(1) var<storage, read> roma_maps: array<RomaMap>;  // of the finest level, by their strata, then of the next
+@group(2) @binding(2) var<storage, read> boms: array<u32>;           // of each level: cell (x, y, z) is bit z % 32 of a word; then what is empty, a
+                                                                     // byte a block (src/visibility/bom/clearance.rs)
+@group(2) @binding(3) var<storage, read_write> columns: array<u32>;  // of all maps, row by row, the words of a column together
+
+const TAN_8: f32 = 0.41421356; // tan(pi / 8)
+
+fn linear(row: vec4<f32>, v: vec3<f32>) -> f32 {
+    return barrier(barrier(barrier(row.x * v.x) + barrier(row.y * v.y)) + barrier(row.z * v.z));
+}
+
+fn affine(row: vec4<f32>, p: vec3<f32>) -> f32 {
+    return barrier(linear(row, p) + row.w);
+}
+
+// Words of a column.
+fn words() -> u32 {
+    return params.roma_size / 32u;
+}
+
+// First word of column (x, y) of a map.
+fn first_word(map: u32, x: u32, y: u32) -> u32 {
+    return ((map * params.roma_size + y) * params.roma_size + x) * words();
+}
+
+// Depth of the middle of the first occupied cell between two depths of the column whose words start at `first`, in the
+// order of travel; below 0: none is.
+fn first_cell(first: u32, start: f32, end: f32, is_forward: bool) -> f32 {
+    let from_depth = floor(min(start, end));
+    let to_depth = floor(max(start, end));
+    let deepest = f32(params.roma_size) - 1.0;
+    if !(to_depth >= 0.0 && from_depth <= deepest) {
+        return -1.0;
+    }
+    let low = u32(max(from_depth, 0.0));
+    let high = u32(min(to_depth, deepest));
+    let first_of = low >> 5u;
+    let last_of = high >> 5u;
+    for (var i = 0u; i <= last_of - first_of; i++) {
+        let w = select(last_of - i, first_of + i, is_forward);
+        let bit_from = select(0u, low & 31u, w == first_of);
+        let bit_to = select(31u, high & 31u, w == last_of);
+        let within = ((columns[first + w] << bit_from) >> (31u - bit_to + bit_from)) << (31u - bit_to);
+        if within != 0u {
+            let cell = select(31u - countTrailingZeros(within), countLeadingZeros(within), is_forward);
+            return f32(32u * w + cell) + 0.5;
+        }
+    }
+    return -1.0;
+}
+
+// Arc tangent of 0 to 1, in units of pi / 4 (Moshier, Cephes, atanf).
+fn eighth_turns(x: f32) -> f32 {
+    let is_steep = x > TAN_8;
+    var y = x;
+    if is_steep {
+        y = divide(x - 1.0, x + 1.0);
+    }
+    let z = barrier(y * y);
+    var p = barrier(8.0537445e-2 * z) - 1.3877686e-1;
+    p = barrier(p * z) + 1.9977711e-1;
+    p = barrier(p * z) - 3.333295e-1;
+    let angle = barrier(barrier(p * barrier(z * y)) + y);
+    let turns = barrier(1.2732395 * angle);
+    return select(turns, 1.0 + turns, is_steep);
+}
+
+// Where in the unit square a direction of the upper hemisphere lies, |z| its height: the inverse of the concentric map
+// (Shirley, Chiu 1997) and of z = 1 - r^2. It needs no unit length.
+fn square_of(d: vec3<f32>) -> vec2<f32> {
+    let across = barrier(barrier(d.x * d.x) + barrier(d.y * d.y));
+    let length = square_root(barrier(across + barrier(d.z * d.z)));
+    let radius = square_root(divide(across, barrier(length * barrier(length + abs(d.z)))));
+    let a = abs(d.x);
+    let b = abs(d.y);
+    let greater = max(a, b);
+    if greater == 0.0 {
+        return vec2<f32>(0.5);
+    }
+    let other = barrier(radius * eighth_turns(divide(min(a, b), greater)));
+    let w = select(vec2<f32>(other, radius), vec2<f32>(radius, other), a > b);
+    return vec2<f32>(0.5) + 0.5 * select(w, -w, d.xy < vec2<f32>(0.0));
+}
+
+// The stratum that a direction, or in the lower hemisphere its opposite, lies in.
+fn stratum_of(direction: vec3<f32>) -> u32 {
+    let d = select(-direction, direction, direction.z >= 0.0);
+    let s = min(vec2<u32>(square_of(d) * f32(params.roma_k)), vec2<u32>(params.roma_k - 1u));
+    return s.x + params.roma_k * s.y;
+}

@@ -1,0 +1,60 @@
+// Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free. The environment shares a
+// direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their gloss.
+#include "common/types.wgsl"
+#include "common/bindings.wgsl"
+#include "shade/shading.wgsl"
+#include "common/random.wgsl"
+#include "shade/lamps.wgsl"
+#include "shade/light.wgsl"
+#include "shade/gloss.wgsl"
+
+// One thread a pixel.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let ray = rays[index];
+    if !(ray.t_min <= ray.t_max) || hits[index].id != NONE {
+        return;
+    }
+    let g = gbuffer[index];
+    var light: vec3<f32>;
+    var density = 0.0; // by which the lamp drew the direction, where the rays of the gloss may meet it
+    let d = ray.direction;
+    if (params.flags & PARAM_EMITTER) != 0u {
+        // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction
+        // leads from the surface to the point.
+        let e = emitter_of(index);
+        let squared = dot(d, d);
+        let shone = shines(e, d);
+        light = e.radiance * max(dot(g.normal, d), 0.0) * shone / (PI * squared * squared) / e.probability;
+        if (e.kind & EMITTER_KIND) == EMITTER_TRIANGLE {
+            density = e.probability * squared * sqrt(squared) / shone;
+        }
+    } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
+        let drawn = environment_sample(lamp_words(index));
+        light = drawn_light(drawn) * max(dot(g.normal, d), 0.0) / PI;
+        density = drawn_density(drawn);
+    } else {
+        light = sunlight(g.normal);
+        if params.sun_radius > 0.0 {
+            density = sun_density(d);
+        }
+    }
+    let s = gloss_of(g, -seen_rays[index].direction);
+    var reflects = s.diffuse;
+    if (params.flags & (PARAM_ENVIRONMENT | PARAM_BOUNCE)) == PARAM_ENVIRONMENT && params.diffuse_count > 0.0 {
+        reflects *= outweighs(density, params.diffuse_count * max(dot(g.normal, d), 0.0) / PI);
+    }
+    if is_glossy(s) {
+        let unit_d = normalize(d);
+        var weight = 1.0;
+        if (params.flags & (PARAM_GLOSSY | PARAM_BOUNCE)) == PARAM_GLOSSY && density > 0.0 {
+            weight = outweighs(density, density_of(s, unit_d));
+        }
+        reflects += weight * reflected(s, unit_d);
+    }
+    add_light(index, weight_of(index) * surface_share() * reflects * light);
+}

@@ -1,0 +1,39 @@
+// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss; where that
+// leads below the surface, none. The throughput and by which density the direction was drawn are noted.
+#include "common/types.wgsl"
+#include "common/bindings.wgsl"
+#include "shade/shading.wgsl"
+#include "common/random.wgsl"
+#include "shade/lamps.wgsl"
+#include "shade/light.wgsl"
+#include "shade/gloss.wgsl"
+
+// One thread a pixel.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let surface = seen_surfaces[index];
+    var ray = Ray(surface.point, 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0);
+    var carried = vec3<f32>(0.0);
+    var density = 0.0;
+    if surface.leaf != NONE {
+        let g = gbuffer[index];
+        let s = gloss_of(g, -seen_rays[index].direction);
+        if is_glossy(s) {
+            ray.direction = gloss_direction(s, random4(index, params.stream, params.seed));
+            density = density_of(s, ray.direction);
+            if density > 0.0 && dot(surface.normal, ray.direction) > 0.0 {
+                ray.t_min = 0.0;
+                ray.t_max = T_INFINITE;
+                carried = surface_share() * reflected(s, ray.direction) * (dot(g.normal, ray.direction) / (PI * density));
+            }
+        }
+    }
+    rays[index] = ray;
+    throughput[index] = vec4<f32>(carried, 0.0);
+    densities[index] = density;
+    start_hit(index, ray.t_max, seen_hits[index].id);
+}

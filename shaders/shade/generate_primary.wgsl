@@ -1,0 +1,24 @@
+// Camera rays: direction(x, y) = base + x * step_x + y * step_y through the jittered pixel position, not normalised.
+#include "common/types.wgsl"
+#include "common/bindings.wgsl"
+#include "common/exact.wgsl"
+
+fn along(base: f32, x: f32, step_x: f32, y: f32, step_y: f32) -> f32 {
+    return barrier(barrier(base + barrier(x * step_x)) + barrier(y * step_y));
+}
+
+// One thread a ray.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let x = barrier(f32(global.x) + params.jitter.x);
+    let y = barrier(f32(global.y) + params.jitter.y);
+    let d = vec3<f32>(along(params.base.x, x, params.step_x.x, y, params.step_y.x),
+                      along(params.base.y, x, params.step_x.y, y, params.step_y.y),
+                      along(params.base.z, x, params.step_x.z, y, params.step_y.z));
+    rays[index] = Ray(params.origin.xyz, 0.0, d, T_INFINITE);
+    start_hit(index, T_INFINITE, NONE);
+}

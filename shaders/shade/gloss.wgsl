@@ -1,0 +1,172 @@
+// How surfaces reflect otherwise than diffusely: microfacets with the distribution of Trowbridge and Reitz (GGX),
+// Smith's masking, Fresnel by Schlick, the light of further bounces between facets by Turquin (2019), and a clear coat
+// of the same kind on top. The diffuse part has what they leave of the light (the albedo scaling of
+// KHR_materials_specular), so that no energy is gained. Twin: src/cpu/gloss.rs.
+
+// Of a lobe's square root of roughness; smoother ones are as sharp as this.
+const LEAST_ALPHA: f32 = 0.001;
+// What a clear coat reflects along its normal (KHR_materials_clearcoat: index of refraction 1.5).
+const COAT_F0: f32 = 0.04;
+
+struct Gloss {
+    normal: vec3<f32>,
+    cos_view: f32,        // of the normal and the view, at least LEAST_COS_VIEW
+    view: vec3<f32>,      // unit vector to where the hit is seen from
+    alpha: f32,
+    f0: vec3<f32>,        // reflectance along the normal, bounces between facets included
+    coat: f32,            // share of the clear coat
+    f90: vec3<f32>,       // and at grazing angles
+    coat_alpha: f32,
+    diffuse: vec3<f32>,   // albedo of the diffuse part
+    under: f32,           // share of the light that the coat leaves
+    share: vec3<f32>,     // of light from everywhere, reflected by the facets below the coat
+    coat_share: f32,      // of light from everywhere, reflected by the coat
+    choice: f32,          // probability that a direction is drawn by the coat
+}
+
+const LEAST_COS_VIEW: f32 = 1.0e-4;
+
+// What a lobe with reflectances of (1, 0) and of (0, 1) along the normal and at grazing angles reflects of light from
+// everywhere.
+fn reflectance(cosine: f32, alpha: f32) -> vec2<f32> {
+    let most = f32(REFLECTANCE_SIZE - 1u);
+    let x = clamp(sqrt(cosine), 0.0, 1.0) * most;
+    let y = clamp(sqrt(alpha), 0.0, 1.0) * most;
+    let column = min(u32(x), REFLECTANCE_SIZE - 2u);
+    let row = min(u32(y), REFLECTANCE_SIZE - 2u);
+    let at = row * REFLECTANCE_SIZE + column;
+    let right = x - f32(column);
+    let low = mix(reflectances[at], reflectances[at + 1u], right);
+    let high = mix(reflectances[at + REFLECTANCE_SIZE], reflectances[at + REFLECTANCE_SIZE + 1u], right);
+    return mix(low, high, y - f32(row));
+}
+
+// Of a hit seen along -view, of any length.
+fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
+    let m = materials[g.material];
+    var s: Gloss;
+    s.diffuse = g.albedo;
+    if (m.flags & MATERIAL_UNLIT) != 0u || !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0) {
+        return s;
+    }
+    s.normal = g.normal;
+    s.view = normalize(view);
+    s.cos_view = max(dot(s.normal, s.view), LEAST_COS_VIEW);
+    s.alpha = max(g.roughness * g.roughness, LEAST_ALPHA);
+    let around = reflectance(s.cos_view, s.alpha);
+    let white = around.x + around.y;
+    let bounces = (1.0 - white) / white;
+    let of_dielectric = vec3<f32>(1.0) + m.specular * bounces;
+    let of_metal = vec3<f32>(1.0) + g.albedo * bounces;
+    s.f0 = mix(m.specular * of_dielectric, g.albedo * of_metal, g.metallic);
+    s.f90 = mix(m.specular_weight * of_dielectric, of_metal, g.metallic);
+    s.share = s.f0 * around.x + s.f90 * around.y;
+    let left = vec3<f32>(1.0) - (m.specular * around.x + vec3<f32>(m.specular_weight * around.y)) * of_dielectric;
+    s.diffuse = g.albedo * (1.0 - g.metallic) * max(left, vec3<f32>(0.0));
+    s.coat = m.clearcoat;
+    s.under = 1.0;
+    if s.coat > 0.0 {
+        s.coat_alpha = max(m.clearcoat_roughness * m.clearcoat_roughness, LEAST_ALPHA);
+        let of_coat = reflectance(s.cos_view, s.coat_alpha);
+        s.coat_share = s.coat * (COAT_F0 * of_coat.x + of_coat.y);
+        s.under = 1.0 - s.coat_share;
+        s.diffuse *= s.under;
+    }
+    let below = s.under * max(s.share.x, max(s.share.y, s.share.z));
+    s.choice = s.coat_share / max(s.coat_share + below, 1.0e-20);
+    return s;
+}
+
+fn is_glossy(s: Gloss) -> bool {
+    return s.alpha > 0.0;
+}
+
+// A lobe toward d: x is distribution and masking over 4 times both cosines, y the density by which directions are
+// drawn.
+fn lobe(s: Gloss, alpha: f32, d: vec3<f32>, half_way: vec3<f32>) -> vec2<f32> {
+    let cosine = max(dot(s.normal, d), 0.0);
+    let across = cross(s.normal, half_way);
+    let c = dot(s.normal, half_way);
+    let squared = alpha * alpha;
+    // The squared sine by the cross product: that of small angles is not lost.
+    let q = squared * c * c + dot(across, across);
+    let distribution = squared / (PI * q * q);
+    let by_view = sqrt(squared + (1.0 - squared) * s.cos_view * s.cos_view);
+    let by_light = sqrt(squared + (1.0 - squared) * cosine * cosine);
+    let masked = 0.5 / max(cosine * by_view + s.cos_view * by_light, 1.0e-20);
+    return vec2<f32>(distribution * masked, 0.5 * distribution / (s.cos_view + by_view));
+}
+
+fn grazing(half_way: vec3<f32>, view: vec3<f32>) -> f32 {
+    let c = clamp(1.0 - dot(half_way, view), 0.0, 1.0);
+    return c * c * c * c * c;
+}
+
+// What the surface reflects of light from d, a unit vector, otherwise than diffusely: pi times its distribution
+// function.
+fn reflected(s: Gloss, d: vec3<f32>) -> vec3<f32> {
+    if s.alpha == 0.0 || dot(s.normal, d) <= 0.0 {
+        return vec3<f32>(0.0);
+    }
+    let half_way = normalize(s.view + d);
+    let f = grazing(half_way, s.view);
+    var sum = mix(s.f0, s.f90, f) * (s.under * lobe(s, s.alpha, d, half_way).x);
+    if s.coat > 0.0 {
+        sum += vec3<f32>(s.coat * mix(COAT_F0, 1.0, f) * lobe(s, s.coat_alpha, d, half_way).x);
+    }
+    return PI * sum;
+}
+
+// By which gloss_direction draws d, a unit vector.
+fn density_of(s: Gloss, d: vec3<f32>) -> f32 {
+    if s.alpha == 0.0 || dot(s.normal, d) <= 0.0 {
+        return 0.0;
+    }
+    let half_way = normalize(s.view + d);
+    var density = (1.0 - s.choice) * lobe(s, s.alpha, d, half_way).y;
+    if s.coat > 0.0 {
+        density += s.choice * lobe(s, s.coat_alpha, d, half_way).y;
+    }
+    return density;
+}
+
+// Share of light of one radiance from everywhere that the surface reflects otherwise than diffusely.
+fn reflected_around(s: Gloss) -> vec3<f32> {
+    return s.share * s.under + vec3<f32>(s.coat_share);
+}
+
+// What the surface reflects otherwise than diffusely of the background, unshadowed, where rays of its own do not bring
+// it.
+fn reflected_ambient(s: Gloss) -> vec3<f32> {
+    if s.alpha == 0.0 || (params.flags & (PARAM_GLOSSY | PARAM_BOUNCE)) == PARAM_GLOSSY {
+        return vec3<f32>(0.0);
+    }
+    return reflected_around(s) * ambient(reflect(-s.view, s.normal));
+}
+
+// Of light from around, what diffuse rays stand for: the diffuse part, and the rest where it has no rays of its own and
+// diffuse rays share nothing with rays to the environment.
+fn reflected_by_diffuse_rays(s: Gloss) -> vec3<f32> {
+    if s.alpha == 0.0 || (params.flags & PARAM_GLOSSY) != 0u || params.diffuse_count > 0.0 {
+        return s.diffuse;
+    }
+    return s.diffuse + reflected_around(s);
+}
+
+// A direction drawn by the facets that are seen (Dupuy, Benyoub 2023, "Sampling visible GGX normals with spherical
+// caps"), a unit vector; it may lead below the surface.
+fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
+    let alpha = select(s.alpha, s.coat_alpha, unit(words.z) < s.choice);
+    let x = tangent(s.normal);
+    let y = cross(s.normal, x);
+    let v = normalize(vec3<f32>(alpha * dot(s.view, x), alpha * dot(s.view, y), s.cos_view));
+    let around = TURN * unit(words.x);
+    let down = unit(words.y);
+    // On the cap of heights -v.z to 1.
+    let height = 1.0 - down * (1.0 + v.z);
+    let level = sqrt(max((1.0 - height) * (1.0 + height), 0.0));
+    let h = vec3<f32>(level * cos(around), level * sin(around), height) + v;
+    let facet = normalize(vec3<f32>(alpha * h.x, alpha * h.y, max(h.z, 0.0)));
+    let half_way = facet.x * x + facet.y * y + facet.z * s.normal;
+    return normalize(2.0 * dot(s.view, half_way) * half_way - s.view);
+}

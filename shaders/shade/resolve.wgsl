@@ -1,0 +1,160 @@
+// Reads the attributes of hits in bricks whose attributes are resident: normal, tangent, texture coordinates, the
+// material without its textures, and what of these the pixel covers.
+#include "common/types.wgsl"
+#include "common/bindings.wgsl"
+#include "common/exact.wgsl"
+#include "trace/cache.wgsl"
+#include "shade/shading.wgsl"
+#include "shade/material.wgsl"
+
+// Of the angle between a ray and a normal; below it a footprint is that of this one.
+const LEAST_COSINE: f32 = 0.05;
+
+// The normal of an attribute vertex; zero if it has none.
+fn octahedral(word: u32) -> vec3<f32> {
+    if word == NO_NORMAL {
+        return vec3<f32>(0.0);
+    }
+    let e = unpack2x16snorm(word);
+    var n = vec3<f32>(e.x, e.y, 1.0 - abs(e.x) - abs(e.y));
+    let t = max(-n.z, 0.0);
+    n.x += select(t, -t, n.x >= 0.0);
+    n.y += select(t, -t, n.y >= 0.0);
+    return normalize(n);
+}
+
+// x y + ..., rounded after every operation.
+fn rounded_dot(a: vec3<f32>, b: vec3<f32>) -> f32 {
+    return barrier(barrier(barrier(a.x * b.x) + barrier(a.y * b.y)) + barrier(a.z * b.z));
+}
+
+// What the pixel covers of the textures' unit square, an area, by ray cones (Akenine-Möller et al. 2021, "Improved
+// shader and texture level of detail using ray cones", eq. 2): the cone's width at the hit by the cosine there,
+// squared, times the area of the triangle in texture coordinates by that in the world. Cones are as wide as a pixel and
+// go on from hits without a change, so their width follows from the way from the camera. Rounded as it stands: which
+// tiles are read depends on it.
+fn footprint_of(ray: Ray, t: f32, surface: Surface, uvs: array<vec2<f32>, 3>) -> f32 {
+    let e1 = uvs[1] - uvs[0];
+    let e2 = uvs[2] - uvs[0];
+    let uv_area = abs(barrier(barrier(e1.x * e2.y) - barrier(e1.y * e2.x)));
+    let way = ray.origin - params.origin.xyz;
+    let length = square_root(rounded_dot(ray.direction, ray.direction));
+    let distance = barrier(square_root(rounded_dot(way, way)) + barrier(t * length));
+    let cosine = max(divide(abs(rounded_dot(ray.direction, surface.normal)), length), LEAST_COSINE);
+    let width = divide(barrier(distance * params.step_y.w), cosine);
+    return barrier(divide(uv_area, max(surface.area, 1.0e-30)) * barrier(width * width));
+}
+
+// One thread a pixel.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let surface = seen_surfaces[index];
+    if surface.leaf == NONE || gbuffer[index].state != 0u {
+        return;
+    }
+    let leaf = leaves[surface.leaf];
+    if (slots[leaf.brick].state & STATE_ATTRIBUTES) == 0u {
+        return;
+    }
+    let b = bricks[leaf.brick];
+    let page = slots[leaf.brick].attributes_page;
+    let at = 4u * slots[leaf.brick].attributes_offset;
+    let word = cache_word(page, at + b.surfaces + surface.triangle);
+    let material = materials[word & 0x3fffffffu];
+    let rotation = word >> 30u;
+    var corner: vec3<u32>;
+    if (b.flags & BRICK_INDEX32) != 0u {
+        let i = at + b.attribute_indices + 3u * surface.triangle;
+        corner = vec3<u32>(cache_word(page, i), cache_word(page, i + 1u), cache_word(page, i + 2u));
+    } else {
+        let half = 3u * surface.triangle;
+        let i = at + b.attribute_indices + (half >> 1u);
+        let x = cache_word(page, i);
+        let y = cache_word(page, i + 1u);
+        if (half & 1u) == 0u {
+            corner = vec3<u32>(x & 0xffffu, x >> 16u, y & 0xffffu);
+        } else {
+            corner = vec3<u32>(x >> 16u, y & 0xffffu, y >> 16u);
+        }
+    }
+    let hit = seen_hits[index];
+    let weights = vec3<f32>(1.0 - hit.u - hit.v, hit.u, hit.v);
+    var normal = vec3<f32>(0.0);
+    var uvs: array<vec2<f32>, 3>;
+    var uv = vec2<f32>(0.0);
+    var color = vec4<f32>(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        let v = cache_vec4(page, (at >> 2u) + corner[k]);
+        normal += weights[k] * octahedral(v.x);
+        uvs[k] = bitcast<vec2<f32>>(v.yz);
+        // Rounded as it stands: which tiles are read depends on it.
+        uv.x = barrier(uv.x + barrier(weights[k] * uvs[k].x));
+        uv.y = barrier(uv.y + barrier(weights[k] * uvs[k].y));
+        color += weights[k] * unpack4x8unorm(v.w);
+    }
+    let m = instances[leaf.instance].object_from_world;
+    var n = m[0].xyz * normal.x + m[1].xyz * normal.y + m[2].xyz * normal.z;
+    let size = dot(n, n);
+    // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric
+    // one.
+    n = select(surface.normal, n * inverseSqrt(max(size, 1.0e-30)), size > 1.0e-12);
+    let is_turned = dot(n, surface.normal) < 0.0;
+    if is_turned {
+        n = -n;
+    }
+    let base = material.base_color * color;
+    // Source vertex (i + rotation) mod 3 was stored as vertex i.
+    let source = array<f32, 3>(weights[(3u - rotation) % 3u], weights[(4u - rotation) % 3u], weights[(5u - rotation) % 3u]);
+    var g: GBuffer;
+    g.albedo = base.rgb;
+    g.state = GBUFFER_READ;
+    g.normal = n;
+    g.material = word & 0x3fffffffu;
+    g.emission = material.emission;
+    g.weights = vec2<f32>(source[1], source[2]);
+    g.uv = uv;
+    g.occlusion = 1.0;
+    g.metallic = material.metallic;
+    g.roughness = material.roughness;
+    for (var place = 0u; place < MATERIAL_TEXTURES; place++) {
+        if texture_of(material, place) != NONE {
+            g.state |= 1u << (GBUFFER_FIRST + place);
+        }
+    }
+    if g.state != GBUFFER_READ {
+        g.footprint = footprint_of(seen_rays[index], hit.t, surface, uvs);
+        if (b.flags & BRICK_DETAIL) != 0u {
+            var along = vec3<f32>(0.0);
+            for (var k = 0u; k < 3u; k++) {
+                let v = cache_vec4(page, ((at + b.details) >> 2u) + corner[k]);
+                along += weights[k] * octahedral(v.x);
+                g.handedness = bitcast<f32>(v.y);
+                uvs[k] = bitcast<vec2<f32>>(v.zw);
+                g.uv1.x = barrier(g.uv1.x + barrier(weights[k] * uvs[k].x));
+                g.uv1.y = barrier(g.uv1.y + barrier(weights[k] * uvs[k].y));
+            }
+            g.footprint1 = footprint_of(seen_rays[index], hit.t, surface, uvs);
+            let w = instances[leaf.instance].world_from_object;
+            g.tangent = vec3<f32>(dot(w[0].xyz, along), dot(w[1].xyz, along), dot(w[2].xyz, along));
+            // Seen from behind, the frame is turned about with its normal.
+            if is_turned {
+                g.tangent = -g.tangent;
+                g.handedness = -g.handedness;
+            }
+            if (instances[leaf.instance].flags & INSTANCE_MIRRORED) != 0u {
+                g.handedness = -g.handedness;
+            }
+        }
+        if g.handedness == 0.0 {
+            g.state &= ~(1u << (GBUFFER_FIRST + NORMAL));
+        }
+    }
+    if g.state == GBUFFER_READ {
+        g = settled(g, material.flags);
+    }
+    gbuffer[index] = g;
+}

@@ -1,9 +1,0 @@
-//! The files a command leaves behind. All of them appear complete or not at all, except [`atomic::JsonLines`], which grows
-//! by whole lines.
-
-pub mod atomic;
-pub mod exr;
-pub mod npy;
-pub mod png;
-pub mod srgb;
-pub mod video;

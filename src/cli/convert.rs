@@ -1,0 +1,216 @@
+//! `convert`: scenes of common formats into one `.bricks` file.
+
+use super::interrupt;
+use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
+use super::options::sizes::{human_bytes, human_count};
+use anyhow::{Context, Result, bail, ensure};
+use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
+use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, TILESET, import};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Deepest nesting of folders that is searched.
+const MAX_DEPTH: u32 = 64;
+
+/// Runs `convert`.
+///
+/// # Errors
+/// An input cannot be read or is bad, or the output cannot be written; an old output then stays as it was.
+pub fn run(args: &ConvertArgs) -> Result<()> {
+    let start = Instant::now();
+    let inputs = expand(&args.inputs.inputs)?;
+    refuse_overwriting(&inputs, &args.output)?;
+    let progress = interrupt::job();
+    let threads = args.build.work.threads.map(|n| n as usize);
+    let beside = || args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
+    let scratch = args.build.work.scratch.clone().or_else(beside);
+    let movable = args.movable.clone();
+    let source = import(&inputs, &ImportSettings { threads, scratch, movable: movable.clone() }, &progress)?;
+    let settings = BuildSettings {
+        textures: args.textures.into(),
+        movable,
+        ..mesh_settings(&args.mesh, build_settings(&args.build))
+    };
+    let summary = usage(build_source(&source, &settings, &args.output, &progress))?;
+    progress.finish();
+    summarise(&args.output, &summary, start)
+}
+
+/// The settings of the builder for everything that writes a scene file.
+pub fn build_settings(args: &BuildArgs) -> BuildSettings {
+    let settings = work_settings(&args.work);
+    let brick_triangles = args.brick_triangles.unwrap_or(settings.brick_triangles);
+    BuildSettings { brick_triangles, proxies: !args.no_proxies, resume: args.resume, ..settings }
+}
+
+/// The settings of the builder for everything that converts.
+pub fn work_settings(args: &WorkArgs) -> BuildSettings {
+    BuildSettings {
+        threads: args.threads.map(|n| n as usize),
+        lattice_log2: args.lattice,
+        memory_bytes: args.memory,
+        fast: args.fast,
+        scratch: args.scratch.clone(),
+        ..BuildSettings::default()
+    }
+}
+
+/// `settings` with those of the triangles and meshes of inputs.
+pub fn mesh_settings(args: &MeshArgs, settings: BuildSettings) -> BuildSettings {
+    BuildSettings {
+        drop_non_finite: args.drop_non_finite,
+        instance_min_triangles: args.instance_min_triangles,
+        bake_budget_triangles: args.bake_budget,
+        ..settings
+    }
+}
+
+/// Makes a setting that only the builder can judge wrong usage.
+///
+/// # Errors
+/// As of the builder.
+pub fn usage(built: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
+    built.map_err(|error| match error {
+        BuildError::Setting { .. } => super::Usage(error.to_string()).into(),
+        error => error.into(),
+    })
+}
+
+/// Says on standard output what a written scene holds, on standard error what its conversion warned of.
+///
+/// # Errors
+/// The file cannot be opened, or standard output is closed.
+pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<()> {
+    let scene = bricks::SceneFile::open(path)?;
+    let resident = scene.resident();
+    for warning in &resident.manifest.warnings {
+        let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(warning));
+    }
+    super::print(&format!(
+        "{}: {} triangles ({} with instances) in {} bricks, {}, {:.1} s\n",
+        path.display(),
+        human_count(resident.manifest.triangles_stored),
+        human_count(resident.manifest.triangles_instanced),
+        human_count(resident.bricks.len() as u64),
+        human_bytes(scene.file_bytes()),
+        start.elapsed().as_secs_f64()
+    ))?;
+    let phases = summary.phases.iter().map(|(phase, time)| format!("{phase} {:.1} s", time.as_secs_f64()));
+    super::print(&format!("{}: {}\n", path.display(), phases.collect::<Vec<_>>().join(", ")))
+}
+
+/// The files that the inputs name: a folder stands for its `tileset.json`, else for the scene files in it and below,
+/// sorted bytewise by path.
+///
+/// # Errors
+/// A folder cannot be read, or holds no scene file.
+pub fn expand(inputs: &[Input]) -> Result<Vec<Input>> {
+    let mut files = Vec::new();
+    for input in inputs {
+        if !input.path.is_dir() {
+            files.push(input.clone());
+            continue;
+        }
+        let mut found = Vec::new();
+        search(&input.path, 0, &mut found)?;
+        ensure!(
+            !found.is_empty(),
+            "{}: there is no {} file in this folder; name the scene files themselves",
+            input.path.display(),
+            EXTENSIONS.map(|extension| format!(".{extension}")).join(", ")
+        );
+        found.sort_by(|a, b| a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes()));
+        files.extend(found.into_iter().map(|path| Input { path, ..input.clone() }));
+    }
+    Ok(files)
+}
+
+fn search(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
+    ensure!(depth < MAX_DEPTH, "{}: folders are nested too deeply; name the scene files themselves", folder.display());
+    // The models below are its tiles.
+    let tileset = folder.join(TILESET);
+    if tileset.is_file() {
+        found.push(tileset);
+        return Ok(());
+    }
+    let context = || format!("{}: cannot read this folder; check its permissions", folder.display());
+    for entry in std::fs::read_dir(folder).with_context(context)? {
+        let entry = entry.with_context(context)?;
+        let path = entry.path();
+        // Links to folders are not followed, so that no circle of them is searched for ever.
+        if entry.file_type().with_context(context)?.is_dir() {
+            search(&path, depth + 1, found)?;
+            continue;
+        }
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an output that is a folder.
+///
+/// # Errors
+/// It is one.
+pub fn refuse_folder(output: &Path) -> Result<()> {
+    ensure!(!output.is_dir(), "{}: this is a folder; give -o the name of a file, as in scene.bricks", output.display());
+    Ok(())
+}
+
+/// Refuses an output that is an input or a folder.
+fn refuse_overwriting(inputs: &[Input], output: &Path) -> Result<()> {
+    refuse_folder(output)?;
+    let Ok(target) = output.canonicalize() else { return Ok(()) };
+    for input in inputs {
+        if input.path.canonicalize().is_ok_and(|input| input == target) {
+            bail!("{}: the output would overwrite this input; give -o another name", input.path.display());
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_stand_for_their_scene_files_in_bytewise_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir_all(at("sub/deep")).unwrap();
+        std::fs::create_dir(at("empty")).unwrap();
+        for name in ["b.gltf", "B.GLB", "a.glb", "notes.txt", "c.STL", "sub/c.glb", "sub/deep/a.gltf", "noextension"] {
+            std::fs::write(at(name), b"").unwrap();
+        }
+        let mut inputs = [at("a.glb"), folder.path().into(), at("missing.gltf")].map(Input::from);
+        inputs[1].metres = 0.5;
+        let files = expand(&inputs).unwrap();
+        let metres: Vec<_> = files.iter().map(|file| file.metres).collect();
+        assert_eq!(metres, [1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 1.0]);
+        let files: Vec<_> = files.into_iter().map(|file| file.path).collect();
+        let expected =
+            ["a.glb", "B.GLB", "a.glb", "b.gltf", "c.STL", "sub/c.glb", "sub/deep/a.gltf", "missing.gltf"].map(at);
+        assert_eq!(files, expected);
+        let error = expand(&[at("empty").into()]).unwrap_err().to_string();
+        assert!(error.contains("empty: there is no"), "{error}");
+    }
+
+    #[test]
+    fn inputs_and_folders_are_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a.glb"), b"").unwrap();
+        std::fs::create_dir(at("sub")).unwrap();
+        assert!(refuse_overwriting(&[at("a.glb").into()], &at("b.bricks")).is_ok());
+        assert!(
+            refuse_overwriting(&[at("a.glb").into()], &at("sub/../a.glb"))
+                .unwrap_err()
+                .to_string()
+                .contains("overwrite")
+        );
+        assert!(refuse_overwriting(&[at("a.glb").into()], &at("sub")).unwrap_err().to_string().contains("folder"));
+    }
+}

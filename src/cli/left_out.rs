@@ -1,0 +1,155 @@
+//! What rendering leaves out because a scene does not need it, and what that saves.
+
+use super::options::args::WalkArgs;
+use super::walk::lit_renderer;
+use crate::frame::{Light, Renderer};
+use crate::kernels::{Extent, Keep, opacity, reflectance};
+use crate::scene::Camera;
+use crate::session::open::Session;
+use anyhow::Result;
+use bricks::SceneFile;
+use serde_json::{Map, Value, json};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Times that a frame is rendered with and without each thing.
+const REPETITIONS: usize = 5;
+
+/// Something that is left out.
+#[derive(Clone, Copy, Debug)]
+pub struct LeftOut {
+    what: &'static str,
+    why: &'static str,
+    /// What keeps it, where it can be kept.
+    keep: Option<fn(&mut Keep)>,
+}
+
+/// What `renderer` leaves out.
+pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
+    let has_short_rays = has_short_rays(renderer);
+    let resident = renderer.scene.resident();
+    let manifest = &resident.manifest;
+    let fits = renderer.cache.residency.budget_bytes() >= renderer.cache.bytes.sizes().sum();
+    let all: [(bool, LeftOut); 7] = [
+        (
+            fits,
+            LeftOut {
+                what: "queries for missing bricks",
+                why: "the cache holds every brick and tile",
+                keep: Some(|keep| keep.queries = true),
+            },
+        ),
+        (
+            !manifest.has_textures,
+            LeftOut {
+                what: "texture lookups",
+                why: "no material has a texture",
+                keep: Some(|keep| keep.textures = true),
+            },
+        ),
+        (
+            !opacity::is_needed(resident),
+            LeftOut {
+                what: "alpha tests in traversal",
+                why: "no ray passes through a triangle",
+                keep: Some(|keep| keep.opacity = true),
+            },
+        ),
+        (
+            !reflectance::is_needed(resident),
+            LeftOut {
+                what: "reflections other than diffuse ones",
+                why: "every surface is Lambertian",
+                keep: Some(|keep| keep.gloss = true),
+            },
+        ),
+        (
+            !manifest.has_instances,
+            LeftOut { what: "instance transforms", why: "everything is baked into the world", keep: None },
+        ),
+        (
+            has_short_rays,
+            LeftOut {
+                what: "occupancy maps for ao",
+                why: "its rays are shorter than three cells of bricks",
+                keep: None,
+            },
+        ),
+        (!manifest.has_wide_bricks, LeftOut { what: "two-part vertices", why: "every brick is near", keep: None }),
+    ];
+    all.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, one)| one).collect()
+}
+
+/// Whether maps would have spared rays of ao that are too short for it.
+fn has_short_rays(renderer: &mut Renderer) -> bool {
+    let is_help = renderer.settings.roma.is_some_and(|roma| roma.occlusion.role.is_help());
+    let length = renderer.settings.effects.occlusion.map(|occlusion| occlusion.length);
+    is_help && length.is_some_and(|length| renderer.roma.is_short(&renderer.scene, length))
+}
+
+/// As the summary lists them, with what `measured` found.
+pub fn listed(all: &[LeftOut], measured: &[Map<String, Value>]) -> Vec<Value> {
+    let one = |(i, one): (usize, &LeftOut)| {
+        let mut entry = Map::new();
+        entry.insert("what".into(), one.what.into());
+        entry.insert("why".into(), one.why.into());
+        entry.extend(measured.get(i).cloned().into_iter().flatten());
+        Value::Object(entry)
+    };
+    all.iter().enumerate().map(one).collect()
+}
+
+/// What a frame of `camera` takes as it is rendered and with each of `all` kept, turn by turn: medians of the
+/// milliseconds of five frames each, after one that is not counted. Nothing is stated of what kernels decide as they
+/// run.
+///
+/// # Errors
+/// The device's.
+pub fn measure(
+    all: &[LeftOut],
+    scene: &Arc<SceneFile>,
+    args: &WalkArgs,
+    light: &Light,
+    camera: &Camera,
+) -> Result<Vec<Map<String, Value>>> {
+    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let mut options = args.clone();
+    options.stream.requests_out = None;
+    options.stream.prefetch = 0;
+    let open = |keep: Keep| -> Result<Renderer> {
+        let session = Session::open_keeping(scene.clone(), &args.scene, &options.stream, extent, keep)?;
+        Ok(lit_renderer(session, &options, light.clone()))
+    };
+    let mut renderers = vec![open(Keep::default())?];
+    let can = renderers[0].executor.leaves_out();
+    let keep = |one: &LeftOut| {
+        let mut keep = Keep::default();
+        one.keep.iter().for_each(|set| set(&mut keep));
+        keep
+    };
+    let kept: Vec<usize> = (0..all.len()).filter(|&i| all[i].keep.is_some() && keep(&all[i]).is_part_of(can)).collect();
+    for &i in &kept {
+        renderers.push(open(keep(&all[i]))?);
+    }
+    let mut times = vec![Vec::new(); renderers.len()];
+    for repetition in 0..=REPETITIONS {
+        for (renderer, times) in renderers.iter_mut().zip(&mut times) {
+            let start = Instant::now();
+            renderer.frame(0, camera)?;
+            if repetition > 0 {
+                times.push(start.elapsed().as_secs_f64() * 1e3);
+            }
+        }
+    }
+    let median = |times: &mut Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    };
+    let medians: Vec<f64> = times.iter_mut().map(median).collect();
+    let mut measured = vec![Map::new(); all.len()];
+    for (&i, &with) in kept.iter().zip(&medians[1..]) {
+        let values = json!({ "ms_frame": medians[0], "ms_frame_kept": with, "ms_saved": with - medians[0], "repetitions": REPETITIONS });
+        measured[i].extend(values.as_object().cloned().into_iter().flatten());
+    }
+    Ok(measured)
+}

@@ -1,0 +1,196 @@
+//! The command: parses, dispatches, and turns whatever happens into an exit status: 0 done, 1 the input is bad (one
+//! line on standard error), 2 wrong usage.
+
+pub mod adapters;
+pub mod compare;
+pub mod convert;
+pub mod demo;
+pub mod dvf;
+pub mod info;
+pub mod instances;
+pub mod interrupt;
+pub mod left_out;
+pub mod motion;
+pub mod options;
+pub mod pictures;
+pub mod quality;
+pub mod repair;
+pub mod replay;
+pub mod scene;
+pub mod summary;
+pub mod trace;
+pub mod verify;
+pub mod walk;
+
+use clap::Parser;
+use options::args::{Cli, Command};
+use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exit status for bad input.
+const BAD_INPUT: u8 = 1;
+
+/// Wrong usage that only a command itself can see: exit status 2.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}; see brickwalk --help")]
+pub struct Usage(pub String);
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    install_panic_hook();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A closed pipe is no reason to fail, and there is nobody to tell.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    // Whatever is half done is dropped with the call: a panic leaves nothing behind that is used afterwards.
+    match catch_unwind(AssertUnwindSafe(|| run(&cli.command))) {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Err(error)) => report(&error),
+        Err(_) => ExitCode::from(BAD_INPUT),
+    }
+}
+
+/// Runs a subcommand.
+///
+/// # Errors
+/// Its input is bad, or ([`Usage`]) its options do not go together.
+pub fn run(command: &Command) -> anyhow::Result<()> {
+    match command {
+        Command::Demo(args) => demo::run(args),
+        Command::Convert(args) => convert::run(args),
+        Command::Scene(args) => scene::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Verify(args) => verify::run(args),
+        Command::Repair(args) => repair::run(args),
+        Command::Walk(args) => {
+            args.optimisations.check(&args.stream)?;
+            args.check()?;
+            walk::run(args)
+        }
+        Command::Trace(args) => {
+            args.check()?;
+            trace::run(args)
+        }
+        Command::Replay(args) => replay::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Bench(args) => crate::lab::bench::run(args),
+        Command::Adapters(args) => adapters::run(args),
+        Command::Selftest(args) => crate::lab::selftest::run(args),
+    }
+}
+
+/// Prints an error as one line and chooses the exit status.
+fn report(error: &anyhow::Error) -> ExitCode {
+    if is_closed_pipe(error) {
+        return ExitCode::SUCCESS;
+    }
+    let _ = writeln!(std::io::stderr(), "brickwalk: {}", one_line(&chain(error)));
+    if error.is::<Usage>() { ExitCode::from(2) } else { ExitCode::from(BAD_INPUT) }
+}
+
+/// The messages of an error and its causes, outermost first. Many error types repeat the message of their source; a
+/// cause that has already been said is left out.
+fn chain(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain() {
+        let message = cause.to_string();
+        if text.is_empty() {
+            text = message;
+        } else if !text.contains(&message) {
+            text.push_str(": ");
+            text.push_str(&message);
+        }
+    }
+    text
+}
+
+/// `text` with every run of control characters and white space as one space.
+fn one_line(text: &str) -> String {
+    text.split(|c: char| c.is_whitespace() || c.is_control())
+        .filter(|word| !word.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// Whether the reader of standard output went away, as in `brickwalk info S.bricks | head -1`.
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<ClosedPipe>().is_some()
+}
+
+/// The reader of standard output went away; the command ends quietly.
+#[derive(Debug, thiserror::Error)]
+#[error("standard output is closed")]
+struct ClosedPipe;
+
+/// Writes text to standard output; unlike `print!`, without a panic when the reader went away.
+///
+/// # Errors
+/// Standard output is closed or full.
+pub fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| {
+        if error.kind() == std::io::ErrorKind::BrokenPipe {
+            ClosedPipe.into()
+        } else {
+            anyhow::Error::new(error).context("cannot write to standard output")
+        }
+    })
+}
+
+/// Writes a value as indented JSON and a newline to standard output.
+///
+/// # Errors
+/// As [`print()`].
+pub fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    print(&(serde_json::to_string_pretty(value)? + "\n"))
+}
+
+/// Makes a panic, which is a defect of the program, one line on standard error; [`main`] turns it into exit status 1.
+/// Only the first one speaks: those of other threads follow from it.
+fn install_panic_hook() {
+    static SPOKEN: AtomicBool = AtomicBool::new(false);
+    std::panic::set_hook(Box::new(|info| {
+        // A decoder that gave up on a damaged input: the importer tells.
+        if brickwalk_convert::import::catches_panics() {
+            return;
+        }
+        if SPOKEN.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let message = info.payload_as_str().unwrap_or("unknown");
+        let place = info.location().map_or(String::new(), |at| format!(" at {}:{}", at.file(), at.line()));
+        let _ = writeln!(
+            std::io::stderr(),
+            "brickwalk: internal error{place}: {}; this is a defect of brickwalk, please report it with the command line",
+            one_line(message)
+        );
+    }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn errors_are_one_line_without_repetition() {
+        let inner = std::io::Error::other("disk\nfull\t!");
+        let error = Err::<(), _>(inner).context("a.bricks: cannot write").unwrap_err();
+        assert_eq!(one_line(&chain(&error)), "a.bricks: cannot write: disk full !");
+        let repeated = anyhow::anyhow!("full").context("a.bricks: full; free some space");
+        assert_eq!(chain(&repeated), "a.bricks: full; free some space");
+    }
+
+    #[test]
+    fn closed_pipes_are_told_from_other_errors() {
+        assert!(is_closed_pipe(&ClosedPipe.into()));
+        assert!(is_closed_pipe(&anyhow::Error::from(ClosedPipe).context("while printing")));
+        assert!(!is_closed_pipe(&anyhow::anyhow!("other")));
+    }
+}

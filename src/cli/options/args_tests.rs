@@ -1,0 +1,270 @@
+use crate::cli::options::args::*;
+use crate::cli::options::sizes::Direction;
+use brickwalk_scenes::Kind;
+use clap::CommandFactory;
+use clap::error::ErrorKind;
+
+fn parse(line: &str) -> Result<Command, clap::Error> {
+    Cli::try_parse_from(std::iter::once("brickwalk").chain(line.split_whitespace())).map(|cli| cli.command)
+}
+
+fn walk(options: &str) -> Result<WalkArgs, clap::Error> {
+    parse(&format!("walk s.bricks -o out {options}")).map(|command| match command {
+        Command::Walk(args) => *args,
+        other => panic!("{other:?}"),
+    })
+}
+
+#[test]
+fn the_definition_is_consistent() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn defaults_of_walk_are_the_documented_ones() {
+    let w = walk("").unwrap();
+    assert_eq!(w.frames, 30);
+    assert_eq!(w.size, ImageSize { width: 1280, height: 720 });
+    assert_eq!(w.effects.effects.to_string(), "primary,shadow");
+    assert_eq!((w.spp, w.seed, w.stream.prefetch), (1, 0, 0));
+    assert_eq!(w.stream.cache, CacheSize::Percent(25.0));
+    assert_eq!(w.stream.host_cache, 1 << 30);
+    assert_eq!(w.secondary, Secondary::Exact);
+    assert_eq!(
+        (w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()),
+        ("off", 0, "round-robin")
+    );
+    let Direction(sun) = "0.4,0.8,0.45".parse().unwrap();
+    assert_eq!(w.light.sun.0, sun);
+    assert_eq!(w.light.sun_angle, 0.53);
+    assert!(w.path.is_none() && !w.aov && !w.json && w.fov.is_none());
+}
+
+#[test]
+fn options_arrive() {
+    let w = walk(
+        "--path p.json --frames 3 --size 64x32 --cache 12M --host-cache 2G --schedule plain --effects primary --spp 4 \
+         --seed 9 --aov --json --sun -1,2,-3 --sun-angle 0 --sun-intensity 5 --sky-intensity 0 --tile 32 --workers 2 \
+         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru --prefetch 16 \
+         --requests-out f.jsonl --measure-needed",
+    )
+    .unwrap();
+    assert_eq!(w.path, Some("p.json".into()));
+    assert_eq!((w.frames, w.spp, w.seed, w.stream.tile), (3, 4, 9, 32));
+    assert_eq!(w.stream.cache, CacheSize::Bytes(12 << 20));
+    assert_eq!(w.stream.host_cache, 2 << 30);
+    assert_eq!(w.stream.schedule, Schedule::Plain);
+    assert_eq!(w.effects.effects.to_string(), "primary");
+    assert!(w.aov && w.json && w.light.sun.0[0] < 0.0);
+    assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
+    assert_eq!(w.stream.adapter, Adapter::Named("llvm".into()));
+    assert_eq!((w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()), ("on", 20, "lru"));
+    assert!(w.measure_needed && w.stream.prefetch == 16 && w.stream.requests_out == Some("f.jsonl".into()));
+    assert_eq!(walk("--hash-threads 3").unwrap().stream.worker_count(), 3);
+    assert!(walk("").unwrap().stream.worker_count() >= 1);
+}
+
+#[test]
+fn wrong_values_are_usage_errors_that_say_what_is_right() {
+    for (options, part) in [
+        ("--frames 0", "1 to 1000000"),
+        ("--frames 1.5", "whole number"),
+        ("--size 0x720", "1 to 16384"),
+        ("--size 99999x1", "1 to 16384"),
+        ("--cache 0", "at least 1"),
+        ("--cache 101%", "100 %"),
+        ("--cache 99999999999G", "64 bits"),
+        ("--host-cache 1.5G", "whole number"),
+        ("--schedule fastest", "known: chc, demand, plain, plain-bvh2, auto"),
+        ("--effects glitter", "no 'glitter'"),
+        ("--effects=", "known: primary, shadow"),
+        ("--secondary displacement", "displacement is not in this version; it has: exact, roma, auto, df, dvf"),
+        ("--dvf-cells 0", "it must be from 1 to 512, or auto"),
+        ("--dvf-octahedral 12", "it must be one of 8, 16, 32"),
+        ("--roma-k 5", "one of 4, 8"),
+        ("--roma-size 100", "32, 64, 128, 256"),
+        ("--roma-samples 3", "1, 2, 4"),
+        ("--roma-unsnapped glossy", "known: none, shadow, ao, diffuse, all"),
+        ("--roma-steps 65", "1 to 64"),
+        ("--df-size 100", "32, 64, 128, 256"),
+        ("--df-steps 0", "1 to 1024"),
+        ("--df-lift 9", "from 0 to 8"),
+        ("--df-hit 0", "from 0.01 to 8"),
+        ("--spp 0", "from 1"),
+        ("--seed -1", "-1"),
+        ("--sun 0,0,0", "not all 0"),
+        ("--sun-angle 91", "90 degrees"),
+        ("--sun-intensity nan", "finite"),
+        ("--sky-intensity=-1", "at least 0"),
+        ("--tile 48", "power of two"),
+        ("--tile 1024", "power of two"),
+        ("--workers 0", "from 1"),
+        ("--fov 180", "179.99"),
+        ("--fov nan", "179.99"),
+        ("--fronts yes", "known: on, off"),
+        ("--query-threshold 40001", "0 to 40000"),
+        ("--evict fifo", "known: round-robin, second-chance, lru"),
+        ("--prefetch 65537", "0 to 65536"),
+        ("--environment-rotation 361", "-360 to 360"),
+        ("--environment-intensity=-1", "at least 0"),
+        ("--nonsense", "--nonsense"),
+    ] {
+        let error = walk(options).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{options}");
+        assert!(error.to_string().contains(part), "{options}: {error}");
+    }
+}
+
+#[test]
+fn other_commands_check_too() {
+    for (line, part) in [
+        ("", "Usage"),
+        ("fly", "fly"),
+        ("convert -o s.bricks", "INPUT"),
+        ("convert a.gltf", "--output"),
+        ("convert a.gltf -o s.bricks --brick-triangles 0", "from 1"),
+        ("convert a.gltf -o s.bricks --memory 0", "at least 1"),
+        ("convert a.gltf -o s.bricks --lattice 999", "999"),
+        ("scene ruins -o s.bricks", "the kinds are: city"),
+        ("scene castle -o s.bricks", "castle"),
+        ("scene city -o s.bricks --triangles 0", "at least 1"),
+        ("info", "S.bricks"),
+        ("info s.bricks --id -1", "-1"),
+        ("info s.bricks --id 4294967296", "4294967296"),
+        ("verify", "S.bricks"),
+        ("trace s.bricks -o h.npy", "--rays"),
+        ("replay", "<F>"),
+        ("replay f.jsonl --cache 0%", "above 0 %"),
+        ("compare a.png", "<B>"),
+        ("walk s.bricks", "--output"),
+    ] {
+        let error = parse(line).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{line}");
+        assert!(error.to_string().contains(part), "{line}: {error}");
+    }
+}
+
+#[test]
+fn trace_refuses_what_is_for_walks() {
+    let check = |options: &str| match parse(&format!("trace s.bricks --rays r.npy -o h.npy {options}")).unwrap() {
+        Command::Trace(args) => args.check(),
+        other => panic!("{other:?}"),
+    };
+    assert!(check("").is_ok() && check("--any --cache 1M --evict lru --requests-out f").is_ok());
+    for options in ["--fronts on", "--query-threshold 20", "--prefetch 4"] {
+        assert!(check(options).unwrap_err().to_string().contains(options.split(' ').next().unwrap()), "{options}");
+    }
+}
+
+#[test]
+fn options_of_other_commands_arrive() {
+    let Command::Convert(c) =
+        parse("convert a.gltf b.glb -o s.bricks --brick-triangles 4K --threads 2 --lattice -12 --drop-non-finite")
+            .unwrap()
+    else {
+        panic!()
+    };
+    assert_eq!(c.inputs.inputs.len(), 2);
+    assert_eq!((c.build.brick_triangles, c.build.work.threads, c.build.work.lattice), (Some(4000), Some(2), Some(-12)));
+    assert!(c.mesh.drop_non_finite);
+    let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
+    assert_eq!((s.kind, s.triangles, s.seed), (SceneKind::Generated(Kind::City), Some(200_000), 7));
+    assert_eq!((s.case, s.build.brick_triangles), (None, None));
+    let Command::Scene(s) = parse("scene stiff --case slivers -o s.glb").unwrap() else { panic!() };
+    assert_eq!((s.kind, s.case, s.triangles), (SceneKind::Stiff, Some(Stiff::Slivers), None));
+    let help = parse("scene --help").unwrap_err().to_string();
+    assert!(Stiff::ALL.iter().all(|kind| help.contains(kind.about())), "{help}");
+    let Command::Replay(r) = parse("replay f.jsonl --cache 5% 1M,2M --cache 7K --json").unwrap() else { panic!() };
+    assert_eq!(r.cache[..2], [CacheSize::Percent(5.0), CacheSize::Bytes(1 << 20)]);
+    assert!(r.cache.len() == 4 && r.json);
+    let Command::Repair(r) = parse("repair s.bricks --from a.gltf b.stl --up z --from c.ply --fast").unwrap() else {
+        panic!()
+    };
+    let inputs: Vec<_> = r.inputs.inputs.iter().map(|input| (input.path.to_str().unwrap(), input.up)).collect();
+    let z = Some(brickwalk_convert::import::Up::Z);
+    assert_eq!(inputs, [("a.gltf", None), ("b.stl", z), ("c.ply", None)]);
+    assert_eq!((r.scene, r.work.fast), (PathBuf::from("s.bricks"), true));
+    let Command::Repair(r) = parse("repair s.bricks").unwrap() else { panic!() };
+    assert!(r.inputs.inputs.is_empty());
+    let Command::Demo(d) = parse("demo").unwrap() else { panic!() };
+    assert_eq!(d.output, PathBuf::from("demo-out"));
+}
+
+/// Every subcommand's help explains units and names a default where an option with a value has one.
+#[test]
+fn help_explains_units_and_defaults() {
+    let top = parse("--help").unwrap_err();
+    assert_eq!((top.kind(), top.exit_code()), (ErrorKind::DisplayHelp, 0));
+    let cli = Cli::command();
+    let mut names: Vec<_> = cli.get_subcommands().map(|c| c.get_name().to_string()).collect();
+    names.sort();
+    let commands = [
+        "adapters", "bench", "compare", "convert", "demo", "info", "repair", "replay", "scene", "selftest", "trace",
+        "verify", "walk",
+    ];
+    assert_eq!(names, commands);
+    for name in commands {
+        let name = if name == "bench" { "bench chc" } else { name };
+        let command = name.split(' ').fold(&cli, |command, word| command.find_subcommand(word).unwrap());
+        let help = parse(&format!("{name} --help")).unwrap_err();
+        assert_eq!(help.exit_code(), 0, "{name}");
+        let text = help.to_string();
+        assert!(text.contains("powers of 1024") && text.contains("Exit status"), "{name}: {text}");
+        for argument in command.get_arguments().filter(|a| !a.is_hide_set()) {
+            let described = argument.get_help().is_some_and(|h| h.to_string().len() > 5);
+            assert!(described, "{name}: {} has no help", argument.get_id());
+            let long = argument.get_long().map(|l| format!("--{l}"));
+            if let Some(long) = long {
+                assert!(text.contains(&long), "{name}: {long}");
+            }
+            let optional = !argument.is_required_set() && argument.get_action().takes_values();
+            let has_default = !argument.get_default_values().is_empty()
+                || argument.get_help().is_some_and(|h| h.to_string().contains("[default:"));
+            let filter = ["path", "adapter", "id"].contains(&argument.get_id().as_str());
+            assert!(!optional || has_default || filter, "{name}: {} states no default", argument.get_id());
+        }
+    }
+    let help = parse("walk --help").unwrap_err().to_string();
+    for part in ["1280x720", "[default: 25%]", "[default: 30]", "degrees", "pixels", "[default: 1G]", "0.4,0.8,0.45"] {
+        assert!(help.contains(part), "walk --help lacks {part}");
+    }
+}
+
+#[test]
+fn version_is_printed() {
+    let version = parse("--version").unwrap_err();
+    assert_eq!((version.kind(), version.exit_code()), (ErrorKind::DisplayVersion, 0));
+}
+
+#[test]
+fn optimisations_are_switched_by_name() {
+    let w = walk("--without requery,nearest-first --with leaf-cache").unwrap();
+    let on = w.optimisations.optimisations();
+    assert!(!on.requery && !on.nearest_first && on.leaf_cache && on.by_tile && on.resident_first);
+    assert_eq!(crate::cli::options::optimisation_args::names(&w.optimisations.without), ["nearest-first", "requery"]);
+    assert_eq!(walk("").unwrap().optimisations.optimisations(), crate::schedule::Optimisations::default());
+    let error = walk("--without haste").unwrap_err().to_string();
+    assert!(error.contains("known: nearest-first, requery"), "{error}");
+}
+
+#[test]
+fn optimisations_without_meaning_are_refused_with_what_they_belong_to() {
+    let check = |options: &str| {
+        let w = walk(options).unwrap();
+        w.optimisations.check(&w.stream).map_err(|error| error.to_string())
+    };
+    for (options, part) in [
+        ("--schedule plain --without requery", "chc, demand or auto"),
+        ("--schedule demand --without by-tile", "chc or auto"),
+        ("--schedule demand --with leaf-cache", "chc or auto"),
+        ("--with requery --without requery", "both"),
+    ] {
+        let error = check(options).unwrap_err();
+        assert!(error.contains(part), "{options}: {error}");
+    }
+    for options in
+        ["--schedule demand --without requery", "--schedule chc --without by-tile", "--without front-to-back"]
+    {
+        check(options).unwrap();
+    }
+}

@@ -1,0 +1,301 @@
+//! Values of options: sizes in bytes, counts, image sizes, shares of a scene, directions. Exact and checked; each
+//! parser returns one sentence that says what is wrong and what is right, for clap to print.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Largest width or height of an image, pixels.
+pub const MAX_IMAGE_PX: u32 = 16384;
+
+/// Splits a whole number from its unit and multiplies, with every overflow refused.
+fn scaled(text: &str, units: &[(char, u64)], what: &str) -> Result<u64, String> {
+    let (digits, factor) = match text.chars().last() {
+        Some(last) if !last.is_ascii_digit() => {
+            let unit = units.iter().find(|(name, _)| *name == last.to_ascii_uppercase());
+            let names = units.iter().map(|(name, _)| name.to_string()).collect::<Vec<_>>().join(", ");
+            let &(_, factor) = unit.ok_or(format!("a {what} is a whole number, with {names} or nothing behind it"))?;
+            (&text[..text.len() - last.len_utf8()], factor)
+        }
+        _ => (text, 1),
+    };
+    if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return Err(format!("'{digits}' is not a whole number; write 1536M rather than 1.5G"));
+    }
+    let number: Option<u64> = digits.parse().ok();
+    number.and_then(|n| n.checked_mul(factor)).ok_or(format!("the {what} does not fit in 64 bits"))
+}
+
+/// A size in bytes: a whole number with `K`, `M` or `G` (powers of 1024) or nothing behind it; 0 is refused.
+///
+/// # Errors
+/// A sentence for the user.
+pub fn size_bytes(text: &str) -> Result<u64, String> {
+    match scaled(text, &[('K', 1 << 10), ('M', 1 << 20), ('G', 1 << 30)], "size")? {
+        0 => Err("a size of 0 bytes holds nothing; give at least 1".into()),
+        bytes => Ok(bytes),
+    }
+}
+
+/// A count: a whole number with `K` or `M` (powers of 1000) or nothing behind it.
+///
+/// # Errors
+/// A sentence for the user.
+pub fn count(text: &str) -> Result<u64, String> {
+    scaled(text, &[('K', 1_000), ('M', 1_000_000)], "count")
+}
+
+/// A count that is not 0.
+///
+/// # Errors
+/// A sentence for the user.
+pub fn positive_count(text: &str) -> Result<u64, String> {
+    match count(text)? {
+        0 => Err("it must be at least 1".into()),
+        n => Ok(n),
+    }
+}
+
+/// A count from 1 that fits in 32 bits.
+///
+/// # Errors
+/// A sentence for the user.
+pub fn positive_count32(text: &str) -> Result<u32, String> {
+    u32::try_from(positive_count(text)?).map_err(|_| format!("it must be at most {}", u32::MAX))
+}
+
+/// Bytes in the largest unit that keeps them short: `1536 B`, `23.4 MiB`.
+pub fn human_bytes(bytes: u64) -> String {
+    const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
+    if bytes < 10 << 10 {
+        return format!("{bytes} B");
+    }
+    let mut value = bytes as f64 / 1024.0;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < UNITS.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    format!("{value:.1} {}", UNITS[unit])
+}
+
+/// At least `bytes`, as [`size_bytes`] reads it: in the largest unit that adds less than 1 %, or 1 KiB.
+pub fn option_bytes(bytes: u64) -> String {
+    let units = [(30, 'G'), (20, 'M'), (10, 'K')];
+    let fits = |shift: u32| bytes >> shift >= if shift == 10 { 10 } else { 100 };
+    match units.into_iter().find(|&(shift, _)| fits(shift)) {
+        Some((shift, unit)) => format!("{}{unit}", bytes.div_ceil(1 << shift)),
+        None => bytes.to_string(),
+    }
+}
+
+/// A count with a comma between groups of three digits.
+pub fn human_count(count: u64) -> String {
+    let digits = count.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// The device memory for bricks and tiles of textures: bytes, or a share of the sum over all of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CacheSize {
+    /// Bytes, at least 1.
+    Bytes(u64),
+    /// Percent of the bytes of all bricks and tiles, above 0, at most 100.
+    Percent(f64),
+}
+
+impl CacheSize {
+    /// Bytes of the cache for a scene whose bricks and tiles take `all` bytes together; a share is rounded up.
+    pub fn bytes(self, all: u64) -> u64 {
+        match self {
+            Self::Bytes(bytes) => bytes,
+            Self::Percent(percent) if percent >= 100.0 => all,
+            Self::Percent(percent) => (all as f64 * (percent / 100.0)).ceil() as u64,
+        }
+    }
+}
+
+impl FromStr for CacheSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Some(share) = text.strip_suffix('%') else {
+            return size_bytes(text).map(Self::Bytes);
+        };
+        match share.parse::<f64>() {
+            Ok(percent) if percent > 0.0 && percent <= 100.0 => Ok(Self::Percent(percent)),
+            _ => Err("a share is a number above 0 % and at most 100 %, as in 25%".into()),
+        }
+    }
+}
+
+impl fmt::Display for CacheSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bytes(bytes) => write!(f, "{bytes}"),
+            Self::Percent(percent) => write!(f, "{percent}%"),
+        }
+    }
+}
+
+/// Width and height of an image, each 1..=[`MAX_IMAGE_PX`] pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageSize {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl FromStr for ImageSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("an image size is WIDTHxHEIGHT, each from 1 to {MAX_IMAGE_PX} pixels, as in 1280x720");
+        let side = |text: &str| -> Result<u32, String> {
+            let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+            let side = if digits { text.parse().ok() } else { None };
+            side.filter(|side| (1..=MAX_IMAGE_PX).contains(side)).ok_or_else(wrong)
+        };
+        let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+        Ok(Self { width: side(width)?, height: side(height)? })
+    }
+}
+
+impl fmt::Display for ImageSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+/// A direction of unit length from `X,Y,Z`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction(pub [f64; 3]);
+
+impl FromStr for Direction {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Vec<f64> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
+        let wrong = || "a direction is three numbers X,Y,Z, not all 0, as in 0.4,0.8,0.45".to_string();
+        let three: [f64; 3] = numbers.try_into().map_err(|_| wrong())?;
+        if text.split(',').count() != 3 {
+            return Err(wrong());
+        }
+        let v = glam::DVec3::from(three);
+        // Scaled first, so that neither large nor small numbers leave the range when squared.
+        (v / v.abs().max_element()).try_normalize().map(|v| Self(v.to_array())).ok_or_else(wrong)
+    }
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{}", self.0[0], self.0[1], self.0[2])
+    }
+}
+
+/// A finite number of at least 0.
+///
+/// # Errors
+/// A sentence for the user.
+pub fn non_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
+        _ => Err("it must be a finite number of at least 0".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_exact_powers_of_1024() {
+        assert_eq!(size_bytes("1"), Ok(1));
+        assert_eq!(size_bytes("3K"), Ok(3072));
+        assert_eq!(size_bytes("256m"), Ok(256 << 20));
+        assert_eq!(size_bytes("2G"), Ok(2 << 30));
+        assert_eq!(size_bytes("18446744073709551615"), Ok(u64::MAX));
+        assert_eq!(size_bytes("17179869183G"), Ok(17179869183 << 30));
+        for bad in ["", "0", "0G", "G", "-1", "+1", "1.5G", "1 G", "1T", "1KB", "1GiB", "0x10", "é", "5é", "nan"] {
+            assert!(size_bytes(bad).is_err(), "{bad}");
+        }
+        // One beyond 64 bits, in the number and in the product.
+        for bad in ["18446744073709551616", "17179869184G", "99999999999999999999999K"] {
+            assert!(size_bytes(bad).unwrap_err().contains("64 bits"), "{bad}");
+        }
+    }
+
+    #[test]
+    fn counts_are_exact_powers_of_1000() {
+        assert_eq!(count("0"), Ok(0));
+        assert_eq!(count("16K"), Ok(16_000));
+        assert_eq!(count("2M"), Ok(2_000_000));
+        assert!(count("2G").is_err());
+        assert!(positive_count("0K").is_err());
+        assert_eq!(positive_count32("4294967295"), Ok(u32::MAX));
+        assert!(positive_count32("4294967296").is_err());
+    }
+
+    #[test]
+    fn caches_are_sizes_or_shares() {
+        assert_eq!("64M".parse(), Ok(CacheSize::Bytes(64 << 20)));
+        assert_eq!("12.5%".parse(), Ok(CacheSize::Percent(12.5)));
+        for bad in ["0%", "-1%", "100.1%", "nan%", "inf%", "%", "25 %", "0"] {
+            assert!(bad.parse::<CacheSize>().is_err(), "{bad}");
+        }
+        assert_eq!(CacheSize::Percent(25.0).bytes(1001), 251);
+        assert_eq!(CacheSize::Percent(100.0).bytes(u64::MAX), u64::MAX);
+        assert_eq!(CacheSize::Bytes(7).bytes(1), 7);
+        for text in ["25%", "1024"] {
+            assert_eq!(text.parse::<CacheSize>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn image_sizes_are_bounded() {
+        assert_eq!("1280x720".parse(), Ok(ImageSize { width: 1280, height: 720 }));
+        assert_eq!("1x16384".parse(), Ok(ImageSize { width: 1, height: 16384 }));
+        for bad in
+            ["", "x", "0x1", "1x0", "16385x1", "1x16385", "1280", "-1x5", "+1x5", "1x2x3", "1.5x2", "99999999999x1"]
+        {
+            assert!(bad.parse::<ImageSize>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn directions_are_unit() {
+        let Direction(d) = "3,0,-4".parse().unwrap();
+        assert!((d[0] - 0.6).abs() < 1e-15 && d[1] == 0.0 && (d[2] + 0.8).abs() < 1e-15);
+        let Direction(d) = "1e300, 1e300, 0".parse().unwrap();
+        assert!((d[0] - 0.5f64.sqrt()).abs() < 1e-15);
+        for bad in ["", "0,0,0", "1,2", "1,2,3,4", "1,2,x", "nan,0,1", "inf,0,0", "1,2,3,"] {
+            assert!(bad.parse::<Direction>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn human_forms() {
+        assert_eq!(human_bytes(1536), "1536 B");
+        assert_eq!(human_bytes(24 << 20), "24.0 MiB");
+        assert_eq!(human_bytes(u64::MAX), "16384.0 PiB");
+        for (bytes, text) in [(1, "1"), (10_239, "10239"), (10_240, "10K"), (10_241, "11K"), (150 << 20, "150M")] {
+            assert_eq!(option_bytes(bytes), text);
+        }
+        for shift in 0..64 {
+            for bytes in [1u64 << shift, (1 << shift) + 1, u64::MAX >> shift] {
+                let read = size_bytes(&option_bytes(bytes)).unwrap_or(u64::MAX);
+                assert!(read >= bytes && read - bytes <= (bytes / 100).max(1 << 10), "{bytes}");
+            }
+        }
+        assert_eq!(human_count(0), "0");
+        assert_eq!(human_count(123), "123");
+        assert_eq!(human_count(1234567), "1,234,567");
+    }
+}

@@ -1,0 +1,284 @@
+//! `summary.json`: what was asked for, on what it ran, and what came of it.
+
+use super::options::args::WalkArgs;
+use super::options::optimisation_args::names;
+use super::pictures::Pictures;
+use crate::counters::Record;
+use crate::frame::{Renderer, Schedule};
+use crate::picture::denoise::Resolve;
+use crate::secondary::roma::Role;
+use crate::secondary::roma::handover::{Handover, Trust};
+use crate::session::lighting::Lighting;
+use serde_json::{Map, Value, json};
+
+/// Raised when a field changes its meaning.
+const FORMAT: u32 = 1;
+
+/// The summary of a walk of `frames` finished frames, with what was left out.
+pub fn of_walk(
+    args: &WalkArgs,
+    renderer: &mut Renderer,
+    (pictures, lighting, resolve): (&Pictures, &Lighting, &Resolve),
+    records: &[Record],
+    frames: u32,
+    left_out: Vec<Value>,
+) -> Value {
+    let streaming = streaming(renderer);
+    let resident = renderer.scene.resident();
+    let manifest = &resident.manifest;
+    let (streamed_bytes, tile_bytes) =
+        (renderer.cache.bytes.sizes().sum(), renderer.cache.bytes.tiles.iter().sum::<u64>());
+    let brick_bytes = streamed_bytes - tile_bytes;
+    json!({
+        "format": FORMAT,
+        "version": env!("CARGO_PKG_VERSION"),
+        "commit": env!("BRICKWALK_COMMIT"),
+        "adapter": renderer.executor.device(),
+        "scene": {
+            "file": args.scene.file_name().map(|n| n.to_string_lossy()),
+            "file_bytes": renderer.scene.file_bytes(),
+            "resident_bytes": renderer.scene.resident_bytes(),
+            "bricks": resident.bricks.len(),
+            "brick_bytes": brick_bytes,
+            "tile_bytes": tile_bytes,
+            "leaves": resident.leaves.len(),
+            "triangles": manifest.triangles_instanced,
+            "motion": args.motion.as_ref().map(|file| file.file_name().map(|name| name.to_string_lossy())),
+        },
+        "settings": {
+            "frames": args.frames,
+            "width": args.size.width,
+            "height": args.size.height,
+            "effects": args.effects.effects.to_string(),
+            "ao_rays": args.effects.ao_rays,
+            "ao_length": args.effects.ao_length,
+            "diffuse_rays": args.effects.diffuse_rays,
+            "rotation_degrees": args.effects.rotation,
+            "schedule": match renderer.settings.schedule {
+                Schedule::Chc => "chc",
+                Schedule::Demand => "demand",
+                Schedule::Plain => "plain",
+                Schedule::PlainBinary => "plain-bvh2",
+                Schedule::Auto => "auto",
+            },
+            "fronts": args.stream.fronts,
+            "without": names(&args.optimisations.without),
+            "with": names(&args.optimisations.with),
+            "query_threshold": args.stream.query_threshold,
+            "tile": args.stream.tile,
+            "evict": renderer.cache.residency.policy().name(),
+            "cache_bytes": renderer.cache.residency.budget_bytes(),
+            "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
+            "host_cache_bytes": args.stream.host_cache,
+            "prefetch": args.stream.prefetch,
+            "interactive_bytes": args.interactive,
+            "secondary": args.secondary.name(),
+            "roma": roma_settings(args, renderer),
+            "df": field_settings(args, renderer),
+            "rsm": renderer.rsm.report(),
+            "spp": args.spp,
+            "seed": args.seed,
+            "sun": args.light.sun.0,
+            "sun_angle_degrees": args.light.sun_angle,
+            "sun_intensity": args.light.sun_intensity(),
+            "sky_intensity": args.light.sky_intensity,
+            "environment": args.light.environment.as_ref().map(ToString::to_string),
+            "environment_rotation_degrees": args.light.environment_rotation,
+            "environment_intensity": args.light.environment_intensity,
+            "rect_light": args.light.rect_light.map(|light| light.map(|v| v.to_array())),
+        },
+        "lamps": {
+            "emitters": renderer.light.lamps.emitters().len(),
+            "environment": renderer.light.lamps.environment.as_ref().zip(lighting.environment).map(|(map, notes)| json!({
+                "width": map.width,
+                "height": map.height,
+                "bad_texels": notes.bad_texels,
+                "energy_change": notes.energy_change,
+            })),
+        },
+        "frames": frames,
+        "pictures": pictures.summary(args),
+        "denoise": resolve.report(),
+        "taa": resolve.taa.is_some(),
+        "auto": (renderer.settings.schedule == Schedule::Auto).then(|| json!({
+            "switches": renderer.auto.switches,
+            "passes_last_by": renderer.auto.in_force().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+        })),
+        "left_out": left_out,
+        "texture_bytes_resident": renderer.executor.texture_bytes(),
+        "host_cache": streaming.0,
+        "prefetch": streaming.1,
+        "error": args.measure_error.then(|| errors(records)),
+        "memory": memory(),
+        "passes": passes(records),
+        "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
+        "non_finite": records.iter().map(|r| r.non_finite).sum::<u64>(),
+    })
+}
+
+/// Cells up to which rays are traced that maps answer from there on.
+fn near(role: Role) -> u32 {
+    if let Role::Far(cells) = role { cells } else { 0 }
+}
+
+/// What the host cache did, and what came of prefetching: payloads brought ahead of need, those that a load then found
+/// there, the rest of them, and requests that were dropped.
+fn streaming(renderer: &mut Renderer) -> (Value, Value) {
+    let workers = renderer.executor.workers();
+    let (host, stats) = (workers.host_cache().stats(), workers.stats());
+    let cache = json!({
+        "hits": host.hits,
+        "misses": host.misses,
+        "evicted": host.evicted,
+        "used_bytes": host.used_bytes,
+    });
+    let prefetch = json!({
+        "prefetched": host.prefetched,
+        "prefetched_bytes": host.prefetched_bytes,
+        "used": host.prefetched_used,
+        "used_bytes": host.prefetched_used_bytes,
+        "wasted": host.prefetched - host.prefetched_used,
+        "wasted_bytes": host.prefetched_bytes - host.prefetched_used_bytes,
+        "dropped": stats.prefetch_dropped,
+    });
+    (cache, prefetch)
+}
+
+/// The errors of the effects that `--measure-error` measured: means over the frames, and the greatest.
+fn errors(records: &[Record]) -> Value {
+    let mut effects: Map<String, Value> = Map::new();
+    for name in records.iter().map(|r| r.pass) {
+        let rows: Vec<&Record> = records.iter().filter(|r| r.pass == name).collect();
+        let most = |of: fn(&Record) -> f64| rows.iter().map(|r| of(r)).fold(0.0, f64::max);
+        effects.entry(name).or_insert_with(|| {
+            json!({
+                "mean": rows.iter().map(|r| r.error_mean).sum::<f64>() / rows.len() as f64,
+                "mean_most": most(|r| r.error_mean),
+                "worst_tile_most": most(|r| r.error_worst_tile),
+                "pixels_mean": rows.iter().map(|r| r.error_pixels).sum::<u64>() as f64 / rows.len() as f64,
+                "pixels_most": rows.iter().map(|r| r.error_pixels).max(),
+            })
+        });
+    }
+    Value::Object(effects)
+}
+
+/// Totals, medians and 95th percentiles of every numeric field, per pass.
+fn passes(records: &[Record]) -> Value {
+    let mut names: Vec<&str> = records.iter().map(|r| r.pass).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut out = Map::new();
+    for name in names {
+        let rows: Vec<Value> =
+            records.iter().filter(|r| r.pass == name).filter_map(|r| serde_json::to_value(r).ok()).collect();
+        out.insert(name.to_string(), statistics(&rows));
+    }
+    Value::Object(out)
+}
+
+fn statistics(rows: &[Value]) -> Value {
+    let (mut totals, mut medians, mut p95) = (Map::new(), Map::new(), Map::new());
+    let Some(Value::Object(first)) = rows.first() else { return Value::Null };
+    for key in first.keys().filter(|k| *k != "frame" && *k != "pass") {
+        if rows.iter().all(|row| row[key].is_u64()) {
+            let total: u64 = rows.iter().filter_map(|row| row[key].as_u64()).sum();
+            totals.insert(key.clone(), total.into());
+        } else {
+            totals.insert(key.clone(), rows.iter().filter_map(|row| row[key].as_f64()).sum::<f64>().into());
+        }
+        let mut values: Vec<f64> = rows.iter().filter_map(|row| row[key].as_f64()).collect();
+        values.sort_by(f64::total_cmp);
+        medians.insert(key.clone(), quantile(&values, 0.5).into());
+        p95.insert(key.clone(), quantile(&values, 0.95).into());
+    }
+    json!({ "total": totals, "median": medians, "p95": p95 })
+}
+
+/// The quantile `q` of ascending values, between neighbours linearly. 0 of none.
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let Some(last) = values.len().checked_sub(1) else { return 0.0 };
+    let at = q * last as f64;
+    let (low, high) = (at.floor() as usize, at.ceil() as usize);
+    values[low] + (values[high] - values[low]) * (at - low as f64)
+}
+
+/// Memory of the process in bytes at its peak, mapped pages apart; null where the system does not tell.
+fn memory() -> Value {
+    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return Value::Null };
+    let field = |name: &str| -> Option<u64> {
+        let line = status.lines().find(|l| l.starts_with(name))?;
+        Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+    };
+    match (field("VmHWM:"), field("RssFile:")) {
+        (Some(peak), Some(mapped)) => json!({
+            "peak_bytes": peak.saturating_sub(mapped),
+            "mapped_bytes": mapped,
+        }),
+        _ => Value::Null,
+    }
+}
+
+/// What was measured of rays that maps sift: shares of all, 0 to 1, that would be answered otherwise than exact ones,
+/// by how far rays in doubt are traced.
+fn handover(role: Role, measured: &Handover) -> Option<Value> {
+    let Role::Sift { most_wrong: Some(most_wrong) } = role else { return None };
+    let ways = Trust::all().map(|trust| json!({ "trust": trust.to_string(), "wrong": measured.share_wrong(trust) }));
+    Some(json!({
+        "pilots": measured.pilots(),
+        "trust": measured.trust(most_wrong).to_string(),
+        "measured": ways.collect::<Vec<_>>(),
+    }))
+}
+
+/// What answers rays by maps; `None` where none does.
+fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
+    renderer.settings.roma.map(|roma| {
+        json!({
+            "bom": args.roma.bom.name(),
+            "k": roma.occlusion.grid.k,
+            "shadow_k": roma.shadow.grid.k,
+            "size": roma.occlusion.grid.size,
+            "samples": roma.occlusion.grid.samples,
+            "steps": roma.occlusion.steps,
+            "shadow_steps": roma.shadow.steps,
+            "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
+            "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
+            "near": near(roma.occlusion.role),
+            "one_in": if let Role::Correct(one_in) = roma.occlusion.role { one_in } else { 1 },
+            "most_wrong": if let Role::Sift { most_wrong: Some(n) } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
+            "shadow_near": near(roma.shadow.role),
+            "ao_handover": handover(roma.occlusion.role, &renderer.roma.handovers()[0]),
+            "shadow_handover": handover(roma.shadow.role, &renderer.roma.handovers()[1]),
+            "finest_cell": renderer.roma.finest_cell(),
+        })
+    })
+}
+
+/// What answers rays by distance fields.
+fn field_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
+    renderer.settings.field.map(|field| {
+        json!({
+            "bom": args.roma.bom.name(),
+            "size": field.size,
+            "steps": field.occlusion_steps,
+            "shadow_steps": field.shadow_steps,
+            "lift": field.lift,
+            "hit": field.hit,
+            "finest_cell": renderer.roma.finest_cell(),
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantile;
+
+    #[test]
+    fn quantiles_are_exact_on_small_sets() {
+        assert_eq!(quantile(&[], 0.5), 0.0);
+        assert_eq!(quantile(&[3.0], 0.95), 3.0);
+        assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.5), 2.0);
+        assert_eq!(quantile(&[1.0, 2.0], 0.5), 1.5);
+    }
+}

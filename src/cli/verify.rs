@@ -1,0 +1,115 @@
+//! `verify`: every checksum and reference of a `.bricks` file.
+
+use super::options::args::VerifyArgs;
+use super::options::sizes::{human_bytes, human_count};
+use anyhow::{Result, bail};
+use bricks::{Error, Part, Payload, Section, VerifyReport};
+use brickwalk_convert::progress::Progress;
+
+/// Most parts that the error line lists; the rest are counted.
+const LISTED: usize = 8;
+
+/// Runs `verify`.
+///
+/// # Errors
+/// The file cannot be opened, or something in it is not as it was written; the message names every damaged part, bricks
+/// by their number.
+pub fn run(args: &VerifyArgs) -> Result<()> {
+    let report = watched(&Progress::new(), |progress| bricks::verify_file(&args.scene, progress))?;
+    if let Some(message) = problems(&report) {
+        bail!("{message}");
+    }
+    super::print(&format!(
+        "{}: whole: {} in {} payloads, every byte as it was written\n",
+        args.scene.display(),
+        human_bytes(report.file_bytes),
+        human_count(report.payloads)
+    ))
+}
+
+/// Shows the progress of a `verification`, which reports bytes done and in all.
+pub(crate) fn watched<T>(progress: &Progress, verification: impl FnOnce(&mut dyn FnMut(u64, u64)) -> T) -> T {
+    let mut shown = None;
+    // Mebibytes, so that the bar's numbers stay readable.
+    let result = verification(&mut |done, total| {
+        if shown.is_none() {
+            progress.phase("verify MiB", total >> 20);
+        }
+        let (before, now) = (shown.unwrap_or(0), done >> 20);
+        progress.advance(now.saturating_sub(before));
+        shown = Some(now.max(before));
+    });
+    progress.finish();
+    result
+}
+
+/// One line about everything that is wrong, or nothing: the first problem in full, then the other damaged parts.
+fn problems(report: &VerifyReport) -> Option<String> {
+    let (first, others) = report.problems.split_first()?;
+    let mut line = first.to_string();
+    if !others.is_empty() {
+        let parts: Vec<String> = others.iter().take(LISTED).map(name).collect();
+        line += &format!("; {} more: {}", others.len(), parts.join(", "));
+        if others.len() > LISTED {
+            line += " and others";
+        }
+    }
+    let bricks = damaged_bricks(report);
+    if bricks.len() > 1 {
+        let numbers: Vec<String> = bricks.iter().take(LISTED).map(u32::to_string).collect();
+        let more = if bricks.len() > LISTED { ", ..." } else { "" };
+        line += &format!("; {} bricks: {}{more}", bricks.len(), numbers.join(", "));
+    }
+    Some(line)
+}
+
+fn name(problem: &Error) -> String {
+    problem.part().map_or_else(|| problem.to_string(), |part| part.to_string())
+}
+
+/// The bricks with a problem, ascending, each once.
+fn damaged_bricks(report: &VerifyReport) -> Vec<u32> {
+    let mut bricks: Vec<u32> = report
+        .problems
+        .iter()
+        .filter_map(|problem| match problem.part()? {
+            Part::Record(Section::Bricks, brick) => Some(brick),
+            Part::Payload(payload) | Part::PaddingAfterPayload(payload) => match payload {
+                Payload::Geometry(brick) | Payload::Attributes(brick) | Payload::Proxies(brick) => Some(brick),
+                Payload::Texture(_) | Payload::Tile(_) | Payload::Opacity(_) => None,
+            },
+            _ => None,
+        })
+        .collect();
+    bricks.sort_unstable();
+    bricks.dedup();
+    bricks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(parts: &[Part]) -> VerifyReport {
+        let problem = |&part: &Part| Error::Corrupt { path: "s.bricks".into(), part, found: 1, expected: 2 };
+        VerifyReport { file_bytes: 9, payloads: 3, problems: parts.iter().map(problem).collect() }
+    }
+
+    #[test]
+    fn names_the_bricks() {
+        assert_eq!(problems(&report(&[])), None);
+        let line = problems(&report(&[Part::Payload(Payload::Geometry(17))])).unwrap();
+        assert!(line.starts_with("s.bricks: brick 17 geometry is damaged"), "{line}");
+        assert!(!line.contains("more"));
+        let line = problems(&report(&[
+            Part::Payload(Payload::Attributes(4)),
+            Part::Payload(Payload::Geometry(4)),
+            Part::Payload(Payload::Texture(9)),
+            Part::Payload(Payload::Geometry(2)),
+        ]))
+        .unwrap();
+        assert!(line.contains("3 more: brick 4 geometry, texture 9, brick 2 geometry; 2 bricks: 2, 4"), "{line}");
+        let many: Vec<Part> = (0..1000).map(|i| Part::Payload(Payload::Geometry(i))).collect();
+        assert!(problems(&report(&many)).unwrap().len() < 600);
+    }
+}

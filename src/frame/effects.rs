@@ -1,0 +1,43 @@
+//! What is traced beside camera rays.
+
+/// The share of its light that a surface shows with `mirror`; the rest is what it mirrors.
+pub const SURFACE_SHARE: f32 = 0.5;
+
+/// Effects of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effects {
+    /// Shadows of the sun and of emitters, at primary hits and at the hits of diffuse and mirrored rays.
+    pub shadow: bool,
+    /// The light of the environment, shadowed, at the same hits: a direction of each is drawn by its radiance. Diffuse
+    /// rays that miss share it with them.
+    pub environment: bool,
+    /// Ambient occlusion, of the sky's light.
+    pub occlusion: Option<Occlusion>,
+    /// Diffuse interreflection, one bounce: rays of each pixel and sample, as long as the scene. Their hits show their
+    /// emission and what they reflect of the lamps; the sky's light comes from those that miss.
+    pub diffuse: Option<u32>,
+    /// Mirrored rays: every surface is half a mirror.
+    pub mirror: bool,
+    /// What surfaces reflect otherwise than diffusely, by their materials, of all that is around: one ray, drawn by the
+    /// gloss of the surface, at primary hits. Without it they reflect the lamps alone, and the sky's light unshadowed.
+    pub glossy: bool,
+    /// Greatest random turn of the directions of occlusion and diffuse rays about the normal, degrees from 0 to 360;
+    /// each pixel has one of its own (CHC+RT §5.3). Small turns keep neighbouring rays alike.
+    pub turn_degrees: f32,
+}
+
+/// Ambient occlusion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Occlusion {
+    /// Rays of each pixel and sample.
+    pub rays: u32,
+    /// Their length, world units.
+    pub length: f64,
+}
+
+impl Effects {
+    /// Whether hits of rays that start at primary hits are shaded.
+    pub fn has_bounces(&self) -> bool {
+        self.diffuse.is_some() || self.mirror || self.glossy
+    }
+}

@@ -1,0 +1,26 @@
+//! A frame, from camera to radiance: primary rays, attributes of what they hit, shadows, occlusion, bounces, shading,
+//! the sum of the samples.
+
+mod accumulate;
+mod capture;
+mod effects;
+mod emissive;
+mod environment;
+mod light;
+pub mod moved;
+pub mod pass_record;
+pub mod render;
+mod sky_model;
+pub mod triangles;
+pub mod view;
+
+pub use accumulate::{Accumulation, BATCH_SAMPLES};
+pub use capture::{Captures, EffectError};
+pub use effects::{Effects, Occlusion};
+pub use emissive::{MOST_TRIANGLES, ShiningTriangles, emissive_triangles};
+pub use environment::{EnvironmentNotes, Equirectangular, environment};
+pub use light::Light;
+pub use moved::{InstanceMotion, Moved};
+pub use render::{FrameOutput, Pixels, RenderError, RenderSettings, Renderer, Schedule};
+pub use sky_model::SkyModel;
+pub use view::camera_view;

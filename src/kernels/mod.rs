@@ -1,0 +1,34 @@
+//! What both executors share: the structures that kernels read and write, which kernels a step consists of, the scene
+//! relative to a frame's reference point, and what their counters say.
+//!
+//! A kernel is a WGSL file in `shaders/` and a function of the same name in [`crate::cpu`], its twin.
+
+pub mod bound;
+pub mod dispatch;
+pub mod frame;
+mod frame_executor;
+pub mod lamps;
+pub mod layout;
+pub mod opacity;
+pub mod query;
+pub mod rays;
+pub mod reflectance;
+pub mod report;
+mod setup;
+pub mod shade;
+pub mod simd;
+pub mod texture;
+pub mod textures;
+pub mod trace;
+pub mod vector;
+
+pub use dispatch::Directions;
+pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
+pub use lamps::Lamps;
+pub use setup::{Extent, Keep, Setup, Tuning, View};
+
+#[rustfmt::skip]
+mod layout_checks {
+    use super::layout;
+    include!(concat!(env!("OUT_DIR"), "/layout_checks.rs"));
+}

@@ -1,0 +1,10 @@
+//! Twins of the kernels that decide which bricks tiles and rays need.
+
+pub mod interval;
+pub mod pair_counts;
+pub mod query;
+pub mod query_all;
+pub mod query_pairs;
+pub mod tile_bounds;
+pub mod tile_lists;
+pub mod tile_walk;

@@ -1,0 +1,158 @@
+//! Ray-by-ray queries of the selected (tile, leaf) pairs: twin of `shaders/query/query.wgsl`. How many rays of the tile
+//! enter a child box of the brick's root at or before their present hit, and where the nearest does.
+
+use super::tile_lists::TileLists;
+use crate::kernels::bound::{Bound, entry_bits};
+use crate::kernels::layout::{INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT};
+use crate::kernels::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, for_each_ray, run_for_each_packet};
+use crate::kernels::simd::isa::Isa;
+use crate::kernels::trace::leaf::BrickRay;
+use crate::kernels::trace::node::{entered_children, framed_ray, node_hits};
+use crate::kernels::trace::packet::RAYS;
+use crate::kernels::trace::packet_node::Place;
+use crate::kernels::trace::packet_walk::PacketScratch;
+use crate::kernels::vector::least;
+
+/// Of the rays of chosen tiles. With PARAM_NEEDED the hits are final and the rays of an any-hit pass that ended
+/// occluded ask only for the brick that holds their hit.
+pub fn query(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
+    if bound.has(PARAM_NEEDED) {
+        for_each_ray(set, bound, Work::Chosen(lists), |_, slot| ask(bound, &slot, lists));
+    } else {
+        run_for_each_packet(set, bound, Work::Chosen(lists), &Query { bound, lists });
+    }
+}
+
+/// Queries of rays whose hits are not final.
+struct Query<'a> {
+    bound: &'a Bound<'a>,
+    lists: &'a TileLists,
+}
+
+impl RayKernel for Query<'_> {
+    #[inline(always)]
+    fn run<I: Isa>(&self, _: I, _: &mut Scratch, slot: Slot) {
+        ask(self.bound, &slot, self.lists);
+    }
+}
+
+impl PacketKernel for Query<'_> {
+    #[inline(always)]
+    fn takes(&self, slot: &Slot) -> bool {
+        let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
+        slot.is_traced() && !is_occluded && self.lists.nearest[slot.tile] <= slot.hit.t
+    }
+
+    /// As [`ask`], where the rays that enter no child of a root are told together.
+    #[inline(always)]
+    fn run_packet<I: Isa>(&self, isa: I, _: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
+        let Self { bound, lists } = self;
+        let (scene, entry, packet) = (bound.scene, lists.lists[tile], &mut packets.packet);
+        let up_to_next = bound.has(PARAM_NEXT);
+        let any = packet.ray(0);
+        let mut r = BrickRay::outside(&any);
+        let mut first = [(NONE, 0.0); RAYS];
+        for next in entry.first..entry.first + entry.selected {
+            let position = lists.selection[next as usize] as usize;
+            let listed = lists.list[position];
+            // Their distances are their limits.
+            let mut rays = packet.reaching(isa, listed.near);
+            if rays == 0 {
+                continue;
+            }
+            let brick = bound.brick_of(listed.leaf);
+            let root = &scene.roots[brick];
+            let instance = scene.leaves[listed.leaf as usize].instance;
+            if scene.instances[instance as usize].flags & INSTANCE_IDENTITY != 0 {
+                r.enter_leaf(scene, &any, listed.leaf);
+                let place = Place::new(r.offset_high, r.offset_low, 0.0);
+                let mut entered = [0; 8];
+                packet.open(isa, root, &place, rays, &mut entered);
+                rays = 0;
+                for child in entered {
+                    rays |= child;
+                }
+            }
+            let (mut asking, mut nearest, mut is_nearer) = (0, u32::MAX, false);
+            while rays != 0 {
+                let i = rays.trailing_zeros() as usize;
+                rays &= rays - 1;
+                r.enter_leaf(scene, &packet.ray(i), listed.leaf);
+                let limit = &mut packet.t.0[i];
+                let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, *limit);
+                let (entered, near) = entered_children(&boxes, root);
+                if entered == 0 {
+                    continue;
+                }
+                asking += 1;
+                nearest = nearest.min(entry_bits(near));
+                if first[i].0 == NONE || near < first[i].1 {
+                    first[i] = (brick as u32, near);
+                    if up_to_next {
+                        *limit = least(*limit, near);
+                        is_nearer = true;
+                    }
+                }
+            }
+            if asking > 0 {
+                lists.pair_demand[position].add(asking, nearest);
+            }
+            if is_nearer {
+                packet.shorten(isa);
+            }
+        }
+        for (brick, _) in first {
+            if brick != NONE {
+                bound.demand[brick as usize].add_next();
+            }
+        }
+    }
+}
+
+fn ask(bound: &Bound, slot: &Slot, lists: &TileLists) {
+    let entry = lists.lists[slot.tile];
+    if !slot.is_traced() {
+        return;
+    }
+    let (ray, hit) = (slot.ray, &slot.hit);
+    let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
+    if occluded && !bound.has(PARAM_NEEDED) {
+        return;
+    }
+    let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    let mut r = BrickRay::outside(&world);
+    // The brick that it enters before any other that it asks for, and where.
+    let mut first: Option<(usize, f32)> = None;
+    let mut limit = hit.t;
+    for next in entry.first..entry.first + entry.selected {
+        let position = lists.selection[next as usize] as usize;
+        let listed = lists.list[position];
+        let leaf = listed.leaf;
+        if occluded {
+            if slot.surface.leaf == leaf {
+                lists.pair_demand[position].add(1, 0);
+            }
+            continue;
+        }
+        if listed.near > limit {
+            continue;
+        }
+        r.enter_leaf(bound.scene, &world, leaf);
+        let brick = bound.brick_of(leaf);
+        let root = &bound.scene.roots[brick];
+        let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, limit);
+        let (entered, near) = entered_children(&boxes, root);
+        if entered != 0 {
+            lists.pair_demand[position].add_ray(near);
+            if first.is_none_or(|(_, nearest)| near < nearest) {
+                first = Some((brick, near));
+                if bound.has(PARAM_NEXT) {
+                    limit = least(limit, near);
+                }
+            }
+        }
+    }
+    if let Some((brick, _)) = first {
+        bound.demand[brick].add_next();
+    }
+}

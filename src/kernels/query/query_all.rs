@@ -1,0 +1,118 @@
+//! Ray-by-ray queries of the whole top level: twin of `shaders/query/query_all.wgsl`. Near children first, each ray
+//! asks for the bricks in the wanted state of whose root it enters a child box at or before its present hit, and notes
+//! whether it asked for any. Or it asks for nothing, and counted is how many rays of a tile see each leaf.
+
+use super::pair_counts::PairCounts;
+use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::layout::{
+    COUNTER_PAIRS_INVISIBLE, COUNTER_PAIRS_VISIBLE, COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT, PARAM_NEXT,
+};
+use crate::kernels::rays::{RaySet, Scratch, Slot, Work, for_each_ray};
+use crate::kernels::trace::leaf::BrickRay;
+use crate::kernels::trace::node::{by_priority, entered_children, framed_ray, inner_before, node_hits};
+use crate::kernels::vector::least;
+
+/// MAX_TOP_HEIGHT levels of which each leaves at most 7 siblings, and the root.
+const TOP_STACK_SIZE: usize = 192;
+
+/// Of the rays of `work`, all or those that walk from the root.
+pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts) {
+    for_each_ray(set, bound, work, |scratch, slot| ask::<false>(bound, scratch, slot, pairs));
+}
+
+/// Of all rays: how many of a tile see each leaf. `pairs` have been started.
+pub fn count_pairs(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<true>(bound, scratch, slot, pairs));
+}
+
+fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
+    if !COUNT && slot.surface.pending == 0 {
+        return;
+    }
+    let (ray, hit) = (*slot.ray, *slot.hit);
+    let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
+    if !COUNT {
+        slot.surface.pending = 0;
+    }
+    if !slot.is_traced() || bound.params.top_count == 0 || occluded {
+        return;
+    }
+    let scene = bound.scene;
+    let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    let up_to_next = !COUNT && bound.has(PARAM_NEXT);
+    let mut r = BrickRay::outside(&world);
+    let Scratch { entered: stack, tally, .. } = scratch;
+    stack.clear();
+    stack.push((0, 0.0));
+    let mut asks = 0;
+    // The brick that it enters before any other that it asks for, and where.
+    let mut first: Option<(usize, f32)> = None;
+    let mut limit = hit.t;
+    while let Some((at, near)) = stack.pop() {
+        if near > limit {
+            continue;
+        }
+        let node = &scene.top8[at as usize];
+        let boxes = node_hits(&world, node, [0.0; 3], [0.0; 3], bound.params.instance_pad, limit);
+        let mut bits = by_priority(boxes.mask, node, world.flip);
+        let inner = u32::from(node.inner_mask);
+        while bits != 0 {
+            // The farthest: the nearest is to be on top of the stack.
+            let child = (31 - bits.trailing_zeros()) ^ world.flip;
+            bits &= bits - 1;
+            let near = boxes.near[child as usize];
+            if near > limit {
+                continue;
+            }
+            if inner & 1 << child != 0 {
+                if stack.len() == TOP_STACK_SIZE {
+                    tally.add(COUNTER_STACK_OVERFLOW, 1);
+                    return;
+                }
+                stack.push((node.child_base + inner_before(inner, child), near));
+                continue;
+            }
+            let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
+            let brick = bound.brick_of(leaf);
+            if !bound.is_selected(brick) || (!COUNT && pairs.is_culled(bound, slot.tile, leaf)) {
+                continue;
+            }
+            r.enter_leaf(scene, &world, leaf);
+            let root = &scene.roots[brick];
+            let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, limit);
+            let (entered, near) = entered_children(&boxes, root);
+            if entered == 0 {
+                continue;
+            }
+            if COUNT {
+                count(bound, tally, pairs.add(slot.tile, leaf));
+                continue;
+            }
+            bound.demand[brick].add_ray(near);
+            asks += 1;
+            if first.is_none_or(|(_, nearest)| near < nearest) {
+                first = Some((brick, near));
+                if up_to_next {
+                    limit = least(limit, near);
+                }
+            }
+        }
+    }
+    if let Some((brick, _)) = first {
+        slot.surface.pending = 1;
+        bound.demand[brick].add_next();
+        tally.add(COUNTER_PAIRS_VISIBLE, asks);
+    }
+}
+
+/// Counts a ray that sees a pair which `before` saw. A pair is visible from one ray above the threshold on.
+fn count(bound: &Bound, tally: &mut Tally, before: u32) {
+    if before == 0 {
+        tally.add(COUNTER_PAIRS_INVISIBLE, 1);
+    }
+    if before == bound.params.threshold {
+        // One less.
+        tally.add(COUNTER_PAIRS_INVISIBLE, u32::MAX);
+        tally.add(COUNTER_PAIRS_VISIBLE, 1);
+    }
+}

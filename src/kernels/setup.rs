@@ -1,0 +1,97 @@
+//! What an executor is set up for, and what it is told of every frame.
+
+use super::Directions;
+use super::frame::Frame;
+use super::layout::Params;
+
+/// Size of the picture, or of the block of rays, in rays, and the tiles over it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Rays per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Edge of a tile in rays.
+    pub tile: u32,
+}
+
+impl Extent {
+    /// Number of rays.
+    pub fn rays(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Tiles per row.
+    pub fn tiles_x(&self) -> u32 {
+        self.width.div_ceil(self.tile)
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> u32 {
+        self.tiles_x() * self.height.div_ceil(self.tile)
+    }
+}
+
+/// How an executor is set up.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    /// Picture and tiles.
+    pub extent: Extent,
+    /// A (tile, leaf) query with at most so many rays is not visible; 0 is exact.
+    pub threshold: u32,
+    /// Count nodes and triangles visited (slower).
+    pub count: bool,
+    /// What is kept though the scene does not need it.
+    pub keep: Keep,
+}
+
+/// What is kept though a scene does not need it, to measure what leaving it out saves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Keep {
+    /// Queries for missing bricks where the cache holds all.
+    pub queries: bool,
+    /// The kernel that looks textures up.
+    pub textures: bool,
+    /// Alpha tests in traversal.
+    pub opacity: bool,
+    /// Reflections other than diffuse ones.
+    pub gloss: bool,
+}
+
+impl Keep {
+    /// Whether `other` has all that is kept.
+    pub fn is_part_of(self, other: Self) -> bool {
+        let fields = |keep: Self| [keep.queries, keep.textures, keep.opacity, keep.gloss];
+        fields(self).into_iter().zip(fields(other)).all(|(own, other)| other || !own)
+    }
+}
+
+/// What of an executor may change between submissions.
+#[derive(Clone, Copy, Debug)]
+pub struct Tuning {
+    /// [`Setup::threshold`].
+    pub threshold: u32,
+    /// Whether lists are intersected by the kernel that postpones groups of triangles.
+    pub leaf_cache: bool,
+    /// The most leaves of a list of [`crate::schedule::Step::ShortLists`], for every pass; with 0 all rays walk from
+    /// the root.
+    pub list_most: u32,
+}
+
+impl Tuning {
+    /// As an executor is set up: no leaf cache, lists bounded by their passes alone.
+    pub fn new(setup: &Setup) -> Self {
+        Self { threshold: setup.threshold, leaf_cache: false, list_most: u32::MAX }
+    }
+}
+
+/// What a frame needs to know besides the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Reference point.
+    pub frame: Frame,
+    /// Fields of [`Params`] that the view sets: camera, lights, sample, seed, jitter.
+    pub params: Params,
+    /// Directions of the passes that start at hits.
+    pub directions: Directions,
+}

@@ -1,0 +1,248 @@
+//! Rays from the camera and from hits: twins of `shaders/shade/generate_primary.wgsl`, `generate_shadow.wgsl`,
+//! `generate_around.wgsl`, `generate_mirror.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
+
+use super::gloss::Gloss;
+use super::lamps::{drawn_light, emitter_of, environment_sample, lamp_words, shines};
+use super::random::{disc_point, tangent};
+use super::shade::{Pixels, surface_share};
+use crate::kernels::bound::Bound;
+use crate::kernels::layout::{
+    EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT,
+    PARAM_SCATTER, Ray, Surface, T_INFINITE,
+};
+use crate::kernels::rays::{RaySet, start_hit};
+use crate::kernels::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
+use crate::math::exact::barrier;
+use crate::math::sampling::{random2, random4};
+use bricks::Material;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// Rays to emitters end short of them by this share of the distance, so that what lies in their plane casts no shadow.
+const SHORT_OF_LIGHT: f32 = 1.0 / 65_536.0;
+
+/// Of the coordinates: more than what three roundings may leave a point of an emitter beside its triangle, and more on
+/// instances.
+const BESIDE: f32 = 1.0 / 1_048_576.0;
+
+/// Makes every ray of `own`, with the triangle that it starts from.
+fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32) + Sync) {
+    let RaySet { rays, hits, surfaces } = own;
+    let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
+    all.enumerate().with_min_len(1024).for_each(|(index, ((ray, hit), surface))| {
+        let source;
+        (*ray, source) = make(index);
+        (*hit, *surface) = start_hit(ray.t_max, source);
+    });
+}
+
+/// Starts the hits of rays that came from outside: nothing found within their range.
+pub fn start_hits(own: &mut RaySet) {
+    let RaySet { rays, hits, surfaces } = own;
+    for ((ray, hit), surface) in rays.iter().zip(hits).zip(surfaces) {
+        (*hit, *surface) = start_hit(ray.t_max, NONE);
+    }
+}
+
+fn along(base: f32, x: f32, step_x: f32, y: f32, step_y: f32) -> f32 {
+    barrier(barrier(base + barrier(x * step_x)) + barrier(y * step_y))
+}
+
+/// Camera rays: direction(x, y) = base + x * step_x + y * step_y through the jittered pixel position, not normalised.
+pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
+    let p = bound.params;
+    for_each_new(own, |index| {
+        let (column, row) = (index as u32 % p.width, index as u32 / p.width);
+        let x = barrier(column as f32 + p.jitter[0]);
+        let y = barrier(row as f32 + p.jitter[1]);
+        let direction = each(|k| along(p.base[k], x, p.step_x[k], y, p.step_y[k]));
+        (Ray { origin: xyz(p.origin), t_min: 0.0, direction, t_max: T_INFINITE }, NONE)
+    });
+}
+
+/// From `start` to the point of `e` that `r` draws evenly. Triangles are surfaces of the scene themselves, so the point
+/// is lifted off them by what roundings leave; a start that lies in the plane of the triangle within as much has no
+/// light from it: zero.
+fn toward(e: &Emitter, start: Vec3, r: [f32; 2]) -> Vec3 {
+    let kind = e.kind & EMITTER_KIND;
+    if kind == EMITTER_DISTANT {
+        return e.u.map(|x| -x);
+    }
+    if kind > EMITTER_TRIANGLE {
+        return each(|k| barrier(e.corner[k] - start[k]));
+    }
+    let is_triangle = kind == EMITTER_TRIANGLE;
+    let s = if is_triangle && r[0] + r[1] > 1.0 { r.map(|r| 1.0 - r) } else { r };
+    let across = |k: usize| barrier(barrier(s[0] * e.u[k]) + barrier(s[1] * e.v[k]));
+    let p = each(|k| barrier(e.corner[k] + across(k)));
+    let direction = each(|k| barrier(p[k] - start[k]));
+    if !is_triangle {
+        return direction;
+    }
+    let n = normalize(cross(e.u, e.v));
+    let above = -dot(direction, n);
+    let beside = BESIDE * (most3(p.map(f32::abs)) + most3(start.map(f32::abs)));
+    if above.abs() <= beside {
+        return [0.0; 3];
+    }
+    let lift = if above > 0.0 { beside } else { -beside };
+    each(|k| direction[k] + lift * n[k])
+}
+
+/// One ray from every hit of the shaded set to a point of the pass's lamp; from surfaces that face away, none.
+pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughput: &[[f32; 4]]) {
+    let p = bound.params;
+    let sun = xyz(p.sun);
+    for_each_new(own, |index| {
+        let surface = &seen.surfaces[index];
+        let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
+        if surface.leaf != NONE {
+            let r = random2(index as u32, p.stream, p.seed);
+            let mut faces = true;
+            let mut t_max = T_INFINITE;
+            if bound.has(PARAM_EMITTER) {
+                let e = emitter_of(bound, index, throughput);
+                ray.direction = toward(e, surface.point, r);
+                faces = shines(e, ray.direction) > 0.0;
+                t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
+            } else if bound.has(PARAM_ENVIRONMENT) {
+                let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
+                ray.direction = drawn.direction;
+                // What lies behind is not looked up.
+                faces = dot(surface.normal, ray.direction) > 0.0 && drawn_light(bound, &drawn).iter().any(|&c| c > 0.0);
+            } else if p.sun_radius > 0.0 {
+                let disc = disc_point(r).map(|x| x * p.sun_radius);
+                let x = tangent(sun);
+                let y = cross(sun, x);
+                let across = |k: usize| barrier(barrier(x[k] * disc[0]) + barrier(y[k] * disc[1]));
+                ray.direction = each(|k| barrier(sun[k] + across(k)));
+            }
+            if faces && dot(surface.normal, ray.direction) > 0.0 {
+                ray.t_min = 0.0;
+                ray.t_max = t_max;
+            }
+        }
+        (ray, seen.hits[index].id)
+    });
+}
+
+/// The pass's direction around the normal, turned about it at random within limits, or scattered over the hemisphere.
+fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
+    let p = bound.params;
+    let mut a = p.around;
+    let r = random2(index as u32, p.stream, p.seed);
+    let angle = a[3] * r[0];
+    let (c, s) = (angle.cos(), angle.sin());
+    let x = tangent(normal);
+    let y = cross(normal, x);
+    if bound.has(PARAM_SCATTER) {
+        // The same bits everywhere: near 1 the height of the direction is sensitive to them.
+        let squared = barrier(barrier(a[0] * a[0]) + barrier(a[1] * a[1]));
+        let moved = barrier(squared + r[1]).fract();
+        let scale = (moved / most(squared, 1e-6)).sqrt();
+        a = [scale * a[0], scale * a[1], (1.0 - moved).sqrt(), a[3]];
+    }
+    let turned = [c * a[0] - s * a[1], s * a[0] + c * a[1], a[2]];
+    normalize(each(|k| turned[0] * x[k] + turned[1] * y[k] + turned[2] * normal[k]))
+}
+
+/// A ray from a hit in `direction`, up to `t_max`; none where that leads below the surface.
+pub fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
+    let above = dot(surface.normal, direction) > 0.0;
+    let (t_min, t_max) = if above { (0.0, t_max) } else { (1.0, 0.0) };
+    Ray { origin: surface.point, t_min, direction, t_max }
+}
+
+/// What stands for the ray of a pixel without a hit.
+fn none(origin: Vec3) -> Ray {
+    Ray { origin, t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 }
+}
+
+/// Makes a ray from every hit of the shaded set; where there is none, none.
+pub fn for_each_leaving(own: &mut RaySet, seen: &RaySet, make: impl Fn(usize, &Surface) -> Ray + Sync) {
+    for_each_new(own, |index| {
+        let surface = &seen.surfaces[index];
+        let ray = if surface.leaf == NONE { none(surface.point) } else { make(index, surface) };
+        (ray, seen.hits[index].id)
+    });
+}
+
+/// One ray of limited length from every primary hit in the pass's direction around the interpolated normal (CHC+RT
+/// §5.3); where that leads below the surface, none.
+pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer]) {
+    for_each_leaving(own, seen, |index, surface| {
+        leaving(surface, turned(bound, index, gbuffer[index].normal), bound.params.length)
+    });
+}
+
+/// As [`generate_occlusion`], of unlimited length. The throughput is noted: what of light from around the surface
+/// reflects, by the share of the direction; in w the direction's number.
+pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
+    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
+    for_each_leaving(own, seen, |index, surface| {
+        leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
+    });
+    let number = bound.params.direction as f32;
+    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut());
+    carried.enumerate().with_min_len(1024).for_each(|(index, (carried, density))| {
+        let ray = &own.rays[index];
+        *carried = [0.0, 0.0, 0.0, number];
+        *density = bound.params.diffuse_count * most(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
+        if ray.t_min <= ray.t_max {
+            let g = &gbuffer[index];
+            let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+            let reflected = s.reflected_by_diffuse_rays(bound);
+            (0..3).for_each(|k| carried[k] = surface_share(bound) * bound.params.share * reflected[k]);
+        }
+    });
+}
+
+/// The mirrored ray of every primary hit, about the interpolated normal; where that leads below the surface, none.
+pub fn generate_mirror(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels) {
+    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
+    for_each_leaving(own, seen, |index, surface| {
+        let (d, n) = (normalize(seen.rays[index].direction), gbuffer[index].normal);
+        let along = 2.0 * dot(n, d);
+        leaving(surface, normalize(each(|k| d[k] - along * n[k])), T_INFINITE)
+    });
+    densities.fill(0.0);
+    for (carried, ray) in throughput.iter_mut().zip(&own.rays) {
+        let share = if ray.t_min <= ray.t_max { 1.0 - bound.params.surface_share } else { 0.0 };
+        *carried = [share, share, share, 0.0];
+    }
+}
+
+/// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss; where that
+/// leads below the surface, none. The throughput and by which density the direction was drawn are noted.
+pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
+    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
+    let p = bound.params;
+    let gloss = |index: usize| {
+        let g = &gbuffer[index];
+        Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x))
+    };
+    for_each_leaving(own, seen, |index, surface| {
+        let s = gloss(index);
+        if !s.is_glossy() {
+            return none(surface.point);
+        }
+        let direction = s.direction(random4(index as u32, p.stream, p.seed));
+        if s.density(direction) > 0.0 {
+            leaving(surface, direction, T_INFINITE)
+        } else {
+            Ray { direction, ..none(surface.point) }
+        }
+    });
+    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut());
+    carried.enumerate().with_min_len(1024).for_each(|(index, (carried, density))| {
+        (*carried, *density) = ([0.0; 4], 0.0);
+        let ray = &own.rays[index];
+        if ray.t_min <= ray.t_max {
+            let s = gloss(index);
+            *density = s.density(ray.direction);
+            let reflected = s.reflected(ray.direction);
+            let share = dot(gbuffer[index].normal, ray.direction) / (PI * *density);
+            (0..3).for_each(|k| carried[k] = surface_share(bound) * reflected[k] * share);
+        }
+    });
+}

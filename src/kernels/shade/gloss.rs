@@ -1,0 +1,319 @@
+//! How surfaces reflect otherwise than diffusely: twin of `shaders/shade/gloss.wgsl`.
+
+use super::lamps::unit;
+use super::light::ambient;
+use super::random::tangent;
+use crate::kernels::bound::Bound;
+use crate::kernels::layout::{GBuffer, MATERIAL_UNLIT, PARAM_BOUNCE, PARAM_GLOSSY, REFLECTANCE_SIZE};
+use crate::kernels::reflectance::REFLECTANCES;
+use crate::kernels::vector::{Vec3, cross, dot, each, mix, most, most3, normalize};
+use bricks::Material;
+use std::f32::consts::{PI, TAU};
+
+/// Of a lobe's square root of roughness; smoother ones are as sharp as this.
+const LEAST_ALPHA: f32 = 0.001;
+/// What a clear coat reflects along its normal (KHR_materials_clearcoat: index of refraction 1.5).
+const COAT_F0: f32 = 0.04;
+/// Views are not flatter.
+const LEAST_COS_VIEW: f32 = 1.0e-4;
+
+/// How a hit reflects; of Lambertian ones all but `diffuse` is zero.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Gloss {
+    normal: Vec3,
+    /// Of the normal and the view.
+    cos_view: f32,
+    /// Unit vector to where the hit is seen from.
+    view: Vec3,
+    alpha: f32,
+    /// Reflectance along the normal, bounces between facets included.
+    f0: Vec3,
+    /// And at grazing angles.
+    f90: Vec3,
+    /// Share of the clear coat.
+    coat: f32,
+    /// Albedo of the diffuse part.
+    pub diffuse: Vec3,
+    coat_alpha: f32,
+    /// Of light from everywhere, reflected by the facets below the coat.
+    share: Vec3,
+    /// Share of the light that the coat leaves.
+    under: f32,
+    /// Of light from everywhere, reflected by the coat.
+    coat_share: f32,
+    /// Probability that a direction is drawn by the coat.
+    choice: f32,
+}
+
+/// What a lobe with reflectances of (1, 0) and of (0, 1) along the normal and at grazing angles reflects of light from
+/// everywhere.
+fn reflectance(cosine: f32, alpha: f32) -> [f32; 2] {
+    let most = (REFLECTANCE_SIZE - 1) as f32;
+    let [x, y] = [cosine, alpha].map(|x| x.sqrt().clamp(0.0, 1.0) * most);
+    let [column, row] = [x, y].map(|x| (x as u32).min(REFLECTANCE_SIZE - 2));
+    let at = (row * REFLECTANCE_SIZE + column) as usize;
+    let (right, up) = (x - column as f32, y - row as f32);
+    let size = REFLECTANCE_SIZE as usize;
+    let between = |at: usize, k: usize| mix(REFLECTANCES[at][k], REFLECTANCES[at + 1][k], right);
+    [0, 1].map(|k| mix(between(at, k), between(at + size, k), up))
+}
+
+impl Gloss {
+    /// Of a hit seen along -view, of any length.
+    pub fn of(g: &GBuffer, m: &Material, view: Vec3) -> Self {
+        let mut s = Self { diffuse: g.albedo, ..Self::default() };
+        let is_matt = !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0);
+        if m.flags & MATERIAL_UNLIT != 0 || is_matt {
+            return s;
+        }
+        s.normal = g.normal;
+        s.view = normalize(view);
+        s.cos_view = most(dot(s.normal, s.view), LEAST_COS_VIEW);
+        s.alpha = most(g.roughness * g.roughness, LEAST_ALPHA);
+        let [along, grazing] = reflectance(s.cos_view, s.alpha);
+        let white = along + grazing;
+        let bounces = (1.0 - white) / white;
+        let of_dielectric = m.specular.map(|c| 1.0 + c * bounces);
+        let of_metal = g.albedo.map(|c| 1.0 + c * bounces);
+        s.f0 = each(|k| mix(m.specular[k] * of_dielectric[k], g.albedo[k] * of_metal[k], g.metallic));
+        s.f90 = each(|k| mix(m.specular_weight * of_dielectric[k], of_metal[k], g.metallic));
+        s.share = each(|k| s.f0[k] * along + s.f90[k] * grazing);
+        let left = each(|k| 1.0 - (m.specular[k] * along + m.specular_weight * grazing) * of_dielectric[k]);
+        s.diffuse = each(|k| g.albedo[k] * (1.0 - g.metallic) * most(left[k], 0.0));
+        s.coat = m.clearcoat;
+        s.under = 1.0;
+        if s.coat > 0.0 {
+            s.coat_alpha = most(m.clearcoat_roughness * m.clearcoat_roughness, LEAST_ALPHA);
+            let of_coat = reflectance(s.cos_view, s.coat_alpha);
+            s.coat_share = s.coat * (COAT_F0 * of_coat[0] + of_coat[1]);
+            s.under = 1.0 - s.coat_share;
+            s.diffuse = s.diffuse.map(|c| c * s.under);
+        }
+        let below = s.under * most3(s.share);
+        s.choice = s.coat_share / most(s.coat_share + below, 1.0e-20);
+        s
+    }
+
+    /// Whether there is more than the diffuse part.
+    pub fn is_glossy(&self) -> bool {
+        self.alpha > 0.0
+    }
+
+    /// A lobe toward d: distribution and masking over 4 times both cosines, and the density by which directions are
+    /// drawn.
+    fn lobe(&self, alpha: f32, d: Vec3, half_way: Vec3) -> [f32; 2] {
+        let cosine = most(dot(self.normal, d), 0.0);
+        let across = cross(self.normal, half_way);
+        let c = dot(self.normal, half_way);
+        let squared = alpha * alpha;
+        // The squared sine by the cross product: that of small angles is not lost.
+        let q = squared * c * c + dot(across, across);
+        let distribution = squared / (PI * q * q);
+        let by_view = (squared + (1.0 - squared) * self.cos_view * self.cos_view).sqrt();
+        let by_light = (squared + (1.0 - squared) * cosine * cosine).sqrt();
+        let masked = 0.5 / most(cosine * by_view + self.cos_view * by_light, 1.0e-20);
+        [distribution * masked, 0.5 * distribution / (self.cos_view + by_view)]
+    }
+
+    fn half_way(&self, d: Vec3) -> Vec3 {
+        normalize(each(|k| self.view[k] + d[k]))
+    }
+
+    /// What the surface reflects of light from d, a unit vector, otherwise than diffusely: pi times its distribution
+    /// function.
+    pub fn reflected(&self, d: Vec3) -> Vec3 {
+        if self.alpha == 0.0 || dot(self.normal, d) <= 0.0 {
+            return [0.0; 3];
+        }
+        let half_way = self.half_way(d);
+        let c = (1.0 - dot(half_way, self.view)).clamp(0.0, 1.0);
+        let f = c * c * c * c * c;
+        let lobe = self.under * self.lobe(self.alpha, d, half_way)[0];
+        let mut sum = each(|k| mix(self.f0[k], self.f90[k], f) * lobe);
+        if self.coat > 0.0 {
+            let of_coat = self.coat * mix(COAT_F0, 1.0, f) * self.lobe(self.coat_alpha, d, half_way)[0];
+            sum = sum.map(|c| c + of_coat);
+        }
+        sum.map(|c| PI * c)
+    }
+
+    /// By which [`Self::direction`] draws d, a unit vector.
+    pub fn density(&self, d: Vec3) -> f32 {
+        if self.alpha == 0.0 || dot(self.normal, d) <= 0.0 {
+            return 0.0;
+        }
+        let half_way = self.half_way(d);
+        let mut density = (1.0 - self.choice) * self.lobe(self.alpha, d, half_way)[1];
+        if self.coat > 0.0 {
+            density += self.choice * self.lobe(self.coat_alpha, d, half_way)[1];
+        }
+        density
+    }
+
+    /// Share of light of one radiance from everywhere that the surface reflects otherwise than diffusely.
+    fn around(&self) -> Vec3 {
+        self.share.map(|c| c * self.under + self.coat_share)
+    }
+
+    /// Share of light of one radiance from everywhere that the surface reflects.
+    pub fn albedo(&self) -> Vec3 {
+        let around = self.around();
+        each(|k| self.diffuse[k] + around[k])
+    }
+
+    /// What the surface reflects otherwise than diffusely of the background, unshadowed, where rays of its own do not
+    /// bring it.
+    pub fn reflected_ambient(&self, bound: &Bound) -> Vec3 {
+        if self.alpha == 0.0 || (bound.has(PARAM_GLOSSY) && !bound.has(PARAM_BOUNCE)) {
+            return [0.0; 3];
+        }
+        let (n, v) = (self.normal, self.view);
+        let along = 2.0 * dot(n, v);
+        let light = ambient(bound.params, each(|k| along * n[k] - v[k]));
+        let around = self.around();
+        each(|k| around[k] * light[k])
+    }
+
+    /// Of light from around, what diffuse rays stand for: the diffuse part, and the rest where it has no rays of its
+    /// own and diffuse rays share nothing with rays to the environment.
+    pub fn reflected_by_diffuse_rays(&self, bound: &Bound) -> Vec3 {
+        if self.alpha == 0.0 || bound.has(PARAM_GLOSSY) || bound.params.diffuse_count > 0.0 {
+            return self.diffuse;
+        }
+        self.albedo()
+    }
+
+    /// A direction drawn by the facets that are seen (Dupuy, Benyoub 2023, "Sampling visible GGX normals with spherical
+    /// caps"), a unit vector; it may lead below the surface.
+    pub fn direction(&self, words: [u32; 4]) -> Vec3 {
+        let alpha = if unit(words[2]) < self.choice { self.coat_alpha } else { self.alpha };
+        let x = tangent(self.normal);
+        let y = cross(self.normal, x);
+        let v = normalize([alpha * dot(self.view, x), alpha * dot(self.view, y), self.cos_view]);
+        let around = TAU * unit(words[0]);
+        let down = unit(words[1]);
+        // On the cap of heights -v.z to 1.
+        let height = 1.0 - down * (1.0 + v[2]);
+        let level = most((1.0 - height) * (1.0 + height), 0.0).sqrt();
+        let h = [level * around.cos() + v[0], level * around.sin() + v[1], height + v[2]];
+        let facet = normalize([alpha * h[0], alpha * h[1], most(h[2], 0.0)]);
+        let half_way = each(|k| facet[0] * x[k] + facet[1] * y[k] + facet[2] * self.normal[k]);
+        let along = 2.0 * dot(self.view, half_way);
+        normalize(each(|k| along * half_way[k] - self.view[k]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sampling::random4;
+
+    const NORMAL: Vec3 = [0.0, 0.0, 1.0];
+
+    fn material(f0: f32, metallic: f32, clearcoat: f32) -> Material {
+        Material {
+            metallic,
+            specular: [f0; 3],
+            specular_weight: if f0 > 0.0 { 1.0 } else { 0.0 },
+            clearcoat,
+            clearcoat_roughness: 0.3,
+            ..Material::DIFFUSE
+        }
+    }
+
+    fn gloss(m: &Material, roughness: f32, cosine: f32) -> Gloss {
+        let view = [(1.0 - cosine * cosine).sqrt(), 0.0, cosine];
+        let g = GBuffer { albedo: [1.0; 3], normal: NORMAL, metallic: m.metallic, roughness, ..GBuffer::default() };
+        Gloss::of(&g, m, view.map(|x| 3.0 * x))
+    }
+
+    /// The integral of `f` over the directions of the hemisphere and their cosines, by a grid in f64.
+    fn over_hemisphere(rows: u32, columns: u32, f: impl Fn(Vec3, f64) -> f64) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..rows {
+            let c = (f64::from(i) + 0.5) / f64::from(rows);
+            for j in 0..columns {
+                let phi = f64::from(TAU) * (f64::from(j) + 0.5) / f64::from(columns);
+                let level = (1.0 - c * c).sqrt();
+                sum += f([level * phi.cos(), level * phi.sin(), c].map(|x| x as f32), c);
+            }
+        }
+        sum * f64::from(TAU) / f64::from(rows * columns)
+    }
+
+    /// What the distribution function itself reflects of light from everywhere.
+    fn integrated(s: &Gloss) -> f64 {
+        over_hemisphere(2000, 300, |d, c| c * f64::from(s.reflected(d)[0]) / f64::from(PI))
+    }
+
+    /// White metals, and white dielectrics with and without a clear coat, lose and gain nothing, whatever their
+    /// roughness.
+    #[test]
+    fn energy_is_conserved_for_every_roughness() {
+        let materials = [material(0.04, 1.0, 0.0), material(0.04, 0.0, 0.0), material(0.3, 0.5, 0.0)];
+        let coated = material(0.04, 0.0, 1.0);
+        for roughness in [0.3, 0.4, 0.55, 0.7, 0.85, 1.0] {
+            for cosine in [0.15, 0.4, 0.7, 0.95] {
+                for m in &materials {
+                    let s = gloss(m, roughness, cosine);
+                    let (sum, of_table) = (integrated(&s), f64::from(s.around()[0]));
+                    assert!((sum - of_table).abs() < 4e-3, "{roughness} {cosine}: {sum} instead of {of_table}");
+                    let all = sum + f64::from(s.diffuse[0]);
+                    assert!((all - 1.0).abs() < 4e-3, "{roughness} {cosine} {}: {all}", m.metallic);
+                }
+                let s = gloss(&coated, roughness, cosine);
+                let all = integrated(&s) + f64::from(s.diffuse[0]);
+                assert!((all - 1.0).abs() < 0.01, "coated {roughness} {cosine}: {all}");
+            }
+        }
+        // Without the light of further bounces a rough metal is far too dark.
+        let rough = Gloss { f0: [1.0; 3], f90: [1.0; 3], ..gloss(&materials[0], 1.0, 0.7) };
+        assert!(integrated(&rough) < 0.8, "{}", integrated(&rough));
+    }
+
+    /// The mean of what is reflected over the density, over drawn directions, is the same sum for the sharpest lobes,
+    /// too.
+    #[test]
+    fn drawn_directions_bring_what_is_reflected() {
+        for (m, bound) in [(material(0.04, 1.0, 0.0), 5e-3), (material(0.04, 0.0, 0.7), 5e-3)] {
+            for roughness in [0.0, 0.05, 0.2, 0.5, 1.0] {
+                for cosine in [0.2, 0.8] {
+                    let s = gloss(&m, roughness, cosine);
+                    let count = 200_000;
+                    let (mut sum, mut below) = (0.0, 0);
+                    for i in 0..count {
+                        let d = s.direction(random4(i, 1, 2));
+                        let density = s.density(d);
+                        if density > 0.0 {
+                            sum += f64::from(s.reflected(d)[0] * d[2] / (PI * density));
+                        } else {
+                            below += 1;
+                        }
+                    }
+                    let (mean, expected) = (sum / f64::from(count), f64::from(s.around()[0]));
+                    assert!((mean - expected).abs() < bound, "{roughness} {cosine}: {mean} instead of {expected}");
+                    assert!(f64::from(below) < 0.5 * f64::from(count), "{below} directions lead below");
+                }
+            }
+        }
+    }
+
+    /// Densities are those of the directions drawn: shares of the hemisphere agree.
+    #[test]
+    fn directions_are_drawn_by_their_density() {
+        let s = gloss(&material(0.04, 0.0, 0.6), 0.6, 0.6);
+        let cap = |d: Vec3| d[2] > 0.8 && d[0] < 0.0;
+        let count = 400_000;
+        let drawn = (0..count).filter(|&i| cap(s.direction(random4(i, 5, 9)))).count() as f64 / f64::from(count);
+        let expected = over_hemisphere(800, 800, |d, _| if cap(d) { f64::from(s.density(d)) } else { 0.0 });
+        assert!((drawn - expected).abs() < 4e-3 && expected > 0.05, "{drawn} instead of {expected}");
+    }
+
+    #[test]
+    fn matt_and_unlit_surfaces_are_diffuse_alone() {
+        let s = gloss(&Material::DIFFUSE, 0.5, 0.7);
+        assert!(!s.is_glossy() && s.diffuse == [1.0; 3] && s.reflected(NORMAL) == [0.0; 3] && s.density(NORMAL) == 0.0);
+        let unlit = Material { flags: MATERIAL_UNLIT, ..material(0.04, 1.0, 1.0) };
+        assert!(!gloss(&unlit, 0.5, 0.7).is_glossy());
+    }
+}

@@ -1,0 +1,188 @@
+//! Reads the attributes of hits in bricks whose attributes are resident: twin of `shaders/shade/resolve.wgsl`. Normal,
+//! tangent, texture coordinates, the material without its textures, and what of these the pixel covers.
+
+use crate::kernels::bound::Bound;
+use crate::kernels::layout::{
+    GBUFFER_FIRST, GBUFFER_READ, GBuffer, INSTANCE_MIRRORED, NO_NORMAL, NONE, Params, Ray, STATE_ATTRIBUTES, Surface,
+};
+use crate::kernels::rays::RaySet;
+use crate::kernels::texture::sample::settle;
+use crate::kernels::trace::indices::Indices;
+use crate::kernels::vector::{Vec3, dot, each, most, normalize, xyz};
+use crate::math::exact::{divide, square_root};
+use bricks::{
+    AttributeDetail, AttributeLayout, AttributeVertex, Brick, Material, NORMAL, SURFACE_MATERIAL,
+    SURFACE_ROTATION_SHIFT,
+};
+use rayon::prelude::*;
+
+/// Of the angle between a ray and a normal; below it a footprint is that of this one.
+const LEAST_COSINE: f32 = 0.05;
+
+/// The arrays of a brick's attributes where they lie.
+#[derive(Clone, Copy, Default)]
+pub struct AttributeView<'a> {
+    vertices: &'a [AttributeVertex],
+    /// Material and rotation of each triangle.
+    surfaces: &'a [u32],
+    indices: Indices<'a>,
+    /// As many as vertices, or none.
+    details: &'a [AttributeDetail],
+}
+
+impl<'a> AttributeView<'a> {
+    /// The arrays in the verified attributes of `brick`, which are aligned for u32 and of the length that the record
+    /// implies.
+    pub fn new(brick: &Brick, bytes: &'a [u8]) -> Self {
+        let layout = AttributeLayout::of(brick);
+        let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
+        Self {
+            vertices: bytemuck::cast_slice(part(0, layout.surfaces)),
+            surfaces: bytemuck::cast_slice(part(layout.surfaces, layout.indices)),
+            indices: Indices::new(brick, part(layout.indices, layout.details)),
+            details: bytemuck::cast_slice(part(layout.details, layout.bytes)),
+        }
+    }
+
+    fn corners(&self, triangle: u32) -> [AttributeVertex; 3] {
+        self.indices.of(triangle).map(|index| self.vertices[index as usize])
+    }
+
+    /// What its corners have besides, where they have.
+    fn details(&self, triangle: u32) -> Option<[AttributeDetail; 3]> {
+        let corners = self.indices.of(triangle);
+        (!self.details.is_empty()).then(|| corners.map(|index| self.details[index as usize]))
+    }
+}
+
+pub(crate) fn unpack4x8unorm(word: u32) -> [f32; 4] {
+    word.to_le_bytes().map(|b| f32::from(b) / 255.0)
+}
+
+/// The normal of an attribute vertex; zero if it has none.
+fn octahedral(word: u32) -> Vec3 {
+    if word == NO_NORMAL {
+        return [0.0; 3];
+    }
+    let snorm = |bits: u32| most(f32::from(bits as u16 as i16) / 32_767.0, -1.0);
+    let [x, y] = [snorm(word), snorm(word >> 16)];
+    let mut n = [x, y, 1.0 - x.abs() - y.abs()];
+    let t = most(-n[2], 0.0);
+    n[0] += if n[0] >= 0.0 { -t } else { t };
+    n[1] += if n[1] >= 0.0 { -t } else { t };
+    normalize(n)
+}
+
+/// What the pixel covers of the textures' unit square, an area, by ray cones; see the kernel.
+pub(crate) fn footprint_of(params: &Params, ray: &Ray, t: f32, surface: &Surface, [a, b, c]: [[f32; 2]; 3]) -> f32 {
+    let e1 = [0, 1].map(|k| b[k] - a[k]);
+    let e2 = [0, 1].map(|k| c[k] - a[k]);
+    let uv_area = (e1[0] * e2[1] - e1[1] * e2[0]).abs();
+    let way = each(|k| ray.origin[k] - params.origin[k]);
+    let length = square_root(dot(ray.direction, ray.direction));
+    let distance = square_root(dot(way, way)) + t * length;
+    let cosine = most(divide(dot(ray.direction, surface.normal).abs(), length), LEAST_COSINE);
+    let width = divide(distance * params.step_y[3], cosine);
+    divide(uv_area, most(surface.area, 1.0e-30)) * (width * width)
+}
+
+/// Of all hits of the shaded set that have none yet.
+pub fn resolve(
+    bound: &Bound,
+    seen: &RaySet,
+    gbuffer: &mut [GBuffer],
+    materials: &[Material],
+    attributes: &[AttributeView],
+) {
+    gbuffer.par_iter_mut().enumerate().with_min_len(256).for_each(|(index, g)| {
+        let surface = &seen.surfaces[index];
+        if surface.leaf == NONE || g.state != 0 {
+            return;
+        }
+        let brick = bound.brick_of(surface.leaf);
+        if bound.slots[brick].state & STATE_ATTRIBUTES != 0 {
+            *g = read(bound, seen, index, materials, &attributes[brick]);
+        }
+    });
+}
+
+fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attributes: &AttributeView) -> GBuffer {
+    let surface = &seen.surfaces[index];
+    let word = attributes.surfaces[surface.triangle as usize];
+    let material = &materials[(word & SURFACE_MATERIAL) as usize];
+    let rotation = word >> SURFACE_ROTATION_SHIFT;
+    let hit = &seen.hits[index];
+    let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+    let (mut normal, mut uv, mut color) = ([0.0; 3], [0.0; 2], [0.0; 4]);
+    let corners = attributes.corners(surface.triangle);
+    for (weight, v) in weights.into_iter().zip(&corners) {
+        let (n, c) = (octahedral(v.normal), unpack4x8unorm(v.color));
+        normal = each(|k| normal[k] + weight * n[k]);
+        uv = [0, 1].map(|k| uv[k] + weight * v.uv[k]);
+        color = [0, 1, 2, 3].map(|k| color[k] + weight * c[k]);
+    }
+    let instance = bound.scene.leaves[surface.leaf as usize].instance;
+    let m = &bound.scene.instances[instance as usize].object_from_world;
+    let mut n = each(|k| m[0][k] * normal[0] + m[1][k] * normal[1] + m[2][k] * normal[2]);
+    let size = dot(n, n);
+    // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric
+    // one.
+    let inverse = 1.0 / most(size, 1.0e-30).sqrt();
+    n = if size > 1.0e-12 { n.map(|x| x * inverse) } else { surface.normal };
+    let is_turned = dot(n, surface.normal) < 0.0;
+    if is_turned {
+        n = n.map(|x| -x);
+    }
+    let base = [0, 1, 2, 3].map(|k| material.base_color[k] * color[k]);
+    // Source vertex (i + rotation) mod 3 was stored as vertex i.
+    let source = |i: u32| weights[((i + 3 - rotation) % 3) as usize];
+    let mut g = GBuffer {
+        albedo: xyz(base),
+        state: GBUFFER_READ,
+        normal: n,
+        material: word & SURFACE_MATERIAL,
+        emission: material.emission,
+        weights: [source(1), source(2)],
+        uv,
+        occlusion: 1.0,
+        metallic: material.metallic,
+        roughness: material.roughness,
+        ..GBuffer::default()
+    };
+    for (place, texture) in (0..).zip(material.textures()) {
+        if texture != NONE {
+            g.state |= 1 << (GBUFFER_FIRST + place);
+        }
+    }
+    if g.state != GBUFFER_READ {
+        let footprint = |uvs| footprint_of(bound.params, &seen.rays[index], hit.t, surface, uvs);
+        g.footprint = footprint(corners.map(|v| v.uv));
+        if let Some(details) = attributes.details(surface.triangle) {
+            let mut along = [0.0; 3];
+            for (weight, v) in weights.into_iter().zip(&details) {
+                let t = octahedral(v.tangent);
+                along = each(|k| along[k] + weight * t[k]);
+                g.uv1 = [0, 1].map(|k| g.uv1[k] + weight * v.uv[k]);
+                g.handedness = v.handedness;
+            }
+            g.footprint1 = footprint(details.map(|v| v.uv));
+            let place = &bound.scene.instances[instance as usize];
+            g.tangent = place.world_from_object.map(|row| dot(xyz(row), along));
+            // Seen from behind, the frame is turned about with its normal.
+            if is_turned {
+                g.tangent = g.tangent.map(|x| -x);
+                g.handedness = -g.handedness;
+            }
+            if place.flags & INSTANCE_MIRRORED != 0 {
+                g.handedness = -g.handedness;
+            }
+        }
+        if g.handedness == 0.0 {
+            g.state &= !(1 << (GBUFFER_FIRST + NORMAL as u32));
+        }
+    }
+    if g.state == GBUFFER_READ {
+        settle(&mut g, material.flags);
+    }
+    g
+}

@@ -1,0 +1,299 @@
+//! What hits show and the light on them: twins of `shaders/shade/clear_gbuffer.wgsl`, `shade.wgsl`, `add_light.wgsl`,
+//! `add_occlusion.wgsl` and `hit_demand.wgsl`.
+
+use super::gloss::Gloss;
+use super::lamps::{
+    drawn_density, drawn_light, emitter_of, environment_density, environment_sample, lamp_words, outweighs, shines,
+    sun_density,
+};
+use super::light::{add_light as add, ambient, background, sunlight};
+use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::layout::{
+    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE,
+    PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_SKY, PARAM_SUN,
+    ROMA_HIT, Ray,
+};
+use crate::kernels::rays::RaySet;
+use crate::kernels::vector::{Vec3, cross, dot, each, most, normalize, xyz};
+use bricks::Material;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// Pixels that a task shades in a row.
+const RUN: usize = 1024;
+
+/// What shading keeps per pixel.
+#[derive(Default)]
+pub struct Pixels {
+    /// Of the hits of sets 0 and 1.
+    pub gbuffers: [Vec<GBuffer>; 2],
+    /// Summed over the samples of a batch; w counts them.
+    pub radiance: Vec<[f32; 4]>,
+    /// Of the light that the rays of set 1 bring.
+    pub throughput: Vec<[f32; 4]>,
+    /// By which their directions were drawn; 0 where no lamp's rays bring the same light.
+    pub densities: Vec<f32>,
+}
+
+impl Pixels {
+    /// Of `rays` pixels.
+    pub fn new(rays: usize) -> Self {
+        let gbuffers = [vec![GBuffer::default(); rays], Vec::new()];
+        Self { gbuffers, radiance: vec![[0.0; 4]; rays], throughput: Vec::new(), densities: Vec::new() }
+    }
+
+    /// Makes room for bounces at every pixel.
+    pub fn allow_bounces(&mut self) {
+        let rays = self.radiance.len();
+        self.gbuffers[1] = vec![GBuffer::default(); rays];
+        self.throughput = vec![[0.0; 4]; rays];
+        self.densities = vec![0.0; rays];
+    }
+}
+
+/// The share of a primary hit's own light that it shows; all of a hit of set 1.
+pub fn surface_share(bound: &Bound) -> f32 {
+    if bound.has(PARAM_BOUNCE) { 1.0 } else { bound.params.surface_share }
+}
+
+/// Empties the G-buffer of the shaded set, and before the first sample of a batch the radiance.
+pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
+    pixels.gbuffers[shaded].fill(GBuffer::default());
+    if bound.params.sample.is_multiple_of(BATCH_SAMPLES) && !bound.has(PARAM_BOUNCE) {
+        pixels.radiance.fill([0.0; 4]);
+    }
+}
+
+/// What the rays of set 1 carry: throughputs and densities.
+type Carried<'a> = (&'a [[f32; 4]], &'a [f32]);
+
+/// Calls `light` for every pixel, with what the rays of all carry, and adds what it gives.
+fn for_each_pixel(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    light: impl Fn(usize, &GBuffer, &mut [f32; 4], Carried) -> Option<Vec3> + Sync,
+) {
+    let Pixels { gbuffers, radiance, throughput, densities } = pixels;
+    let (gbuffer, carried) = (&gbuffers[shaded], (&throughput[..], &densities[..]));
+    radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
+        let mut tally = Tally::default();
+        for (i, radiance) in radiance.iter_mut().enumerate() {
+            let index = run * RUN + i;
+            if let Some(light) = light(index, &gbuffer[index], radiance, carried) {
+                add(bound, &mut tally, radiance, carried.0.get(index), light);
+            }
+        }
+        bound.counters.add(&tally);
+    });
+}
+
+/// For how many rays one that met nothing counts: those beside it were not traced ([`crate::secondary::roma::twin`]).
+fn weight_of(hit: &Hit) -> f32 {
+    1.0 + hit.u
+}
+
+fn is_traced(ray: &Ray) -> bool {
+    ray.t_min <= ray.t_max
+}
+
+/// Of the background in direction `d`, which was drawn by `density`; 0: where no lamp draws it as well.
+fn seen_background(bound: &Bound, d: Vec3, density: f32) -> Vec3 {
+    let params = bound.params;
+    let mut light = background(bound, d);
+    if density > 0.0 {
+        let n = normalize(d);
+        if bound.has(PARAM_ENVIRONMENT) && params.environment_width != 0 {
+            let weight = outweighs(density, environment_density(bound, n));
+            light = light.map(|c| c * weight);
+        }
+        // The sun's disc is met by rays of gloss alone, unless its light is without shadows.
+        let sun = xyz(params.sun);
+        let along = dot(n, sun);
+        if bound.has(PARAM_EMITTER) && !bound.has(PARAM_SUN) && params.sun_radius > 0.0 && along > 0.0 {
+            let across = cross(n, sun);
+            if dot(across, across) <= params.sun_radius * params.sun_radius * along * along {
+                let of_sun = sun_density(params, n.map(|x| x / along));
+                let weight = PI * of_sun * outweighs(density, of_sun);
+                light = each(|k| light[k] + params.sun_color[k] * weight);
+            }
+        }
+    }
+    light
+}
+
+/// The emission of the hit of ray `index` of `seen`, which was drawn by `density`, as above.
+fn seen_emission(bound: &Bound, g: &GBuffer, m: &Material, seen: &RaySet, index: usize, density: f32) -> Vec3 {
+    // Only these are lamps.
+    let is_lamp = m.emissive_texture == NONE && m.flags & MATERIAL_UNLIT == 0;
+    if !is_lamp {
+        return g.emission;
+    }
+    if !bound.has(PARAM_EMISSION) {
+        return [0.0; 3];
+    }
+    if density > 0.0 && bound.params.emitter_density > 0.0 {
+        let d = seen.rays[index].direction;
+        let length = seen.hits[index].t * dot(d, d).sqrt();
+        let cosine = most(dot(normalize(d), seen.surfaces[index].normal).abs(), 1.0e-6);
+        let sides = if m.flags & MATERIAL_DOUBLE_SIDED != 0 { 2.0 } else { 1.0 };
+        let luminance = dot(m.emission, [0.2126, 0.7152, 0.0722]);
+        let of_lamp = luminance * sides * bound.params.emitter_density * (length * length / cosine);
+        let weight = outweighs(density, of_lamp);
+        return g.emission.map(|c| c * weight);
+    }
+    g.emission
+}
+
+/// What the hits of the shaded set show by themselves, unless passes of their own bring it: the background on a miss,
+/// else their emission and the light of the sun and of the background, unshadowed. Where rays were drawn by the gloss
+/// of surfaces, what rays to lamps bring as well is weighted; so is the environment where diffuse rays meet it. The
+/// first shading of a sample counts it.
+pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, materials: &[Material]) {
+    let params = bound.params;
+    for_each_pixel(bound, pixels, shaded, |index, g, radiance, (_, densities)| {
+        if !bound.has(PARAM_BOUNCE) {
+            radiance[3] += 1.0;
+        }
+        let ray = &seen.rays[index];
+        if !is_traced(ray) {
+            return None;
+        }
+        let density = if bound.has(PARAM_BOUNCE) { densities[index] } else { 0.0 };
+        if seen.surfaces[index].leaf == NONE {
+            // What occupancy maps met is lit otherwise.
+            let is_miss = bound.has(PARAM_MISS) && seen.hits[index].id != ROMA_HIT;
+            return is_miss.then(|| seen_background(bound, ray.direction, density));
+        }
+        let m = &materials[g.material as usize];
+        let s = Gloss::of(g, m, ray.direction.map(|x| -x));
+        let (mut light, mut mirrored) = ([0.0; 3], [0.0; 3]);
+        if bound.has(PARAM_SUN) {
+            let sun = sunlight(params, g.normal);
+            let reflected = s.reflected(xyz(params.sun));
+            light = each(|k| light[k] + sun[k]);
+            mirrored = each(|k| mirrored[k] + reflected[k] * sun[k]);
+        }
+        if bound.has(PARAM_SKY) {
+            let ambient = ambient(params, g.normal);
+            let reflected = s.reflected_ambient(bound);
+            light = each(|k| light[k] + ambient[k] * g.occlusion);
+            mirrored = each(|k| mirrored[k] + reflected[k] * g.occlusion);
+        }
+        let emission = seen_emission(bound, g, m, seen, index, density);
+        Some(each(|k| surface_share(bound) * (s.diffuse[k] * light[k] + mirrored[k] + emission[k])))
+    });
+}
+
+/// Adds the light of the environment to the primary hits as the paper of visibility fields has it: twin of
+/// `shaders/dvf/dvf_light.wgsl`.
+pub fn dvf_light(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    (seen, own): (&RaySet, &RaySet),
+    materials: &[Material],
+) {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
+        if seen.surfaces[index].leaf == NONE {
+            return None;
+        }
+        let ray = &own.rays[index];
+        let is_met = !is_traced(ray) || own.hits[index].id != NONE;
+        let is_occluded_cell = g.padding0 == 1;
+        let mut light = if is_met != is_occluded_cell { background(bound, ray.direction) } else { [0.0; 3] };
+        if !is_occluded_cell {
+            let all = ambient(bound.params, g.normal);
+            light = each(|k| all[k] - light[k]);
+        }
+        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+        Some(each(|k| surface_share(bound) * s.diffuse[k] * light[k]))
+    });
+}
+
+/// Adds the light of the pass's lamp to the hits of the shaded set, those of `seen`, whose shadow ray went free. The
+/// environment shares a direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their
+/// gloss.
+pub fn add_light(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    (seen, own): (&RaySet, &RaySet),
+    materials: &[Material],
+) {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, (throughput, _)| {
+        let ray = &own.rays[index];
+        if !is_traced(ray) || own.hits[index].id != NONE {
+            return None;
+        }
+        let d = ray.direction;
+        let cosine = most(dot(g.normal, d), 0.0);
+        // By which the lamp drew the direction, where the rays of the gloss may meet it.
+        let mut density = 0.0;
+        let light = if bound.has(PARAM_EMITTER) {
+            // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction
+            // leads from the surface to the point.
+            let e = emitter_of(bound, index, throughput);
+            let squared = dot(d, d);
+            let shone = shines(e, d);
+            if e.kind & EMITTER_KIND == EMITTER_TRIANGLE {
+                density = e.probability * squared * squared.sqrt() / shone;
+            }
+            each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / e.probability)
+        } else if bound.has(PARAM_ENVIRONMENT) {
+            let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
+            density = drawn_density(bound, &drawn);
+            drawn_light(bound, &drawn).map(|c| c * cosine / PI)
+        } else {
+            if bound.params.sun_radius > 0.0 {
+                density = sun_density(bound.params, d);
+            }
+            sunlight(bound.params, g.normal)
+        };
+        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+        let mut reflects = s.diffuse;
+        if bound.has(PARAM_ENVIRONMENT) && !bound.has(PARAM_BOUNCE) && bound.params.diffuse_count > 0.0 {
+            let share = outweighs(density, bound.params.diffuse_count * cosine / PI);
+            reflects = reflects.map(|c| c * share);
+        }
+        if s.is_glossy() {
+            let unit = normalize(d);
+            let mut weight = 1.0;
+            if bound.has(PARAM_GLOSSY) && !bound.has(PARAM_BOUNCE) && density > 0.0 {
+                weight = outweighs(density, s.density(unit));
+            }
+            let reflected = s.reflected(unit);
+            reflects = each(|k| reflects[k] + weight * reflected[k]);
+        }
+        Some(each(|k| weight_of(&own.hits[index]) * surface_share(bound) * reflects[k] * light[k]))
+    });
+}
+
+/// Adds the share of the sky's light that the pass's direction stands for, where its ray went free.
+pub fn add_occlusion(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    (seen, own): (&RaySet, &RaySet),
+    materials: &[Material],
+) {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
+        if !is_traced(&own.rays[index]) || own.hits[index].id != NONE {
+            return None;
+        }
+        let ambient = ambient(bound.params, g.normal);
+        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+        let mirrored = s.reflected_ambient(bound);
+        let share = weight_of(&own.hits[index]) * surface_share(bound) * bound.params.share;
+        Some(each(|k| share * (s.diffuse[k] * ambient[k] + mirrored[k])))
+    });
+}
+
+/// Counts, per brick, the final hits of a pass.
+pub fn hit_demand(bound: &Bound, own: &RaySet) {
+    own.surfaces.par_chunks(RUN).for_each(|run| {
+        for hits in run.chunk_by(|a, b| a.leaf == b.leaf).filter(|hits| hits[0].leaf != NONE) {
+            bound.demand[bound.brick_of(hits[0].leaf)].add(hits.len() as u32, 0);
+        }
+    });
+}

@@ -1,0 +1,310 @@
+//! Instruction sets: the node test for eight children at once, where the processor has the instructions for it. All
+//! give the same bits: the same operations in the same order, none of them fused.
+
+use super::wide::{Portable, Wide};
+use crate::kernels::trace::node::{FramedRay, by_priority, node_hits, traversal_mask};
+use crate::kernels::vector::{Vec3, xyz};
+use bricks::Node;
+
+/// A ray and its offset from the space of nodes as vectors of four, the last of no meaning.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(16))]
+pub struct Lanes {
+    origin: [f32; 4],
+    inverse: [f32; 4],
+    offset_high: [f32; 4],
+    offset_low: [f32; 4],
+}
+
+impl Lanes {
+    /// Of `ray` in a frame in which nodes lie at the offset.
+    #[inline(always)]
+    pub fn new(ray: &FramedRay, offset_high: Vec3, offset_low: Vec3) -> Self {
+        let four = |v: Vec3| [v[0], v[1], v[2], 0.0];
+        let (origin, inverse) = (four(ray.origin), four(ray.frame.inv));
+        Self { origin, inverse, offset_high: four(offset_high), offset_low: four(offset_low) }
+    }
+}
+
+/// What nodes are tested by. A value of the type is proof that the processor has the instructions.
+pub trait Isa: Copy + Send + Sync {
+    /// Numbers of several rays.
+    type Wide: Wide;
+
+    /// Eight numbers.
+    type Eight: Wide;
+
+    /// The same number in all eight lanes.
+    fn eight(self, x: f32) -> Self::Eight;
+
+    /// Eight numbers, one a lane.
+    fn load_eight(self, from: &[f32; 8]) -> Self::Eight;
+
+    /// Eight bounds as numbers.
+    fn numbers(self, bytes: &[u8; 8]) -> Self::Eight;
+
+    /// Origin and steps of a node's grid by axis; the other lanes are 0.
+    fn grid(self, node: &Node) -> [Self::Eight; 2];
+
+    /// The same number in all lanes.
+    fn splat(self, x: f32) -> Self::Wide;
+
+    /// The first of `from`, a number a lane.
+    fn load(self, from: &[f32]) -> Self::Wide;
+
+    /// The same word in all lanes.
+    #[inline(always)]
+    fn splat_bits(self, x: u32) -> Self::Wide {
+        self.splat(f32::from_bits(x))
+    }
+
+    /// The first of `from`, a word a lane.
+    #[inline(always)]
+    fn load_bits(self, from: &[u32]) -> Self::Wide {
+        self.load(bytemuck::cast_slice(from))
+    }
+
+    /// Asks for the memory of `at` to be brought near, for it will be read.
+    #[inline(always)]
+    fn prefetch<T>(self, _at: &T) {}
+
+    /// The traversal mask of a brick's node ([`traversal_mask`]): what `ray` enters of it up to `t_max`. `lanes` are
+    /// the ray's.
+    fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32;
+
+    /// The children of a node of the top level that `ray` enters up to `t_max`, inner ones and leaves alike, by
+    /// priority in the high byte. `slack`: see [`crate::kernels::trace::node::NodeFrame::new`].
+    fn open_top(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32;
+}
+
+/// No more than every processor has.
+#[derive(Clone, Copy, Debug)]
+pub struct Scalar;
+
+impl Isa for Scalar {
+    type Wide = Portable;
+    type Eight = Portable;
+
+    #[inline(always)]
+    fn eight(self, x: f32) -> Portable {
+        Portable([x; 8])
+    }
+
+    #[inline(always)]
+    fn load_eight(self, from: &[f32; 8]) -> Portable {
+        Portable(*from)
+    }
+
+    #[inline(always)]
+    fn numbers(self, bytes: &[u8; 8]) -> Portable {
+        Portable(bytes.map(f32::from))
+    }
+
+    #[inline(always)]
+    fn grid(self, node: &Node) -> [Portable; 2] {
+        let [x, y, z] = node.origin;
+        let [i, j, k] = node.exponent.map(|e| f32::from_bits(u32::from(e) << 23));
+        [Portable([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]), Portable([i, j, k, 0.0, 0.0, 0.0, 0.0, 0.0])]
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Portable {
+        Portable([x; 8])
+    }
+
+    #[inline(always)]
+    fn load(self, from: &[f32]) -> Portable {
+        let mut lanes = [0.0; 8];
+        lanes.copy_from_slice(&from[..8]);
+        Portable(lanes)
+    }
+
+    #[inline(always)]
+    fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
+        let (high, low) = (xyz(lanes.offset_high), xyz(lanes.offset_low));
+        let entered = node_hits(ray, node, high, low, 0.0, t_max).mask;
+        traversal_mask(entered, node, ray.flip)
+    }
+
+    #[inline(always)]
+    fn open_top(self, ray: &FramedRay, _: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
+        by_priority(node_hits(ray, node, [0.0; 3], [0.0; 3], slack, t_max).mask, node, ray.flip)
+    }
+}
+
+/// [`Isa`] by the functions of the module where this is used. A value of `$name` is proof that the processor has their
+/// instructions.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+macro_rules! isa_over_intrinsics {
+    ($name:ident, $wide:ty, $eight:ty) => {
+        impl Isa for $name {
+            type Wide = $wide;
+            type Eight = $eight;
+
+            #[inline(always)]
+            fn eight(self, x: f32) -> $eight {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { <$eight>::splat(x) }
+            }
+
+            #[inline(always)]
+            fn load_eight(self, from: &[f32; 8]) -> $eight {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { <$eight>::load(from) }
+            }
+
+            #[inline(always)]
+            fn numbers(self, bytes: &[u8; 8]) -> $eight {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { <$eight>::of(numbers(bytes)) }
+            }
+
+            #[inline(always)]
+            fn grid(self, node: &Node) -> [$eight; 2] {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe {
+                    let [origin, step] = grid(node);
+                    [<$eight>::of(extended(origin)), <$eight>::of(extended(step))]
+                }
+            }
+
+            #[inline(always)]
+            fn splat(self, x: f32) -> $wide {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { <$wide>::splat(x) }
+            }
+
+            #[inline(always)]
+            fn load(self, from: &[f32]) -> $wide {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { <$wide>::load(from) }
+            }
+
+            #[inline(always)]
+            fn prefetch<T>(self, at: &T) {
+                for line in 0..size_of::<T>().div_ceil(64) {
+                    prefetch_line(std::ptr::from_ref(at).cast::<u8>().wrapping_add(64 * line));
+                }
+            }
+
+            #[inline(always)]
+            fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { open(ray, lanes, node, t_max) }
+            }
+
+            #[inline(always)]
+            fn open_top(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
+                // SAFETY: a value of the type exists only where the instructions have been detected.
+                unsafe { open_top(ray, lanes, node, slack, t_max) }
+            }
+        }
+    };
+}
+
+#[cfg(target_arch = "aarch64")]
+mod neon;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+#[cfg(target_arch = "aarch64")]
+pub use neon::Neon;
+#[cfg(target_arch = "x86_64")]
+pub use x86::{Avx2, Avx512};
+
+/// The instruction set that kernels run with.
+#[derive(Clone, Copy, Debug)]
+pub enum Best {
+    /// [`Scalar`].
+    Scalar(Scalar),
+    /// [`Avx2`].
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// [`Avx512`].
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+    /// [`Neon`].
+    #[cfg(target_arch = "aarch64")]
+    Neon(Neon),
+}
+
+impl Best {
+    /// The best that this processor has.
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx512) = Avx512::detect() {
+            return Self::Avx512(avx512);
+        } else if let Some(avx2) = Avx2::detect() {
+            return Self::Avx2(avx2);
+        }
+        #[cfg(target_arch = "aarch64")]
+        if let Some(neon) = Neon::detect() {
+            return Self::Neon(neon);
+        }
+        Self::Scalar(Scalar)
+    }
+
+    /// All that this processor has, for tests.
+    #[cfg(test)]
+    pub fn all() -> Vec<Self> {
+        let mut all = vec![Self::Scalar(Scalar)];
+        #[cfg(target_arch = "x86_64")]
+        {
+            all.extend(Avx2::detect().map(Self::Avx2));
+            all.extend(Avx512::detect().map(Self::Avx512));
+        }
+        #[cfg(target_arch = "aarch64")]
+        all.extend(Neon::detect().map(Self::Neon));
+        println!("{all:?}");
+        all
+    }
+
+    /// Numbers in a vector.
+    pub fn lanes(self) -> u32 {
+        match self {
+            Self::Scalar(_) => 1,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => 8,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => 16,
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(_) => 8,
+        }
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar(_) => "scalar",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "AVX2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "AVX-512",
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(_) => "NEON",
+        }
+    }
+}
+
+/// The expression for every instruction set that this processor has.
+#[cfg(test)]
+macro_rules! for_each_isa {
+    ($isa:ident => $x:expr) => {
+        for best in $crate::kernels::simd::isa::Best::all() {
+            match best {
+                $crate::kernels::simd::isa::Best::Scalar($isa) => $x,
+                #[cfg(target_arch = "x86_64")]
+                $crate::kernels::simd::isa::Best::Avx2($isa) => $x,
+                #[cfg(target_arch = "x86_64")]
+                $crate::kernels::simd::isa::Best::Avx512($isa) => $x,
+                #[cfg(target_arch = "aarch64")]
+                $crate::kernels::simd::isa::Best::Neon($isa) => $x,
+            }
+        }
+    };
+}
+#[cfg(test)]
+pub(crate) use for_each_isa;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+use crate::kernels::simd::isa::*;
+use crate::kernels::simd::wide::Wide;
+use crate::kernels::trace::node::framed_ray;
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
+struct Rng(u64);
+
+impl Rng {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn signed(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / 8_388_608.0 - 1.0
+    }
+
+    fn point(&mut self, size: f32) -> Vec3 {
+        [0; 3].map(|_| size * self.signed())
+    }
+}
+
+/// A node as the reader accepts it: every child inner, or a leaf of 1 to 3 triangles, or absent.
+fn node(rng: &mut Rng) -> Node {
+    let mut node = Node {
+        origin: rng.point(20.0),
+        exponent: [0; 3].map(|_| 115 + (rng.bits() % 8) as u8),
+        inner_mask: 0,
+        child_base: 1,
+        triangle_base: 0,
+        meta: [0; 8],
+        lo: [[0; 8]; 3],
+        hi: [[0; 8]; 3],
+    };
+    let mut first = 0;
+    for i in 0..8 {
+        for k in 0..3 {
+            let [a, b] = [rng.bits() as u8, rng.bits() as u8];
+            (node.lo[k][i], node.hi[k][i]) = (a.min(b), a.max(b));
+        }
+        let count = rng.bits() % 5;
+        node.meta[i] = match count {
+            0 => 0,
+            4 => {
+                node.inner_mask |= 1 << i;
+                0x38 + i as u8
+            }
+            count => {
+                first += count as u8;
+                ((1 << count) - 1) << 5 | (first - count as u8)
+            }
+        };
+    }
+    node
+}
+
+/// Eight numbers' bits.
+fn bits(x: impl Wide) -> [u32; 8] {
+    let mut numbers = [0.0; 8];
+    x.store(&mut numbers);
+    numbers.map(f32::to_bits)
+}
+
+#[test]
+fn eight_at_once_are_each_alone() {
+    for_each_isa!(isa => compare_with_scalar(isa));
+}
+
+fn compare_with_scalar(isa: impl Isa) {
+    let (mut entered, mut met) = (0, 0);
+    let mut rng = Rng(11);
+    println!("seed 11");
+    for case in 0..200_000 {
+        let node = node(&mut rng);
+        let (high, low) = (rng.point(4.0), if case % 2 == 0 { [0.0; 3] } else { rng.point(1e-3) });
+        let aim = [0, 1, 2].map(|k| {
+            let step = f32::from_bits(u32::from(node.exponent[k]) << 23);
+            // At the node where a brick has it, or where the top level has it.
+            [high[k], 0.0][case / 2 % 2] + node.origin[k] + step * 255.0 * (0.5 + 0.5 * rng.signed())
+        });
+        let origin = rng.point([1.0, 30.0, 3e4][case % 3]);
+        let mut direction = [0, 1, 2].map(|k| aim[k] - origin[k]);
+        if case % 5 == 0 {
+            // Of either sign.
+            direction[case / 5 % 3] = [0.0, -0.0][case / 15 % 2];
+        }
+        let ray = framed_ray(origin, direction, [0.0, 0.9, 1.1][case / 3 % 3]);
+        let t_max = [1.0, 3e38, 0.7][case / 7 % 3];
+        let lanes = Lanes::new(&ray, high, low);
+        let one = Scalar.open(&ray, &lanes, &node, t_max);
+        assert_eq!(isa.open(&ray, &lanes, &node, t_max), one, "case {case}: {ray:?} {node:?}");
+        entered += u32::from(one != 0);
+        for k in 0..3 {
+            assert_eq!(bits(isa.numbers(&node.lo[k])), bits(Scalar.numbers(&node.lo[k])), "case {case}: {node:?}");
+        }
+        assert_eq!(isa.grid(&node).map(bits), Scalar.grid(&node).map(bits), "case {case}: {node:?}");
+        let slack = [0.0, 1e-6][case % 2];
+        let lanes = Lanes::new(&ray, [0.0; 3], [0.0; 3]);
+        let one = Scalar.open_top(&ray, &lanes, &node, slack, t_max);
+        assert_eq!(isa.open_top(&ray, &lanes, &node, slack, t_max), one, "case {case}: {ray:?} {node:?}");
+        met += u32::from(one != 0);
+    }
+    let some = 10_000..190_000;
+    assert!(some.contains(&entered) && some.contains(&met), "{entered} and {met} of 200,000 rays enter a child");
+}

@@ -1,0 +1,4 @@
+//! Vectors of numbers by instruction set.
+
+pub mod isa;
+pub mod wide;

@@ -1,0 +1,145 @@
+//! Intersects each ray with a run of the selected leaves of its tile, in their order: twin of
+//! `shaders/trace/intersect_list.wgsl`. Nodes are visited until one has triangles.
+
+use super::brick::Best;
+use super::leaf::BrickRay;
+use super::node::framed_ray;
+use super::packet_walk::PacketScratch;
+use super::walk_brick::{Group, Visits, finish_walk};
+use crate::kernels::bound::Bound;
+use crate::kernels::layout::{COUNTER_LEAF_GROUPS, Entry, NONE, PARAM_ANY_HIT};
+use crate::kernels::query::tile_lists::TileLists;
+use crate::kernels::rays::{
+    PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet, run_for_each_ray,
+};
+use crate::kernels::simd::isa::Isa;
+
+/// Of the rays of chosen tiles. With `LEAF_CACHE` two groups of triangles are gathered, as long as the ray does not
+/// enter another leaf.
+pub fn intersect_list<const LEAF_CACHE: bool>(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
+    let kernel = IntersectList::<LEAF_CACHE> { bound, lists };
+    if LEAF_CACHE {
+        run_for_each_ray(set, bound, Work::Chosen(lists), &kernel);
+    } else {
+        run_for_each_packet(set, bound, Work::Chosen(lists), &kernel);
+    }
+}
+
+struct IntersectList<'a, const LEAF_CACHE: bool> {
+    bound: &'a Bound<'a>,
+    lists: &'a TileLists,
+}
+
+impl<const LEAF_CACHE: bool> RayKernel for IntersectList<'_, LEAF_CACHE> {
+    #[inline(always)]
+    fn run<I: Isa>(&self, isa: I, scratch: &mut Scratch, slot: Slot) {
+        trace(isa, self, scratch, slot);
+    }
+}
+
+impl<const LEAF_CACHE: bool> IntersectList<'_, LEAF_CACHE> {
+    /// The run of a tile's selection: its first, and the one after the last.
+    #[inline(always)]
+    fn run_of(&self, tile: usize) -> (u32, u32) {
+        let (entry, params) = (&self.lists.lists[tile], self.bound.params);
+        let next = entry.first + params.run_first.min(entry.selected);
+        (next, (entry.first + entry.selected).min(next.saturating_add(params.run_count)))
+    }
+
+    /// An entry of the selection.
+    #[inline(always)]
+    fn listed(&self, position: u32) -> Entry {
+        self.lists.list[self.lists.selection[position as usize] as usize]
+    }
+}
+
+impl<const LEAF_CACHE: bool> PacketKernel for IntersectList<'_, LEAF_CACHE> {
+    #[inline(always)]
+    fn takes(&self, slot: &Slot) -> bool {
+        let (next, end) = self.run_of(slot.tile);
+        next != end && slot.is_traced() && !(self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE)
+    }
+
+    #[inline(always)]
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
+        let (next, end) = self.run_of(tile);
+        for position in next..end {
+            let listed = self.listed(position);
+            let rays = packets.packet.reaching(isa, listed.near) & !packets.packet.done;
+            if rays != 0 {
+                packets.walk_leaf(isa, self.bound, scratch, listed.leaf, rays, self.bound.has(PARAM_ANY_HIT));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn trace<I: Isa, const LEAF_CACHE: bool>(
+    isa: I,
+    kernel: &IntersectList<LEAF_CACHE>,
+    scratch: &mut Scratch,
+    mut slot: Slot,
+) {
+    if !kernel.takes(&slot) {
+        return;
+    }
+    let bound = kernel.bound;
+    let (mut next, end) = kernel.run_of(slot.tile);
+    let ray = *slot.ray;
+    let any_hit = bound.has(PARAM_ANY_HIT);
+    let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    let mut best = Best::before(&slot);
+    let mut visits = Visits::default();
+    let mut r = BrickRay::outside(&world);
+    let Scratch { stack, tally, .. } = scratch;
+    let mut depth = 0;
+    let mut group = Group::default();
+    let mut leaf_groups_postponed = 0;
+    loop {
+        let mut postponed = Group::default();
+        let mut triangles = Group::default();
+        loop {
+            if !group.has_children() {
+                if depth > 0 {
+                    depth -= 1;
+                    group = stack[depth];
+                } else {
+                    if next == end || (LEAF_CACHE && postponed.bits != 0) {
+                        break;
+                    }
+                    let listed = kernel.listed(next);
+                    next += 1;
+                    if listed.near > best.t {
+                        continue;
+                    }
+                    r.enter_leaf(bound.scene, &world, listed.leaf);
+                    r.enter_brick(bound, bound.brick_of(listed.leaf));
+                    group = Group::root(r.ray.flip);
+                }
+            }
+            let Some(child) = group.take_nearest(r.ray.flip, stack, &mut depth, tally) else { break };
+            let opened = r.open_node(isa, bound, &mut visits, best.t, group.child_index(child));
+            group = opened.children;
+            triangles = opened.triangles;
+            if triangles.bits != 0 {
+                if !LEAF_CACHE || postponed.bits != 0 {
+                    break;
+                }
+                postponed = std::mem::take(&mut triangles);
+                leaf_groups_postponed += 1;
+            }
+        }
+        if postponed.bits | triangles.bits == 0 {
+            break;
+        }
+        if LEAF_CACHE {
+            r.test_triangles(&mut visits, &mut best, postponed, any_hit);
+        }
+        r.test_triangles(&mut visits, &mut best, triangles, any_hit);
+        if any_hit && best.leaf != NONE {
+            break;
+        }
+    }
+    tally.add(COUNTER_LEAF_GROUPS, leaf_groups_postponed);
+    finish_walk(bound, &world, &best, visits, &mut slot, tally);
+}

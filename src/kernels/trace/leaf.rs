@@ -1,0 +1,95 @@
+//! A ray at a leaf of the top level, transformed into the frame of the leaf's instance: twin of
+//! `shaders/trace/leaf.wgsl`.
+
+use super::brick::BrickView;
+use super::node::{FramedRay, framed_ray};
+use super::opacity::Draw;
+use crate::kernels::bound::{Bound, Scene};
+use crate::kernels::layout::INSTANCE_IDENTITY;
+use crate::kernels::simd::isa::Lanes;
+use crate::kernels::vector::Vec3;
+use crate::math::exact::barrier;
+
+/// A ray in a brick.
+#[derive(Clone, Copy)]
+pub struct BrickRay<'a> {
+    /// In the object's frame.
+    pub ray: FramedRay,
+    /// Brick origin in the object's frame: high part.
+    pub offset_high: Vec3,
+    /// Low part.
+    pub offset_low: Vec3,
+    /// The leaf.
+    pub leaf: u32,
+    /// Global id of the instance's triangle 0.
+    pub base: u32,
+    /// The brick's geometry, once it has been entered.
+    pub brick: BrickView<'a>,
+    /// What is drawn from where rays pass through triangles at random.
+    pub draw: Draw,
+    /// The ray and the offset as vectors.
+    pub lanes: Lanes,
+}
+
+/// A row of a matrix with a direction.
+#[inline(always)]
+pub fn row_direction(row: [f32; 4], d: Vec3) -> f32 {
+    barrier(barrier(barrier(row[0] * d[0]) + barrier(row[1] * d[1])) + barrier(row[2] * d[2]))
+}
+
+/// A row of a matrix with a point.
+#[inline(always)]
+pub fn row_point(row: [f32; 4], p: Vec3) -> f32 {
+    barrier(row_direction(row, p) + row[3])
+}
+
+/// Rows of a matrix with a direction.
+pub fn rows_direction(rows: &[[f32; 4]; 3], d: Vec3) -> Vec3 {
+    rows.map(|row| row_direction(row, d))
+}
+
+/// Rows of a matrix with a point.
+pub fn rows_point(rows: &[[f32; 4]; 3], p: Vec3) -> Vec3 {
+    rows.map(|row| row_point(row, p))
+}
+
+impl<'a> BrickRay<'a> {
+    /// `world` outside of all bricks.
+    pub fn outside(world: &FramedRay) -> Self {
+        Self {
+            ray: *world,
+            offset_high: [0.0; 3],
+            offset_low: [0.0; 3],
+            leaf: 0,
+            base: 0,
+            brick: BrickView::default(),
+            draw: Draw::default(),
+            lanes: Lanes::default(),
+        }
+    }
+
+    /// Points the ray at the geometry of a brick.
+    #[inline(always)]
+    pub fn enter_brick(&mut self, bound: &Bound<'a>, brick: usize) {
+        self.brick = bound.bricks[brick];
+        self.draw = Draw { seed: bound.params.seed, stream: bound.params.stream };
+    }
+
+    /// Points the ray at a leaf. The ray of the instance is made anew only where the instance is not the world.
+    #[inline(always)]
+    pub fn enter_leaf(&mut self, scene: &Scene, world: &FramedRay, leaf: u32) {
+        let l = &scene.leaves[leaf as usize];
+        let instance = &scene.instances[l.instance as usize];
+        self.leaf = leaf;
+        self.offset_high = l.offset_high;
+        self.offset_low = l.offset_low;
+        self.base = instance.base;
+        if instance.flags & INSTANCE_IDENTITY != 0 {
+            self.ray = *world;
+        } else {
+            let rows = &instance.object_from_world;
+            self.ray = framed_ray(rows_point(rows, world.origin), rows_direction(rows, world.direction), world.t_min);
+        }
+        self.lanes = Lanes::new(&self.ray, self.offset_high, self.offset_low);
+    }
+}

@@ -1,0 +1,179 @@
+//! The triangle test for the rays of a packet: [`intersect_triangle`] lane by lane, with the same operations in the
+//! same order. Lanes whose numbers leave the range in which an f32 operation is what the kernel carries out in integers
+//! are tested alone.
+
+use super::leaf::BrickRay;
+use super::packet::{Packet, RAYS};
+use crate::kernels::simd::isa::Isa;
+use crate::kernels::simd::wide::{Wide, inside, three};
+use crate::kernels::vector::{Vec3, each};
+use crate::math::exact::{CLAMP_ULPS, TINY, TriangleHit, intersect_triangle};
+
+impl Packet {
+    /// Tests a triangle of the brick that `r` is in with `rays`, and keeps nearer hits as [`BrickRay::test_triangle`]
+    /// does. With `any_hit` the rays that it ends are done.
+    #[inline(always)]
+    pub fn test_triangle<I: Isa>(&mut self, isa: I, r: &BrickRay, triangle: u32, rays: u64, any_hit: bool) -> bool {
+        let [a, b, c] = r.vertices(triangle);
+        let mut is_nearer = false;
+        for v in 0..self.vectors::<I>() {
+            let shift = v * I::Wide::LANES;
+            let lanes = ((rays >> shift) & (u64::MAX >> (RAYS - I::Wide::LANES))) as u32;
+            if lanes == 0 {
+                continue;
+            }
+            let origin = three!(k => self.origin[k].get(isa, v));
+            let (a, b, c) = (relative(isa, a, origin), relative(isa, b, origin), relative(isa, c, origin));
+            let axes = self.axes(shift, I::Wide::LANES);
+            let by = [self.shear[0].get(isa, v), self.shear[1].get(isa, v)];
+            let sa = shear(turned::<I>(a, self.axis, axes), by);
+            let sb = shear(turned::<I>(b, self.axis, axes), by);
+            let sc = shear(turned::<I>(c, self.axis, axes), by);
+            let u = sc[0] * sb[1] - sc[1] * sb[0];
+            let v_ = sa[0] * sc[1] - sa[1] * sc[0];
+            let w = sb[0] * sa[1] - sb[1] * sa[0];
+            let (zero, tiny) = (isa.splat(0.0), isa.splat(TINY));
+            let mut alone = (u.abs().less(tiny) | v_.abs().less(tiny) | w.abs().less(tiny)) & lanes;
+            let beside = u.least(v_.least(w)).less(zero) & zero.less(u.most(v_.most(w)));
+            let mut hit = lanes & !beside & !alone;
+            if hit | alone == 0 {
+                continue;
+            }
+            let det = u + v_ + w;
+            hit &= det.less(zero) | zero.less(det);
+            let sum = u * sa[2] + v_ * sb[2] + w * sc[2];
+            let quotient = sum / det;
+            let plain = inside(isa, sum) & inside(isa, det) & inside(isa, quotient);
+            alone |= hit & !plain;
+            hit &= plain;
+            let (t_min, t_max) = (self.t_min.get(isa, v), self.t.get(isa, v));
+            let t = quotient * self.along.get(isa, v);
+            hit &= t_min.less_equal(t);
+            if hit != 0 {
+                let low = three!(k => a[k].least(b[k].least(c[k])));
+                let high = three!(k => a[k].most(b[k].most(c[k])));
+                let m = three!(k => low[k].abs().most(high[k].abs()));
+                let e = isa.splat(CLAMP_ULPS) * m[0].most(m[1].most(m[2]));
+                let inverse = three!(k => self.inverse[k].get(isa, v));
+                let t0 = three!(k => (low[k] - e) * inverse[k]);
+                let t1 = three!(k => (high[k] + e) * inverse[k]);
+                let near = three!(k => t0[k].least(t1[k]));
+                let far = three!(k => t0[k].most(t1[k]));
+                let n = near[0].most(near[1].most(near[2]));
+                let x = far[0].least(far[1].least(far[2]));
+                hit &= !x.less(t_min);
+                let t = t.least(x).most(n.most(t_min)).abs();
+                hit &= t.less_equal(t_max);
+                if hit != 0 {
+                    hit = self.keep(isa, r, triangle, (v, hit), [t, u, v_, w, det]);
+                    is_nearer |= hit != 0;
+                    self.done |= if any_hit { u64::from(hit) << shift } else { 0 };
+                }
+            }
+            while alone != 0 {
+                let i = shift + alone.trailing_zeros() as usize;
+                alone &= alone - 1;
+                is_nearer |= self.test_alone(r, triangle, i, any_hit);
+            }
+        }
+        is_nearer
+    }
+
+    /// Of the lanes from `shift` on, those whose directions are largest along x, and along y.
+    #[inline(always)]
+    fn axes(&self, shift: usize, lanes: usize) -> [u32; 2] {
+        let all = u64::MAX >> (RAYS - lanes);
+        [((self.largest[0] >> shift) & all) as u32, ((self.largest[1] >> shift) & all) as u32]
+    }
+
+    /// [`BrickRay::keep`] for the lanes of `hit` of vector `v`, whose distances are not beyond what they have. Returns
+    /// those that keep it.
+    #[inline(always)]
+    fn keep<I: Isa>(
+        &mut self,
+        isa: I,
+        r: &BrickRay,
+        triangle: u32,
+        (v, mut hit): (usize, u32),
+        [t, u, v_, w, det]: [I::Wide; 5],
+    ) -> u32 {
+        let found = &mut self.found;
+        let id = isa.splat_bits(r.id(triangle));
+        hit &= !self.t.get(isa, v).less_equal(t) | id.less_bits(found.id.get(isa, v));
+        hit &= !id.same_bits(found.source.get(isa, v));
+        if hit != 0 && !r.brick.opacity.of.is_empty() {
+            hit = self.stopped(r, triangle, (v, hit), [u, v_, w, det]);
+        }
+        let found = &mut self.found;
+        if hit != 0 {
+            self.t.replace(isa, v, hit, t);
+            found.id.replace(isa, v, hit, id);
+            found.leaf.replace(isa, v, hit, isa.splat_bits(r.leaf));
+            found.triangle.replace(isa, v, hit, isa.splat_bits(triangle));
+            found.edges[0].replace(isa, v, hit, u);
+            found.edges[1].replace(isa, v, hit, v_);
+            found.edges[2].replace(isa, v, hit, w);
+            found.det.replace(isa, v, hit, det);
+        }
+        hit
+    }
+
+    /// Of the lanes of `hit` of vector `v`, which meet a triangle of a brick that rays may pass through, those that do
+    /// not pass through it.
+    fn stopped<W: Wide>(&self, r: &BrickRay, triangle: u32, (v, hit): (usize, u32), edges: [W; 4]) -> u32 {
+        // The longest vectors have 16 lanes.
+        let mut values = [[0.0; 16]; 4];
+        for (lane, edge) in values.iter_mut().zip(edges) {
+            edge.store(lane);
+        }
+        let id = r.id(triangle);
+        let stops = |&i: &usize| {
+            let [u, v_, w, det] = values.map(|lane| lane[i]);
+            let alone = BrickRay { ray: self.ray(v * W::LANES + i), ..*r };
+            // The distance decides nothing.
+            !alone.passes(triangle, id, &TriangleHit { hit: true, t: 0.0, u, v: v_, w, det })
+        };
+        (0..W::LANES).filter(|i| hit >> i & 1 != 0).filter(stops).fold(0, |lanes, i| lanes | 1 << i)
+    }
+
+    /// Tests a triangle with ray `i` alone, and keeps the hit if it is the best so far.
+    fn test_alone(&mut self, r: &BrickRay, triangle: u32, i: usize, any_hit: bool) -> bool {
+        let (ray, mut best) = (self.ray(i), self.best(i));
+        let [a, b, c] = r.vertices(triangle).map(|x| each(|k| x[k] - ray.origin[k]));
+        let hit = intersect_triangle(&ray.frame, a, b, c, ray.t_min);
+        let alone = BrickRay { ray, ..*r };
+        if !hit.hit || !alone.keep(&mut best, triangle, hit) {
+            return false;
+        }
+        self.set_best(i, &best);
+        self.done |= u64::from(any_hit) << i;
+        true
+    }
+}
+
+/// A vertex as seen from the origins.
+#[inline(always)]
+fn relative<I: Isa>(isa: I, x: Vec3, origin: [I::Wide; 3]) -> [I::Wide; 3] {
+    three!(k => isa.splat(x[k]) - origin[k])
+}
+
+/// [`crate::math::exact::shear`] of components in their order.
+#[inline(always)]
+fn shear<W: Wide>(p: [W; 3], by: [W; 2]) -> [W; 3] {
+    [p[0] - by[0] * p[2], p[1] - by[1] * p[2], p[2]]
+}
+
+/// A vector's components in the order of [`crate::math::exact::RayFrame`]: kx, ky, kz.
+#[inline(always)]
+pub fn turned<I: Isa>(x: [I::Wide; 3], axis: u32, [along_x, along_y]: [u32; 2]) -> [I::Wide; 3] {
+    match axis {
+        0 => [x[1], x[2], x[0]],
+        1 => [x[2], x[0], x[1]],
+        2 => x,
+        _ => [
+            x[1].or_else(along_x, x[2].or_else(along_y, x[0])),
+            x[2].or_else(along_x, x[0].or_else(along_y, x[1])),
+            x[0].or_else(along_x, x[1].or_else(along_y, x[2])),
+        ],
+    }
+}

@@ -1,0 +1,231 @@
+//! Packets in bricks: what [`super::walk_brick`] does for a ray, for up to 64.
+
+use super::leaf::BrickRay;
+use super::packet::Packet;
+use super::packet_node::Place;
+use super::walk_brick::{Group, STACK_SIZE, Stack, Visits};
+use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::layout::{COUNTER_STACK_OVERFLOW, INSTANCE_IDENTITY, NONE};
+use crate::kernels::rays::Scratch;
+use crate::kernels::simd::isa::{Isa, Lanes};
+
+/// Where fewer rays than this go, each goes by itself: testing eight children for one ray costs less than testing the
+/// rays for each child.
+const TOGETHER: u32 = 3;
+
+/// A node's entered children, with the rays that enter each by slot.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PacketGroup {
+    /// Those that any ray enters.
+    pub group: Group,
+    /// Who enters each.
+    pub rays: [u64; 8],
+}
+
+/// Groups that are left to be visited.
+pub type PacketStack = [PacketGroup; STACK_SIZE];
+
+/// What packets work with.
+pub struct PacketScratch {
+    /// The rays.
+    pub packet: Packet,
+    /// Groups of bricks.
+    pub bricks: PacketStack,
+    /// Groups of the top level.
+    pub top: PacketStack,
+    /// Visits of all rays.
+    pub visits: Visits,
+}
+
+impl Default for PacketScratch {
+    fn default() -> Self {
+        let stack = [PacketGroup::default(); STACK_SIZE];
+        Self { packet: Packet::empty(), bricks: stack, top: stack, visits: Visits::default() }
+    }
+}
+
+/// Takes the nearest child of the group on top of the stack: its node, its slot and the rays that enter it. The group
+/// is taken down with its last child.
+#[inline(always)]
+pub fn take(stack: &mut PacketStack, depth: &mut usize, flip: u32) -> (Group, u32, u64) {
+    let top = &mut stack[*depth - 1];
+    let group = top.group;
+    let (slot, rest) = group.nearest_child(flip);
+    top.group = rest;
+    let rays = top.rays[(slot & 7) as usize];
+    if !rest.has_children() {
+        *depth -= 1;
+    }
+    (group, slot, rays)
+}
+
+/// Puts a group on the stack, if it has children. False: there is no room.
+#[inline(always)]
+pub fn put(stack: &mut PacketStack, depth: &mut usize, group: PacketGroup, tally: &mut Tally) -> bool {
+    if group.group.has_children() {
+        if *depth == STACK_SIZE {
+            tally.add(COUNTER_STACK_OVERFLOW, 1);
+            return false;
+        }
+        stack[*depth] = group;
+        *depth += 1;
+    }
+    true
+}
+
+impl PacketScratch {
+    /// Has `rays` meet the brick of a leaf of the top level.
+    #[inline(always)]
+    pub fn walk_leaf<I: Isa>(
+        &mut self,
+        isa: I,
+        bound: &Bound,
+        scratch: &mut Scratch,
+        leaf: u32,
+        rays: u64,
+        any_hit: bool,
+    ) {
+        let Scratch { tally, stack, .. } = scratch;
+        let first = self.packet.ray(0);
+        let mut r = BrickRay::outside(&first);
+        let instance = &bound.scene.instances[bound.scene.leaves[leaf as usize].instance as usize];
+        r.enter_brick(bound, bound.brick_of(leaf));
+        if instance.flags & INSTANCE_IDENTITY == 0 {
+            // Rays of one octant of the world may be of several here.
+            let mut left = rays & !self.packet.done;
+            while left != 0 {
+                let i = left.trailing_zeros() as usize;
+                left &= left - 1;
+                r.enter_leaf(bound.scene, &self.packet.ray(i), leaf);
+                self.walk_alone(isa, bound, &r, stack, tally, (i, 0), any_hit);
+            }
+            return;
+        }
+        r.enter_leaf(bound.scene, &first, leaf);
+        let place = Place::new(r.offset_high, r.offset_low, 0.0);
+        let flip = self.packet.flip;
+        self.bricks[0] = PacketGroup { group: Group::root(flip), rays: [rays; 8] };
+        let mut depth = 1;
+        while depth > 0 {
+            let (group, slot, rays) = take(&mut self.bricks, &mut depth, flip);
+            let index = group.child_index(slot);
+            let rays = rays & !self.packet.done;
+            if rays.count_ones() < TOGETHER {
+                let mut left = rays;
+                while left != 0 {
+                    let i = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    r.ray = self.packet.ray(i);
+                    r.lanes = Lanes::new(&r.ray, r.offset_high, r.offset_low);
+                    self.walk_alone(isa, bound, &r, stack, tally, (i, index), any_hit);
+                }
+                continue;
+            }
+            let children = self.open_node(isa, bound, &r, &place, (index, rays), any_hit);
+            if !put(&mut self.bricks, &mut depth, children, tally) {
+                break;
+            }
+        }
+    }
+
+    /// Opens a node of a brick, and tests its triangles.
+    #[inline(always)]
+    fn open_node<I: Isa>(
+        &mut self,
+        isa: I,
+        bound: &Bound,
+        r: &BrickRay,
+        place: &Place,
+        (index, rays): (u32, u64),
+        any_hit: bool,
+    ) -> PacketGroup {
+        let node = &r.brick.nodes[index as usize];
+        let mut entered = [0; 8];
+        let met = self.packet.open(isa, node, place, rays, &mut entered);
+        self.visits.nodes = self.visits.nodes.wrapping_add(rays.count_ones());
+        if index == 0 && met != 0 {
+            bound.note_use(r.leaf);
+        }
+        let mut children = Group { base: node.child_base, bits: u32::from(node.inner_mask) };
+        let mut triangles = 0;
+        let mut testing = [0; 32];
+        let mut left = met;
+        while left != 0 {
+            let i = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let what = u32::from(node.meta[i]);
+            let count = what >> 5;
+            if what & 24 == 24 && count == 1 {
+                children.bits |= 1 << (31 - ((what & 7) ^ self.packet.flip));
+                continue;
+            }
+            let first = what & 31;
+            triangles |= count << first;
+            self.visits.triangles = self.visits.triangles.wrapping_add(count.count_ones() * entered[i].count_ones());
+            for k in 0..3 {
+                if count >> k & 1 != 0 {
+                    testing[((first + k) & 31) as usize] = entered[i];
+                }
+            }
+        }
+        let mut is_nearer = false;
+        while triangles != 0 {
+            let bit = triangles.trailing_zeros();
+            triangles &= triangles - 1;
+            let rays = testing[bit as usize] & !self.packet.done;
+            is_nearer |= self.packet.test_triangle(isa, r, node.triangle_base + bit, rays, any_hit);
+        }
+        if is_nearer {
+            self.packet.shorten(isa);
+        }
+        PacketGroup { group: children, rays: entered }
+    }
+
+    /// Has ray `i`, which `r` is, visit a node and what is below it.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn walk_alone<I: Isa>(
+        &mut self,
+        isa: I,
+        bound: &Bound,
+        r: &BrickRay,
+        stack: &mut Stack,
+        tally: &mut Tally,
+        (i, index): (usize, u32),
+        any_hit: bool,
+    ) {
+        let packet = &mut self.packet;
+        let mut best = packet.best(i);
+        best.leaf = NONE;
+        let mut depth = 0;
+        let mut group = Group { base: index, ..Group::root(r.ray.flip) };
+        loop {
+            if !group.has_children() {
+                if depth == 0 {
+                    break;
+                }
+                depth -= 1;
+                group = stack[depth];
+            }
+            let Some(child) = group.take_nearest(r.ray.flip, stack, &mut depth, tally) else { break };
+            let opened = r.open_node(isa, bound, &mut self.visits, best.t, group.child_index(child));
+            group = opened.children;
+            if opened.triangles.bits != 0 {
+                r.test_triangles(&mut self.visits, &mut best, opened.triangles, any_hit);
+                if any_hit && best.leaf != NONE {
+                    packet.done |= 1 << i;
+                    break;
+                }
+            }
+        }
+        if best.leaf != NONE {
+            packet.set_best(i, &best);
+        }
+    }
+
+    /// Counts visits, if they are asked for, and begins anew.
+    #[inline(always)]
+    pub fn count(&mut self, bound: &Bound, tally: &mut Tally) {
+        std::mem::take(&mut self.visits).count(bound, tally);
+    }
+}

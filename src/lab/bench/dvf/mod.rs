@@ -1,0 +1,333 @@
+//! `brickwalk bench dvf`: the experiments of Günay and Akyüz 2025 in ratios and errors: how many rays to the
+//! environment are left to be traced with a field of visibility, and how far pictures by it are from those of the same
+//! rays without.
+//!
+//! Each finished measurement is a line of `rows.jsonl`, from which alone tables and pages are made.
+
+pub mod args;
+mod flicker;
+mod output;
+mod plots;
+
+use super::cells::Header;
+use super::measure::walk_args;
+use super::rows::{Row, Rows};
+use crate::cli::dvf as field;
+use crate::cli::interrupt;
+use crate::cli::options::args::{Cli, WalkArgs};
+use crate::cli::options::dvf_args::RegionKind;
+use crate::cli::walk;
+use crate::frame::Renderer;
+use crate::kernels::{DeviceInfo, Extent};
+use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
+use crate::output::atomic;
+use crate::scene::Camera;
+use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::secondary::dvf::answer::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Region};
+use crate::session::device::Device;
+use crate::session::open::{Session, open_scene};
+use anyhow::{Context, Result, bail};
+use args::{DvfBenchArgs, Stage};
+use brickwalk_convert::progress::Progress;
+use clap::Parser;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Raised when a value changes its meaning.
+const FORMAT: u32 = 3;
+
+/// The box's name.
+const BOX: &str = "cornell";
+
+/// Its triangles, and those of a brick, so that shares of the cache hold several.
+const BOX_SIZE: [&str; 4] = ["--triangles", "10K", "--brick-triangles", "100"];
+
+/// A scene with its path.
+struct Place {
+    name: String,
+    scene: PathBuf,
+    camera: Camera,
+    /// How something in it moves.
+    motion: Option<PathBuf>,
+}
+
+/// A picture, and what its rays to the environment were.
+struct Picture {
+    image: Image,
+    /// Ids of the triangles that are seen.
+    ids: Vec<u32>,
+    traced: f64,
+    answered: f64,
+    /// Rays by which cells of the field were made anew, and these cells.
+    renewal: [f64; 2],
+    ms: f64,
+}
+
+/// Pictures of a scene.
+struct View<'a> {
+    place: &'a Place,
+    args: &'a DvfBenchArgs,
+    renderer: Renderer,
+    /// Without a field.
+    exact: Picture,
+    /// Of the scene in motion, once it was asked for: by exact rays, and by those of the paper's mode.
+    truth: [Option<flicker::Truth>; 2],
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The folder holds other measurements or cannot be written; a scene cannot be read; the device's.
+pub fn run(args: &DvfBenchArgs) -> Result<()> {
+    atomic::create_folder(&args.output)?;
+    let places = places(args)?;
+    let mut rows = Rows::open(&args.output, header(args, &places)?)?;
+    let deadline = args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
+    let stages: Vec<Stage> =
+        Stage::ALL.into_iter().filter(|stage| args.stages.is_empty() || args.stages.contains(stage)).collect();
+    let jobs: Vec<(&Place, Stage, String)> = places
+        .iter()
+        .flat_map(|place| stages.iter().map(move |&stage| (place, stage)))
+        .filter(|(place, stage)| *stage != Stage::Flicker || place.motion.is_some())
+        .flat_map(|(place, stage)| args.measurements(stage).into_iter().map(move |options| (place, stage, options)))
+        .collect();
+    let progress = Progress::new();
+    progress.phase("measurements", jobs.len() as u64);
+    let mut view: Option<View> = None;
+    let mut ended = "";
+    for (place, stage, options) in &jobs {
+        let key = key(&place.name, *stage, options);
+        if !rows.has(&key) {
+            if interrupt::flag().load(Ordering::Relaxed) {
+                ended = "Interrupted: the same command goes on where this one stopped.\n";
+                break;
+            }
+            if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+                ended = "Out of time: the same command goes on where this one stopped.\n";
+                break;
+            }
+            if *stage == Stage::Memory {
+                rows.push(Row { key, values: memory(place, args, options)? })?;
+            } else {
+                let of_place = view.take().filter(|view| std::ptr::eq(view.place, *place));
+                let open = match of_place {
+                    Some(view) => view,
+                    None => View::open(place, args, "100%")?,
+                };
+                let open = view.insert(open);
+                let values = match stage {
+                    Stage::Flicker => flicker::measure(open, options)?,
+                    _ => open.measure(*stage, options)?.0,
+                };
+                rows.push(Row { key, values })?;
+            }
+        }
+        progress.advance(1);
+    }
+    progress.finish();
+    let names: Vec<&str> = places.iter().map(|place| place.name.as_str()).collect();
+    let text = output::write(args, &names, &rows, jobs.len())?;
+    crate::cli::print(&text)?;
+    if ended.starts_with("Interrupted") {
+        bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display());
+    }
+    crate::cli::print(ended)
+}
+
+/// The name of a measurement.
+fn key(scene: &str, stage: Stage, options: &str) -> String {
+    format!("{scene}, {}: {options}", stage.name())
+}
+
+fn header(args: &DvfBenchArgs, places: &[Place]) -> Result<Header> {
+    let DeviceInfo { name, driver, driver_info, backend, .. } = Device::open(&args.adapter)?.info();
+    Ok(Header {
+        format: FORMAT,
+        settings: json!({
+            "scenes": places.iter().map(|place| place.name.as_str()).collect::<Vec<_>>(),
+            "size": args.size.to_string(),
+            "samples": args.samples,
+            "points": args.points,
+            "rays": args.rays,
+            "repeat": args.repeat,
+            "environment": args.environment.as_ref().map(|file| file.display().to_string()),
+        }),
+        adapter: json!({ "name": name, "driver": driver, "driver_info": driver_info, "backend": backend }),
+        commit: env!("BRICKWALK_COMMIT").into(),
+    })
+}
+
+/// The scenes, and the box, which is built if it is not there.
+fn places(args: &DvfBenchArgs) -> Result<Vec<Place>> {
+    let mut places = Vec::new();
+    for (i, scene) in args.scenes.iter().enumerate() {
+        let file = open_scene(scene)?;
+        let near = scene.with_extension("near.json");
+        let path = match args.paths.get(i) {
+            Some(path) => CameraPath::read(path)?,
+            None if near.exists() => CameraPath::read(&near)?,
+            None => path_from_bounds(file.resident().manifest.min, file.resident().manifest.max),
+        };
+        let name = scene.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        places.push(Place::of(name, scene.clone(), path.frame(0, 1)));
+    }
+    let scene = args.output.join(format!("{BOX}.bricks"));
+    let near = scene.with_extension("near.json");
+    // Paths are written after the scene.
+    if !scene.with_extension("motion.json").exists() || open_scene(&scene).is_err() {
+        let words = ["brickwalk", "scene", BOX].into_iter().chain(BOX_SIZE).chain(["-o"]);
+        let words = words.map(OsString::from).chain([scene.clone().into()]);
+        let cli = Cli::try_parse_from(words).context("the bench's own scene")?;
+        crate::cli::run(&cli.command).with_context(|| scene.display().to_string())?;
+    }
+    places.push(Place::of(BOX.into(), scene, CameraPath::read(&near)?.frame(0, 1)));
+    Ok(places)
+}
+
+impl Place {
+    fn of(name: String, scene: PathBuf, camera: Camera) -> Self {
+        let motion = Some(scene.with_extension("motion.json")).filter(|motion| motion.exists());
+        Self { name, scene, camera, motion }
+    }
+}
+
+type Values = BTreeMap<String, f64>;
+
+impl<'a> View<'a> {
+    fn open(place: &'a Place, args: &'a DvfBenchArgs, cache: &str) -> Result<Self> {
+        let environment = args.environment.as_ref().map(|file| format!(" --environment {}", file.display()));
+        let line = format!(
+            "--size {} --tile 16 --spp {} --sun-intensity 0 --effects environment --aov --cache {cache}{}",
+            args.size,
+            args.samples,
+            environment.unwrap_or_default()
+        );
+        let options = walk_args(&line, &place.scene, &args.adapter)?;
+        let extent = Extent { width: args.size.width, height: args.size.height, tile: 16 };
+        let session = Session::open(open_scene(&place.scene)?, &place.scene, &options.stream, extent)?;
+        let renderer = walk::renderer(session, &options)?;
+        let image = Image { width: 0, height: 0, rgb: Vec::new() };
+        let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, renewal: [0.0; 2], ms: 0.0 };
+        let mut view = Self { place, args, renderer, exact: nothing, truth: [None, None] };
+        view.exact = view.picture(0)?;
+        Ok(view)
+    }
+
+    /// A picture; `frame` says by which rays.
+    fn picture(&mut self, frame: u32) -> Result<Picture> {
+        let output =
+            self.renderer.frame(frame, &self.place.camera).with_context(|| self.place.scene.display().to_string())?;
+        let record = output.records.iter().find(|record| record.pass == "environment");
+        let record = record.context("no rays lead to the environment")?;
+        let renewal = output.records.iter().find(|record| record.pass == DVF_EFFECT);
+        let renewal = renewal.map_or([0.0; 2], |record| [record.rays as f64, record.cells_renewed as f64]);
+        let (width, height) = (self.renderer.size.0 as usize, self.renderer.size.1 as usize);
+        let (traced, answered, ms) = (record.rays as f64, record.rays_answered as f64, record.ms);
+        let image = Image { width, height, rgb: output.pixels.radiance };
+        Ok(Picture { image, ids: output.pixels.id, traced, answered, renewal, ms })
+    }
+
+    /// Where the field is that `options` ask for.
+    fn region(&mut self, options: &WalkArgs) -> Result<Region> {
+        Ok(match options.dvf.dvf_region {
+            RegionKind::Scene => Region::scene(self.renderer.scene.resident()),
+            RegionKind::View => self.renderer.visible_region(&[self.place.camera])?,
+        })
+    }
+
+    /// Makes the field that `options` ask for, which are those of a walk.
+    fn make(&mut self, options: &WalkArgs) -> Result<(DvfMade, f64)> {
+        let region = self.region(options)?;
+        field::make(&mut self.renderer, &options.dvf.settings(), &region, options.dvf.tracing())
+    }
+
+    /// Makes the field that `options` ask for, and a picture by it; the values, and the picture.
+    fn measure(&mut self, stage: Stage, options: &str) -> Result<(Values, Image)> {
+        let options = walk_args(options, &self.place.scene, &self.args.adapter)?;
+        self.renderer.dvf = Dvf::default();
+        let (made, seconds) = self.make(&options)?;
+        let known = made.field.known_cells();
+        let longest = made.field.shape.size.into_iter().max().unwrap_or(0);
+        let field = Arc::new(made.field);
+        self.renderer.dvf = Dvf::new(field.clone(), options.dvf.how());
+        let picture = self.picture(0)?;
+        let mut times = [vec![self.exact.ms], vec![picture.ms]];
+        for _ in 1..self.args.repeat {
+            self.renderer.dvf = Dvf::default();
+            times[0].push(self.picture(0)?.ms);
+            self.renderer.dvf = Dvf::new(field.clone(), options.dvf.how());
+            times[1].push(self.picture(0)?.ms);
+        }
+        self.renderer.dvf = Dvf::default();
+        let [exact_ms, ms] = times.map(median);
+        let exact = &self.exact;
+        let errors = pixel_errors(&picture.image, &exact.image)?;
+        let flip = flip_ldr(&picture.image, &exact.image, PIXELS_PER_DEGREE)?;
+        let [areas, rays, labels] = made.seconds;
+        let values = [
+            ("points", made.points as f64),
+            ("longest", f64::from(longest)),
+            ("known_cells", known as f64),
+            ("rays_of_field", made.record.rays as f64),
+            ("seconds", seconds),
+            ("seconds_areas", areas),
+            ("seconds_rays", rays),
+            ("seconds_labels", labels),
+            ("exact_ms", exact_ms),
+            ("ms", ms),
+            ("rays", exact.traced),
+            ("traced", picture.traced),
+            ("answered", picture.answered),
+            ("fewer", exact.traced / picture.traced.max(1.0)),
+            ("faster", exact_ms / ms.max(1e-9)),
+            ("flip", flip.mean()),
+            ("rmse", errors.rmse),
+            ("bias", errors.bias),
+            (
+                "pixels_that_differ",
+                differing(&picture.image, &exact.image) as f64 / exact.image.rgb.len().max(1) as f64,
+            ),
+            ("bricks_loaded", made.record.bricks_loaded as f64),
+            ("bricks_needed", made.record.bricks_needed as f64),
+            ("bricks_read", made.bricks_read as f64),
+        ];
+        let mut values: Values = values.map(|(name, value)| (name.to_string(), value)).into();
+        if stage == Stage::Modes {
+            // The paper's mode has rays of its own: what other rays make alone.
+            let other = self.picture(1)?.image;
+            values.insert("noise_flip".into(), flip_ldr(&other, &self.exact.image, PIXELS_PER_DEGREE)?.mean());
+            values.insert("noise_rmse".into(), pixel_errors(&other, &self.exact.image)?.rmse);
+        }
+        Ok((values, picture.image))
+    }
+}
+
+/// The middle one of values, of an even number the mean of two.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}
+
+/// Pixels whose bits are not the same.
+fn differing(a: &Image, b: &Image) -> usize {
+    a.rgb.iter().zip(&b.rgb).filter(|(a, b)| a.map(f32::to_bits) != b.map(f32::to_bits)).count()
+}
+
+/// What is seen, with a small cache and with all resident: values of the first, and how many pixels of both differ.
+fn memory(place: &Place, args: &DvfBenchArgs, options: &str) -> Result<Values> {
+    let (mut values, out_of_core) =
+        View::open(place, args, &args.cache.to_string())?.measure(Stage::Memory, options)?;
+    let mut resident = View::open(place, args, "100%")?;
+    resident.renderer.settings.tracing.measure_needed = true;
+    let (of_resident, in_core) = resident.measure(Stage::Memory, options)?;
+    // Which bricks rays need is known where all are resident.
+    values.extend(of_resident.into_iter().filter(|(name, _)| name == "bricks_needed"));
+    values.insert("differ_from_in_core".into(), differing(&out_of_core, &in_core) as f64);
+    Ok(values)
+}

@@ -1,0 +1,301 @@
+//! `brickwalk bench executors`: the same frames on every device that is present, frame by frame in turns.
+//!
+//! The first repetition brings in what frames need, and its pictures are compared with those of the first device; times
+//! are those of the others.
+
+use super::args::{ExecutorsArgs, Settings};
+use super::measure::walk_args;
+use super::plan::{SceneId, View};
+use super::scenes;
+use crate::cli::options::sizes::human_count;
+use crate::cli::{interrupt, walk};
+use crate::frame::{Pixels, Renderer};
+use crate::gpu::device::candidates;
+use crate::kernels::{DeviceInfo, Extent};
+use crate::output::atomic;
+use crate::session::device::Adapter;
+use crate::session::open::{Session, open_scene};
+use anyhow::{Context, Result, bail};
+use brickwalk_convert::progress::Progress;
+use brickwalk_report::{Table, Value};
+use serde_json::json;
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+/// Raised when a field of `executors.json` changes its meaning.
+const FORMAT: u32 = 2;
+
+/// A device with all that it renders with.
+struct Side {
+    renderer: Renderer,
+    info: DeviceInfo,
+    /// Rays and wall times of all frames, by pass, in the order of passes.
+    passes: Vec<(&'static str, Vec<(u64, f64)>)>,
+    differences: Differences,
+}
+
+/// How pictures differ from those of the first device.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Differences {
+    /// Pixels of all pictures.
+    pixels: u64,
+    /// Pixels whose triangles differ.
+    ids: u64,
+    /// The greatest difference of depths where they do not, in units of the last place.
+    depth_ulps: u32,
+    /// The sum of the squares of the differences of radiance, over pixels and channels.
+    squares: f64,
+}
+
+impl Differences {
+    /// Adds those of a frame of the same size.
+    fn add(&mut self, one: &Pixels, other: &Pixels) {
+        self.pixels += one.radiance.len() as u64;
+        for ((a, b), (da, db)) in one.id.iter().zip(&other.id).zip(one.depth.iter().zip(&other.depth)) {
+            if a == b {
+                self.depth_ulps = self.depth_ulps.max(da.to_bits().abs_diff(db.to_bits()));
+            } else {
+                self.ids += 1;
+            }
+        }
+        let squared = |a: &f32, b: &f32| (f64::from(*a) - f64::from(*b)).powi(2);
+        let channels = one.radiance.as_flattened().iter().zip(other.radiance.as_flattened());
+        self.squares += channels.map(|(a, b)| squared(a, b)).sum::<f64>();
+    }
+
+    /// The root of the mean square of the differences of radiance.
+    fn radiance_rmse(&self) -> f64 {
+        (self.squares / (3 * self.pixels.max(1)) as f64).sqrt()
+    }
+}
+
+impl Side {
+    /// Median rays of a frame, and milliseconds, of a pass, if the device has one of this name.
+    fn medians(&self, pass: &str) -> Option<(f64, f64)> {
+        let (_, all) = self.passes.iter().find(|(name, _)| *name == pass)?;
+        let (rays, ms) = all.iter().map(|&(rays, ms)| (rays as f64, ms)).unzip();
+        Some((median(rays), median(ms)))
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The folder cannot be written; a scene that cannot be generated or read; a device that was asked for and cannot be
+/// had.
+pub fn run(args: &ExecutorsArgs) -> Result<()> {
+    let settings = args.settings();
+    atomic::create_folder(&args.output)?;
+    let folder = args.scenes.clone().unwrap_or_else(|| args.output.join("scenes"));
+    let place = scenes::place(SceneId::City, &folder, &settings, None)?;
+    let mut notes = Vec::new();
+    let mut sides = Vec::new();
+    for adapter in wanted(args) {
+        match open(args, &settings, &place.scene, &adapter) {
+            Ok(side) => sides.push(side),
+            Err(error) if args.adapters.is_empty() => notes.push(format!("{adapter}: left out: {error:#}")),
+            Err(error) => return Err(error),
+        }
+    }
+    let path = place.path(View::Near)?;
+    let progress = Progress::new();
+    progress.phase("frames", u64::from(settings.repeat + 1) * u64::from(settings.frames));
+    for repetition in 0..=settings.repeat {
+        for frame in 0..settings.frames {
+            let camera = path.frame(frame, settings.frames.max(30));
+            let mut first: Option<Pixels> = None;
+            for side in &mut sides {
+                if interrupt::flag().load(Ordering::Relaxed) {
+                    bail!("interrupted; nothing has been written to {}", args.output.display());
+                }
+                let output = side.renderer.frame(frame, &camera).with_context(|| side.info.name.clone())?;
+                if repetition == 0 {
+                    match &first {
+                        None => first = Some(output.pixels),
+                        Some(first) => side.differences.add(first, &output.pixels),
+                    }
+                    continue;
+                }
+                for record in output.records {
+                    let one = (record.rays, record.ms);
+                    match side.passes.iter_mut().find(|(name, _)| *name == record.pass) {
+                        Some((_, all)) => all.push(one),
+                        None => side.passes.push((record.pass, vec![one])),
+                    }
+                }
+            }
+            progress.advance(1);
+        }
+    }
+    progress.finish();
+    let text = write(args, &settings, &sides, &notes)?;
+    crate::cli::print(&text)
+}
+
+/// The devices to be measured: those asked for, else the processor and every graphics adapter that has what is needed.
+fn wanted(args: &ExecutorsArgs) -> Vec<Adapter> {
+    if !args.adapters.is_empty() {
+        return args.adapters.clone();
+    }
+    let mut all = vec![Adapter::Cpu];
+    for candidate in candidates().iter().filter(|candidate| candidate.flaw.is_none()) {
+        let adapter = Adapter::Named(candidate.info.name.clone());
+        // One that several systems of graphics show is measured once.
+        if !all.contains(&adapter) {
+            all.push(adapter);
+        }
+    }
+    all
+}
+
+fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapter) -> Result<Side> {
+    let line = format!(
+        "--effects {} --cache {} --schedule {} --tile {} --size {} --ao-rays {rays} --diffuse-rays {rays} --aov",
+        args.effects,
+        args.cache,
+        args.schedule,
+        settings.tile,
+        settings.size,
+        rays = settings.rays
+    );
+    let walk_args = walk_args(&line, scene, adapter)?;
+    let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
+    let session = Session::open(open_scene(scene)?, scene, &walk_args.stream, extent)?;
+    let renderer = walk::renderer(session, &walk_args)?;
+    let info = renderer.executor.device();
+    Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
+}
+
+/// The median, of an even number of values the upper one.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// The table of all devices and passes.
+fn table(sides: &[Side]) -> Table {
+    let columns = ["device", "pass", "rays a frame", "ms", "Mray/s", "over the first"];
+    let mut rows = Vec::new();
+    for side in sides {
+        for (pass, _) in &side.passes {
+            let own = side.medians(pass);
+            let first = sides.first().and_then(|first| first.medians(pass));
+            rows.push(vec![
+                Value::Text(side.info.name.clone()),
+                Value::Text((*pass).into()),
+                Value::number(own.map(|(rays, _)| rays)),
+                Value::number(own.map(|(_, ms)| ms)),
+                Value::number(own.map(|(rays, ms)| rays * 1e-3 / ms)),
+                Value::ratio(own.zip(first).map(|((_, own), (_, first))| first / own)),
+            ]);
+        }
+    }
+    let caption = "Medians over frames and repetitions of the wall time of a pass.";
+    Table { name: "executors".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows }
+}
+
+/// How the pictures of each device but the first differ from those of the first, a line each.
+fn differences(sides: &[Side]) -> String {
+    let Some((first, others)) = sides.split_first() else { return String::new() };
+    let line = |side: &Side| {
+        let d = &side.differences;
+        format!(
+            "- {} beside {}: {} of {} pixels show another triangle; where it is the same, depths differ by at most {} ulps; \
+             radiance differs by an RMSE of {}.\n",
+            side.info.name,
+            first.info.name,
+            human_count(d.ids),
+            human_count(d.pixels),
+            human_count(u64::from(d.depth_ulps)),
+            Value::Number(d.radiance_rmse()).show()
+        )
+    };
+    others.iter().map(line).collect()
+}
+
+/// Writes the results; returns what to print.
+fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[String]) -> Result<String> {
+    let table = table(sides);
+    let devices: Vec<serde_json::Value> = sides
+        .iter()
+        .map(|side| {
+            let DeviceInfo { name, driver, driver_info, backend, .. } = &side.info;
+            let d = &side.differences;
+            json!({
+                "name": name,
+                "driver": driver,
+                "driver_info": driver_info,
+                "backend": backend,
+                "pixels_compared": d.pixels,
+                "other_ids": d.ids,
+                "depth_ulps": d.depth_ulps,
+                "radiance_rmse": d.radiance_rmse(),
+            })
+        })
+        .collect();
+    let json = json!({
+        "format": FORMAT,
+        "version": env!("CARGO_PKG_VERSION"),
+        "commit": env!("BRICKWALK_COMMIT"),
+        "devices": devices,
+        "settings": {
+            "triangles": settings.triangles[0],
+            "size": settings.size.to_string(),
+            "cache": args.cache,
+            "schedule": args.schedule,
+            "effects": args.effects,
+            "frames": settings.frames,
+            "repetitions": settings.repeat,
+            "rays": settings.rays,
+            "tile": settings.tile,
+        },
+        "left_out": notes,
+        "table": table,
+    });
+    atomic::write(&args.output.join("executors.json"), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
+    let mut text = format!(
+        "# The same frames on every device\n\nCity of {} triangles, {}, cache {}, schedule {}, {} frames, {} repetitions.\n\n",
+        human_count(settings.triangles[0]),
+        settings.size,
+        args.cache,
+        args.schedule,
+        settings.frames,
+        settings.repeat
+    );
+    for side in sides {
+        text +=
+            &format!("- {}: {} {} ({})\n", side.info.name, side.info.driver, side.info.driver_info, side.info.backend);
+    }
+    for note in notes {
+        text += &format!("- {note}\n");
+    }
+    text += &format!("\n{}\n\n{}", table.caption, table.to_markdown());
+    if sides.len() > 1 {
+        text += &format!("\n{}", differences(sides));
+    }
+    atomic::write(&args.output.join("executors.md"), text.as_bytes())?;
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_count_triangles_and_measure_depths_and_radiance() {
+        let pixels = |id: [u32; 3], depth: [f32; 3], red: f32| Pixels {
+            id: id.to_vec(),
+            depth: depth.to_vec(),
+            radiance: vec![[red, 0.5, 0.5]; 3],
+            ..Pixels::default()
+        };
+        let one = pixels([1, 2, 3], [1.0, 2.0, f32::INFINITY], 0.25);
+        let mut all = Differences::default();
+        all.add(&one, &one);
+        assert_eq!(all, Differences { pixels: 3, ..Differences::default() });
+        all.add(&one, &pixels([1, 5, 3], [1.0f32.next_up().next_up(), 9.0, f32::INFINITY], 0.75));
+        assert_eq!((all.pixels, all.ids, all.depth_ulps), (6, 1, 2));
+        // Half of the pixels differ by 0.5 in one of three channels.
+        assert_eq!(all.radiance_rmse(), (0.25f64 / 6.0).sqrt());
+    }
+}

@@ -1,0 +1,362 @@
+//! What is measured.
+
+use super::args::Settings;
+use crate::lab::bench::plan::SceneId;
+use std::fmt;
+
+/// A part of the measurements that can be asked for alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Times over resolutions and numbers of directions (the paper's table 2).
+    Speed,
+    /// Errors by scenes (its figure 5).
+    Ao,
+    /// Errors by resolutions and numbers of directions (its figure 9).
+    Resolution,
+    /// Errors by the length of rays: where the method fails.
+    Radius,
+    /// Snapped and unsnapped shadow rays (its figures 7 and 8).
+    Shadows,
+    /// One-bounce diffuse light of the sun by reflective shadow maps (its figure 6).
+    Diffuse,
+    /// A cache that holds 15 % of the scene.
+    OutOfCore,
+    /// Rays that maps and bricks answer together, out of core.
+    Handover,
+    /// Errors by the distance from where maps with larger cells take over.
+    Seams,
+    /// How often columns pass through single sheets, by how base maps are made and looked up (spec §2).
+    Leaks,
+}
+
+impl Stage {
+    /// All of them, in their order.
+    pub const ALL: [Self; 10] = [
+        Self::Speed,
+        Self::Ao,
+        Self::Resolution,
+        Self::Radius,
+        Self::Shadows,
+        Self::Diffuse,
+        Self::OutOfCore,
+        Self::Handover,
+        Self::Seams,
+        Self::Leaks,
+    ];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Ao => "ao",
+            Self::Resolution => "resolution",
+            Self::Radius => "radius",
+            Self::Shadows => "shadows",
+            Self::Diffuse => "diffuse",
+            Self::OutOfCore => "out-of-core",
+            Self::Handover => "handover",
+            Self::Seams => "seams",
+            Self::Leaks => "leaks",
+        }
+    }
+}
+
+impl std::str::FromStr for Stage {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = Self::ALL.map(Self::name);
+        let found = Self::ALL.into_iter().find(|stage| stage.name() == text.trim());
+        found.ok_or_else(|| crate::cli::options::named::unknown(text, &names, &[]))
+    }
+}
+
+/// How rays are answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// By tracing them.
+    Exact,
+    /// By ray-aligned occupancy maps.
+    Roma {
+        /// Square root of the number of directions.
+        k: u32,
+        /// Cells of a map on each axis.
+        size: u32,
+        /// Whether rays keep their direction.
+        is_unsnapped: bool,
+    },
+    /// By tracing them up to so many cells from their start, by maps from there on.
+    Handed {
+        /// Cells.
+        cells: u32,
+    },
+    /// By tracing those that maps do not find free.
+    Sifted,
+    /// By maps, and one of so many is traced to correct them by.
+    Corrected {
+        /// How many.
+        one_in: u32,
+    },
+    /// By tracing them as far as it takes for so many of a hundred to be answered otherwise.
+    Bounded {
+        /// How many.
+        percent: u32,
+    },
+    /// By a distance field, the paper's baseline.
+    Field {
+        /// Cells on each axis.
+        size: u32,
+    },
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Exact => f.write_str("exact"),
+            Self::Roma { k, size, is_unsnapped } => {
+                write!(f, "roma {size} K={k}{}", if *is_unsnapped { " unsnapped" } else { "" })
+            }
+            Self::Handed { cells } => write!(f, "roma beyond {cells} cells"),
+            Self::Sifted => f.write_str("auto, in doubt traced"),
+            Self::Corrected { one_in } => write!(f, "auto, one in {one_in}"),
+            Self::Bounded { percent } => write!(f, "auto, {percent} % wrong"),
+            Self::Field { size } => write!(f, "df {size}"),
+        }
+    }
+}
+
+impl Way {
+    /// The options of `walk` for it.
+    pub fn options(&self) -> String {
+        match self {
+            Self::Exact => "--secondary exact".into(),
+            Self::Roma { k, size, is_unsnapped } => {
+                let unsnapped = if *is_unsnapped { "all" } else { "none" };
+                format!(
+                    "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-diffuse-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
+                )
+            }
+            Self::Handed { cells } => format!("--secondary roma --roma-near {cells}"),
+            Self::Sifted => "--secondary auto --auto-error off".into(),
+            Self::Corrected { one_in } => format!("--secondary auto --auto-one-in {one_in}"),
+            Self::Bounded { percent } => format!("--secondary auto --auto-error {percent}"),
+            Self::Field { size } => format!("--secondary df --df-size {size}"),
+        }
+    }
+
+    /// Whether bricks are asked.
+    pub fn is_traced(&self) -> bool {
+        !matches!(self, Self::Roma { .. } | Self::Field { .. })
+    }
+
+    /// MiB of a level: a bit a cell of every map; of a distance field 16 bits a cell, and two mips. `None` where there
+    /// are neither.
+    pub fn mib(&self) -> Option<f64> {
+        let cubed = |size: u32| f64::from(size).powi(3) / f64::from(1 << 20);
+        match self {
+            Self::Roma { k, size, .. } => Some(f64::from(k * k) * cubed(*size) / 8.0),
+            Self::Field { size } => Some(2.0 * cubed(*size) * (1.0 + 1.0 / 8.0 + 1.0 / 64.0)),
+            _ => None,
+        }
+    }
+
+    /// The distance field of as many cells on each axis, which with K = 4 takes as much memory as the maps.
+    pub fn field(&self) -> Option<Self> {
+        match self {
+            Self::Roma { size, .. } => Some(Self::Field { size: *size }),
+            _ => None,
+        }
+    }
+}
+
+/// Snapped rays.
+const fn snapped(size: u32, k: u32) -> Way {
+    Way::Roma { k, size, is_unsnapped: false }
+}
+
+/// The baseline of as much memory as [`USUAL`].
+pub const FIELD: Way = Way::Field { size: 128 };
+
+/// What the paper recommends for occlusion.
+pub const USUAL: Way = snapped(128, 4);
+
+/// The frame of the near path, of thirty, that a view shows.
+const VIEW: &[u32] = &[10];
+
+/// Frames all along it, whose errors are looked at together: a scene is more than one view.
+const WALK: &[u32] = &[0, 5, 10, 15, 20, 25];
+
+/// Ways to answer the rays of one effect in one view, or all along a path, compared with each other.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// What it is a part of.
+    pub stage: Stage,
+    /// The scene.
+    pub scene: SceneId,
+    /// What is varied beside ways and scenes.
+    pub variant: String,
+    /// The pass that is measured.
+    pub effect: &'static str,
+    /// The options of `walk` for effect and light.
+    pub options: String,
+    /// Those of a picture without the effect, which is taken off; none is where empty.
+    pub without: String,
+    /// Length of rays of occlusion, world units.
+    pub length: f64,
+    /// The frames of the near path, of thirty. Times are those of the first.
+    pub frames: &'static [u32],
+    /// Share of the scene that the cache holds, per cent.
+    pub cache: u32,
+    /// Whether times are measured.
+    pub times: bool,
+    /// Whether every picture starts with an empty cache.
+    pub is_cold: bool,
+    /// Whether pictures are compared.
+    pub errors: bool,
+    /// The ways.
+    pub ways: Vec<Way>,
+}
+
+impl Job {
+    /// Names a measurement.
+    pub fn key(&self, way: &Way) -> String {
+        [self.stage.name(), self.scene.name(), &self.variant, &way.to_string()].join("/")
+    }
+}
+
+/// Occlusion alone, of a sky of one brightness.
+fn occlusion(length: f64) -> String {
+    format!("--effects ao --ao-rays 1 --ao-length {length} --sun-intensity 0 --rotation full")
+}
+
+/// The sun alone, and what is lit by what it lights, if `effects` have that.
+fn bounce(effects: &str) -> String {
+    format!("--effects {effects} --diffuse-rays 1 --sky-intensity 0 --sun-angle 0 --rotation full --roma-steps 64")
+}
+
+/// All jobs, in their order.
+pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
+    let sizes = [32, 64, 128];
+    let all: Vec<Way> =
+        sizes.iter().flat_map(|&size| [snapped(size, 4), snapped(size, 8), Way::Field { size }]).collect();
+    let with_exact = |ways: &[Way]| [&[Way::Exact], ways].concat();
+    let job = |stage, scene, variant: String, length, ways: Vec<Way>| Job {
+        stage,
+        scene,
+        variant,
+        effect: "ao",
+        options: occlusion(length),
+        without: String::new(),
+        length,
+        frames: VIEW,
+        cache: 100,
+        times: false,
+        is_cold: false,
+        errors: true,
+        ways,
+    };
+    let length = settings.ao_length;
+    let mut scenes = vec![SceneId::City, SceneId::Pipes];
+    scenes.extend(has_sponza.then_some(SceneId::Sponza));
+    let mut jobs = Vec::new();
+    for &scene in &scenes {
+        let own = job(Stage::Speed, scene, "all resident".into(), length, with_exact(&all));
+        jobs.push(Job { times: true, errors: false, ..own });
+    }
+    for &scene in &scenes {
+        let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
+        // None takes more memory than the field.
+        let ways = with_exact(&[USUAL, snapped(64, 8), unsnapped, FIELD]);
+        // Rays that end in a room, too.
+        for length in [length, length / 4.0] {
+            let own = job(Stage::Ao, scene, format!("rays of {length}"), length, ways.clone());
+            jobs.push(Job { frames: WALK, ..own });
+        }
+    }
+    jobs.push(job(Stage::Resolution, SceneId::City, format!("rays of {length}"), length, with_exact(&all)));
+    for halvings in 0..6 {
+        let length = length / f64::from(1 << halvings);
+        jobs.push(job(Stage::Radius, SceneId::City, format!("rays of {length}"), length, with_exact(&[USUAL, FIELD])));
+    }
+    let shadows: Vec<Way> = [false, true]
+        .iter()
+        .flat_map(|&is_unsnapped| [4, 8].map(|k| Way::Roma { k, size: 128, is_unsnapped }))
+        .chain([FIELD])
+        .collect();
+    for (light, options) in [("sun of 0.5 degrees", ""), ("sun of 10 degrees", " --sun-angle 10")] {
+        let own = job(Stage::Shadows, SceneId::City, light.into(), length, with_exact(&shadows));
+        let options = format!("--effects shadow --sky-intensity 0{options}");
+        jobs.push(Job { effect: "shadow", options, times: true, ..own });
+    }
+    let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
+    for &scene in &scenes {
+        let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped]);
+        let own =
+            Job { effect: "diffuse", times: true, ..job(Stage::Diffuse, scene, "all resident".into(), length, ways) };
+        jobs.push(Job { options: bounce("shadow,diffuse"), without: bounce("shadow"), ..own });
+    }
+    let own = job(Stage::Diffuse, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
+    let own =
+        Job { effect: "diffuse", options: bounce("shadow,diffuse"), cache: 15, times: true, errors: false, ..own };
+    jobs.push(Job { is_cold: true, ..own });
+    let own = job(Stage::OutOfCore, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
+    jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
+    jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
+    let handed = [1, 2, 4, 8, 16].map(|cells| Way::Handed { cells });
+    let corrected = [2, 4, 6, 8].map(|one_in| Way::Corrected { one_in });
+    let bounded = [2, 5, 10].map(|percent| Way::Bounded { percent });
+    for length in [length, 4.0 * length] {
+        let ways = with_exact(&[&[USUAL][..], &corrected, &handed, &[Way::Sifted], &bounded].concat());
+        let own = job(Stage::Handover, SceneId::City, format!("rays of {length}, cache 15 %"), length, ways);
+        // As many rays a sample as make the maps a small part, and as are chosen among.
+        let options = own.options.replace("--ao-rays 1", "--ao-rays 16");
+        jobs.push(Job { cache: 15, times: true, options, ..own });
+    }
+    for scene in [SceneId::City, SceneId::Pipes] {
+        let own = job(Stage::Seams, scene, format!("rays of {length}"), length, with_exact(&[USUAL, FIELD]));
+        let options = format!("{} --aov", own.options);
+        jobs.push(Job { options, frames: WALK, ..own });
+    }
+    jobs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::options::sizes::ImageSize;
+
+    #[test]
+    fn measurements_have_names_of_their_own() {
+        let settings = Settings {
+            triangles: 1000,
+            size: ImageSize { width: 16, height: 9 },
+            repeat: 1,
+            samples: 2,
+            ao_length: 16.0,
+            tile: 16,
+        };
+        for has_sponza in [false, true] {
+            let jobs = jobs(&settings, has_sponza);
+            let mut keys: Vec<String> = jobs.iter().flat_map(|job| job.ways.iter().map(|way| job.key(way))).collect();
+            let count = keys.len();
+            keys.sort();
+            keys.dedup();
+            assert_eq!(keys.len(), count);
+            let has_jobs = |stage: &Stage| jobs.iter().any(|job| job.stage == *stage);
+            assert!(Stage::ALL.iter().all(|stage| has_jobs(stage) != (*stage == Stage::Leaks)), "leaks need no scene");
+            assert!(jobs.iter().all(|job| job.ways.contains(&Way::Exact)), "all are compared with exact rays");
+            assert!(jobs.iter().all(|job| job.frames.len() == 1 || !job.times), "times are those of one frame");
+            // Scenes are compared at equal memory.
+            let fits = |way: &Way| way.mib().is_none_or(|mib| mib <= FIELD.mib().expect("a field takes some"));
+            let of_scenes = || jobs.iter().filter(|job| job.stage == Stage::Ao);
+            assert!(of_scenes().all(|job| job.ways.contains(&FIELD) && job.ways.iter().all(fits)));
+            assert!(!fits(&snapped(128, 8)));
+            // Elsewhere is, beside every array of maps, the field of as many cells, where it answers such rays and
+            // bricks do not matter.
+            let others = [Stage::Ao, Stage::Diffuse, Stage::OutOfCore, Stage::Handover];
+            let with_fields = jobs.iter().filter(|job| !others.contains(&job.stage));
+            let has_field = |job: &Job| job.ways.iter().filter_map(Way::field).all(|field| job.ways.contains(&field));
+            assert!(with_fields.clone().count() > 5 && with_fields.clone().all(has_field));
+        }
+    }
+}

@@ -1,0 +1,566 @@
+//! An executor that runs every step on a graphics device and on the processor and compares all that they write, for
+//! tests.
+//!
+//! Rays that start at hits are within [`Lockstep::bound`] of each other, because WGSL leaves sine, cosine, division and
+//! inverse square root some ulps; the device's are then given to both, so that everything that follows can be compared
+//! exactly: hits, surfaces, lists, what is asked and counted, bit for bit. What is read and added for shading is
+//! compared within the bound; before textures are looked up both are given the device's, so that which tiles are asked
+//! for and read can be compared exactly.
+
+mod tests;
+
+use crate::cpu::CpuExecutor;
+use crate::gpu::executor::GpuExecutor;
+use crate::kernels::dispatch::dispatches;
+use crate::kernels::layout::{DvfTriangle, GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
+use crate::kernels::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
+use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::secondary::df::maps::FieldMaps;
+use crate::secondary::df::{DistanceField, LEVELS};
+use crate::secondary::dvf::maps::DvfMaps;
+use crate::secondary::occupancy::Cascades;
+use crate::secondary::roma::maps::RomaMaps;
+use crate::secondary::rsm::maps::RsmMaps;
+use crate::stream::WorkerPool;
+use bricks::SceneFile;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex};
+
+/// What was compared.
+#[derive(Default)]
+pub struct Findings {
+    /// The first differences, in words.
+    pub differences: Vec<String>,
+    /// Kernels that ran.
+    pub kernels: BTreeSet<&'static str>,
+    /// Values compared, by what they are.
+    pub compared: BTreeMap<&'static str, usize>,
+    /// The greatest difference of values that are compared within the bound, relative to numbers above 1.
+    pub greatest: f32,
+}
+
+/// A defect of the processor's side, which comparing must notice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Defect {
+    /// Rays start 2^-10 beside where they should.
+    Rays,
+    /// Other random numbers.
+    Seed,
+    /// The light is brighter by 2^-8.
+    Light,
+    /// Textures are looked up a quarter of their width aside.
+    Lookups,
+    /// Ray-aligned maps lie a hundredth of a cell aside.
+    Maps,
+    /// Base maps of distance fields have a cell more.
+    Fields,
+    /// What lamps see is looked up a texel aside.
+    LampMaps,
+    /// Points of fields of visibility lie elsewhere.
+    Points,
+}
+
+/// Both executors.
+pub struct Lockstep {
+    gpu: GpuExecutor,
+    cpu: CpuExecutor,
+    bound: f32,
+    defect: Option<Defect>,
+    directions: Directions,
+    tuning: Tuning,
+    findings: Arc<Mutex<Findings>>,
+}
+
+impl Findings {
+    fn note(&mut self, text: impl FnOnce() -> String) {
+        if self.differences.len() < 8 {
+            self.differences.push(text());
+        }
+    }
+
+    /// Compares words; both zeros are one value.
+    fn words<T: bytemuck::Pod>(&mut self, what: &'static str, context: &str, gpu: &[T], cpu: &[T]) {
+        *self.compared.entry(what).or_default() += gpu.len();
+        if gpu.len() != cpu.len() {
+            self.note(|| format!("{context}: {} {what} instead of {}", cpu.len(), gpu.len()));
+        }
+        let value = |x: &u32| if *x == 1 << 31 { 0 } else { *x };
+        for (i, (g, c)) in gpu.iter().zip(cpu).enumerate() {
+            let of = |x: &T| -> Vec<u32> { bytemuck::pod_collect_to_vec(bytemuck::bytes_of(x)) };
+            let (g, c) = (of(g), of(c));
+            if !g.iter().map(value).eq(c.iter().map(value)) {
+                self.note(|| format!("{context}: {what} {i}: {c:08x?} instead of {g:08x?}"));
+                return;
+            }
+        }
+    }
+
+    /// Compares numbers within `bound`, relative to numbers above 1.
+    fn numbers(&mut self, what: &'static str, context: &str, bound: f32, gpu: &[f32], cpu: &[f32]) {
+        *self.compared.entry(what).or_default() += gpu.len();
+        for (i, (g, c)) in gpu.iter().zip(cpu).enumerate() {
+            let apart = (g - c).abs() / g.abs().max(1.0);
+            self.greatest = self.greatest.max(apart);
+            if apart.is_nan() || apart > bound {
+                self.note(|| format!("{context}: {what} {i}: {c} instead of {g}"));
+                return;
+            }
+        }
+    }
+
+    fn gbuffers(&mut self, context: &str, bound: f32, gpu: &[GBuffer], cpu: &[GBuffer]) {
+        let numbers = |g: &GBuffer| {
+            let others = [g.handedness, g.occlusion, g.metallic, g.roughness];
+            [&g.albedo[..], &g.normal, &g.emission, &g.weights, &g.tangent, &others].concat()
+        };
+        let whole = |g: &GBuffer| [g.state, g.material];
+        // Which tiles are read depends on these.
+        let exact = |g: &GBuffer| [g.footprint, g.uv[0], g.uv[1], g.footprint1, g.uv1[0], g.uv1[1]].map(f32::to_bits);
+        for (g, c) in gpu.iter().zip(cpu) {
+            self.numbers("attributes", context, bound, &numbers(g), &numbers(c));
+            self.words("materials", context, &[whole(g)], &[whole(c)]);
+            self.words("footprints", context, &[exact(g)], &[exact(c)]);
+        }
+    }
+
+    fn report(&mut self, context: &str, gpu: &Report, cpu: &Report) {
+        // The kernel of binary trees, a baseline, does not count.
+        let counts = !context.contains("IntersectBinary");
+        let counted = |count: u64| if counts { count } else { 0 };
+        let numbers = |r: &Report| {
+            [
+                r.list_entries.into(),
+                r.pairs_tested,
+                r.pairs_culled,
+                r.pairs_visible,
+                r.pairs_invisible,
+                r.pairs_intersected,
+                r.most_selected.into(),
+                r.tiles_from_root,
+                r.pairs_front_to_back,
+                r.tile_batches,
+                r.tile_batch_leaves,
+                r.leaf_groups_postponed,
+                r.rays,
+                counted(r.nodes),
+                counted(r.triangles),
+                r.non_finite,
+                r.unresolved,
+                r.queries_tightened,
+                r.rays_capped,
+                r.rays_answered,
+                r.pilots.rays,
+                r.pilots.missed,
+            ]
+            .into_iter()
+            .chain(r.pilots.doubted)
+            .collect::<Vec<u64>>()
+        };
+        self.words("counters", context, &numbers(gpu), &numbers(cpu));
+        let demand = |r: &Report| -> Vec<[u32; 4]> {
+            r.demand.iter().map(|d| [d.brick, d.rays, d.nearest.to_bits(), d.next]).collect()
+        };
+        self.words("demands", context, &demand(gpu), &demand(cpu));
+        let tiles = |r: &Report| -> Vec<[u32; 4]> {
+            r.tiles.iter().map(|t| [t.tile, t.rays, t.first, t.is_used.into()]).collect()
+        };
+        self.words("tiles", context, &tiles(gpu), &tiles(cpu));
+        self.words("used bricks", context, &gpu.used, &cpu.used);
+        self.words("rays of pairs", context, &gpu.pair_rays, &cpu.pair_rays);
+    }
+}
+
+/// The distances of fields as the device keeps them.
+fn words_of(fields: &[DistanceField]) -> Vec<u32> {
+    let levels = fields.iter().flat_map(|field| (0..LEVELS).map(|level| field.level(level)));
+    let pairs = levels.flat_map(|level| level.as_chunks::<2>().0);
+    pairs.map(|[low, high]| u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16).collect()
+}
+
+impl Lockstep {
+    /// Of both, over the same scene and with the same extent. `bound`: of differences where they are allowed.
+    pub fn new(gpu: GpuExecutor, mut cpu: CpuExecutor, bound: f32, findings: Arc<Mutex<Findings>>) -> Self {
+        let tuning = *cpu.tuning();
+        Self { gpu, cpu, bound, defect: None, directions: Directions::default(), tuning, findings }
+    }
+
+    /// Breaks the processor's side.
+    pub fn with_defect(mut self, defect: Defect) -> Self {
+        self.defect = Some(defect);
+        self
+    }
+
+    /// The distance fields that the processor has made.
+    pub fn fields(&self) -> &[DistanceField] {
+        self.cpu.fields()
+    }
+
+    /// Rays that have been made alike on both sides.
+    fn generate(&mut self, context: &str, pass: Pass, step: Step, bricks: &BrickStates) -> Result<(), ExecutorError> {
+        self.gpu.run(pass, &[step], bricks)?;
+        self.cpu.run(pass, &[step], bricks)?;
+        let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);
+        let surfaces = match pass.set() {
+            0 => Vec::new(),
+            1 => self.gpu.read_surfaces(Pass::Primary)?,
+            _ => self.gpu.read_surfaces(Pass::Mirror)?,
+        };
+        let mut findings = self.findings.lock().expect("findings");
+        if pass == Pass::Primary {
+            findings.words("camera rays", context, &rays, &own);
+        }
+        // A ray that all but touches its surface may be traced on one side alone.
+        let is_grazing = |i: usize, ray: &Ray| {
+            surfaces.get(i).is_some_and(|s| {
+                let along: f32 = (0..3).map(|k| s.normal[k] * ray.direction[k]).sum();
+                let length = ray.direction.iter().map(|x| x * x).sum::<f32>().sqrt();
+                along.abs() <= 4.0 * self.bound * length
+            })
+        };
+        for (i, (g, c)) in rays.iter().zip(&own).enumerate() {
+            findings.numbers("origins", context, 0.0, &g.origin, &c.origin);
+            findings.numbers("directions", context, self.bound, &g.direction, &c.direction);
+            if !is_grazing(i, g) {
+                findings.numbers("ends of rays", context, 0.0, &[g.t_min, g.t_max], &[c.t_min, c.t_max]);
+            }
+        }
+        own = rays;
+        if self.defect == Some(Defect::Rays) {
+            own.iter_mut().for_each(|ray| ray.origin[0] += 1.0 / 1024.0);
+        }
+        drop(findings);
+        self.cpu.set_rays(pass, &own);
+        // Their hits have been started by the side that made them: started anew, with the device's ends.
+        Ok(())
+    }
+
+    /// Compares what has been read of the hits of the set before that of `pass`, and gives the processor the device's.
+    fn align(&mut self, context: &str, pass: Pass) -> Result<(), ExecutorError> {
+        let set = pass.set().saturating_sub(1);
+        let gbuffer = self.gpu.read_gbuffer_of(set)?;
+        self.findings.lock().expect("findings").gbuffers(context, self.bound, &gbuffer, self.cpu.gbuffer_of(set));
+        *self.cpu.gbuffer_of(set) = gbuffer;
+        if self.defect == Some(Defect::Lookups) {
+            self.cpu.gbuffer_of(set).iter_mut().for_each(|g| g.uv[0] += 0.25);
+        }
+        Ok(())
+    }
+
+    fn compare(&mut self, context: &str, pass: Pass, steps: &[Step]) -> Result<(), ExecutorError> {
+        let hits = (self.gpu.read_hits(pass)?, self.cpu.read_hits(pass)?);
+        let surfaces = (self.gpu.read_surfaces(pass)?, self.cpu.read_surfaces(pass)?);
+        let rays = self.gpu.read_rays(pass)?;
+        let mut findings = self.findings.lock().expect("findings");
+        let traced = |i: &usize| rays[*i].t_min <= rays[*i].t_max;
+        let of_traced = |all: &[Hit]| -> Vec<Hit> { (0..all.len()).filter(traced).map(|i| all[i]).collect() };
+        findings.words("hits", context, &of_traced(&hits.0), &of_traced(&hits.1));
+        let of_traced = |all: &[Surface]| -> Vec<Surface> { (0..all.len()).filter(traced).map(|i| all[i]).collect() };
+        findings.words("surfaces", context, &of_traced(&surfaces.0), &of_traced(&surfaces.1));
+        let has_lists =
+            |step: &Step| matches!(step, Step::Lists | Step::ShortLists | Step::SortByNumber | Step::SortNodesNear);
+        if steps.iter().any(has_lists) {
+            let (bounds, lists, list, selection) = self.gpu.read_tiles()?;
+            let own = self.cpu.tiles();
+            findings.words("bounds of tiles", context, &bounds, &own.bounds);
+            // Which tiles have work is noted place by place there, and in any order.
+            let placed = |l: &TileList| TileList { chosen: 0, rooted: 0, ..*l };
+            findings.words("lists of tiles", context, &lists.iter().map(placed).collect::<Vec<_>>(), &own.lists);
+            let numbers = |has_work: &dyn Fn(&TileList) -> bool| -> Vec<u32> {
+                (0..).zip(&own.lists).filter(|(_, l)| has_work(l)).map(|(tile, _)| tile).collect()
+            };
+            let (with_selection, rooted) = (numbers(&|l| l.selected > 0), numbers(&|l| l.from_root != 0));
+            let mut chosen: Vec<u32> = lists[..with_selection.len()].iter().map(|l| l.chosen).collect();
+            chosen.sort_unstable();
+            findings.words("chosen tiles", context, &chosen, &with_selection);
+            assert!(with_selection.iter().all(|&tile| own.chosen[tile as usize]), "{context}: chosen tiles");
+            let places: Vec<u32> = lists[..rooted.len()].iter().map(|l| l.rooted).collect();
+            findings.words("rooted tiles", context, &places, &rooted);
+            let held: u32 = lists.iter().map(|l| l.count).sum();
+            let held = (held as usize).min(own.list.len());
+            findings.words("entries", context, &list[..held], &own.list[..held]);
+            for l in &lists {
+                let range = l.first as usize..(l.first + l.selected) as usize;
+                if own.selection.len() >= range.end {
+                    findings.words("selections", context, &selection[range.clone()], &own.selection[range]);
+                }
+            }
+        }
+        if steps.contains(&Step::RomaRotate) {
+            findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfAreas { .. } | Step::DvfCounts { .. })) {
+            findings.words("sums over triangles", context, &self.gpu.read_dvf_sums()?, &self.cpu.read_dvf_sums()?);
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfSeen | Step::DvfPoints { .. })) {
+            findings.words(
+                "hits and points in cells",
+                context,
+                &self.gpu.read_dvf_tally()?,
+                &self.cpu.read_dvf_tally()?,
+            );
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfRays { .. })) {
+            findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);
+        }
+        if steps.iter().any(|step| matches!(step, Step::DvfWrite { .. } | Step::DvfFinish { .. })) {
+            let (gpu, cpu) = (self.gpu.read_dvf()?, self.cpu.read_dvf()?);
+            findings.words("masks of cells", context, &gpu.0, &cpu.0);
+            findings.words("labels of cells", context, &gpu.1, &cpu.1);
+            let gpu = self.gpu.read_dvf_waiting()?;
+            findings.words("rays that wait", context, &gpu, &self.cpu.dvf_waiting()[..gpu.len()]);
+        }
+        if steps.contains(&Step::FieldMake) {
+            findings.words("distances of fields", context, &self.gpu.read_distances()?, &words_of(self.cpu.fields()));
+        }
+        if steps.iter().any(|step| matches!(step, Step::RsmWrite { .. })) {
+            let (texels, own) = (self.gpu.read_rsm_texels()?, self.cpu.rsm_texels());
+            let light: [Vec<f32>; 2] = [&texels, &*own].map(|all| all.iter().flat_map(|texel| texel.flux).collect());
+            findings.numbers("light of shadow maps", context, self.bound, &light[0], &light[1]);
+            let place =
+                |t: &RsmTexel| [[t.depth, t.facing].map(f32::to_bits), [t.normal[0], t.normal[1]].map(f32::to_bits)];
+            let places: [Vec<_>; 2] = [&texels, &*own].map(|all| all.iter().map(place).collect());
+            findings.words("texels of shadow maps", context, &places[0], &places[1]);
+            *own = texels;
+        }
+        let shades = |step: &Step| {
+            matches!(
+                step,
+                Step::Resolve
+                    | Step::Sample
+                    | Step::SampleCoarser
+                    | Step::Shade(_)
+                    | Step::AddLight
+                    | Step::AddOcclusion
+                    | Step::RsmLight
+                    | Step::DvfLight
+            )
+        };
+        if steps.iter().any(shades) {
+            let radiance = (self.gpu.read_radiance()?, self.cpu.read_radiance()?);
+            let brighter = if self.defect == Some(Defect::Light) { 1.0 + 1.0 / 256.0 } else { 1.0 };
+            let own: Vec<f32> = radiance.1.iter().flatten().map(|x| x * brighter).collect();
+            findings.numbers("radiance", context, self.bound, radiance.0.as_flattened(), &own);
+            let gbuffer = (self.gpu.read_gbuffer()?, self.cpu.read_gbuffer()?);
+            findings.gbuffers(context, self.bound, &gbuffer.0, &gbuffer.1);
+            let set = pass.set().saturating_sub(1);
+            let gbuffer = (self.gpu.read_gbuffer_of(set)?, self.cpu.gbuffer_of(set));
+            findings.gbuffers(context, self.bound, &gbuffer.0, gbuffer.1);
+        }
+        Ok(())
+    }
+}
+
+impl Lockstep {
+    /// Runs `steps` on both and compares.
+    fn both(
+        &mut self,
+        context: &str,
+        pass: Pass,
+        steps: &[Step],
+        bricks: &BrickStates,
+    ) -> Result<Report, ExecutorError> {
+        let gpu = self.gpu.run(pass, steps, bricks)?;
+        let cpu = self.cpu.run(pass, steps, bricks)?;
+        self.findings.lock().expect("findings").report(context, &gpu, &cpu);
+        self.compare(context, pass, steps)?;
+        Ok(gpu)
+    }
+}
+
+impl Executor for Lockstep {
+    fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
+        self.gpu.load(loads)?;
+        self.cpu.load(loads)
+    }
+
+    fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
+        self.gpu.set_lists(lists)?;
+        self.cpu.set_lists(lists)
+    }
+
+    fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError> {
+        self.gpu.set_pairs(queries, nodes)?;
+        self.cpu.set_pairs(queries, nodes)
+    }
+
+    fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
+        let context = format!("{pass:?}, {steps:?}");
+        let Tuning { threshold, leaf_cache: has_leaf_cache, .. } = self.tuning;
+        (*self.gpu.tuning(), *self.cpu.tuning()) = (self.tuning, self.tuning);
+        let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, threshold, ..Params::default() };
+        let params = Params { field_cells: 32, field_levels: 1, ..params };
+        for &step in steps {
+            let everything = bricks.all_geometry_resident();
+            for leaf_cache in [false, true] {
+                let list = dispatches(pass, step, &params, &self.directions, leaf_cache, everything);
+                let ran = |name: &str| leaf_cache == has_leaf_cache || !name.starts_with("intersect_list");
+                let names = list.iter().map(|dispatch| dispatch.kernel).filter(|name| ran(name));
+                self.findings.lock().expect("findings").kernels.extend(names);
+            }
+        }
+        let rest = match steps {
+            [step @ (Step::Generate | Step::DvfCosine), rest @ ..] => {
+                self.generate(&context, pass, *step, bricks)?;
+                rest
+            }
+            all => all,
+        };
+        let Some((before, &[last @ (Step::Sample | Step::SampleCoarser)])) = rest.split_last_chunk::<1>() else {
+            return self.both(&context, pass, rest, bricks);
+        };
+        let mut report = match before {
+            [] => Report { round_trips: 0, ..Report::default() },
+            before => self.both(&context, pass, before, bricks)?,
+        };
+        self.align(&context, pass)?;
+        let Report { round_trips, tiles, unresolved, .. } = self.both(&context, pass, &[last], bricks)?;
+        (report.tiles, report.unresolved) = (tiles, unresolved);
+        report.round_trips = report.round_trips.max(round_trips);
+        Ok(report)
+    }
+}
+
+impl FrameExecutor for Lockstep {
+    fn device(&self) -> DeviceInfo {
+        self.gpu.device()
+    }
+
+    fn page_bytes(&self) -> u64 {
+        self.gpu.page_bytes()
+    }
+
+    fn texture_bytes(&self) -> u64 {
+        assert_eq!(self.gpu.texture_bytes(), self.cpu.texture_bytes());
+        self.gpu.texture_bytes()
+    }
+
+    fn workers(&self) -> &dyn WorkerPool {
+        self.gpu.workers()
+    }
+
+    fn leaves_out(&self) -> Keep {
+        self.gpu.leaves_out()
+    }
+
+    fn allow_bounces(&mut self) {
+        self.gpu.allow_bounces();
+        self.cpu.allow_bounces();
+    }
+
+    fn make_binary(&mut self) -> Result<(), ExecutorError> {
+        self.gpu.make_binary()?;
+        self.cpu.make_binary()
+    }
+
+    fn tuning(&mut self) -> &mut Tuning {
+        &mut self.tuning
+    }
+
+    fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
+        self.gpu.set_lamps(lamps)?;
+        self.cpu.set_lamps(lamps)
+    }
+
+    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
+        self.gpu.set_cascades(cascades)?;
+        self.cpu.set_cascades(cascades)
+    }
+
+    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_roma(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::Maps) {
+            own.maps.iter_mut().for_each(|map| map.base_from_cell[0][3] += 0.01);
+        }
+        self.cpu.set_roma(&own)
+    }
+
+    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_field(field)?;
+        let mut own = field.clone();
+        if self.defect == Some(Defect::Fields) {
+            Arc::make_mut(&mut own.cascades).levels.iter_mut().for_each(|bom| bom.occupy([3, 5, 7]));
+        }
+        self.cpu.set_field(&own)
+    }
+
+    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_rsm(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::LampMaps) {
+            own.maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
+        }
+        self.cpu.set_rsm(&own)
+    }
+
+    fn set_scene(&mut self, scene: &Arc<SceneFile>) {
+        self.gpu.set_scene(scene);
+        self.cpu.set_scene(scene);
+    }
+
+    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf(maps)?;
+        let mut own = maps.clone();
+        if self.defect == Some(Defect::Points) {
+            own.grid.seed ^= 1;
+        }
+        self.cpu.set_dvf(&own)
+    }
+
+    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf_triangles(triangles, points)?;
+        self.cpu.set_dvf_triangles(triangles, points)
+    }
+
+    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
+        self.gpu.set_dvf_tally(words)?;
+        self.cpu.set_dvf_tally(words)
+    }
+
+    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
+        self.gpu.read_dvf_tally()
+    }
+
+    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
+        self.gpu.read_dvf()
+    }
+
+    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
+        self.gpu.read_dvf_sums()
+    }
+
+    fn begin_frame(&mut self, view: &View) {
+        self.directions = view.directions;
+        self.gpu.begin_frame(view);
+        let mut view = *view;
+        if self.defect == Some(Defect::Seed) {
+            view.params.seed ^= 1;
+        }
+        self.cpu.begin_frame(&view);
+    }
+
+    fn set_rays(&mut self, pass: Pass, rays: &[Ray]) {
+        self.gpu.set_rays(pass, rays);
+        self.cpu.set_rays(pass, rays);
+    }
+
+    fn read_rays(&mut self, pass: Pass) -> Result<Vec<Ray>, ExecutorError> {
+        self.gpu.read_rays(pass)
+    }
+
+    fn read_hits(&mut self, pass: Pass) -> Result<Vec<Hit>, ExecutorError> {
+        self.gpu.read_hits(pass)
+    }
+
+    fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<Surface>, ExecutorError> {
+        self.gpu.read_surfaces(pass)
+    }
+
+    fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError> {
+        self.gpu.read_gbuffer()
+    }
+
+    fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
+        self.gpu.read_radiance()
+    }
+}

@@ -1,0 +1,560 @@
+//! Every kernel against its twin: frames of all effects, by all schedules, with caches that hold everything and next to
+//! nothing.
+
+use super::{Defect, Findings, Lockstep};
+use crate::cpu::CpuExecutor;
+use crate::frame::{
+    Effects, Equirectangular, Light, Moved, Occlusion, RenderSettings, Renderer, Schedule, emissive_triangles,
+    environment,
+};
+use crate::gpu::device::Gpu;
+use crate::gpu::executor::GpuExecutor;
+use crate::gpu::kernels;
+use crate::gpu::kernels::Kernels;
+use crate::gpu::probe;
+use crate::gpu::wgsl::Pages;
+use crate::kernels::dispatch::{
+    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE,
+    RSM_LIGHT, RSM_WRITE,
+};
+use crate::kernels::frame::Frame;
+use crate::kernels::lamps::{Emitter, Lamps, Shape};
+use crate::kernels::layout::{FIELD_HIT, NONE, Params, Ray};
+use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
+use crate::scene::path::path_from_bounds;
+use crate::schedule::auto::Auto;
+use crate::schedule::cache::{Cache, SceneBytes};
+use crate::schedule::fronts::Fronts;
+use crate::schedule::{Executor, Lamp, Optimisation, Pass, Step, Tracing};
+use crate::secondary::df::answer::Field;
+use crate::secondary::df::maps::FieldMaps;
+use crate::secondary::df::{DistanceField, FieldSettings};
+use crate::secondary::dvf::answer::{Dvf, DvfTracing, Region};
+use crate::secondary::dvf::renew::Renewal;
+use crate::secondary::dvf::{Cells, DvfSettings, DvfUse};
+use crate::secondary::occupancy::{Bom, Cascades};
+use crate::secondary::roma::answer::Roma;
+use crate::secondary::roma::{Grid, Role, RomaPass, RomaSettings};
+use crate::secondary::rsm::RsmSettings;
+use crate::secondary::rsm::answer::Rsm;
+use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
+use bricks::SceneFile;
+use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene, SourceTexture};
+use glam::DVec3;
+use std::sync::{Arc, Mutex};
+
+/// Of numbers that pass through sine, cosine and inverse square roots; the greatest difference that software Vulkan
+/// shows is a fraction of it.
+const BOUND: f32 = 1.0 / 65_536.0;
+
+const EXTENT: Extent = Extent { width: 40, height: 28, tile: 16 };
+
+/// A device and its kernels, or a note why the test is skipped.
+fn device() -> Option<(Gpu, Arc<Kernels>)> {
+    let Ok(gpu) = Gpu::open(None) else {
+        println!("skipped: no adapter");
+        return None;
+    };
+    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true }, true));
+    Some((gpu, kernels))
+}
+
+/// Triangles in all directions with normals, colours and textures of every way to wrap, most of which let rays pass;
+/// turned and mirrored copies of them. With `tiled` textures of many tiles, of which each triangle shows a small part.
+fn textured(tiled: bool) -> Arc<SceneFile> {
+    let mut state = 7u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1 << 24)
+    };
+    let mut primitive = |material: u32, count: u32| {
+        let mut part = Primitive { material, ..Primitive::default() };
+        let (mut normals, mut uvs, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut uvs1, mut tangents) = (Vec::new(), Vec::new());
+        for corner in 0..3 * count {
+            let near = if corner % 3 == 0 { 0.0 } else { 1.0 };
+            let around = *part.positions.last().filter(|_| near > 0.0).unwrap_or(&[
+                8.0 * random(),
+                3.0 * random(),
+                8.0 * random(),
+            ]);
+            part.positions.push(around.map(|x: f64| x + near * (random() - 0.5)));
+            normals.push([0; 3].map(|_| random() as f32 - 0.5));
+            let anywhere = [0; 2].map(|_| 5.0 * random() as f32 - 2.0);
+            let beside = uvs.last().filter(|_| tiled && near > 0.0);
+            uvs.push(beside.map_or(anywhere, |uv: &[f32; 2]| [0, 1].map(|k| uv[k] + 0.001 * anywhere[k])));
+            colors.push([0; 4].map(|_| random() as f32));
+            let beside = uvs1.last().filter(|_| tiled && near > 0.0);
+            uvs1.push(beside.map_or(anywhere, |uv: &[f32; 2]| [0, 1].map(|k| uv[k] + 0.002 * anywhere[k])));
+            let sign = if corner / 3 % 2 == 0 { 1.0 } else { -1.0 };
+            tangents.push([random() as f32 - 0.5, random() as f32 - 0.5, random() as f32, sign]);
+        }
+        part.indices = (0..3 * count).collect();
+        (part.normals, part.uvs, part.colors) = (Some(normals), Some(uvs), Some(colors));
+        (part.uvs1, part.tangents) = (Some(uvs1), Some(tangents));
+        part
+    };
+    let texture = |i: u32| SourceTexture {
+        name: format!("texture {i}"),
+        width: if tiled { [700, 257, 500][i as usize] } else { 8 << i },
+        height: if tiled { [300, 640, 500][i as usize] } else { 16 >> i },
+        wrap: [bricks::WRAP_REPEAT, bricks::WRAP_CLAMP, bricks::WRAP_MIRROR][i as usize] * 0x0001_0001,
+        rgba: (0..if tiled { 4 * [210_000, 164_480, 250_000][i as usize] } else { 4 * (8 << i) * (16 >> i) })
+            .map(|k: u32| (k * 37 + k / 7 * 11) as u8)
+            .collect(),
+    };
+    let material = |i: u32| bricks::Material {
+        base_color: [0.9, 0.8, 0.7, 1.0 - 0.1 * i as f32],
+        emission: [0.25 * i as f32; 3],
+        alpha_cutoff: 0.25,
+        flags: [0, bricks::MATERIAL_MASK, bricks::MATERIAL_BLEND, bricks::MATERIAL_BLEND][i as usize],
+        base_color_texture: if i < 3 { i } else { bricks::NONE },
+        // Metal, polished and coated things; one Lambertian.
+        metallic: [0.0, 0.8, 0.3, 0.0][i as usize],
+        roughness: [1.0, 0.5, 0.9, 0.4][i as usize],
+        specular: [0.0, 0.04, 0.08, 0.04].map(|f0: f32| [f0, f0, 0.5 * f0])[i as usize],
+        specular_weight: [0.0, 1.0, 0.7, 1.0][i as usize],
+        clearcoat: [0.0, 0.0, 0.6, 1.0][i as usize],
+        clearcoat_roughness: 0.4,
+        metallic_roughness_texture: [bricks::NONE, 2, bricks::NONE, 1][i as usize],
+        occlusion_texture: [2, bricks::NONE, 0, 1][i as usize],
+        emissive_texture: [bricks::NONE, 0, 1, bricks::NONE][i as usize],
+        occlusion_strength: 0.7,
+        normal_texture: [bricks::NONE, 1, 2, 0][i as usize],
+        normal_scale: 0.8,
+        // The second set for occlusion, and for the normals of some; base colours, which have maps of opacity, by the
+        // first.
+        uv_sets: [8, 2, 0, 10][i as usize],
+        uv_from_set: {
+            let mut rows = bricks::Material::SAME_UV;
+            (rows[2], rows[3]) = ([0.8, 0.6, 0.25, 2.0], [-1.2, 1.6, 0.5, 0.0]);
+            (rows[6], rows[7]) = ([0.5, 0.0, 0.25, 0.25], [0.0, 0.5, -0.25, 0.0]);
+            rows
+        },
+        ..bricks::Material::DIFFUSE
+    };
+    let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
+    let place = |mesh, world_from_mesh| Placement {
+        name: "p".into(),
+        mesh,
+        source: 0,
+        world_from_mesh,
+        ..Placement::default()
+    };
+    let source = SourceScene {
+        meshes: vec![
+            mesh("world", (0..4).map(|i| primitive(i, 150)).collect()),
+            mesh("thing", vec![primitive(1, 200)]),
+        ],
+        placements: vec![
+            place(0, IDENTITY),
+            place(1, [0.75, 0.0, 1.0, 0.75, 0.0, 1.25, 0.0, 0.5, -1.0, 0.0, 0.75, -0.25]),
+            place(1, [-0.5, 0.0, 0.0, -1.0, 0.0, 0.8, 0.1, 0.25, 0.2, 0.0, 0.7, 1.0]),
+        ],
+        materials: (0..4).map(material).collect(),
+        textures: (0..3).map(texture).collect(),
+        sources: vec![bricks::Source { name: "t".into(), bytes: 0, hash: "2d06800538d394c2".into() }],
+        ..SourceScene::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.bricks");
+    let settings = BuildSettings { brick_triangles: 40, instance_min_triangles: 1, ..BuildSettings::default() };
+    build(source, &settings, &path, &Progress::hidden()).unwrap();
+    let scene = SceneFile::from_bytes("the textured scene", std::fs::read(&path).unwrap()).unwrap();
+    assert!(scene.resident().manifest.has_textures && scene.resident().instances.len() == 3);
+    assert_eq!(scene.resident().opacity_maps.len(), 2);
+    assert_eq!(scene.resident().tiles.len() > 50, tiled);
+    let has = |encoding| scene.resident().textures.iter().any(|texture| texture.encoding == encoding);
+    assert!(has(bricks::TEXTURE_BC5) && has(bricks::TEXTURE_BC7));
+    Arc::new(scene)
+}
+
+/// One way to render.
+struct Variant {
+    schedule: Schedule,
+    everything_fits: bool,
+    fronts: bool,
+    threshold: u32,
+    /// Leaves of the longest list that is intersected.
+    list_most: u32,
+    without: &'static [Optimisation],
+    with: &'static [Optimisation],
+    /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped; what these do for them.
+    roma: Option<(u32, Role)>,
+    /// Bytes of tiles that a frame may load.
+    tile_bytes: Option<u64>,
+    /// Look-ups of rays answered by distance fields, if they are.
+    field: Option<u32>,
+    /// How a field of visibility is made that answers rays to the environment, if one does.
+    dvf: Option<DvfSettings>,
+}
+
+const VARIANT: Variant = Variant {
+    schedule: Schedule::Chc,
+    everything_fits: false,
+    fronts: false,
+    threshold: 0,
+    list_most: u32::MAX,
+    without: &[],
+    with: &[],
+    roma: None,
+    tile_bytes: None,
+    field: None,
+    dvf: None,
+};
+
+fn effects() -> Effects {
+    Effects {
+        shadow: true,
+        environment: true,
+        occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
+        diffuse: Some(1),
+        mirror: true,
+        glossy: true,
+        turn_degrees: 360.0,
+    }
+}
+
+/// An environment, and emitters of every kind around `top`.
+fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
+    let image = Equirectangular::of(24, 12, |[x, y, z]| [1.2 + x, 1.1 + y, 1.5 + x * z]);
+    let rectangle = Shape::Parallelogram { corner: top, edges: [DVec3::X * 3.0, DVec3::Z * 3.0] };
+    let down = DVec3::new(0.1, -1.0, 0.2).normalize();
+    let shapes = [
+        rectangle,
+        Shape::Point { position: top, range: 0.0 },
+        Shape::Point { position: top + DVec3::X, range: 9.0 },
+        Shape::Spot { position: top, direction: down, range: 20.0, cone: [0.3, 0.9] },
+        Shape::Distant { direction: down },
+    ];
+    let radiance = [4.0, 3.0, 2.0];
+    let mut emitters: Vec<Emitter> = shapes.map(|shape| Emitter { shape, two_sided: false, radiance }).into();
+    let surfaces = emissive_triangles(scene, 1 << 20).unwrap().unwrap().emitters(scene.resident());
+    emitters.extend(surfaces.iter().enumerate().map(|(i, e)| Emitter { two_sided: i % 2 == 0, ..*e }));
+    Lamps::new(Some(environment(image, 1.0, 40.0).0), emitters, 10.0)
+}
+
+/// Small maps, of both numbers of directions.
+fn roma((steps, role): (u32, Role)) -> RomaSettings {
+    let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 4 }, steps, role };
+    let diffuse = (!role.is_help()).then(|| RomaPass { role: Role::Answer, ..pass(4) });
+    RomaSettings { occlusion: pass(4), shadow: pass(8), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
+}
+
+/// Small fields.
+fn field(steps: u32) -> FieldSettings {
+    FieldSettings { size: 32, occlusion_steps: steps, shadow_steps: steps, lift: 1.75, hit: 0.75 }
+}
+
+/// A field of visibility of few points.
+fn visibility(octahedral: u32) -> DvfSettings {
+    DvfSettings { points: 200, rays: 6, cells: Cells::Longest(6), octahedral, ..DvfSettings::default() }
+}
+
+/// Both executors with pages of these sizes.
+fn lockstep(
+    (gpu, kernels): &(Gpu, Arc<Kernels>),
+    scene: &Arc<SceneFile>,
+    pages: &[u64],
+    threshold: u32,
+    findings: &Arc<Mutex<Findings>>,
+) -> Lockstep {
+    let setup = Setup { extent: EXTENT, threshold, count: true, keep: Keep::default() };
+    let host = || HostCache::new(1 << 20);
+    let on_gpu = GpuExecutor::with_kernels(
+        gpu.clone(),
+        kernels.clone(),
+        scene.clone(),
+        Workers::new(scene.clone(), host(), 1, 0).unwrap(),
+        pages,
+        setup,
+    );
+    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1, 0).unwrap(), setup);
+    Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone())
+}
+
+/// Renders two frames in lockstep.
+fn render(
+    device: &(Gpu, Arc<Kernels>),
+    scene: &Arc<SceneFile>,
+    variant: &Variant,
+    defect: Option<Defect>,
+    findings: &Arc<Mutex<Findings>>,
+) {
+    let sizes = scene.sizes();
+    let page_bytes = device.0.page_bytes();
+    let residency = |budget| Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin);
+    let least = match residency(16) {
+        Err(ResidencyError::CacheTooSmall { needed, .. }) => needed,
+        other => panic!("a cache of nothing must be refused: {other:?}"),
+    };
+    let budget = if variant.everything_fits { Residency::budget_for_all(&sizes, page_bytes) } else { least };
+    let residency = residency(budget).unwrap();
+    let pages: Vec<u64> = residency.page_sizes().collect();
+    let mut executor = lockstep(device, scene, &pages, variant.threshold, findings);
+    if let Some(defect) = defect {
+        executor = executor.with_defect(defect);
+    }
+    executor.allow_bounces();
+    executor.tuning().list_most = variant.list_most;
+    if variant.schedule == Schedule::PlainBinary {
+        executor.make_binary().unwrap();
+    }
+    let mut tracing = Tracing { measure_needed: true, ..Tracing::default() };
+    variant.without.iter().for_each(|&which| tracing.optimisations.set(which, false));
+    variant.with.iter().for_each(|&which| tracing.optimisations.set(which, true));
+    let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
+    let manifest = &scene.resident().manifest;
+    let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
+    light.lamps = Arc::new(lamps(scene, top));
+    let mut renderer = Renderer {
+        scene: scene.clone(),
+        executor: Box::new(executor),
+        cache: Cache::new(residency, SceneBytes::from(&sizes), None),
+        settings: RenderSettings {
+            tile_bytes: variant.tile_bytes,
+            schedule: variant.schedule,
+            effects: effects(),
+            samples: 1,
+            seed: 3,
+            tracing,
+            guides: false,
+            taa: false,
+            roma: variant.roma.map(roma),
+            field: variant.field.map(field),
+            aov: false,
+        },
+        light,
+        size: (EXTENT.width, EXTENT.height),
+        tile: EXTENT.tile,
+        fronts: variant.fronts.then(Fronts::default),
+        auto: Auto::default(),
+        captures: None,
+        moved: Moved::default(),
+        roma: Roma::default(),
+        field: Field::default(),
+        rsm: Rsm::default(),
+        dvf: Dvf::default(),
+        host_seen: HostCacheStats::default(),
+    };
+    let path = path_from_bounds(manifest.min, manifest.max);
+    if let Some(settings) = &variant.dvf {
+        let made = renderer
+            .make_dvf(settings, &Region::scene(scene.resident()), DvfTracing::over(4), &mut |_, _| true)
+            .unwrap();
+        assert!(made.points > 0 && made.field.known_cells() > 0);
+        assert_eq!(made.trials.is_empty(), settings.cells != Cells::Auto);
+        // Rays wait, so that blocks are made again.
+        assert_eq!(made.drains > 0, variant.schedule != Schedule::Plain);
+        let how = DvfUse {
+            doubt: settings.octahedral == 8,
+            paper: settings.hammersley && settings.dilate && settings.octahedral == 16,
+        };
+        let renewal = Renewal {
+            kept: Arc::new(made.kept),
+            settings: *settings,
+            region: Region::scene(scene.resident()),
+            tracing: DvfTracing::over(4),
+            rays: 2000,
+            frames: u32::MAX,
+        };
+        renderer.dvf = Dvf::new(Arc::new(made.field), how).renewed_by(renewal);
+    }
+    for frame in 0..2 {
+        // The second frame scatters directions, and an instance has moved.
+        renderer.settings.guides = frame == 1;
+        if let Some(instance) = scene.resident().instances.get(1).filter(|_| frame == 1) {
+            let mut matrix = instance.world_from_object;
+            matrix[3] += 0.1 * (manifest.max[0] - manifest.min[0]);
+            assert_eq!(renderer.place(scene, &[(1, matrix)]), Ok(vec![1]));
+        }
+        let output = renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
+        let renewed = output.records.iter().find(|record| record.pass == "dvf");
+        if renderer.dvf.moved_field().is_some() {
+            assert!(renewed.is_some_and(|record| record.cells_renewed > 0 && record.rays > 0), "{renewed:?}");
+        }
+    }
+}
+
+#[test]
+fn twins_agree_with_their_kernels() {
+    let Some(device) = device() else { return };
+    use Optimisation::*;
+    let variants = [
+        Variant { schedule: Schedule::Plain, everything_fits: true, ..VARIANT },
+        Variant { schedule: Schedule::PlainBinary, everything_fits: true, ..VARIANT },
+        Variant { everything_fits: true, ..VARIANT },
+        VARIANT,
+        // Walks from the root, of some tiles and of all; pairs that a threshold culls.
+        Variant { everything_fits: true, list_most: 0, ..VARIANT },
+        Variant { list_most: 3, ..VARIANT },
+        Variant { list_most: 3, threshold: 4, ..VARIANT },
+        Variant { list_most: 0, threshold: 2, ..VARIANT },
+        // Coarser levels stand for most tiles.
+        Variant { tile_bytes: Some(0), ..VARIANT },
+        Variant { schedule: Schedule::Demand, ..VARIANT },
+        Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
+        Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
+        Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
+        Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
+        // Maps drawn by the cosine; by the rays' own strata.
+        Variant { roma: Some((0, Role::Answer)), ..VARIANT },
+        Variant { roma: Some((3, Role::Answer)), ..VARIANT },
+        Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { most_wrong: None })), ..VARIANT },
+        Variant { roma: Some((3, Role::Sift { most_wrong: None })), schedule: Schedule::Demand, ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { most_wrong: Some(100_000) })), ..VARIANT },
+        Variant { roma: Some((3, Role::Sift { most_wrong: Some(500_000) })), ..VARIANT },
+        Variant { roma: Some((64, Role::Sift { most_wrong: Some(1000) })), ..VARIANT },
+        Variant { roma: Some((0, Role::Correct(4))), ..VARIANT },
+        Variant { roma: Some((3, Role::Correct(2))), schedule: Schedule::Demand, ..VARIANT },
+        Variant { field: Some(64), ..VARIANT },
+        Variant { field: Some(3), ..VARIANT },
+        Variant { dvf: Some(visibility(8)), ..VARIANT },
+        Variant { dvf: Some(visibility(16)), ..VARIANT },
+        Variant { dvf: Some(DvfSettings { hammersley: false, both: true, round: true, ..visibility(16) }), ..VARIANT },
+        Variant { dvf: Some(DvfSettings { dilate: false, cells: Cells::Auto, ..visibility(32) }), ..VARIANT },
+        Variant { fronts: true, ..VARIANT },
+        Variant { fronts: true, threshold: 3, ..VARIANT },
+        Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
+    ];
+    let findings = Arc::new(Mutex::new(Findings::default()));
+    for (scene, variants) in [
+        (Arc::new(probe::scene().unwrap()), &variants[..]),
+        (textured(false), &variants),
+        (textured(true), &variants[2..10]),
+    ] {
+        let has_occupancy = !scene.resident().occupancy.is_empty();
+        for (i, variant) in
+            variants.iter().enumerate().filter(|(_, v)| has_occupancy || (v.roma.is_none() && v.field.is_none()))
+        {
+            render(&device, &scene, variant, None, &findings);
+            let found = findings.lock().unwrap();
+            assert_eq!(found.differences, Vec::<String>::new(), "variant {i} of {}", scene.path().display());
+        }
+    }
+    let found = findings.lock().unwrap();
+    println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
+    let all = kernels::names()
+        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE, RSM_WRITE, RSM_LIGHT])
+        .chain(FIELD_KERNELS)
+        .chain(DVF_KERNELS);
+    let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
+    assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
+    assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
+    assert!(found.greatest > 0.0, "nothing was compared within the bound");
+}
+
+#[test]
+fn a_twin_that_differs_is_noticed() {
+    let Some(device) = device() else { return };
+    let (opaque, plain, tiled) = (Arc::new(probe::scene().unwrap()), textured(false), textured(true));
+    let cases = [
+        (Defect::Rays, &plain, "hits"),
+        (Defect::Seed, &opaque, "directions"),
+        // What lets rays pass by chance is drawn anew.
+        (Defect::Seed, &plain, "hits"),
+        (Defect::Light, &plain, "radiance"),
+        (Defect::Lookups, &tiled, "tiles"),
+        (Defect::Maps, &plain, "columns of maps"),
+        (Defect::Fields, &plain, "distances of fields"),
+        (Defect::LampMaps, &plain, "radiance"),
+        (Defect::Points, &plain, "rays of points"),
+    ];
+    for (defect, scene, what) in cases {
+        let findings = Arc::new(Mutex::new(Findings::default()));
+        let roma = matches!(defect, Defect::Maps | Defect::LampMaps).then_some((0, Role::Answer));
+        let field = (defect == Defect::Fields).then_some(64);
+        // Points of the set of Hammersley have no seed but for how their rays are turned.
+        let dvf = (defect == Defect::Points).then(|| visibility(8));
+        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, dvf, ..VARIANT };
+        render(&device, scene, &variant, Some(defect), &findings);
+        let found = findings.lock().unwrap();
+        assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);
+    }
+}
+
+/// Two levels of base maps with every n-th cell or so occupied; of no n none.
+fn base_maps(cells: u32, every: Option<u32>) -> Arc<Cascades> {
+    let mut state = 0x2545_f491u32;
+    let mut level = |cell_log2: i32, first: i64| {
+        let mut map = Bom::new(cells, cell_log2, [first; 3]);
+        let count = every.map_or(0, |every| cells.pow(3) / every);
+        for _ in 0..count {
+            let mut next = || {
+                state ^= state << 13;
+                state ^= state >> 17;
+                state ^= state << 5;
+                (state >> 8) % cells
+            };
+            map.occupy([next(), next(), next()]);
+        }
+        map
+    };
+    Arc::new(Cascades { levels: vec![level(0, 0), level(1, -i64::from(cells) / 4)] })
+}
+
+/// Rays from inside and outside of such maps, some along axes, of lengths of direction of their own.
+fn rays(cells: u32) -> Vec<Ray> {
+    let mut state = 77u32;
+    let mut unit = || {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        (state >> 8) as f32 / (1 << 24) as f32
+    };
+    let ray = |number: u32| {
+        let origin = [(); 3].map(|()| (unit() * 2.6 - 0.8) * cells as f32);
+        let d = [(); 3].map(|()| unit() - 0.5);
+        let direction = if number.is_multiple_of(16) { [0.0, -1.0, 0.0] } else { d };
+        let t_max = if number.is_multiple_of(5) { 12.0 } else { f32::MAX };
+        Ray { origin, t_min: 0.0, direction, t_max }
+    };
+    (0..EXTENT.width * EXTENT.height).map(ray).collect()
+}
+
+#[test]
+fn distance_fields_of_all_sizes_are_those_of_their_twins() {
+    let Some(device) = device() else { return };
+    let scene = Arc::new(probe::scene().unwrap());
+    let sizes = scene.sizes();
+    let page_bytes = device.0.page_bytes();
+    let budget = Residency::budget_for_all(&sizes, page_bytes);
+    let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin).unwrap();
+    let pages: Vec<u64> = residency.page_sizes().collect();
+    let cache = Cache::new(residency, SceneBytes::from(&sizes), None);
+    let frame = Frame { reference: [0; 3], unit: 1.0, origin: DVec3::ZERO };
+    let pass = Pass::Shadow(Lamp::Sun);
+    for (cells, every) in [(32, None), (32, Some(32_768)), (32, Some(20)), (64, Some(50)), (96, Some(100))] {
+        for defect in [None, Some(Defect::Fields)] {
+            let findings = Arc::new(Mutex::new(Findings::default()));
+            let mut executor = lockstep(&device, &scene, &pages, 0, &findings);
+            if let Some(defect) = defect {
+                executor = executor.with_defect(defect);
+            }
+            executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
+            let maps = base_maps(cells, every);
+            let own: Vec<DistanceField> = maps.levels.iter().map(DistanceField::new).collect();
+            executor.set_field(&FieldMaps::new(&maps, &frame, &field(64))).unwrap();
+            executor.run(pass, &[Step::FieldMake], &cache.states).unwrap();
+            assert_eq!(executor.fields() == own, defect.is_none(), "{cells}, {every:?}");
+            executor.set_rays(pass, &rays(cells));
+            let mut hits = 0;
+            for steps in [64, 16] {
+                executor.run(pass, &[Step::StartHits, Step::FieldTrace { steps }], &cache.states).unwrap();
+                let met = executor.read_hits(pass).unwrap();
+                assert!(met.iter().all(|hit| hit.id == FIELD_HIT || hit.id == NONE));
+                hits += met.iter().filter(|hit| hit.id == FIELD_HIT).count();
+            }
+            let found = findings.lock().unwrap();
+            if defect.is_none() {
+                println!("{cells}³, one in {every:?}: {hits} hits");
+                assert_eq!(found.differences, Vec::<String>::new(), "{cells}, {every:?}");
+                let is_dense = every.is_some_and(|every| every < 10_000);
+                assert!(if is_dense { hits > 200 } else { every.is_some() || hits == 0 }, "{cells}, {every:?}: {hits}");
+            } else {
+                assert!(found.differences[0].contains("distances of fields"), "{:?}", found.differences);
+            }
+        }
+    }
+}

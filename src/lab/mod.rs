@@ -1,0 +1,6 @@
+//! The laboratory: benchmarks of the papers, the selftest, and the comparison of both executors.
+
+pub mod bench;
+#[cfg(test)]
+mod lockstep;
+pub mod selftest;

@@ -1,0 +1,8 @@
+//! From radiance to pictures: denoising and anti-aliasing over frames, exposure, tone maps.
+
+pub mod denoise;
+pub mod exposure;
+pub mod tone_map;
+
+pub use exposure::{Exposure, MOST_STOPS, Meter};
+pub use tone_map::ToneMap;

@@ -1,0 +1,149 @@
+//! Reflective shadow maps: twins of `shaders/rsm/rsm_write.wgsl` and `rsm_light.wgsl`.
+
+use super::maps::RsmMaps;
+use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::layout::{NONE, ROMA_HIT, RSM_PERSPECTIVE, RsmTexel};
+use crate::kernels::rays::RaySet;
+use crate::kernels::shade::gloss::Gloss;
+use crate::kernels::shade::lamps::{lamp_words, shines, unit};
+use crate::kernels::shade::light::{add_light, sunlight};
+use crate::kernels::shade::shade::Pixels;
+use crate::kernels::vector::{Vec3, dot, each, most};
+use crate::math::exact::divide;
+use bricks::Material;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// By the lift of the level that was met: how wide points are moved.
+const MOVED: f32 = 0.8;
+/// How far what is seen may be from the point, across its surface.
+const ACROSS: f32 = 1.2;
+/// And in depth.
+const IN_DEPTH: f32 = 3.6;
+
+/// Pixels that a task lights in a row.
+const RUN: usize = 1024;
+
+/// The maps and their texels.
+#[derive(Default)]
+pub struct RsmTables {
+    /// How they are placed.
+    pub maps: RsmMaps,
+    /// Of all maps, row by row.
+    pub texels: Vec<RsmTexel>,
+}
+
+impl RsmTables {
+    /// Takes maps; as many texels as before keep what they hold.
+    pub fn set(&mut self, maps: &RsmMaps) {
+        if self.texels.len() != maps.texels as usize {
+            self.texels.clear();
+        }
+        self.texels.resize(maps.texels as usize, RsmTexel::default());
+        self.maps = maps.clone();
+    }
+}
+
+/// Writes a block of texels of a map from the hits of set 0.
+pub fn rsm_write(bound: &Bound, tables: &mut RsmTables, pixels: &Pixels, seen: &RaySet, materials: &[Material]) {
+    let p = bound.params;
+    let map = &tables.maps.maps[p.rsm_map as usize];
+    let (width, height) = (map.width.saturating_sub(p.rsm_x), map.height.saturating_sub(p.rsm_y));
+    let rows =
+        tables.texels[map.first as usize..][..(map.width * map.height) as usize].par_chunks_mut(map.width as usize);
+    rows.skip(p.rsm_y as usize).take(height.min(p.height) as usize).enumerate().for_each(|(y, row)| {
+        for (x, texel) in row.iter_mut().skip(p.rsm_x as usize).take(width.min(p.width) as usize).enumerate() {
+            let index = y * p.width as usize + x;
+            *texel = seen_by_lamp(bound, (map.lamp, map.flags), pixels, seen, index, materials);
+        }
+    });
+}
+
+fn seen_by_lamp(
+    bound: &Bound,
+    (lamp, flags): (u32, u32),
+    pixels: &Pixels,
+    seen: &RaySet,
+    index: usize,
+    materials: &[Material],
+) -> RsmTexel {
+    let surface = &seen.surfaces[index];
+    if surface.leaf == NONE {
+        return RsmTexel { depth: -1.0, ..RsmTexel::default() };
+    }
+    let g = &pixels.gbuffers[0][index];
+    let t = seen.hits[index].t;
+    let to_lamp = seen.rays[index].direction.map(|x| -x);
+    let light = if lamp == NONE {
+        sunlight(bound.params, g.normal)
+    } else {
+        let e = bound.lamps.emitter(lamp);
+        let d = if flags & RSM_PERSPECTIVE != 0 { to_lamp.map(|x| x * t) } else { to_lamp };
+        let squared = dot(d, d);
+        let (cosine, shone) = (most(dot(g.normal, d), 0.0), shines(e, d));
+        e.radiance.map(|c| c * cosine * shone / (PI * squared * squared))
+    };
+    let n = surface.normal;
+    let facing = n[0] * to_lamp[0] + n[1] * to_lamp[1] + n[2] * to_lamp[2];
+    let s = Gloss::of(g, &materials[g.material as usize], to_lamp);
+    RsmTexel { flux: each(|k| s.diffuse[k] * light[k]), depth: t, normal: n, facing }
+}
+
+fn row_at(row: &[f32; 4], p: Vec3) -> f32 {
+    row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]
+}
+
+/// What is reflected to a ray along `-view` from near `p`, which is known to within `lift`.
+fn reflected(bound: &Bound, tables: &RsmTables, p: Vec3, view: Vec3, lift: f32) -> Vec3 {
+    let mut light = [0.0; 3];
+    let mut done = bound.params.emitter_count;
+    for map in &tables.maps.maps {
+        if map.lamp == done {
+            continue;
+        }
+        let [mut u, mut v, depth] = [0, 1, 2].map(|k| row_at(&map.texel_from_point[k], p));
+        if map.flags & RSM_PERSPECTIVE != 0 {
+            if depth.is_nan() || depth <= 0.0 {
+                continue;
+            }
+            (u, v) = (divide(u, depth), divide(v, depth));
+        }
+        if !(u >= 0.0 && v >= 0.0 && u < map.width as f32 && v < map.height as f32) {
+            continue;
+        }
+        done = map.lamp;
+        let texel = &tables.texels[(map.first + v as u32 * map.width + u as u32) as usize];
+        let n = texel.normal;
+        let turned = n[0] * view[0] + n[1] * view[1] + n[2] * view[2];
+        let apart = (depth - texel.depth).abs();
+        let is_near = apart <= IN_DEPTH * lift && apart * texel.facing <= ACROSS * lift;
+        if texel.depth >= 0.0 && turned > 0.0 && is_near {
+            light = each(|k| light[k] + texel.flux[k]);
+        }
+    }
+    light
+}
+
+/// Adds what the hits that occupancy maps gave reflect of the lamps, by their maps.
+pub fn rsm_light(bound: &Bound, tables: &RsmTables, pixels: &mut Pixels, seen: &RaySet) {
+    let Pixels { radiance, throughput, .. } = pixels;
+    radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
+        let mut tally = Tally::default();
+        for (i, radiance) in radiance.iter_mut().enumerate() {
+            let index = run * RUN + i;
+            let ray = &seen.rays[index];
+            let is_traced = ray.t_min <= ray.t_max;
+            if !is_traced || seen.hits[index].id != ROMA_HIT {
+                continue;
+            }
+            let met = &seen.surfaces[index];
+            let words = lamp_words(bound, index, throughput);
+            let p = each(|k| met.point[k] + MOVED * met.area * (unit(words[k]) - 0.5));
+            let light = reflected(bound, tables, p, met.normal, met.area);
+            if light.iter().any(|&c| c != 0.0) {
+                add_light(bound, &mut tally, radiance, throughput.get(index), light);
+            }
+        }
+        bound.counters.add(&tally);
+    });
+}

@@ -1,0 +1,190 @@
+//! Which device renders: a graphics adapter, or the processor itself. Nothing but this module tells them apart.
+
+use crate::cpu;
+use crate::cpu::CpuExecutor;
+use crate::gpu::device::{Candidate, Gpu, candidates};
+use crate::gpu::executor::GpuExecutor;
+use crate::gpu::probe;
+use crate::kernels::{DeviceInfo, FrameExecutor, Setup};
+use crate::stream::{HostCache, Workers};
+use anyhow::{Result, bail};
+use bricks::SceneFile;
+use std::convert::Infallible;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+/// The name of the processor among the adapters.
+const CPU: &str = "cpu";
+
+/// What `--adapter` asks for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Adapter {
+    /// A hardware GPU if there is one, else the processor.
+    #[default]
+    Auto,
+    /// The processor.
+    Cpu,
+    /// The graphics adapter whose name contains this, in any case.
+    Named(String),
+}
+
+impl FromStr for Adapter {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            CPU => Self::Cpu,
+            name => Self::Named(name.into()),
+        })
+    }
+}
+
+impl fmt::Display for Adapter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "auto",
+            Self::Cpu => CPU,
+            Self::Named(name) => name,
+        })
+    }
+}
+
+/// What was chosen, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// The candidate of this number; `None`: the processor.
+    pub candidate: Option<usize>,
+    /// In words.
+    pub why: &'static str,
+}
+
+/// What `auto` takes of `candidates`.
+pub fn automatic(candidates: &[Candidate]) -> Choice {
+    let hardware = |c: &&(usize, &Candidate)| c.1.is_hardware() && c.1.flaw.is_none();
+    match candidates.iter().enumerate().filter(|c| hardware(&c)).min_by_key(|(_, c)| c.rank()) {
+        Some((number, _)) => Choice { candidate: Some(number), why: "the best hardware GPU that has what is needed" },
+        None if candidates.iter().any(Candidate::is_hardware) => {
+            Choice { candidate: None, why: "no hardware GPU has what is needed" }
+        }
+        None => Choice { candidate: None, why: "there is no hardware GPU" },
+    }
+}
+
+/// A device that has been chosen.
+pub enum Device {
+    /// The processor.
+    Cpu,
+    /// A graphics adapter.
+    Gpu(Box<Gpu>),
+}
+
+impl Device {
+    /// Opens what `adapter` asks for.
+    ///
+    /// # Errors
+    /// No such adapter, or one that gives no device or lacks what is needed.
+    pub fn open(adapter: &Adapter) -> Result<Self> {
+        match adapter {
+            Adapter::Cpu => Ok(Self::Cpu),
+            Adapter::Named(name) => Ok(Self::Gpu(Box::new(Gpu::open(Some(name))?))),
+            Adapter::Auto => {
+                let candidates = candidates();
+                match automatic(&candidates).candidate {
+                    Some(number) => Ok(Self::Gpu(Box::new(candidates[number].open()?))),
+                    None => Ok(Self::Cpu),
+                }
+            }
+        }
+    }
+
+    /// What summaries say of it.
+    pub fn info(&self) -> DeviceInfo {
+        match self {
+            Self::Cpu => cpu::device_info(),
+            Self::Gpu(gpu) => gpu.device_info(),
+        }
+    }
+
+    /// Largest number of bytes of one page of the cache.
+    pub fn page_bytes(&self) -> u64 {
+        match self {
+            Self::Cpu => CpuExecutor::PAGE_BYTES,
+            Self::Gpu(gpu) => gpu.page_bytes(),
+        }
+    }
+
+    /// The executor of `scene`, with a cache of pages of the given sizes.
+    ///
+    /// # Errors
+    /// A device that fails the start-up probe; textures that cannot be read; a picture or a cache beyond the device's
+    /// limits.
+    pub fn executor(
+        self,
+        scene: Arc<SceneFile>,
+        host: Arc<HostCache>,
+        (threads, prefetch): (usize, usize),
+        page_sizes: &[u64],
+        setup: Setup,
+    ) -> Result<Box<dyn FrameExecutor>> {
+        match self {
+            Self::Cpu => {
+                let workers = Workers::new(scene.clone(), host, threads, prefetch)?;
+                Ok(Box::new(CpuExecutor::new(scene, workers, setup)?))
+            }
+            Self::Gpu(gpu) => {
+                require(&gpu, &probe::run(&gpu.device, &gpu.queue).checks)?;
+                let workers = Workers::new(scene.clone(), host, threads, prefetch)?;
+                let executor = GpuExecutor::new(*gpu, scene, workers, page_sizes, setup)?;
+                require(executor.gpu(), &probe::compare_pipelines(&executor))?;
+                Ok(Box::new(executor))
+            }
+        }
+    }
+}
+
+/// Refuses a device with a failed check.
+fn require(gpu: &Gpu, checks: &[probe::Check]) -> Result<()> {
+    let failures = probe::failures(checks);
+    if failures.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "{} does not compute as exact rendering needs: {}; choose another with --adapter",
+        gpu.info.name,
+        failures.join(", ")
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgpu::DeviceType::{Cpu, DiscreteGpu, IntegratedGpu};
+
+    fn found(kinds: &[(wgpu::DeviceType, bool)]) -> Vec<Candidate> {
+        kinds.iter().map(|&(kind, is_sound)| Candidate::for_tests(kind, is_sound)).collect()
+    }
+
+    #[test]
+    fn hardware_comes_first_and_software_vulkan_never_by_itself() {
+        let chosen = |kinds: &[_]| automatic(&found(kinds)).candidate;
+        assert_eq!(chosen(&[]), None);
+        assert_eq!(chosen(&[(Cpu, true)]), None);
+        assert_eq!(chosen(&[(Cpu, true), (IntegratedGpu, true)]), Some(1));
+        assert_eq!(chosen(&[(IntegratedGpu, true), (DiscreteGpu, true), (Cpu, true)]), Some(1));
+        // One that lacks something is passed over.
+        assert_eq!(chosen(&[(IntegratedGpu, true), (DiscreteGpu, false)]), Some(0));
+        assert_eq!(chosen(&[(DiscreteGpu, false), (Cpu, true)]), None);
+        assert_ne!(automatic(&found(&[(DiscreteGpu, false)])).why, automatic(&[]).why);
+    }
+
+    #[test]
+    fn names_are_read_and_written() {
+        for (text, adapter) in [("auto", Adapter::Auto), ("cpu", Adapter::Cpu), ("llvm", Adapter::Named("llvm".into()))]
+        {
+            assert_eq!(text.parse::<Adapter>(), Ok(adapter.clone()));
+            assert_eq!(adapter.to_string(), text);
+        }
+    }
+}
