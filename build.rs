@@ -111,12 +111,6 @@ fn layout_checks(module: &naga::Module) -> String {
         "TileDemand",
         "GBuffer",
         "Emitter",
-        "RomaLevel",
-        "RomaMap",
-        "RsmMap",
-        "RsmTexel",
-        "DvfGrid",
-        "DvfTriangle",
     ];
     let mut s = String::new();
     for name in mirrored {
@@ -152,10 +146,6 @@ fn layout_checks(module: &naga::Module) -> String {
             "MATERIAL_DOUBLE",
             "MATERIAL_UNLIT",
             "REFLECTANCE_",
-            "ROMA_",
-            "FIELD_HIT",
-            "RSM_",
-            "DVF_",
             "NONE",
         ];
         if prefixes.iter().any(|p| name.starts_with(p))

@@ -7,8 +7,9 @@ use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::kernels::layout::NONE;
 use brickwalk::reference::Truth;
 use brickwalk::scene::Camera;
-use brickwalk::schedule::{Pass, RomaPart, Step};
+use brickwalk::schedule::{Pass, Step};
 use brickwalk::secondary::occupancy::{Settings, assemble};
+use brickwalk::secondary::roma::RomaPart;
 use brickwalk::secondary::roma::handover::Trust;
 use brickwalk::session::open::open_scene;
 use common::{city, converted, folder, frames, sheet};
@@ -272,7 +273,7 @@ fn maps_answer_what_measured_errors_allow() {
         let mut renderer = renderer(&scene, &format!("--effects ao --spp 4 {options}"));
         // What is measured in the first picture decides of the second.
         let pictures = [0, 1].map(|frame| renderer.frame(frame, &eye()).expect("a frame"));
-        (pictures, renderer.roma.handovers()[0])
+        (pictures, renderer.methods.get::<Roma>().expect("maps").handovers()[0])
     };
     let seen = |output: &FrameOutput| output.pixels.radiance.iter().map(|x| x[1] as f64).collect::<Vec<_>>();
     let ([_, exact], _) = walk("");

@@ -41,32 +41,8 @@ struct Params {
     environment_height: u32,
     emitter_density: f32, // of points of surfaces that shine, by the luminance of their radiance, an area of 1: how rays to them are drawn
     diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
-    roma_k: u32,          // square root of the number of maps of a level
-    roma_size: u32,       // texels of a map on both axes, and cells of a column
-    roma_cells: u32,      // cells of a base map on each axis
-    roma_levels: u32,     // base maps
-    roma_samples: u32,    // look-ups of the base map a cell
-    roma_steps: u32,      // columns that a ray passes before it is finished snapped; 0: it is snapped
-    roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced; NONE: to its end. roma_measure: in one of a map
-    roma_part: u32,       // which part of rays roma_trace answers, ROMA_*
-    roma_is_part: u32,    // 1: rays that leave the coarsest base map are not answered, 0: it holds the scene
-    roma_pilots: u32,     // of rays that maps answer one in so many is traced to its end; 0: none
-    field_cells: u32,     // cells of a distance field's base map on each axis
-    field_levels: u32,    // distance fields, one a base map
-    field_level: u32,     // which of them is made
-    field_mip: u32,       // and which of its levels: cells are 2^mip of the base map's
-    field_step: u32,      // cells on each axis that jump flooding looks away
-    field_half: u32,      // which half of the nearest cells is read
-    field_steps: u32,     // look-ups of a ray at most
-    field_hit: f32,       // a ray meets what it is no farther from, cells
-    rsm_maps: u32,        // reflective shadow maps of all lamps
-    rsm_map: u32,         // rsm_write: the one that is written,
-    rsm_x: u32,           // and its texel that ray 0 of the pass is for
-    rsm_y: u32,
-    dvf_first: u32,       // dvf_rays: number of the first ray of the block; dvf_points: first side of a point; sweeps: first element of the level
-    dvf_next: u32,        // sweeps: first element of the level above; dvf_rays, dvf_write: first word of the block's bits of waiting rays, NONE: none may wait
-    dvf_count: u32,       // sweeps: elements of the level; dvf_points: sides of points; dvf_write: 0: nothing is entered into masks
-    dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
+    padding0: u32,
+    padding1: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }

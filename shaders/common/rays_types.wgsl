@@ -103,3 +103,4 @@ const COUNTER_FIELD_CAPPED: u32 = 23u;
 const COUNTER_PILOTS: u32 = 24u;    // rays that were sifted and traced all the same; then those wrongly free, and those wrongly met by HANDOVERS
 const WORK_CHOSEN: u32 = 32u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 36u;      // the same over tiles whose rays walk from the root
+const MET: u32 = 0xfffffffeu;         // id of a hit that a method of secondary visibility gives, which is no triangle

@@ -5,4 +5,4 @@
 #include "common/rays_types.wgsl"
 #include "common/scene_types.wgsl"
 #include "common/surfaces_types.wgsl"
-#include "common/visibility_types.wgsl"
+#include "common/lamp_types.wgsl"

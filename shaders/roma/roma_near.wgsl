@@ -6,14 +6,14 @@
 #include "common/exact.wgsl"
 #include "common/random.wgsl"
 #include "roma/roma.wgsl"
-#include "roma/levels.wgsl"
+#include "occupancy/levels.wgsl"
 #include "roma/roma_start.wgsl"
 #include "roma/roma_pilot.wgsl"
 
 // One thread a ray.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
-    if global.x >= params.width || global.y >= params.height || params.roma_levels == 0u {
+    if global.x >= params.width || global.y >= params.height || own.levels == 0u {
         return;
     }
     let index = global.y * params.width + global.x;
@@ -21,10 +21,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if !(ray.t_min <= ray.t_max) {
         return;
     }
-    if params.roma_near != NONE {
-        hits[index].t = min(ray.t_max, near_end(index, ray, params.roma_near));
+    if own.near != NONE {
+        hits[index].t = min(ray.t_max, near_end(index, ray, own.near));
     }
-    if params.roma_pilots != 0u && !is_pilot(index) {
+    if own.pilots != 0u && !is_pilot(index) {
         hits[index].t = ANSWERED;
     }
 }

@@ -75,7 +75,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     if seen_surfaces[index].leaf == NONE {
         // What occupancy maps met is lit otherwise.
-        if (params.flags & PARAM_MISS) != 0u && seen_hits[index].id != ROMA_HIT {
+        if (params.flags & PARAM_MISS) != 0u && seen_hits[index].id != MET {
             add_light(index, seen_background(ray.direction, density));
         }
         return;

@@ -3,10 +3,13 @@
 use super::options::args::WalkArgs;
 use super::options::optimisation_args::names;
 use super::pictures::Pictures;
+use super::walk::finest_cell;
 use crate::counters::Record;
 use crate::frame::{Renderer, Schedule};
 use crate::picture::denoise::Resolve;
+use crate::secondary::df::answer::Df;
 use crate::secondary::roma::Role;
+use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::handover::{Handover, Trust};
 use crate::session::lighting::Lighting;
 use serde_json::{Map, Value, json};
@@ -75,7 +78,7 @@ pub fn of_walk(
             "secondary": args.secondary.name(),
             "roma": roma_settings(args, renderer),
             "df": field_settings(args, renderer),
-            "rsm": renderer.rsm.report(),
+            "rsm": renderer.methods.get::<Roma>().and_then(|roma| roma.rsm.report()),
             "spp": args.spp,
             "seed": args.seed,
             "sun": args.light.sun.0,
@@ -233,7 +236,8 @@ fn handover(role: Role, measured: &Handover) -> Option<Value> {
 
 /// What answers rays by maps; `None` where none does.
 fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
-    renderer.settings.roma.map(|roma| {
+    let answers = renderer.methods.get::<Roma>()?;
+    answers.settings.map(|roma| {
         json!({
             "bom": args.roma.bom.name(),
             "k": roma.occlusion.grid.k,
@@ -248,16 +252,17 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "one_in": if let Role::Correct(one_in) = roma.occlusion.role { one_in } else { 1 },
             "most_wrong": if let Role::Sift { most_wrong: Some(n) } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
             "shadow_near": near(roma.shadow.role),
-            "ao_handover": handover(roma.occlusion.role, &renderer.roma.handovers()[0]),
-            "shadow_handover": handover(roma.shadow.role, &renderer.roma.handovers()[1]),
-            "finest_cell": renderer.roma.finest_cell(),
+            "ao_handover": handover(roma.occlusion.role, &answers.handovers()[0]),
+            "shadow_handover": handover(roma.shadow.role, &answers.handovers()[1]),
+            "finest_cell": finest_cell(&renderer.methods),
         })
     })
 }
 
 /// What answers rays by distance fields.
 fn field_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
-    renderer.settings.field.map(|field| {
+    renderer.methods.get::<Df>().map(|df| {
+        let field = df.settings();
         json!({
             "bom": args.roma.bom.name(),
             "size": field.size,
@@ -265,7 +270,7 @@ fn field_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "shadow_steps": field.shadow_steps,
             "lift": field.lift,
             "hit": field.hit,
-            "finest_cell": renderer.roma.finest_cell(),
+            "finest_cell": finest_cell(&renderer.methods),
         })
     })
 }

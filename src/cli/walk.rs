@@ -8,7 +8,8 @@ use super::pictures::Pictures;
 use super::summary;
 use crate::counters::Record;
 use crate::frame::{
-    Accumulation, BATCH_SAMPLES, Captures, Light, Moved, RenderError, RenderSettings, Renderer, Schedule,
+    Accumulation, BATCH_SAMPLES, Captures, Engine, Light, Methods, Moved, RenderError, RenderSettings, Renderer,
+    Schedule,
 };
 use crate::kernels::Extent;
 use crate::output::atomic;
@@ -18,11 +19,9 @@ use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
-use crate::secondary::df::answer::Field;
-use crate::secondary::dvf::answer::Dvf;
+use crate::secondary::df::answer::Df;
 use crate::secondary::roma::LEAST_CELLS;
 use crate::secondary::roma::answer::Roma;
-use crate::secondary::rsm::answer::Rsm;
 use crate::session::lighting::lighting;
 use crate::session::open::{Session, open_scene, write_requests};
 use crate::stream::{BrickBox, HostCacheStats, Item, Prefetcher};
@@ -189,7 +188,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
     let settings = settings(args, schedule);
     let fronts = (args.stream.fronts == "on").then(Fronts::default);
     let size = (args.size.width, args.size.height);
-    Renderer {
+    let engine = Engine {
         scene,
         executor,
         cache,
@@ -201,18 +200,34 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
-        roma: Roma::new(args.roma.source()),
-        field: Field::default(),
-        rsm: Rsm::default(),
-        dvf: Dvf::default(),
         host_seen: HostCacheStats::default(),
+    };
+    Renderer { engine, methods: methods(args) }
+}
+
+/// The methods that answer secondary rays by the options of a walk; a field of visibility is made or read later.
+pub fn methods(args: &WalkArgs) -> Methods {
+    let mut methods = Methods::default();
+    match args.secondary {
+        Secondary::Roma | Secondary::Auto => {
+            methods.set(Roma::new(args.roma.settings(args.secondary == Secondary::Auto), args.roma.source()));
+        }
+        Secondary::Df => methods.set(Df::new(args.df.settings(), args.roma.source())),
+        Secondary::Exact | Secondary::Dvf => {}
     }
+    methods
+}
+
+/// Side of the finest base map of a method that has some, world units.
+pub fn finest_cell(methods: &Methods) -> Option<f64> {
+    let roma = methods.get::<Roma>().and_then(|roma| roma.base.finest_cell());
+    roma.or_else(|| methods.get::<Df>().and_then(|df| df.base.finest_cell()))
 }
 
 /// Says that rays of ao are too short for the cells that they are to meet.
 fn warn_of_short_rays(renderer: &Renderer) {
     let length = renderer.settings.effects.occlusion.map_or(f64::INFINITY, |occlusion| occlusion.length);
-    if let Some(cell) = renderer.roma.finest_cell().filter(|cell| length < LEAST_CELLS * cell) {
+    if let Some(cell) = finest_cell(&renderer.methods).filter(|cell| length < LEAST_CELLS * cell) {
         let _ = writeln!(
             std::io::stderr(),
             "brickwalk: warning: --ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has here: \
@@ -223,7 +238,8 @@ fn warn_of_short_rays(renderer: &Renderer) {
 
 /// Says which lamps do not light what diffuse rays meet.
 fn warn_of_dark_lamps(renderer: &Renderer) {
-    let [others, areas] = renderer.rsm.left_out();
+    let Some(roma) = renderer.methods.get::<Roma>() else { return };
+    let [others, areas] = roma.rsm.left_out();
     if others > 0 {
         let _ = writeln!(
             std::io::stderr(),
@@ -279,9 +295,6 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         guides: args.pictures.denoise || args.pictures.taa,
         taa: args.pictures.taa,
         tile_bytes: args.interactive,
-        roma: matches!(args.secondary, Secondary::Roma | Secondary::Auto)
-            .then(|| args.roma.settings(args.secondary == Secondary::Auto)),
-        field: (args.secondary == Secondary::Df).then(|| args.df.settings()),
     }
 }
 

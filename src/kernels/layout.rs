@@ -59,16 +59,14 @@ pub const WORK_ROOTED: u32 = 36;
 pub const GBUFFER_READ: u32 = 1;
 pub const GBUFFER_WAITS: u32 = 62;
 pub const GBUFFER_FIRST: u32 = 1;
-pub const ROMA_HIT: u32 = 0xffff_fffe;
+pub const MET: u32 = 0xffff_fffe;
 pub const ROMA_WHOLE: u32 = 0;
 pub const ROMA_FAR: u32 = 1;
 pub const ROMA_SIFT: u32 = 2;
 pub const ROMA_CORRECT: u32 = 3;
 /// Distances up to which rays in doubt may be traced: 0, 2, 4, 8, 16 and 32 cells of a map.
 pub const HANDOVERS: u32 = 6;
-pub const FIELD_HIT: u32 = 0xffff_fffd;
 pub const RSM_PERSPECTIVE: u32 = 1;
-pub const DVF_HIT: u32 = 0xffff_fffc;
 pub const DVF_HAMMERSLEY: u32 = 1;
 pub const DVF_ROUND: u32 = 2;
 pub const DVF_BOTH: u32 = 4;
@@ -116,13 +114,7 @@ mirror! {
         share: f32, surface_share: f32, length: f32, stream: u32,
         pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
-        emitter_density: f32, diffuse_count: f32, roma_k: u32, roma_size: u32,
-        roma_cells: u32, roma_levels: u32, roma_samples: u32, roma_steps: u32,
-        roma_near: u32, roma_part: u32, roma_is_part: u32, roma_pilots: u32,
-        field_cells: u32, field_levels: u32, field_level: u32, field_mip: u32,
-        field_step: u32, field_half: u32, field_steps: u32, field_hit: f32,
-        rsm_maps: u32, rsm_map: u32, rsm_x: u32, rsm_y: u32,
-        dvf_first: u32, dvf_next: u32, dvf_count: u32, dvf_turn: u32,
+        emitter_density: f32, diffuse_count: f32, padding0: u32, padding1: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }
@@ -178,7 +170,7 @@ mirror! {
         weights: [f32; 2], uv: [f32; 2], tangent: [f32; 3], handedness: f32,
         uv1: [f32; 2], footprint1: f32, occlusion: f32, metallic: f32, roughness: f32, padding0: u32, padding1: u32,
     }
-    struct RomaLevel { first: [f32; 3], scale: f32, lift: f32, padding0: u32, padding1: u32, padding2: u32 }
+    struct Level { first: [f32; 3], scale: f32, lift: f32, padding0: u32, padding1: u32, padding2: u32 }
     struct RomaMap { cell_from_point: [[f32; 4]; 3], base_from_cell: [[f32; 4]; 3], direction: [f32; 4] }
     struct RsmMap {
         texel_from_point: [[f32; 4]; 3], first: u32, width: u32, height: u32, lamp: u32,
@@ -192,6 +184,12 @@ mirror! {
     }
     struct DvfTriangle { a: [f32; 3], id: u32, b: [f32; 3], flags: u32, c: [f32; 3], padding: u32 }
     struct RsmTexel { flux: [f32; 3], depth: f32, normal: [f32; 3], facing: f32 }
+    struct RomaOwn {
+        k: u32, size: u32, cells: u32, levels: u32, samples: u32, steps: u32, near: u32, part: u32, is_part: u32, pilots: u32,
+    }
+    struct DfOwn { cells: u32, levels: u32, level: u32, mip: u32, step: u32, half: u32, steps: u32, hit: f32 }
+    struct RsmOwn { maps: u32, map: u32, x: u32, y: u32 }
+    struct DvfOwn { first: u32, next: u32, count: u32, turn: u32, around: [f32; 4] }
     struct Emitter {
         corner: [f32; 3], kind: u32, u: [f32; 3], probability: f32,
         v: [f32; 3], threshold: u32, radiance: [f32; 3], other: u32,

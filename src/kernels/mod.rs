@@ -17,6 +17,7 @@ pub mod report;
 mod setup;
 pub mod shade;
 pub mod simd;
+pub mod table;
 pub mod texture;
 pub mod textures;
 pub mod trace;

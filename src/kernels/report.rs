@@ -1,7 +1,7 @@
 //! What an executor is told of bricks before a submission, and what its counters say after it.
 
 use super::layout;
-use crate::schedule::{BrickStates, Demand, ExecutorError, Pilots, Report, Step};
+use crate::schedule::{BrickStates, Demand, ExecutorError, Report, Step};
 
 /// Where every brick lies and its part in the pass.
 pub fn slots(bricks: &BrickStates) -> Vec<layout::Slot> {
@@ -54,11 +54,7 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
     Ok(Report {
         round_trips: 1,
         rays_capped: count(layout::COUNTER_ROMA_CAPPED) + count(layout::COUNTER_FIELD_CAPPED),
-        pilots: Pilots {
-            rays: count(layout::COUNTER_PILOTS),
-            missed: count(layout::COUNTER_PILOTS + 1),
-            doubted: std::array::from_fn(|i| count(layout::COUNTER_PILOTS + 2 + i as u32)),
-        },
+        own: std::array::from_fn(|i| count(layout::COUNTER_PILOTS + i as u32)),
         demand: wanted.map(asked).collect(),
         tiles: Vec::new(),
         used: Vec::new(),

@@ -19,11 +19,13 @@
 pub mod answer;
 pub mod bits;
 pub mod cosine;
-pub mod device;
 pub mod directions;
 pub mod handover;
+pub mod kernels;
 pub mod maps;
 pub mod twin;
+
+pub use kernels::{Pilots, RomaPart, Sift};
 
 use super::rsm::RsmSettings;
 
@@ -135,9 +137,6 @@ pub struct RomaSettings {
     /// What lights the hits of diffuse rays.
     pub rsm: RsmSettings,
 }
-
-/// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.
-pub const MOST_LEVELS: u32 = 6;
 
 /// Most cells of a map on each axis.
 pub const MOST_CELLS: u32 = 256;
