@@ -119,7 +119,7 @@ pub struct ConvertArgs {
     #[command(flatten)]
     pub build: BuildArgs,
     /// How textures are stored: bc7 (blocks, a byte a texel, of BC5 for normals, the loss measured in
-    /// benches/results/textures.md) or raw (RGBA8, four bytes)
+    /// docs/results/textures.md) or raw (RGBA8, four bytes)
     #[arg(long, value_name = "ENCODING", value_enum, default_value = "bc7")]
     pub textures: Textures,
     /// Keep the meshes of the nodes called NAME, and of those below them, as instances of their own, so that walk

@@ -367,7 +367,7 @@ impl Engine {
 }
 
 /// Most rays, of all, that a grid may answer wrongly: FLIP of Sponza stays below 0.002 by it
-/// (`benches/results/dvf.md`).
+/// (`docs/results/dvf.md`).
 pub const MOST_WRONG: f64 = 0.001;
 
 /// Cells along the longest side of the finest grid that is tried: as many as there is room for.

@@ -11,7 +11,7 @@ const MOST_TRIANGLES: u64 = 1 << 20;
 
 /// What is counted in rays to the environment: to make anything anew at all, one ray of a cell, a triangle of a brick
 /// that is read. Rays of a cell go everywhere and those of a pixel go in packets: as measured in larger scenes
-/// (`benches/results/dvf.md`).
+/// (`docs/results/dvf.md`).
 const BEGUN: f64 = 10_000.0;
 pub(crate) const MADE: f64 = 4.0;
 const READ: f64 = 0.25;

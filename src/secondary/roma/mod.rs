@@ -146,7 +146,7 @@ pub const LEAST_CELLS: f64 = 3.0;
 
 /// Rays around a normal as long as this, in cells that bricks have, draw their map by the cosine. Of shorter ones cells
 /// add more to what is met than the cosine in a stratum takes away, and to draw it takes up to half of the time
-/// (`benches/results/roma-errors.md`).
+/// (`docs/results/roma-errors.md`).
 pub const LONG_CELLS: f64 = 32.0;
 
 /// Most rays of which one is traced to correct maps by.

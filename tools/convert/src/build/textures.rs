@@ -216,7 +216,7 @@ pub(super) fn sound_wrap(texture: &SourceTexture) -> u32 {
 
 /// Makes the mip chain of a texture and encodes it.
 ///
-/// As blocks, normals are BC5: unit vectors without the sign of z. See `benches/results/textures.md` for the angles
+/// As blocks, normals are BC5: unit vectors without the sign of z. See `docs/results/textures.md` for the angles
 /// that it costs.
 pub(super) fn encode(
     source: &SourceTexture,
@@ -576,7 +576,7 @@ mod tests {
         [sum / count, most, 10.0 * (255.0 * 255.0 * count / error).log10(), milliseconds]
     }
 
-    /// What is lost of Sponza's is in `benches/results/textures.md`.
+    /// What is lost of Sponza's is in `docs/results/textures.md`.
     #[test]
     fn directions_lose_little_as_bc5_and_less_than_as_bc7() {
         // Waves of 80 and 40 texels, up to 35 degrees steep.
