@@ -150,7 +150,6 @@ fn counter(which: Optimisation) -> fn(&Record) -> u64 {
         Optimisation::TighterBounds => |r| r.queries_tightened,
         Optimisation::LazyRequery => |r| r.requeries_deferred,
         Optimisation::PullUp => |r| r.pulled_up,
-        Optimisation::LeafCache => |r| r.leaf_groups_postponed,
     }
 }
 

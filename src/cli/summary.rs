@@ -63,7 +63,6 @@ pub fn of_walk(
             },
             "fronts": args.stream.fronts,
             "without": names(&args.optimisations.without),
-            "with": names(&args.optimisations.with),
             "query_threshold": args.stream.query_threshold,
             "tile": args.stream.tile,
             "evict": renderer.cache.residency.policy().name(),

@@ -65,8 +65,6 @@ pub struct Record {
     pub tile_batches: u64,
     /// Leaves that these intersected.
     pub tile_batch_leaves: u64,
-    /// With leaf-cache: groups of triangles that rays postponed.
-    pub leaf_groups_postponed: u64,
     /// With ROMA: rays that had passed as many columns of cells as they may, and went on along their map's direction;
     /// with distance fields, that had made as many look-ups as they may, and went free.
     pub rays_capped: u64,
@@ -177,7 +175,6 @@ impl Record {
             pairs_front_to_back: r.pairs_front_to_back,
             tile_batches: r.tile_batches,
             tile_batch_leaves: r.tile_batch_leaves,
-            leaf_groups_postponed: r.leaf_groups_postponed,
             rays_capped: r.rays_capped,
             bricks_nearest_first: stats.bricks_nearest_first,
             bricks_no_longer_wanted: stats.bricks_no_longer_wanted,

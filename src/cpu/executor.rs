@@ -246,8 +246,7 @@ fn run_kernel(
             count_pairs(bound, own, &tiles.pair_counts);
         }
         "query_pairs" => query_pairs(bound, own, tiles),
-        "intersect_list" => intersect_list::<false>(bound, own, tiles),
-        "intersect_list_cached" => intersect_list::<true>(bound, own, tiles),
+        "intersect_list" => intersect_list(bound, own, tiles),
         "intersect_from_root" => intersect_all::<true>(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
         "intersect_from_root_all" => intersect_all::<false>(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
         "intersect_selected" => intersect_all::<true>(bound, own, Work::All, &tiles.pair_counts),
@@ -324,7 +323,7 @@ impl Executor for CpuExecutor {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            for dispatch in dispatches(pass, step, &params, &self.directions, self.tuning.leaf_cache, everything) {
+            for dispatch in dispatches(pass, step, &params, &self.directions, everything) {
                 let start = Instant::now();
                 let bound = Bound {
                     params: &dispatch.params,

@@ -175,7 +175,6 @@ impl Renderer {
         camera: &Camera,
         watch: &mut dyn FnMut(u32, &Accumulation) -> bool,
     ) -> Result<FrameOutput, RenderError> {
-        self.executor.tuning().leaf_cache = self.settings.tracing.optimisations.leaf_cache;
         if let Some(captures) = &mut self.captures {
             captures.clear();
         }

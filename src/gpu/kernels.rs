@@ -99,8 +99,7 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("query", "query", Groups::Tiles, &[]),
     ("query_pairs", "query_pairs", Groups::Tiles, &[]),
     ("query_reduce", "query_reduce", Groups::Tiles, &[]),
-    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 0.0), ("LEAF_CACHE", 0.0)]),
-    ("intersect_list", "intersect_list_cached", Groups::CacheTiles, &[("COUNT", 0.0), ("LEAF_CACHE", 1.0)]),
+    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 0.0)]),
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0)]),
     ("intersect_all", "intersect_from_root", Groups::CacheTiles, &[("COUNT", 0.0), ("SELECT", 1.0), ("OF_TILES", 1.0)]),
@@ -123,8 +122,7 @@ pub(crate) fn names() -> impl Iterator<Item = &'static str> {
 
 /// Specialisations that count nodes and triangles, made only when counting is asked for.
 const COUNTING: &[Specialisation] = &[
-    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 1.0), ("LEAF_CACHE", 0.0)]),
-    ("intersect_list", "intersect_list_cached", Groups::CacheTiles, &[("COUNT", 1.0), ("LEAF_CACHE", 1.0)]),
+    ("intersect_list", "intersect_list", Groups::CacheTiles, &[("COUNT", 1.0)]),
     ("intersect_all", "intersect_all", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 0.0)]),
     ("intersect_all", "intersect_selected", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0)]),
     ("intersect_all", "intersect_from_root", Groups::CacheTiles, &[("COUNT", 1.0), ("SELECT", 1.0), ("OF_TILES", 1.0)]),

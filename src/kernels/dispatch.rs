@@ -218,16 +218,8 @@ fn across(count: u32) -> [u32; 2] {
 }
 
 /// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells passes and their dispatches
-/// apart; with `leaf_cache` lists are intersected by the kernel that has one; with `everything` resident no kernel
-/// looks for what is.
-pub fn dispatches(
-    pass: Pass,
-    step: Step,
-    params: &Params,
-    directions: &Directions,
-    leaf_cache: bool,
-    everything: bool,
-) -> Vec<Dispatch> {
+/// apart; with `everything` resident no kernel looks for what is.
+pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directions, everything: bool) -> Vec<Dispatch> {
     let params = Params { run_count: u32::MAX >> 1, ..directions.params(pass, params) };
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
@@ -245,10 +237,7 @@ pub fn dispatches(
         let groups = Workgroups::Fixed(groups);
         Dispatch { kernel, params, groups, cache: false, third: Third::Roma, phase: Some(phase) }
     };
-    let list = |params, phase| {
-        let name = if leaf_cache { "intersect_list_cached" } else { "intersect_list" };
-        dispatch(name, params, Workgroups::Chosen, Some(phase))
-    };
+    let list = |params, phase| dispatch("intersect_list", params, Workgroups::Chosen, Some(phase));
     let choose = |params, phase| kernel("tile_choose", params, [1, 1], phase);
     let intersect = |mask, want, from_root, phase| {
         let params = Params { select_mask: mask, select_want: want, ..params };

@@ -86,8 +86,6 @@ pub struct Report {
     pub tile_batches: u64,
     /// Leaves that these intersected.
     pub tile_batch_leaves: u64,
-    /// Groups of triangles that rays postponed.
-    pub leaf_groups_postponed: u64,
     /// Rays that [`Step::RomaTrace`] finished along their map's direction because they had passed as many columns as
     /// they may, and those that [`Step::FieldTrace`] let go free because they had made as many look-ups as they may.
     pub rays_capped: u64,
@@ -193,7 +191,6 @@ impl PassStats {
         sum.pairs_front_to_back += r.pairs_front_to_back;
         sum.tile_batches += r.tile_batches;
         sum.tile_batch_leaves += r.tile_batch_leaves;
-        sum.leaf_groups_postponed += r.leaf_groups_postponed;
         sum.queries_tightened += r.queries_tightened;
         sum.rays_capped += r.rays_capped;
         sum.pilots.add(r.pilots);

@@ -238,9 +238,9 @@ fn version_is_printed() {
 
 #[test]
 fn optimisations_are_switched_by_name() {
-    let w = walk("--without requery,nearest-first --with leaf-cache").unwrap();
+    let w = walk("--without requery,nearest-first").unwrap();
     let on = w.optimisations.optimisations();
-    assert!(!on.requery && !on.nearest_first && on.leaf_cache && on.by_tile && on.resident_first);
+    assert!(!on.requery && !on.nearest_first && on.by_tile && on.resident_first);
     assert_eq!(crate::cli::options::optimisation_args::names(&w.optimisations.without), ["nearest-first", "requery"]);
     assert_eq!(walk("").unwrap().optimisations.optimisations(), crate::schedule::Optimisations::default());
     let error = walk("--without haste").unwrap_err().to_string();
@@ -256,8 +256,7 @@ fn optimisations_without_meaning_are_refused_with_what_they_belong_to() {
     for (options, part) in [
         ("--schedule plain --without requery", "chc, demand or auto"),
         ("--schedule demand --without by-tile", "chc or auto"),
-        ("--schedule demand --with leaf-cache", "chc or auto"),
-        ("--with requery --without requery", "both"),
+        ("--schedule demand --without root-walk", "chc or auto"),
     ] {
         let error = check(options).unwrap_err();
         assert!(error.contains(part), "{options}: {error}");

@@ -140,7 +140,6 @@ impl Findings {
                 r.pairs_front_to_back,
                 r.tile_batches,
                 r.tile_batch_leaves,
-                r.leaf_groups_postponed,
                 r.rays,
                 counted(r.nodes),
                 counted(r.triangles),
@@ -385,18 +384,15 @@ impl Executor for Lockstep {
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let context = format!("{pass:?}, {steps:?}");
-        let Tuning { threshold, leaf_cache: has_leaf_cache, .. } = self.tuning;
+        let Tuning { threshold, .. } = self.tuning;
         (*self.gpu.tuning(), *self.cpu.tuning()) = (self.tuning, self.tuning);
         let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, threshold, ..Params::default() };
         let params = Params { field_cells: 32, field_levels: 1, ..params };
         for &step in steps {
             let everything = bricks.all_geometry_resident();
-            for leaf_cache in [false, true] {
-                let list = dispatches(pass, step, &params, &self.directions, leaf_cache, everything);
-                let ran = |name: &str| leaf_cache == has_leaf_cache || !name.starts_with("intersect_list");
-                let names = list.iter().map(|dispatch| dispatch.kernel).filter(|name| ran(name));
-                self.findings.lock().expect("findings").kernels.extend(names);
-            }
+            let list = dispatches(pass, step, &params, &self.directions, everything);
+            let names = list.iter().map(|dispatch| dispatch.kernel);
+            self.findings.lock().expect("findings").kernels.extend(names);
         }
         let rest = match steps {
             [step @ (Step::Generate | Step::DvfCosine), rest @ ..] => {

@@ -180,7 +180,6 @@ struct Variant {
     /// Leaves of the longest list that is intersected.
     list_most: u32,
     without: &'static [Optimisation],
-    with: &'static [Optimisation],
     /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped; what these do for them.
     roma: Option<(u32, Role)>,
     /// Bytes of tiles that a frame may load.
@@ -198,7 +197,6 @@ const VARIANT: Variant = Variant {
     threshold: 0,
     list_most: u32::MAX,
     without: &[],
-    with: &[],
     roma: None,
     tile_bytes: None,
     field: None,
@@ -304,7 +302,6 @@ fn render(
     }
     let mut tracing = Tracing { measure_needed: true, ..Tracing::default() };
     variant.without.iter().for_each(|&which| tracing.optimisations.set(which, false));
-    variant.with.iter().for_each(|&which| tracing.optimisations.set(which, true));
     let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
     let manifest = &scene.resident().manifest;
     let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
@@ -398,7 +395,7 @@ fn twins_agree_with_their_kernels() {
         Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
-        Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
+        Variant { without: &[RootWalk], ..VARIANT },
         // Maps drawn by the cosine; by the rays' own strata.
         Variant { roma: Some((0, Role::Answer)), ..VARIANT },
         Variant { roma: Some((3, Role::Answer)), ..VARIANT },
