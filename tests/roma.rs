@@ -195,23 +195,6 @@ fn apart(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a.1 - b.1) * (a.1 - b.1)).sum::<f64>() / a.len() as f64).sqrt()
 }
 
-#[test]
-fn traced_near_its_start_a_ray_is_nearer_to_the_exact_one() {
-    let folder = folder();
-    let of = |options: &str| openness(folder.path(), true, &format!("--spp 32 {options}"));
-    let exact = of("");
-    let handed_over = [0, 8, 32].map(|cells| of(&format!("--secondary roma --roma-near {cells}")));
-    // Of means: snapped rays go elsewhere than exact ones, and what pixels differ by for that alone must not count.
-    let error =
-        |pixels: &Vec<(f64, f64)>| BEFORE.map(|d| (mean(pixels, d) - mean(&exact, d)).abs()).iter().sum::<f64>() / 5.0;
-    let errors: Vec<f64> = handed_over.iter().map(error).collect();
-    println!("traced up to 0, 8, 32 cells: {errors:?}");
-    assert!(errors[0] > 0.02, "control: maps alone err");
-    assert!(errors[1] < 0.7 * errors[0] && errors[2] < 0.3 * errors[0], "{errors:?}");
-    // Traced beyond everything that is there: the same rays, the same picture.
-    assert_eq!(apart(&of("--secondary roma --roma-near 256"), &exact), 0.0);
-}
-
 /// Rays of ao of a frame: those that maps answer and those that are traced.
 fn rays_of_ao(scene: &Path, options: &str) -> u64 {
     let output = renderer(scene, &format!("--effects ao {options}")).frame(0, &eye()).expect("a frame");
@@ -404,8 +387,6 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     let corrected = picture("--cache 100% --secondary auto --auto-one-in 3", "1");
     assert!(corrected != one && corrected != hybrid);
     assert!(picture("--cache 20% --secondary auto --auto-one-in 3 --schedule demand", "3") == corrected);
-    let near = picture("--cache 100% --roma-near 2", "1");
-    assert!(near != one && near != hybrid && picture("--cache 20% --roma-near 2", "3") == near);
     for other in ["--seed 1", "--roma-k 8", "--roma-size 64", "--roma-samples 1", "--roma-unsnapped all"] {
         assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
     }

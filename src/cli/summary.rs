@@ -115,11 +115,6 @@ pub fn of_walk(
     })
 }
 
-/// Cells up to which rays are traced that maps answer from there on.
-fn near(role: Role) -> u32 {
-    if let Role::Far(cells) = role { cells } else { 0 }
-}
-
 /// What the host cache did, and what came of prefetching: payloads brought ahead of need, those that a load then found
 /// there, the rest of them, and requests that were dropped.
 fn streaming(renderer: &mut Renderer) -> (Value, Value) {
@@ -243,10 +238,8 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "shadow_steps": roma.shadow.steps,
             "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
             "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
-            "near": near(roma.occlusion.role),
             "one_in": if let Role::Correct(one_in) = roma.occlusion.role { one_in } else { 1 },
             "most_wrong": if let Role::Sift { most_wrong: Some(n) } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
-            "shadow_near": near(roma.shadow.role),
             "ao_handover": handover(roma.occlusion.role, &renderer.roma.handovers()[0]),
             "shadow_handover": handover(roma.shadow.role, &renderer.roma.handovers()[1]),
             "finest_cell": renderer.roma.finest_cell(),

@@ -5,7 +5,7 @@ use super::cache::{BrickCache, Shared};
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
 use crate::kernels::dispatch::{
     COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_POINTS, DVF_RAYS, DVF_SEEN, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS,
-    FIELD_TRACE, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
+    FIELD_TRACE, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_PILOTS, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
     are_pairs_culled, dispatches,
 };
 use crate::kernels::layout;
@@ -43,7 +43,7 @@ use crate::secondary::dvf::twin::DvfTables;
 use crate::secondary::occupancy::{Cascades, clearance};
 use crate::secondary::roma::cosine::roma_draw;
 use crate::secondary::roma::maps::RomaMaps;
-use crate::secondary::roma::twin::{RomaTables, roma_measure, roma_near, roma_rotate, roma_trace};
+use crate::secondary::roma::twin::{RomaTables, roma_measure, roma_pilots, roma_rotate, roma_trace};
 use crate::secondary::rsm::maps::RsmMaps;
 use crate::secondary::rsm::twin::{RsmTables, rsm_light, rsm_write};
 use crate::stream::{PayloadSource, WorkerPool, Workers};
@@ -252,7 +252,7 @@ fn run_kernel(
         "intersect_selected" => intersect_all::<true>(bound, own, Work::All, &tiles.pair_counts),
         "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
         ROMA_ROTATE => roma_rotate(bound, roma),
-        ROMA_NEAR => roma_near(bound, roma, own, seen),
+        ROMA_PILOTS => roma_pilots(bound, roma, own),
         ROMA_TRACE => roma_trace(bound, roma, own, seen),
         ROMA_DRAW => roma_draw(bound, roma, own, seen, (pixels, shaded)),
         ROMA_MEASURE => roma_measure(bound, roma, own, seen),

@@ -354,10 +354,6 @@ impl Renderer {
                     stats.add(self.executor.run(pass, &first, &self.cache.states)?);
                     return Ok(());
                 }
-                Role::Far(cells) => {
-                    first.push(Step::RomaNear { cells: cells * grid.base_per_cell() });
-                    last.push(trace(RomaPart::Far));
-                }
                 Role::Correct(one_in) => {
                     first.push(Step::RomaPilots { one_in });
                     last.push(trace(RomaPart::Correct { one_in }));

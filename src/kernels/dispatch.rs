@@ -150,7 +150,7 @@ pub const INTERSECT_BINARY: &str = "intersect_binary";
 /// The kernel that makes ray-aligned occupancy maps.
 pub const ROMA_ROTATE: &str = "roma_rotate";
 /// The kernel that ends rays before they are traced exactly.
-pub const ROMA_NEAR: &str = "roma_near";
+pub const ROMA_PILOTS: &str = "roma_pilots";
 /// The kernel that traces them.
 pub const ROMA_TRACE: &str = "roma_trace";
 /// The kernel that draws and traces them.
@@ -354,11 +354,10 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
             let columns = params.roma_levels * params.roma_k * params.roma_k * params.roma_size * params.roma_size;
             vec![roma(ROMA_ROTATE, params, across(columns.div_ceil(64)), 0)]
         }
-        Step::RomaNear { cells } => vec![roma(ROMA_NEAR, Params { roma_near: cells, ..params }, per_ray, 0)],
         Step::RomaPilots { one_in } => {
             let roma_part = layout::ROMA_CORRECT;
-            let params = Params { roma_part, roma_near: layout::NONE, roma_pilots: one_in, ..params };
-            vec![roma(ROMA_NEAR, params, per_ray, 0)]
+            let params = Params { roma_part, roma_pilots: one_in, ..params };
+            vec![roma(ROMA_PILOTS, params, per_ray, 0)]
         }
         Step::RomaTrace { steps, part } => {
             let (roma_part, Sift { near, pilots }) = match part {

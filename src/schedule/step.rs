@@ -81,12 +81,6 @@ pub enum Step {
     AddOcclusion,
     /// Make the ray-aligned maps that the executor was given last: phase 1.
     RomaRotate,
-    /// End the pass's rays, not traced yet, this many cells of the base map that holds their start from it: what they
-    /// meet up to there is for bricks to tell.
-    RomaNear {
-        /// Cells.
-        cells: u32,
-    },
     /// End those of the pass's rays, not traced yet, that are no pilots.
     RomaPilots {
         /// One ray in so many is one.
@@ -198,7 +192,7 @@ pub enum RomaPart {
     /// All of them, which are snapped, by the maps that are drawn in proportion to the cosines between their directions
     /// and the normals of the set before; they go on in these directions.
     Cosine,
-    /// Of those that have met nothing where [`Step::RomaNear`] ended them, what lies beyond: they have been traced.
+    /// Of those that have met nothing up to where [`Sift::near`] ended them, what lies beyond: they have been traced.
     Far,
     /// Whether they meet anything. Those that do not are answered; the others are still to be traced.
     Sift(Sift),

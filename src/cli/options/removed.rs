@@ -6,7 +6,11 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 const REMOVED: &[(&str, &str)] = &[
     ("leaf-cache", "triangles are tested where they are found, which is faster"),
     ("--with", "every optimisation is on; --without LIST switches some off"),
+    ("--roma-near", HANDED_OVER),
+    ("--roma-shadow-near", HANDED_OVER),
 ];
+
+const HANDED_OVER: &str = "--secondary auto hands rays over to maps where their measured error allows it";
 
 /// What to say to somebody who writes `name`, if it is gone.
 pub fn removed(name: &str) -> Option<String> {

@@ -14,7 +14,7 @@ use crate::gpu::kernels::Kernels;
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernels::dispatch::{
-    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE,
+    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_PILOTS, ROMA_ROTATE, ROMA_TRACE,
     RSM_LIGHT, RSM_WRITE,
 };
 use crate::kernels::frame::Frame;
@@ -399,7 +399,6 @@ fn twins_agree_with_their_kernels() {
         // Maps drawn by the cosine; by the rays' own strata.
         Variant { roma: Some((0, Role::Answer)), ..VARIANT },
         Variant { roma: Some((3, Role::Answer)), ..VARIANT },
-        Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
         Variant { roma: Some((64, Role::Sift { most_wrong: None })), ..VARIANT },
         Variant { roma: Some((3, Role::Sift { most_wrong: None })), schedule: Schedule::Demand, ..VARIANT },
         Variant { roma: Some((64, Role::Sift { most_wrong: Some(100_000) })), ..VARIANT },
@@ -435,7 +434,7 @@ fn twins_agree_with_their_kernels() {
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
     let all = kernels::names()
-        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE, RSM_WRITE, RSM_LIGHT])
+        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_PILOTS, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE, RSM_WRITE, RSM_LIGHT])
         .chain(FIELD_KERNELS)
         .chain(DVF_KERNELS);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();

@@ -113,7 +113,7 @@ impl Roma {
 
     /// Has the executor take the maps of `pass` for rays that are `length` world units long at most, unless it has
     /// them; the step that then makes them. Levels are left out that such rays end in before they are off their
-    /// surface, or before they are answered by maps.
+    /// surface.
     ///
     /// # Errors
     /// The executor's.
@@ -131,7 +131,6 @@ impl Roma {
         let cells = grid.base_cells();
         self.assemble(scene, grid.size, cells)?;
         let before = LIFT / grid.scale(cells);
-        let before = if let Role::Far(near) = role { before.max((near * grid.base_per_cell()).into()) } else { before };
         let is_of_use = |bom: &&Bom| before * bom.side() < length;
         let levels = self.cascades.levels.iter().take_while(is_of_use).count();
         if self.made == Some((grid, role, levels)) {

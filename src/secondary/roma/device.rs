@@ -6,7 +6,7 @@ use crate::gpu::kernels;
 use crate::gpu::kernels::Kernels;
 use crate::gpu::method::{Method, check_bytes, grow};
 use crate::gpu::rays::storage;
-use crate::kernels::dispatch::{ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE};
+use crate::kernels::dispatch::{ROMA_DRAW, ROMA_MEASURE, ROMA_PILOTS, ROMA_ROTATE, ROMA_TRACE};
 use crate::kernels::layout::{RomaLevel, RomaMap};
 use crate::schedule::ExecutorError;
 use crate::secondary::occupancy::{Cascades, clearance};
@@ -34,7 +34,7 @@ pub struct Roma {
 impl Roma {
     /// Of nothing.
     pub fn new(gpu: &Gpu, kernels: &Kernels) -> Self {
-        let names = [ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE];
+        let names = [ROMA_ROTATE, ROMA_PILOTS, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE];
         let method = Method::new(gpu, kernels, "roma", kernels::roma_layout(&gpu.device), &names);
         let [levels, map_records, boms, columns] =
             [("roma levels", size_of::<RomaLevel>()), ("roma maps", size_of::<RomaMap>()), ("boms", 4), ("columns", 4)]

@@ -437,21 +437,15 @@ fn near_end(p: &Params, levels: &[RomaLevel], index: u32, ray: &Ray, normal: Vec
     level.map_or(T_INFINITE, |level| divide(cells as f32, level.scale * length))
 }
 
-/// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those
-/// that no base map holds are traced whole. Where there are pilots only these are traced.
-pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
-    let (p, levels) = (bound.params, &tables.maps.levels);
-    if levels.is_empty() {
+/// Ends those of the pass's rays that are no pilots before they are traced: maps answer them.
+pub fn roma_pilots(bound: &Bound, tables: &RomaTables, own: &mut RaySet) {
+    let p = bound.params;
+    if tables.maps.levels.is_empty() {
         return;
     }
     own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
-        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
-            let index = run * RUN + i;
-            if p.roma_near != NONE {
-                let end = near_end(p, levels, index as u32, ray, normal_of(seen, index), p.roma_near);
-                hit.t = least(ray.t_max, end);
-            }
-            if p.roma_pilots != 0 && !is_pilot(p, index as u32) {
+        for (i, (hit, _)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+            if p.roma_pilots != 0 && !is_pilot(p, (run * RUN + i) as u32) {
                 hit.t = ANSWERED;
             }
         }
