@@ -23,7 +23,7 @@ pub fn of_walk(
     frames: u32,
     left_out: Vec<Value>,
 ) -> Value {
-    let streaming = streaming(renderer);
+    let host_cache = host_cache(renderer);
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let (streamed_bytes, tile_bytes) =
@@ -69,7 +69,6 @@ pub fn of_walk(
             "cache_bytes": renderer.cache.residency.budget_bytes(),
             "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
             "host_cache_bytes": args.stream.host_cache,
-            "prefetch": args.stream.prefetch,
             "interactive_bytes": args.interactive,
             "secondary": args.secondary.name(),
             "roma": roma_settings(args, renderer),
@@ -105,8 +104,7 @@ pub fn of_walk(
         })),
         "left_out": left_out,
         "texture_bytes_resident": renderer.executor.texture_bytes(),
-        "host_cache": streaming.0,
-        "prefetch": streaming.1,
+        "host_cache": host_cache,
         "error": args.measure_error.then(|| errors(records)),
         "memory": memory(),
         "passes": passes(records),
@@ -115,27 +113,15 @@ pub fn of_walk(
     })
 }
 
-/// What the host cache did, and what came of prefetching: payloads brought ahead of need, those that a load then found
-/// there, the rest of them, and requests that were dropped.
-fn streaming(renderer: &mut Renderer) -> (Value, Value) {
-    let workers = renderer.executor.workers();
-    let (host, stats) = (workers.host_cache().stats(), workers.stats());
-    let cache = json!({
+/// What the host cache did.
+fn host_cache(renderer: &Renderer) -> Value {
+    let host = renderer.executor.workers().host_cache().stats();
+    json!({
         "hits": host.hits,
         "misses": host.misses,
         "evicted": host.evicted,
         "used_bytes": host.used_bytes,
-    });
-    let prefetch = json!({
-        "prefetched": host.prefetched,
-        "prefetched_bytes": host.prefetched_bytes,
-        "used": host.prefetched_used,
-        "used_bytes": host.prefetched_used_bytes,
-        "wasted": host.prefetched - host.prefetched_used,
-        "wasted_bytes": host.prefetched_bytes - host.prefetched_used_bytes,
-        "dropped": stats.prefetch_dropped,
-    });
-    (cache, prefetch)
+    })
 }
 
 /// The errors of the effects that `--measure-error` measured: means over the frames, and the greatest.

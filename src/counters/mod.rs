@@ -120,13 +120,6 @@ pub struct Record {
     pub cache_bytes: u64,
     /// Of it, bytes in use at the end.
     pub cache_used_bytes: u64,
-    /// Bytes that workers brought into the host cache ahead of need, from the end of the pass before this effect's
-    /// passes on.
-    pub prefetched_bytes: u64,
-    /// Bytes brought ahead of need that the effect's loads found in the host cache.
-    pub prefetched_used_bytes: u64,
-    /// Bytes brought ahead of need that the host cache put out before anything asked for them.
-    pub prefetched_wasted_bytes: u64,
     /// With `--measure-error`: mean absolute difference of the effect's part of the picture from the exact one, over
     /// pixels and channels, linear radiance.
     pub error_mean: f64,

@@ -3,7 +3,6 @@
 use super::Renderer;
 use crate::counters::Record;
 use crate::schedule::{ExecutorError, PassStats};
-use crate::stream::HostCacheStats;
 use std::time::Instant;
 
 /// Collects the statistics of the effects of a frame, each over all its samples, directions and lamps.
@@ -17,8 +16,6 @@ struct EffectRecord {
     stats: PassStats,
     resident_start: u64,
     resident_end: u64,
-    /// What became of prefetches.
-    ahead: HostCacheStats,
 }
 
 impl FrameRecords {
@@ -59,8 +56,8 @@ impl FrameRecords {
         let resident = |renderer: &Renderer| renderer.cache.residency.resident().count() as u64;
         let before = resident(renderer);
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
-            let (stats, ahead) = (PassStats::default(), HostCacheStats::default());
-            self.effects.push(EffectRecord { name, stats, resident_start: before, resident_end: before, ahead });
+            let stats = PassStats::default();
+            self.effects.push(EffectRecord { name, stats, resident_start: before, resident_end: before });
             self.effects.len() - 1
         });
         let effect = &mut self.effects[index];
@@ -69,11 +66,6 @@ impl FrameRecords {
         effect.stats.ms += start.elapsed().as_secs_f64() * 1e3;
         effect.stats.cache_passes = effect.stats.cache_passes.max(renderer.cache.residency.fillings());
         effect.resident_end = effect.resident_end + resident(renderer) - before;
-        let host = renderer.executor.workers().host_cache().stats();
-        let seen = std::mem::replace(&mut renderer.host_seen, host);
-        effect.ahead.prefetched_bytes += host.prefetched_bytes - seen.prefetched_bytes;
-        effect.ahead.prefetched_used_bytes += host.prefetched_used_bytes - seen.prefetched_used_bytes;
-        effect.ahead.prefetched_wasted_bytes += host.prefetched_wasted_bytes - seen.prefetched_wasted_bytes;
         // Maps of lamps and fields of visibility add nothing to the picture, whose last sum they come before.
         let adds = ![crate::secondary::rsm::answer::EFFECT, crate::secondary::dvf::answer::EFFECT].contains(&name);
         if let Some(captures) = renderer.captures.as_mut().filter(|_| adds) {
@@ -90,9 +82,6 @@ impl FrameRecords {
             cache_used_bytes: residency.used_bytes(),
             bricks_resident_start: effect.resident_start,
             bricks_resident_end: effect.resident_end,
-            prefetched_bytes: effect.ahead.prefetched_bytes,
-            prefetched_used_bytes: effect.ahead.prefetched_used_bytes,
-            prefetched_wasted_bytes: effect.ahead.prefetched_wasted_bytes,
             ..Record::of(self.frame, effect.name, &effect.stats)
         };
         self.effects.into_iter().map(record).collect()

@@ -20,7 +20,6 @@ use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::handover::{PILOTS, Trust};
 use crate::secondary::roma::{Role, RomaPass, RomaSettings};
 use crate::secondary::rsm::answer::Rsm;
-use crate::stream::HostCacheStats;
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -150,8 +149,6 @@ pub struct Renderer {
     pub dvf: Dvf,
     /// The reflective shadow maps, where diffuse rays are answered by occupancy maps.
     pub rsm: Rsm,
-    /// The host cache's statistics at the end of the pass before.
-    pub host_seen: HostCacheStats,
 }
 
 impl Renderer {

@@ -6,6 +6,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 const REMOVED: &[(&str, &str)] = &[
     ("leaf-cache", "triangles are tested where they are found, which is faster"),
     ("--with", "every optimisation is on; --without LIST switches some off"),
+    ("--prefetch", "bricks are read when rays ask for them, and --host-cache keeps them"),
     ("--roma-near", HANDED_OVER),
     ("--roma-shadow-near", HANDED_OVER),
 ];

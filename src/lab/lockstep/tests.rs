@@ -37,7 +37,7 @@ use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::{Grid, Role, RomaPass, RomaSettings};
 use crate::secondary::rsm::RsmSettings;
 use crate::secondary::rsm::answer::Rsm;
-use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
+use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -265,11 +265,11 @@ fn lockstep(
         gpu.clone(),
         kernels.clone(),
         scene.clone(),
-        Workers::new(scene.clone(), host(), 1, 0).unwrap(),
+        Workers::new(scene.clone(), host(), 1).unwrap(),
         pages,
         setup,
     );
-    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1, 0).unwrap(), setup);
+    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1).unwrap(), setup);
     Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone())
 }
 
@@ -334,7 +334,6 @@ fn render(
         field: Field::default(),
         rsm: Rsm::default(),
         dvf: Dvf::default(),
-        host_seen: HostCacheStats::default(),
     };
     let path = path_from_bounds(manifest.min, manifest.max);
     if let Some(settings) = &variant.dvf {
