@@ -28,7 +28,6 @@ struct Params {
     jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
     around: vec4<f32>,    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
     share: f32,           // of the light that the pass's direction stands for
-    surface_share: f32,   // of its own light that a primary hit shows, the rest being mirrored
     length: f32,          // of the pass's rays where that is limited, device units
     stream: u32,          // which random numbers the pass takes
     pair_count: u32,      // pairs to be queried
@@ -67,6 +66,7 @@ struct Params {
     dvf_next: u32,        // sweeps: first element of the level above; dvf_rays, dvf_write: first word of the block's bits of waiting rays, NONE: none may wait
     dvf_count: u32,       // sweeps: elements of the level; dvf_points: sides of points; dvf_write: 0: nothing is entered into masks
     dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
+    padding: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }

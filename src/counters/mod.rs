@@ -8,10 +8,9 @@ use serde::Serialize;
 pub struct Record {
     /// Frame, from 0.
     pub frame: u32,
-    /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `mirror`, `glossy`, and of the rays to lamps
-    /// from the hits of bounces `diffuse-shadow`, `diffuse-environment`, `mirror-shadow`, `mirror-environment`,
-    /// `glossy-shadow`, `glossy-environment`; `dvf`, where the cells of a field of visibility are made anew for what
-    /// moves.
+    /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `glossy`, and of the rays to lamps from the hits
+    /// of bounces `diffuse-shadow`, `diffuse-environment`, `glossy-shadow`, `glossy-environment`; `dvf`, where the
+    /// cells of a field of visibility are made anew for what moves.
     pub pass: &'static str,
     /// Rays traced.
     pub rays: u64,

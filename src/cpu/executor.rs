@@ -18,8 +18,7 @@ use crate::kernels::query::tile_lists::{TileLists, query_reduce, tile_choose, ti
 use crate::kernels::query::tile_walk::{tile_walk_count, tile_walk_write};
 use crate::kernels::rays::{RaySet, Work};
 use crate::kernels::shade::generate::{
-    generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
-    start_hits,
+    generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
 use crate::kernels::shade::lamps::LampTables;
 use crate::kernels::shade::resolve::{AttributeView, resolve};
@@ -216,7 +215,6 @@ fn run_kernel(
         "generate_shadow" => generate_shadow(bound, own, seen, &pixels.throughput),
         "generate_occlusion" => generate_occlusion(bound, own, seen, &pixels.gbuffers[shaded]),
         "generate_diffuse" => generate_diffuse(bound, own, seen, pixels, materials),
-        "generate_mirror" => generate_mirror(bound, own, seen, pixels),
         "generate_glossy" => generate_glossy(bound, own, seen, pixels, materials),
         "start_hits" => start_hits(own),
         "clear_gbuffer" => clear_gbuffer(bound, pixels, shaded),

@@ -227,9 +227,6 @@ impl Renderer {
                     None => self.bounce(&mut records, names, Pass::Diffuse(index))?,
                 }
             }
-            if effects.mirror {
-                self.bounce(&mut records, ["mirror", "mirror-shadow", "mirror-environment"], Pass::Mirror)?;
-            }
             if effects.glossy {
                 self.bounce(&mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
             }

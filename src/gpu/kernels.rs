@@ -76,7 +76,6 @@ const SPECIALISATIONS: &[Specialisation] = &[
     ("generate_shadow", "generate_shadow", Groups::Shading, &[]),
     ("generate_around", "generate_occlusion", Groups::Shading, &[("LIMITED", 1.0)]),
     ("generate_around", "generate_diffuse", Groups::Shading, &[("LIMITED", 0.0)]),
-    ("generate_mirror", "generate_mirror", Groups::Shading, &[]),
     ("generate_glossy", "generate_glossy", Groups::Shading, &[]),
     ("start_hits", "start_hits", Groups::Tiles, &[]),
     ("clear_gbuffer", "clear_gbuffer", Groups::Shading, &[]),

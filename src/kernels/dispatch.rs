@@ -37,7 +37,7 @@ impl Directions {
     fn params(&self, pass: Pass, params: &Params) -> Params {
         // Every kind of pass takes random numbers of its own. Those of a sun alone depend on the sample only.
         let (stream, direction) = match pass {
-            Pass::Primary | Pass::Mirror | Pass::Shadow(Lamp::Sun) => (0, None),
+            Pass::Primary | Pass::Shadow(Lamp::Sun) => (0, None),
             Pass::Shadow(Lamp::Emitter) => (1, None),
             Pass::BounceShadow(Lamp::Sun) => (2, None),
             Pass::BounceShadow(Lamp::Emitter) => (3, None),
@@ -271,7 +271,6 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
             let kernel = match pass {
                 Pass::Occlusion(_) => "generate_occlusion",
                 Pass::Diffuse(_) => "generate_diffuse",
-                Pass::Mirror => "generate_mirror",
                 Pass::Glossy => "generate_glossy",
                 Pass::Primary | Pass::Shadow(_) | Pass::BounceShadow(_) => "generate_shadow",
             };

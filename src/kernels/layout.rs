@@ -112,7 +112,7 @@ mirror! {
         origin: [f32; 4], base: [f32; 4], step_x: [f32; 4], step_y: [f32; 4],
         sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
         around: [f32; 4],
-        share: f32, surface_share: f32, length: f32, stream: u32,
+        share: f32, length: f32, stream: u32,
         pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
         emitter_density: f32, diffuse_count: f32, roma_k: u32, roma_size: u32,
@@ -122,6 +122,7 @@ mirror! {
         field_step: u32, field_half: u32, field_steps: u32, field_hit: f32,
         rsm_maps: u32, rsm_map: u32, rsm_x: u32, rsm_y: u32,
         dvf_first: u32, dvf_next: u32, dvf_count: u32, dvf_turn: u32,
+        padding: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

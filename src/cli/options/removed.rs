@@ -4,6 +4,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// Each name as it was written on the command line, and what to write now.
 const REMOVED: &[(&str, &str)] = &[
+    ("mirror", "glossy shows what smooth metals mirror"),
     ("leaf-cache", "triangles are tested where they are found, which is faster"),
     ("--with", "every optimisation is on; --without LIST switches some off"),
     ("--prefetch", "bricks are read when rays ask for them, and --host-cache keeps them"),
@@ -41,6 +42,7 @@ mod tests {
     fn words(name: &str) -> String {
         match name {
             "leaf-cache" => "--without leaf-cache".into(),
+            "mirror" => "--effects mirror".into(),
             option => format!("{option} 1"),
         }
     }

@@ -202,7 +202,7 @@ impl Lockstep {
         let surfaces = match pass.set() {
             0 => Vec::new(),
             1 => self.gpu.read_surfaces(Pass::Primary)?,
-            _ => self.gpu.read_surfaces(Pass::Mirror)?,
+            _ => self.gpu.read_surfaces(Pass::Glossy)?,
         };
         let mut findings = self.findings.lock().expect("findings");
         if pass == Pass::Primary {

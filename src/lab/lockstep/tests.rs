@@ -209,7 +209,6 @@ fn effects() -> Effects {
         environment: true,
         occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
         diffuse: Some(1),
-        mirror: true,
         glossy: true,
         turn_degrees: 360.0,
     }

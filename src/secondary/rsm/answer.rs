@@ -183,7 +183,6 @@ impl Renderer {
             sun: self.light.sun_direction.as_vec3().extend(0.0).to_array(),
             sun_color: [r, g, b, 0.0],
             emitter_count: self.light.lamps.emitters().len() as u32,
-            surface_share: 1.0,
             seed: self.settings.seed,
             ..Params::default()
         };
