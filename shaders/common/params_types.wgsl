@@ -28,7 +28,6 @@ struct Params {
     jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
     around: vec4<f32>,    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
     share: f32,           // of the light that the pass's direction stands for
-    surface_share: f32,   // of its own light that a primary hit shows, the rest being mirrored
     length: f32,          // of the pass's rays where that is limited, device units
     stream: u32,          // which random numbers the pass takes
     pair_count: u32,      // pairs to be queried
@@ -43,6 +42,7 @@ struct Params {
     diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
     padding0: u32,
     padding1: u32,
+    padding2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
 }

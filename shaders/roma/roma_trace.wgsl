@@ -1,6 +1,6 @@
 // Answers the pass's rays by ray-aligned occupancy maps, each by that of its stratum. What is met is written as a hit
 // of no triangle, but where rays are sifted: there, those that meet nothing are ended, and others are traced up to
-// roma_near cells from their start. Where pilots have been traced, these count for what maps get wrong.
+// own.near cells from their start. Where pilots have been traced, these count for what maps get wrong.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"

@@ -92,5 +92,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         light += ambient(g.normal) * g.occlusion;
         mirrored += reflected_ambient(s) * g.occlusion;
     }
-    add_light(index, surface_share() * (s.diffuse * light + mirrored + seen_emission(g, ray, index, density)));
+    add_light(index, s.diffuse * light + mirrored + seen_emission(g, ray, index, density));
 }

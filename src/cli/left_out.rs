@@ -118,7 +118,6 @@ pub fn measure(
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
     let mut options = args.clone();
     options.stream.requests_out = None;
-    options.stream.prefetch = 0;
     let open = |keep: Keep| -> Result<Renderer> {
         let session = Session::open_keeping(scene.clone(), &args.scene, &options.stream, extent, keep)?;
         Ok(lit_renderer(session, &options, light.clone()))

@@ -26,7 +26,7 @@ pub fn of_walk(
     frames: u32,
     left_out: Vec<Value>,
 ) -> Value {
-    let streaming = streaming(renderer);
+    let host_cache = host_cache(renderer);
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let (streamed_bytes, tile_bytes) =
@@ -66,14 +66,12 @@ pub fn of_walk(
             },
             "fronts": args.stream.fronts,
             "without": names(&args.optimisations.without),
-            "with": names(&args.optimisations.with),
             "query_threshold": args.stream.query_threshold,
             "tile": args.stream.tile,
             "evict": renderer.cache.residency.policy().name(),
             "cache_bytes": renderer.cache.residency.budget_bytes(),
             "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
             "host_cache_bytes": args.stream.host_cache,
-            "prefetch": args.stream.prefetch,
             "interactive_bytes": args.interactive,
             "secondary": args.secondary.name(),
             "roma": roma_settings(args, renderer),
@@ -109,8 +107,7 @@ pub fn of_walk(
         })),
         "left_out": left_out,
         "texture_bytes_resident": renderer.executor.texture_bytes(),
-        "host_cache": streaming.0,
-        "prefetch": streaming.1,
+        "host_cache": host_cache,
         "error": args.measure_error.then(|| errors(records)),
         "memory": memory(),
         "passes": passes(records),
@@ -119,32 +116,15 @@ pub fn of_walk(
     })
 }
 
-/// Cells up to which rays are traced that maps answer from there on.
-fn near(role: Role) -> u32 {
-    if let Role::Far(cells) = role { cells } else { 0 }
-}
-
-/// What the host cache did, and what came of prefetching: payloads brought ahead of need, those that a load then found
-/// there, the rest of them, and requests that were dropped.
-fn streaming(renderer: &mut Renderer) -> (Value, Value) {
-    let workers = renderer.executor.workers();
-    let (host, stats) = (workers.host_cache().stats(), workers.stats());
-    let cache = json!({
+/// What the host cache did.
+fn host_cache(renderer: &Renderer) -> Value {
+    let host = renderer.executor.workers().host_cache().stats();
+    json!({
         "hits": host.hits,
         "misses": host.misses,
         "evicted": host.evicted,
         "used_bytes": host.used_bytes,
-    });
-    let prefetch = json!({
-        "prefetched": host.prefetched,
-        "prefetched_bytes": host.prefetched_bytes,
-        "used": host.prefetched_used,
-        "used_bytes": host.prefetched_used_bytes,
-        "wasted": host.prefetched - host.prefetched_used,
-        "wasted_bytes": host.prefetched_bytes - host.prefetched_used_bytes,
-        "dropped": stats.prefetch_dropped,
-    });
-    (cache, prefetch)
+    })
 }
 
 /// The errors of the effects that `--measure-error` measured: means over the frames, and the greatest.
@@ -248,10 +228,8 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "shadow_steps": roma.shadow.steps,
             "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
             "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
-            "near": near(roma.occlusion.role),
             "one_in": if let Role::Correct(one_in) = roma.occlusion.role { one_in } else { 1 },
             "most_wrong": if let Role::Sift { most_wrong: Some(n) } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
-            "shadow_near": near(roma.shadow.role),
             "ao_handover": handover(roma.occlusion.role, &answers.handovers()[0]),
             "shadow_handover": handover(roma.shadow.role, &answers.handovers()[1]),
             "finest_cell": finest_cell(&renderer.methods),

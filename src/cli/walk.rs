@@ -14,7 +14,6 @@ use crate::frame::{
 use crate::kernels::Extent;
 use crate::output::atomic;
 use crate::picture::denoise::Resolve;
-use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
@@ -24,7 +23,6 @@ use crate::secondary::roma::LEAST_CELLS;
 use crate::secondary::roma::answer::Roma;
 use crate::session::lighting::lighting;
 use crate::session::open::{Session, open_scene, write_requests};
-use crate::stream::{BrickBox, HostCacheStats, Item, Prefetcher};
 use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
 use brickwalk_convert::progress::Progress;
@@ -74,7 +72,6 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         Secondary::Dvf => dvf::prepare(&mut renderer, args, &path)?,
         _ => None,
     };
-    let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
     let mut resolve = Resolve::new(args.pictures.denoise, args.pictures.taa);
     let mut pictures = Pictures::create(&frames_folder, args)?;
     let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
@@ -97,12 +94,9 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         let camera = path.frame(frame, args.frames);
         if let Some(motion) = &motion {
             let time = path.time(frame, args.frames);
-            let moved = motion.place(&mut renderer, time)?;
+            motion.place(&mut renderer, time)?;
             if let Some(reference) = &mut reference {
                 motion.place(reference, time)?;
-            }
-            if let Some(prefetcher) = prefetcher.as_mut().filter(|_| moved) {
-                prefetcher.set_boxes(BrickBox::of_scene(renderer.scene.resident()));
             }
         }
         if frame == 0 && args.measure_left_out {
@@ -131,9 +125,6 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         if let Some(reference) = &mut reference {
             reference.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
             note_errors(&mut output.records, &renderer, reference);
-        }
-        if let Some(prefetcher) = prefetcher.as_mut().filter(|_| frame + 1 < args.frames) {
-            look_ahead(&mut renderer, prefetcher, &camera);
         }
         resolve.frame(&mut output);
         pictures.frame(frame, path.frame_time(args.frames), &output.pixels)?;
@@ -200,7 +191,6 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
-        host_seen: HostCacheStats::default(),
     };
     Renderer { engine, methods: methods(args) }
 }
@@ -258,7 +248,6 @@ fn warn_of_dark_lamps(renderer: &Renderer) {
 fn reference(scene: Arc<SceneFile>, args: &WalkArgs, light: Light, extent: Extent) -> Result<Renderer> {
     let mut args = args.clone();
     args.stream.query_threshold = 0;
-    args.stream.prefetch = 0;
     args.stream.requests_out = None;
     args.secondary = Secondary::Exact;
     args.interactive = None;
@@ -296,25 +285,6 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         taa: args.pictures.taa,
         tile_bytes: args.interactive,
     }
-}
-
-/// What watches the camera for `--prefetch`; `None` when that is off.
-pub fn prefetcher(renderer: &Renderer, most: u32) -> Option<Prefetcher> {
-    let aspect = f64::from(renderer.size.0) / f64::from(renderer.size.1);
-    (most > 0).then(|| Prefetcher::new(BrickBox::of_scene(renderer.scene.resident()), aspect, most as usize))
-}
-
-/// Between two frames: has the workers read ahead what the motion up to `camera` leads to, in place of what they were
-/// asked for before and have not begun. Changes nothing but the host cache.
-pub fn look_ahead(renderer: &mut Renderer, prefetcher: &mut Prefetcher, camera: &Camera) {
-    let workers = renderer.executor.workers();
-    workers.cancel_prefetch();
-    let host = workers.host_cache();
-    host.begin_round();
-    let residency = &renderer.cache.residency;
-    let at_hand = |item: Item| residency.slot(item).is_some() || host.contains(item);
-    let items = prefetcher.after_frame(camera, at_hand);
-    workers.prefetch(&items);
 }
 
 fn finish(args: &WalkArgs, renderer: &Renderer, summary: &serde_json::Value) -> Result<()> {

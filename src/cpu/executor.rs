@@ -237,7 +237,7 @@ impl Executor for CpuExecutor {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            for dispatch in dispatches(pass, step, &params, &self.directions, self.tuning.leaf_cache, everything) {
+            for dispatch in dispatches(pass, step, &params, &self.directions, everything) {
                 let start = Instant::now();
                 let bound = Bound {
                     params: &dispatch.params,

@@ -6,7 +6,6 @@ use crate::schedule::auto::{Auto, Fixed};
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{ExecutorError, Pass, PassStats, Shading, Step, Tracing, chc, demand, plain};
-use crate::stream::HostCacheStats;
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -75,8 +74,6 @@ pub struct Engine {
     pub captures: Option<Captures>,
     /// What has moved since the frame before.
     pub moved: Moved,
-    /// The host cache's statistics at the end of the pass before.
-    pub host_seen: HostCacheStats,
 }
 
 impl Engine {

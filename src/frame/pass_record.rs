@@ -3,7 +3,6 @@
 use super::Engine;
 use crate::counters::Record;
 use crate::schedule::{ExecutorError, PassStats};
-use crate::stream::HostCacheStats;
 use std::time::Instant;
 
 /// Collects the statistics of the effects of a frame, each over all its samples, directions and lamps.
@@ -17,8 +16,6 @@ struct EffectRecord {
     stats: PassStats,
     resident_start: u64,
     resident_end: u64,
-    /// What became of prefetches.
-    ahead: HostCacheStats,
 }
 
 impl FrameRecords {
@@ -87,8 +84,8 @@ impl FrameRecords {
         let resident = |engine: &Engine| engine.cache.residency.resident().count() as u64;
         let before = resident(engine);
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
-            let (stats, ahead) = (PassStats::default(), HostCacheStats::default());
-            self.effects.push(EffectRecord { name, stats, resident_start: before, resident_end: before, ahead });
+            let stats = PassStats::default();
+            self.effects.push(EffectRecord { name, stats, resident_start: before, resident_end: before });
             self.effects.len() - 1
         });
         let effect = &mut self.effects[index];
@@ -97,11 +94,6 @@ impl FrameRecords {
         effect.stats.ms += start.elapsed().as_secs_f64() * 1e3;
         effect.stats.cache_passes = effect.stats.cache_passes.max(engine.cache.residency.fillings());
         effect.resident_end = effect.resident_end + resident(engine) - before;
-        let host = engine.executor.workers().host_cache().stats();
-        let seen = std::mem::replace(&mut engine.host_seen, host);
-        effect.ahead.prefetched_bytes += host.prefetched_bytes - seen.prefetched_bytes;
-        effect.ahead.prefetched_used_bytes += host.prefetched_used_bytes - seen.prefetched_used_bytes;
-        effect.ahead.prefetched_wasted_bytes += host.prefetched_wasted_bytes - seen.prefetched_wasted_bytes;
         Ok(())
     }
 
@@ -113,9 +105,6 @@ impl FrameRecords {
             cache_used_bytes: residency.used_bytes(),
             bricks_resident_start: effect.resident_start,
             bricks_resident_end: effect.resident_end,
-            prefetched_bytes: effect.ahead.prefetched_bytes,
-            prefetched_used_bytes: effect.ahead.prefetched_used_bytes,
-            prefetched_wasted_bytes: effect.ahead.prefetched_wasted_bytes,
             ..Record::of(self.frame, effect.name, &effect.stats)
         };
         self.effects.into_iter().map(record).collect()

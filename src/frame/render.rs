@@ -100,7 +100,6 @@ impl Renderer {
         watch: &mut dyn FnMut(u32, &Accumulation) -> bool,
     ) -> Result<FrameOutput, RenderError> {
         let Self { engine, methods } = self;
-        engine.executor.tuning().leaf_cache = engine.settings.tracing.optimisations.leaf_cache;
         if let Some(captures) = &mut engine.captures {
             captures.clear();
         }
@@ -157,9 +156,6 @@ impl Renderer {
             for index in directions(effects.diffuse.unwrap_or(0)) {
                 let names = ["diffuse", "diffuse-shadow", "diffuse-environment"];
                 bounce(engine, methods, &mut records, names, Pass::Diffuse(index))?;
-            }
-            if effects.mirror {
-                bounce(engine, methods, &mut records, ["mirror", "mirror-shadow", "mirror-environment"], Pass::Mirror)?;
             }
             if effects.glossy {
                 bounce(engine, methods, &mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;

@@ -222,7 +222,7 @@ impl GpuExecutor {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            list.extend(dispatches(pass, step, &params, &self.directions, self.tuning.leaf_cache, everything));
+            list.extend(dispatches(pass, step, &params, &self.directions, everything));
         }
         let dispatches = list;
         if dispatches.iter().any(|dispatch| dispatch.kernel == names::count_pairs) {

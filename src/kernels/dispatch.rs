@@ -35,7 +35,7 @@ impl Directions {
     fn params(&self, pass: Pass, params: &Params) -> Params {
         // Every kind of pass takes random numbers of its own. Those of a sun alone depend on the sample only.
         let (stream, direction) = match pass {
-            Pass::Primary | Pass::Mirror | Pass::Shadow(Lamp::Sun) => (0, None),
+            Pass::Primary | Pass::Shadow(Lamp::Sun) => (0, None),
             Pass::Shadow(Lamp::Emitter) => (1, None),
             Pass::BounceShadow(Lamp::Sun) => (2, None),
             Pass::BounceShadow(Lamp::Emitter) => (3, None),
@@ -130,16 +130,8 @@ fn across(count: u32) -> [u32; 2] {
 }
 
 /// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells passes and their dispatches
-/// apart; with `leaf_cache` lists are intersected by the kernel that has one; with `everything` resident no kernel
-/// looks for what is.
-pub fn dispatches(
-    pass: Pass,
-    step: Step,
-    params: &Params,
-    directions: &Directions,
-    leaf_cache: bool,
-    everything: bool,
-) -> Vec<Dispatch> {
+/// apart; with `everything` resident no kernel looks for what is.
+pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directions, everything: bool) -> Vec<Dispatch> {
     let params = Params { run_count: u32::MAX >> 1, ..directions.params(pass, params) };
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
@@ -147,10 +139,7 @@ pub fn dispatches(
     let dispatch = |kernel, params, groups, phase| Dispatch { kernel, params, own: [0; OWN_WORDS], groups, phase };
     let kernel = |kernel, params, groups, phase| dispatch(kernel, params, Workgroups::Fixed(groups), phase);
     let shading = |name, params| kernel(name, params, per_ray, None);
-    let list = |params, phase| {
-        let name = if leaf_cache { kernels::intersect_list_cached } else { kernels::intersect_list };
-        dispatch(name, params, Workgroups::Chosen, Some(phase))
-    };
+    let list = |params, phase| dispatch(kernels::intersect_list, params, Workgroups::Chosen, Some(phase));
     let choose = |params, phase| kernel(kernels::tile_choose, params, [1, 1], phase);
     let intersect = |mask, want, from_root, phase| {
         let params = Params { select_mask: mask, select_want: want, ..params };
@@ -184,7 +173,6 @@ pub fn dispatches(
             let kernel = match pass {
                 Pass::Occlusion(_) => kernels::generate_occlusion,
                 Pass::Diffuse(_) => kernels::generate_diffuse,
-                Pass::Mirror => kernels::generate_mirror,
                 Pass::Glossy => kernels::generate_glossy,
                 Pass::Primary | Pass::Shadow(_) | Pass::BounceShadow(_) => kernels::generate_shadow,
             };

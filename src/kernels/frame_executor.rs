@@ -45,7 +45,7 @@ pub trait FrameExecutor: Executor {
     /// decide as they run.
     fn leaves_out(&self) -> Keep;
 
-    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160
+    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160
     /// bytes a pixel; without it they must not be run.
     fn allow_bounces(&mut self);
 

@@ -45,15 +45,14 @@ pub const COUNTER_MOST_SELECTED: u32 = 12;
 pub const COUNTER_FRONT_TO_BACK: u32 = 13;
 pub const COUNTER_TILE_BATCHES: u32 = 14;
 pub const COUNTER_TILE_BATCH_LEAVES: u32 = 15;
-pub const COUNTER_LEAF_GROUPS: u32 = 16;
-pub const COUNTER_TIGHTENED: u32 = 17;
-pub const COUNTER_TILES_FROM_ROOT: u32 = 18;
-pub const COUNTER_TILES_CHOSEN: u32 = 19;
-pub const COUNTER_ROMA_CAPPED: u32 = 20;
-pub const COUNTER_UNRESOLVED: u32 = 21;
-pub const COUNTER_DVF_ANSWERED: u32 = 22;
-pub const COUNTER_FIELD_CAPPED: u32 = 23;
-pub const COUNTER_PILOTS: u32 = 24;
+pub const COUNTER_TIGHTENED: u32 = 16;
+pub const COUNTER_TILES_FROM_ROOT: u32 = 17;
+pub const COUNTER_TILES_CHOSEN: u32 = 18;
+pub const COUNTER_ROMA_CAPPED: u32 = 19;
+pub const COUNTER_UNRESOLVED: u32 = 20;
+pub const COUNTER_DVF_ANSWERED: u32 = 21;
+pub const COUNTER_FIELD_CAPPED: u32 = 22;
+pub const COUNTER_PILOTS: u32 = 23;
 pub const WORK_CHOSEN: u32 = 32;
 pub const WORK_ROOTED: u32 = 36;
 pub const GBUFFER_READ: u32 = 1;
@@ -111,10 +110,10 @@ mirror! {
         origin: [f32; 4], base: [f32; 4], step_x: [f32; 4], step_y: [f32; 4],
         sun: [f32; 4], sun_color: [f32; 4], sky_color: [f32; 4], ground_color: [f32; 4], jitter: [f32; 4],
         around: [f32; 4],
-        share: f32, surface_share: f32, length: f32, stream: u32,
+        share: f32, length: f32, stream: u32,
         pair_count: u32, run_first: u32, run_count: u32, list_most: u32,
         emitter_count: u32, direction: u32, environment_width: u32, environment_height: u32,
-        emitter_density: f32, diffuse_count: f32, padding0: u32, padding1: u32,
+        emitter_density: f32, diffuse_count: f32, padding0: u32, padding1: u32, padding2: u32,
         environment_turn: [f32; 4], ambient: [[f32; 4]; 9],
     }
     struct Ray { origin: [f32; 3], t_min: f32, direction: [f32; 3], t_max: f32 }

@@ -69,7 +69,6 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
         pairs_front_to_back: count(layout::COUNTER_FRONT_TO_BACK),
         tile_batches: count(layout::COUNTER_TILE_BATCHES),
         tile_batch_leaves: count(layout::COUNTER_TILE_BATCH_LEAVES),
-        leaf_groups_postponed: count(layout::COUNTER_LEAF_GROUPS),
         rays: count(layout::COUNTER_RAYS),
         rays_answered: count(layout::COUNTER_DVF_ANSWERED),
         nodes: count(layout::COUNTER_NODES),

@@ -14,8 +14,7 @@ use super::query::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, 
 use super::query::tile_walk::{tile_walk_count, tile_walk_write};
 use super::rays::{RaySet, Work};
 use super::shade::generate::{
-    generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
-    start_hits,
+    generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
 use super::shade::resolve::{AttributeView, resolve};
 use super::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
@@ -199,7 +198,6 @@ kernels! {
         |b, t| generate_occlusion(b, t.own, t.seen, &t.pixels.gbuffers[t.shaded]);
     generate_diffuse: "shade/generate_around" Shading [LIMITED = 0]
         |b, t| generate_diffuse(b, t.own, t.seen, t.pixels, t.materials);
-    generate_mirror: "shade/generate_mirror" Shading [] |b, t| generate_mirror(b, t.own, t.seen, t.pixels);
     generate_glossy: "shade/generate_glossy" Shading []
         |b, t| generate_glossy(b, t.own, t.seen, t.pixels, t.materials);
     start_hits: "shade/start_hits" Tiles [] |_, t| start_hits(t.own);
@@ -237,10 +235,7 @@ kernels! {
     };
     hit_demand: "query/hit_demand" Tiles [] |b, t| hit_demand(b, t.own);
 
-    intersect_list: "trace/intersect_list" CacheTiles [COUNT = 0, LEAF_CACHE = 0]
-        |b, t| intersect_list::<false>(b, t.own, t.tiles);
-    intersect_list_cached: "trace/intersect_list" CacheTiles [COUNT = 0, LEAF_CACHE = 1]
-        |b, t| intersect_list::<true>(b, t.own, t.tiles);
+    intersect_list: "trace/intersect_list" CacheTiles [COUNT = 0] |b, t| intersect_list(b, t.own, t.tiles);
     intersect_all: "trace/intersect_all" CacheTiles [COUNT = 0, SELECT = 0]
         |b, t| intersect_all::<false>(b, t.own, Work::All, &t.tiles.pair_counts);
     intersect_selected: "trace/intersect_all" CacheTiles [COUNT = 0, SELECT = 1]

@@ -64,8 +64,6 @@ pub struct Report {
     pub tile_batches: u64,
     /// Leaves that these intersected.
     pub tile_batch_leaves: u64,
-    /// Groups of triangles that rays postponed.
-    pub leaf_groups_postponed: u64,
     /// Rays that `roma_trace` finished along their map's direction because they had passed as many columns as
     /// they may, and those that `df_trace` let go free because they had made as many look-ups as they may.
     pub rays_capped: u64,
@@ -171,7 +169,6 @@ impl PassStats {
         sum.pairs_front_to_back += r.pairs_front_to_back;
         sum.tile_batches += r.tile_batches;
         sum.tile_batch_leaves += r.tile_batch_leaves;
-        sum.leaf_groups_postponed += r.leaf_groups_postponed;
         sum.queries_tightened += r.queries_tightened;
         sum.rays_capped += r.rays_capped;
         for (total, count) in sum.own.iter_mut().zip(r.own) {

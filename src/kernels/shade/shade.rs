@@ -51,11 +51,6 @@ impl Pixels {
     }
 }
 
-/// The share of a primary hit's own light that it shows; all of a hit of set 1.
-pub fn surface_share(bound: &Bound) -> f32 {
-    if bound.has(PARAM_BOUNCE) { 1.0 } else { bound.params.surface_share }
-}
-
 /// Empties the G-buffer of the shaded set, and before the first sample of a batch the radiance.
 pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
     pixels.gbuffers[shaded].fill(GBuffer::default());
@@ -181,7 +176,7 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
             mirrored = each(|k| mirrored[k] + reflected[k] * g.occlusion);
         }
         let emission = seen_emission(bound, g, m, seen, index, density);
-        Some(each(|k| surface_share(bound) * (s.diffuse[k] * light[k] + mirrored[k] + emission[k])))
+        Some(each(|k| s.diffuse[k] * light[k] + mirrored[k] + emission[k]))
     });
 }
 
@@ -239,7 +234,7 @@ pub fn add_light(
             let reflected = s.reflected(unit);
             reflects = each(|k| reflects[k] + weight * reflected[k]);
         }
-        Some(each(|k| weight_of(&own.hits[index]) * surface_share(bound) * reflects[k] * light[k]))
+        Some(each(|k| weight_of(&own.hits[index]) * reflects[k] * light[k]))
     });
 }
 
@@ -258,7 +253,7 @@ pub fn add_occlusion(
         let ambient = ambient(bound.params, g.normal);
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
         let mirrored = s.reflected_ambient(bound);
-        let share = weight_of(&own.hits[index]) * surface_share(bound) * bound.params.share;
+        let share = weight_of(&own.hits[index]) * bound.params.share;
         Some(each(|k| share * (s.diffuse[k] * ambient[k] + mirrored[k])))
     });
 }

@@ -150,7 +150,6 @@ impl Findings {
                 r.pairs_front_to_back,
                 r.tile_batches,
                 r.tile_batch_leaves,
-                r.leaf_groups_postponed,
                 r.rays,
                 counted(r.nodes),
                 counted(r.triangles),
@@ -209,7 +208,7 @@ impl Lockstep {
         let surfaces = match pass.set() {
             0 => Vec::new(),
             1 => self.gpu.read_surfaces(Pass::Primary)?,
-            _ => self.gpu.read_surfaces(Pass::Mirror)?,
+            _ => self.gpu.read_surfaces(Pass::Glossy)?,
         };
         let mut findings = self.findings.lock().expect("findings");
         if pass == Pass::Primary {
@@ -368,17 +367,14 @@ impl Executor for Lockstep {
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let context = format!("{pass:?}, {steps:?}");
-        let Tuning { threshold, leaf_cache: has_leaf_cache, .. } = self.tuning;
+        let Tuning { threshold, .. } = self.tuning;
         (*self.gpu.tuning(), *self.cpu.tuning()) = (self.tuning, self.tuning);
         let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, threshold, ..Params::default() };
         for &step in steps {
             let everything = bricks.all_geometry_resident();
-            for leaf_cache in [false, true] {
-                let list = dispatches(pass, step, &params, &self.directions, leaf_cache, everything);
-                let ran = |name: &str| leaf_cache == has_leaf_cache || !name.starts_with("intersect_list");
-                let names = list.iter().map(|dispatch| dispatch.kernel).filter(|name| ran(name));
-                self.findings.lock().expect("findings").kernels.extend(names);
-            }
+            let list = dispatches(pass, step, &params, &self.directions, everything);
+            let names = list.iter().map(|dispatch| dispatch.kernel);
+            self.findings.lock().expect("findings").kernels.extend(names);
         }
         let rest = match steps {
             [step, rest @ ..] if *step == Step::Generate || own_kernel(step) == Some("dvf_cosine") => {

@@ -34,7 +34,7 @@ use crate::secondary::occupancy::{Bom, Cascades, Source};
 use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::{Grid, Role, RomaPass, RomaSettings};
 use crate::secondary::rsm::RsmSettings;
-use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
+use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -177,7 +177,6 @@ struct Variant {
     /// Leaves of the longest list that is intersected.
     list_most: u32,
     without: &'static [Optimisation],
-    with: &'static [Optimisation],
     /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped; what these do for them.
     roma: Option<(u32, Role)>,
     /// Bytes of tiles that a frame may load.
@@ -195,7 +194,6 @@ const VARIANT: Variant = Variant {
     threshold: 0,
     list_most: u32::MAX,
     without: &[],
-    with: &[],
     roma: None,
     tile_bytes: None,
     field: None,
@@ -208,7 +206,6 @@ fn effects() -> Effects {
         environment: true,
         occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
         diffuse: Some(1),
-        mirror: true,
         glossy: true,
         turn_degrees: 360.0,
     }
@@ -264,11 +261,11 @@ fn lockstep(
         gpu.clone(),
         kernels.clone(),
         scene.clone(),
-        Workers::new(scene.clone(), host(), 1, 0).unwrap(),
+        Workers::new(scene.clone(), host(), 1).unwrap(),
         pages,
         setup,
     );
-    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1, 0).unwrap(), setup);
+    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1).unwrap(), setup);
     Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone())
 }
 
@@ -301,7 +298,6 @@ fn render(
     }
     let mut tracing = Tracing { measure_needed: true, ..Tracing::default() };
     variant.without.iter().for_each(|&which| tracing.optimisations.set(which, false));
-    variant.with.iter().for_each(|&which| tracing.optimisations.set(which, true));
     let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
     let manifest = &scene.resident().manifest;
     let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
@@ -328,7 +324,6 @@ fn render(
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
-        host_seen: HostCacheStats::default(),
     };
     let mut renderer = Renderer { engine, methods: Methods::default() };
     if let Some(settings) = variant.roma.map(roma) {
@@ -396,11 +391,10 @@ fn twins_agree_with_their_kernels() {
         Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
-        Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
+        Variant { without: &[RootWalk], ..VARIANT },
         // Maps drawn by the cosine; by the rays' own strata.
         Variant { roma: Some((0, Role::Answer)), ..VARIANT },
         Variant { roma: Some((3, Role::Answer)), ..VARIANT },
-        Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
         Variant { roma: Some((64, Role::Sift { most_wrong: None })), ..VARIANT },
         Variant { roma: Some((3, Role::Sift { most_wrong: None })), schedule: Schedule::Demand, ..VARIANT },
         Variant { roma: Some((64, Role::Sift { most_wrong: Some(100_000) })), ..VARIANT },

@@ -12,6 +12,7 @@ use crate::math::sampling::random2;
 use crate::schedule::ExecutorError;
 use crate::secondary::roma::twin::{BLEND, clipped, end_of};
 use half::f16;
+use half::slice::HalfBitsSliceExt;
 use rayon::prelude::*;
 
 /// Rays that a task traces in a row.
@@ -28,7 +29,7 @@ fn field_of(distances: &[u32], cells: u32, level: u32) -> FieldView<'_> {
     let levels = std::array::from_fn(|mip| {
         let words;
         (words, rest) = rest.split_at(mip_words(cells, mip));
-        bytemuck::cast_slice(words)
+        bytemuck::cast_slice::<u32, u16>(words).reinterpret_cast()
     });
     FieldView::new(cells, levels)
 }
@@ -39,7 +40,8 @@ fn levels_of(distances: &mut [u32], cells: u32, level: u32, mip: usize) -> (&[f1
     let first = level as usize * (0..LEVELS).map(words).sum::<usize>() + (0..mip).map(words).sum::<usize>();
     let (before, own) = distances.split_at_mut(first);
     let fine = if mip == 0 { &[][..] } else { &before[first - words(mip - 1)..] };
-    (bytemuck::cast_slice(fine), bytemuck::cast_slice_mut(&mut own[..words(mip)]))
+    let own = bytemuck::cast_slice_mut::<u32, u16>(&mut own[..words(mip)]).reinterpret_cast_mut();
+    (bytemuck::cast_slice::<u32, u16>(fine).reinterpret_cast(), own)
 }
 
 /// Begins flooding a field.

@@ -16,7 +16,7 @@ use crate::kernels::shade::generate::{for_each_leaving, leaving};
 use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::shade::lamps::unit;
 use crate::kernels::shade::light::{ambient, background};
-use crate::kernels::shade::shade::{Pixels, for_each_pixel, is_traced as is_ray, surface_share};
+use crate::kernels::shade::shade::{Pixels, for_each_pixel, is_traced as is_ray};
 use crate::kernels::table::{atomic, words};
 use crate::kernels::vector::{Vec3, each, most3};
 use crate::math::exact::{
@@ -480,6 +480,6 @@ pub fn dvf_light(
             light = each(|k| all[k] - light[k]);
         }
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
-        Some(each(|k| surface_share(bound) * s.diffuse[k] * light[k]))
+        Some(each(|k| s.diffuse[k] * light[k]))
     });
 }

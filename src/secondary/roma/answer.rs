@@ -35,6 +35,11 @@ impl Roma {
         Self { settings: Some(settings), base: BaseMaps::new(source), ..Self::default() }
     }
 
+    /// The ray-aligned maps that the executor was given last.
+    pub fn maps(&self) -> &RomaMaps {
+        &self.maps
+    }
+
     /// Goes on with what another made of the same scene: base maps, and unless `is_cold` the maps of lamps.
     pub fn keep(&mut self, other: Self, is_cold: bool) {
         self.base = other.base;
@@ -72,15 +77,13 @@ impl Roma {
     }
 
     /// Has the executor take the maps of `pass` for rays that are `length` world units long at most, unless it has them;
-    /// the step that then makes them. Levels are left out that such rays end in before they are off their surface, or
-    /// before they are answered by maps.
+    /// the step that then makes them. Levels are left out that such rays end in before they are off their surface.
     fn prepare(&mut self, engine: &mut Engine, pass: RomaPass, length: f64) -> Result<Option<Step>, ExecutorError> {
         let Some(BaseView { frame, sample, seed, .. }) = self.base.view().copied() else { return Ok(None) };
         let RomaPass { grid, role, .. } = pass;
         let cells = grid.base_cells();
         let cascades = self.base.assemble(&engine.scene, grid.size, cells)?.clone();
         let before = LIFT / grid.scale(cells);
-        let before = if let Role::Far(near) = role { before.max((near * grid.base_per_cell()).into()) } else { before };
         let is_of_use = |bom: &&Bom| before * bom.side() < length;
         let levels = cascades.levels.iter().take_while(is_of_use).count();
         if self.made == Some((grid, role, levels)) {
@@ -148,10 +151,6 @@ impl Secondary for Roma {
                 plan.before.push(maps.trace(steps, RomaPart::answering(pass, steps, is_long)));
                 plan.is_whole = true;
                 plan.light = self.rsm.light();
-            }
-            Role::Far(cells) => {
-                plan.before.push(maps.near(cells * grid.base_per_cell()));
-                plan.after.push(maps.trace(steps, RomaPart::Far));
             }
             Role::Correct(one_in) => {
                 plan.before.push(maps.pilots(one_in));

@@ -2,7 +2,7 @@
 
 use super::cosine::roma_draw;
 use super::maps::RomaMaps;
-use super::twin::{roma_measure, roma_near, roma_rotate, roma_trace};
+use super::twin::{roma_measure, roma_pilots, roma_rotate, roma_trace};
 use crate::kernels;
 use crate::kernels::layout::{HANDOVERS, Level, NONE, ROMA_CORRECT, ROMA_FAR, ROMA_SIFT, ROMA_WHOLE, RomaMap, RomaOwn};
 use crate::kernels::table::{Family, FamilyBuffer};
@@ -13,7 +13,7 @@ kernels! {
     static KERNELS, names;
 
     roma_rotate: "roma/roma_rotate" Own [] |b, t| roma_rotate(b, t.buffers);
-    roma_near: "roma/roma_near" Own [] |b, t| roma_near(b, t.buffers, t.own, t.seen);
+    roma_pilots: "roma/roma_pilots" Own [] |b, t| roma_pilots(b, t.own);
     roma_trace: "roma/roma_trace" Own [] |b, t| roma_trace(b, t.buffers, t.own, t.seen);
     roma_draw: "roma/roma_draw" Own [] |b, t| roma_draw(b, t.buffers, t.own, t.seen, (t.pixels, t.shaded));
     roma_measure: "roma/roma_measure" Own [] |b, t| roma_measure(b, t.buffers, t.own, t.seen);
@@ -51,7 +51,7 @@ pub enum RomaPart {
     /// All of them, which are snapped, by the maps that are drawn in proportion to the cosines between their directions
     /// and the normals of the set before; they go on in these directions.
     Cosine,
-    /// Of those that have met nothing where [`RomaMaps::near`] ended them, what lies beyond: they have been traced.
+    /// Of those that have met nothing up to where [`Sift::near`] ended them, what lies beyond: they have been traced.
     Far,
     /// Whether they meet anything. Those that do not are answered; the others are still to be traced.
     Sift(Sift),
@@ -132,16 +132,10 @@ impl RomaMaps {
         Own::new(names::roma_rotate, &own).over(Over::Elements(columns)).in_phase(0).into()
     }
 
-    /// Ends the pass's rays, not traced yet, this many cells of the base map that holds their start from it: what they
-    /// meet up to there is for bricks to tell.
-    pub fn near(&self, cells: u32) -> Step {
-        Own::new(names::roma_near, &RomaOwn { near: cells, ..self.own() }).in_phase(0).into()
-    }
-
     /// Ends those of the pass's rays, not traced yet, that are no pilots: one ray in so many is one.
     pub fn pilots(&self, one_in: u32) -> Step {
-        let own = RomaOwn { part: ROMA_CORRECT, near: NONE, pilots: one_in, ..self.own() };
-        Own::new(names::roma_near, &own).in_phase(0).into()
+        let own = RomaOwn { part: ROMA_CORRECT, pilots: one_in, ..self.own() };
+        Own::new(names::roma_pilots, &own).in_phase(0).into()
     }
 
     /// Answers a part of the pass's rays, and counts them: phase 3. `steps`: columns that a ray passes before it is

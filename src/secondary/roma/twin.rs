@@ -435,36 +435,23 @@ fn near_end(p: &Params, own: &RomaOwn, levels: &[Level], index: u32, ray: &Ray, 
     level.map_or(T_INFINITE, |level| divide(cells as f32, level.scale * length))
 }
 
-/// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those
-/// that no base map holds are traced whole. Where there are pilots only these are traced.
-pub fn roma_near(
-    bound: &Bound,
-    buffers: &mut [Vec<u32>],
-    set: &mut RaySet,
-    seen: &RaySet,
-) -> Result<(), ExecutorError> {
+/// Ends those of the pass's rays that are no pilots before they are traced: maps answer them.
+pub fn roma_pilots(bound: &Bound, set: &mut RaySet) {
     let (p, own) = (bound.params, bound.own::<RomaOwn>());
-    let levels = Maps::of(bound, buffers)?.levels;
-    if levels.is_empty() {
-        return Ok(());
+    if own.levels == 0 {
+        return;
     }
     set.hits.par_chunks_mut(RUN).zip(set.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
-        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
-            let index = run * RUN + i;
-            if own.near != NONE {
-                let end = near_end(p, own, levels, index as u32, ray, normal_of(seen, index), own.near);
-                hit.t = least(ray.t_max, end);
-            }
-            if own.pilots != 0 && !is_pilot(p, own, index as u32) {
+        for (i, (hit, _)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+            if own.pilots != 0 && !is_pilot(p, own, (run * RUN + i) as u32) {
                 hit.t = ANSWERED;
             }
         }
     });
-    Ok(())
 }
 
 /// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are
-/// sifted: there, those that meet nothing are ended, and others are traced up to `roma_near` cells from their start.
+/// sifted: there, those that meet nothing are ended, and others are traced up to `near` cells from their start.
 /// Where pilots have been traced, these count for what maps get wrong.
 pub fn roma_trace(
     bound: &Bound,

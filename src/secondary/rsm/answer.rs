@@ -196,7 +196,6 @@ fn lamp_view(engine: &Engine, lamp: &LampView, frame: Frame) -> View {
         sun: engine.light.sun_direction.as_vec3().extend(0.0).to_array(),
         sun_color: [r, g, b, 0.0],
         emitter_count: engine.light.lamps.emitters().len() as u32,
-        surface_share: 1.0,
         seed: engine.settings.seed,
         ..Params::default()
     };

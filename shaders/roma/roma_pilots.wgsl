@@ -1,5 +1,4 @@
-// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those
-// that no base map holds are traced whole. Where there are pilots only these are traced.
+// Ends those of the pass's rays that are no pilots before they are traced: maps answer them.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
@@ -20,9 +19,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let ray = rays[index];
     if !(ray.t_min <= ray.t_max) {
         return;
-    }
-    if own.near != NONE {
-        hits[index].t = min(ray.t_max, near_end(index, ray, own.near));
     }
     if own.pilots != 0u && !is_pilot(index) {
         hits[index].t = ANSWERED;
