@@ -159,7 +159,8 @@ fn low_walls_occlude_by_the_cosine() {
             let pass = Pass::Occlusion(16 * seed + i);
             for (free, (steps, part)) in free.iter_mut().zip(ways) {
                 let steps = [Step::Generate, maps.trace(steps, part)];
-                renderer.executor.run(pass, &steps, &renderer.cache.states).expect("rays");
+                let brickwalk::frame::Engine { executor, cache, .. } = &mut renderer.engine;
+                executor.run(pass, &steps, &cache.states).expect("rays");
                 let hits = renderer.executor.read_hits(pass).expect("hits");
                 *free += floor.iter().filter(|&&i| hits[i].id == NONE).count() as u64;
             }
