@@ -1,6 +1,6 @@
-// What every kernel is told.
+// Parameters of a dispatch, their flags, and constants of all kernels.
 
-struct Params {
+struct Params {           // What every kernel is told.
     zero: u32,            // 0; what barrier() ors in, unknown to the compiler
     width: u32,           // rays per row
     height: u32,          // rows
@@ -10,11 +10,11 @@ struct Params {
     flags: u32,           // PARAM_* bits
     list_capacity: u32,   // entries of the tile lists
     select_mask: u32,     // tile_select takes leaves with (state & select_mask) == select_want
-    select_want: u32,
+    select_want: u32,     // the bits of select_mask that must be set
     threshold: u32,       // a (tile, leaf) query with at most so many rays is not visible; 0 = exact
     top_count: u32,       // nodes of the binary top-level tree
     sample: u32,          // index of the sample of this frame
-    seed: u32,
+    seed: u32,            // of all random numbers
     instance_pad: f32,    // relative padding of top-level boxes for the rounding of instance rays
     sun_radius: f32,      // tangent of the sun's angular radius
     origin: vec4<f32>,    // camera position in the frame, device units
@@ -22,32 +22,35 @@ struct Params {
     step_x: vec4<f32>,    // change of direction per pixel in x
     step_y: vec4<f32>,    // change of direction per pixel in y; w: pixel angle in radians
     sun: vec4<f32>,       // unit vector to the sun; w: cosine-weighted irradiance scale
-    sun_color: vec4<f32>,
-    sky_color: vec4<f32>,
-    ground_color: vec4<f32>,
+    sun_color: vec4<f32>, // irradiance of a surface that faces the sun
+    sky_color: vec4<f32>, // of the zenith
+    ground_color: vec4<f32>, // below the horizon
     jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
-    around: vec4<f32>,    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
+    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
+    around: vec4<f32>,
     share: f32,           // of the light that the pass's direction stands for
     length: f32,          // of the pass's rays where that is limited, device units
     stream: u32,          // which random numbers the pass takes
     pair_count: u32,      // pairs to be queried
     run_first: u32,       // of a tile's selected leaves, the first that intersect_list takes
-    run_count: u32,       // and how many it takes at most
+    run_count: u32,       // how many of them intersect_list takes at most
     list_most: u32,       // leaves of the longest list that rays are intersected with
-    emitter_count: u32,
+    emitter_count: u32,   // emitters of the scene
     direction: u32,       // number of the pass's direction
     environment_width: u32,  // texels of a row of the environment; 0: the sky is the background
-    environment_height: u32,
-    emitter_density: f32, // of points of surfaces that shine, by the luminance of their radiance, an area of 1: how rays to them are drawn
+    environment_height: u32, // rows of the environment
+    // density of the points that rays to emitters are drawn from: of an area of 1, by the luminance of its radiance
+    emitter_density: f32,
     diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
     padding0: u32,
     padding1: u32,
     padding2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
-    ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
+    // what a white surface reflects of the environment, by terms of its normal (light.wgsl)
+    ambient: array<vec4<f32>, 9>,
 }
 
-const PARAM_ANY_HIT: u32 = 1u;
+const PARAM_ANY_HIT: u32 = 1u;     // the pass asks whether rays hit anything, not what
 const PARAM_NEEDED: u32 = 2u;     // queries ask what a pass needed, from its final hits, whatever was resident
 const PARAM_SUN: u32 = 4u;        // shade: with the sun, unshadowed
 const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
@@ -63,5 +66,5 @@ const PARAM_MISS: u32 = 2048u;    // shade: with the background, where rays miss
 const PARAM_COARSER: u32 = 16384u; // coarser levels of textures stand for what is not resident
 const PARAM_GLOSSY: u32 = 8192u;   // what surfaces reflect otherwise than diffusely comes by rays of its own, too
 const BATCH_SAMPLES: u32 = 64u;   // samples that are summed before the radiance is emptied
-const NONE: u32 = 0xffffffffu;
-const T_INFINITE: f32 = 3.4028234e38;
+const NONE: u32 = 0xffffffffu;     // "no such thing", in every index that may be absent
+const T_INFINITE: f32 = 3.4028234e38; // t_max of an unbounded ray: the greatest f32

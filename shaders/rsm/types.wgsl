@@ -2,14 +2,15 @@
 
 struct RsmOwn {           // what a kernel is told
     maps: u32,            // maps of all lamps
-    map: u32,             // rsm_write: the one that is written,
-    x: u32,               // and its texel that ray 0 of the pass is for
-    y: u32,
+    map: u32,             // rsm_write: the map that is written
+    x: u32,               // rsm_write: column of the texel that ray 0 of the pass is for
+    y: u32,               // rsm_write: its row
 }
 
 struct RsmMap {           // what a lamp lights, as it sees it
-    texel_from_point: array<vec4<f32>, 3>, // rows: place in texels, and depth, from points of the frame; in perspective the place is to be
-                          // divided by the depth
+    // rows: place in texels, and depth, from points of the frame; in perspective the place is to be divided by the
+    // depth
+    texel_from_point: array<vec4<f32>, 3>,
     first: u32,           // its first texel among those of all
     width: u32,           // texels of a row
     height: u32,          // rows
@@ -20,11 +21,13 @@ struct RsmMap {           // what a lamp lights, as it sees it
     padding2: u32,
 }
 
-struct RsmTexel {
+struct RsmTexel {         // What a ray of a reflective shadow map meets.
     flux: vec3<f32>,      // radiance that the surface reflects of the lamp to all sides, its diffuse part
     depth: f32,           // t of the texel's ray, device units; below 0: it met nothing
     normal: vec3<f32>,    // geometric unit normal toward the lamp, world space
-    facing: f32,          // minus the cosine between it and the texel's ray, times the ray's length: of a unit of depth, the part across the surface
+    // minus the cosine between the normal and the texel's ray, times the ray's length: of a unit of depth, the part
+    // across the surface
+    facing: f32,
 }
 
-const RSM_PERSPECTIVE: u32 = 1u;
+const RSM_PERSPECTIVE: u32 = 1u;   // the map is seen from a point

@@ -27,9 +27,3 @@ pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
 pub use lamps::Lamps;
 pub use setup::{Extent, Keep, Setup, Tuning, View};
-
-#[rustfmt::skip]
-mod layout_checks {
-    use super::layout;
-    include!(concat!(env!("OUT_DIR"), "/layout_checks.rs"));
-}
