@@ -131,9 +131,9 @@ class Golden:
         """Standard output of the binary."""
         command = [self.binary, *map(str, words)]
         try:
-            done = subprocess.run(command, capture_output=True, timeout=300, cwd=self.folder, check=False)
+            done = subprocess.run(command, capture_output=True, timeout=900, cwd=self.folder, check=False)
         except subprocess.TimeoutExpired as error:
-            raise Failure(f"no end after 300 s: {shlex.join(command)}") from error
+            raise Failure(f"no end after 900 s: {shlex.join(command)}") from error
         if done.returncode != 0:
             last = (done.stderr.decode(errors="replace").strip().splitlines() or ["nothing on standard error"])[-1]
             raise Failure(f"exit {done.returncode}: {last}: {shlex.join(command)}")
