@@ -1,6 +1,8 @@
-//! Parses and validates every kernel, so that a typo is a build error, and writes the assertions that hold the WGSL
-//! structures and constants to their Rust mirrors.
+//! Parses and validates every kernel, so that a typo is a build error, and writes the Rust mirrors of the structures and
+//! constants that WGSL files named `*types.wgsl` declare.
 
+#[path = "src/kernels/layout/mirror.rs"]
+mod mirror;
 #[path = "src/gpu/wgsl.rs"]
 #[allow(dead_code)]
 mod wgsl;
@@ -12,6 +14,7 @@ use std::{env, fs};
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
     println!("cargo::rerun-if-changed=src/gpu/wgsl.rs");
+    println!("cargo::rerun-if-changed=src/kernels/layout/mirror.rs");
     println!("cargo::rustc-env=BRICKWALK_COMMIT={}", commit());
     let shaders = Path::new("shaders");
     let read = |name: &str| match name {
@@ -20,7 +23,6 @@ fn main() {
     };
     let files = files(shaders);
     let is_kernel = |name: &&String| fs::read_to_string(shaders.join(name)).is_ok_and(|text| text.contains("@compute"));
-    let mut structures = None;
     for name in files.iter().filter(is_kernel) {
         for pages in [
             wgsl::Pages { cache: 1, texels: 1, opacity: false, gloss: false },
@@ -28,21 +30,33 @@ fn main() {
         ] {
             let text =
                 wgsl::assemble(name, pages, &read).unwrap_or_else(|| panic!("{name}: an included file is missing"));
-            let module =
-                naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(&text)));
+            let module = parse(name, &text);
             naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default())
                 .validate(&module)
                 .unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(&text)));
-            if name == "shade/resolve.wgsl" {
-                structures = Some(module);
-            }
         }
     }
     let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out = Path::new(&out);
     fs::write(out.join("shaders.rs"), embedded(&files)).expect("write shaders.rs");
-    let module = structures.expect("shaders/shade/resolve.wgsl declares every shared structure");
-    fs::write(out.join("layout_checks.rs"), layout_checks(&module)).expect("write layout_checks.rs");
+    fs::write(out.join("layout.rs"), layout(&files, &read)).expect("write layout.rs");
+}
+
+/// Parses a text.
+fn parse(name: &str, text: &str) -> naga::Module {
+    naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(text)))
+}
+
+/// Rust mirrors of what all files of shared types declare.
+fn layout(files: &[String], read: &dyn Fn(&str) -> Option<String>) -> String {
+    let types = || files.iter().filter(|name| name.ends_with("types.wgsl"));
+    let all = "*types.wgsl";
+    let includes: String = types().map(|name| format!("#include \"{name}\"\n")).collect();
+    let pages = wgsl::Pages { cache: 1, texels: 1, opacity: false, gloss: false };
+    let with_all = |name: &str| if name == all { Some(includes.clone()) } else { read(name) };
+    let text = wgsl::assemble(all, pages, &with_all).unwrap_or_else(|| panic!("{all}: an included file is missing"));
+    let texts: Vec<(&str, String)> = types().filter_map(|name| Some((name.as_str(), read(name)?))).collect();
+    mirror::mirrors(&texts, &parse(all, &text)).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The commit of the sources, or "unknown" outside a checkout.
@@ -83,86 +97,5 @@ fn embedded(files: &[String]) -> String {
         let _ = writeln!(s, "({file:?}, include_str!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/shaders/{file}\"))),");
     }
     s.push_str("];\n");
-    s
-}
-
-/// Compile-time assertions: size and member offsets of every structure that `layout` mirrors, values of its constants.
-fn layout_checks(module: &naga::Module) -> String {
-    let mirrored = [
-        "Params",
-        "Ray",
-        "Hit",
-        "Surface",
-        "TileBounds",
-        "TileList",
-        "Entry",
-        "TopNode2",
-        "BinaryNode",
-        "Leaf",
-        "Instance",
-        "Brick",
-        "Opacity",
-        "Slot",
-        "Demand",
-        "Pair",
-        "Material",
-        "Texture",
-        "TileSlot",
-        "TileDemand",
-        "GBuffer",
-        "Emitter",
-        "RomaLevel",
-        "RomaMap",
-        "RsmMap",
-        "RsmTexel",
-        "DvfGrid",
-        "DvfTriangle",
-    ];
-    let mut s = String::new();
-    for name in mirrored {
-        let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
-        let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
-            panic!("shaders/common/types.wgsl lacks the structure {name}");
-        };
-        let _ = writeln!(s, "const _: () = assert!(size_of::<layout::{name}>() == {span}, \"size of {name}\");");
-        for member in members {
-            let field = member.name.as_deref().unwrap_or_default();
-            let _ = writeln!(
-                s,
-                "const _: () = assert!(std::mem::offset_of!(layout::{name}, {field}) == {}, \"{name}.{field}\");",
-                member.offset
-            );
-        }
-    }
-    for (_, constant) in module.constants.iter() {
-        let Some(name) = constant.name.as_deref() else { continue };
-        let prefixes = [
-            "PARAM_",
-            "STATE_",
-            "COUNTER_",
-            "WORK_",
-            "INSTANCE_",
-            "BRICK_",
-            "BINARY_",
-            "BATCH_",
-            "EMITTER_",
-            "GBUFFER_",
-            "TEXTURE_",
-            "TILE_",
-            "MATERIAL_DOUBLE",
-            "MATERIAL_UNLIT",
-            "REFLECTANCE_",
-            "ROMA_",
-            "FIELD_HIT",
-            "RSM_",
-            "DVF_",
-            "NONE",
-        ];
-        if prefixes.iter().any(|p| name.starts_with(p))
-            && let naga::Expression::Literal(naga::Literal::U32(value)) = module.global_expressions[constant.init]
-        {
-            let _ = writeln!(s, "const _: () = assert!(layout::{name} == {value}, \"{name}\");");
-        }
-    }
     s
 }

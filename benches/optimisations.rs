@@ -53,7 +53,6 @@ const GROUPS: &[(&str, &[&str])] = &[
             "--without resident-first",
             "--without front-to-back",
             "--without by-tile",
-            "--with leaf-cache",
         ],
     ),
     (

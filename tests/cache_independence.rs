@@ -63,7 +63,7 @@ fn frames_are_byte_identical_whatever_the_cache_and_schedule() {
 fn effects_do_not_depend_on_the_cache() {
     let folder = folder();
     let scene = city(folder.path(), "60K", "1K");
-    let effects = "--effects shadow,ao,diffuse,mirror --ao-rays 2 --ao-length 4 --diffuse-rays 2 \
+    let effects = "--effects shadow,ao,diffuse,glossy --ao-rays 2 --ao-length 4 --diffuse-rays 2 \
                    --rect-light -2,6,-2,4,0,0,0,0,4 --rotation full";
     let view = near(&scene).replace("--frames 3", "--frames 2");
     let run = |name: &str, options: &str| {
@@ -94,7 +94,7 @@ fn effects_do_not_depend_on_the_cache() {
 fn light_of_the_sky_does_not_depend_on_the_cache() {
     let folder = folder();
     let scene = city(folder.path(), "30K", "1K");
-    let options = "--effects shadow,diffuse,mirror,environment --environment sky --diffuse-rays 2 --rotation full";
+    let options = "--effects shadow,diffuse,glossy,environment --environment sky --diffuse-rays 2 --rotation full";
     let view = near(&scene).replace("--frames 3", "--frames 2");
     let run = |name: &str, more: &str| {
         let output = folder.path().join(name);

@@ -63,10 +63,10 @@ fn rays(output: &FrameOutput) -> [u64; 2] {
 
 /// A frame by exact rays and by a field: pixels that differ, rays of the first, traced and answered ones of the second.
 fn compared(renderer: &mut Renderer, field: Option<(&DvfField, DvfUse)>, camera: &Camera) -> (usize, u64, [u64; 2]) {
-    renderer.dvf = Dvf::default();
+    renderer.methods.remove::<Dvf>();
     let exact = renderer.frame(0, camera).expect("a frame");
     if let Some((field, how)) = field {
-        renderer.dvf = Dvf::new(Arc::new(field.clone()), how);
+        renderer.methods.set(Dvf::new(Arc::new(field.clone()), how));
     }
     let answered = renderer.frame(0, camera).expect("a frame");
     let bits = |output: &FrameOutput| -> Vec<[u32; 3]> {
@@ -162,7 +162,7 @@ fn rays_that_are_not_answered_are_those_without_a_field() {
     assert!(differ > pixels / 10, "{differ} pixels differ by a field that is wrong");
     // Hits of bounces ask, too.
     let mut renderer = common::evenly_lit(&scene, "environment,diffuse", "--size 32x32 --cache 100% --diffuse-rays 2");
-    renderer.dvf = Dvf::new(Arc::new(many), LABEL);
+    renderer.methods.set(Dvf::new(Arc::new(many), LABEL));
     let records = renderer.frame(0, &camera).expect("a frame").records;
     let of_bounces = records.iter().find(|record| record.pass == "diffuse-environment").expect("a record");
     assert!(of_bounces.rays_answered > 0);
@@ -269,7 +269,7 @@ fn the_field_of_a_view_out_of_core_is_that_in_core() {
         assert!(bricks > 3 && bricks < renderer.scene.resident().bricks.len(), "{bricks} bricks are seen");
         let asked = DvfSettings { rays: 32, ..settings(5000, 24) };
         let made = renderer.make_dvf(&asked, &region, DvfTracing::over(32), &mut |_, _| true).expect("a field");
-        renderer.dvf = Dvf::new(Arc::new(made.field.clone()), LABEL);
+        renderer.methods.set(Dvf::new(Arc::new(made.field.clone()), LABEL));
         let frame = renderer.frame(0, &camera).expect("a frame");
         println!(
             "{cache}: {} bricks loaded, {} needed, {} read",
@@ -368,7 +368,7 @@ fn what_moves_is_traced_and_nothing_flickers() {
     let still = all[0].scene.clone();
     let field = Arc::new(made(&mut all[1], &DvfSettings { rays: 512, ..settings(50_000, 16) }, 64).field);
     let stills: Vec<_> = all.iter().map(|renderer| renderer.scene.clone()).collect();
-    all[1].dvf = Dvf::new(field.clone(), LABEL);
+    all[1].methods.set(Dvf::new(field.clone(), LABEL));
     let camera = Camera {
         position: DVec3::new(-0.2, 1.7, 2.9),
         target: DVec3::new(-0.2, 1.9, -1.0),
@@ -385,7 +385,7 @@ fn what_moves_is_traced_and_nothing_flickers() {
             renderer.place(still, &[(1, matrix)]).expect("a place");
         }
         // Control: one that is not told that anything has moved.
-        all[2].dvf = Dvf::new(field.clone(), LABEL);
+        all[2].methods.set(Dvf::new(field.clone(), LABEL));
         let [exact, told, untold] = all.each_mut().map(|renderer| renderer.frame(step, &camera).expect("a frame"));
         let differ = |a: &FrameOutput, b: &FrameOutput| {
             a.pixels.radiance.iter().zip(&b.pixels.radiance).filter(|(a, b)| a != b).count()

@@ -86,7 +86,7 @@ fn a_plane_in_the_open_has_its_irradiance_without_a_ray() {
     let field = made(&mut renderer);
     for (a, b) in [(1.0, 0.0), (1.0, 0.75)] {
         shine(&mut renderer, |d| [a + b * d[1]; 3]);
-        renderer.dvf = Dvf::new(Arc::new(field.clone()), PAPER);
+        renderer.methods.set(Dvf::new(Arc::new(field.clone()), PAPER));
         let expected = a + 2.0 * b / 3.0;
         // The integral over 64 x 32 texels.
         let worst = columns(&mut renderer).iter().map(|[_, light]| (light - expected).abs()).fold(0.0, f64::max);
@@ -96,7 +96,7 @@ fn a_plane_in_the_open_has_its_irradiance_without_a_ray() {
     // hold.
     let (radiance, edge) = (100.0, 10f64.to_radians().cos());
     shine(&mut renderer, |d| [if d[1] > edge { radiance } else { 0.0 }; 3]);
-    renderer.dvf = Dvf::new(Arc::new(field), PAPER);
+    renderer.methods.set(Dvf::new(Arc::new(field), PAPER));
     let expected = radiance * (1.0 - edge * edge);
     let found = columns(&mut renderer)[SIZE[0] / 2][1];
     assert!((found - expected).abs() > 0.03 * expected, "{found}, without the error of order 2: {expected}");
@@ -111,7 +111,7 @@ fn a_plane_beside_a_wall_has_the_light_of_the_rest_of_the_sky() {
     let field = made(&mut renderer);
     shine(&mut renderer, |_| [1.0; 3]);
     let mut worst_of = |field: &DvfField| {
-        renderer.dvf = Dvf::new(Arc::new(field.clone()), PAPER);
+        renderer.methods.set(Dvf::new(Arc::new(field.clone()), PAPER));
         let error = |[d, light]: [f64; 2]| (light - 0.5 * (1.0 + d / d.hypot(HEIGHT))).abs();
         let all: Vec<[f64; 2]> = columns(&mut renderer).into_iter().filter(|[d, _]| *d > 0.02 && *d < 3.9).collect();
         (all.len(), all.into_iter().map(error).fold(0.0, f64::max))

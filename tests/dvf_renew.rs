@@ -96,13 +96,13 @@ fn renewed_cells_are_those_of_a_field_made_from_scratch() {
             if options.contains("15%") {
                 (renewal.tracing.lanes, renewal.tracing.pool) = (3, 1);
             }
-            renderer.dvf = dvf(&renewal);
+            renderer.methods.set(dvf(&renewal));
             renderer.place(&still, &[(1, matrix(&still, 1))]).expect("a place");
             let output = renderer.frame(0, &camera()).expect("a frame");
             let own = record(&output, "dvf").expect("a record");
-            let renewed: Vec<u32> = renderer.dvf.renewed_cells().collect();
+            let renewed: Vec<u32> = renderer.methods.get::<Dvf>().expect("a field").renewed_cells().collect();
             assert_eq!((own.cells_renewed, own.cells_left), (renewed.len() as u64, 0));
-            let field = renderer.dvf.moved_field().expect("a field").clone();
+            let field = renderer.methods.get::<Dvf>().expect("a field").moved_field().expect("a field").clone();
             fields.push((field, renewed, own.rays));
             if fields.len() > 1 {
                 assert!(fields[0] == fields[fields.len() - 1], "{options}: another field");
@@ -113,7 +113,7 @@ fn renewed_cells_are_those_of_a_field_made_from_scratch() {
             let marked = renderer.scene.clone();
             let at = |scene: &SceneFile| scene.resident().instances[1].world_from_object;
             assert_ne!(at(&still), at(&marked));
-            renderer.dvf = Dvf::default();
+            renderer.methods.remove::<Dvf>();
             let scratch = renderer.remake_dvf(&renewal, &still).expect("a field");
             let differ = |field: &DvfField| -> usize {
                 renewed.iter().filter(|&&cell| bits(field, cell) != bits(&scratch, cell)).count()
@@ -148,9 +148,9 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 640"));
     let budget = 60_000;
     let renewal = renewal(&mut all[1], &settings, budget);
-    all[1].dvf = Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default());
-    all[2].dvf = dvf(&Renewal { rays: 0, ..renewal.clone() });
-    all[3].dvf = dvf(&renewal);
+    all[1].methods.set(Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default()));
+    all[2].methods.set(dvf(&Renewal { rays: 0, ..renewal.clone() }));
+    all[3].methods.set(dvf(&renewal));
     let stills: Vec<_> = all.iter().map(|renderer| renderer.scene.clone()).collect();
     let (mut wrong, mut left, mut spent) = ([0; 2], [0; 2], 0);
     for step in 0..2 {
@@ -176,7 +176,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     let mut resting = renderer(&scene, "--size 96x72 --cache 100% --spp 160");
     let still = resting.scene.clone();
     let mut rest = |step: u32, horizon: u32| {
-        resting.dvf = dvf(&Renewal { frames: horizon, ..renewal.clone() });
+        resting.methods.set(dvf(&Renewal { frames: horizon, ..renewal.clone() }));
         resting.place(&still, &[(1, matrix(&still, step))]).expect("a place");
         let mut left = Vec::new();
         for frame in 0..30 {
@@ -195,7 +195,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     assert!(last > 0 && 2 * last < first, "{last} of {first}");
     assert_eq!(rest(3, u32::MAX).1, 0);
     // Of few rays all are spent but for less than a cell takes.
-    all[2].dvf = dvf(&Renewal { rays: 3000, frames: u32::MAX, ..renewal.clone() });
+    all[2].methods.set(dvf(&Renewal { rays: 3000, frames: u32::MAX, ..renewal.clone() }));
     all[2].place(&stills[2], &[(1, matrix(&stills[2], 2))]).expect("a place");
     for frame in 0..3 {
         let output = all[2].frame(frame, &camera()).expect("a frame");
@@ -205,7 +205,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     // Back where it was it is the field that was made.
     let own = still.resident().instances[1].world_from_object;
     resting.place(&still, &[(1, own)]).expect("a place");
-    assert!(resting.dvf.moved_field().is_none());
+    assert!(resting.methods.get::<Dvf>().expect("a field").moved_field().is_none());
     assert!(record(&resting.frame(0, &camera()).expect("a frame"), "dvf").is_none());
 }
 
@@ -219,15 +219,15 @@ fn pictures_are_those_of_exact_rays() {
     let mut all = [(); 3].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 4"));
     let mut renewal = renewal(&mut all[1], &settings, 1 << 40);
     renewal.frames = u32::MAX;
-    all[1].dvf = dvf(&Renewal { rays: 0, ..renewal.clone() });
-    all[2].dvf = dvf(&renewal);
+    all[1].methods.set(dvf(&Renewal { rays: 0, ..renewal.clone() }));
+    all[2].methods.set(dvf(&renewal));
     for renderer in &mut all {
         let still = renderer.scene.clone();
         renderer.place(&still, &[(1, matrix(&still, 2))]).expect("a place");
     }
     let [exact, told, renewed] = all.each_mut().map(|r| r.frame(0, &camera()).expect("a frame"));
     // Control: the field of the scene as it was, which is not told.
-    all[1].dvf = Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default());
+    all[1].methods.set(Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default()));
     let untold = all[1].frame(0, &camera()).expect("a frame");
     let differ = |a: &FrameOutput| a.pixels.radiance.iter().zip(&exact.pixels.radiance).filter(|(a, b)| a != b).count();
     let answered = [&told, &renewed].map(|output| record(output, "environment").map_or(0, |own| own.rays_answered));

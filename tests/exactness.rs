@@ -118,17 +118,17 @@ fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
     let truth = Truth::load(&file).expect("truth");
     let light =
         "--rect-light 0,60,0,9,0,0,0,0,9 --environment sky --rotation full --ao-rays 2 --diffuse-rays 2 --ao-length 5";
-    let words = format!("brickwalk walk s -o o {OPTIONS} {size} {light} --effects shadow,ao,diffuse,mirror");
+    let words = format!("brickwalk walk s -o o {OPTIONS} {size} {light} --effects shadow,ao,diffuse,glossy");
     let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
     let session = Session::open(file.clone(), scene, &args.stream, extent).expect("a session");
     let mut renderer = renderer(session, &args).expect("lamps");
     let all = renderer.settings.effects;
-    let none = Effects { shadow: false, environment: false, occlusion: None, diffuse: None, mirror: false, ..all };
+    let none = Effects { shadow: false, environment: false, occlusion: None, diffuse: None, glossy: false, ..all };
     let cases = [
         ("ao", Effects { occlusion: all.occlusion, ..none }, Pass::Occlusion(1)),
         ("diffuse", Effects { diffuse: all.diffuse, shadow: true, ..none }, Pass::Diffuse(1)),
-        ("mirror", Effects { mirror: true, shadow: true, ..none }, Pass::Mirror),
+        ("glossy", Effects { glossy: true, shadow: true, ..none }, Pass::Glossy),
         ("rectangular light", Effects { shadow: true, ..none }, Pass::Shadow(Lamp::Emitter)),
         ("environment", Effects { environment: true, ..none }, Pass::Shadow(Lamp::Environment)),
     ];

@@ -1,4 +1,4 @@
-//! Effects against closed forms: what a surface reflects of a sky behind a wall, inside an emissive box, in a mirror,
+//! Effects against closed forms: what a surface reflects of a sky behind a wall, inside an emissive box,
 //! under rectangular lights, surfaces that emit, points, spots and distant lights, in uniform environments and under a
 //! single bright texel.
 
@@ -106,23 +106,6 @@ fn a_closed_emissive_box_gathers_one_bounce() {
     assert!(gathered.iter().all(|x| (x - 0.375).abs() < 1e-5), "{gathered:?}");
     let alone = render(&scene, &path, &format!("{dark} primary"));
     assert!(alone.iter().all(|x| (x - 0.25).abs() < 1e-6), "{alone:?}");
-    // Half a mirror shows half of the surface and half of what it sees.
-    let mirrored = render(&scene, &path, &format!("{dark} mirror"));
-    assert!(mirrored.iter().all(|x| (x - 0.25).abs() < 1e-6), "{mirrored:?}");
-}
-
-#[test]
-fn mirrors_show_half_of_what_is_opposite() {
-    let folder = common::folder();
-    let folder = folder.path();
-    let ceiling = "v -200 5 -200\nv -200 5 200\nv 200 5 200\nv 200 5 -200\n";
-    let materials = "newmtl black\nKd 0 0 0\nnewmtl glow\nKd 0 0 0\nKe 0.8 0.8 0.8\n";
-    let shape = format!("{FLOOR}{ceiling}usemtl black\nf 1 2 3 4\nusemtl glow\nf 5 6 7 8\n");
-    let scene = converted(folder, "mirror", materials, &shape);
-    let path = down_on(folder, 0.0);
-    let seen = render(&scene, &path, "--effects mirror,shadow");
-    assert!(seen.iter().all(|x| (x - 0.4).abs() < 1e-6), "{seen:?}");
-    assert!(mean(&render(&scene, &path, "--effects shadow")) < 0.01, "the floor itself is black");
 }
 
 #[test]

@@ -35,7 +35,7 @@ const MOTION: &str = r#"{"instances": [{"node": "orbiting box", "keyframes": [
     {"time": 2, "translation": [-1.2, -1.0, 1.1], "rotation": [0.5, 0.5, -0.1, 0.3], "scale": 1.25},
     {"time": 3, "translation": [-1.4, -1.2, 1.9]}]}]}"#;
 
-const ALL: &str = "--effects shadow,ao,diffuse,mirror --ao-rays 1 --diffuse-rays 1 --sun 0.3,0.4,1 --aov";
+const ALL: &str = "--effects shadow,ao,diffuse,glossy --ao-rays 1 --diffuse-rays 1 --sun 0.3,0.4,1 --aov";
 
 /// A Cornell box, its mover where `matrix` says, shining or not.
 fn source(matrix: Option<[f64; 12]>, shines: bool) -> SourceScene {

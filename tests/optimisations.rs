@@ -17,7 +17,7 @@ use clap::Parser;
 use std::path::Path;
 
 /// Every effect, with few rays.
-const OPTIONS: &str = "--aov --effects shadow,ao,diffuse,mirror --ao-rays 2 --ao-length 4 --diffuse-rays 2 \
+const OPTIONS: &str = "--aov --effects shadow,ao,diffuse,glossy --ao-rays 2 --ao-length 4 --diffuse-rays 2 \
                        --rect-light -2,6,-2,4,0,0,0,0,4 --rotation full";
 
 /// A renderer of a scene with all effects, as `walk` makes it.
@@ -75,11 +75,11 @@ fn total(records: &[Record], field: impl Fn(&Record) -> u64) -> u64 {
 
 /// What is traced: everything, or a part.
 fn effect_sets(all: Effects) -> [Effects; 3] {
-    let none = Effects { shadow: false, occlusion: None, diffuse: None, mirror: false, ..all };
+    let none = Effects { shadow: false, occlusion: None, diffuse: None, glossy: false, ..all };
     [
         Effects { shadow: true, ..none },
         Effects { occlusion: all.occlusion, ..none },
-        Effects { shadow: true, diffuse: all.diffuse, mirror: true, ..none },
+        Effects { shadow: true, diffuse: all.diffuse, glossy: true, ..none },
     ]
 }
 
@@ -150,7 +150,6 @@ fn counter(which: Optimisation) -> fn(&Record) -> u64 {
         Optimisation::TighterBounds => |r| r.queries_tightened,
         Optimisation::LazyRequery => |r| r.requeries_deferred,
         Optimisation::PullUp => |r| r.pulled_up,
-        Optimisation::LeafCache => |r| r.leaf_groups_postponed,
     }
 }
 

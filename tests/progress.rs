@@ -7,7 +7,7 @@ use common::{city, folder, frames, walk};
 use serde_json::Value;
 use std::path::Path;
 
-const EFFECTS: &str = "--effects primary,shadow,ao,diffuse,mirror --ao-rays 2 --diffuse-rays 2 --ao-length 5";
+const EFFECTS: &str = "--effects primary,shadow,ao,diffuse,glossy --ao-rays 2 --diffuse-rays 2 --ao-length 5";
 
 fn records(output: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
@@ -53,7 +53,7 @@ fn every_frame_is_finished_by_a_cache_of_two_bricks() {
             assert!(n("bricks_reloaded_frame") <= n("bricks_loaded"), "{name}: {record}");
             reloaded += n("bricks_reloaded_frame");
             // Effects with one pass a frame: its fillings hold what it needed.
-            if ["primary", "shadow", "mirror"].contains(&record["pass"].as_str().expect("a name")) {
+            if ["primary", "shadow", "glossy"].contains(&record["pass"].as_str().expect("a name")) {
                 assert!(n("cache_passes") * n("cache_bytes") >= n("bytes_needed"), "{name}: {record}");
             }
         }

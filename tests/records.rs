@@ -248,10 +248,10 @@ fn records_are_what_a_spy_counts() {
             for pass_of_frame in 0..2 {
                 let tracing = Tracing { measure_needed: true, ..Tracing::default() };
                 let (start, mut stats) = (Instant::now(), PassStats::default());
-                let cache = &mut renderer.cache;
+                let cache = &mut renderer.engine.cache;
                 let resident_start = cache.residency.resident().count() as u64;
                 cache.begin_pass("primary", number);
-                let inner = &mut *renderer.executor;
+                let inner = &mut *renderer.engine.executor;
                 let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
                 let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
                 trace(&mut spy, cache, Pass::Primary, &[Step::Generate], &tracing, &mut stats).expect("a pass");
@@ -320,10 +320,10 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
             let optimisations = Optimisations { nearest_first, ..Optimisations::default() };
             let tracing = Tracing { measure_needed: true, optimisations };
             let mut stats = PassStats::default();
-            let inner = &mut *renderer.executor;
+            let inner = &mut *renderer.engine.executor;
             let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
             let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
-            let cache = &mut renderer.cache;
+            let cache = &mut renderer.engine.cache;
             trace(&mut spy, cache, Pass::Primary, &[Step::Generate], &tracing, &mut stats).expect("a pass");
             let needed: BTreeSet<u32> = stats.bricks_needed.into_iter().flatten().collect();
             let loaded = spy.batches.iter().flatten().map(|load| load.item.number);

@@ -1,18 +1,14 @@
-//! Prefetching and replay through the command line: prefetching changes no output but the host cache's numbers, and a
-//! replay of the recorded requests in the recorded cache does what the walk's own records say.
+//! Replay through the command line: a replay of the recorded requests in the recorded cache does what the walk's own
+//! records say.
 
 mod common;
 
-use common::{brickwalk, city, folder, frames, succeed, walk};
+use common::{brickwalk, city, folder, succeed, walk};
 use serde_json::Value;
 use std::path::Path;
 
 fn near(scene: &Path) -> String {
     format!("--frames 6 --size 96x64 --path {}", scene.with_extension("near.json").display())
-}
-
-fn json(file: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(file).expect("a file")).expect("JSON")
 }
 
 /// The sum of a field over all records of a walk.
@@ -35,92 +31,6 @@ fn refused(words: &[&str]) -> String {
     assert!(text.starts_with("brickwalk: ") && text.lines().count() == 1, "{words:?}: {text}");
     assert!(!text.contains("internal error") && output.stdout.is_empty(), "{words:?}: {text}");
     text
-}
-
-/// Bricks whose geometry or attributes a trace asks for.
-fn requested(trace: &Path) -> Vec<String> {
-    let text = std::fs::read_to_string(trace).expect("a trace");
-    let passes = text.lines().skip(1).map(|line| serde_json::from_str::<Value>(line).expect("a pass"));
-    passes
-        .flat_map(|pass| pass["requests"].as_array().expect("requests").clone())
-        .map(|code| code.as_str().expect("a code").to_owned())
-        .collect()
-}
-
-/// Copies a scene with a flipped bit in the geometry of each of `damaged`.
-fn damage(scene: &Path, copy: &Path, damaged: &[u32]) {
-    let mut bytes = std::fs::read(scene).expect("the scene");
-    let file = bricks::SceneFile::open(scene).expect("a scene");
-    for &brick in damaged {
-        let span = file.span(bricks::Payload::Geometry(brick));
-        bytes[(span.offset + span.bytes / 2) as usize] ^= 0x10;
-    }
-    std::fs::write(copy, bytes).expect("a copy");
-}
-
-#[test]
-fn prefetching_changes_nothing_but_the_host_cache() {
-    let folder = folder();
-    let scene = city(folder.path(), "60K", "1K");
-    let run = |scene: &Path, name: &str, options: &str| {
-        let output = folder.path().join(name);
-        let requests = output.with_extension("jsonl");
-        // A fixed schedule: a clock decides what auto asks for.
-        let fixed = format!("{} --schedule chc --cache 10%", near(scene));
-        walk(scene, &output, &format!("{fixed} {options} --requests-out {}", requests.display()));
-        let summary = json(&output.join("summary.json"));
-        (frames(&output), std::fs::read(&requests).expect("a trace"), summary)
-    };
-    let (pictures, requests, without) = run(&scene, "without", "--prefetch 0");
-    let (with_pictures, with_requests, with) = run(&scene, "with", "--prefetch 16");
-    assert!(with_pictures == pictures, "prefetching changes a picture");
-    assert!(with_requests == requests, "prefetching changes what is asked of the device's cache");
-    for field in ["bricks_loaded", "bricks_evicted", "bytes_geometry", "bytes_attributes", "round_trips"] {
-        let [a, b] = ["with", "without"].map(|name| total(&folder.path().join(name), field));
-        assert_eq!(a, b, "{field}");
-    }
-    let count = |summary: &Value, field: &str| summary["prefetch"][field].as_u64().expect("a count");
-    assert!(count(&with, "used") > 0, "{}", with["prefetch"]);
-    assert_eq!(count(&with, "used") + count(&with, "wasted"), count(&with, "prefetched"));
-    // Frame by frame: what loads found is all accounted for; what arrived after the last pass is in no record.
-    let of = |name: &str, field: &str| total(&folder.path().join(name), field);
-    assert_eq!(of("with", "prefetched_used_bytes"), count(&with, "used_bytes"));
-    let arrived = of("with", "prefetched_bytes");
-    assert!(arrived >= of("with", "prefetched_used_bytes") + of("with", "prefetched_wasted_bytes"));
-    assert!(arrived <= count(&with, "prefetched_bytes"), "{arrived}, {}", with["prefetch"]);
-    for field in ["prefetched_bytes", "prefetched_used_bytes", "prefetched_wasted_bytes"] {
-        assert_eq!(of("without", field), 0, "{field}");
-    }
-    let misses = |summary: &Value| summary["host_cache"]["misses"].as_u64().expect("a count");
-    // A load is either read from the file or found in the host cache, brought there by prefetching or by a load.
-    assert_eq!(misses(&with) + count(&with, "used"), misses(&without));
-    // Controls: without it nothing is prefetched, nor without a host cache; another seed makes other pictures.
-    assert_eq!(count(&without, "prefetched"), 0);
-    let (_, _, off) = run(&scene, "off", "--prefetch 16 --host-cache 0");
-    assert_eq!(count(&off, "prefetched"), 0);
-    assert!(run(&scene, "seed", "--prefetch 16 --seed 1").0 != pictures, "a different seed must change some frame");
-
-    // Damaged bricks that no ray asks for are prefetched in vain, and the walk is none the worse.
-    let asked = requested(&folder.path().join("with.jsonl"));
-    let bricks = bricks::SceneFile::open(&scene).expect("a scene").resident().bricks.len() as u32;
-    let unasked: Vec<u32> = (0..bricks).filter(|brick| !asked.contains(&format!("g{brick}"))).collect();
-    let damaged = folder.path().join("damaged.bricks");
-    damage(&scene, &damaged, &unasked);
-    std::fs::copy(scene.with_extension("near.json"), damaged.with_extension("near.json")).expect("a path");
-    let (damaged_pictures, _, summary) = run(&damaged, "vain", "--prefetch 64");
-    assert!(damaged_pictures == pictures);
-    assert!(count(&summary, "dropped") > 0, "{}", summary["prefetch"]);
-    // Control: one that the last frame asks for first is named, prefetched or not.
-    let last = asked.iter().rev().find(|code| code.starts_with('g')).expect("geometry");
-    damage(&scene, &damaged, &[last[1..].parse().expect("a brick")]);
-    for prefetch in ["0", "64"] {
-        let out = folder.path().join("refused");
-        let path = damaged.with_extension("near.json");
-        let [file, out, path] = [&damaged, &out, &path].map(|p| p.to_str().expect("UTF-8"));
-        let options = ["--frames", "6", "--size", "96x64", "--cache", "10%", "--path", path, "--prefetch", prefetch];
-        let line = refused(&[&["walk", file, "-o", out][..], &options].concat());
-        assert!(line.contains(&format!("brick {} geometry", &last[1..])), "{line}");
-    }
 }
 
 #[test]

@@ -7,8 +7,10 @@ use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::kernels::layout::NONE;
 use brickwalk::reference::Truth;
 use brickwalk::scene::Camera;
-use brickwalk::schedule::{Pass, RomaPart, Step};
+use brickwalk::schedule::{Pass, Step};
 use brickwalk::secondary::occupancy::{Settings, assemble};
+use brickwalk::secondary::roma::RomaPart;
+use brickwalk::secondary::roma::answer::Roma;
 use brickwalk::secondary::roma::handover::Trust;
 use brickwalk::session::open::open_scene;
 use common::{city, converted, folder, frames, sheet};
@@ -148,6 +150,7 @@ fn low_walls_occlude_by_the_cosine() {
     for seed in 0..96 {
         renderer.settings.seed = seed;
         let output = renderer.frame(0, &eye).expect("a frame");
+        let maps = renderer.methods.get::<Roma>().expect("maps").maps().clone();
         let floor: Vec<usize> =
             (0..SIZE * SIZE).filter(|&i| output.pixels.normal[i][1] > 0.9 && output.pixels.depth[i] > 8.0).collect();
         assert_eq!(floor.len(), SIZE * SIZE, "nothing else is seen");
@@ -155,8 +158,9 @@ fn low_walls_occlude_by_the_cosine() {
             // Other directions in every sample, as those of a walk are.
             let pass = Pass::Occlusion(16 * seed + i);
             for (free, (steps, part)) in free.iter_mut().zip(ways) {
-                let steps = [Step::Generate, Step::RomaTrace { steps, part }];
-                renderer.executor.run(pass, &steps, &renderer.cache.states).expect("rays");
+                let steps = [Step::Generate, maps.trace(steps, part)];
+                let brickwalk::frame::Engine { executor, cache, .. } = &mut renderer.engine;
+                executor.run(pass, &steps, &cache.states).expect("rays");
                 let hits = renderer.executor.read_hits(pass).expect("hits");
                 *free += floor.iter().filter(|&&i| hits[i].id == NONE).count() as u64;
             }
@@ -193,23 +197,6 @@ fn low_walls_occlude_by_the_cosine() {
 fn apart(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
     assert_eq!(a.len(), b.len());
     (a.iter().zip(b).map(|(a, b)| (a.1 - b.1) * (a.1 - b.1)).sum::<f64>() / a.len() as f64).sqrt()
-}
-
-#[test]
-fn traced_near_its_start_a_ray_is_nearer_to_the_exact_one() {
-    let folder = folder();
-    let of = |options: &str| openness(folder.path(), true, &format!("--spp 32 {options}"));
-    let exact = of("");
-    let handed_over = [0, 8, 32].map(|cells| of(&format!("--secondary roma --roma-near {cells}")));
-    // Of means: snapped rays go elsewhere than exact ones, and what pixels differ by for that alone must not count.
-    let error =
-        |pixels: &Vec<(f64, f64)>| BEFORE.map(|d| (mean(pixels, d) - mean(&exact, d)).abs()).iter().sum::<f64>() / 5.0;
-    let errors: Vec<f64> = handed_over.iter().map(error).collect();
-    println!("traced up to 0, 8, 32 cells: {errors:?}");
-    assert!(errors[0] > 0.02, "control: maps alone err");
-    assert!(errors[1] < 0.7 * errors[0] && errors[2] < 0.3 * errors[0], "{errors:?}");
-    // Traced beyond everything that is there: the same rays, the same picture.
-    assert_eq!(apart(&of("--secondary roma --roma-near 256"), &exact), 0.0);
 }
 
 /// Rays of ao of a frame: those that maps answer and those that are traced.
@@ -272,7 +259,7 @@ fn maps_answer_what_measured_errors_allow() {
         let mut renderer = renderer(&scene, &format!("--effects ao --spp 4 {options}"));
         // What is measured in the first picture decides of the second.
         let pictures = [0, 1].map(|frame| renderer.frame(frame, &eye()).expect("a frame"));
-        (pictures, renderer.roma.handovers()[0])
+        (pictures, renderer.methods.get::<Roma>().expect("maps").handovers()[0])
     };
     let seen = |output: &FrameOutput| output.pixels.radiance.iter().map(|x| x[1] as f64).collect::<Vec<_>>();
     let ([_, exact], _) = walk("");
@@ -404,8 +391,6 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     let corrected = picture("--cache 100% --secondary auto --auto-one-in 3", "1");
     assert!(corrected != one && corrected != hybrid);
     assert!(picture("--cache 20% --secondary auto --auto-one-in 3 --schedule demand", "3") == corrected);
-    let near = picture("--cache 100% --roma-near 2", "1");
-    assert!(near != one && near != hybrid && picture("--cache 20% --roma-near 2", "3") == near);
     for other in ["--seed 1", "--roma-k 8", "--roma-size 64", "--roma-samples 1", "--roma-unsnapped all"] {
         assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
     }

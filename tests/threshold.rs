@@ -72,7 +72,7 @@ fn the_error_of_a_threshold_is_that_of_the_pictures() {
     assert!(report.contains("worst tile") && report.contains("error_pixels"));
 
     // At 0 there is none, of any effect; and the measurement changes nothing else.
-    let all = "--effects shadow,ao,diffuse,mirror --ao-rays 2 --diffuse-rays 2 --spp 2";
+    let all = "--effects shadow,ao,diffuse,glossy --ao-rays 2 --diffuse-rays 2 --spp 2";
     let measured = run("measured", &format!("{all} --measure-error"));
     let plain = run("plain", all);
     assert!(frames(&measured) == frames(&plain));

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const VIEW: &str = "--frames 2 --size 104x72 --aov";
-const EFFECTS: &str = "--effects shadow,ao,diffuse,mirror --ao-rays 2 --ao-length 4 --diffuse-rays 2 --rotation full";
+const EFFECTS: &str = "--effects shadow,ao,diffuse,glossy --ao-rays 2 --ao-length 4 --diffuse-rays 2 --rotation full";
 
 /// The name of a software adapter, or a note why the test is skipped.
 fn software() -> Option<String> {

@@ -1,6 +1,6 @@
-// What every kernel is told.
+// Parameters of a dispatch, their flags, and constants of all kernels.
 
-struct Params {
+struct Params {           // What every kernel is told.
     zero: u32,            // 0; what barrier() ors in, unknown to the compiler
     width: u32,           // rays per row
     height: u32,          // rows
@@ -10,11 +10,11 @@ struct Params {
     flags: u32,           // PARAM_* bits
     list_capacity: u32,   // entries of the tile lists
     select_mask: u32,     // tile_select takes leaves with (state & select_mask) == select_want
-    select_want: u32,
+    select_want: u32,     // the bits of select_mask that must be set
     threshold: u32,       // a (tile, leaf) query with at most so many rays is not visible; 0 = exact
     top_count: u32,       // nodes of the binary top-level tree
     sample: u32,          // index of the sample of this frame
-    seed: u32,
+    seed: u32,            // of all random numbers
     instance_pad: f32,    // relative padding of top-level boxes for the rounding of instance rays
     sun_radius: f32,      // tangent of the sun's angular radius
     origin: vec4<f32>,    // camera position in the frame, device units
@@ -22,56 +22,35 @@ struct Params {
     step_x: vec4<f32>,    // change of direction per pixel in x
     step_y: vec4<f32>,    // change of direction per pixel in y; w: pixel angle in radians
     sun: vec4<f32>,       // unit vector to the sun; w: cosine-weighted irradiance scale
-    sun_color: vec4<f32>,
-    sky_color: vec4<f32>,
-    ground_color: vec4<f32>,
+    sun_color: vec4<f32>, // irradiance of a surface that faces the sun
+    sky_color: vec4<f32>, // of the zenith
+    ground_color: vec4<f32>, // below the horizon
     jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
-    around: vec4<f32>,    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
+    // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
+    around: vec4<f32>,
     share: f32,           // of the light that the pass's direction stands for
-    surface_share: f32,   // of its own light that a primary hit shows, the rest being mirrored
     length: f32,          // of the pass's rays where that is limited, device units
     stream: u32,          // which random numbers the pass takes
     pair_count: u32,      // pairs to be queried
     run_first: u32,       // of a tile's selected leaves, the first that intersect_list takes
-    run_count: u32,       // and how many it takes at most
+    run_count: u32,       // how many of them intersect_list takes at most
     list_most: u32,       // leaves of the longest list that rays are intersected with
-    emitter_count: u32,
+    emitter_count: u32,   // emitters of the scene
     direction: u32,       // number of the pass's direction
     environment_width: u32,  // texels of a row of the environment; 0: the sky is the background
-    environment_height: u32,
-    emitter_density: f32, // of points of surfaces that shine, by the luminance of their radiance, an area of 1: how rays to them are drawn
+    environment_height: u32, // rows of the environment
+    // density of the points that rays to emitters are drawn from: of an area of 1, by the luminance of its radiance
+    emitter_density: f32,
     diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
-    roma_k: u32,          // square root of the number of maps of a level
-    roma_size: u32,       // texels of a map on both axes, and cells of a column
-    roma_cells: u32,      // cells of a base map on each axis
-    roma_levels: u32,     // base maps
-    roma_samples: u32,    // look-ups of the base map a cell
-    roma_steps: u32,      // columns that a ray passes before it is finished snapped; 0: it is snapped
-    roma_near: u32,       // cells of the base map that holds a ray's start, up to where it is traced; NONE: to its end. roma_measure: in one of a map
-    roma_part: u32,       // which part of rays roma_trace answers, ROMA_*
-    roma_is_part: u32,    // 1: rays that leave the coarsest base map are not answered, 0: it holds the scene
-    roma_pilots: u32,     // of rays that maps answer one in so many is traced to its end; 0: none
-    field_cells: u32,     // cells of a distance field's base map on each axis
-    field_levels: u32,    // distance fields, one a base map
-    field_level: u32,     // which of them is made
-    field_mip: u32,       // and which of its levels: cells are 2^mip of the base map's
-    field_step: u32,      // cells on each axis that jump flooding looks away
-    field_half: u32,      // which half of the nearest cells is read
-    field_steps: u32,     // look-ups of a ray at most
-    field_hit: f32,       // a ray meets what it is no farther from, cells
-    rsm_maps: u32,        // reflective shadow maps of all lamps
-    rsm_map: u32,         // rsm_write: the one that is written,
-    rsm_x: u32,           // and its texel that ray 0 of the pass is for
-    rsm_y: u32,
-    dvf_first: u32,       // dvf_rays: number of the first ray of the block; dvf_points: first side of a point; sweeps: first element of the level
-    dvf_next: u32,        // sweeps: first element of the level above; dvf_rays, dvf_write: first word of the block's bits of waiting rays, NONE: none may wait
-    dvf_count: u32,       // sweeps: elements of the level; dvf_points: sides of points; dvf_write: 0: nothing is entered into masks
-    dvf_turn: u32,        // dvf_rays: which of its directions every lane takes
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
-    ambient: array<vec4<f32>, 9>, // of the environment: what a white surface reflects of it, by terms of its normal (light.wgsl)
+    // what a white surface reflects of the environment, by terms of its normal (light.wgsl)
+    ambient: array<vec4<f32>, 9>,
 }
 
-const PARAM_ANY_HIT: u32 = 1u;
+const PARAM_ANY_HIT: u32 = 1u;     // the pass asks whether rays hit anything, not what
 const PARAM_NEEDED: u32 = 2u;     // queries ask what a pass needed, from its final hits, whatever was resident
 const PARAM_SUN: u32 = 4u;        // shade: with the sun, unshadowed
 const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
@@ -87,5 +66,5 @@ const PARAM_MISS: u32 = 2048u;    // shade: with the background, where rays miss
 const PARAM_COARSER: u32 = 16384u; // coarser levels of textures stand for what is not resident
 const PARAM_GLOSSY: u32 = 8192u;   // what surfaces reflect otherwise than diffusely comes by rays of its own, too
 const BATCH_SAMPLES: u32 = 64u;   // samples that are summed before the radiance is emptied
-const NONE: u32 = 0xffffffffu;
-const T_INFINITE: f32 = 3.4028234e38;
+const NONE: u32 = 0xffffffffu;     // "no such thing", in every index that may be absent
+const T_INFINITE: f32 = 3.4028234e38; // t_max of an unbounded ray: the greatest f32

@@ -1,40 +1,40 @@
 // Materials, textures, and what shading reads of hits.
 
-struct Material {
-    base_color: vec4<f32>,
-    emission: vec3<f32>,
-    metallic: f32,
-    roughness: f32,
-    alpha_cutoff: f32,
+struct Material {         // What surfaces are made of, as in the scene file.
+    base_color: vec4<f32>, // linear factor
+    emission: vec3<f32>,  // linear factor, strength included
+    metallic: f32,        // factor, 0 to 1
+    roughness: f32,       // factor, 0 to 1
+    alpha_cutoff: f32,    // of MASK
     flags: u32,           // MATERIAL_* bits
-    base_color_texture: u32, // NONE: it has none; so with the others
-    opacity_map: u32,
-    normal_texture: u32,
-    metallic_roughness_texture: u32,
-    occlusion_texture: u32,
-    emissive_texture: u32,
-    normal_scale: f32,
-    occlusion_strength: f32,
-    clearcoat: f32,       // share that it covers
-    specular: vec3<f32>,  // what its dielectric part reflects along the normal
-    specular_weight: f32, // and at grazing angles
-    clearcoat_roughness: f32,
-    transmission: f32,
+    base_color_texture: u32, // sRGB. NONE: it has none; so with the others
+    opacity_map: u32,     // of the alpha of its base colour texture
+    normal_texture: u32,  // linear
+    metallic_roughness_texture: u32, // linear: roughness in green, metallic in blue
+    occlusion_texture: u32, // linear, in red
+    emissive_texture: u32, // sRGB
+    normal_scale: f32,    // of x and y of the normal texture
+    occlusion_strength: f32, // 0 to 1; 0: nothing of the texture
+    clearcoat: f32,       // share of the surface that a clear coat covers
+    specular: vec3<f32>,  // what the dielectric part reflects along the normal
+    specular_weight: f32, // what it reflects at grazing angles
+    clearcoat_roughness: f32, // 0 to 1
+    transmission: f32,    // share of light that thin walls let through
     uv_sets: u32,         // bit i: texture i takes the second set of coordinates
     padding: u32,
     uv_from_set: array<vec4<f32>, 10>, // two rows a texture; w of the first: by what areas grow
 }
 
-struct Texture {
-    width: u32,
-    height: u32,
-    levels: u32,
+struct Texture {          // A texture that is cut into tiles.
+    width: u32,           // texels of a row of level 0
+    height: u32,          // rows of level 0
+    levels: u32,          // number of levels
     wrap: u32,            // WRAP_* of s in the low half, of t in the high half
     encoding: u32,        // TEXTURE_RGBA8, TEXTURE_BC7 or TEXTURE_BC5
     flags: u32,           // TEXTURE_SRGB
     first_tile: u32,      // of level 0; the tiles of a level follow each other row by row, and so do levels
     tail_level: u32,      // the first of the levels that are resident throughout
-    tail_page: u32,       // where these lie
+    tail_page: u32,       // page of texels that holds these levels
     tail_offset: u32,     // words within the page
     padding0: u32,
     padding1: u32,
@@ -54,37 +54,38 @@ struct TileDemand {       // what texture lookups ask of a tile
 struct GBuffer {          // what shading reads of a primary hit
     albedo: vec3<f32>,    // linear base colour
     state: u32,           // 0: attributes not read yet; else GBUFFER_*
-    normal: vec3<f32>,    // unit normal, world space: interpolated on the side of the geometric one, then by its texture
-    material: u32,
-    emission: vec3<f32>,
+    // unit normal, world space: interpolated on the side of the geometric one, then by its texture
+    normal: vec3<f32>,
+    material: u32,        // index of the material
+    emission: vec3<f32>,  // linear radiance
     footprint: f32,       // what the pixel covers of the first coordinates' unit square, an area; 0 without textures
     weights: vec2<f32>,   // barycentric weights of source vertices 1 and 2
-    uv: vec2<f32>,
+    uv: vec2<f32>,        // first coordinates
     tangent: vec3<f32>,   // of the normal texture, world space, not unit
     handedness: f32,      // the bitangent is this times cross(normal, tangent); 0 without a tangent
     uv1: vec2<f32>,       // second coordinates
-    footprint1: f32,      // of these
+    footprint1: f32,      // what the pixel covers of the unit square of second coordinates
     occlusion: f32,       // share of unshadowed light that the occlusion texture leaves
-    metallic: f32,
-    roughness: f32,
+    metallic: f32,        // factor times texture
+    roughness: f32,       // factor times texture
     padding0: u32,        // with DVF_PAPER: 1 where its cell is mostly occluded
     padding1: u32,
 }
 
-const MATERIAL_DOUBLE_SIDED: u32 = 4u;
-const MATERIAL_UNLIT: u32 = 8u;
+const MATERIAL_DOUBLE_SIDED: u32 = 4u; // both sides are drawn
+const MATERIAL_UNLIT: u32 = 8u;    // it shows its base colour, whatever the light
 const GBUFFER_READ: u32 = 1u;      // attributes are read
 const GBUFFER_WAITS: u32 = 62u;    // bits of textures that have still to be looked up, the first is that of texture 0
-const GBUFFER_FIRST: u32 = 1u;     // its place
-const BASE_COLOR: u32 = 0u;        // textures of a material
-const NORMAL: u32 = 1u;
-const METALLIC_ROUGHNESS: u32 = 2u;
-const OCCLUSION: u32 = 3u;
-const EMISSIVE: u32 = 4u;
-const MATERIAL_TEXTURES: u32 = 5u;
+const GBUFFER_FIRST: u32 = 1u;     // bit of texture 0 among GBUFFER_WAITS
+const BASE_COLOR: u32 = 0u;        // textures of a material, by number
+const NORMAL: u32 = 1u;            // its normal texture
+const METALLIC_ROUGHNESS: u32 = 2u; // its metallic-roughness texture
+const OCCLUSION: u32 = 3u;         // its occlusion texture
+const EMISSIVE: u32 = 4u;          // its emissive texture
+const MATERIAL_TEXTURES: u32 = 5u; // number of textures of a material
 const REFLECTANCE_SIZE: u32 = 32u; // rows and columns of the table of reflectances
-const TEXTURE_RGBA8: u32 = 0u;     // encoding: texels; else blocks
-const TEXTURE_BC7: u32 = 1u;
-const TEXTURE_BC5: u32 = 2u;       // x and y of directions
+const TEXTURE_RGBA8: u32 = 0u;     // encoding: texels
+const TEXTURE_BC7: u32 = 1u;       // encoding: blocks of colours
+const TEXTURE_BC5: u32 = 2u;       // encoding: blocks of x and y of directions
 const TEXTURE_SRGB: u32 = 1u;      // flags: red, green and blue are sRGB, else linear
 const TILE_TEXELS: u32 = 128u;     // side of a tile

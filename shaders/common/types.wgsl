@@ -1,8 +1,8 @@
-// Structures shared by all kernels. Each mirrors a #[repr(C)] struct of src/kernel/layout.rs; the build compares the
-// two.
+// Structures and constants that kernels share. The build writes their Rust mirrors, `kernels::layout`, from every file
+// whose name ends in `types.wgsl`: a declaration's comment documents both. Padding needs fields of its own.
 
 #include "common/params_types.wgsl"
 #include "common/rays_types.wgsl"
 #include "common/scene_types.wgsl"
 #include "common/surfaces_types.wgsl"
-#include "common/visibility_types.wgsl"
+#include "common/lamp_types.wgsl"

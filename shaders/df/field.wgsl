@@ -1,7 +1,11 @@
 // What the kernels of distance fields share (src/visibility/distance_field): bindings of group 2, and where things lie
 // in them. Cell (x, y, z) of a cube of n on each axis is element (x n + y) n + z.
 
-@group(2) @binding(0) var<storage, read> field_levels: array<RomaLevel>;     // the base maps, the finest first
+#include "occupancy/types.wgsl"
+#include "df/types.wgsl"
+
+@group(1) @binding(6) var<uniform> own: DfOwn;
+@group(2) @binding(0) var<storage, read> field_levels: array<Level>;     // the base maps, the finest first
 @group(2) @binding(1) var<storage, read> boms: array<u32>;                  // of all levels: cell (x, y, z) is bit z % 32 of a word
 @group(2) @binding(2) var<storage, read_write> nearest: array<u32>;         // of one field, the nearest occupied cell to each, twice
 @group(2) @binding(3) var<storage, read_write> distances: array<u32>;       // of all fields, their levels one by one: two f16 a word, the first lowest
@@ -21,12 +25,12 @@ fn cell_of(element: u32, cells: u32) -> vec3<u32> {
 
 // First of the nearest cells of a half.
 fn half_of(half: u32) -> u32 {
-    return half * params.field_cells * params.field_cells * params.field_cells;
+    return half * own.cells * own.cells * own.cells;
 }
 
 // Words of the distances of a level, `mip`, of a field.
 fn mip_words(mip: u32) -> u32 {
-    let n = params.field_cells >> mip;
+    let n = own.cells >> mip;
     return n * n * n / 2u;
 }
 

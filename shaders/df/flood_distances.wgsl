@@ -23,7 +23,7 @@ fn root_toward_zero(squared: u32) -> u32 {
 }
 
 fn distance_bits(cell: vec3<u32>) -> u32 {
-    let seed = nearest[half_of(params.field_half) + element(cell, params.field_cells)];
+    let seed = nearest[half_of(own.half) + element(cell, own.cells)];
     if seed == NO_SEED {
         return INFINITE;
     }
@@ -37,12 +37,12 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let n = params.field_cells;
+    let n = own.cells;
     let number = (group.x + group.y * groups.x) * 64u + lane;
     let cell = cell_of(2u * number, n);
     if cell.x >= n {
         return;
     }
     let word = distance_bits(cell) | distance_bits(cell + vec3<u32>(0u, 0u, 1u)) << 16u;
-    distances[first_distance(params.field_level, 0u) + number] = word;
+    distances[first_distance(own.level, 0u) + number] = word;
 }

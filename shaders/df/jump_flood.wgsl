@@ -11,14 +11,14 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let n = params.field_cells;
+    let n = own.cells;
     let number = (group.x + group.y * groups.x) * 64u + lane;
     let cell = cell_of(number, n);
     if cell.x >= n {
         return;
     }
-    let step = i32(params.field_step);
-    let given = half_of(params.field_half);
+    let step = i32(own.step);
+    let given = half_of(own.half);
     var best = NO_SEED;
     var least = 0xffffffffu;
     for (var x = -step; x <= step; x += step) {
@@ -41,5 +41,5 @@ fn main(
             }
         }
     }
-    nearest[half_of(1u - params.field_half) + number] = best;
+    nearest[half_of(1u - own.half) + number] = best;
 }

@@ -1,6 +1,9 @@
 // Discrete visibility fields (src/visibility/dvf): bindings of group 2, and where things lie in them. Twin:
 // src/cpu/dvf.rs.
 
+#include "dvf/types.wgsl"
+
+@group(1) @binding(6) var<uniform> own: DvfOwn;
 @group(2) @binding(0) var<storage, read> dvf: DvfGrid;
 @group(2) @binding(1) var<storage, read_write> dvf_masks: array<atomic<u32>>; // of each cell, texel by texel: where some ray missed, then where some
                                                                               // ray hit

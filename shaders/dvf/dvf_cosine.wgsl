@@ -28,7 +28,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let surface = seen_surfaces[index];
     var ray = Ray(surface.point, 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0);
     if surface.leaf != NONE {
-        ray.direction = dvf_around(turn_of(global.xy), params.around.xyz, gbuffer[index].normal);
+        ray.direction = dvf_around(turn_of(global.xy), own.around.xyz, gbuffer[index].normal);
         if dot(surface.normal, ray.direction) > 0.0 {
             ray.t_min = 0.0;
             ray.t_max = T_INFINITE;

@@ -31,13 +31,13 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     if lane > 0u {
         before = sums[read + lane - 1u];
     }
-    if params.dvf_next != NONE && block * DVF_WALK < params.dvf_count {
-        before = plus(before, dvf_sums[params.dvf_next + block]);
+    if own.next != NONE && block * DVF_WALK < own.count {
+        before = plus(before, dvf_sums[own.next + block]);
     }
-    if first < params.dvf_count {
-        dvf_sums[params.dvf_first + first] = before;
+    if first < own.count {
+        dvf_sums[own.first + first] = before;
     }
-    if first + 1u < params.dvf_count {
-        dvf_sums[params.dvf_first + first + 1u] = plus(before, one);
+    if first + 1u < own.count {
+        dvf_sums[own.first + first + 1u] = plus(before, one);
     }
 }

@@ -12,11 +12,11 @@
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let i = (group.y * groups.x + group.x) * 64u + lane;
-    if i >= params.dvf_count {
+    if i >= own.count {
         return;
     }
     let sides = select(1u, 2u, (dvf.flags & DVF_BOTH) != 0u);
-    let number = params.dvf_first + i;
+    let number = own.first + i;
     let start = start_of(number / sides, number % sides == 1u);
     let entry = entry_of(start.cell);
     var count = 0u;

@@ -17,10 +17,10 @@ struct Made {
 
 // Whether a ray is made: all, or those that wait.
 fn is_made(index: u32) -> bool {
-    if params.dvf_next == NONE {
+    if own.next == NONE {
         return true;
     }
-    return (atomicLoad(&dvf_waiting[params.dvf_next + index / 32u]) >> (index % 32u) & 1u) != 0u;
+    return (atomicLoad(&dvf_waiting[own.next + index / 32u]) >> (index % 32u) & 1u) != 0u;
 }
 
 // No ray.
@@ -32,7 +32,7 @@ fn no_ray() -> Made {
 fn ray_of(slot: u32) -> Made {
     var made = no_ray();
     var point = slot / dvf.lanes;
-    var turn = slot % dvf.lanes + params.dvf_turn * dvf.lanes;
+    var turn = slot % dvf.lanes + own.turn * dvf.lanes;
     let is_both = (dvf.flags & DVF_BOTH) != 0u;
     var is_behind = false;
     if dvf_renews() {
@@ -76,7 +76,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let index = global.y * params.width + global.x;
     var made = no_ray();
     if is_made(index) {
-        made = ray_of(params.dvf_first + index);
+        made = ray_of(own.first + index);
     }
     rays[index] = made.ray;
     start_hit(index, made.ray.t_max, made.source);

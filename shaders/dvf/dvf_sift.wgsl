@@ -29,7 +29,7 @@ fn sift_as_in_paper(index: u32, ray: Ray) -> bool {
     }
     hits[index].t = -1.0;
     if is_occluded_cell {
-        hits[index].id = DVF_HIT;
+        hits[index].id = MET;
     }
     return true;
 }
@@ -63,7 +63,7 @@ fn sift(index: u32, ray: Ray) -> bool {
     }
     hits[index].t = -1.0;
     if is_met {
-        hits[index].id = DVF_HIT;
+        hits[index].id = MET;
     }
     return true;
 }

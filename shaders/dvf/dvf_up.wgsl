@@ -20,7 +20,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
             sums[lane] = plus(sums[lane], sums[lane + step]);
         }
     }
-    if lane == 0u && block * DVF_WALK < params.dvf_count {
-        dvf_sums[params.dvf_next + block] = sums[0];
+    if lane == 0u && block * DVF_WALK < own.count {
+        dvf_sums[own.next + block] = sums[0];
     }
 }

@@ -13,8 +13,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     let ray = rays[index];
-    if params.dvf_next != NONE {
-        let word = params.dvf_next + index / 32u;
+    if own.next != NONE {
+        let word = own.next + index / 32u;
         let bit = 1u << (index % 32u);
         if is_traced(index, ray) && surfaces[index].pending != 0u {
             atomicOr(&dvf_waiting[word], bit);
@@ -23,7 +23,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
         atomicAnd(&dvf_waiting[word], ~bit);
     }
-    if params.dvf_count == 0u {
+    if own.count == 0u {
         return;
     }
     if !(ray.t_min <= ray.t_max) {

@@ -7,8 +7,8 @@ fn plus(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
 
 // Element `i` of the level at hand; 0 behind its last.
 fn element_of(i: u32) -> vec2<u32> {
-    if i < params.dvf_count {
-        return dvf_sums[params.dvf_first + i];
+    if i < own.count {
+        return dvf_sums[own.first + i];
     }
     return vec2<u32>(0u);
 }

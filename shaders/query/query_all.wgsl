@@ -1,6 +1,6 @@
 // Ray-by-ray queries of the whole top level, near children first: each ray asks for the bricks in the wanted state of
 // whose root it enters a child box at or before its present hit, and notes whether it asked for any. With OF_TILES only
-// the rays of the tiles that have no list ask. With COUNT they ask for nothing: counted is how many rays of a tile see
+// the rays of the tiles that have no list ask. With PAIRS they ask for nothing: counted is how many rays of a tile see
 // each leaf.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
@@ -10,7 +10,7 @@
 #include "trace/leaf.wgsl"
 
 override OF_TILES: bool = false;
-override COUNT: bool = false;
+override PAIRS: bool = false;
 
 const TOP_STACK_SIZE: u32 = 192u;  // MAX_TOP_HEIGHT levels of which each leaves at most 7 siblings, and the root
 
@@ -39,20 +39,20 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     if index == NONE {
         return;
     }
-    if !COUNT && surfaces[index].pending == 0u {
+    if !PAIRS && surfaces[index].pending == 0u {
         return;
     }
     let ray = rays[index];
     let hit = hits[index];
     let occluded = (params.flags & PARAM_ANY_HIT) != 0u && hit.id != NONE;
-    if !COUNT {
+    if !PAIRS {
         surfaces[index].pending = 0u;
     }
     if !is_traced(index, ray) || params.top_count == 0u || occluded {
         return;
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let up_to_next = !COUNT && (params.flags & PARAM_NEXT) != 0u;
+    let up_to_next = !PAIRS && (params.flags & PARAM_NEXT) != 0u;
     var r: BrickRay;
     var stack: array<Entry, TOP_STACK_SIZE>; // nodes, and where the ray enters them
     stack[0] = Entry(0u, 0.0);
@@ -92,7 +92,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             }
             let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
             let brick = leaves[leaf].brick;
-            if (slots[brick].state & params.select_mask) != params.select_want || (!COUNT && is_culled(work.tile, leaf)) {
+            if (slots[brick].state & params.select_mask) != params.select_want || (!PAIRS && is_culled(work.tile, leaf)) {
                 continue;
             }
             enter_leaf(&r, world, leaf);
@@ -102,7 +102,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             if own.bits == 0u {
                 continue;
             }
-            if COUNT {
+            if PAIRS {
                 count(work.tile, leaf);
                 continue;
             }

@@ -1,7 +1,11 @@
 // Ray-aligned occupancy maps (Zeng et al., ROMA): bindings of group 2, cells of a column in words of 32 bits (depth t
 // at bit 31 - t % 32 of word t / 32), strata of directions. Twins: src/visibility/roma/bits.rs and directions.rs.
 
-@group(2) @binding(0) var<storage, read> roma_levels: array<RomaLevel>;
+#include "occupancy/types.wgsl"
+#include "roma/types.wgsl"
+
+@group(1) @binding(6) var<uniform> own: RomaOwn;
+@group(2) @binding(0) var<storage, read> roma_levels: array<Level>;
 @group(2) @binding(1) var<storage, read> roma_maps: array<RomaMap>;  // of the finest level, by their strata, then of the next
 @group(2) @binding(2) var<storage, read> boms: array<u32>;           // of each level: cell (x, y, z) is bit z % 32 of a word; then what is empty, a
                                                                      // byte a block (src/visibility/bom/clearance.rs)
@@ -19,12 +23,12 @@ fn affine(row: vec4<f32>, p: vec3<f32>) -> f32 {
 
 // Words of a column.
 fn words() -> u32 {
-    return params.roma_size / 32u;
+    return own.size / 32u;
 }
 
 // First word of column (x, y) of a map.
 fn first_word(map: u32, x: u32, y: u32) -> u32 {
-    return ((map * params.roma_size + y) * params.roma_size + x) * words();
+    return ((map * own.size + y) * own.size + x) * words();
 }
 
 // Depth of the middle of the first occupied cell between two depths of the column whose words start at `first`, in the
@@ -32,7 +36,7 @@ fn first_word(map: u32, x: u32, y: u32) -> u32 {
 fn first_cell(first: u32, start: f32, end: f32, is_forward: bool) -> f32 {
     let from_depth = floor(min(start, end));
     let to_depth = floor(max(start, end));
-    let deepest = f32(params.roma_size) - 1.0;
+    let deepest = f32(own.size) - 1.0;
     if !(to_depth >= 0.0 && from_depth <= deepest) {
         return -1.0;
     }
@@ -89,6 +93,6 @@ fn square_of(d: vec3<f32>) -> vec2<f32> {
 // The stratum that a direction, or in the lower hemisphere its opposite, lies in.
 fn stratum_of(direction: vec3<f32>) -> u32 {
     let d = select(-direction, direction, direction.z >= 0.0);
-    let s = min(vec2<u32>(square_of(d) * f32(params.roma_k)), vec2<u32>(params.roma_k - 1u));
-    return s.x + params.roma_k * s.y;
+    let s = min(vec2<u32>(square_of(d) * f32(own.k)), vec2<u32>(own.k - 1u));
+    return s.x + own.k * s.y;
 }

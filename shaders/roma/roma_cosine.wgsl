@@ -25,7 +25,7 @@ fn upward(map: u32, normal: vec3<f32>) -> vec3<f32> {
 fn drawn(index: u32, ray: Ray) -> Taken {
     let normal = seen_surfaces[index].normal;
     let shading_normal = gbuffer[index].normal;
-    let maps = params.roma_k * params.roma_k;
+    let maps = own.k * own.k;
     var word = drawn_word(index);
     for (var i = 0u; i < TRIES; i++) {
         let at = barrier(f32(word >> 8u) * 5.9604645e-8 * f32(maps)); // by powers of two: exact

@@ -7,7 +7,7 @@
 #include "common/exact.wgsl"
 #include "common/random.wgsl"
 #include "roma/roma.wgsl"
-#include "roma/levels.wgsl"
+#include "occupancy/levels.wgsl"
 #include "roma/roma_start.wgsl"
 #include "roma/roma_walk.wgsl"
 #include "roma/roma_cosine.wgsl"
@@ -29,7 +29,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
         let ray = rays[index];
         if ray.t_min <= ray.t_max {
             var is_capped = false;
-            if params.roma_levels > 0u {
+            if own.levels > 0u {
                 let taken = drawn(index, ray);
                 turn(index, taken.direction);
                 let found = answer(index, ray, taken, ray.t_min, false);

@@ -8,7 +8,7 @@
 #include "common/exact.wgsl"
 #include "common/random.wgsl"
 #include "roma/roma.wgsl"
-#include "roma/levels.wgsl"
+#include "occupancy/levels.wgsl"
 #include "roma/roma_start.wgsl"
 #include "roma/roma_walk.wgsl"
 #include "roma/roma_pilot.wgsl"
@@ -35,7 +35,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
                 atomicAdd(&counted[1], 1u);
             }
             for (var i = 0u; i < HANDOVERS && is_free && found.t >= 0.0; i++) {
-                let begin = near_end(index, ray, handover_cells(i) * params.roma_near);
+                let begin = near_end(index, ray, handover_cells(i) * own.near);
                 if begin < ray.t_max && answer(index, ray, taken, begin, false).t >= 0.0 {
                     atomicAdd(&counted[2u + i], 1u);
                 }

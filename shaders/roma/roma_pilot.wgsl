@@ -14,11 +14,11 @@ fn block_of(index: u32, side: u32) -> u32 {
 // as many pixels as a tile mostly has are together, since for tiles without any no query is made; which one of so many
 // directions goes on by the golden section, so that over samples all have their turn.
 fn is_pilot(index: u32) -> bool {
-    let n = params.roma_pilots;
+    let n = own.pilots;
     if n == 0u {
         return false;
     }
-    if params.roma_part == ROMA_CORRECT {
+    if own.part == ROMA_CORRECT {
         let word = random4(block_of(index, 64u), ~(params.stream - params.sample), params.seed).z + params.direction / n * GOLDEN;
         return params.direction % n == u32(barrier(f32(word >> 8u) * 5.9604645e-8 * f32(n))); // rounded, never up to n
     }

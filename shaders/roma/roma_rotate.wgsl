@@ -14,24 +14,24 @@ const BLOCK_CELLS: u32 = 4u;
 
 // Words of a level: a bit a cell, a byte a block.
 fn words_of_level() -> u32 {
-    let n = params.roma_cells;
+    let n = own.cells;
     let side = n / BLOCK_CELLS;
     return n * n * (n / 32u) + side * side * side / 4u;
 }
 
 fn is_within(c: vec3<u32>) -> bool {
-    return all(c < vec3<u32>(params.roma_cells));
+    return all(c < vec3<u32>(own.cells));
 }
 
 fn is_occupied(level: u32, c: vec3<u32>) -> bool {
-    let n = params.roma_cells;
+    let n = own.cells;
     let word = level * words_of_level() + (c.x + n * c.y) * (n / 32u) + c.z / 32u;
     return ((boms[word] >> (c.z % 32u)) & 1u) != 0u;
 }
 
 // Cells around one, on every axis, that are empty as it is.
 fn empty_around(level: u32, c: vec3<u32>) -> u32 {
-    let n = params.roma_cells;
+    let n = own.cells;
     let side = n / BLOCK_CELLS;
     let b = c / BLOCK_CELLS;
     let at = (b.x * side + b.y) * side + b.z;
@@ -47,7 +47,7 @@ fn bounded(range: vec2<f32>, start: f32, step: f32) -> vec2<f32> {
         return range;
     }
     let a = -start / step;
-    let b = (f32(params.roma_cells) - start) / step;
+    let b = (f32(own.cells) - start) / step;
     return vec2<f32>(max(range.x, min(a, b) - 1.0), min(range.y, max(a, b) + 1.0));
 }
 
@@ -58,11 +58,11 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let n = params.roma_size;
-    let maps = params.roma_k * params.roma_k;
+    let n = own.size;
+    let maps = own.k * own.k;
     let column = (group.x + group.y * groups.x) * 64u + lane;
     let map = column / (n * n);
-    if map >= maps * params.roma_levels {
+    if map >= maps * own.levels {
         return;
     }
     let level = map / maps;
@@ -72,7 +72,7 @@ fn main(
     let step = vec3<f32>(rows[0].z, rows[1].z, rows[2].z);
     var range = vec2<f32>(0.0, f32(n));
     range = bounded(bounded(bounded(range, start.x, step.x), start.y, step.y), start.z, step.z);
-    let part = 1.0 / f32(params.roma_samples);
+    let part = 1.0 / f32(own.samples);
     let per_cell = 1.0 / max(max(abs(step.x), abs(step.y)), abs(step.z));
     var next = 0u;
     for (var w = 0u; w < words(); w++) {
@@ -83,7 +83,7 @@ fn main(
                 continue;
             }
             let i = next - 32u * w;
-            for (var s = 0u; s < params.roma_samples; s++) {
+            for (var s = 0u; s < own.samples; s++) {
                 let at = depth + (f32(s) + 0.5) * part;
                 let cell = vec3<u32>(vec3<i32>(floor(barrier3(start + barrier3(at * step)))));
                 if !is_within(cell) {

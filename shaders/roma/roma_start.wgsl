@@ -2,7 +2,7 @@
 
 // Cells before its sides at which a level ends for ray `index`.
 fn margin_of(index: u32) -> f32 {
-    let side = f32(params.roma_cells);
+    let side = f32(own.cells);
     return barrier(BLEND * barrier(side * random2(index, ~params.stream, params.seed).x));
 }
 
@@ -16,7 +16,7 @@ fn near_end(index: u32, ray: Ray, cells: u32) -> f32 {
     let d = ray.direction;
     let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
     let l = start_level_of(ray.origin, seen_surfaces[index].normal, margin_of(index));
-    if l >= params.roma_levels {
+    if l >= own.levels {
         return T_INFINITE;
     }
     return divide(f32(cells), barrier(roma_levels[l].scale * length));
@@ -28,13 +28,13 @@ fn lifted(origin: vec3<f32>, normal: vec3<f32>, lift: f32) -> vec3<f32> {
 
 // The finest level that holds the start; the number of levels where none does.
 fn start_level_of(origin: vec3<f32>, normal: vec3<f32>, margin: f32) -> u32 {
-    let side = f32(params.roma_cells);
-    for (var l = 0u; l < params.roma_levels; l++) {
+    let side = f32(own.cells);
+    for (var l = 0u; l < own.levels; l++) {
         let level = roma_levels[l];
         let at = barrier3(barrier3(lifted(origin, normal, level.lift) * level.scale) + level.first);
         if all(at >= vec3<f32>(margin)) && all(at <= vec3<f32>(side - margin)) {
             return l;
         }
     }
-    return params.roma_levels - select(1u, 0u, params.roma_is_part != 0u);
+    return own.levels - select(1u, 0u, own.is_part != 0u);
 }

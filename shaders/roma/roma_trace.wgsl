@@ -1,13 +1,13 @@
 // Answers the pass's rays by ray-aligned occupancy maps, each by that of its stratum. What is met is written as a hit
 // of no triangle, but where rays are sifted: there, those that meet nothing are ended, and others are traced up to
-// roma_near cells from their start. Where pilots have been traced, these count for what maps get wrong.
+// own.near cells from their start. Where pilots have been traced, these count for what maps get wrong.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
 #include "common/exact.wgsl"
 #include "common/random.wgsl"
 #include "roma/roma.wgsl"
-#include "roma/levels.wgsl"
+#include "occupancy/levels.wgsl"
 #include "roma/roma_start.wgsl"
 #include "roma/roma_walk.wgsl"
 #include "roma/roma_pilot.wgsl"
@@ -21,20 +21,20 @@ fn sift(index: u32, ray: Ray, found: Answer) {
         }
         return;
     }
-    if params.roma_near == 0u {
+    if own.near == 0u {
         hits[index].t = WAITING;
-    } else if params.roma_near != NONE {
-        hits[index].t = min(ray.t_max, near_end(index, ray, params.roma_near));
+    } else if own.near != NONE {
+        hits[index].t = min(ray.t_max, near_end(index, ray, own.near));
     }
 }
 
 // Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or
 // 0. So the mean is that of traced rays, and its noise that of what maps get wrong (a control variate).
 fn correct(index: u32, found: Answer) {
-    if params.roma_levels == 0u {
+    if own.levels == 0u {
         return;
     }
-    let n = f32(params.roma_pilots);
+    let n = f32(own.pilots);
     let is_free = hits[index].id == NONE;
     if is_free && found.t >= 0.0 {
         hits[index].u = n - 1.0;
@@ -49,15 +49,15 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
     if global.x < params.width && global.y < params.height {
         let index = global.y * params.width + global.x;
         let ray = rays[index];
-        let is_far = params.roma_part == ROMA_FAR;
-        let is_sifted = params.roma_part == ROMA_SIFT;
+        let is_far = own.part == ROMA_FAR;
+        let is_sifted = own.part == ROMA_SIFT;
         // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
         let is_done = hits[index].id != NONE || hits[index].t == ANSWERED || hits[index].t >= ray.t_max;
         if ray.t_min <= ray.t_max && !(is_far && is_done) && !(is_sifted && is_pilot(index)) {
             let found = answer(index, ray, nearest(index, ray), select(ray.t_min, hits[index].t, is_far), is_sifted);
             if is_sifted {
                 sift(index, ray, found);
-            } else if params.roma_part == ROMA_CORRECT && is_pilot(index) {
+            } else if own.part == ROMA_CORRECT && is_pilot(index) {
                 correct(index, found);
             } else {
                 write(index, found);

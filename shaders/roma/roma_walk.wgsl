@@ -47,7 +47,7 @@ fn through(map: u32, at: vec3<f32>, speed: vec3<f32>, range: vec2<f32>, steps: u
     if range.x > range.y {
         return Found(-1.0, false);
     }
-    let last = i32(params.roma_size) - 1;
+    let last = i32(own.size) - 1;
     var x = clamp(i32(floor(along(at.x, speed.x, range.x))), 0, last);
     var y = clamp(i32(floor(along(at.y, speed.y, range.x))), 0, last);
     var t = range.x;
@@ -97,8 +97,8 @@ fn length_of(d: vec3<f32>) -> f32 {
 fn nearest(index: u32, ray: Ray) -> Taken {
     let d = ray.direction;
     let map = stratum_of(d);
-    if params.roma_steps > 0u {
-        return Taken(map, d, params.roma_steps);
+    if own.steps > 0u {
+        return Taken(map, d, own.steps);
     }
     let normal = seen_surfaces[index].normal;
     let length = length_of(d);
@@ -115,23 +115,23 @@ fn nearest(index: u32, ray: Ray) -> Taken {
 // `is_sifted` by less, and must be free to their own ends.
 fn answer(index: u32, ray: Ray, taken: Taken, begin: f32, is_sifted: bool) -> Answer {
     let normal = seen_surfaces[index].normal;
-    let maps = params.roma_k * params.roma_k;
+    let maps = own.k * own.k;
     let direction = taken.direction;
-    let side = f32(params.roma_cells);
+    let side = f32(own.cells);
     let margin = margin_of(index);
     let start_level = start_level_of(ray.origin, normal, margin);
     let rise = barrier(barrier(barrier(direction.x * normal.x) + barrier(direction.y * normal.y)) + barrier(direction.z * normal.z));
     let squares = barrier(barrier(barrier(direction.x * direction.x) + barrier(direction.y * direction.y)) + barrier(direction.z * direction.z));
     var t = max(ray.t_min, begin);
     var is_capped = false;
-    for (var l = start_level; l < params.roma_levels; l++) {
+    for (var l = start_level; l < own.levels; l++) {
         let level = roma_levels[l];
         let lift = lift_of(select(level.lift, barrier(SIFTED_LIFT * level.lift), is_sifted), barrier(t * rise));
         let start = lifted(ray.origin, normal, lift);
         let end = select(end_of(ray.t_max, lift, squares, rise), ray.t_max, is_sifted);
         let at = barrier3(barrier3(start * level.scale) + level.first);
         let speed = barrier3(direction * level.scale);
-        let low = select(margin, 0.0, l + 1u == params.roma_levels && params.roma_is_part == 0u);
+        let low = select(margin, 0.0, l + 1u == own.levels && own.is_part == 0u);
         let high = side - low;
         var range = vec2<f32>(t, end);
         range = clipped(range, at.x, speed.x, low, high);
@@ -154,6 +154,6 @@ fn answer(index: u32, ray: Ray, taken: Taken, begin: f32, is_sifted: bool) -> An
             }
         }
     }
-    let is_known = params.roma_is_part == 0u || t >= ray.t_max;
+    let is_known = own.is_part == 0u || t >= ray.t_max;
     return Answer(-1.0, vec3<f32>(0.0), direction, 0.0, is_capped, is_known);
 }

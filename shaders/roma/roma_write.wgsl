@@ -6,7 +6,7 @@ fn write(index: u32, found: Answer) {
     if found.t < 0.0 {
         return;
     }
-    hits[index] = Hit(found.t, ROMA_HIT, 0.0, 0.0);
+    hits[index] = Hit(found.t, MET, 0.0, 0.0);
     if (params.flags & PARAM_ANY_HIT) == 0u {
         surfaces[index].point = found.point;
         surfaces[index].normal = -found.direction;

@@ -30,7 +30,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     let ray = seen_rays[index];
-    if !(ray.t_min <= ray.t_max) || seen_hits[index].id != ROMA_HIT {
+    if !(ray.t_min <= ray.t_max) || seen_hits[index].id != MET {
         return;
     }
     let met = seen_surfaces[index];
@@ -39,7 +39,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let p = barrier3(met.point + barrier3(barrier(MOVED * met.area) * moved));
     var light = vec3<f32>(0.0);
     var done = params.emitter_count; // the lamp that was looked up last; none has this number
-    for (var i = 0u; i < params.rsm_maps; i++) {
+    for (var i = 0u; i < own.maps; i++) {
         let map = rsm_maps[i];
         if map.lamp == done {
             continue;

@@ -13,9 +13,9 @@
 // One thread a ray.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
-    let map = rsm_maps[params.rsm_map];
-    let x = params.rsm_x + global.x;
-    let y = params.rsm_y + global.y;
+    let map = rsm_maps[own.map];
+    let x = own.x + global.x;
+    let y = own.y + global.y;
     if global.x >= params.width || global.y >= params.height || x >= map.width || y >= map.height {
         return;
     }

@@ -56,5 +56,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
         reflects += weight * reflected(s, unit_d);
     }
-    add_light(index, weight_of(index) * surface_share() * reflects * light);
+    add_light(index, weight_of(index) * reflects * light);
 }

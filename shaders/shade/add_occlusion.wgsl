@@ -20,5 +20,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let g = gbuffer[index];
     let s = gloss_of(g, -seen_rays[index].direction);
-    add_light(index, weight_of(index) * surface_share() * params.share * (s.diffuse * ambient(g.normal) + reflected_ambient(s)));
+    add_light(index, weight_of(index) * params.share * (s.diffuse * ambient(g.normal) + reflected_ambient(s)));
 }

@@ -28,7 +28,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             if density > 0.0 && dot(surface.normal, ray.direction) > 0.0 {
                 ray.t_min = 0.0;
                 ray.t_max = T_INFINITE;
-                carried = surface_share() * reflected(s, ray.direction) * (dot(g.normal, ray.direction) / (PI * density));
+                carried = reflected(s, ray.direction) * (dot(g.normal, ray.direction) / (PI * density));
             }
         }
     }

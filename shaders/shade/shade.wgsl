@@ -75,7 +75,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     if seen_surfaces[index].leaf == NONE {
         // What occupancy maps met is lit otherwise.
-        if (params.flags & PARAM_MISS) != 0u && seen_hits[index].id != ROMA_HIT {
+        if (params.flags & PARAM_MISS) != 0u && seen_hits[index].id != MET {
             add_light(index, seen_background(ray.direction, density));
         }
         return;
@@ -92,5 +92,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         light += ambient(g.normal) * g.occlusion;
         mirrored += reflected_ambient(s) * g.occlusion;
     }
-    add_light(index, surface_share() * (s.diffuse * light + mirrored + seen_emission(g, ray, index, density)));
+    add_light(index, s.diffuse * light + mirrored + seen_emission(g, ray, index, density));
 }

@@ -10,8 +10,3 @@
 @group(3) @binding(6) var<storage, read_write> throughput: array<vec4<f32>>; // of the light that the rays of set 1 bring; w: number of their direction
 @group(3) @binding(7) var<storage, read_write> densities: array<f32>;      // by which the directions of the rays of set 1 were drawn; 0 where no lamp's
                                                                            // rays bring the same light
-
-// The share of a primary hit's own light that it shows; all of a hit of set 1.
-fn surface_share() -> f32 {
-    return select(params.surface_share, 1.0, (params.flags & PARAM_BOUNCE) != 0u);
-}

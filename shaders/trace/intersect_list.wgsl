@@ -1,6 +1,5 @@
 // Intersects each ray with a run of the selected leaves of its tile, in their order. Nodes are visited until one has
-// triangles, so that the rays of a subgroup test theirs together. With LEAF_CACHE two such groups are gathered, as long
-// as the ray does not enter another leaf.
+// triangles, so that the rays of a subgroup test theirs together.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "query/tiles.wgsl"
@@ -10,10 +9,6 @@
 #include "trace/leaf.wgsl"
 #include "trace/brick.wgsl"
 #include "trace/walk_brick.wgsl"
-
-override LEAF_CACHE: bool = false;
-
-var<private> leaf_groups_postponed: u32;
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
@@ -45,7 +40,6 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
     var depth = 0u;
     var group = vec2<u32>(0u);
     loop {
-        var postponed = vec2<u32>(0u);
         var triangles = vec2<u32>(0u);
         loop {
             if !has_children(group) {
@@ -53,7 +47,7 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
                     depth -= 1u;
                     group = stack[depth];
                 } else {
-                    if next == end || (LEAF_CACHE && postponed.y != 0u) {
+                    if next == end {
                         break;
                     }
                     let listed = list[selection[next]];
@@ -80,27 +74,16 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             group = opened.children;
             triangles = opened.triangles;
             if triangles.y != 0u {
-                if !LEAF_CACHE || postponed.y != 0u {
-                    break;
-                }
-                postponed = triangles;
-                triangles = vec2<u32>(0u);
-                leaf_groups_postponed += 1u;
+                break;
             }
         }
-        if (postponed.y | triangles.y) == 0u {
+        if triangles.y == 0u {
             break;
-        }
-        if LEAF_CACHE {
-            test_triangles(&r, &best, postponed, any_hit);
         }
         test_triangles(&r, &best, triangles, any_hit);
         if any_hit && best.leaf != NONE {
             break;
         }
-    }
-    if LEAF_CACHE && leaf_groups_postponed > 0u {
-        atomicAdd(&counters[COUNTER_LEAF_GROUPS], leaf_groups_postponed);
     }
     finish_walk(&r, world, best, index);
 }

@@ -73,11 +73,11 @@ pub fn prepare(renderer: &mut Renderer, args: &WalkArgs, path: &CameraPath) -> R
             (made.kept.clone(), Some((made, seconds)))
         }
     };
-    renderer.dvf = Dvf::new(Arc::new(kept.finished(settings.dilate)), args.dvf.how());
+    let mut dvf = Dvf::new(Arc::new(kept.finished(settings.dilate)), args.dvf.how());
     if args.motion.is_some() && args.dvf.dvf_renew > 0 {
-        let renewal = renewal(args, Arc::new(kept), region);
-        renderer.dvf = std::mem::take(&mut renderer.dvf).renewed_by(renewal);
+        dvf = dvf.renewed_by(renewal(args, Arc::new(kept), region));
     }
+    renderer.methods.set(dvf);
     Ok(Some(Note { file, made }))
 }
 
@@ -155,7 +155,7 @@ pub fn make(
 impl Note {
     /// As summaries have it.
     pub fn report(&self, renderer: &Renderer, args: &WalkArgs, records: &[Record]) -> Value {
-        let Some(field) = renderer.dvf.field() else { return Value::Null };
+        let Some(field) = renderer.methods.get::<Dvf>().and_then(Dvf::field) else { return Value::Null };
         let own = || records.iter().filter(|record| record.pass == DVF_EFFECT);
         let sum = |of: &dyn Fn(&Record) -> u64| own().map(of).sum::<u64>();
         let settings = args.dvf.settings();

@@ -5,6 +5,7 @@ use super::walk::lit_renderer;
 use crate::frame::{Light, Renderer};
 use crate::kernels::{Extent, Keep, opacity, reflectance};
 use crate::scene::Camera;
+use crate::secondary::roma::answer::Roma;
 use crate::session::open::Session;
 use anyhow::Result;
 use bricks::SceneFile;
@@ -82,9 +83,11 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
 
 /// Whether maps would have spared rays of ao that are too short for it.
 fn has_short_rays(renderer: &mut Renderer) -> bool {
-    let is_help = renderer.settings.roma.is_some_and(|roma| roma.occlusion.role.is_help());
-    let length = renderer.settings.effects.occlusion.map(|occlusion| occlusion.length);
-    is_help && length.is_some_and(|length| renderer.roma.is_short(&renderer.scene, length))
+    let Renderer { engine, methods } = renderer;
+    let Some(roma) = methods.get_mut::<Roma>() else { return false };
+    let is_help = roma.settings.is_some_and(|settings| settings.occlusion.role.is_help());
+    let length = engine.settings.effects.occlusion.map(|occlusion| occlusion.length);
+    is_help && length.is_some_and(|length| roma.is_short(&engine.scene, length))
 }
 
 /// As the summary lists them, with what `measured` found.
@@ -115,7 +118,6 @@ pub fn measure(
     let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
     let mut options = args.clone();
     options.stream.requests_out = None;
-    options.stream.prefetch = 0;
     let open = |keep: Keep| -> Result<Renderer> {
         let session = Session::open_keeping(scene.clone(), &args.scene, &options.stream, extent, keep)?;
         Ok(lit_renderer(session, &options, light.clone()))

@@ -24,6 +24,7 @@ pub mod walk;
 
 use clap::Parser;
 use options::args::{Cli, Command};
+use options::removed;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -40,7 +41,7 @@ pub struct Usage(pub String);
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     install_panic_hook();
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse().map_err(removed::explained) {
         Ok(cli) => cli,
         Err(error) => {
             // A closed pipe is no reason to fail, and there is nobody to tell.

@@ -3,10 +3,13 @@
 use super::options::args::WalkArgs;
 use super::options::optimisation_args::names;
 use super::pictures::Pictures;
+use super::walk::finest_cell;
 use crate::counters::Record;
 use crate::frame::{Renderer, Schedule};
 use crate::picture::denoise::Resolve;
+use crate::secondary::df::answer::Df;
 use crate::secondary::roma::Role;
+use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::handover::{Handover, Trust};
 use crate::session::lighting::Lighting;
 use serde_json::{Map, Value, json};
@@ -23,7 +26,7 @@ pub fn of_walk(
     frames: u32,
     left_out: Vec<Value>,
 ) -> Value {
-    let streaming = streaming(renderer);
+    let host_cache = host_cache(renderer);
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let (streamed_bytes, tile_bytes) =
@@ -63,19 +66,17 @@ pub fn of_walk(
             },
             "fronts": args.stream.fronts,
             "without": names(&args.optimisations.without),
-            "with": names(&args.optimisations.with),
             "query_threshold": args.stream.query_threshold,
             "tile": args.stream.tile,
             "evict": renderer.cache.residency.policy().name(),
             "cache_bytes": renderer.cache.residency.budget_bytes(),
             "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
             "host_cache_bytes": args.stream.host_cache,
-            "prefetch": args.stream.prefetch,
             "interactive_bytes": args.interactive,
             "secondary": args.secondary.name(),
             "roma": roma_settings(args, renderer),
             "df": field_settings(args, renderer),
-            "rsm": renderer.rsm.report(),
+            "rsm": renderer.methods.get::<Roma>().and_then(|roma| roma.rsm.report()),
             "spp": args.spp,
             "seed": args.seed,
             "sun": args.light.sun.0,
@@ -106,8 +107,7 @@ pub fn of_walk(
         })),
         "left_out": left_out,
         "texture_bytes_resident": renderer.executor.texture_bytes(),
-        "host_cache": streaming.0,
-        "prefetch": streaming.1,
+        "host_cache": host_cache,
         "error": args.measure_error.then(|| errors(records)),
         "memory": memory(),
         "passes": passes(records),
@@ -116,32 +116,15 @@ pub fn of_walk(
     })
 }
 
-/// Cells up to which rays are traced that maps answer from there on.
-fn near(role: Role) -> u32 {
-    if let Role::Far(cells) = role { cells } else { 0 }
-}
-
-/// What the host cache did, and what came of prefetching: payloads brought ahead of need, those that a load then found
-/// there, the rest of them, and requests that were dropped.
-fn streaming(renderer: &mut Renderer) -> (Value, Value) {
-    let workers = renderer.executor.workers();
-    let (host, stats) = (workers.host_cache().stats(), workers.stats());
-    let cache = json!({
+/// What the host cache did.
+fn host_cache(renderer: &Renderer) -> Value {
+    let host = renderer.executor.workers().host_cache().stats();
+    json!({
         "hits": host.hits,
         "misses": host.misses,
         "evicted": host.evicted,
         "used_bytes": host.used_bytes,
-    });
-    let prefetch = json!({
-        "prefetched": host.prefetched,
-        "prefetched_bytes": host.prefetched_bytes,
-        "used": host.prefetched_used,
-        "used_bytes": host.prefetched_used_bytes,
-        "wasted": host.prefetched - host.prefetched_used,
-        "wasted_bytes": host.prefetched_bytes - host.prefetched_used_bytes,
-        "dropped": stats.prefetch_dropped,
-    });
-    (cache, prefetch)
+    })
 }
 
 /// The errors of the effects that `--measure-error` measured: means over the frames, and the greatest.
@@ -233,7 +216,8 @@ fn handover(role: Role, measured: &Handover) -> Option<Value> {
 
 /// What answers rays by maps; `None` where none does.
 fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
-    renderer.settings.roma.map(|roma| {
+    let answers = renderer.methods.get::<Roma>()?;
+    answers.settings.map(|roma| {
         json!({
             "bom": args.roma.bom.name(),
             "k": roma.occlusion.grid.k,
@@ -244,20 +228,19 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "shadow_steps": roma.shadow.steps,
             "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
             "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
-            "near": near(roma.occlusion.role),
             "one_in": if let Role::Correct(one_in) = roma.occlusion.role { one_in } else { 1 },
             "most_wrong": if let Role::Sift { most_wrong: Some(n) } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
-            "shadow_near": near(roma.shadow.role),
-            "ao_handover": handover(roma.occlusion.role, &renderer.roma.handovers()[0]),
-            "shadow_handover": handover(roma.shadow.role, &renderer.roma.handovers()[1]),
-            "finest_cell": renderer.roma.finest_cell(),
+            "ao_handover": handover(roma.occlusion.role, &answers.handovers()[0]),
+            "shadow_handover": handover(roma.shadow.role, &answers.handovers()[1]),
+            "finest_cell": finest_cell(&renderer.methods),
         })
     })
 }
 
 /// What answers rays by distance fields.
 fn field_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
-    renderer.settings.field.map(|field| {
+    renderer.methods.get::<Df>().map(|df| {
+        let field = df.settings();
         json!({
             "bom": args.roma.bom.name(),
             "size": field.size,
@@ -265,7 +248,7 @@ fn field_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
             "shadow_steps": field.shadow_steps,
             "lift": field.lift,
             "hit": field.hit,
-            "finest_cell": renderer.roma.finest_cell(),
+            "finest_cell": finest_cell(&renderer.methods),
         })
     })
 }

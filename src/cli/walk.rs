@@ -8,24 +8,21 @@ use super::pictures::Pictures;
 use super::summary;
 use crate::counters::Record;
 use crate::frame::{
-    Accumulation, BATCH_SAMPLES, Captures, Light, Moved, RenderError, RenderSettings, Renderer, Schedule,
+    Accumulation, BATCH_SAMPLES, Captures, Engine, Light, Methods, Moved, RenderError, RenderSettings, Renderer,
+    Schedule,
 };
 use crate::kernels::Extent;
 use crate::output::atomic;
 use crate::picture::denoise::Resolve;
-use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
-use crate::secondary::df::answer::Field;
-use crate::secondary::dvf::answer::Dvf;
+use crate::secondary::df::answer::Df;
 use crate::secondary::roma::LEAST_CELLS;
 use crate::secondary::roma::answer::Roma;
-use crate::secondary::rsm::answer::Rsm;
 use crate::session::lighting::lighting;
 use crate::session::open::{Session, open_scene, write_requests};
-use crate::stream::{BrickBox, HostCacheStats, Item, Prefetcher};
 use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
 use brickwalk_convert::progress::Progress;
@@ -75,7 +72,6 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         Secondary::Dvf => dvf::prepare(&mut renderer, args, &path)?,
         _ => None,
     };
-    let mut prefetcher = prefetcher(&renderer, args.stream.prefetch);
     let mut resolve = Resolve::new(args.pictures.denoise, args.pictures.taa);
     let mut pictures = Pictures::create(&frames_folder, args)?;
     let mut lines = atomic::JsonLines::create(&args.output.join("records.jsonl"))?;
@@ -98,12 +94,9 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         let camera = path.frame(frame, args.frames);
         if let Some(motion) = &motion {
             let time = path.time(frame, args.frames);
-            let moved = motion.place(&mut renderer, time)?;
+            motion.place(&mut renderer, time)?;
             if let Some(reference) = &mut reference {
                 motion.place(reference, time)?;
-            }
-            if let Some(prefetcher) = prefetcher.as_mut().filter(|_| moved) {
-                prefetcher.set_boxes(BrickBox::of_scene(renderer.scene.resident()));
             }
         }
         if frame == 0 && args.measure_left_out {
@@ -132,9 +125,6 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         if let Some(reference) = &mut reference {
             reference.frame(frame, &camera).with_context(|| args.scene.display().to_string())?;
             note_errors(&mut output.records, &renderer, reference);
-        }
-        if let Some(prefetcher) = prefetcher.as_mut().filter(|_| frame + 1 < args.frames) {
-            look_ahead(&mut renderer, prefetcher, &camera);
         }
         resolve.frame(&mut output);
         pictures.frame(frame, path.frame_time(args.frames), &output.pixels)?;
@@ -189,7 +179,7 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
     let settings = settings(args, schedule);
     let fronts = (args.stream.fronts == "on").then(Fronts::default);
     let size = (args.size.width, args.size.height);
-    Renderer {
+    let engine = Engine {
         scene,
         executor,
         cache,
@@ -201,18 +191,33 @@ pub fn lit_renderer(session: Session, args: &WalkArgs, light: Light) -> Renderer
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
-        roma: Roma::new(args.roma.source()),
-        field: Field::default(),
-        rsm: Rsm::default(),
-        dvf: Dvf::default(),
-        host_seen: HostCacheStats::default(),
+    };
+    Renderer { engine, methods: methods(args) }
+}
+
+/// The methods that answer secondary rays by the options of a walk; a field of visibility is made or read later.
+pub fn methods(args: &WalkArgs) -> Methods {
+    let mut methods = Methods::default();
+    match args.secondary {
+        Secondary::Roma | Secondary::Auto => {
+            methods.set(Roma::new(args.roma.settings(args.secondary == Secondary::Auto), args.roma.source()));
+        }
+        Secondary::Df => methods.set(Df::new(args.df.settings(), args.roma.source())),
+        Secondary::Exact | Secondary::Dvf => {}
     }
+    methods
+}
+
+/// Side of the finest base map of a method that has some, world units.
+pub fn finest_cell(methods: &Methods) -> Option<f64> {
+    let roma = methods.get::<Roma>().and_then(|roma| roma.base.finest_cell());
+    roma.or_else(|| methods.get::<Df>().and_then(|df| df.base.finest_cell()))
 }
 
 /// Says that rays of ao are too short for the cells that they are to meet.
 fn warn_of_short_rays(renderer: &Renderer) {
     let length = renderer.settings.effects.occlusion.map_or(f64::INFINITY, |occlusion| occlusion.length);
-    if let Some(cell) = renderer.roma.finest_cell().filter(|cell| length < LEAST_CELLS * cell) {
+    if let Some(cell) = finest_cell(&renderer.methods).filter(|cell| length < LEAST_CELLS * cell) {
         let _ = writeln!(
             std::io::stderr(),
             "brickwalk: warning: --ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has here: \
@@ -223,7 +228,8 @@ fn warn_of_short_rays(renderer: &Renderer) {
 
 /// Says which lamps do not light what diffuse rays meet.
 fn warn_of_dark_lamps(renderer: &Renderer) {
-    let [others, areas] = renderer.rsm.left_out();
+    let Some(roma) = renderer.methods.get::<Roma>() else { return };
+    let [others, areas] = roma.rsm.left_out();
     if others > 0 {
         let _ = writeln!(
             std::io::stderr(),
@@ -242,7 +248,6 @@ fn warn_of_dark_lamps(renderer: &Renderer) {
 fn reference(scene: Arc<SceneFile>, args: &WalkArgs, light: Light, extent: Extent) -> Result<Renderer> {
     let mut args = args.clone();
     args.stream.query_threshold = 0;
-    args.stream.prefetch = 0;
     args.stream.requests_out = None;
     args.secondary = Secondary::Exact;
     args.interactive = None;
@@ -279,29 +284,7 @@ pub fn settings(args: &WalkArgs, schedule: Schedule) -> RenderSettings {
         guides: args.pictures.denoise || args.pictures.taa,
         taa: args.pictures.taa,
         tile_bytes: args.interactive,
-        roma: matches!(args.secondary, Secondary::Roma | Secondary::Auto)
-            .then(|| args.roma.settings(args.secondary == Secondary::Auto)),
-        field: (args.secondary == Secondary::Df).then(|| args.df.settings()),
     }
-}
-
-/// What watches the camera for `--prefetch`; `None` when that is off.
-pub fn prefetcher(renderer: &Renderer, most: u32) -> Option<Prefetcher> {
-    let aspect = f64::from(renderer.size.0) / f64::from(renderer.size.1);
-    (most > 0).then(|| Prefetcher::new(BrickBox::of_scene(renderer.scene.resident()), aspect, most as usize))
-}
-
-/// Between two frames: has the workers read ahead what the motion up to `camera` leads to, in place of what they were
-/// asked for before and have not begun. Changes nothing but the host cache.
-pub fn look_ahead(renderer: &mut Renderer, prefetcher: &mut Prefetcher, camera: &Camera) {
-    let workers = renderer.executor.workers();
-    workers.cancel_prefetch();
-    let host = workers.host_cache();
-    host.begin_round();
-    let residency = &renderer.cache.residency;
-    let at_hand = |item: Item| residency.slot(item).is_some() || host.contains(item);
-    let items = prefetcher.after_frame(camera, at_hand);
-    workers.prefetch(&items);
 }
 
 fn finish(args: &WalkArgs, renderer: &Renderer, summary: &serde_json::Value) -> Result<()> {

@@ -8,10 +8,9 @@ use serde::Serialize;
 pub struct Record {
     /// Frame, from 0.
     pub frame: u32,
-    /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `mirror`, `glossy`, and of the rays to lamps
-    /// from the hits of bounces `diffuse-shadow`, `diffuse-environment`, `mirror-shadow`, `mirror-environment`,
-    /// `glossy-shadow`, `glossy-environment`; `dvf`, where the cells of a field of visibility are made anew for what
-    /// moves.
+    /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `glossy`, and of the rays to lamps from the hits
+    /// of bounces `diffuse-shadow`, `diffuse-environment`, `glossy-shadow`, `glossy-environment`; `dvf`, where the
+    /// cells of a field of visibility are made anew for what moves.
     pub pass: &'static str,
     /// Rays traced.
     pub rays: u64,
@@ -65,8 +64,6 @@ pub struct Record {
     pub tile_batches: u64,
     /// Leaves that these intersected.
     pub tile_batch_leaves: u64,
-    /// With leaf-cache: groups of triangles that rays postponed.
-    pub leaf_groups_postponed: u64,
     /// With ROMA: rays that had passed as many columns of cells as they may, and went on along their map's direction;
     /// with distance fields, that had made as many look-ups as they may, and went free.
     pub rays_capped: u64,
@@ -122,13 +119,6 @@ pub struct Record {
     pub cache_bytes: u64,
     /// Of it, bytes in use at the end.
     pub cache_used_bytes: u64,
-    /// Bytes that workers brought into the host cache ahead of need, from the end of the pass before this effect's
-    /// passes on.
-    pub prefetched_bytes: u64,
-    /// Bytes brought ahead of need that the effect's loads found in the host cache.
-    pub prefetched_used_bytes: u64,
-    /// Bytes brought ahead of need that the host cache put out before anything asked for them.
-    pub prefetched_wasted_bytes: u64,
     /// With `--measure-error`: mean absolute difference of the effect's part of the picture from the exact one, over
     /// pixels and channels, linear radiance.
     pub error_mean: f64,
@@ -177,7 +167,6 @@ impl Record {
             pairs_front_to_back: r.pairs_front_to_back,
             tile_batches: r.tile_batches,
             tile_batch_leaves: r.tile_batch_leaves,
-            leaf_groups_postponed: r.leaf_groups_postponed,
             rays_capped: r.rays_capped,
             bricks_nearest_first: stats.bricks_nearest_first,
             bricks_no_longer_wanted: stats.bricks_no_longer_wanted,

@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn what_is_overwritten_is_given_up_and_nothing_else() {
         let scene = Arc::new(probe::scene().unwrap());
-        let workers = Workers::new(scene.clone(), HostCache::new(0), 1, 0).unwrap();
+        let workers = Workers::new(scene.clone(), HostCache::new(0), 1).unwrap();
         let mut cache = BrickCache::new(scene.sizes().rows());
         let mut load = |brick: u32, slot: Slot| {
             cache.load(&scene, &workers, &[Load { item: Item::geometry(brick), slot }]).unwrap();

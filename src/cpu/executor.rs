@@ -3,55 +3,25 @@
 
 use super::cache::{BrickCache, Shared};
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
-use crate::kernels::dispatch::{
-    COUNT_PAIRS, DVF_COSINE, DVF_KERNELS, DVF_POINTS, DVF_RAYS, DVF_SEEN, DVF_SIFT, DVF_WRITE, Dispatch, FIELD_KERNELS,
-    FIELD_TRACE, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE, RSM_LIGHT, RSM_WRITE,
-    are_pairs_culled, dispatches,
-};
-use crate::kernels::layout;
-use crate::kernels::layout::Params;
-use crate::kernels::query::query::query;
-use crate::kernels::query::query_all::{count_pairs, query_all};
-use crate::kernels::query::query_pairs::query_pairs;
-use crate::kernels::query::tile_bounds::tile_bounds;
-use crate::kernels::query::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
-use crate::kernels::query::tile_walk::{tile_walk_count, tile_walk_write};
-use crate::kernels::rays::{RaySet, Work};
-use crate::kernels::shade::generate::{
-    generate_diffuse, generate_glossy, generate_mirror, generate_occlusion, generate_primary, generate_shadow,
-    start_hits,
-};
+use crate::kernels::dispatch::{Dispatch, are_pairs_culled, dispatches};
+use crate::kernels::layout::{self, Params};
+use crate::kernels::query::tile_lists::TileLists;
+use crate::kernels::rays::RaySet;
 use crate::kernels::shade::lamps::LampTables;
-use crate::kernels::shade::resolve::{AttributeView, resolve};
-use crate::kernels::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, dvf_light, hit_demand, shade};
+use crate::kernels::shade::resolve::AttributeView;
+use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
-use crate::kernels::texture::sample::{Sampling, Texels, TileDemand, sample};
-use crate::kernels::trace::intersect_all::intersect_all;
-use crate::kernels::trace::intersect_binary::{BinaryTrees, intersect_binary};
-use crate::kernels::trace::intersect_list::intersect_list;
+use crate::kernels::table::{self, Family, Target};
+use crate::kernels::texture::sample::{Sampling, Texels, TileDemand};
+use crate::kernels::trace::intersect_binary::BinaryTrees;
 use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-#[cfg(test)]
-use crate::secondary::df::DistanceField;
-use crate::secondary::df::maps::FieldMaps;
-use crate::secondary::df::twin::{FieldTables, field_trace, make_field};
-use crate::secondary::dvf::maps::DvfMaps;
-use crate::secondary::dvf::twin as dvf;
-use crate::secondary::dvf::twin::DvfTables;
-use crate::secondary::occupancy::{Cascades, clearance};
-use crate::secondary::roma::cosine::roma_draw;
-use crate::secondary::roma::maps::RomaMaps;
-use crate::secondary::roma::twin::{RomaTables, roma_measure, roma_near, roma_rotate, roma_trace};
-use crate::secondary::rsm::maps::RsmMaps;
-use crate::secondary::rsm::twin::{RsmTables, rsm_light, rsm_write};
 use crate::stream::{PayloadSource, WorkerPool, Workers};
 use bricks::SceneFile;
-use rayon::prelude::*;
+use std::any::Any;
 use std::sync::Arc;
-#[cfg(test)]
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Bytes of a page of the cache: offsets within one are u32. Pages are numbers here, no memory.
@@ -63,10 +33,27 @@ struct Buffers {
     sets: [RaySet; 3],
     pixels: Pixels,
     tiles: TileLists,
-    roma: RomaTables,
-    field: FieldTables,
-    rsm: RsmTables,
-    dvf: DvfTables,
+    families: Vec<FamilyBuffers>,
+}
+
+/// The buffers of a secondary method's kernels.
+struct FamilyBuffers {
+    family: &'static Family,
+    words: Vec<Vec<u32>>,
+    /// What its method has noted.
+    held: Option<Box<dyn Any>>,
+}
+
+impl Buffers {
+    fn family(&mut self, family: &'static Family) -> &mut FamilyBuffers {
+        let index = self.families.iter().position(|own| std::ptr::eq(own.family, family));
+        let index = index.unwrap_or_else(|| {
+            let words = vec![Vec::new(); family.buffers.len()];
+            self.families.push(FamilyBuffers { family, words, held: None });
+            self.families.len() - 1
+        });
+        &mut self.families[index]
+    }
 }
 
 /// Renders one scene on the processor.
@@ -112,15 +99,7 @@ impl CpuExecutor {
             texels: Texels::new(&file)?,
             opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
             lamps: LampTables::default(),
-            buffers: Buffers {
-                sets,
-                pixels: Pixels::new(rays),
-                tiles,
-                roma: RomaTables::default(),
-                field: FieldTables::default(),
-                rsm: RsmTables::default(),
-                dvf: DvfTables::default(),
-            },
+            buffers: Buffers { sets, pixels: Pixels::new(rays), tiles, families: Vec::new() },
             binary: None,
             extent,
             view: Params::default(),
@@ -137,7 +116,7 @@ impl CpuExecutor {
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
         let extent = self.extent;
-        let params = self.buffers.field.maps.params(self.buffers.roma.maps.params(Params {
+        Params {
             zero: 0,
             width: extent.width,
             height: extent.height,
@@ -152,8 +131,7 @@ impl CpuExecutor {
             top_count: self.scene.top2.len() as u32,
             instance_pad: self.scene.instance_pad,
             ..self.view
-        }));
-        Params { rsm_maps: self.buffers.rsm.maps.maps.len() as u32, ..params }
+        }
     }
 
     /// The G-buffer of the hits of a set, for tests.
@@ -162,28 +140,10 @@ impl CpuExecutor {
         &mut self.buffers.pixels.gbuffers[set]
     }
 
-    /// The columns of the ray-aligned maps that were made last, for tests.
+    /// The words of a buffer of a family, for tests.
     #[cfg(test)]
-    pub(crate) fn columns(&self) -> &[u32] {
-        &self.buffers.roma.columns
-    }
-
-    /// The distance fields that were made last, for tests.
-    #[cfg(test)]
-    pub(crate) fn fields(&self) -> &[DistanceField] {
-        &self.buffers.field.fields
-    }
-
-    /// The texels of reflective shadow maps, for tests.
-    #[cfg(test)]
-    pub(crate) fn rsm_texels(&mut self) -> &mut Vec<layout::RsmTexel> {
-        &mut self.buffers.rsm.texels
-    }
-
-    /// The bits of rays that wait for bricks, for tests.
-    #[cfg(test)]
-    pub(crate) fn dvf_waiting(&self) -> Vec<u32> {
-        self.buffers.dvf.waiting.iter().map(|word| word.load(Ordering::Relaxed)).collect()
+    pub(crate) fn words(&mut self, family: &'static Family, buffer: usize) -> &mut Vec<u32> {
+        &mut self.buffers.family(family).words[buffer]
     }
 
     /// The tiles and their lists, for tests.
@@ -193,7 +153,7 @@ impl CpuExecutor {
     }
 }
 
-/// Runs one kernel by its name.
+/// Runs the twin of one kernel.
 fn run_kernel(
     dispatch: &Dispatch,
     pass: Pass,
@@ -203,79 +163,32 @@ fn run_kernel(
     (sampling, tile_demand): (Sampling, &[TileDemand]),
     binary: Option<&BinaryTrees>,
 ) -> Result<(), ExecutorError> {
-    let Buffers { sets, pixels, tiles, roma, field, rsm, dvf: visibility } = buffers;
+    let Buffers { sets, pixels, tiles, families } = buffers;
     // The set of the pass, and the one before it, whose hits are shaded.
-    let shaded = pass.set().saturating_sub(1);
     let (before, from) = sets.split_at_mut(pass.set());
-    let own = &mut from[0];
     let none = RaySet::default();
-    let seen = before.last().unwrap_or(&none);
-    let materials = &sampling.texels.materials;
-    match dispatch.kernel {
-        "generate_primary" => generate_primary(bound, own),
-        "generate_shadow" => generate_shadow(bound, own, seen, &pixels.throughput),
-        "generate_occlusion" => generate_occlusion(bound, own, seen, &pixels.gbuffers[shaded]),
-        "generate_diffuse" => generate_diffuse(bound, own, seen, pixels, materials),
-        "generate_mirror" => generate_mirror(bound, own, seen, pixels),
-        "generate_glossy" => generate_glossy(bound, own, seen, pixels, materials),
-        "start_hits" => start_hits(own),
-        "clear_gbuffer" => clear_gbuffer(bound, pixels, shaded),
-        "hit_demand" => hit_demand(bound, own),
-        "resolve" => {
-            resolve(bound, seen, &mut pixels.gbuffers[shaded], materials, attributes);
+    let family = families.iter_mut().find_map(|own| Some((own.family.kernel(dispatch.kernel)?, &mut own.words[..])));
+    let (kernel, buffers) = match (table::kernel(dispatch.kernel), family) {
+        (Some(kernel), _) => (kernel, &mut [][..]),
+        (None, Some(of_family)) => of_family,
+        (None, None) => {
+            return Err(ExecutorError::Device(format!("has no kernel {}; this is a defect", dispatch.kernel)));
         }
-        "sample" => sample(bound, &mut pixels.gbuffers[shaded], sampling, tile_demand),
-        "shade" => shade(bound, pixels, shaded, seen, materials),
-        "add_light" => add_light(bound, pixels, shaded, (seen, own), materials),
-        "add_occlusion" => add_occlusion(bound, pixels, shaded, (seen, own), materials),
-        "tile_bounds" => tile_bounds(bound, own, &mut tiles.bounds),
-        "tile_walk_count" => tile_walk_count(bound, tiles),
-        "tile_scan" => tile_scan(bound, tiles)?,
-        "tile_walk_write" => tile_walk_write(bound, tiles),
-        "tile_select" => tile_select::<false>(bound, tiles),
-        "tile_select_intersect" => tile_select::<true>(bound, tiles),
-        "tile_choose" => tile_choose(tiles),
-        "tile_sort_number" => tile_sort::<false>(bound, tiles),
-        "tile_sort_near" => tile_sort::<true>(bound, tiles),
-        "query" => query(bound, own, tiles),
-        "query_reduce" => query_reduce(bound, tiles),
-        "query_from_root" => query_all(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
-        "query_all" => query_all(bound, own, Work::All, &tiles.pair_counts),
-        COUNT_PAIRS => {
-            tiles.pair_counts.start(bound.params.tiles, bound.scene.leaves.len())?;
-            count_pairs(bound, own, &tiles.pair_counts);
-        }
-        "query_pairs" => query_pairs(bound, own, tiles),
-        "intersect_list" => intersect_list::<false>(bound, own, tiles),
-        "intersect_list_cached" => intersect_list::<true>(bound, own, tiles),
-        "intersect_from_root" => intersect_all::<true>(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
-        "intersect_from_root_all" => intersect_all::<false>(bound, own, Work::Rooted(tiles), &tiles.pair_counts),
-        "intersect_selected" => intersect_all::<true>(bound, own, Work::All, &tiles.pair_counts),
-        "intersect_all" => intersect_all::<false>(bound, own, Work::All, &tiles.pair_counts),
-        ROMA_ROTATE => roma_rotate(bound, roma),
-        ROMA_NEAR => roma_near(bound, roma, own, seen),
-        ROMA_TRACE => roma_trace(bound, roma, own, seen),
-        ROMA_DRAW => roma_draw(bound, roma, own, seen, (pixels, shaded)),
-        ROMA_MEASURE => roma_measure(bound, roma, own, seen),
-        FIELD_TRACE => field_trace(bound, field, own, seen),
-        making if FIELD_KERNELS.contains(&making) => make_field(making, bound, field),
-        RSM_WRITE => rsm_write(bound, rsm, pixels, seen, materials),
-        RSM_LIGHT => rsm_light(bound, rsm, pixels, seen),
-        DVF_COSINE => dvf::cosine(bound, visibility, own, seen, &pixels.gbuffers[shaded]),
-        DVF_SEEN => dvf::seen(bound, visibility, seen),
-        DVF_POINTS => dvf::points(bound, visibility),
-        DVF_RAYS => dvf::rays(bound, visibility, own),
-        DVF_WRITE => dvf::write(bound, visibility, own),
-        DVF_SIFT => dvf::sift(bound, visibility, own, &mut pixels.gbuffers[shaded]),
-        "dvf_light" => dvf_light(bound, pixels, shaded, (seen, own), materials),
-        making if DVF_KERNELS.contains(&making) => dvf::make(making, bound, visibility),
-        INTERSECT_BINARY => match binary {
-            Some(trees) => intersect_binary(bound, own, trees),
-            None => return Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
-        },
-        other => return Err(ExecutorError::Device(format!("has no kernel {other}; this is a defect"))),
-    }
-    Ok(())
+    };
+    let mut target = Target {
+        own: &mut from[0],
+        seen: before.last().unwrap_or(&none),
+        shaded: pass.set().saturating_sub(1),
+        pixels,
+        tiles,
+        materials: &sampling.texels.materials,
+        attributes,
+        sampling,
+        tile_demand,
+        binary,
+        buffers,
+    };
+    (kernel.twin)(bound, &mut target)
 }
 
 impl Executor for CpuExecutor {
@@ -324,10 +237,11 @@ impl Executor for CpuExecutor {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            for dispatch in dispatches(pass, step, &params, &self.directions, self.tuning.leaf_cache, everything) {
+            for dispatch in dispatches(pass, step, &params, &self.directions, everything) {
                 let start = Instant::now();
                 let bound = Bound {
                     params: &dispatch.params,
+                    block: &dispatch.own,
                     scene: &self.scene,
                     bricks: &geometry,
                     slots: &slots,
@@ -395,60 +309,35 @@ impl FrameExecutor for CpuExecutor {
         Ok(())
     }
 
-    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
-        let roma = &mut self.buffers.roma;
-        if !Arc::ptr_eq(&roma.cascades, cascades) {
-            roma.cascades = cascades.clone();
-            roma.clearances = cascades.levels.par_iter().map(clearance).collect();
+    fn reserve(&mut self, family: &'static Family, elements: &[usize]) -> Result<(), ExecutorError> {
+        let own = self.buffers.family(family);
+        for ((buffer, words), &count) in family.buffers.iter().zip(&mut own.words).zip(elements) {
+            // As on a device there is an element at least.
+            let needed = (count.max(1) * buffer.stride).div_ceil(4);
+            if words.len() < needed {
+                words.clear();
+                words.resize(needed, 0);
+            }
         }
         Ok(())
     }
 
-    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
-        self.buffers.roma.maps = maps.clone();
-        Ok(())
+    fn write(&mut self, family: &'static Family, buffer: usize, at: usize, bytes: &[u8]) {
+        let words = &mut self.buffers.family(family).words[buffer];
+        bytemuck::cast_slice_mut(words)[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
-    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
-        self.buffers.field.maps = field.clone();
-        Ok(())
+    fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
+        Ok(self.buffers.family(family).words[buffer][..words].to_vec())
     }
 
-    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
-        self.buffers.rsm.set(maps);
-        Ok(())
+    fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>> {
+        &mut self.buffers.family(family).held
     }
 
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.file = scene.clone();
         self.scene.forget_frame();
-    }
-
-    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
-        self.buffers.dvf.set(maps);
-        Ok(())
-    }
-
-    fn set_dvf_triangles(&mut self, triangles: &[layout::DvfTriangle], points: u32) -> Result<(), ExecutorError> {
-        self.buffers.dvf.set_triangles(triangles, points);
-        Ok(())
-    }
-
-    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
-        self.buffers.dvf.set_tally(words);
-        Ok(())
-    }
-
-    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
-        Ok(self.buffers.dvf.tally())
-    }
-
-    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
-        Ok((self.buffers.dvf.masks(), self.buffers.dvf.labels.clone()))
-    }
-
-    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
-        Ok(self.buffers.dvf.sums.clone())
     }
 
     fn begin_frame(&mut self, view: &View) {

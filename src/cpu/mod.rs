@@ -3,7 +3,7 @@
 //! A twin has the name of its kernel in `shaders/` and the same operations in the same order, in f32; what the WGSL
 //! guards with `barrier` rounds as it stands here, because Rust neither contracts nor reassociates. So both executors
 //! find the same hits, bit for bit, where rays are the same. Rays differ where they depend on functions that WGSL
-//! leaves some ulps (sine, cosine, inverse square root): those of soft shadows, occlusion, diffuse and mirrored light.
+//! leaves some ulps (sine, cosine, inverse square root): those of soft shadows, occlusion, diffuse and glossy light.
 //!
 //! Intersection kernels take rays of one octant together (`packet.rs`): they meet children in the same order, so that
 //! each has the hits, uses and counts that it has alone.

@@ -1,12 +1,9 @@
 //! What is traced beside camera rays.
 
-/// The share of its light that a surface shows with `mirror`; the rest is what it mirrors.
-pub const SURFACE_SHARE: f32 = 0.5;
-
 /// Effects of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effects {
-    /// Shadows of the sun and of emitters, at primary hits and at the hits of diffuse and mirrored rays.
+    /// Shadows of the sun and of emitters, at primary hits and at the hits of diffuse and glossy rays.
     pub shadow: bool,
     /// The light of the environment, shadowed, at the same hits: a direction of each is drawn by its radiance. Diffuse
     /// rays that miss share it with them.
@@ -16,8 +13,6 @@ pub struct Effects {
     /// Diffuse interreflection, one bounce: rays of each pixel and sample, as long as the scene. Their hits show their
     /// emission and what they reflect of the lamps; the sky's light comes from those that miss.
     pub diffuse: Option<u32>,
-    /// Mirrored rays: every surface is half a mirror.
-    pub mirror: bool,
     /// What surfaces reflect otherwise than diffusely, by their materials, of all that is around: one ray, drawn by the
     /// gloss of the surface, at primary hits. Without it they reflect the lamps alone, and the sky's light unshadowed.
     pub glossy: bool,
@@ -38,6 +33,6 @@ pub struct Occlusion {
 impl Effects {
     /// Whether hits of rays that start at primary hits are shaded.
     pub fn has_bounces(&self) -> bool {
-        self.diffuse.is_some() || self.mirror || self.glossy
+        self.diffuse.is_some() || self.glossy
     }
 }

@@ -1,6 +1,6 @@
 //! Instances that move from frame to frame: the scene placed anew, and what was made of where they were.
 
-use super::Renderer;
+use super::{Displaced, Renderer};
 use bricks::{PlaceError, Resident, SceneFile};
 use glam::{DAffine3, DMat3, DVec3};
 use std::ops::Range;
@@ -75,7 +75,8 @@ impl Renderer {
     /// # Errors
     /// As of [`SceneFile::place`]; then nothing has changed.
     pub fn place(&mut self, still: &Arc<SceneFile>, places: &[(u32, [f64; 12])]) -> Result<Vec<u32>, PlaceError> {
-        let resident = self.scene.resident();
+        let Self { engine, methods } = self;
+        let resident = engine.scene.resident();
         let is_other = |(instance, matrix): &&(u32, [f64; 12])| {
             resident.instances.get(*instance as usize).is_none_or(|before| before.world_from_object != *matrix)
         };
@@ -92,8 +93,8 @@ impl Renderer {
         let before = matrices(resident);
         let mut touched = boxes(resident, &moving);
         // Nobody else holds the scene that frames before were of, but for the first time.
-        let mut scene = std::mem::replace(&mut self.scene, still.clone());
-        self.executor.set_scene(still);
+        let mut scene = std::mem::replace(&mut engine.scene, still.clone());
+        engine.executor.set_scene(still);
         let placed = match Arc::get_mut(&mut scene) {
             Some(scene) => scene.place(places),
             None => {
@@ -103,10 +104,10 @@ impl Renderer {
                 placed
             }
         };
-        self.executor.set_scene(&scene);
-        self.scene = scene;
+        engine.executor.set_scene(&scene);
+        engine.scene = scene;
         placed?;
-        let resident = self.scene.resident();
+        let resident = engine.scene.resident();
         touched.extend(boxes(resident, &moving));
         for ((&instance, before), now) in moving.iter().zip(before).zip(matrices(resident)) {
             let (Some(before), Some(now)) = (before, now) else { continue };
@@ -114,9 +115,9 @@ impl Renderer {
             let end = record.base + resident.objects[record.object as usize].triangle_ids;
             let before_from_now = affine(&before) * affine(&now).inverse();
             let normals = before_from_now.matrix3.inverse().transpose();
-            self.moved.instances.push(InstanceMotion { ids: record.base..end, before_from_now, normals });
+            engine.moved.instances.push(InstanceMotion { ids: record.base..end, before_from_now, normals });
         }
-        self.moved.instances.sort_by_key(|one| one.ids.start);
+        engine.moved.instances.sort_by_key(|one| one.ids.start);
         // A field of visibility is that of the scene as it was opened.
         let mut displaced: Vec<u32> = places.iter().map(|(instance, _)| *instance).collect();
         displaced.sort_unstable();
@@ -124,9 +125,8 @@ impl Renderer {
         displaced.retain(|&instance| stands_elsewhere(own, resident, instance));
         let mut elsewhere = boxes(own, &displaced);
         elsewhere.extend(boxes(resident, &displaced));
-        self.dvf.scene_has_moved(still, &displaced, &elsewhere);
-        self.roma.scene_has_moved();
-        self.rsm.scene_has_moved(&touched);
+        let displaced = Displaced { still, instances: &displaced, boxes: &elsewhere, touched: &touched };
+        methods.iter_mut().for_each(|method| method.scene_has_moved(&displaced));
         Ok(moving)
     }
 }

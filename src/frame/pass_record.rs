@@ -1,9 +1,8 @@
 //! The statistics of the effects of one frame.
 
-use super::Renderer;
+use super::Engine;
 use crate::counters::Record;
 use crate::schedule::{ExecutorError, PassStats};
-use crate::stream::HostCacheStats;
 use std::time::Instant;
 
 /// Collects the statistics of the effects of a frame, each over all its samples, directions and lamps.
@@ -17,8 +16,6 @@ struct EffectRecord {
     stats: PassStats,
     resident_start: u64,
     resident_end: u64,
-    /// What became of prefetches.
-    ahead: HostCacheStats,
 }
 
 impl FrameRecords {
@@ -38,12 +35,26 @@ impl FrameRecords {
     /// The work's.
     pub fn pass(
         &mut self,
-        renderer: &mut Renderer,
+        engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Renderer, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
-        renderer.cache.begin_pass(name, self.frame);
-        self.more(renderer, name, work)
+        engine.cache.begin_pass(name, self.frame);
+        self.more(engine, name, work)
+    }
+
+    /// Does `work`, passes of a method that add nothing to the picture, as a part of the effect `name`.
+    ///
+    /// # Errors
+    /// The work's.
+    pub fn work(
+        &mut self,
+        engine: &mut Engine,
+        name: &'static str,
+        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+    ) -> Result<(), ExecutorError> {
+        engine.cache.begin_pass(name, self.frame);
+        self.count(engine, name, work)
     }
 
     /// Does `work`, which goes on with a pass, as a part of the effect `name`.
@@ -52,47 +63,48 @@ impl FrameRecords {
     /// The work's.
     pub fn more(
         &mut self,
-        renderer: &mut Renderer,
+        engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Renderer, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
-        let resident = |renderer: &Renderer| renderer.cache.residency.resident().count() as u64;
-        let before = resident(renderer);
+        self.count(engine, name, work)?;
+        match &mut engine.captures {
+            Some(captures) => captures.note(&mut *engine.executor, name),
+            None => Ok(()),
+        }
+    }
+
+    /// Does `work` and counts it for the effect `name`.
+    fn count(
+        &mut self,
+        engine: &mut Engine,
+        name: &'static str,
+        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+    ) -> Result<(), ExecutorError> {
+        let resident = |engine: &Engine| engine.cache.residency.resident().count() as u64;
+        let before = resident(engine);
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
-            let (stats, ahead) = (PassStats::default(), HostCacheStats::default());
-            self.effects.push(EffectRecord { name, stats, resident_start: before, resident_end: before, ahead });
+            let stats = PassStats::default();
+            self.effects.push(EffectRecord { name, stats, resident_start: before, resident_end: before });
             self.effects.len() - 1
         });
         let effect = &mut self.effects[index];
         let start = Instant::now();
-        work(renderer, &mut effect.stats)?;
+        work(engine, &mut effect.stats)?;
         effect.stats.ms += start.elapsed().as_secs_f64() * 1e3;
-        effect.stats.cache_passes = effect.stats.cache_passes.max(renderer.cache.residency.fillings());
-        effect.resident_end = effect.resident_end + resident(renderer) - before;
-        let host = renderer.executor.workers().host_cache().stats();
-        let seen = std::mem::replace(&mut renderer.host_seen, host);
-        effect.ahead.prefetched_bytes += host.prefetched_bytes - seen.prefetched_bytes;
-        effect.ahead.prefetched_used_bytes += host.prefetched_used_bytes - seen.prefetched_used_bytes;
-        effect.ahead.prefetched_wasted_bytes += host.prefetched_wasted_bytes - seen.prefetched_wasted_bytes;
-        // Maps of lamps and fields of visibility add nothing to the picture, whose last sum they come before.
-        let adds = ![crate::secondary::rsm::answer::EFFECT, crate::secondary::dvf::answer::EFFECT].contains(&name);
-        if let Some(captures) = renderer.captures.as_mut().filter(|_| adds) {
-            captures.note(&mut *renderer.executor, name)?;
-        }
+        effect.stats.cache_passes = effect.stats.cache_passes.max(engine.cache.residency.fillings());
+        effect.resident_end = effect.resident_end + resident(engine) - before;
         Ok(())
     }
 
     /// The records, in the order in which effects began.
-    pub fn finish(self, renderer: &Renderer) -> Vec<Record> {
-        let residency = &renderer.cache.residency;
+    pub fn finish(self, engine: &Engine) -> Vec<Record> {
+        let residency = &engine.cache.residency;
         let record = |effect: EffectRecord| Record {
             cache_bytes: residency.budget_bytes(),
             cache_used_bytes: residency.used_bytes(),
             bricks_resident_start: effect.resident_start,
             bricks_resident_end: effect.resident_end,
-            prefetched_bytes: effect.ahead.prefetched_bytes,
-            prefetched_used_bytes: effect.ahead.prefetched_used_bytes,
-            prefetched_wasted_bytes: effect.ahead.prefetched_wasted_bytes,
             ..Record::of(self.frame, effect.name, &effect.stats)
         };
         self.effects.into_iter().map(record).collect()

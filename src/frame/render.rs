@@ -1,75 +1,13 @@
 //! The frame loop.
 
-use super::pass_record::FrameRecords;
-use super::{Accumulation, BATCH_SAMPLES, Captures, Effects, Light, Moved, camera_view};
+use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, Methods, Moved, camera_view};
 use crate::counters::Record;
-use crate::kernels::FrameExecutor;
 use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::picture::denoise::{GuideReader, Guides, taa_jitter};
 use crate::scene::Camera;
-use crate::schedule::auto::{Auto, Fixed};
-use crate::schedule::cache::Cache;
-use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{
-    ExecutorError, Lamp, Pass, PassStats, RomaPart, Shading, Sift, Step, Tracing, attributes, chc, demand, plain,
-};
-use crate::secondary::df::FieldSettings;
-use crate::secondary::df::answer::Field;
-use crate::secondary::dvf::answer::Dvf;
-use crate::secondary::roma::answer::Roma;
-use crate::secondary::roma::handover::{PILOTS, Trust};
-use crate::secondary::roma::{Role, RomaPass, RomaSettings};
-use crate::secondary::rsm::answer::Rsm;
-use crate::stream::HostCacheStats;
-use bricks::SceneFile;
-use std::sync::Arc;
-use std::time::Instant;
+use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Shading, Step, attributes};
+use std::ops::{Deref, DerefMut};
 use thiserror::Error;
-
-/// Which schedule traces a pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Schedule {
-    /// Tile lists, queries, loads nearest first.
-    Chc,
-    /// Every ray from the root over what is resident, then asking for what is missing.
-    Demand,
-    /// Everything resident, every ray from the root.
-    Plain,
-    /// Everything resident, every ray from the root, over binary trees; the executor has been made ready for it.
-    PlainBinary,
-    /// The cheapest of the first three, pass by pass.
-    Auto,
-}
-
-/// How frames are rendered.
-#[derive(Clone, Copy, Debug)]
-pub struct RenderSettings {
-    /// The schedule of every pass.
-    pub schedule: Schedule,
-    /// What is traced beside camera rays.
-    pub effects: Effects,
-    /// Samples a pixel.
-    pub samples: u32,
-    /// Seed of all random numbers.
-    pub seed: u32,
-    /// Ask which bricks every pass needed; which optimisations are on.
-    pub tracing: Tracing,
-    /// Read depth, normals, ids and albedo back.
-    pub aov: bool,
-    /// Read back what guides denoising and temporal anti-aliasing, and give every pixel directions of its own for ao
-    /// and diffuse.
-    pub guides: bool,
-    /// Samples lie at other points of their pixels in every frame.
-    pub taa: bool,
-    /// Interactive: bytes of tiles of textures that a frame may load. Coarser levels stand for the others, and the
-    /// frame is exact only where `unresolved_pixels` says 0.
-    pub tile_bytes: Option<u64>,
-    /// Occlusion and diffuse rays and those to the sun and emitters are answered by occupancy maps; none of them asks
-    /// for bricks.
-    pub roma: Option<RomaSettings>,
-    /// The same rays are answered by distance fields.
-    pub field: Option<FieldSettings>,
-}
 
 /// Why a frame could not be rendered.
 #[derive(Debug, Error)]
@@ -118,40 +56,26 @@ pub struct FrameOutput {
     pub guides: Option<Guides>,
 }
 
-/// A scene, an executor and a cache that frames are rendered with.
+/// Renders frames: an engine, and the methods that answer secondary rays in place of tracing them.
 pub struct Renderer {
-    /// The scene.
-    pub scene: Arc<SceneFile>,
-    /// The executor.
-    pub executor: Box<dyn FrameExecutor>,
-    /// The cache.
-    pub cache: Cache,
-    /// Settings of all frames.
-    pub settings: RenderSettings,
-    /// Sun and sky.
-    pub light: Light,
-    /// Picture size in pixels.
-    pub size: (u32, u32),
-    /// Edge of a tile in pixels.
-    pub tile: u32,
-    /// The temporal fronts, when they are on.
-    pub fronts: Option<Fronts>,
-    /// What [`Schedule::Auto`] has measured.
-    pub auto: Auto,
-    /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
-    pub captures: Option<Captures>,
-    /// What has moved since the frame before.
-    pub moved: Moved,
-    /// The occupancy maps, where settings ask for them or for distance fields.
-    pub roma: Roma,
-    /// The distance fields, where settings ask for them.
-    pub field: Field,
-    /// The field of visibility, where one has been made or read.
-    pub dvf: Dvf,
-    /// The reflective shadow maps, where diffuse rays are answered by occupancy maps.
-    pub rsm: Rsm,
-    /// The host cache's statistics at the end of the pass before.
-    pub host_seen: HostCacheStats,
+    /// What passes are traced with; a renderer derefs to it.
+    pub engine: Engine,
+    /// The methods; without any, all rays are traced.
+    pub methods: Methods,
+}
+
+impl Deref for Renderer {
+    type Target = Engine;
+
+    fn deref(&self) -> &Engine {
+        &self.engine
+    }
+}
+
+impl DerefMut for Renderer {
+    fn deref_mut(&mut self) -> &mut Engine {
+        &mut self.engine
+    }
 }
 
 impl Renderer {
@@ -175,37 +99,39 @@ impl Renderer {
         camera: &Camera,
         watch: &mut dyn FnMut(u32, &Accumulation) -> bool,
     ) -> Result<FrameOutput, RenderError> {
-        self.executor.tuning().leaf_cache = self.settings.tracing.optimisations.leaf_cache;
-        if let Some(captures) = &mut self.captures {
+        let Self { engine, methods } = self;
+        if let Some(captures) = &mut engine.captures {
             captures.clear();
         }
-        self.cache.begin_frame(self.settings.tile_bytes);
+        engine.cache.begin_frame(engine.settings.tile_bytes);
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
-        let effects = self.settings.effects;
+        let effects = engine.settings.effects;
         let mut accumulation = Accumulation::default();
-        self.executor.set_lamps(&self.light.lamps)?;
-        let mut guides = self.settings.guides.then(|| GuideReader::new(camera, self.size, &self.moved));
-        for sample in 0..self.settings.samples {
+        engine.executor.set_lamps(&engine.light.lamps)?;
+        let mut guides = engine.settings.guides.then(|| GuideReader::new(camera, engine.size, &engine.moved));
+        for sample in 0..engine.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
-                && let Some(captures) = &mut self.captures
+                && let Some(captures) = &mut engine.captures
             {
                 captures.begin_batch();
             }
-            let seed = self.settings.seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9));
-            let mut view = camera_view(self.scene.resident(), camera, &self.light, &effects, self.size, sample, seed);
-            view.directions.scatter = self.settings.guides;
-            if self.settings.taa {
-                let [x, y] = taa_jitter(frame, sample, self.settings.samples);
+            let seed = engine.settings.seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9));
+            let mut view =
+                camera_view(engine.scene.resident(), camera, &engine.light, &effects, engine.size, sample, seed);
+            view.directions.scatter = engine.settings.guides;
+            if engine.settings.taa {
+                let [x, y] = taa_jitter(frame, sample, engine.settings.samples);
                 view.params.jitter = [x, y, 0.0, 0.0];
             }
-            self.executor.begin_frame(&view);
-            self.roma.begin(camera.position, &view);
-            self.dvf.begin(&view);
-            if sample == 0 && effects.diffuse.is_some() {
-                self.prepare_rsm(&mut records, &view)?;
+            engine.executor.begin_frame(&view);
+            methods.iter_mut().for_each(|method| method.begin(camera, &view));
+            if sample == 0 {
+                for method in methods.iter_mut() {
+                    method.before_camera_rays(engine, &mut records, &view)?;
+                }
             }
-            records.pass(self, "primary", |r, stats| {
+            records.pass(engine, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, &[Step::Generate], stats)?;
                 attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
@@ -214,43 +140,40 @@ impl Renderer {
                 r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
             if sample == 0 {
-                self.renew_dvf(&mut records, &view)?;
+                for method in methods.iter_mut() {
+                    method.after_camera_rays(engine, &mut records, &view)?;
+                }
             }
-            self.light(&mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
+            light(engine, methods, &mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
             if let Some(guides) = &mut guides {
-                guides.lamps(&mut *self.executor, sample)?;
+                guides.lamps(&mut *engine.executor, sample)?;
             }
             let directions = |count: u32| sample * count..(sample + 1) * count;
             for index in directions(effects.occlusion.map_or(0, |occlusion| occlusion.rays)) {
-                records.pass(self, "ao", |r, stats| r.trace_and_add(frame, Pass::Occlusion(index), stats))?;
+                records
+                    .pass(engine, "ao", |r, stats| trace_and_add(r, methods, frame, Pass::Occlusion(index), stats))?;
             }
             for index in directions(effects.diffuse.unwrap_or(0)) {
                 let names = ["diffuse", "diffuse-shadow", "diffuse-environment"];
-                match self.settings.roma.and_then(|roma| roma.diffuse) {
-                    Some(roma) => self.gather(&mut records, names, index, roma)?,
-                    None => self.bounce(&mut records, names, Pass::Diffuse(index))?,
-                }
-            }
-            if effects.mirror {
-                self.bounce(&mut records, ["mirror", "mirror-shadow", "mirror-environment"], Pass::Mirror)?;
+                bounce(engine, methods, &mut records, names, Pass::Diffuse(index))?;
             }
             if effects.glossy {
-                self.bounce(&mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
+                bounce(engine, methods, &mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
             }
-            if sample == 0 && self.settings.aov {
-                self.read_aovs(view.frame.unit, &mut output.pixels)?;
+            if sample == 0 && engine.settings.aov {
+                read_aovs(engine, view.frame.unit, &mut output.pixels)?;
             }
             if let Some(guides) = &mut guides {
                 guides.sample(
-                    &mut *self.executor,
-                    &self.scene.resident().materials,
+                    &mut *engine.executor,
+                    &engine.scene.resident().materials,
                     &view,
-                    (sample, self.settings.samples),
+                    (sample, engine.settings.samples),
                 )?;
             }
             let finished = sample + 1;
-            if finished.is_multiple_of(BATCH_SAMPLES) || finished == self.settings.samples {
-                accumulation.add(&self.executor.read_radiance()?);
+            if finished.is_multiple_of(BATCH_SAMPLES) || finished == engine.settings.samples {
+                accumulation.add(&engine.executor.read_radiance()?);
                 if !watch(finished, &accumulation) {
                     return Err(RenderError::Interrupted);
                 }
@@ -258,210 +181,124 @@ impl Renderer {
         }
         output.pixels.radiance = accumulation.mean();
         output.guides = guides.map(GuideReader::finish);
-        output.records = records.finish(self);
-        self.moved = Moved::default();
+        output.records = records.finish(engine);
+        engine.moved = Moved::default();
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
         if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {
             primary.non_finite += output.pixels.not_finite();
         }
         Ok(output)
     }
+}
 
-    /// Whether rays lead to the environment.
-    pub fn draws_environment(&self) -> bool {
-        self.settings.effects.environment && self.light.lamps.environment.is_some()
-    }
-
-    /// Traces rays from primary hits whose own hits are shaded, and lights those: `names` are the effects that it
-    /// counts for, as in [`Renderer::light`].
-    fn bounce(
-        &mut self,
-        records: &mut FrameRecords,
-        names: [&'static str; 3],
-        pass: Pass,
-    ) -> Result<(), ExecutorError> {
-        let (frame, effects) = (records.frame(), self.settings.effects);
-        records.pass(self, names[0], |r, stats| {
-            r.trace(frame, pass, &[Step::Generate], stats)?;
-            attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
-            let (is_diffuse, draws) = (matches!(pass, Pass::Diffuse(_)), r.draws_environment());
-            // What rays to lamps bring to the surface itself must not come by diffuse rays as well, or be weighted.
-            let shading = Shading {
-                sun: !effects.shadow,
-                sky: !is_diffuse && !draws,
-                emission: !is_diffuse || !r.light.lamps.has_surfaces(),
-                miss: true,
-                environment: draws,
-                gloss: pass == Pass::Glossy,
-            };
-            r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats)
-        })?;
-        self.light(records, names, Pass::BounceShadow)
-    }
-
-    /// Lights the hits that the passes `of_lamp` start from by all lamps, with shadows if they are on; the environment
-    /// has them always. The sun without shadows has been added before. Light without shadows counts for the first of
-    /// the effects, rays to sun and emitters for the second, those to the environment for the third.
-    fn light(
-        &mut self,
-        records: &mut FrameRecords,
-        [name, shadow, environment]: [&'static str; 3],
-        of_lamp: impl Fn(Lamp) -> Pass,
-    ) -> Result<(), ExecutorError> {
-        let frame = records.frame();
-        let has_emitters = !self.light.lamps.emitters().is_empty();
-        let lamps = [Some(Lamp::Sun), has_emitters.then_some(Lamp::Emitter)];
-        for lamp in lamps.into_iter().flatten() {
-            let pass = of_lamp(lamp);
-            if self.settings.effects.shadow {
-                records.pass(self, shadow, |r, stats| r.trace_and_add(frame, pass, stats))?;
-            } else if lamp == Lamp::Emitter {
-                records.more(self, name, |r, stats| {
-                    stats.add(r.executor.run(pass, &[Step::Generate, Step::AddLight], &r.cache.states)?);
-                    Ok(())
-                })?;
-            }
+/// Traces rays from primary hits whose own hits are shaded, and lights those: `names` are the effects that it counts for,
+/// as in [`light`].
+fn bounce(
+    engine: &mut Engine,
+    methods: &mut Methods,
+    records: &mut FrameRecords,
+    names: [&'static str; 3],
+    pass: Pass,
+) -> Result<(), ExecutorError> {
+    let (frame, effects) = (records.frame(), engine.settings.effects);
+    let mut lit = None;
+    records.pass(engine, names[0], |r, stats| {
+        let plan = methods.plan(r, pass)?;
+        let draws = r.draws_environment();
+        if plan.is_whole {
+            stats.add(r.executor.run(pass, &plan.first(), &r.cache.states)?);
+            lit = Some(plan.light);
+            // What is met shows nothing by itself.
+            let shading = Shading { miss: true, environment: draws, ..Shading::default() };
+            return r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats);
         }
-        if self.draws_environment() {
-            let pass = of_lamp(Lamp::Environment);
-            records.pass(self, environment, |r, stats| r.trace_and_add(frame, pass, stats))?;
-        }
-        Ok(())
-    }
-
-    /// Traces any-hit rays, notes the bricks that were hit, and adds the light that comes through.
-    fn trace_and_add(&mut self, frame: u32, pass: Pass, stats: &mut PassStats) -> Result<(), ExecutorError> {
-        let (generate, add) = match pass {
-            Pass::Occlusion(_) => (Step::Generate, Step::AddOcclusion),
-            _ if self.dvf.is_paper(pass) => (Step::DvfCosine, Step::DvfLight),
-            _ => (Step::Generate, Step::AddLight),
+        r.trace(frame, pass, &plan.first(), stats)?;
+        attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
+        let is_diffuse = matches!(pass, Pass::Diffuse(_));
+        // What rays to lamps bring to the surface itself must not come by diffuse rays as well, or be weighted.
+        let shading = Shading {
+            sun: !effects.shadow,
+            sky: !is_diffuse && !draws,
+            emission: !is_diffuse || !r.light.lamps.has_surfaces(),
+            miss: true,
+            environment: draws,
+            gloss: pass == Pass::Glossy,
         };
-        let roma = self.settings.roma.and_then(|settings| Roma::pass_of(&settings, pass));
-        let (mut first, mut last) = (vec![generate], vec![Step::QueryHits]);
-        let length = match (pass, self.settings.effects.occlusion) {
-            (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
-            _ => f64::INFINITY,
-        };
-        let is_short = |r: &mut Self| r.roma.is_short(&r.scene, length);
-        let mut is_measured = false;
-        if let Some(roma) = roma.filter(|roma| !roma.role.is_help() || !is_short(self)) {
-            let RomaPass { grid, steps, role } = roma;
-            first.extend(self.roma.prepare(&mut *self.executor, &self.scene, roma, length)?);
-            let trace = |part| Step::RomaTrace { steps, part };
-            match role {
-                Role::Answer => {
-                    let is_long = self.roma.is_long(&self.scene, length);
-                    first.extend([trace(RomaPart::answering(pass, steps, is_long)), add]);
-                    stats.add(self.executor.run(pass, &first, &self.cache.states)?);
-                    return Ok(());
-                }
-                Role::Far(cells) => {
-                    first.push(Step::RomaNear { cells: cells * grid.base_per_cell() });
-                    last.push(trace(RomaPart::Far));
-                }
-                Role::Correct(one_in) => {
-                    first.push(Step::RomaPilots { one_in });
-                    last.push(trace(RomaPart::Correct { one_in }));
-                }
-                Role::Sift { most_wrong: None } => first.push(trace(RomaPart::Sift(Sift::default()))),
-                Role::Sift { most_wrong: Some(most_wrong) } => {
-                    is_measured = true;
-                    let trust = self.roma.handover(pass).trust(most_wrong);
-                    let near = match trust {
-                        Trust::Beyond(cells) => Some(cells * grid.base_per_cell()),
-                        Trust::Free | Trust::Nothing => None,
-                    };
-                    if trust != Trust::Nothing {
-                        first.push(trace(RomaPart::Sift(Sift { near, pilots: PILOTS })));
-                    }
-                    last.push(Step::RomaMeasure { steps, pilots: PILOTS, cell: grid.base_per_cell() });
-                    if near.is_some() {
-                        last.push(trace(RomaPart::Far));
-                    }
-                }
-            }
-        }
-        first.extend(self.dvf.prepare(&mut *self.executor, pass)?);
-        if self.add_by_field(pass, add, stats)? {
-            return Ok(());
-        }
-        self.trace(frame, pass, &first, stats)?;
-        last.push(add);
-        let report = self.executor.run(pass, &last, &self.cache.states)?;
-        if is_measured {
-            self.roma.handover(pass).note(report.pilots);
-        }
-        stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
-        stats.add(report);
-        Ok(())
+        r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats)
+    })?;
+    match lit {
+        Some(steps) => records.pass(engine, names[1], |r, stats| {
+            stats.add(r.executor.run(Pass::BounceShadow(Lamp::Sun), &steps, &r.cache.states)?);
+            Ok(())
+        }),
+        None => light(engine, methods, records, names, Pass::BounceShadow),
     }
+}
 
-    /// Shades the hits of the set before that of `pass`.
-    pub(crate) fn shade(&mut self, pass: Pass, light: Shading, stats: &mut PassStats) -> Result<(), ExecutorError> {
-        stats.add(self.executor.run(pass, &[Step::Shade(light)], &self.cache.states)?);
-        Ok(())
-    }
-
-    /// Traces the rays of a pass, which the steps in `first` make, by the schedule in force.
-    fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut PassStats) -> Result<(), ExecutorError> {
-        let fixed = match self.settings.schedule {
-            Schedule::Chc => Fixed::Chc,
-            Schedule::Demand => Fixed::Demand,
-            Schedule::Plain => Fixed::Plain,
-            Schedule::PlainBinary => {
-                let tracing = &self.settings.tracing;
-                return plain::trace_binary(&mut *self.executor, &mut self.cache, pass, first, tracing, stats);
-            }
-            Schedule::Auto => {
-                let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
-                let start = Instant::now();
-                // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the
-                // schedule.
-                let besides = stats.ms_stream - stats.ms;
-                let rays = stats.report.rays;
-                self.trace_by(chosen, frame, pass, first, stats)?;
-                let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
-                self.auto.note(pass, ms, stats.report.rays - rays);
-                return Ok(());
-            }
-        };
-        self.trace_by(fixed, frame, pass, first, stats)
-    }
-
-    fn trace_by(
-        &mut self,
-        schedule: Fixed,
-        frame: u32,
-        pass: Pass,
-        first: &[Step],
-        stats: &mut PassStats,
-    ) -> Result<(), ExecutorError> {
-        let tracing = &self.settings.tracing;
-        let (executor, cache) = (&mut *self.executor, &mut self.cache);
-        match (schedule, &mut self.fronts) {
-            (Fixed::Plain, _) => plain::trace(executor, cache, pass, first, tracing, stats),
-            (Fixed::Demand, _) => demand::trace(executor, cache, pass, first, tracing, stats),
-            (Fixed::Chc, None) => chc::trace(executor, cache, pass, first, tracing, stats),
-            (Fixed::Chc, Some(fronts)) => {
-                let resident = self.scene.resident();
-                let extent = (self.size.0, self.size.1, self.tile);
-                let setup = FrontPass { resident, extent, frame, pass, tracing };
-                fronts.trace(executor, cache, &setup, first, stats)
-            }
+/// Lights the hits that the passes `of_lamp` start from by all lamps, with shadows if they are on; the environment has
+/// them always. The sun without shadows has been added before. Light without shadows counts for the first of the
+/// effects, rays to sun and emitters for the second, those to the environment for the third.
+fn light(
+    engine: &mut Engine,
+    methods: &mut Methods,
+    records: &mut FrameRecords,
+    [name, shadow, environment]: [&'static str; 3],
+    of_lamp: impl Fn(Lamp) -> Pass,
+) -> Result<(), ExecutorError> {
+    let frame = records.frame();
+    let has_emitters = !engine.light.lamps.emitters().is_empty();
+    let lamps = [Some(Lamp::Sun), has_emitters.then_some(Lamp::Emitter)];
+    for lamp in lamps.into_iter().flatten() {
+        let pass = of_lamp(lamp);
+        if engine.settings.effects.shadow {
+            records.pass(engine, shadow, |r, stats| trace_and_add(r, methods, frame, pass, stats))?;
+        } else if lamp == Lamp::Emitter {
+            records.more(engine, name, |r, stats| {
+                stats.add(r.executor.run(pass, &[Step::Generate, Step::AddLight], &r.cache.states)?);
+                Ok(())
+            })?;
         }
     }
-
-    fn read_aovs(&mut self, unit: f64, pixels: &mut Pixels) -> Result<(), ExecutorError> {
-        let rays: Vec<Ray> = self.executor.read_rays(Pass::Primary)?;
-        let hits: Vec<Hit> = self.executor.read_hits(Pass::Primary)?;
-        let surfaces: Vec<Surface> = self.executor.read_surfaces(Pass::Primary)?;
-        let gbuffer: Vec<GBuffer> = self.executor.read_gbuffer()?;
-        pixels.id = hits.iter().map(|h| h.id).collect();
-        pixels.depth = rays.iter().zip(&hits).map(|(r, h)| depth(r, h, unit)).collect();
-        pixels.normal = surfaces.iter().map(|s| s.normal).collect();
-        pixels.albedo = gbuffer.iter().map(|g| g.albedo).collect();
-        Ok(())
+    if engine.draws_environment() {
+        let pass = of_lamp(Lamp::Environment);
+        records.pass(engine, environment, |r, stats| trace_and_add(r, methods, frame, pass, stats))?;
     }
+    Ok(())
+}
+
+/// Traces any-hit rays that no method answers, notes the bricks that were hit, and adds the light that comes through.
+fn trace_and_add(
+    engine: &mut Engine,
+    methods: &mut Methods,
+    frame: u32,
+    pass: Pass,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
+    let plan = methods.plan(engine, pass)?;
+    if plan.is_whole {
+        let steps = [&plan.first()[..], &[plan.add]].concat();
+        stats.add(engine.executor.run(pass, &steps, &engine.cache.states)?);
+        return Ok(());
+    }
+    engine.trace(frame, pass, &plan.first(), stats)?;
+    let last = [&[Step::QueryHits], &plan.after[..], &[plan.add]].concat();
+    let report = engine.executor.run(pass, &last, &engine.cache.states)?;
+    methods.learn(pass, &report);
+    stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
+    stats.add(report);
+    Ok(())
+}
+
+fn read_aovs(engine: &mut Engine, unit: f64, pixels: &mut Pixels) -> Result<(), ExecutorError> {
+    let rays: Vec<Ray> = engine.executor.read_rays(Pass::Primary)?;
+    let hits: Vec<Hit> = engine.executor.read_hits(Pass::Primary)?;
+    let surfaces: Vec<Surface> = engine.executor.read_surfaces(Pass::Primary)?;
+    let gbuffer: Vec<GBuffer> = engine.executor.read_gbuffer()?;
+    pixels.id = hits.iter().map(|h| h.id).collect();
+    pixels.depth = rays.iter().zip(&hits).map(|(r, h)| depth(r, h, unit)).collect();
+    pixels.normal = surfaces.iter().map(|s| s.normal).collect();
+    pixels.albedo = gbuffer.iter().map(|g| g.albedo).collect();
+    Ok(())
 }
 
 /// Distance along a ray in world units, from its parameter.

@@ -1,6 +1,5 @@
 //! What the device gets to know of a camera and the lights.
 
-use super::effects::SURFACE_SHARE;
 use super::{Effects, Light};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::Params;
@@ -47,7 +46,6 @@ pub fn camera_view(
         jitter: [jx, jy, 0.0, 0.0],
         emitter_count: light.lamps.emitters().len() as u32,
         emitter_density: (light.lamps.density_of_surfaces() * frame.unit * frame.unit) as f32,
-        surface_share: if effects.mirror { SURFACE_SHARE } else { 1.0 },
         sample,
         seed,
         ..Params::default()

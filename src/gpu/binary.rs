@@ -8,8 +8,8 @@ use super::kernels::Kernels;
 use super::pages::device_error;
 use super::rays::storage;
 use super::wgsl;
-use crate::kernels::dispatch::INTERSECT_BINARY;
 use crate::kernels::layout::BinaryNode;
+use crate::kernels::table::{self, names};
 use crate::kernels::trace::binary_tree::{Tree, top_height, tree_of};
 use crate::schedule::ExecutorError;
 use bricks::SceneFile;
@@ -58,7 +58,7 @@ impl BinaryTrees {
         let (pages, bytes) = pages.finish()?;
         let root_buffer = storage(gpu, "binary roots", count, size_of::<[u32; 2]>());
         gpu.queue.write_buffer(&root_buffer, 0, bytemuck::cast_slice(&roots));
-        let (layout, pipeline) = pipeline(gpu, kernels, pages.len(), height + top_height(scene.resident()));
+        let (layout, pipeline) = pipeline(gpu, kernels, pages.len(), height + top_height(scene.resident()))?;
         let entries = numbered(std::iter::once(&root_buffer).chain(&pages), 0);
         let descriptor = wgpu::BindGroupDescriptor { label: Some("binary"), layout: &layout, entries: &entries };
         Ok(Self { group: gpu.device.create_bind_group(&descriptor), pipeline, bytes })
@@ -144,27 +144,22 @@ impl Pages<'_> {
 }
 
 /// Layout of group 3 and the pipeline, for so many pages of nodes and a stack of so many entries.
-fn pipeline(gpu: &Gpu, kernels: &Kernels, pages: usize, stack: u32) -> (wgpu::BindGroupLayout, wgpu::ComputePipeline) {
+fn pipeline(
+    gpu: &Gpu,
+    kernels: &Kernels,
+    pages: usize,
+    stack: u32,
+) -> Result<(wgpu::BindGroupLayout, wgpu::ComputePipeline), ExecutorError> {
     let binary = |name: &str| (name == "trace/binary.wgsl").then(|| wgsl::binary_accessors(pages, stack.max(1)));
     let device = &gpu.device;
     let group = kernels::read_layout(device, "binary", 1 + pages);
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(INTERSECT_BINARY),
+        label: Some(names::intersect_binary),
         bind_group_layouts: &[Some(&kernels.scene), Some(&kernels.rays), Some(&kernels.cache), Some(&group)],
         immediate_size: 0,
     });
-    let source = kernels::source_with(INTERSECT_BINARY, kernels.pages, &binary);
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(INTERSECT_BINARY),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(INTERSECT_BINARY),
-        layout: Some(&layout),
-        module: &module,
-        entry_point: Some("main"),
-        compilation_options: Default::default(),
-        cache: None,
-    });
-    (group, pipeline)
+    let kernel = table::kernel(names::intersect_binary)
+        .ok_or_else(|| ExecutorError::Device("has no kernel over binary trees; this is a defect".into()))?;
+    let pipeline = kernels.make(gpu, kernel, &layout, kernels::source_with(kernel.file, kernels.pages, &binary));
+    Ok((group, pipeline))
 }

@@ -5,6 +5,7 @@ mod peek;
 
 use super::binary::BinaryTrees;
 use super::device::Gpu;
+use super::family::FamilyBuffers;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
 use super::lamps::LampBuffers;
@@ -15,27 +16,18 @@ use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::kernels::dispatch::{
-    COUNT_PAIRS, Dispatch, INTERSECT_BINARY, Third, Workgroups, are_pairs_culled, dispatches,
-};
+use crate::kernels::dispatch::{Dispatch, OWN_WORDS, Workgroups, are_pairs_culled, dispatches};
 use crate::kernels::layout;
 use crate::kernels::layout::Params;
+use crate::kernels::table::{self, Bindings, Family, names};
 use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
     report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::secondary::df::device::Field;
-use crate::secondary::df::maps::FieldMaps;
-use crate::secondary::dvf::device::Dvf;
-use crate::secondary::dvf::maps::DvfMaps;
-use crate::secondary::occupancy::Cascades;
-use crate::secondary::roma::device::Roma;
-use crate::secondary::roma::maps::RomaMaps;
-use crate::secondary::rsm::device::Rsm;
-use crate::secondary::rsm::maps::RsmMaps;
 use crate::stream::{Item, WorkerPool, Workers};
 use bricks::SceneFile;
+use std::any::Any;
 use std::sync::Arc;
 
 /// Most dispatches of one submission.
@@ -54,10 +46,9 @@ pub struct GpuExecutor {
     buffers: Buffers,
     groups: Groups,
     binary: Option<BinaryTrees>,
-    roma: Option<Roma>,
-    field: Option<Field>,
-    rsm: Option<Rsm>,
-    dvf: Option<Dvf>,
+    families: Vec<FamilyBuffers>,
+    /// Of families that nothing is made of: nothing.
+    unheld: Option<Box<dyn Any>>,
     extent: Extent,
     readback: Readback,
     timing: Timing,
@@ -140,12 +131,8 @@ impl GpuExecutor {
                 usage: wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
-            params: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("params"),
-                size: (MOST_DISPATCHES as u64) * params_stride(&gpu),
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
+            params: uniform(&gpu, "params", size_of::<Params>()),
+            blocks: uniform(&gpu, "blocks", 4 * OWN_WORDS),
         };
         let read = [&buffers.counters, &buffers.demand, &buffers.texels.tile_demand];
         let readback = Readback::new(&gpu, read.iter().map(|buffer| buffer.size()).sum());
@@ -160,10 +147,8 @@ impl GpuExecutor {
             buffers,
             groups,
             binary: None,
-            roma: None,
-            field: None,
-            rsm: None,
-            dvf: None,
+            families: Vec::new(),
+            unheld: None,
             extent,
             readback,
             timing,
@@ -186,15 +171,14 @@ impl GpuExecutor {
         &self.kernels
     }
 
-    fn read<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
+    fn read_all<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
         let bytes = self.readback.read(&self.gpu, buffer(self))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
-    /// The first words of a buffer.
-    fn read_words(&self, (buffer, count): (&wgpu::Buffer, usize)) -> Result<Vec<u32>, ExecutorError> {
-        let bytes = self.readback.read(&self.gpu, buffer)?;
-        Ok(bytemuck::pod_collect_to_vec(&bytes[..4 * count]))
+    /// What is made of a family.
+    fn family(&self, family: &'static Family) -> Option<&FamilyBuffers> {
+        self.families.iter().find(|own| std::ptr::eq(own.family, family))
     }
 
     fn rebind(&mut self) {
@@ -204,7 +188,7 @@ impl GpuExecutor {
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
         let extent = self.extent;
-        let params = Params {
+        Params {
             zero: 0,
             width: extent.width,
             height: extent.height,
@@ -218,10 +202,7 @@ impl GpuExecutor {
             top_count: self.scene.resident().top2.len() as u32,
             instance_pad: self.buffers.scene.instance_pad,
             ..self.view
-        };
-        let params = self.roma.as_ref().map_or(params, |roma| roma.maps.params(params));
-        let params = self.field.as_ref().map_or(params, |field| field.maps.params(params));
-        Params { rsm_maps: self.rsm.as_ref().map_or(0, |rsm| rsm.maps), ..params }
+        }
     }
 
     /// One submission: all steps, then counters and demand read back.
@@ -241,25 +222,29 @@ impl GpuExecutor {
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            list.extend(dispatches(pass, step, &params, &self.directions, self.tuning.leaf_cache, everything));
+            list.extend(dispatches(pass, step, &params, &self.directions, everything));
         }
         let dispatches = list;
-        if dispatches.iter().any(|dispatch| dispatch.kernel == COUNT_PAIRS) {
+        if dispatches.iter().any(|dispatch| dispatch.kernel == names::count_pairs) {
             self.make_room_for_counts()?;
         }
-        let stride = params_stride(&self.gpu);
-        let mut params = vec![0u8; stride as usize * dispatches.len()];
+        let strides = [size_of::<Params>(), 4 * OWN_WORDS].map(|bytes| stride(&self.gpu, bytes));
+        let mut told = strides.map(|stride| vec![0u8; stride as usize * dispatches.len()]);
         for (i, dispatch) in dispatches.iter().enumerate() {
-            let at = i * stride as usize;
-            params[at..at + size_of::<Params>()].copy_from_slice(bytemuck::bytes_of(&dispatch.params));
+            let bytes = [bytemuck::bytes_of(&dispatch.params), bytemuck::cast_slice(&dispatch.own)];
+            for ((told, stride), bytes) in told.iter_mut().zip(strides).zip(bytes) {
+                told[i * stride as usize..][..bytes.len()].copy_from_slice(bytes);
+            }
         }
-        self.gpu.queue.write_buffer(&self.buffers.params, 0, &params);
+        for (buffer, told) in [&self.buffers.params, &self.buffers.blocks].into_iter().zip(&told) {
+            self.gpu.queue.write_buffer(buffer, 0, told);
+        }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         encoder.clear_buffer(&self.buffers.counters, 0, Some(layout::COUNTERS as u64 * 4));
         let unasked = vec![layout::Demand { rays: 0, nearest: u32::MAX, next: 0 }; bricks.len()];
         self.gpu.queue.write_buffer(&self.buffers.demand, 0, bytemuck::cast_slice(&unasked));
         for (i, dispatch) in dispatches.iter().enumerate() {
-            if dispatch.kernel == COUNT_PAIRS {
+            if dispatch.kernel == names::count_pairs {
                 encoder.clear_buffer(&self.buffers.tiles.pair_rays, 0, None);
             }
             let work = match dispatch.groups {
@@ -275,36 +260,38 @@ impl GpuExecutor {
                 label: Some(dispatch.kernel),
                 timestamp_writes: self.timing.writes(i as u32),
             });
-            let binary = self.binary.as_ref().filter(|_| dispatch.kernel == INTERSECT_BINARY);
-            let roma = self.roma.as_ref().and_then(|roma| Some((roma.pipeline(dispatch.kernel)?, roma)));
-            let field = self.field.as_ref().and_then(|field| Some((field.pipeline(dispatch.kernel)?, field)));
-            let rsm = self.rsm.as_ref().and_then(|rsm| Some((rsm.pipeline(dispatch.kernel)?, rsm)));
-            let of_maps = roma.map(|(pipeline, _)| pipeline).or(field.map(|(pipeline, _)| pipeline));
-            let dvf = self.dvf.as_ref().and_then(|dvf| Some((dvf.pipeline(dispatch.kernel)?, dvf)));
-            let of_maps = of_maps.or(rsm.map(|(pipeline, _)| pipeline)).or(dvf.map(|(pipeline, _)| pipeline));
-            let own = binary.map(|b| &b.pipeline).or(of_maps);
-            compute.set_pipeline(own.unwrap_or_else(|| self.kernels.pipeline(dispatch.kernel)));
+            let family = self.families.iter().find_map(|own| Some((own, own.family.kernel(dispatch.kernel)?)));
+            let kernel = table::kernel(dispatch.kernel).or(family.map(|(_, kernel)| kernel));
+            let binary = self.binary.as_ref().filter(|_| dispatch.kernel == names::intersect_binary);
+            let pipeline = match (family, binary) {
+                (Some((family, _)), _) => family.pipeline(dispatch.kernel),
+                (None, Some(binary)) => Some(&binary.pipeline),
+                (None, None) => self.kernels.pipeline(dispatch.kernel),
+            };
+            let (Some(kernel), Some(pipeline)) = (kernel, pipeline) else {
+                let text = format!("has no kernel {}; this is a defect", dispatch.kernel);
+                return Err(ExecutorError::Device(text));
+            };
+            compute.set_pipeline(pipeline);
             compute.set_bind_group(0, &self.groups.scene, &[]);
-            compute.set_bind_group(1, &self.groups.rays[pass.set()], &[(i as u64 * stride) as u32]);
-            let second = match (dispatch.cache, dispatch.third) {
-                (true, _) => &self.groups.cache,
-                (false, Third::Shading) => &self.groups.lamps,
-                (false, Third::Roma) => roma.map_or(&self.groups.empty, |(_, roma)| &roma.group),
-                (false, Third::Field) => field.map_or(&self.groups.empty, |(_, field)| &field.group),
-                (false, Third::Rsm) => rsm.map_or(&self.groups.empty, |(_, rsm)| &rsm.group),
-                (false, Third::Dvf) => dvf.map_or(&self.groups.empty, |(_, dvf)| &dvf.group),
-                _ => &self.groups.empty,
+            let offsets = strides.map(|stride| (i as u64 * stride) as u32);
+            compute.set_bind_group(1, &self.groups.rays[pass.set()], &offsets);
+            let groups = &self.groups;
+            let shaded = pass.set().saturating_sub(1);
+            let (second, third) = match kernel.bindings {
+                Bindings::Tiles => (&groups.empty, &groups.tiles),
+                Bindings::CacheTiles => (&groups.cache, &groups.tiles),
+                Bindings::Shading => (&groups.lamps, &groups.shading[shaded]),
+                Bindings::CacheShading => (&groups.cache, &groups.shading[shaded]),
+                Bindings::Sampling => {
+                    let sampling = groups.sampling.as_ref().map_or(&groups.tiles, |sampling| &sampling[shaded]);
+                    (&groups.cache, sampling)
+                }
+                Bindings::Binary => (&groups.cache, binary.map_or(&groups.tiles, |binary| &binary.group)),
+                Bindings::Own => (family.map_or(&groups.empty, |(family, _)| &family.group), &groups.shading[shaded]),
             };
             compute.set_bind_group(2, second, &[]);
-            let shaded = pass.set().saturating_sub(1);
-            let third = match (dispatch.third, &self.groups.sampling) {
-                (Third::Shading | Third::Roma | Third::Field | Third::Rsm | Third::Dvf, _) => {
-                    &self.groups.shading[shaded]
-                }
-                (Third::Sampling, Some(sampling)) => &sampling[shaded],
-                _ => &self.groups.tiles,
-            };
-            compute.set_bind_group(3, binary.map_or(third, |b| &b.group), &[]);
+            compute.set_bind_group(3, third, &[]);
             match dispatch.groups {
                 Workgroups::Fixed([x, y]) => compute.dispatch_workgroups(x, y, 1),
                 Workgroups::Chosen | Workgroups::Rooted => {
@@ -330,7 +317,7 @@ impl GpuExecutor {
             report.tiles = textures::demand(&bytemuck::pod_collect_to_vec::<_, layout::TileDemand>(tiles));
         }
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
-            let rays: Vec<u32> = self.read(|s| &s.buffers.tiles.pair_rays)?;
+            let rays: Vec<u32> = self.read_all(|s| &s.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
         }
         let times = self.timing.read(&self.gpu, dispatches.len())?;
@@ -410,75 +397,50 @@ impl FrameExecutor for GpuExecutor {
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
         if self.buffers.lamps.set(&self.gpu, lamps)? {
             self.rebind();
-            if let Some(rsm) = &mut self.rsm {
-                rsm.rebind(&self.gpu, &self.buffers.lamps);
+            for family in self.families.iter_mut().filter(|own| own.family.has_lamps) {
+                family.rebind(&self.gpu, &self.buffers.lamps);
             }
         }
         Ok(())
     }
 
-    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
-        let Self { gpu, kernels, roma, .. } = self;
-        roma.get_or_insert_with(|| Roma::new(gpu, kernels)).set_cascades(gpu, cascades)
-    }
-
-    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
-        let Self { gpu, kernels, roma, .. } = self;
-        roma.get_or_insert_with(|| Roma::new(gpu, kernels)).set_maps(gpu, maps)
-    }
-
-    fn set_field(&mut self, maps: &FieldMaps) -> Result<(), ExecutorError> {
-        let Self { gpu, kernels, field, .. } = self;
-        field.get_or_insert_with(|| Field::new(gpu, kernels)).set(gpu, maps)
-    }
-
-    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
-        let Self { gpu, kernels, rsm, buffers, .. } = self;
-        let rsm = match rsm {
-            Some(rsm) => rsm,
-            none => none.insert(Rsm::new(gpu, kernels, &buffers.lamps)?),
+    fn reserve(&mut self, family: &'static Family, elements: &[usize]) -> Result<(), ExecutorError> {
+        let Self { gpu, kernels, buffers, families, .. } = self;
+        let index = match families.iter().position(|own| std::ptr::eq(own.family, family)) {
+            Some(index) => index,
+            None => {
+                families.push(FamilyBuffers::new(gpu, kernels, &buffers.lamps, family)?);
+                families.len() - 1
+            }
         };
-        rsm.set(gpu, &buffers.lamps, maps)
+        families[index].reserve(gpu, &buffers.lamps, elements)
+    }
+
+    fn write(&mut self, family: &'static Family, buffer: usize, at: usize, bytes: &[u8]) {
+        if let Some(own) = self.family(family) {
+            self.gpu.queue.write_buffer(own.buffer(buffer), at as u64, bytes);
+        }
+    }
+
+    fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
+        let Some(own) = self.family(family) else { return Ok(Vec::new()) };
+        let bytes = self.readback.read(&self.gpu, own.buffer(buffer))?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes[..4 * words]))
+    }
+
+    fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>> {
+        match self.families.iter_mut().find(|own| std::ptr::eq(own.family, family)) {
+            Some(own) => &mut own.held,
+            None => {
+                self.unheld = None;
+                &mut self.unheld
+            }
+        }
     }
 
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.scene = scene.clone();
         self.buffers.scene.forget_frame();
-    }
-
-    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
-        let Self { gpu, kernels, dvf, .. } = self;
-        let dvf = match dvf {
-            Some(dvf) => dvf,
-            none => none.insert(Dvf::new(gpu, kernels)?),
-        };
-        dvf.set(gpu, maps)
-    }
-
-    fn set_dvf_triangles(&mut self, triangles: &[layout::DvfTriangle], points: u32) -> Result<(), ExecutorError> {
-        let Self { gpu, dvf, .. } = self;
-        dvf.as_mut().map_or(Ok(()), |dvf| dvf.set_triangles(gpu, triangles, points))
-    }
-
-    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
-        let Self { gpu, dvf, .. } = self;
-        dvf.as_mut().map_or(Ok(()), |dvf| dvf.set_tally(gpu, words))
-    }
-
-    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
-        self.dvf.as_ref().map_or(Ok(Vec::new()), |dvf| self.read_words(dvf.tally()))
-    }
-
-    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
-        let Some(dvf) = &self.dvf else { return Ok(Default::default()) };
-        let [masks, labels, _] = dvf.results();
-        Ok((self.read_words(masks)?, self.read_words(labels)?))
-    }
-
-    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
-        let Some(dvf) = &self.dvf else { return Ok(Vec::new()) };
-        let words = self.read_words(dvf.results()[2])?;
-        Ok(words.as_chunks::<2>().0.to_vec())
     }
 
     fn begin_frame(&mut self, view: &View) {
@@ -494,23 +456,23 @@ impl FrameExecutor for GpuExecutor {
     }
 
     fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.read(|s| &s.buffers.sets[pass.set()].rays)
+        self.read_all(|s| &s.buffers.sets[pass.set()].rays)
     }
 
     fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.read(|s| &s.buffers.sets[pass.set()].hits)
+        self.read_all(|s| &s.buffers.sets[pass.set()].hits)
     }
 
     fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.read(|s| &s.buffers.sets[pass.set()].surfaces)
+        self.read_all(|s| &s.buffers.sets[pass.set()].surfaces)
     }
 
     fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read(|s| &s.buffers.pixels.gbuffers[0])
+        self.read_all(|s| &s.buffers.pixels.gbuffers[0])
     }
 
     fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.read(|s| &s.buffers.pixels.radiance)
+        self.read_all(|s| &s.buffers.pixels.radiance)
     }
 }
 
@@ -577,7 +539,17 @@ impl Executor for GpuExecutor {
     }
 }
 
-/// Bytes from one set of parameters to the next: the device's alignment for dynamic offsets.
-fn params_stride(gpu: &Gpu) -> u64 {
-    (size_of::<Params>() as u64).next_multiple_of(u64::from(gpu.limits.min_uniform_buffer_offset_alignment.max(16)))
+/// Bytes from what one dispatch is told to the next: the device's alignment for dynamic offsets.
+fn stride(gpu: &Gpu, bytes: usize) -> u64 {
+    (bytes as u64).next_multiple_of(u64::from(gpu.limits.min_uniform_buffer_offset_alignment.max(16)))
+}
+
+/// A buffer of so many bytes for each dispatch of a submission.
+fn uniform(gpu: &Gpu, label: &str, bytes: usize) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: (MOST_DISPATCHES as u64) * stride(gpu, bytes),
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
 }

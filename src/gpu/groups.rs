@@ -8,6 +8,7 @@ use super::rays::{PixelBuffers, RayBuffers, TileBuffers};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::wgsl::TEXEL_BINDING;
+use crate::kernels::dispatch::OWN_WORDS;
 use crate::kernels::layout::Params;
 
 /// What kernels read and write.
@@ -34,6 +35,8 @@ pub struct Buffers {
     pub indirect: wgpu::Buffer,
     /// [`Params`] of every dispatch of a submission.
     pub params: wgpu::Buffer,
+    /// What a method's kernel is told beside them, of every dispatch.
+    pub blocks: wgpu::Buffer,
 }
 
 /// Bind groups; made anew when a buffer is.
@@ -62,17 +65,18 @@ impl Groups {
         let group = |label, layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries })
         };
-        let Buffers { scene, cache, texels, lamps, sets, pixels, tiles, demand, counters, params, .. } = buffers;
-        let params = wgpu::BindGroupEntry {
-            binding: 0,
+        let Buffers { scene, cache, texels, lamps, sets, pixels, tiles, demand, counters, params, blocks, .. } =
+            buffers;
+        let of_dispatch = |binding, buffer, bytes: usize| wgpu::BindGroupEntry {
+            binding,
             resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                buffer: params,
+                buffer,
                 offset: 0,
-                size: std::num::NonZeroU64::new(size_of::<Params>() as u64),
+                size: std::num::NonZeroU64::new(bytes as u64),
             }),
         };
         let rays = |set: &RayBuffers| {
-            let mut entries = vec![params.clone()];
+            let mut entries = vec![of_dispatch(0, params, size_of::<Params>()), of_dispatch(6, blocks, 4 * OWN_WORDS)];
             entries.extend(numbered([&set.rays, &set.hits, &set.surfaces, demand, counters], 1));
             group("rays", &kernels.rays, &entries)
         };

@@ -3,10 +3,10 @@
 pub mod binary;
 pub mod device;
 pub mod executor;
+pub mod family;
 pub mod groups;
 pub mod kernels;
 pub mod lamps;
-pub mod method;
 pub mod pages;
 pub mod probe;
 pub mod rays;

@@ -1,6 +1,7 @@
 //! What every kernel of a submission reads: the resident part of the scene in the frame, bricks where they lie,
 //! parameters; and what all of them add to.
 
+use super::dispatch::OWN_WORDS;
 use super::frame::{Frame, Placement};
 use super::layout;
 use super::layout::Params;
@@ -143,6 +144,8 @@ impl Tally {
 pub struct Bound<'a> {
     /// Parameters.
     pub params: &'a Params,
+    /// What a method's kernel is told beside these ([`crate::schedule::Own::block`]).
+    pub block: &'a [u32; OWN_WORDS],
     /// The scene.
     pub scene: &'a Scene,
     /// Geometry of the bricks; empty of those that are not resident.
@@ -166,6 +169,12 @@ impl<'a> Bound<'a> {
     #[inline(always)]
     pub fn has(&self, flag: u32) -> bool {
         self.params.flags & flag != 0
+    }
+
+    /// What a method's kernel is told, as its WGSL declares it.
+    #[inline(always)]
+    pub fn own<T: bytemuck::Pod>(&self) -> &'a T {
+        bytemuck::from_bytes(&bytemuck::bytes_of(self.block)[..size_of::<T>()])
     }
 
     /// The brick of a leaf.

@@ -1,11 +1,9 @@
 //! Which dispatches of which kernels a step consists of.
 
-use super::layout;
-use super::layout::Params;
+use super::layout::{self, Params};
+use super::table::names as kernels;
 use crate::math::sampling::{cosine_hemisphere, halton};
-use crate::schedule::{Lamp, Pass, Query, RomaPart, Sift, Step};
-use crate::secondary::df::{LEVELS, flood_steps};
-use crate::secondary::dvf::maps::sweep_levels;
+use crate::schedule::{Lamp, Over, Own, Pass, Query, Step};
 
 /// The directions of the passes that start at hits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,7 +35,7 @@ impl Directions {
     fn params(&self, pass: Pass, params: &Params) -> Params {
         // Every kind of pass takes random numbers of its own. Those of a sun alone depend on the sample only.
         let (stream, direction) = match pass {
-            Pass::Primary | Pass::Mirror | Pass::Shadow(Lamp::Sun) => (0, None),
+            Pass::Primary | Pass::Shadow(Lamp::Sun) => (0, None),
             Pass::Shadow(Lamp::Emitter) => (1, None),
             Pass::BounceShadow(Lamp::Sun) => (2, None),
             Pass::BounceShadow(Lamp::Emitter) => (3, None),
@@ -88,38 +86,16 @@ pub enum Workgroups {
     Rooted,
 }
 
-/// What group 3 of a dispatch is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Third {
-    /// Tiles of rays and their lists.
-    Tiles,
-    /// What shading the set before the pass's needs.
-    Shading,
-    /// What texture lookups for the set before the pass's need.
-    Sampling,
-    /// What shading the set before the pass's needs, with group 2 the occupancy maps.
-    Roma,
-    /// The same with group 2 the distance fields.
-    Field,
-    /// The same with group 2 a field of visibility.
-    Dvf,
-    /// What shading the set before the pass's needs, with group 2 the lamps and the reflective shadow maps.
-    Rsm,
-}
-
 /// One dispatch of a kernel.
 pub struct Dispatch {
-    /// The kernel's pipeline.
+    /// The kernel's name, in the table of kernels or in a family's.
     pub kernel: &'static str,
     /// Its parameters.
     pub params: Params,
+    /// What a method's kernel is told beside these.
+    pub own: [u32; OWN_WORDS],
     /// Its workgroups.
     pub groups: Workgroups,
-    /// Whether group 2 is the cache; else it is the lamps of kernels that shade, the maps or fields of those over such,
-    /// and nothing of others.
-    pub cache: bool,
-    /// What group 3 is.
-    pub third: Third,
     /// Phase of the schedule that its time counts for, from 0.
     pub phase: Option<usize>,
 }
@@ -131,9 +107,6 @@ fn list_most(pass: Pass) -> u32 {
     if pass == Pass::Primary { 128 } else { 12 }
 }
 
-/// The kernel that counts, from zero, how many rays of each tile see each leaf.
-pub const COUNT_PAIRS: &str = "count_pairs";
-
 /// Whether pairs are culled after `step`, given whether they were before it: from [`Step::CullPairs`] on to the end of
 /// the pass. Other passes begin with one of the steps that end it.
 pub fn are_pairs_culled(step: Step, before: bool, threshold: u32) -> bool {
@@ -144,69 +117,8 @@ pub fn are_pairs_culled(step: Step, before: bool, threshold: u32) -> bool {
     }
 }
 
-/// The kernel that traverses binary trees.
-pub const INTERSECT_BINARY: &str = "intersect_binary";
-
-/// The kernel that makes ray-aligned occupancy maps.
-pub const ROMA_ROTATE: &str = "roma_rotate";
-/// The kernel that ends rays before they are traced exactly.
-pub const ROMA_NEAR: &str = "roma_near";
-/// The kernel that traces them.
-pub const ROMA_TRACE: &str = "roma_trace";
-/// The kernel that draws and traces them.
-pub const ROMA_DRAW: &str = "roma_draw";
-/// The kernel that counts what they get wrong.
-pub const ROMA_MEASURE: &str = "roma_measure";
-/// The kernel that writes reflective shadow maps.
-pub const RSM_WRITE: &str = "rsm_write";
-/// The kernel that lights what ROMA met by them.
-pub const RSM_LIGHT: &str = "rsm_light";
-
-/// Which random numbers the look-ups of reflective shadow maps take.
-const RSM_STREAM: u32 = 10 << 24;
-
-/// The kernel that finds the occupied cells of a distance field.
-pub const FLOOD_SEEDS: &str = "flood_seeds";
-/// The kernel that finds the nearest of them.
-pub const JUMP_FLOOD: &str = "jump_flood";
-/// The kernel that makes distances of these.
-pub const FLOOD_DISTANCES: &str = "flood_distances";
-/// The kernel that makes a level of half as many cells.
-pub const HALVE_DISTANCES: &str = "halve_distances";
-/// The kernel that traces distance fields.
-pub const FIELD_TRACE: &str = "field_trace";
-/// All kernels over distance fields.
-pub const FIELD_KERNELS: [&str; 5] = [FLOOD_SEEDS, JUMP_FLOOD, FLOOD_DISTANCES, HALVE_DISTANCES, FIELD_TRACE];
-
-/// The kernel of areas of triangles.
-pub const DVF_AREAS: &str = "dvf_areas";
-/// The kernel of numbers of points on triangles.
-pub const DVF_COUNTS: &str = "dvf_counts";
-/// The kernel that sums blocks.
-pub const DVF_UP: &str = "dvf_up";
-/// The kernel that hands sums down.
-pub const DVF_DOWN: &str = "dvf_down";
-/// The kernel that makes rays of points.
-pub const DVF_RAYS: &str = "dvf_rays";
-/// The kernel that enters what they met.
-pub const DVF_WRITE: &str = "dvf_write";
-/// The kernel that widens masks.
-pub const DVF_DILATE: &str = "dvf_dilate";
-/// The kernel that labels cells.
-pub const DVF_LABELS: &str = "dvf_labels";
-/// The kernel that makes rays as the paper has them.
-pub const DVF_COSINE: &str = "dvf_cosine";
-/// The kernel that answers rays by a field.
-pub const DVF_SIFT: &str = "dvf_sift";
-/// The kernel that counts primary hits in cells.
-pub const DVF_SEEN: &str = "dvf_seen";
-/// The kernel that finds points in cells that are made anew.
-pub const DVF_POINTS: &str = "dvf_points";
-/// All kernels over fields of visibility.
-pub const DVF_KERNELS: [&str; 12] = [
-    DVF_AREAS, DVF_COUNTS, DVF_UP, DVF_DOWN, DVF_RAYS, DVF_WRITE, DVF_DILATE, DVF_LABELS, DVF_COSINE, DVF_SIFT,
-    DVF_SEEN, DVF_POINTS,
-];
+/// Words of what a method's kernel is told beside the parameters of all.
+pub const OWN_WORDS: usize = crate::schedule::Own::WORDS;
 
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
@@ -218,42 +130,21 @@ fn across(count: u32) -> [u32; 2] {
 }
 
 /// The dispatches of `step` over the rays of `pass`. `params` has everything but what tells passes and their dispatches
-/// apart; with `leaf_cache` lists are intersected by the kernel that has one; with `everything` resident no kernel
-/// looks for what is.
-pub fn dispatches(
-    pass: Pass,
-    step: Step,
-    params: &Params,
-    directions: &Directions,
-    leaf_cache: bool,
-    everything: bool,
-) -> Vec<Dispatch> {
+/// apart; with `everything` resident no kernel looks for what is.
+pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directions, everything: bool) -> Vec<Dispatch> {
     let params = Params { run_count: u32::MAX >> 1, ..directions.params(pass, params) };
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
     let by_tile = across(params.tiles * (params.tile / 8) * (params.tile / 8));
-    let dispatch = |kernel: &'static str, params, groups, phase| {
-        let cache = kernel.starts_with("intersect");
-        Dispatch { kernel, params, groups, cache, third: Third::Tiles, phase }
-    };
+    let dispatch = |kernel, params, groups, phase| Dispatch { kernel, params, own: [0; OWN_WORDS], groups, phase };
     let kernel = |kernel, params, groups, phase| dispatch(kernel, params, Workgroups::Fixed(groups), phase);
-    let shading = |kernel, params, cache| {
-        let groups = Workgroups::Fixed(per_ray);
-        Dispatch { kernel, params, groups, cache, third: Third::Shading, phase: None }
-    };
-    let roma = |kernel, params, groups, phase| {
-        let groups = Workgroups::Fixed(groups);
-        Dispatch { kernel, params, groups, cache: false, third: Third::Roma, phase: Some(phase) }
-    };
-    let list = |params, phase| {
-        let name = if leaf_cache { "intersect_list_cached" } else { "intersect_list" };
-        dispatch(name, params, Workgroups::Chosen, Some(phase))
-    };
-    let choose = |params, phase| kernel("tile_choose", params, [1, 1], phase);
+    let shading = |name, params| kernel(name, params, per_ray, None);
+    let list = |params, phase| dispatch(kernels::intersect_list, params, Workgroups::Chosen, Some(phase));
+    let choose = |params, phase| kernel(kernels::tile_choose, params, [1, 1], phase);
     let intersect = |mask, want, from_root, phase| {
         let params = Params { select_mask: mask, select_want: want, ..params };
         vec![
-            kernel("tile_select_intersect", params, per_tile, Some(phase)),
+            kernel(kernels::tile_select_intersect, params, per_tile, Some(phase)),
             choose(params, Some(phase)),
             list(params, phase),
             dispatch(from_root, params, Workgroups::Rooted, Some(phase)),
@@ -261,34 +152,33 @@ pub fn dispatches(
     };
     let select_single = |mask, want, phase| {
         let params = Params { select_mask: mask, select_want: want, run_count: 1, ..params };
-        vec![kernel("tile_select_intersect", params, per_tile, Some(phase)), choose(params, Some(phase))]
+        vec![kernel(kernels::tile_select_intersect, params, per_tile, Some(phase)), choose(params, Some(phase))]
     };
     let query = |params: Params, phase| {
         vec![
-            kernel("tile_select", params, per_tile, phase),
+            kernel(kernels::tile_select, params, per_tile, phase),
             choose(params, phase),
-            dispatch("query", params, Workgroups::Chosen, phase),
-            dispatch("query_from_root", params, Workgroups::Rooted, phase),
-            kernel("query_reduce", params, per_tile, phase),
+            dispatch(kernels::query, params, Workgroups::Chosen, phase),
+            dispatch(kernels::query_from_root, params, Workgroups::Rooted, phase),
+            kernel(kernels::query_reduce, params, per_tile, phase),
         ]
     };
-    let bounds = |phase| kernel("tile_bounds", params, across(params.tiles), phase);
+    let bounds = |phase| kernel(kernels::tile_bounds, params, across(params.tiles), phase);
     let resident = layout::STATE_GEOMETRY;
     let not_done = layout::STATE_GEOMETRY | layout::STATE_DONE;
     let unprocessed = |undone: bool| if undone { layout::STATE_DONE } else { not_done };
     match step {
-        Step::Generate if pass == Pass::Primary => vec![kernel("generate_primary", params, per_ray, None)],
+        Step::Generate if pass == Pass::Primary => vec![kernel(kernels::generate_primary, params, per_ray, None)],
         Step::Generate => {
             let kernel = match pass {
-                Pass::Occlusion(_) => "generate_occlusion",
-                Pass::Diffuse(_) => "generate_diffuse",
-                Pass::Mirror => "generate_mirror",
-                Pass::Glossy => "generate_glossy",
-                Pass::Primary | Pass::Shadow(_) | Pass::BounceShadow(_) => "generate_shadow",
+                Pass::Occlusion(_) => kernels::generate_occlusion,
+                Pass::Diffuse(_) => kernels::generate_diffuse,
+                Pass::Glossy => kernels::generate_glossy,
+                Pass::Primary | Pass::Shadow(_) | Pass::BounceShadow(_) => kernels::generate_shadow,
             };
-            vec![shading(kernel, params, false)]
+            vec![shading(kernel, params)]
         }
-        Step::StartHits => vec![kernel("start_hits", params, per_ray, None)],
+        Step::StartHits => vec![kernel(kernels::start_hits, params, per_ray, None)],
         Step::CountRays => vec![bounds(None)],
         Step::Lists | Step::ShortLists => {
             let is_short = step == Step::ShortLists;
@@ -296,58 +186,63 @@ pub fn dispatches(
             let params = Params { list_most: most, ..params };
             vec![
                 bounds(Some(1)),
-                kernel("tile_walk_count", params, per_tile, Some(1)),
-                kernel("tile_scan", params, [1, 1], Some(1)),
-                kernel("tile_walk_write", params, per_tile, Some(1)),
+                kernel(kernels::tile_walk_count, params, per_tile, Some(1)),
+                kernel(kernels::tile_scan, params, [1, 1], Some(1)),
+                kernel(kernels::tile_walk_write, params, per_tile, Some(1)),
             ]
         }
         Step::IntersectResident => {
-            let from_root = if everything { "intersect_from_root_all" } else { "intersect_from_root" };
+            let from_root = if everything { kernels::intersect_from_root_all } else { kernels::intersect_from_root };
             intersect(not_done, resident, from_root, 0)
         }
-        Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, "intersect_from_root", 2),
+        Step::IntersectBatch => intersect(layout::STATE_BATCH, layout::STATE_BATCH, kernels::intersect_from_root, 2),
         Step::SelectResident => select_single(not_done, resident, 0),
         Step::SelectBatch => select_single(layout::STATE_BATCH, layout::STATE_BATCH, 2),
         Step::IntersectOne { leaf, is_batch } => {
             vec![list(Params { run_first: leaf, run_count: 1, ..params }, if is_batch { 2 } else { 0 })]
         }
-        Step::SortByNumber => vec![kernel("tile_sort_number", params, per_tile, Some(1))],
-        Step::SortNodesNear => vec![kernel("tile_sort_near", params, per_tile, Some(1))],
-        Step::IntersectAll => vec![kernel("intersect_all", params, by_tile, Some(0))],
-        Step::IntersectBinary => vec![kernel(INTERSECT_BINARY, params, by_tile, Some(0))],
+        Step::SortByNumber => vec![kernel(kernels::tile_sort_number, params, per_tile, Some(1))],
+        Step::SortNodesNear => vec![kernel(kernels::tile_sort_near, params, per_tile, Some(1))],
+        Step::IntersectAll => vec![kernel(kernels::intersect_all, params, by_tile, Some(0))],
+        Step::IntersectBinary => vec![kernel(kernels::intersect_binary, params, by_tile, Some(0))],
         Step::IntersectAllResident => {
             let params = Params { select_mask: not_done, select_want: resident, ..params };
-            vec![kernel(if everything { "intersect_all" } else { "intersect_selected" }, params, by_tile, Some(0))]
+            vec![kernel(
+                if everything { kernels::intersect_all } else { kernels::intersect_selected },
+                params,
+                by_tile,
+                Some(0),
+            )]
         }
         Step::IntersectAllBatch => {
             let params = Params { select_mask: layout::STATE_BATCH, select_want: layout::STATE_BATCH, ..params };
-            vec![kernel("intersect_selected", params, by_tile, Some(2))]
+            vec![kernel(kernels::intersect_selected, params, by_tile, Some(2))]
         }
         Step::CullPairs { .. } if params.threshold == 0 => Vec::new(),
         Step::CullPairs { undone } => {
             let params = Params { select_mask: unprocessed(undone), select_want: 0, ..params };
-            vec![kernel(COUNT_PAIRS, params, by_tile, Some(1))]
+            vec![kernel(kernels::count_pairs, params, by_tile, Some(1))]
         }
         Step::Query(Query { from_root, undone, up_to_next }) => {
             let flags = params.flags | if up_to_next { layout::PARAM_NEXT } else { 0 };
             let params = Params { select_mask: unprocessed(undone), select_want: 0, flags, ..params };
-            if from_root { vec![kernel("query_all", params, by_tile, Some(1))] } else { query(params, Some(1)) }
+            if from_root { vec![kernel(kernels::query_all, params, by_tile, Some(1))] } else { query(params, Some(1)) }
         }
         Step::QueryPairs { tighter } => {
             let flags = params.flags | if tighter { layout::PARAM_TIGHTER } else { 0 };
-            vec![kernel("query_pairs", Params { flags, ..params }, across(params.pair_count), Some(1))]
+            vec![kernel(kernels::query_pairs, Params { flags, ..params }, across(params.pair_count), Some(1))]
         }
         Step::QueryNeeded => {
             let flags = params.flags | layout::PARAM_NEEDED;
             query(Params { select_mask: 0, select_want: 0, flags, ..params }, None)
         }
-        Step::ClearAttributes => vec![shading("clear_gbuffer", params, false)],
-        Step::QueryHits => vec![kernel("hit_demand", params, per_ray, None)],
-        Step::Resolve => vec![shading("resolve", params, true)],
+        Step::ClearAttributes => vec![shading(kernels::clear_gbuffer, params)],
+        Step::QueryHits => vec![kernel(kernels::hit_demand, params, per_ray, None)],
+        Step::Resolve => vec![shading(kernels::resolve, params)],
         Step::Sample | Step::SampleCoarser => {
             let coarser = if step == Step::SampleCoarser { layout::PARAM_COARSER } else { 0 };
             let params = Params { flags: params.flags | coarser, ..params };
-            vec![Dispatch { third: Third::Sampling, ..shading("sample", params, true) }]
+            vec![shading(kernels::sample, params)]
         }
         Step::Shade(light) => {
             let sun = if light.sun { layout::PARAM_SUN } else { 0 };
@@ -357,129 +252,19 @@ pub fn dispatches(
             let environment = if light.environment { layout::PARAM_ENVIRONMENT } else { 0 };
             let gloss = if light.gloss { layout::PARAM_EMITTER } else { 0 };
             let flags = params.flags | sun | sky | emission | miss | environment | gloss;
-            vec![shading("shade", Params { flags, ..params }, false)]
+            vec![shading(kernels::shade, Params { flags, ..params })]
         }
-        Step::AddLight => vec![shading("add_light", params, false)],
-        Step::AddOcclusion => vec![shading("add_occlusion", params, false)],
-        Step::RomaRotate => {
-            let columns = params.roma_levels * params.roma_k * params.roma_k * params.roma_size * params.roma_size;
-            vec![roma(ROMA_ROTATE, params, across(columns.div_ceil(64)), 0)]
-        }
-        Step::RomaNear { cells } => vec![roma(ROMA_NEAR, Params { roma_near: cells, ..params }, per_ray, 0)],
-        Step::RomaPilots { one_in } => {
-            let roma_part = layout::ROMA_CORRECT;
-            let params = Params { roma_part, roma_near: layout::NONE, roma_pilots: one_in, ..params };
-            vec![roma(ROMA_NEAR, params, per_ray, 0)]
-        }
-        Step::RomaTrace { steps, part } => {
-            let (roma_part, Sift { near, pilots }) = match part {
-                RomaPart::Whole | RomaPart::Cosine => (layout::ROMA_WHOLE, Sift::default()),
-                RomaPart::Far => (layout::ROMA_FAR, Sift::default()),
-                RomaPart::Sift(sift) => (layout::ROMA_SIFT, sift),
-                RomaPart::Correct { one_in } => (layout::ROMA_CORRECT, Sift { near: None, pilots: one_in }),
+        Step::AddLight => vec![shading(kernels::add_light, params)],
+        Step::AddOcclusion => vec![shading(kernels::add_occlusion, params)],
+        Step::Own(Own { kernel, over, block, phase, stream }) => {
+            let groups = match over {
+                Over::Rays => per_ray,
+                Over::Elements(count) => across(count.div_ceil(64)),
+                Over::Groups(count) => across(count),
             };
-            let roma_near = near.unwrap_or(layout::NONE);
-            let params = Params { roma_steps: steps, roma_part, roma_near, roma_pilots: pilots, ..params };
-            let kernel = if part == RomaPart::Cosine { ROMA_DRAW } else { ROMA_TRACE };
-            vec![roma(kernel, params, per_ray, 2)]
-        }
-        Step::RomaMeasure { steps, pilots, cell } => {
-            let params = Params { roma_steps: steps, roma_pilots: pilots, roma_near: cell, ..params };
-            vec![roma(ROMA_MEASURE, params, per_ray, 2)]
-        }
-        Step::FieldMake => (0..params.field_levels).flat_map(|level| make_field(&params, level)).collect(),
-        Step::FieldTrace { steps } => {
-            vec![field(FIELD_TRACE, Params { field_steps: steps, ..params }, per_ray, 2)]
-        }
-        Step::DvfAreas { triangles } => {
-            let mut all = vec![dvf(DVF_AREAS, params, across(triangles.div_ceil(64)))];
-            all.extend(sweep(&params, triangles, false));
-            all
-        }
-        Step::DvfCounts { triangles } => {
-            let mut all = vec![dvf(DVF_COUNTS, params, across(triangles.div_ceil(64)))];
-            all.extend(sweep(&params, triangles, true));
-            all
-        }
-        Step::DvfRays { first, turn, waiting } => {
-            let dvf_next = waiting.unwrap_or(layout::NONE);
-            vec![dvf(DVF_RAYS, Params { dvf_first: first, dvf_turn: turn, dvf_next, ..params }, per_ray)]
-        }
-        Step::DvfWrite { waiting, enters } => {
-            let dvf_next = waiting.unwrap_or(layout::NONE);
-            vec![dvf(DVF_WRITE, Params { dvf_next, dvf_count: enters.into(), ..params }, per_ray)]
-        }
-        Step::DvfFinish { cells, dilate } => {
-            let widened = dilate.then(|| dvf(DVF_DILATE, params, across((2 * cells).div_ceil(64))));
-            widened.into_iter().chain([dvf(DVF_LABELS, params, across(cells.div_ceil(64)))]).collect()
-        }
-        Step::DvfCosine => {
-            let [x, y, z] = direction_around(params.sample);
-            vec![dvf(DVF_COSINE, Params { around: [x, y, z, 0.0], ..params }, per_ray)]
-        }
-        Step::DvfLight => vec![shading("dvf_light", params, false)],
-        Step::DvfSift => vec![dvf(DVF_SIFT, params, per_ray)],
-        Step::DvfSeen => vec![dvf(DVF_SEEN, params, per_ray)],
-        Step::DvfPoints { first, count } => {
-            let params = Params { dvf_first: first, dvf_count: count, ..params };
-            vec![dvf(DVF_POINTS, params, across(count.div_ceil(64)))]
-        }
-        Step::RsmWrite { map, corner: [x, y] } => {
-            let params = Params { rsm_map: map, rsm_x: x, rsm_y: y, ..params };
-            vec![Dispatch { third: Third::Rsm, ..shading(RSM_WRITE, params, false) }]
-        }
-        Step::RsmLight => {
-            let params = Params { stream: params.sample.wrapping_add(RSM_STREAM), ..params };
-            vec![Dispatch { third: Third::Rsm, phase: Some(2), ..shading(RSM_LIGHT, params, false) }]
+            let stream = stream.map_or(params.stream, |stream| params.sample.wrapping_add(stream));
+            let (params, groups) = (Params { stream, ..params }, Workgroups::Fixed(groups));
+            vec![Dispatch { kernel, params, own: block, groups, phase }]
         }
     }
-}
-
-/// A dispatch of a kernel over distance fields.
-fn field(kernel: &'static str, params: Params, groups: [u32; 2], phase: usize) -> Dispatch {
-    let groups = Workgroups::Fixed(groups);
-    Dispatch { kernel, params, groups, cache: false, third: Third::Field, phase: Some(phase) }
-}
-
-/// A dispatch of a kernel over a field of visibility.
-fn dvf(kernel: &'static str, params: Params, groups: [u32; 2]) -> Dispatch {
-    let groups = Workgroups::Fixed(groups);
-    Dispatch { kernel, params, groups, cache: false, third: Third::Dvf, phase: None }
-}
-
-/// The dispatches that sum `count` elements, and with `is_down` make each the sum of those before it; the sum of all is
-/// left in the last level.
-fn sweep(params: &Params, count: u32, is_down: bool) -> Vec<Dispatch> {
-    let levels = sweep_levels(count);
-    let of = |kernel, level: usize, next: u32| {
-        let (first, count) = levels[level];
-        let params = Params { dvf_first: first, dvf_count: count, dvf_next: next, ..*params };
-        dvf(kernel, params, across(count.div_ceil(layout::DVF_WALK)))
-    };
-    let last = levels.len() - 1;
-    let up = (0..last).map(|level| of(DVF_UP, level, levels[level + 1].0));
-    // Of the one block below the sum of all nothing comes before.
-    let next = |level: usize| if level + 1 == last { layout::NONE } else { levels[level + 1].0 };
-    let down = (0..last).rev().filter(|_| is_down).map(|level| of(DVF_DOWN, level, next(level)));
-    up.chain(down).collect()
-}
-
-/// The dispatches that make field `level`.
-fn make_field(params: &Params, level: u32) -> Vec<Dispatch> {
-    let params = Params { field_level: level, ..*params };
-    let cells = |mip: u32| (params.field_cells >> mip).pow(3);
-    // A thread a cell, or two cells.
-    let each = |count: u32| across(count.div_ceil(64));
-    let mut all = vec![field(FLOOD_SEEDS, params, each(cells(0)), 0)];
-    let mut half = 0;
-    for step in flood_steps(params.field_cells) {
-        let params = Params { field_step: step, field_half: half, ..params };
-        all.push(field(JUMP_FLOOD, params, each(cells(0)), 0));
-        half = 1 - half;
-    }
-    all.push(field(FLOOD_DISTANCES, Params { field_half: half, ..params }, each(cells(0) / 2), 0));
-    for mip in 1..LEVELS as u32 {
-        all.push(field(HALVE_DISTANCES, Params { field_mip: mip, ..params }, each(cells(mip) / 2), 0));
-    }
-    all
 }

@@ -1,16 +1,13 @@
 //! What a frame needs of an executor beside steps.
 
-use super::layout::{DvfTriangle, GBuffer, Hit, Ray, Surface};
+use super::layout::{GBuffer, Hit, Ray, Surface};
+use super::table::Family;
 use super::{Keep, Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
-use crate::secondary::df::maps::FieldMaps;
-use crate::secondary::dvf::maps::DvfMaps;
-use crate::secondary::occupancy::Cascades;
-use crate::secondary::roma::maps::RomaMaps;
-use crate::secondary::rsm::maps::RsmMaps;
 use crate::stream::WorkerPool;
 use bricks::SceneFile;
 use serde::Serialize;
+use std::any::Any;
 use std::sync::Arc;
 
 /// The device that an executor runs on, as summaries name it.
@@ -48,7 +45,7 @@ pub trait FrameExecutor: Executor {
     /// decide as they run.
     fn leaves_out(&self) -> Keep;
 
-    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Mirror`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160
+    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160
     /// bytes a pixel; without it they must not be run.
     fn allow_bounces(&mut self);
 
@@ -67,80 +64,28 @@ pub trait FrameExecutor: Executor {
     /// More emitters, or a larger environment, than the device holds in one buffer, with how many it does.
     fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError>;
 
-    /// Takes base occupancy maps, and makes what [`crate::schedule::Step::RomaRotate`] and
-    /// [`crate::schedule::Step::RomaTrace`] need; without it these must not be run. The same maps again cost nothing.
-    ///
-    /// # Errors
-    /// More than the device holds in one buffer, with how much it does.
-    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError>;
-
-    /// Places the ray-aligned maps that [`crate::schedule::Step::RomaRotate`] makes of these next, in the frame that
-    /// has begun.
-    ///
-    /// # Errors
-    /// As of [`FrameExecutor::set_cascades`].
-    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError>;
-
-    /// Takes base maps and where their distance fields lie in the frame that has begun, and makes what
-    /// [`crate::schedule::Step::FieldMake`] and [`crate::schedule::Step::FieldTrace`] need; without it these must not
-    /// be run. The fields that were made last stay as long as their maps do.
-    ///
-    /// # Errors
-    /// As of [`FrameExecutor::set_cascades`].
-    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError>;
-
-    /// Takes reflective shadow maps as they lie in the frame that has begun, and makes what
-    /// [`crate::schedule::Step::RsmWrite`] and [`crate::schedule::Step::RsmLight`] need; without it these must not be
-    /// run. Texels keep what was written as long as there are as many.
+    /// Makes room for so many elements in each buffer of a family, and its kernels, when it is first asked to; without
+    /// it these must not be run. A buffer that has room keeps what it holds.
     ///
     /// # Errors
     /// More than the device holds in one buffer, with how much it does; a device that binds too few buffers.
-    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError>;
+    fn reserve(&mut self, family: &'static Family, elements: &[usize]) -> Result<(), ExecutorError>;
+
+    /// Writes into a buffer of a family, from byte `at` on, for which there is room.
+    fn write(&mut self, family: &'static Family, buffer: usize, at: usize, bytes: &[u8]);
+
+    /// Reads the first words of a buffer of a family back.
+    ///
+    /// # Errors
+    /// The device's.
+    fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError>;
+
+    /// What a method has noted of what the buffers of its family hold; it lives as long as they do.
+    fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>>;
 
     /// Takes the scene with instances placed anew ([`SceneFile::place`]), for frames that begin from now on. All else
     /// of it is as it was.
     fn set_scene(&mut self, scene: &Arc<SceneFile>);
-
-    /// Places a field of visibility in the frame that has begun, and makes what the steps
-    /// [`crate::schedule::Step::DvfAreas`] to [`crate::schedule::Step::DvfSift`] need; without it these must not be
-    /// run. Masks and labels are those that it gives; where it gives none, those that are there, unless it says
-    /// otherwise or they are not as many: then empty ones.
-    ///
-    /// # Errors
-    /// More than the device holds in one buffer, with how much it does; a device that binds too few buffers.
-    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError>;
-
-    /// Takes the triangles of which areas, numbers and rays are made next, and the number of points on all of them once
-    /// it is known.
-    ///
-    /// # Errors
-    /// As of [`FrameExecutor::set_dvf`], which has been called.
-    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError>;
-
-    /// Takes what [`crate::schedule::Step::DvfSeen`] and [`crate::schedule::Step::DvfPoints`] count on, or the numbers
-    /// of the points that rays of cells that are made anew start from ([`crate::secondary::dvf::Fresh`]).
-    ///
-    /// # Errors
-    /// As of [`FrameExecutor::set_dvf`], which has been called.
-    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError>;
-
-    /// Reads what these steps have made of them.
-    ///
-    /// # Errors
-    /// The device's.
-    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError>;
-
-    /// Reads the masks and labels of all cells back; where some cells are made anew, the masks of these.
-    ///
-    /// # Errors
-    /// The device's.
-    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError>;
-
-    /// Reads the sums of areas or points back, level by level ([`crate::secondary::dvf::maps::sweep_levels`]).
-    ///
-    /// # Errors
-    /// The device's.
-    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError>;
 
     /// Starts a frame: moves the scene to its reference point, takes its camera and lights.
     fn begin_frame(&mut self, view: &View);

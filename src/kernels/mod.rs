@@ -17,6 +17,7 @@ pub mod report;
 mod setup;
 pub mod shade;
 pub mod simd;
+pub mod table;
 pub mod texture;
 pub mod textures;
 pub mod trace;
@@ -26,9 +27,3 @@ pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
 pub use lamps::Lamps;
 pub use setup::{Extent, Keep, Setup, Tuning, View};
-
-#[rustfmt::skip]
-mod layout_checks {
-    use super::layout;
-    include!(concat!(env!("OUT_DIR"), "/layout_checks.rs"));
-}

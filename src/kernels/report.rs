@@ -1,7 +1,7 @@
 //! What an executor is told of bricks before a submission, and what its counters say after it.
 
 use super::layout;
-use crate::schedule::{BrickStates, Demand, ExecutorError, Pilots, Report, Step};
+use crate::schedule::{BrickStates, Demand, ExecutorError, Report, Step};
 
 /// Where every brick lies and its part in the pass.
 pub fn slots(bricks: &BrickStates) -> Vec<layout::Slot> {
@@ -54,11 +54,7 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
     Ok(Report {
         round_trips: 1,
         rays_capped: count(layout::COUNTER_ROMA_CAPPED) + count(layout::COUNTER_FIELD_CAPPED),
-        pilots: Pilots {
-            rays: count(layout::COUNTER_PILOTS),
-            missed: count(layout::COUNTER_PILOTS + 1),
-            doubted: std::array::from_fn(|i| count(layout::COUNTER_PILOTS + 2 + i as u32)),
-        },
+        own: std::array::from_fn(|i| count(layout::COUNTER_PILOTS + i as u32)),
         demand: wanted.map(asked).collect(),
         tiles: Vec::new(),
         used: Vec::new(),
@@ -73,7 +69,6 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
         pairs_front_to_back: count(layout::COUNTER_FRONT_TO_BACK),
         tile_batches: count(layout::COUNTER_TILE_BATCHES),
         tile_batch_leaves: count(layout::COUNTER_TILE_BATCH_LEAVES),
-        leaf_groups_postponed: count(layout::COUNTER_LEAF_GROUPS),
         rays: count(layout::COUNTER_RAYS),
         rays_answered: count(layout::COUNTER_DVF_ANSWERED),
         nodes: count(layout::COUNTER_NODES),

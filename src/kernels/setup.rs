@@ -71,17 +71,15 @@ impl Keep {
 pub struct Tuning {
     /// [`Setup::threshold`].
     pub threshold: u32,
-    /// Whether lists are intersected by the kernel that postpones groups of triangles.
-    pub leaf_cache: bool,
     /// The most leaves of a list of [`crate::schedule::Step::ShortLists`], for every pass; with 0 all rays walk from
     /// the root.
     pub list_most: u32,
 }
 
 impl Tuning {
-    /// As an executor is set up: no leaf cache, lists bounded by their passes alone.
+    /// As an executor is set up: lists bounded by their passes alone.
     pub fn new(setup: &Setup) -> Self {
-        Self { threshold: setup.threshold, leaf_cache: false, list_most: u32::MAX }
+        Self { threshold: setup.threshold, list_most: u32::MAX }
     }
 }
 

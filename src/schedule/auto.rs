@@ -113,9 +113,8 @@ fn kind(pass: Pass) -> u32 {
         Pass::Shadow(_) => 1,
         Pass::Occlusion(_) => 2,
         Pass::Diffuse(_) => 3,
-        Pass::Mirror => 4,
+        Pass::Glossy => 4,
         Pass::BounceShadow(_) => 5,
-        Pass::Glossy => 6,
     }
 }
 
@@ -175,8 +174,8 @@ mod tests {
     fn plain_needs_everything_resident() {
         let mut auto = Auto::default();
         assert!((0..100).all(|_| {
-            let chosen = auto.choose(Pass::Mirror, false);
-            auto.note(Pass::Mirror, 1.0, 1);
+            let chosen = auto.choose(Pass::Glossy, false);
+            auto.note(Pass::Glossy, 1.0, 1);
             chosen != Fixed::Plain
         }));
         run(&mut auto, 20, true, |fixed, _| if fixed == Fixed::Plain { 1.0 } else { 2.0 });

@@ -1,4 +1,4 @@
-//! The optimisations of CHC+RT, each of which can be switched off, or on, by itself. They change what is asked, loaded
+//! The optimisations of CHC+RT, each of which can be switched off by itself. They change what is asked, loaded
 //! and intersected when, never a hit.
 
 use super::{BrickStates, Executor, ExecutorError, Pass, PassStats, Report, Step};
@@ -15,7 +15,7 @@ pub enum PartOf {
 }
 
 macro_rules! optimisations {
-    ($($(#[$doc:meta])* $variant:ident, $field:ident = $name:literal, $part:ident, $default:literal;)*) => {
+    ($($(#[$doc:meta])* $variant:ident, $field:ident = $name:literal, $part:ident;)*) => {
         /// One of the optimisations.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum Optimisation { $($(#[$doc])* $variant,)* }
@@ -26,7 +26,7 @@ macro_rules! optimisations {
 
         impl Default for Optimisations {
             fn default() -> Self {
-                Self { $($field: $default,)* }
+                Self { $($field: true,)* }
             }
         }
 
@@ -58,32 +58,29 @@ macro_rules! optimisations {
 
 optimisations! {
     /// Wanted bricks are taken nearest entry first; else in the order of their numbers (design of the load order).
-    NearestFirst, nearest_first = "nearest-first", Loading, true;
+    NearestFirst, nearest_first = "nearest-first", Loading;
     /// Between two batches of loads everything not loaded yet is asked for again; else what the first query wanted is
     /// loaded whole.
-    Requery, requery = "requery", Loading, true;
+    Requery, requery = "requery", Loading;
     /// What is resident is intersected before missing bricks are asked for (CHC+RT §5.4); else all wanted bricks are
     /// taken in one order, resident ones without a load.
-    ResidentFirst, resident_first = "resident-first", Loading, true;
+    ResidentFirst, resident_first = "resident-first", Loading;
     /// The leaves of a tile are intersected near to far (CHC+RT §5.2); else by number.
-    FrontToBack, front_to_back = "front-to-back", Lists, true;
+    FrontToBack, front_to_back = "front-to-back", Lists;
     /// A dispatch intersects all selected leaves of a tile (CHC+RT §5.2, which stops at 24); else one leaf a tile.
-    ByTile, by_tile = "by-tile", Lists, true;
+    ByTile, by_tile = "by-tile", Lists;
     /// The rays of a tile whose list is long walk from the root instead, each by itself; else by the list whatever its
     /// length. In force with `by-tile` and `front-to-back`.
-    RootWalk, root_walk = "root-walk", Lists, true;
+    RootWalk, root_walk = "root-walk", Lists;
     /// Invisible pairs of a tile that will probably stay so are asked for together (CHC+RT §5.1); else each by itself.
-    MultiQueries, multi_queries = "multi-queries", Fronts, true;
+    MultiQueries, multi_queries = "multi-queries", Fronts;
     /// A node is asked for by the boxes of its children (CHC+RT §5.1); else by its own.
-    TighterBounds, tighter_bounds = "tighter-bounds", Fronts, true;
+    TighterBounds, tighter_bounds = "tighter-bounds", Fronts;
     /// Visible pairs are asked for again every third frame (CHC+RT §5.1); else in every frame.
-    LazyRequery, lazy_requery = "lazy-requery", Fronts, true;
+    LazyRequery, lazy_requery = "lazy-requery", Fronts;
     /// Pairs whose children are all invisible become leaves, one level a frame (CHC+RT §5.1); else what was split stays
     /// so.
-    PullUp, pull_up = "pull-up", Fronts, true;
-    /// Up to two groups of triangles that a ray found are postponed and tested together (CHC+RT §5.2); else each is
-    /// tested where it is found.
-    LeafCache, leaf_cache = "leaf-cache", Lists, false;
+    PullUp, pull_up = "pull-up", Fronts;
 }
 
 impl Optimisation {

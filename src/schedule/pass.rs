@@ -24,8 +24,6 @@ pub enum Pass {
     Occlusion(u32),
     /// Rays from primary hits in the direction of this number around the normal: closest hit.
     Diffuse(u32),
-    /// Mirrored camera rays from primary hits: closest hit.
-    Mirror,
     /// Rays from primary hits in a direction drawn by their gloss: closest hit.
     Glossy,
     /// Rays from the hits of set 1 to a lamp: any hit.
@@ -37,7 +35,7 @@ impl Pass {
     pub fn set(self) -> usize {
         match self {
             Pass::Primary => 0,
-            Pass::Shadow(_) | Pass::Occlusion(_) | Pass::Diffuse(_) | Pass::Mirror | Pass::Glossy => 1,
+            Pass::Shadow(_) | Pass::Occlusion(_) | Pass::Diffuse(_) | Pass::Glossy => 1,
             Pass::BounceShadow(_) => 2,
         }
     }

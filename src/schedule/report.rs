@@ -1,29 +1,7 @@
 //! What comes back from round trips, and the statistics of a pass.
 
-use crate::kernels::layout::HANDOVERS;
-
-impl Pilots {
-    /// Adds others.
-    pub fn add(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.missed += other.missed;
-        for (total, doubted) in self.doubted.iter_mut().zip(other.doubted) {
-            *total += doubted;
-        }
-    }
-}
-
-/// Rays that are traced to their ends though they could be sifted, and what maps would have answered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Pilots {
-    /// How many there are.
-    pub rays: u64,
-    /// That meet something and would have been found free.
-    pub missed: u64,
-    /// That are free and would have met something in the maps, had they been traced up to each of [`HANDOVERS`]
-    /// distances.
-    pub doubted: [u64; HANDOVERS as usize],
-}
+/// Counters that a secondary method has for itself.
+pub const OWN_COUNTERS: usize = 8;
 
 /// What rays still ask of a brick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,17 +64,15 @@ pub struct Report {
     pub tile_batches: u64,
     /// Leaves that these intersected.
     pub tile_batch_leaves: u64,
-    /// Groups of triangles that rays postponed.
-    pub leaf_groups_postponed: u64,
-    /// Rays that [`Step::RomaTrace`] finished along their map's direction because they had passed as many columns as
-    /// they may, and those that [`Step::FieldTrace`] let go free because they had made as many look-ups as they may.
+    /// Rays that `roma_trace` finished along their map's direction because they had passed as many columns as
+    /// they may, and those that `df_trace` let go free because they had made as many look-ups as they may.
     pub rays_capped: u64,
-    /// What [`Step::RomaMeasure`] counted.
-    pub pilots: Pilots,
-    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`], [`Step::RomaTrace`] and
-    /// [`Step::FieldTrace`].
+    /// What kernels of a method counted for it, from its first counter on.
+    pub own: [u64; OWN_COUNTERS],
+    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`], by kernels of
+    /// methods.
     pub rays: u64,
-    /// Rays that [`Step::DvfSift`] answered.
+    /// Rays that a method answered.
     pub rays_answered: u64,
     /// Nodes visited, when the executor counts.
     pub nodes: u64,
@@ -193,10 +169,11 @@ impl PassStats {
         sum.pairs_front_to_back += r.pairs_front_to_back;
         sum.tile_batches += r.tile_batches;
         sum.tile_batch_leaves += r.tile_batch_leaves;
-        sum.leaf_groups_postponed += r.leaf_groups_postponed;
         sum.queries_tightened += r.queries_tightened;
         sum.rays_capped += r.rays_capped;
-        sum.pilots.add(r.pilots);
+        for (total, count) in sum.own.iter_mut().zip(r.own) {
+            *total += count;
+        }
         sum.rays += r.rays;
         sum.rays_answered += r.rays_answered;
         sum.nodes += r.nodes;

@@ -1,7 +1,5 @@
 //! Steps: what an executor is asked to run.
 
-use super::Pass;
-
 /// A kernel, or a few that belong together, run over all rays or tiles of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -79,104 +77,8 @@ pub enum Step {
     AddLight,
     /// Add the share of the sky's light that the pass's direction stands for, where its ray went free.
     AddOcclusion,
-    /// Make the ray-aligned maps that the executor was given last: phase 1.
-    RomaRotate,
-    /// End the pass's rays, not traced yet, this many cells of the base map that holds their start from it: what they
-    /// meet up to there is for bricks to tell.
-    RomaNear {
-        /// Cells.
-        cells: u32,
-    },
-    /// End those of the pass's rays, not traced yet, that are no pilots.
-    RomaPilots {
-        /// One ray in so many is one.
-        one_in: u32,
-    },
-    /// Answer the pass's rays by them, and count them: phase 3.
-    RomaTrace {
-        /// Columns that a ray passes before it is finished along the map's direction; 0: it takes that direction from
-        /// the start.
-        steps: u32,
-        /// Which part of them.
-        part: RomaPart,
-    },
-    /// Count what maps would have answered wrongly of the rays that were not sifted, after they have been traced: phase
-    /// 3.
-    RomaMeasure {
-        /// As of [`Step::RomaTrace`].
-        steps: u32,
-        /// As of [`Sift::pilots`].
-        pilots: u32,
-        /// Cells of a base map in one of a map.
-        cell: u32,
-    },
-    /// Make the distance fields of the base maps that the executor was given last: phase 1.
-    FieldMake,
-    /// Answer the pass's rays by them, and count them: phase 3.
-    FieldTrace {
-        /// Look-ups of a ray at most; one that has made them goes free.
-        steps: u32,
-    },
-    /// Write a block of texels of a reflective shadow map from the hits of the set before, whose attributes are read.
-    RsmWrite {
-        /// The map.
-        map: u32,
-        /// The texel that ray 0 is for.
-        corner: [u32; 2],
-    },
-    /// Sum the areas of so many triangles that the executor was given last, for a field of visibility.
-    DvfAreas {
-        /// How many.
-        triangles: u32,
-    },
-    /// Say how many points lie on all triangles before each of them.
-    DvfCounts {
-        /// How many triangles.
-        triangles: u32,
-    },
-    /// Make the rays of so many lanes of the points, in place of [`Step::Generate`].
-    DvfRays {
-        /// The first lane.
-        first: u32,
-        /// Which of its directions each takes.
-        turn: u32,
-        /// Only those that [`Step::DvfWrite`] noted from this word on to wait for bricks; else all.
-        waiting: Option<u32>,
-    },
-    /// Enter what they met into the masks of the cells that they start in.
-    DvfWrite {
-        /// Rays that asked for bricks wait: they are noted from this word on, a bit each, and ended. Else all are
-        /// answered.
-        waiting: Option<u32>,
-        /// Whether what the others met is entered.
-        enters: bool,
-    },
-    /// Label so many cells, after masks have been widened, if they are to be.
-    DvfFinish {
-        /// How many.
-        cells: u32,
-        /// Whether masks are widened.
-        dilate: bool,
-    },
-    /// Make rays around primary hits by the cosine, in place of [`Step::Generate`].
-    DvfCosine,
-    /// Add what they bring of the environment, and what needs no ray, as the paper has it.
-    DvfLight,
-    /// Answer the pass's rays, not traced yet, that the field tells, and count them: they are not traced.
-    DvfSift,
-    /// Count the primary hits in each cell of a field of visibility.
-    DvfSeen,
-    /// Find which of the points that the executor was given last lie in cells that are made anew, and how many of their
-    /// rays are made.
-    DvfPoints {
-        /// The first side of a point that rays start from.
-        first: u32,
-        /// How many of them.
-        count: u32,
-    },
-    /// Add what the hits of the set before that [`Step::RomaTrace`] gave reflect of the lamps, by their reflective
-    /// shadow maps: phase 3.
-    RsmLight,
+    /// Run a kernel of a secondary method.
+    Own(Own),
 }
 
 /// Whom rays ask, and for what.
@@ -190,43 +92,59 @@ pub struct Query {
     pub up_to_next: bool,
 }
 
-/// Which part of rays occupancy maps answer.
+/// A kernel of a secondary method, and what it is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RomaPart {
-    /// All of them, by the map of the stratum that they lie in.
-    Whole,
-    /// All of them, which are snapped, by the maps that are drawn in proportion to the cosines between their directions
-    /// and the normals of the set before; they go on in these directions.
-    Cosine,
-    /// Of those that have met nothing where [`Step::RomaNear`] ended them, what lies beyond: they have been traced.
-    Far,
-    /// Whether they meet anything. Those that do not are answered; the others are still to be traced.
-    Sift(Sift),
-    /// All of them, after the pilots of [`Step::RomaPilots`] were traced; each of these counts for what maps get wrong
-    /// of so many.
-    Correct {
-        /// One ray in so many is a pilot.
-        one_in: u32,
-    },
+pub struct Own {
+    /// The kernel's name.
+    pub kernel: &'static str,
+    /// Over what its threads run.
+    pub over: Over,
+    /// Its parameters beside those of all kernels, as its WGSL declares them; zeros behind.
+    pub block: [u32; Own::WORDS],
+    /// The phase that its time counts for, from 0.
+    pub phase: Option<usize>,
+    /// Which random numbers it takes, in place of the pass's.
+    pub stream: Option<u32>,
 }
 
-impl RomaPart {
-    /// The one that answers all rays of a pass; with no `steps` they are snapped. `is_long`: so far do they go that
-    /// what the cosine is within a stratum counts.
-    pub fn answering(pass: Pass, steps: u32, is_long: bool) -> Self {
-        let is_around_normal = matches!(pass, Pass::Occlusion(_) | Pass::Diffuse(_));
-        if is_around_normal && steps == 0 && is_long { Self::Cosine } else { Self::Whole }
+/// Over what the threads of a kernel run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Over {
+    /// The rays of the pass, or its pixels.
+    Rays,
+    /// So many elements, 64 a workgroup.
+    Elements(u32),
+    /// So many workgroups.
+    Groups(u32),
+}
+
+impl Own {
+    /// Words of [`Own::block`].
+    pub const WORDS: usize = 16;
+
+    /// A kernel over the rays of the pass, told `block`, timed by no phase.
+    pub fn new<T: bytemuck::Pod>(kernel: &'static str, block: &T) -> Self {
+        const { assert!(size_of::<T>() <= 4 * Self::WORDS) };
+        let mut words = [0; Self::WORDS];
+        bytemuck::bytes_of_mut(&mut words)[..size_of::<T>()].copy_from_slice(bytemuck::bytes_of(block));
+        Self { kernel, over: Over::Rays, block: words, phase: None, stream: None }
+    }
+
+    /// The same over other threads.
+    pub fn over(self, over: Over) -> Self {
+        Self { over, ..self }
+    }
+
+    /// The same, its time counted for a phase.
+    pub fn in_phase(self, phase: usize) -> Self {
+        Self { phase: Some(phase), ..self }
     }
 }
 
-/// How rays are sifted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sift {
-    /// Those in doubt are traced up to so many cells of the base map that holds their start from it; `None`: to their
-    /// ends.
-    pub near: Option<u32>,
-    /// One ray in so many is a pilot: it is not sifted; 0: none.
-    pub pilots: u32,
+impl From<Own> for Step {
+    fn from(own: Own) -> Self {
+        Self::Own(own)
+    }
 }
 
 impl Step {

@@ -5,3 +5,9 @@ pub mod dvf;
 pub mod occupancy;
 pub mod roma;
 pub mod rsm;
+
+use crate::kernels::table::Family;
+
+/// The kernels of all methods: what is compared on both executors.
+pub static FAMILIES: [&Family; 4] =
+    [&df::kernels::FAMILY, &dvf::kernels::FAMILY, &roma::kernels::FAMILY, &rsm::kernels::FAMILY];

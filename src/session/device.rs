@@ -124,18 +124,18 @@ impl Device {
         self,
         scene: Arc<SceneFile>,
         host: Arc<HostCache>,
-        (threads, prefetch): (usize, usize),
+        threads: usize,
         page_sizes: &[u64],
         setup: Setup,
     ) -> Result<Box<dyn FrameExecutor>> {
         match self {
             Self::Cpu => {
-                let workers = Workers::new(scene.clone(), host, threads, prefetch)?;
+                let workers = Workers::new(scene.clone(), host, threads)?;
                 Ok(Box::new(CpuExecutor::new(scene, workers, setup)?))
             }
             Self::Gpu(gpu) => {
                 require(&gpu, &probe::run(&gpu.device, &gpu.queue).checks)?;
-                let workers = Workers::new(scene.clone(), host, threads, prefetch)?;
+                let workers = Workers::new(scene.clone(), host, threads)?;
                 let executor = GpuExecutor::new(*gpu, scene, workers, page_sizes, setup)?;
                 require(executor.gpu(), &probe::compare_pipelines(&executor))?;
                 Ok(Box::new(executor))

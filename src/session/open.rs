@@ -31,8 +31,8 @@ pub struct Needs<'a> {
     pub scene: Arc<SceneFile>,
     /// The host's cache.
     pub host: Arc<HostCache>,
-    /// Threads that read payloads, and how many of them may be read ahead.
-    pub threads: (usize, usize),
+    /// Threads that read payloads.
+    pub threads: usize,
     /// Bytes of the cache's pages.
     pub page_sizes: &'a [u64],
     /// Picture, tiles and counting.
@@ -178,7 +178,7 @@ impl Session {
         let setup = Setup { extent, threshold, count: args.count, keep: Keep::default() };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let host = HostCache::new(args.host_cache);
-        let threads = (args.worker_count(), args.prefetch as usize);
+        let threads = args.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
         let mut executor = make(needs).with_context(|| format!("{name}"))?;
         if schedule == Schedule::PlainBinary {

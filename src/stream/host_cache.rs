@@ -3,9 +3,6 @@
 //! The budget is exact to the byte in what is really held: room is reserved before a copy is allocated, and what a
 //! worker still copies into or reads from is not evicted. A batch larger than the budget keeps its first items, so what
 //! is cached depends on the order of requests alone, never on which thread finished first.
-//!
-//! What is brought in ahead of need is on sufferance: it takes the room of nothing that was used in the present round
-//! or the one before ([`HostCache::begin_round`]), and the statistics say what came of it.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -26,16 +23,6 @@ pub struct HostCacheStats {
     pub entries: u64,
     /// Bytes held or reserved now; never above the budget.
     pub used_bytes: u64,
-    /// Of the payloads put in, those brought ahead of need; one that its first load overtook is not among them.
-    pub prefetched: u64,
-    /// Bytes of those.
-    pub prefetched_bytes: u64,
-    /// Payloads brought ahead of need that a look-up found later; each counts once.
-    pub prefetched_used: u64,
-    /// Bytes of those.
-    pub prefetched_used_bytes: u64,
-    /// Bytes of payloads brought ahead of need that were put out before a look-up found them.
-    pub prefetched_wasted_bytes: u64,
 }
 
 /// A payload, or the room reserved for one.
@@ -44,10 +31,6 @@ struct Entry {
     bytes: u64,
     /// Verified bytes; `None` until a worker has filled it.
     payload: Option<Arc<[u8]>>,
-    /// Brought ahead of need and not looked up yet.
-    ahead: bool,
-    /// The round of its last use. In the order of use these ascend.
-    round: u64,
 }
 
 impl Entry {
@@ -61,7 +44,6 @@ impl Entry {
 #[derive(Debug)]
 struct Inner {
     entries: lru::LruCache<Item, Entry>,
-    round: u64,
     stats: HostCacheStats,
 }
 
@@ -75,7 +57,7 @@ pub struct HostCache {
 impl HostCache {
     /// A cache of `budget_bytes`; 0 turns it off.
     pub fn new(budget_bytes: u64) -> Arc<Self> {
-        let inner = Inner { entries: lru::LruCache::unbounded(), round: 0, stats: HostCacheStats::default() };
+        let inner = Inner { entries: lru::LruCache::unbounded(), stats: HostCacheStats::default() };
         Arc::new(Self { budget_bytes, inner: Mutex::new(inner) })
     }
 
@@ -105,18 +87,8 @@ impl HostCache {
             return None;
         }
         let mut inner = self.lock();
-        let Inner { entries, round, stats } = &mut *inner;
-        let found = entries.get_mut(&item).and_then(|entry| {
-            entry.round = *round;
-            // A load that finds its payload still on the way reads it itself: that was not ahead of need.
-            let ahead = std::mem::take(&mut entry.ahead);
-            let payload = entry.payload.clone()?;
-            if ahead {
-                stats.prefetched_used += 1;
-                stats.prefetched_used_bytes += entry.bytes;
-            }
-            Some(payload)
-        });
+        let Inner { entries, stats } = &mut *inner;
+        let found = entries.get(&item).and_then(|entry| entry.payload.clone());
         match found {
             Some(_) => stats.hits += 1,
             None => stats.misses += 1,
@@ -124,26 +96,11 @@ impl HostCache {
         found
     }
 
-    /// Begins a round, such as a frame: see [`Self::reserve_ahead`].
-    pub fn begin_round(&self) {
-        self.lock().round += 1;
-    }
-
     /// Reserves room for `item`, evicting the least recently used payloads that nobody is using.
     ///
     /// `None` when it is held or reserved already, is larger than the budget, or does not fit beside what is in use:
     /// then nothing is evicted and the payload is simply not cached.
     pub fn reserve(self: &Arc<Self>, item: Item, bytes: u64) -> Option<Reservation> {
-        self.reserve_where(item, bytes, false)
-    }
-
-    /// As [`Self::reserve`], for an item that nobody asked for yet: nothing is evicted for it that was used, or brought
-    /// ahead, in the present round or the one before.
-    pub fn reserve_ahead(self: &Arc<Self>, item: Item, bytes: u64) -> Option<Reservation> {
-        self.reserve_where(item, bytes, true)
-    }
-
-    fn reserve_where(self: &Arc<Self>, item: Item, bytes: u64, ahead: bool) -> Option<Reservation> {
         if bytes > self.budget_bytes || self.budget_bytes == 0 {
             return None;
         }
@@ -153,14 +110,10 @@ impl HostCache {
             if inner.entries.contains(&item) {
                 return None;
             }
-            let round = inner.round;
             let mut used = inner.stats.used_bytes;
             let mut oldest_first = inner.entries.iter().rev();
             while used > self.budget_bytes - bytes {
                 let (&old, entry) = oldest_first.next()?;
-                if ahead && entry.round + 1 >= round {
-                    return None;
-                }
                 if entry.evictable() {
                     used -= entry.bytes;
                     victims.push((old, None));
@@ -169,12 +122,10 @@ impl HostCache {
             for (old, entry) in &mut victims {
                 *entry = inner.entries.pop(old);
             }
-            let in_vain = victims.iter().filter_map(|(_, entry)| entry.as_ref()).filter(|entry| entry.ahead);
-            inner.stats.prefetched_wasted_bytes += in_vain.map(|entry| entry.bytes).sum::<u64>();
             inner.stats.entries -= victims.len() as u64;
             inner.stats.evicted += victims.len() as u64;
             inner.stats.used_bytes = used + bytes;
-            inner.entries.put(item, Entry { bytes, payload: None, ahead, round });
+            inner.entries.put(item, Entry { bytes, payload: None });
         }
         // Freed outside the lock, yet before the reservation can be filled.
         drop(victims);
@@ -206,15 +157,11 @@ impl Reservation {
             return;
         }
         let mut inner = self.cache.lock();
-        let Inner { entries, stats, .. } = &mut *inner;
+        let Inner { entries, stats } = &mut *inner;
         if let Some(entry) = entries.peek_mut(&self.item) {
             entry.payload = Some(payload);
             stats.entries += 1;
             stats.inserted += 1;
-            if entry.ahead {
-                stats.prefetched += 1;
-                stats.prefetched_bytes += self.bytes;
-            }
             self.filled = true;
         }
     }

@@ -12,13 +12,12 @@
 //!
 //! **Practice.** [`Residency`] is a pure state machine that says where a payload goes and what it overwrites.
 //! [`Workers`] are the only threads that touch the scene file: they take a payload from the [`HostCache`] or copy and
-//! verify it from its [`PayloadSource`], then hand it to a [`Destination`]. [`Prefetcher`] says what the camera's
-//! motion will ask for next. [`Trace`] records requests.
+//! verify it from its [`PayloadSource`], then hand it to a [`Destination`]. [`Trace`] records
+//! requests.
 
 mod host_cache;
 mod item;
 mod lru;
-mod prefetch;
 mod residency;
 mod ring;
 mod sizes;
@@ -32,7 +31,6 @@ mod tests;
 
 pub use host_cache::{HostCache, HostCacheStats, Reservation};
 pub use item::{Item, Kind, ParseItemError, Policy, Slot};
-pub use prefetch::{BrickBox, Frustum, Prefetcher, nearest_in_view, predict};
 pub use residency::{Counters, KindCounters, NoRoom, Placed, Residency, ResidencyError};
 pub use sizes::Sizes;
 pub use source::{PayloadSource, SourceError};

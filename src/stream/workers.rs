@@ -5,16 +5,16 @@
 //! copies into one buffer that it keeps, so a load neither allocates nor clears memory unless its payload is cached.
 //!
 //! What is looked up and what room is reserved in the host cache is decided by the caller of [`Workers::load_each`], in
-//! the order of requests, before a worker sees any of them: without prefetching the counters do not depend on timing.
+//! the order of requests, before a worker sees any of them: the counters do not depend on timing.
 
 use std::any::Any;
 use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
-use crossbeam::channel::{Receiver, Sender, bounded, select, select_biased};
+use crossbeam::channel::{Receiver, Sender, bounded, select};
 
 use super::host_cache::{HostCache, Reservation};
 use super::item::Item;
@@ -39,12 +39,6 @@ pub trait Destination: Send + 'static {
 
 /// What frames ask of workers beside loads, whatever their destinations.
 pub trait WorkerPool {
-    /// As [`Workers::prefetch`].
-    fn prefetch(&self, items: &[Item]) -> usize;
-
-    /// As [`Workers::cancel_prefetch`].
-    fn cancel_prefetch(&self);
-
     /// As [`Workers::host_cache`].
     fn host_cache(&self) -> &Arc<HostCache>;
 
@@ -53,14 +47,6 @@ pub trait WorkerPool {
 }
 
 impl<D: Destination> WorkerPool for Workers<D> {
-    fn prefetch(&self, items: &[Item]) -> usize {
-        Self::prefetch(self, items)
-    }
-
-    fn cancel_prefetch(&self) {
-        Self::cancel_prefetch(self);
-    }
-
     fn host_cache(&self) -> &Arc<HostCache> {
         Self::host_cache(self)
     }
@@ -135,9 +121,6 @@ pub struct WorkersStats {
     pub cached_bytes: u64,
     /// Loads that failed.
     pub failed: u64,
-    /// Prefetches dropped: cancelled, a full queue, no room in the host cache, loaded meanwhile, or a payload that
-    /// cannot be had (a later load of which says why). The host cache counts those that arrived.
-    pub prefetch_dropped: u64,
 }
 
 #[derive(Debug, Default)]
@@ -147,7 +130,6 @@ struct Tally {
     cached: AtomicU64,
     cached_bytes: AtomicU64,
     failed: AtomicU64,
-    prefetch_dropped: AtomicU64,
 }
 
 /// Adds to a counter; counters order nothing.
@@ -175,16 +157,12 @@ pub(super) struct Shared {
     source: Arc<dyn PayloadSource>,
     host_cache: Arc<HostCache>,
     tally: Tally,
-    stop: AtomicBool,
 }
 
-/// A pool of threads that load payloads into destinations. Dropping it ends them; queued prefetches are dropped.
+/// A pool of threads that load payloads into destinations. Dropping it ends them.
 pub struct Workers<D: Destination> {
     /// `None` only while dropping.
     jobs: Option<Sender<Job<D>>>,
-    wishes: Option<Sender<Item>>,
-    /// The other end of `wishes`, to take back those that wait.
-    waiting: Receiver<Item>,
     /// Carries nothing; closed when the last thread has ended.
     ended: Receiver<Infallible>,
     threads: Vec<JoinHandle<()>>,
@@ -192,8 +170,7 @@ pub struct Workers<D: Destination> {
 }
 
 impl<D: Destination> Workers<D> {
-    /// Starts `threads` ≥ 1 threads (0 is taken as 1) over `source`. At most `prefetch_queue` prefetches wait; 0 turns
-    /// prefetching off, and so does a host cache that is off.
+    /// Starts `threads` ≥ 1 threads (0 is taken as 1) over `source`.
     ///
     /// # Errors
     /// [`StreamError::Spawn`] when a thread cannot be started.
@@ -201,9 +178,8 @@ impl<D: Destination> Workers<D> {
         source: Arc<dyn PayloadSource>,
         host_cache: Arc<HostCache>,
         threads: usize,
-        prefetch_queue: usize,
     ) -> Result<Self, StreamError> {
-        Self::with_body(source, host_cache, threads, prefetch_queue, work)
+        Self::with_body(source, host_cache, threads, work)
     }
 
     /// [`Self::new`] with what a thread does.
@@ -211,23 +187,20 @@ impl<D: Destination> Workers<D> {
         source: Arc<dyn PayloadSource>,
         host_cache: Arc<HostCache>,
         threads: usize,
-        prefetch_queue: usize,
-        body: fn(&Shared, &Receiver<Job<D>>, &Receiver<Item>),
+        body: fn(&Shared, &Receiver<Job<D>>),
     ) -> Result<Self, StreamError> {
         let count = threads.max(1);
-        let shared = Arc::new(Shared { source, host_cache, tally: Tally::default(), stop: AtomicBool::new(false) });
+        let shared = Arc::new(Shared { source, host_cache, tally: Tally::default() });
         // The pool keeps no receiver of jobs, so that sending fails, and does not wait, when the last thread has ended.
         let (jobs, job_queue) = bounded::<Job<D>>(count.saturating_mul(QUEUED_JOBS_PER_THREAD));
-        let (wishes, waiting) = bounded::<Item>(prefetch_queue);
         let (alive, ended) = bounded(0);
-        let mut workers = Self { jobs: Some(jobs), wishes: Some(wishes), waiting, ended, threads: Vec::new(), shared };
+        let mut workers = Self { jobs: Some(jobs), ended, threads: Vec::new(), shared };
         for number in 0..count {
-            let (job_queue, wish_queue) = (job_queue.clone(), workers.waiting.clone());
-            let (alive, shared) = (alive.clone(), workers.shared.clone());
+            let (job_queue, alive, shared) = (job_queue.clone(), alive.clone(), workers.shared.clone());
             let thread = std::thread::Builder::new().name(format!("brick worker {number}")).spawn(move || {
                 // Dropped however the thread ends.
                 let _alive: Sender<Infallible> = alive;
-                body(&shared, &job_queue, &wish_queue);
+                body(&shared, &job_queue);
             })?;
             workers.threads.push(thread);
         }
@@ -294,32 +267,6 @@ impl<D: Destination> Workers<D> {
             .collect()
     }
 
-    /// Asks for items to be brought into the host cache when no load waits, first come, first served. Never waits: what
-    /// the queue does not hold is dropped. Returns how many were queued.
-    pub fn prefetch(&self, items: &[Item]) -> usize {
-        let shared = &*self.shared;
-        let mut queued = 0;
-        let mut dropped = 0;
-        if let Some(wishes) = &self.wishes
-            && wishes.capacity() != Some(0)
-            && shared.host_cache.budget_bytes() > 0
-        {
-            for &item in items.iter().filter(|item| shared.source.has(**item) && !shared.host_cache.contains(**item)) {
-                match wishes.try_send(item) {
-                    Ok(()) => queued += 1,
-                    Err(_) => dropped += 1,
-                }
-            }
-        }
-        add(&shared.tally.prefetch_dropped, dropped);
-        queued
-    }
-
-    /// Drops the prefetches that wait, because the camera went elsewhere. What a thread has begun it finishes.
-    pub fn cancel_prefetch(&self) {
-        add(&self.shared.tally.prefetch_dropped, self.waiting.try_iter().count() as u64);
-    }
-
     /// The host cache.
     pub fn host_cache(&self) -> &Arc<HostCache> {
         &self.shared.host_cache
@@ -335,16 +282,13 @@ impl<D: Destination> Workers<D> {
             cached: get(&tally.cached),
             cached_bytes: get(&tally.cached_bytes),
             failed: get(&tally.failed),
-            prefetch_dropped: get(&tally.prefetch_dropped),
         }
     }
 }
 
 impl<D: Destination> Drop for Workers<D> {
     fn drop(&mut self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
         self.jobs = None;
-        self.wishes = None;
         for thread in self.threads.drain(..) {
             // A thread that panicked has already been answered for.
             let _ = thread.join();
@@ -383,20 +327,11 @@ pub(super) fn collect<D>(
     loaded
 }
 
-/// A worker thread: loads first, prefetches when there are none.
-fn work<D: Destination>(shared: &Shared, jobs: &Receiver<Job<D>>, wishes: &Receiver<Item>) {
+/// A worker thread.
+fn work<D: Destination>(shared: &Shared, jobs: &Receiver<Job<D>>) {
     let mut buffer = Vec::new();
-    loop {
-        select_biased! {
-            recv(jobs) -> job => match job {
-                Ok(job) => answer(shared, job, &mut buffer),
-                Err(_) => return,
-            },
-            // When this queue is closed the other one is, too, and comes first.
-            recv(wishes) -> wish => if let Ok(wish) = wish {
-                grant(shared, wish, &mut buffer);
-            },
-        }
+    while let Ok(job) = jobs.recv() {
+        answer(shared, job, &mut buffer);
     }
 }
 
@@ -441,25 +376,6 @@ fn answer<D: Destination>(shared: &Shared, job: Job<D>, buffer: &mut Vec<u8>) {
     };
     // Everything the batch held in the host cache is released by now. The caller waits for the answer.
     let _ = answers.send((index, destination, result));
-}
-
-/// Prefetches one item, unless the threads are to end.
-fn grant(shared: &Shared, item: Item, buffer: &mut Vec<u8>) {
-    let done = !shared.stop.load(Ordering::Relaxed)
-        && catch_unwind(AssertUnwindSafe(|| {
-            let bytes = shared.source.bytes(item);
-            let Some(reservation) = shared.host_cache.reserve_ahead(item, bytes) else { return false };
-            let Ok(payload) = read(shared, item, bytes as usize, buffer) else { return false };
-            reservation.fill(payload);
-            true
-        }))
-        .unwrap_or_else(|panic| {
-            panic_text(panic);
-            false
-        });
-    if !done {
-        add(&shared.tally.prefetch_dropped, 1);
-    }
 }
 
 /// Copies and verifies a payload into the buffer, which only ever grows.

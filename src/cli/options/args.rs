@@ -328,11 +328,6 @@ pub struct StreamArgs {
     /// pixels; 0 is exact, more loads less and misses hits
     #[arg(long, value_name = "PIXELS", default_value = "0", value_parser = query_threshold)]
     pub query_threshold: u32,
-    /// Payloads (geometry or attributes of a brick) that the workers may read into the host cache while a frame
-    /// renders: the nearest in the view that the camera's motion leads to; 0 is off. It changes no picture. On 2 cores
-    /// with software Vulkan no gain was measured; summary.json says how much of it was used (walk)
-    #[arg(long, value_name = "N", default_value = "0", value_parser = prefetch)]
-    pub prefetch: u32,
     /// Write the trace of brick requests to this file, for replay against other caches [default: none]
     #[arg(long, value_name = "F")]
     pub requests_out: Option<PathBuf>,
@@ -502,11 +497,8 @@ impl TraceArgs {
     /// # Errors
     /// Which option to leave out.
     pub fn check(&self) -> Result<(), crate::cli::Usage> {
-        let meaningless = [
-            (self.stream.fronts == "on", "--fronts on"),
-            (self.stream.query_threshold > 0, "--query-threshold"),
-            (self.stream.prefetch > 0, "--prefetch"),
-        ];
+        let meaningless =
+            [(self.stream.fronts == "on", "--fronts on"), (self.stream.query_threshold > 0, "--query-threshold")];
         match meaningless.iter().find(|(given, _)| *given) {
             Some((_, option)) => Err(crate::cli::Usage(format!("{option} is for walk; leave it out of trace"))),
             None => Ok(()),
@@ -618,10 +610,6 @@ fn threads(text: &str) -> Result<u32, String> {
 
 fn query_threshold(text: &str) -> Result<u32, String> {
     ranged(text, 0, 40_000)
-}
-
-fn prefetch(text: &str) -> Result<u32, String> {
-    ranged(text, 0, 65_536)
 }
 
 fn brick_triangles(text: &str) -> Result<u32, String> {

@@ -26,7 +26,7 @@ fn defaults_of_walk_are_the_documented_ones() {
     assert_eq!(w.frames, 30);
     assert_eq!(w.size, ImageSize { width: 1280, height: 720 });
     assert_eq!(w.effects.effects.to_string(), "primary,shadow");
-    assert_eq!((w.spp, w.seed, w.stream.prefetch), (1, 0, 0));
+    assert_eq!((w.spp, w.seed), (1, 0));
     assert_eq!(w.stream.cache, CacheSize::Percent(25.0));
     assert_eq!(w.stream.host_cache, 1 << 30);
     assert_eq!(w.secondary, Secondary::Exact);
@@ -45,7 +45,7 @@ fn options_arrive() {
     let w = walk(
         "--path p.json --frames 3 --size 64x32 --cache 12M --host-cache 2G --schedule plain --effects primary --spp 4 \
          --seed 9 --aov --json --sun -1,2,-3 --sun-angle 0 --sun-intensity 5 --sky-intensity 0 --tile 32 --workers 2 \
-         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru --prefetch 16 \
+         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru \
          --requests-out f.jsonl --measure-needed",
     )
     .unwrap();
@@ -59,7 +59,7 @@ fn options_arrive() {
     assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
     assert_eq!(w.stream.adapter, Adapter::Named("llvm".into()));
     assert_eq!((w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()), ("on", 20, "lru"));
-    assert!(w.measure_needed && w.stream.prefetch == 16 && w.stream.requests_out == Some("f.jsonl".into()));
+    assert!(w.measure_needed && w.stream.requests_out == Some("f.jsonl".into()));
     assert_eq!(walk("--hash-threads 3").unwrap().stream.worker_count(), 3);
     assert!(walk("").unwrap().stream.worker_count() >= 1);
 }
@@ -104,7 +104,6 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--fronts yes", "known: on, off"),
         ("--query-threshold 40001", "0 to 40000"),
         ("--evict fifo", "known: round-robin, second-chance, lru"),
-        ("--prefetch 65537", "0 to 65536"),
         ("--environment-rotation 361", "-360 to 360"),
         ("--environment-intensity=-1", "at least 0"),
         ("--nonsense", "--nonsense"),
@@ -151,7 +150,7 @@ fn trace_refuses_what_is_for_walks() {
         other => panic!("{other:?}"),
     };
     assert!(check("").is_ok() && check("--any --cache 1M --evict lru --requests-out f").is_ok());
-    for options in ["--fronts on", "--query-threshold 20", "--prefetch 4"] {
+    for options in ["--fronts on", "--query-threshold 20"] {
         assert!(check(options).unwrap_err().to_string().contains(options.split(' ').next().unwrap()), "{options}");
     }
 }
@@ -238,9 +237,9 @@ fn version_is_printed() {
 
 #[test]
 fn optimisations_are_switched_by_name() {
-    let w = walk("--without requery,nearest-first --with leaf-cache").unwrap();
+    let w = walk("--without requery,nearest-first").unwrap();
     let on = w.optimisations.optimisations();
-    assert!(!on.requery && !on.nearest_first && on.leaf_cache && on.by_tile && on.resident_first);
+    assert!(!on.requery && !on.nearest_first && on.by_tile && on.resident_first);
     assert_eq!(crate::cli::options::optimisation_args::names(&w.optimisations.without), ["nearest-first", "requery"]);
     assert_eq!(walk("").unwrap().optimisations.optimisations(), crate::schedule::Optimisations::default());
     let error = walk("--without haste").unwrap_err().to_string();
@@ -256,8 +255,7 @@ fn optimisations_without_meaning_are_refused_with_what_they_belong_to() {
     for (options, part) in [
         ("--schedule plain --without requery", "chc, demand or auto"),
         ("--schedule demand --without by-tile", "chc or auto"),
-        ("--schedule demand --with leaf-cache", "chc or auto"),
-        ("--with requery --without requery", "both"),
+        ("--schedule demand --without root-walk", "chc or auto"),
     ] {
         let error = check(options).unwrap_err();
         assert!(error.contains(part), "{options}: {error}");

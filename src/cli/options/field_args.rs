@@ -2,7 +2,7 @@
 
 use super::args::ranged;
 use super::roma_args::of;
-use crate::secondary::df::{FieldSettings, Tracing};
+use crate::secondary::df::{DfSettings, Tracing};
 use clap::Args;
 
 /// Look-ups of shadow rays (Zeng et al., §7).
@@ -32,8 +32,8 @@ pub struct FieldArgs {
 
 impl FieldArgs {
     /// How rays are answered.
-    pub fn settings(&self) -> FieldSettings {
-        FieldSettings {
+    pub fn settings(&self) -> DfSettings {
+        DfSettings {
             size: self.df_size,
             occlusion_steps: self.df_steps.unwrap_or(Tracing::default().iterations),
             shadow_steps: self.df_steps.unwrap_or(SHADOW_STEPS),

@@ -17,8 +17,8 @@ pub struct EffectArgs {
     /// which light others by it), ao (ambient occlusion of the sky's light), diffuse (one bounce between surfaces, the
     /// sky's light with it), environment (the light of the environment, or of the sky, with shadows: rays in directions
     /// drawn by its brightness; ao is left out beside it, and diffuse rays share the light with them), glossy (what
-    /// metals and polished surfaces mirror: one ray in a direction drawn by their roughness, whose hits are lit),
-    /// mirror (every surface is half a mirror, for tests); all include primary
+    /// metals and polished surfaces mirror: one ray in a direction drawn by their roughness, whose hits are lit);
+    /// all include primary
     #[arg(long, value_name = "LIST", default_value = "primary,shadow")]
     pub effects: EffectList,
     /// Rays a pixel and sample of ao, 1 to 1024
@@ -40,13 +40,12 @@ pub struct EffectArgs {
 impl EffectArgs {
     /// The effects of every frame.
     pub fn effects(&self) -> Effects {
-        let EffectList { shadow, ao, diffuse, mirror, glossy, environment } = self.effects;
+        let EffectList { shadow, ao, diffuse, glossy, environment } = self.effects;
         Effects {
             shadow,
             environment,
             occlusion: (ao && !environment).then_some(Occlusion { rays: self.ao_rays, length: self.ao_length }),
             diffuse: diffuse.then_some(self.diffuse_rays),
-            mirror,
             glossy,
             turn_degrees: self.rotation,
         }
@@ -64,8 +63,6 @@ named_values! {
         Ao = "ao",
         /// Rays around the normal whose hits are shaded.
         Diffuse = "diffuse",
-        /// Mirrored rays whose hits are shaded.
-        Mirror = "mirror",
         /// Rays drawn by the gloss of surfaces, whose hits are shaded.
         Glossy = "glossy",
         /// Rays towards the environment.
@@ -82,8 +79,6 @@ pub struct EffectList {
     pub ao: bool,
     /// Diffuse interreflection.
     pub diffuse: bool,
-    /// Mirrored rays.
-    pub mirror: bool,
     /// Reflections by the gloss of surfaces.
     pub glossy: bool,
     /// Rays towards the environment.
@@ -101,7 +96,6 @@ impl FromStr for EffectList {
                 Effect::Shadow => effects.shadow = true,
                 Effect::Ao => effects.ao = true,
                 Effect::Diffuse => effects.diffuse = true,
-                Effect::Mirror => effects.mirror = true,
                 Effect::Glossy => effects.glossy = true,
                 Effect::Environment => effects.environment = true,
             }
@@ -116,7 +110,6 @@ impl std::fmt::Display for EffectList {
             (self.shadow, ",shadow"),
             (self.ao, ",ao"),
             (self.diffuse, ",diffuse"),
-            (self.mirror, ",mirror"),
             (self.glossy, ",glossy"),
             (self.environment, ",environment"),
         ];
@@ -250,7 +243,7 @@ mod tests {
 
     #[test]
     fn lists_are_read_and_written_alike() {
-        for text in ["primary", "primary,shadow", "primary,ao", "primary,shadow,ao,diffuse,mirror,glossy,environment"] {
+        for text in ["primary", "primary,shadow", "primary,ao", "primary,shadow,ao,diffuse,glossy,environment"] {
             assert_eq!(text.parse::<EffectList>().unwrap().to_string(), text);
         }
         assert_eq!("ao".parse::<EffectList>().unwrap().to_string(), "primary,ao");

@@ -1,5 +1,7 @@
 //! Option values with names.
 
+use super::removed::removed;
+
 /// Declares an enum of named values some of which this version only knows by name.
 macro_rules! named_values {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* } later $later:expr) => {
@@ -29,8 +31,12 @@ macro_rules! named_values {
     };
 }
 
-/// Why a value is refused that is none of `known`; those of `later` are announced.
+/// Why a value is refused that is none of `known`; those of `later` are announced, of removed ones it says what stands
+/// in their place.
 pub(crate) fn unknown(text: &str, known: &[&str], later: &[&str]) -> String {
+    if let Some(message) = removed(text) {
+        return message;
+    }
     let known = known.join(", ");
     if later.contains(&text) {
         format!("{text} is not in this version; it has: {known}")

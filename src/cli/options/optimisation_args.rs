@@ -15,35 +15,29 @@ pub struct OptimisationArgs {
     /// resident-first (off: bricks on the device are not intersected before missing ones are asked for, all wanted
     /// bricks are taken nearest first). Of lists (chc): front-to-back (off: a tile's leaves are intersected by number),
     /// by-tile (off: a dispatch intersects one leaf a tile, not all), root-walk (off: a tile has a list however long;
-    /// on, the rays of tiles with long lists walk from the root), leaf-cache (see --with). Of --fronts on:
+    /// on, the rays of tiles with long lists walk from the root). Of --fronts on:
     /// multi-queries (off: every invisible pair is asked for by itself), tighter-bounds (off: a node is asked for by
     /// its own box, not its children's), lazy-requery (off: visible pairs are asked for again in every frame, not every
     /// third), pull-up (off: pairs stay split where all is invisible) [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optimisation)]
     pub without: Vec<Optimisation>,
-    /// Optimisations to switch on that are off because measurements show no gain, separated by commas: leaf-cache (chc:
-    /// a ray postpones up to two groups of triangles and tests them together) [default: none]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optimisation)]
-    pub with: Vec<Optimisation>,
 }
 
 impl OptimisationArgs {
     /// The optimisations that are on.
     pub fn optimisations(&self) -> Optimisations {
         let mut on = Optimisations::default();
-        self.with.iter().for_each(|&which| on.set(which, true));
         self.without.iter().for_each(|&which| on.set(which, false));
         on
     }
 
-    /// Refuses names that mean nothing with the schedule in `stream`, and those both switched on and off.
+    /// Refuses names that mean nothing with the schedule in `stream`.
     ///
     /// # Errors
     /// Which name, and what it belongs to.
     pub fn check(&self, stream: &StreamArgs) -> Result<(), Usage> {
         let chc = matches!(stream.schedule, Schedule::Chc | Schedule::Auto);
-        let given = |option, list: &[Optimisation]| list.iter().map(|&which| (option, which)).collect::<Vec<_>>();
-        for (option, which) in [given("--without", &self.without), given("--with", &self.with)].concat() {
+        for which in &self.without {
             let (has_meaning, belongs) = match which.part_of() {
                 PartOf::Loading => (
                     !matches!(stream.schedule, Schedule::Plain | Schedule::PlainBvh2),
@@ -53,10 +47,7 @@ impl OptimisationArgs {
                 PartOf::Fronts => (chc && stream.fronts == "on", "--fronts on (schedule chc)"),
             };
             if !has_meaning {
-                return Err(Usage(format!("{option} {}: it belongs to {belongs}", which.name())));
-            }
-            if self.with.contains(&which) && self.without.contains(&which) {
-                return Err(Usage(format!("{} is given to both --with and --without", which.name())));
+                return Err(Usage(format!("--without {}: it belongs to {belongs}", which.name())));
             }
         }
         Ok(())

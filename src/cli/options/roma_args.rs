@@ -3,7 +3,7 @@
 use super::args::ranged;
 use super::named::named_values;
 use crate::secondary::occupancy::Source;
-use crate::secondary::roma::{CLOSED, Grid, MOST_NEAR, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings, THIN};
+use crate::secondary::roma::{CLOSED, Grid, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings, THIN};
 use crate::secondary::rsm::RsmSettings;
 use clap::Args;
 
@@ -43,13 +43,6 @@ pub struct RomaArgs {
     /// on in that of its map; rays_capped counts such rays
     #[arg(long, value_name = "N", default_value = "8", value_parser = |s: &str| ranged(s, 1, MOST_STEPS.into()))]
     pub roma_steps: u32,
-    /// With --secondary roma: rays of ao are traced exactly up to so many cells (of the map that holds their start)
-    /// from their start, 0 to 256, and answered by maps from there on
-    #[arg(long, value_name = "CELLS", default_value = "0", value_parser = |s: &str| ranged(s, 0, MOST_NEAR.into()))]
-    pub roma_near: u32,
-    /// With --secondary roma: the same of rays of shadow
-    #[arg(long, value_name = "CELLS", default_value = "0", value_parser = |s: &str| ranged(s, 0, MOST_NEAR.into()))]
-    pub roma_shadow_near: u32,
     /// With --secondary auto: maps answer rays of ao, and one in N, 2 to 16, is traced, too, and counts for what maps
     /// get wrong of all N: the mean is that of exact rays, and where few are summed radiance may lie below 0; more take
     /// less time and are noisier. Blocks of 64 pixels go together, which shows in few rays but with --rotation full,
@@ -111,12 +104,11 @@ impl RomaArgs {
 
     /// How rays are answered; with `is_auto` exact ones are traced as far as `auto_error` or `auto_one_in` have it.
     pub fn settings(&self, is_auto: bool) -> RomaSettings {
-        let pass = |k, is_unsnapped, near, one_in: OneIn, stride| {
-            let role = match (is_auto, one_in, near) {
-                (true, Some(one_in), _) => Role::Correct(one_in),
-                (true, None, _) => Role::Sift { most_wrong: self.auto_error },
-                (false, _, 0) => Role::Answer,
-                (false, _, cells) => Role::Far(cells),
+        let pass = |k, is_unsnapped, one_in: OneIn, stride| {
+            let role = match (is_auto, one_in) {
+                (true, Some(one_in)) => Role::Correct(one_in),
+                (true, None) => Role::Sift { most_wrong: self.auto_error },
+                (false, _) => Role::Answer,
             };
             let is_sifted = matches!(role, Role::Sift { .. });
             let steps = if is_sifted { MOST_STEPS } else { self.roma_steps };
@@ -130,9 +122,9 @@ impl RomaArgs {
         };
         let keeps = |rays| self.roma_unsnapped.iter().any(|named| [rays, Unsnapped::All].contains(named));
         RomaSettings {
-            occlusion: pass(self.roma_k, keeps(Unsnapped::Ao), self.roma_near, self.auto_one_in, THIN),
-            shadow: pass(self.roma_shadow_k, keeps(Unsnapped::Shadow), self.roma_shadow_near, None, CLOSED),
-            diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), 0, None, CLOSED)),
+            occlusion: pass(self.roma_k, keeps(Unsnapped::Ao), self.auto_one_in, THIN),
+            shadow: pass(self.roma_shadow_k, keeps(Unsnapped::Shadow), None, CLOSED),
+            diffuse: (!is_auto).then(|| pass(self.roma_diffuse_k, keeps(Unsnapped::Diffuse), None, CLOSED)),
             rsm: RsmSettings { size: self.rsm_size, lamps: self.rsm_lamps },
         }
     }

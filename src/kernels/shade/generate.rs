@@ -1,10 +1,10 @@
 //! Rays from the camera and from hits: twins of `shaders/shade/generate_primary.wgsl`, `generate_shadow.wgsl`,
-//! `generate_around.wgsl`, `generate_mirror.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
+//! `generate_around.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
 
 use super::gloss::Gloss;
 use super::lamps::{drawn_light, emitter_of, environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
-use super::shade::{Pixels, surface_share};
+use super::shade::Pixels;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT,
@@ -192,24 +192,9 @@ pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: 
             let g = &gbuffer[index];
             let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
             let reflected = s.reflected_by_diffuse_rays(bound);
-            (0..3).for_each(|k| carried[k] = surface_share(bound) * bound.params.share * reflected[k]);
+            (0..3).for_each(|k| carried[k] = bound.params.share * reflected[k]);
         }
     });
-}
-
-/// The mirrored ray of every primary hit, about the interpolated normal; where that leads below the surface, none.
-pub fn generate_mirror(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels) {
-    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
-    for_each_leaving(own, seen, |index, surface| {
-        let (d, n) = (normalize(seen.rays[index].direction), gbuffer[index].normal);
-        let along = 2.0 * dot(n, d);
-        leaving(surface, normalize(each(|k| d[k] - along * n[k])), T_INFINITE)
-    });
-    densities.fill(0.0);
-    for (carried, ray) in throughput.iter_mut().zip(&own.rays) {
-        let share = if ray.t_min <= ray.t_max { 1.0 - bound.params.surface_share } else { 0.0 };
-        *carried = [share, share, share, 0.0];
-    }
 }
 
 /// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss; where that
@@ -242,7 +227,7 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
             *density = s.density(ray.direction);
             let reflected = s.reflected(ray.direction);
             let share = dot(gbuffer[index].normal, ray.direction) / (PI * *density);
-            (0..3).for_each(|k| carried[k] = surface_share(bound) * reflected[k] * share);
+            (0..3).for_each(|k| carried[k] = reflected[k] * share);
         }
     });
 }

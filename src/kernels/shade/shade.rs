@@ -9,9 +9,9 @@ use super::lamps::{
 use super::light::{add_light as add, ambient, background, sunlight};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
-    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE,
+    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, MET, NONE,
     PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_SKY, PARAM_SUN,
-    ROMA_HIT, Ray,
+    Ray,
 };
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, most, normalize, xyz};
@@ -51,11 +51,6 @@ impl Pixels {
     }
 }
 
-/// The share of a primary hit's own light that it shows; all of a hit of set 1.
-pub fn surface_share(bound: &Bound) -> f32 {
-    if bound.has(PARAM_BOUNCE) { 1.0 } else { bound.params.surface_share }
-}
-
 /// Empties the G-buffer of the shaded set, and before the first sample of a batch the radiance.
 pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
     pixels.gbuffers[shaded].fill(GBuffer::default());
@@ -68,7 +63,7 @@ pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
 type Carried<'a> = (&'a [[f32; 4]], &'a [f32]);
 
 /// Calls `light` for every pixel, with what the rays of all carry, and adds what it gives.
-fn for_each_pixel(
+pub(crate) fn for_each_pixel(
     bound: &Bound,
     pixels: &mut Pixels,
     shaded: usize,
@@ -93,7 +88,7 @@ fn weight_of(hit: &Hit) -> f32 {
     1.0 + hit.u
 }
 
-fn is_traced(ray: &Ray) -> bool {
+pub(crate) fn is_traced(ray: &Ray) -> bool {
     ray.t_min <= ray.t_max
 }
 
@@ -162,7 +157,7 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
         let density = if bound.has(PARAM_BOUNCE) { densities[index] } else { 0.0 };
         if seen.surfaces[index].leaf == NONE {
             // What occupancy maps met is lit otherwise.
-            let is_miss = bound.has(PARAM_MISS) && seen.hits[index].id != ROMA_HIT;
+            let is_miss = bound.has(PARAM_MISS) && seen.hits[index].id != MET;
             return is_miss.then(|| seen_background(bound, ray.direction, density));
         }
         let m = &materials[g.material as usize];
@@ -181,33 +176,7 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
             mirrored = each(|k| mirrored[k] + reflected[k] * g.occlusion);
         }
         let emission = seen_emission(bound, g, m, seen, index, density);
-        Some(each(|k| surface_share(bound) * (s.diffuse[k] * light[k] + mirrored[k] + emission[k])))
-    });
-}
-
-/// Adds the light of the environment to the primary hits as the paper of visibility fields has it: twin of
-/// `shaders/dvf/dvf_light.wgsl`.
-pub fn dvf_light(
-    bound: &Bound,
-    pixels: &mut Pixels,
-    shaded: usize,
-    (seen, own): (&RaySet, &RaySet),
-    materials: &[Material],
-) {
-    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
-        if seen.surfaces[index].leaf == NONE {
-            return None;
-        }
-        let ray = &own.rays[index];
-        let is_met = !is_traced(ray) || own.hits[index].id != NONE;
-        let is_occluded_cell = g.padding0 == 1;
-        let mut light = if is_met != is_occluded_cell { background(bound, ray.direction) } else { [0.0; 3] };
-        if !is_occluded_cell {
-            let all = ambient(bound.params, g.normal);
-            light = each(|k| all[k] - light[k]);
-        }
-        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
-        Some(each(|k| surface_share(bound) * s.diffuse[k] * light[k]))
+        Some(each(|k| s.diffuse[k] * light[k] + mirrored[k] + emission[k]))
     });
 }
 
@@ -265,7 +234,7 @@ pub fn add_light(
             let reflected = s.reflected(unit);
             reflects = each(|k| reflects[k] + weight * reflected[k]);
         }
-        Some(each(|k| weight_of(&own.hits[index]) * surface_share(bound) * reflects[k] * light[k]))
+        Some(each(|k| weight_of(&own.hits[index]) * reflects[k] * light[k]))
     });
 }
 
@@ -284,7 +253,7 @@ pub fn add_occlusion(
         let ambient = ambient(bound.params, g.normal);
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
         let mirrored = s.reflected_ambient(bound);
-        let share = weight_of(&own.hits[index]) * surface_share(bound) * bound.params.share;
+        let share = weight_of(&own.hits[index]) * bound.params.share;
         Some(each(|k| share * (s.diffuse[k] * ambient[k] + mirrored[k])))
     });
 }

@@ -7,37 +7,29 @@ use super::node::framed_ray;
 use super::packet_walk::PacketScratch;
 use super::walk_brick::{Group, Visits, finish_walk};
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{COUNTER_LEAF_GROUPS, Entry, NONE, PARAM_ANY_HIT};
+use crate::kernels::layout::{Entry, NONE, PARAM_ANY_HIT};
 use crate::kernels::query::tile_lists::TileLists;
-use crate::kernels::rays::{
-    PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet, run_for_each_ray,
-};
+use crate::kernels::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
 use crate::kernels::simd::isa::Isa;
 
-/// Of the rays of chosen tiles. With `LEAF_CACHE` two groups of triangles are gathered, as long as the ray does not
-/// enter another leaf.
-pub fn intersect_list<const LEAF_CACHE: bool>(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
-    let kernel = IntersectList::<LEAF_CACHE> { bound, lists };
-    if LEAF_CACHE {
-        run_for_each_ray(set, bound, Work::Chosen(lists), &kernel);
-    } else {
-        run_for_each_packet(set, bound, Work::Chosen(lists), &kernel);
-    }
+/// Of the rays of chosen tiles.
+pub fn intersect_list(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
+    run_for_each_packet(set, bound, Work::Chosen(lists), &IntersectList { bound, lists });
 }
 
-struct IntersectList<'a, const LEAF_CACHE: bool> {
+struct IntersectList<'a> {
     bound: &'a Bound<'a>,
     lists: &'a TileLists,
 }
 
-impl<const LEAF_CACHE: bool> RayKernel for IntersectList<'_, LEAF_CACHE> {
+impl RayKernel for IntersectList<'_> {
     #[inline(always)]
     fn run<I: Isa>(&self, isa: I, scratch: &mut Scratch, slot: Slot) {
         trace(isa, self, scratch, slot);
     }
 }
 
-impl<const LEAF_CACHE: bool> IntersectList<'_, LEAF_CACHE> {
+impl IntersectList<'_> {
     /// The run of a tile's selection: its first, and the one after the last.
     #[inline(always)]
     fn run_of(&self, tile: usize) -> (u32, u32) {
@@ -53,7 +45,7 @@ impl<const LEAF_CACHE: bool> IntersectList<'_, LEAF_CACHE> {
     }
 }
 
-impl<const LEAF_CACHE: bool> PacketKernel for IntersectList<'_, LEAF_CACHE> {
+impl PacketKernel for IntersectList<'_> {
     #[inline(always)]
     fn takes(&self, slot: &Slot) -> bool {
         let (next, end) = self.run_of(slot.tile);
@@ -74,12 +66,7 @@ impl<const LEAF_CACHE: bool> PacketKernel for IntersectList<'_, LEAF_CACHE> {
 }
 
 #[inline(always)]
-fn trace<I: Isa, const LEAF_CACHE: bool>(
-    isa: I,
-    kernel: &IntersectList<LEAF_CACHE>,
-    scratch: &mut Scratch,
-    mut slot: Slot,
-) {
+fn trace<I: Isa>(isa: I, kernel: &IntersectList, scratch: &mut Scratch, mut slot: Slot) {
     if !kernel.takes(&slot) {
         return;
     }
@@ -94,9 +81,7 @@ fn trace<I: Isa, const LEAF_CACHE: bool>(
     let Scratch { stack, tally, .. } = scratch;
     let mut depth = 0;
     let mut group = Group::default();
-    let mut leaf_groups_postponed = 0;
     loop {
-        let mut postponed = Group::default();
         let mut triangles = Group::default();
         loop {
             if !group.has_children() {
@@ -104,7 +89,7 @@ fn trace<I: Isa, const LEAF_CACHE: bool>(
                     depth -= 1;
                     group = stack[depth];
                 } else {
-                    if next == end || (LEAF_CACHE && postponed.bits != 0) {
+                    if next == end {
                         break;
                     }
                     let listed = kernel.listed(next);
@@ -122,24 +107,16 @@ fn trace<I: Isa, const LEAF_CACHE: bool>(
             group = opened.children;
             triangles = opened.triangles;
             if triangles.bits != 0 {
-                if !LEAF_CACHE || postponed.bits != 0 {
-                    break;
-                }
-                postponed = std::mem::take(&mut triangles);
-                leaf_groups_postponed += 1;
+                break;
             }
         }
-        if postponed.bits | triangles.bits == 0 {
+        if triangles.bits == 0 {
             break;
-        }
-        if LEAF_CACHE {
-            r.test_triangles(&mut visits, &mut best, postponed, any_hit);
         }
         r.test_triangles(&mut visits, &mut best, triangles, any_hit);
         if any_hit && best.leaf != NONE {
             break;
         }
     }
-    tally.add(COUNTER_LEAF_GROUPS, leaf_groups_postponed);
     finish_walk(bound, &world, &best, visits, &mut slot, tally);
 }

@@ -59,6 +59,7 @@ impl Stage {
         let (params, scene) = (&params, &self.scene);
         let bound = Bound {
             params,
+            block: &[0; 16],
             scene,
             bricks: &views,
             slots: &slots,

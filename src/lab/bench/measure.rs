@@ -8,6 +8,7 @@ use super::scenes::Place;
 use crate::cli::options::args::{Cli, Command, WalkArgs};
 use crate::cli::walk;
 use crate::counters::Record;
+use crate::frame::Engine;
 use crate::frame::{Renderer, Schedule};
 use crate::kernels::Extent;
 use crate::output::srgb;
@@ -115,7 +116,7 @@ impl<'a> Bench<'a> {
 
     /// Makes everything resident, so that walks in core begin alike.
     fn load_all(&mut self) -> Result<()> {
-        let Renderer { executor, cache, .. } = &mut self.renderer;
+        let Engine { executor, cache, .. } = &mut self.renderer.engine;
         let items: Vec<Item> = cache.bytes.sizes().items().map(|(item, _)| item).collect();
         let mut rest = &items[..];
         while !rest.is_empty() {

@@ -12,17 +12,18 @@ mod tests;
 use crate::cpu::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernels::dispatch::dispatches;
-use crate::kernels::layout::{DvfTriangle, GBuffer, Hit, Params, Ray, RsmTexel, Surface, TileList};
+use crate::kernels::layout::{DvfGrid, GBuffer, Hit, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList};
+use crate::kernels::table::Family;
 use crate::kernels::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::secondary::df::maps::FieldMaps;
-use crate::secondary::df::{DistanceField, LEVELS};
-use crate::secondary::dvf::maps::DvfMaps;
-use crate::secondary::occupancy::Cascades;
-use crate::secondary::roma::maps::RomaMaps;
-use crate::secondary::rsm::maps::RsmMaps;
+use crate::secondary::FAMILIES;
+use crate::secondary::df::kernels as df;
+use crate::secondary::dvf::kernels as dvf;
+use crate::secondary::roma::kernels as roma;
+use crate::secondary::rsm::kernels as rsm;
 use crate::stream::WorkerPool;
 use bricks::SceneFile;
+use std::any::Any;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
@@ -123,6 +124,15 @@ impl Findings {
         }
     }
 
+    fn texels(&mut self, context: &str, bound: f32, gpu: &[RsmTexel], cpu: &[RsmTexel]) {
+        let light = [gpu, cpu].map(|all| all.iter().flat_map(|texel| texel.flux).collect::<Vec<f32>>());
+        self.numbers("light of shadow maps", context, bound, &light[0], &light[1]);
+        let place =
+            |t: &RsmTexel| [[t.depth, t.facing].map(f32::to_bits), [t.normal[0], t.normal[1]].map(f32::to_bits)];
+        let places = [gpu, cpu].map(|all| all.iter().map(place).collect::<Vec<_>>());
+        self.words("texels of shadow maps", context, &places[0], &places[1]);
+    }
+
     fn report(&mut self, context: &str, gpu: &Report, cpu: &Report) {
         // The kernel of binary trees, a baseline, does not count.
         let counts = !context.contains("IntersectBinary");
@@ -140,7 +150,6 @@ impl Findings {
                 r.pairs_front_to_back,
                 r.tile_batches,
                 r.tile_batch_leaves,
-                r.leaf_groups_postponed,
                 r.rays,
                 counted(r.nodes),
                 counted(r.triangles),
@@ -149,11 +158,9 @@ impl Findings {
                 r.queries_tightened,
                 r.rays_capped,
                 r.rays_answered,
-                r.pilots.rays,
-                r.pilots.missed,
             ]
             .into_iter()
-            .chain(r.pilots.doubted)
+            .chain(r.own)
             .collect::<Vec<u64>>()
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
@@ -170,11 +177,9 @@ impl Findings {
     }
 }
 
-/// The distances of fields as the device keeps them.
-fn words_of(fields: &[DistanceField]) -> Vec<u32> {
-    let levels = fields.iter().flat_map(|field| (0..LEVELS).map(|level| field.level(level)));
-    let pairs = levels.flat_map(|level| level.as_chunks::<2>().0);
-    pairs.map(|[low, high]| u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16).collect()
+/// The name of the kernel of a method that a step runs.
+fn own_kernel(step: &Step) -> Option<&'static str> {
+    if let Step::Own(own) = step { Some(own.kernel) } else { None }
 }
 
 impl Lockstep {
@@ -190,9 +195,9 @@ impl Lockstep {
         self
     }
 
-    /// The distance fields that the processor has made.
-    pub fn fields(&self) -> &[DistanceField] {
-        self.cpu.fields()
+    /// The words of a buffer that the processor has made.
+    pub fn words(&mut self, family: &'static Family, buffer: usize) -> &[u32] {
+        self.cpu.words(family, buffer)
     }
 
     /// Rays that have been made alike on both sides.
@@ -203,7 +208,7 @@ impl Lockstep {
         let surfaces = match pass.set() {
             0 => Vec::new(),
             1 => self.gpu.read_surfaces(Pass::Primary)?,
-            _ => self.gpu.read_surfaces(Pass::Mirror)?,
+            _ => self.gpu.read_surfaces(Pass::Glossy)?,
         };
         let mut findings = self.findings.lock().expect("findings");
         if pass == Pass::Primary {
@@ -285,42 +290,21 @@ impl Lockstep {
                 }
             }
         }
-        if steps.contains(&Step::RomaRotate) {
-            findings.words("columns of maps", context, &self.gpu.read_columns()?, self.cpu.columns());
-        }
-        if steps.iter().any(|step| matches!(step, Step::DvfAreas { .. } | Step::DvfCounts { .. })) {
-            findings.words("sums over triangles", context, &self.gpu.read_dvf_sums()?, &self.cpu.read_dvf_sums()?);
-        }
-        if steps.iter().any(|step| matches!(step, Step::DvfSeen | Step::DvfPoints { .. })) {
-            findings.words(
-                "hits and points in cells",
-                context,
-                &self.gpu.read_dvf_tally()?,
-                &self.cpu.read_dvf_tally()?,
-            );
-        }
-        if steps.iter().any(|step| matches!(step, Step::DvfRays { .. })) {
+        if steps.iter().any(|step| own_kernel(step) == Some("dvf_rays")) {
             findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);
         }
-        if steps.iter().any(|step| matches!(step, Step::DvfWrite { .. } | Step::DvfFinish { .. })) {
-            let (gpu, cpu) = (self.gpu.read_dvf()?, self.cpu.read_dvf()?);
-            findings.words("masks of cells", context, &gpu.0, &cpu.0);
-            findings.words("labels of cells", context, &gpu.1, &cpu.1);
-            let gpu = self.gpu.read_dvf_waiting()?;
-            findings.words("rays that wait", context, &gpu, &self.cpu.dvf_waiting()[..gpu.len()]);
-        }
-        if steps.contains(&Step::FieldMake) {
-            findings.words("distances of fields", context, &self.gpu.read_distances()?, &words_of(self.cpu.fields()));
-        }
-        if steps.iter().any(|step| matches!(step, Step::RsmWrite { .. })) {
-            let (texels, own) = (self.gpu.read_rsm_texels()?, self.cpu.rsm_texels());
-            let light: [Vec<f32>; 2] = [&texels, &*own].map(|all| all.iter().flat_map(|texel| texel.flux).collect());
-            findings.numbers("light of shadow maps", context, self.bound, &light[0], &light[1]);
-            let place =
-                |t: &RsmTexel| [[t.depth, t.facing].map(f32::to_bits), [t.normal[0], t.normal[1]].map(f32::to_bits)];
-            let places: [Vec<_>; 2] = [&texels, &*own].map(|all| all.iter().map(place).collect());
-            findings.words("texels of shadow maps", context, &places[0], &places[1]);
-            *own = texels;
+        let ran = |family: &&Family| steps.iter().filter_map(own_kernel).any(|name| family.kernel(name).is_some());
+        for family in FAMILIES.into_iter().filter(ran) {
+            for (number, buffer) in family.buffers.iter().enumerate().filter(|(_, buffer)| buffer.is_written) {
+                let own = self.cpu.words(family, number);
+                let words = self.gpu.read(family, number, own.len())?;
+                if std::ptr::eq(family, &rsm::FAMILY) {
+                    findings.texels(context, self.bound, bytemuck::cast_slice(&words), bytemuck::cast_slice(own));
+                    *own = words;
+                } else {
+                    findings.words(buffer.name, context, &words, own);
+                }
+            }
         }
         let shades = |step: &Step| {
             matches!(
@@ -331,9 +315,7 @@ impl Lockstep {
                     | Step::Shade(_)
                     | Step::AddLight
                     | Step::AddOcclusion
-                    | Step::RsmLight
-                    | Step::DvfLight
-            )
+            ) || own_kernel(step).is_some_and(|name| ["rsm_light", "dvf_light"].contains(&name))
         };
         if steps.iter().any(shades) {
             let radiance = (self.gpu.read_radiance()?, self.cpu.read_radiance()?);
@@ -385,21 +367,17 @@ impl Executor for Lockstep {
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let context = format!("{pass:?}, {steps:?}");
-        let Tuning { threshold, leaf_cache: has_leaf_cache, .. } = self.tuning;
+        let Tuning { threshold, .. } = self.tuning;
         (*self.gpu.tuning(), *self.cpu.tuning()) = (self.tuning, self.tuning);
         let params = Params { tiles_x: 1, tile: 1, width: 1, height: 1, tiles: 1, threshold, ..Params::default() };
-        let params = Params { field_cells: 32, field_levels: 1, ..params };
         for &step in steps {
             let everything = bricks.all_geometry_resident();
-            for leaf_cache in [false, true] {
-                let list = dispatches(pass, step, &params, &self.directions, leaf_cache, everything);
-                let ran = |name: &str| leaf_cache == has_leaf_cache || !name.starts_with("intersect_list");
-                let names = list.iter().map(|dispatch| dispatch.kernel).filter(|name| ran(name));
-                self.findings.lock().expect("findings").kernels.extend(names);
-            }
+            let list = dispatches(pass, step, &params, &self.directions, everything);
+            let names = list.iter().map(|dispatch| dispatch.kernel);
+            self.findings.lock().expect("findings").kernels.extend(names);
         }
         let rest = match steps {
-            [step @ (Step::Generate | Step::DvfCosine), rest @ ..] => {
+            [step, rest @ ..] if *step == Step::Generate || own_kernel(step) == Some("dvf_cosine") => {
                 self.generate(&context, pass, *step, bricks)?;
                 rest
             }
@@ -461,72 +439,47 @@ impl FrameExecutor for Lockstep {
         self.cpu.set_lamps(lamps)
     }
 
-    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
-        self.gpu.set_cascades(cascades)?;
-        self.cpu.set_cascades(cascades)
+    fn reserve(&mut self, family: &'static Family, elements: &[usize]) -> Result<(), ExecutorError> {
+        self.gpu.reserve(family, elements)?;
+        self.cpu.reserve(family, elements)
     }
 
-    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
-        self.gpu.set_roma(maps)?;
-        let mut own = maps.clone();
-        if self.defect == Some(Defect::Maps) {
-            own.maps.iter_mut().for_each(|map| map.base_from_cell[0][3] += 0.01);
+    fn write(&mut self, family: &'static Family, buffer: usize, at: usize, bytes: &[u8]) {
+        self.gpu.write(family, buffer, at, bytes);
+        let mut own = bytes.to_vec();
+        let is =
+            |defect, of: &Family, number| self.defect == Some(defect) && std::ptr::eq(family, of) && buffer == number;
+        if is(Defect::Maps, &roma::FAMILY, roma::MAPS) {
+            let maps: &mut [RomaMap] = bytemuck::cast_slice_mut(&mut own);
+            maps.iter_mut().for_each(|map| map.base_from_cell[0][3] += 0.01);
         }
-        self.cpu.set_roma(&own)
+        if is(Defect::Fields, &df::FAMILY, df::BOMS) {
+            let words: &mut [u32] = bytemuck::cast_slice_mut(&mut own);
+            let cells = (32.0 * words.len() as f64).cbrt().round() as usize;
+            words[(3 + 5 * cells) * (cells / 32)] |= 1 << 7;
+        }
+        if is(Defect::LampMaps, &rsm::FAMILY, rsm::MAPS) {
+            let maps: &mut [RsmMap] = bytemuck::cast_slice_mut(&mut own);
+            maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
+        }
+        if is(Defect::Points, &dvf::FAMILY, dvf::GRID) {
+            let grids: &mut [DvfGrid] = bytemuck::cast_slice_mut(&mut own);
+            grids.iter_mut().for_each(|grid| grid.seed ^= 1);
+        }
+        self.cpu.write(family, buffer, at, &own);
     }
 
-    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
-        self.gpu.set_field(field)?;
-        let mut own = field.clone();
-        if self.defect == Some(Defect::Fields) {
-            Arc::make_mut(&mut own.cascades).levels.iter_mut().for_each(|bom| bom.occupy([3, 5, 7]));
-        }
-        self.cpu.set_field(&own)
+    fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
+        self.gpu.read(family, buffer, words)
     }
 
-    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
-        self.gpu.set_rsm(maps)?;
-        let mut own = maps.clone();
-        if self.defect == Some(Defect::LampMaps) {
-            own.maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
-        }
-        self.cpu.set_rsm(&own)
+    fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>> {
+        self.gpu.held(family)
     }
 
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.gpu.set_scene(scene);
         self.cpu.set_scene(scene);
-    }
-
-    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
-        self.gpu.set_dvf(maps)?;
-        let mut own = maps.clone();
-        if self.defect == Some(Defect::Points) {
-            own.grid.seed ^= 1;
-        }
-        self.cpu.set_dvf(&own)
-    }
-
-    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError> {
-        self.gpu.set_dvf_triangles(triangles, points)?;
-        self.cpu.set_dvf_triangles(triangles, points)
-    }
-
-    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
-        self.gpu.set_dvf_tally(words)?;
-        self.cpu.set_dvf_tally(words)
-    }
-
-    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
-        self.gpu.read_dvf_tally()
-    }
-
-    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
-        self.gpu.read_dvf()
-    }
-
-    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
-        self.gpu.read_dvf_sums()
     }
 
     fn begin_frame(&mut self, view: &View) {

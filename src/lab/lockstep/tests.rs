@@ -4,40 +4,37 @@
 use super::{Defect, Findings, Lockstep};
 use crate::cpu::CpuExecutor;
 use crate::frame::{
-    Effects, Equirectangular, Light, Moved, Occlusion, RenderSettings, Renderer, Schedule, emissive_triangles,
-    environment,
+    Effects, Engine, Equirectangular, Light, Methods, Moved, Occlusion, RenderSettings, Renderer, Schedule,
+    emissive_triangles, environment,
 };
 use crate::gpu::device::Gpu;
 use crate::gpu::executor::GpuExecutor;
-use crate::gpu::kernels;
 use crate::gpu::kernels::Kernels;
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
-use crate::kernels::dispatch::{
-    DVF_KERNELS, FIELD_KERNELS, INTERSECT_BINARY, ROMA_DRAW, ROMA_MEASURE, ROMA_NEAR, ROMA_ROTATE, ROMA_TRACE,
-    RSM_LIGHT, RSM_WRITE,
-};
 use crate::kernels::frame::Frame;
 use crate::kernels::lamps::{Emitter, Lamps, Shape};
-use crate::kernels::layout::{FIELD_HIT, NONE, Params, Ray};
+use crate::kernels::layout::{MET, NONE, Params, Ray};
+use crate::kernels::table::KERNELS;
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::fronts::Fronts;
 use crate::schedule::{Executor, Lamp, Optimisation, Pass, Step, Tracing};
-use crate::secondary::df::answer::Field;
-use crate::secondary::df::maps::FieldMaps;
-use crate::secondary::df::{DistanceField, FieldSettings};
+use crate::secondary::FAMILIES;
+use crate::secondary::df::answer::Df;
+use crate::secondary::df::kernels as df;
+use crate::secondary::df::maps::DfMaps;
+use crate::secondary::df::{DfSettings, DistanceField, LEVELS};
 use crate::secondary::dvf::answer::{Dvf, DvfTracing, Region};
 use crate::secondary::dvf::renew::Renewal;
 use crate::secondary::dvf::{Cells, DvfSettings, DvfUse};
-use crate::secondary::occupancy::{Bom, Cascades};
+use crate::secondary::occupancy::{Bom, Cascades, Source};
 use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::{Grid, Role, RomaPass, RomaSettings};
 use crate::secondary::rsm::RsmSettings;
-use crate::secondary::rsm::answer::Rsm;
-use crate::stream::{HostCache, HostCacheStats, PayloadSource, Policy, Residency, ResidencyError, Workers};
+use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -180,7 +177,6 @@ struct Variant {
     /// Leaves of the longest list that is intersected.
     list_most: u32,
     without: &'static [Optimisation],
-    with: &'static [Optimisation],
     /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped; what these do for them.
     roma: Option<(u32, Role)>,
     /// Bytes of tiles that a frame may load.
@@ -198,7 +194,6 @@ const VARIANT: Variant = Variant {
     threshold: 0,
     list_most: u32::MAX,
     without: &[],
-    with: &[],
     roma: None,
     tile_bytes: None,
     field: None,
@@ -211,7 +206,6 @@ fn effects() -> Effects {
         environment: true,
         occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
         diffuse: Some(1),
-        mirror: true,
         glossy: true,
         turn_degrees: 360.0,
     }
@@ -244,8 +238,8 @@ fn roma((steps, role): (u32, Role)) -> RomaSettings {
 }
 
 /// Small fields.
-fn field(steps: u32) -> FieldSettings {
-    FieldSettings { size: 32, occlusion_steps: steps, shadow_steps: steps, lift: 1.75, hit: 0.75 }
+fn field(steps: u32) -> DfSettings {
+    DfSettings { size: 32, occlusion_steps: steps, shadow_steps: steps, lift: 1.75, hit: 0.75 }
 }
 
 /// A field of visibility of few points.
@@ -267,11 +261,11 @@ fn lockstep(
         gpu.clone(),
         kernels.clone(),
         scene.clone(),
-        Workers::new(scene.clone(), host(), 1, 0).unwrap(),
+        Workers::new(scene.clone(), host(), 1).unwrap(),
         pages,
         setup,
     );
-    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1, 0).unwrap(), setup);
+    let on_cpu = CpuExecutor::new(scene.clone(), Workers::new(scene.clone(), host(), 1).unwrap(), setup);
     Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone())
 }
 
@@ -304,12 +298,11 @@ fn render(
     }
     let mut tracing = Tracing { measure_needed: true, ..Tracing::default() };
     variant.without.iter().for_each(|&which| tracing.optimisations.set(which, false));
-    variant.with.iter().for_each(|&which| tracing.optimisations.set(which, true));
     let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
     let manifest = &scene.resident().manifest;
     let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
     light.lamps = Arc::new(lamps(scene, top));
-    let mut renderer = Renderer {
+    let engine = Engine {
         scene: scene.clone(),
         executor: Box::new(executor),
         cache: Cache::new(residency, SceneBytes::from(&sizes), None),
@@ -322,8 +315,6 @@ fn render(
             tracing,
             guides: false,
             taa: false,
-            roma: variant.roma.map(roma),
-            field: variant.field.map(field),
             aov: false,
         },
         light,
@@ -333,12 +324,14 @@ fn render(
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
-        roma: Roma::default(),
-        field: Field::default(),
-        rsm: Rsm::default(),
-        dvf: Dvf::default(),
-        host_seen: HostCacheStats::default(),
     };
+    let mut renderer = Renderer { engine, methods: Methods::default() };
+    if let Some(settings) = variant.roma.map(roma) {
+        renderer.methods.set(Roma::new(settings, Source::default()));
+    }
+    if let Some(settings) = variant.field.map(field) {
+        renderer.methods.set(Df::new(settings, Source::default()));
+    }
     let path = path_from_bounds(manifest.min, manifest.max);
     if let Some(settings) = &variant.dvf {
         let made = renderer
@@ -360,7 +353,7 @@ fn render(
             rays: 2000,
             frames: u32::MAX,
         };
-        renderer.dvf = Dvf::new(Arc::new(made.field), how).renewed_by(renewal);
+        renderer.methods.set(Dvf::new(Arc::new(made.field), how).renewed_by(renewal));
     }
     for frame in 0..2 {
         // The second frame scatters directions, and an instance has moved.
@@ -372,7 +365,7 @@ fn render(
         }
         let output = renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
         let renewed = output.records.iter().find(|record| record.pass == "dvf");
-        if renderer.dvf.moved_field().is_some() {
+        if renderer.methods.get::<Dvf>().is_some_and(|dvf| dvf.moved_field().is_some()) {
             assert!(renewed.is_some_and(|record| record.cells_renewed > 0 && record.rays > 0), "{renewed:?}");
         }
     }
@@ -398,11 +391,10 @@ fn twins_agree_with_their_kernels() {
         Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
         Variant { without: &[RootWalk, ByTile, ResidentFirst, NearestFirst], ..VARIANT },
-        Variant { with: &[LeafCache], without: &[RootWalk], ..VARIANT },
+        Variant { without: &[RootWalk], ..VARIANT },
         // Maps drawn by the cosine; by the rays' own strata.
         Variant { roma: Some((0, Role::Answer)), ..VARIANT },
         Variant { roma: Some((3, Role::Answer)), ..VARIANT },
-        Variant { roma: Some((0, Role::Far(2))), ..VARIANT },
         Variant { roma: Some((64, Role::Sift { most_wrong: None })), ..VARIANT },
         Variant { roma: Some((3, Role::Sift { most_wrong: None })), schedule: Schedule::Demand, ..VARIANT },
         Variant { roma: Some((64, Role::Sift { most_wrong: Some(100_000) })), ..VARIANT },
@@ -437,10 +429,8 @@ fn twins_agree_with_their_kernels() {
     }
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
-    let all = kernels::names()
-        .chain([INTERSECT_BINARY, ROMA_ROTATE, ROMA_NEAR, ROMA_TRACE, ROMA_DRAW, ROMA_MEASURE, RSM_WRITE, RSM_LIGHT])
-        .chain(FIELD_KERNELS)
-        .chain(DVF_KERNELS);
+    let families = FAMILIES.into_iter().flat_map(|family| family.kernels);
+    let all = KERNELS.iter().chain(families).map(|kernel| kernel.name);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
     assert!(found.compared.values().all(|&count| count > 100), "{:?}", found.compared);
@@ -477,6 +467,13 @@ fn a_twin_that_differs_is_noticed() {
 }
 
 /// Two levels of base maps with every n-th cell or so occupied; of no n none.
+/// The distances of fields as the device keeps them.
+fn words_of(fields: &[DistanceField]) -> Vec<u32> {
+    let levels = fields.iter().flat_map(|field| (0..LEVELS).map(|level| field.level(level)));
+    let pairs = levels.flat_map(|level| level.as_chunks::<2>().0);
+    pairs.map(|[low, high]| u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16).collect()
+}
+
 fn base_maps(cells: u32, every: Option<u32>) -> Arc<Cascades> {
     let mut state = 0x2545_f491u32;
     let mut level = |cell_log2: i32, first: i64| {
@@ -535,16 +532,18 @@ fn distance_fields_of_all_sizes_are_those_of_their_twins() {
             executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
             let maps = base_maps(cells, every);
             let own: Vec<DistanceField> = maps.levels.iter().map(DistanceField::new).collect();
-            executor.set_field(&FieldMaps::new(&maps, &frame, &field(64))).unwrap();
-            executor.run(pass, &[Step::FieldMake], &cache.states).unwrap();
-            assert_eq!(executor.fields() == own, defect.is_none(), "{cells}, {every:?}");
+            let fields = DfMaps::new(&maps, &frame, &field(64));
+            fields.give(&mut executor).unwrap();
+            executor.run(pass, &fields.make(), &cache.states).unwrap();
+            let is_own = executor.words(&df::FAMILY, df::DISTANCES) == words_of(&own);
+            assert_eq!(is_own, defect.is_none(), "{cells}, {every:?}");
             executor.set_rays(pass, &rays(cells));
             let mut hits = 0;
             for steps in [64, 16] {
-                executor.run(pass, &[Step::StartHits, Step::FieldTrace { steps }], &cache.states).unwrap();
+                executor.run(pass, &[Step::StartHits, fields.trace(steps)], &cache.states).unwrap();
                 let met = executor.read_hits(pass).unwrap();
-                assert!(met.iter().all(|hit| hit.id == FIELD_HIT || hit.id == NONE));
-                hits += met.iter().filter(|hit| hit.id == FIELD_HIT).count();
+                assert!(met.iter().all(|hit| hit.id == MET || hit.id == NONE));
+                hits += met.iter().filter(|hit| hit.id == MET).count();
             }
             let found = findings.lock().unwrap();
             if defect.is_none() {
@@ -553,7 +552,7 @@ fn distance_fields_of_all_sizes_are_those_of_their_twins() {
                 let is_dense = every.is_some_and(|every| every < 10_000);
                 assert!(if is_dense { hits > 200 } else { every.is_some() || hits == 0 }, "{cells}, {every:?}: {hits}");
             } else {
-                assert!(found.differences[0].contains("distances of fields"), "{:?}", found.differences);
+                assert!(found.differences[0].contains("distances"), "{:?}", found.differences);
             }
         }
     }

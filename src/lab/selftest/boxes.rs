@@ -205,7 +205,7 @@ fn entered(lab: &Lab, cases: &[BoxCase]) -> Result<Vec<(u32, [f32; 8])>> {
         };
         return Ok(cases.iter().map(one).collect());
     };
-    let text = kernels::source("probe_boxes", Pages { cache: 1, texels: 1, opacity: false, gloss: false });
+    let text = kernels::source("probe/probe_boxes", Pages { cache: 1, texels: 1, opacity: false, gloss: false });
     let text = lab.defect.map_or(text.clone(), |defect| defect.plant(text));
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("probe_boxes"),

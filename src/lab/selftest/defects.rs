@@ -8,18 +8,15 @@ use crate::gpu::kernels;
 use crate::gpu::kernels::Kernels;
 use crate::gpu::wgsl::Pages;
 use crate::kernels::frame::Frame;
-use crate::kernels::layout::{DvfTriangle, GBuffer, Hit, Ray, Surface};
+use crate::kernels::layout::{GBuffer, Hit, Ray, Surface};
+use crate::kernels::table::Family;
 use crate::kernels::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::secondary::df::maps::FieldMaps;
-use crate::secondary::dvf::maps::DvfMaps;
-use crate::secondary::occupancy::Cascades;
-use crate::secondary::roma::maps::RomaMaps;
-use crate::secondary::rsm::maps::RsmMaps;
 use crate::stream::WorkerPool;
 use anyhow::{Result, bail};
 use bricks::SceneFile;
 use glam::DVec3;
+use std::any::Any;
 use std::sync::Arc;
 
 crate::cli::options::named::named_values! {
@@ -161,7 +158,7 @@ impl Defect {
     /// # Errors
     /// No kernel has the text that would be replaced.
     pub fn kernels(self, gpu: &Gpu, pages: Pages) -> Result<Kernels> {
-        let names = ["intersect_all", "intersect_list"];
+        let names = ["trace/intersect_all", "trace/intersect_list"];
         let texts = names.map(|name| kernels::source(name, pages));
         for (sound, _) in self.changes() {
             if !texts.iter().any(|text| text.contains(sound)) {
@@ -270,48 +267,24 @@ impl FrameExecutor for Faulty {
         self.inner.set_lamps(lamps)
     }
 
-    fn set_cascades(&mut self, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
-        self.inner.set_cascades(cascades)
+    fn reserve(&mut self, family: &'static Family, elements: &[usize]) -> Result<(), ExecutorError> {
+        self.inner.reserve(family, elements)
     }
 
-    fn set_roma(&mut self, maps: &RomaMaps) -> Result<(), ExecutorError> {
-        self.inner.set_roma(maps)
+    fn write(&mut self, family: &'static Family, buffer: usize, at: usize, bytes: &[u8]) {
+        self.inner.write(family, buffer, at, bytes);
     }
 
-    fn set_field(&mut self, field: &FieldMaps) -> Result<(), ExecutorError> {
-        self.inner.set_field(field)
+    fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
+        self.inner.read(family, buffer, words)
     }
 
-    fn set_rsm(&mut self, maps: &RsmMaps) -> Result<(), ExecutorError> {
-        self.inner.set_rsm(maps)
+    fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>> {
+        self.inner.held(family)
     }
 
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.inner.set_scene(scene);
-    }
-
-    fn set_dvf(&mut self, maps: &DvfMaps) -> Result<(), ExecutorError> {
-        self.inner.set_dvf(maps)
-    }
-
-    fn set_dvf_triangles(&mut self, triangles: &[DvfTriangle], points: u32) -> Result<(), ExecutorError> {
-        self.inner.set_dvf_triangles(triangles, points)
-    }
-
-    fn set_dvf_tally(&mut self, words: &[u32]) -> Result<(), ExecutorError> {
-        self.inner.set_dvf_tally(words)
-    }
-
-    fn read_dvf_tally(&mut self) -> Result<Vec<u32>, ExecutorError> {
-        self.inner.read_dvf_tally()
-    }
-
-    fn read_dvf(&mut self) -> Result<(Vec<u32>, Vec<u32>), ExecutorError> {
-        self.inner.read_dvf()
-    }
-
-    fn read_dvf_sums(&mut self) -> Result<Vec<[u32; 2]>, ExecutorError> {
-        self.inner.read_dvf_sums()
     }
 
     fn begin_frame(&mut self, view: &View) {

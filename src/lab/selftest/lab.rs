@@ -139,10 +139,10 @@ impl Lab {
     }
 
     fn executor(&mut self, needs: Needs) -> Result<Box<dyn FrameExecutor>> {
-        let Needs { scene, host, threads: (threads, prefetch), page_sizes, setup } = needs;
+        let Needs { scene, host, threads, page_sizes, setup } = needs;
         let executor: Box<dyn FrameExecutor> = match &self.device {
             Device::Cpu => {
-                let workers = Workers::new(scene.clone(), host, threads, prefetch)?;
+                let workers = Workers::new(scene.clone(), host, threads)?;
                 Box::new(CpuExecutor::new(scene.clone(), workers, setup)?)
             }
             Device::Gpu(gpu) => {
@@ -157,7 +157,7 @@ impl Lab {
                 if !self.kernels.iter().any(|known| known.pages == pages) {
                     self.kernels.push(kernels.clone());
                 }
-                let workers = Workers::new(scene.clone(), host, threads, prefetch)?;
+                let workers = Workers::new(scene.clone(), host, threads)?;
                 let gpu = gpu.as_ref().clone();
                 Box::new(GpuExecutor::with_kernels(gpu, kernels, scene.clone(), workers, page_sizes, setup)?)
             }

@@ -3,13 +3,13 @@
 use super::case::Checks;
 use super::lab::{Lab, Stage, settings};
 use crate::cli::trace::EXTENT;
-use crate::kernels::layout::{Hit, NONE, Params, ROMA_HIT, Ray, RomaLevel, RomaMap};
+use crate::kernels::layout::{Hit, Level, MET, NONE, Params, Ray, RomaMap};
 use crate::kernels::{Directions, View};
 use crate::math::sampling::pcg;
-use crate::schedule::{Lamp, Pass, RomaPart, Step};
+use crate::schedule::{Lamp, Pass, Step};
 use crate::secondary::occupancy::{Bom, Cascades};
-use crate::secondary::roma::MOST_STEPS;
 use crate::secondary::roma::maps::RomaMaps;
+use crate::secondary::roma::{MOST_STEPS, RomaPart};
 use anyhow::Result;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Rng, one_mesh};
@@ -33,7 +33,7 @@ fn aligned(cells: u32, levels: &[(f32, f32)], axis: usize) -> RomaMaps {
         direction[axis] = 1.0;
         RomaMap { cell_from_point: there, base_from_cell: back, direction }
     };
-    let level = |&(scale, first): &(f32, f32)| RomaLevel { first: [first; 3], scale, ..RomaLevel::default() };
+    let level = |&(scale, first): &(f32, f32)| Level { first: [first; 3], scale, ..Level::default() };
     RomaMaps {
         k: 1,
         size: cells,
@@ -57,24 +57,19 @@ fn make(stage: &mut Stage, boms: Vec<Bom>, maps: &RomaMaps) -> Result<()> {
     let frame = stage.frame(DVec3::ZERO);
     let executor = &mut *stage.session.executor;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
-    executor.set_cascades(&Arc::new(Cascades { levels: boms }))?;
-    executor.set_roma(maps)?;
-    executor.run(Pass::Shadow(Lamp::Sun), &[Step::RomaRotate], &stage.session.cache.states)?;
+    maps.give(executor, &Arc::new(Cascades { levels: boms }))?;
+    executor.run(Pass::Shadow(Lamp::Sun), &[maps.rotate()], &stage.session.cache.states)?;
     Ok(())
 }
 
 /// What the maps that were made answer.
-fn answers(stage: &mut Stage, rays: &[Ray], steps: u32) -> Result<Vec<Hit>> {
+fn answers(stage: &mut Stage, maps: &RomaMaps, rays: &[Ray], steps: u32) -> Result<Vec<Hit>> {
     let pass = Pass::Shadow(Lamp::Sun);
     let executor = &mut *stage.session.executor;
     let mut hits = Vec::with_capacity(rays.len());
     for chunk in rays.chunks(EXTENT.rays()) {
         executor.set_rays(pass, chunk);
-        executor.run(
-            pass,
-            &[Step::StartHits, Step::RomaTrace { steps, part: RomaPart::Whole }],
-            &stage.session.cache.states,
-        )?;
+        executor.run(pass, &[Step::StartHits, maps.trace(steps, RomaPart::Whole)], &stage.session.cache.states)?;
         hits.extend_from_slice(&executor.read_hits(pass)?[..chunk.len()]);
     }
     Ok(hits)
@@ -140,7 +135,8 @@ pub fn bits(lab: &mut Lab) -> Result<Checks> {
                 }
             }
         }
-        make(&mut stage, vec![bom], &aligned(size, &[(1.0, 0.0)], 2))?;
+        let maps = aligned(size, &[(1.0, 0.0)], 2);
+        make(&mut stage, vec![bom], &maps)?;
         let (mut wrong, mut unlike, mut of) = (0u64, 0u64, 0u64);
         for (i, pattern) in patterns.iter().enumerate() {
             let [x, y] = place(i).map(|x| x as f32 + 0.5);
@@ -163,9 +159,9 @@ pub fn bits(lab: &mut Lab) -> Result<Checks> {
                 .collect();
             let rays: Vec<Ray> = pairs.iter().copied().map(ray).collect();
             let other = &patterns[(i + 1) % patterns.len()];
-            for (&(from, to, is_upward), hit) in pairs.iter().zip(answers(&mut stage, &rays, 0)?) {
-                let found = (hit.id == ROMA_HIT).then_some(hit.t);
-                let is_sound = hit.id == ROMA_HIT || hit.id == NONE;
+            for (&(from, to, is_upward), hit) in pairs.iter().zip(answers(&mut stage, &maps, &rays, 0)?) {
+                let found = (hit.id == MET).then_some(hit.t);
+                let is_sound = hit.id == MET || hit.id == NONE;
                 wrong += u64::from(!is_sound || found != first_met(pattern, size, from, to, is_upward));
                 unlike += u64::from(found != first_met(other, size, from, to, is_upward));
                 of += 1;
@@ -230,7 +226,7 @@ fn is_right(ray: &Ray, hit: &Hit, boxes: &[[DVec3; 2]], levels: usize) -> bool {
     let is_past = || met.iter().any(|([_, to], is_certain)| *is_certain && to + slack < t);
     match hit.id {
         NONE => met.iter().all(|(_, is_certain)| !is_certain),
-        ROMA_HIT => is_in_one() && !is_past(),
+        MET => is_in_one() && !is_past(),
         _ => false,
     }
 }
@@ -266,14 +262,15 @@ pub fn leaving(lab: &mut Lab) -> Result<Checks> {
         let mut bom = Bom::new(cells, 0, [0; 3]);
         let occupied: Vec<[u32; 3]> = (0..800).map(|_| [0; 3].map(|_| rng.range(0.0, 32.0) as u32)).collect();
         occupied.iter().for_each(|&cell| bom.occupy(cell));
-        make(&mut stage, vec![bom], &aligned(cells, &[(1.0, 0.0)], axis))?;
+        let maps = aligned(cells, &[(1.0, 0.0)], axis);
+        make(&mut stage, vec![bom], &maps)?;
         let boxes: Vec<[DVec3; 2]> = occupied.iter().map(|c| of_cell(c.map(f64::from), 1.0)).collect();
         let rays = anywhere(&mut rng, count, [-8.0, 40.0]);
-        let hits = answers(&mut stage, &rays, MOST_STEPS)?;
+        let hits = answers(&mut stage, &maps, &rays, MOST_STEPS)?;
         let wrong =
             |boxes: &[[DVec3; 2]]| rays.iter().zip(&hits).filter(|(r, h)| !is_right(r, h, boxes, 1)).count() as u64;
         checks.none(&format!("answers unlike brute force, columns along axis {axis}"), wrong(&boxes), count as u64);
-        let met = hits.iter().filter(|hit| hit.id == ROMA_HIT).count() as u64;
+        let met = hits.iter().filter(|hit| hit.id == MET).count() as u64;
         checks.at_least("rays that meet something", met, count as u64 / 20);
         let aside: Vec<[DVec3; 2]> = boxes.iter().map(|b| b.map(|p| p + DVec3::X)).collect();
         checks.at_least("answers unlike those of cells one aside", wrong(&aside), count as u64 / 40);
@@ -292,9 +289,10 @@ pub fn leaving(lab: &mut Lab) -> Result<Checks> {
             boxes.push(of_cell(cell.map(|x| 2.0 * f64::from(x) - 16.0), 2.0));
         }
     }
-    make(&mut stage, levels, &aligned(cells, &[(1.0, 0.0), (0.5, 8.0)], 1))?;
+    let maps = aligned(cells, &[(1.0, 0.0), (0.5, 8.0)], 1);
+    make(&mut stage, levels, &maps)?;
     let rays = anywhere(&mut rng, count, [2.0, 30.0]);
-    let hits = answers(&mut stage, &rays, MOST_STEPS)?;
+    let hits = answers(&mut stage, &maps, &rays, MOST_STEPS)?;
     let wrong = |boxes: &[[DVec3; 2]]| rays.iter().zip(&hits).filter(|(r, h)| !is_right(r, h, boxes, 2)).count() as u64;
     checks.none("answers unlike brute force where rays go on in the next level", wrong(&boxes), count as u64);
     let inner: Vec<[DVec3; 2]> = boxes.iter().filter(|[low, high]| (*high - *low).x < 1.5).copied().collect();

@@ -2,6 +2,7 @@
 
 use super::case::Checks;
 use super::lab::{Lab, settings};
+use crate::frame::Engine;
 use crate::frame::{Accumulation, BATCH_SAMPLES, Renderer, camera_view};
 use crate::scene::Camera;
 use crate::schedule::{Lamp, Pass, Shading, Step};
@@ -33,13 +34,13 @@ fn add_samples(renderer: &mut Renderer, camera: &Camera, first: u32, count: u32)
     let view = camera_view(resident, camera, &renderer.light, &effects, renderer.size, first, 0);
     renderer.executor.begin_frame(&view);
     let pass = Pass::Shadow(Lamp::Sun);
-    let states = &renderer.cache.states;
-    renderer.executor.run(pass, &[Step::ClearAttributes, Step::Resolve], states)?;
+    let Engine { executor, cache, .. } = &mut renderer.engine;
+    executor.run(pass, &[Step::ClearAttributes, Step::Resolve], &cache.states)?;
     let shade =
         [Step::Shade(Shading { sun: true, sky: true, emission: true, miss: true, environment: false, gloss: false });
             STEPS as usize];
     for _ in 0..count / STEPS {
-        renderer.executor.run(pass, &shade, states)?;
+        executor.run(pass, &shade, &cache.states)?;
     }
     Ok(())
 }

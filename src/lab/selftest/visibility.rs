@@ -3,11 +3,12 @@
 use super::case::Checks;
 use super::lab::{Lab, Stage, settings};
 use crate::frame::{Equirectangular, environment};
-use crate::kernels::layout::{DVF_HIT, DvfTriangle, NONE, Params, Ray};
+use crate::kernels::layout::{DvfTriangle, MET, NONE, Params, Ray};
 use crate::kernels::{Directions, Lamps, View};
 use crate::scene::Camera;
 use crate::schedule::{Lamp, Pass, Step};
 use crate::secondary::dvf::answer::{Dvf, DvfTracing, Region};
+use crate::secondary::dvf::kernels;
 use crate::secondary::dvf::maps::{DvfMaps, directions, sum};
 use crate::secondary::dvf::{Areas, Cells, DvfField, DvfSettings, DvfUse, Shape, mask};
 use anyhow::Result;
@@ -59,13 +60,13 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
     ];
     let rays: Vec<Ray> = cases.iter().map(|case| case.1).collect();
     let field = Arc::new(field);
-    executor.set_dvf(&DvfMaps::to_answer(&field, &frame, DvfUse { doubt: true, ..DvfUse::default() }))?;
+    DvfMaps::to_answer(&field, &frame, DvfUse { doubt: true, ..DvfUse::default() }).give(executor)?;
     executor.set_rays(PASS, &rays);
-    let report = executor.run(PASS, &[Step::StartHits, Step::DvfSift], &stage.session.cache.states)?;
+    let report = executor.run(PASS, &[Step::StartHits, kernels::sift()], &stage.session.cache.states)?;
     let hits = executor.read_hits(PASS)?;
     for ((what, ray, is_answered), hit) in cases.iter().zip(&hits) {
         checks.equal(&format!("{what}: answered"), hit.t < ray.t_min, *is_answered);
-        checks.equal(&format!("{what}: said to be met"), hit.id == DVF_HIT, false);
+        checks.equal(&format!("{what}: said to be met"), hit.id == MET, false);
         checks.equal(&format!("{what}: nothing was met"), hit.id == NONE, true);
     }
     let expected = cases.iter().filter(|case| case.2).count() as u64;
@@ -103,11 +104,11 @@ pub fn prefix_sums(lab: &mut Lab) -> Result<Checks> {
     let mut areas = Areas::of(count as u64, 1e6);
     let mut total = 0u64;
     for group in triangles.chunks(GROUP) {
-        executor.set_dvf(&DvfMaps::to_make(&shape, &frame, &plan, 1, &areas, &table))?;
-        executor.set_dvf_triangles(group, 0)?;
-        executor.run(PASS, &[Step::DvfAreas { triangles: group.len() as u32 }], states)?;
+        DvfMaps::to_make(&shape, &frame, &plan, 1, &areas, &table).give(executor)?;
+        kernels::give_triangles(executor, group, 0)?;
+        executor.run(PASS, &kernels::areas(group.len() as u32), states)?;
         let before = total;
-        total += executor.read_dvf_sums()?.last().map_or(0, |&words| sum(words));
+        total += kernels::read_sums(executor)?.last().map_or(0, |&words| sum(words));
         checks.holds("a group adds at least one step a triangle", total - before >= group.len() as u64);
     }
     areas = areas.with_sum(total);
@@ -115,10 +116,10 @@ pub fn prefix_sums(lab: &mut Lab) -> Result<Checks> {
     checks.at_most("relative error of the sum", (f64::from(areas.total) / truth - 1.0).abs(), 1e-6);
     let (mut falls, mut empty, mut wrong, mut points) = (0u64, 0u64, 0u64, 0u64);
     for group in triangles.chunks(GROUP) {
-        executor.set_dvf(&DvfMaps::to_make(&shape, &frame, &plan, 1, &areas, &table))?;
-        executor.set_dvf_triangles(group, 0)?;
-        executor.run(PASS, &[Step::DvfCounts { triangles: group.len() as u32 }], states)?;
-        let sums = executor.read_dvf_sums()?;
+        DvfMaps::to_make(&shape, &frame, &plan, 1, &areas, &table).give(executor)?;
+        kernels::give_triangles(executor, group, 0)?;
+        executor.run(PASS, &kernels::counts(group.len() as u32), states)?;
+        let sums = kernels::read_sums(executor)?;
         let last = sums.last().map_or(0, |words| words[0]);
         let prefix: Vec<u32> = sums[..group.len()].iter().map(|words| words[0]).chain([last]).collect();
         falls += prefix.windows(2).filter(|pair| pair[1] < pair[0]).count() as u64;
@@ -192,7 +193,7 @@ pub fn closed_box(lab: &mut Lab) -> Result<Checks> {
     let made = renderer.make_dvf(&plan, &Region::scene(file.resident()), DvfTracing::over(64), &mut |_, _| true)?;
     checks.at_least("points", made.points, 4000);
     for doubt in [false, true] {
-        renderer.dvf = Dvf::new(Arc::new(made.field.clone()), DvfUse { doubt, ..DvfUse::default() });
+        renderer.methods.set(Dvf::new(Arc::new(made.field.clone()), DvfUse { doubt, ..DvfUse::default() }));
         let frame = renderer.frame(0, &camera)?;
         let least = frame.pixels.radiance.iter().flatten().copied().fold(f32::MAX, f32::min);
         let most = frame.pixels.radiance.iter().flatten().copied().fold(f32::MIN, f32::max);

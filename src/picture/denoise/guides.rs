@@ -161,7 +161,6 @@ impl GuideReader {
         let hits: Vec<Hit> = executor.read_hits(Pass::Primary)?;
         let surfaces: Vec<Surface> = executor.read_surfaces(Pass::Primary)?;
         let gbuffer: Vec<GBuffer> = executor.read_gbuffer()?;
-        let share = view.params.surface_share;
         let in_f64 = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
         let all = rays.iter().zip(&hits).zip(surfaces.iter().zip(&gbuffer));
         self.seen = all
@@ -177,7 +176,7 @@ impl GuideReader {
                     id: hit.id,
                     footprint: if is_hit { self.projection.footprint(point) as f32 } else { 0.0 },
                     albedo: if is_hit { albedo(g, materials, ray) } else { [0.0; 3] },
-                    emission: if is_hit { g.emission.map(|x| share * x) } else { [0.0; 3] },
+                    emission: if is_hit { g.emission } else { [0.0; 3] },
                 }
             })
             .collect();

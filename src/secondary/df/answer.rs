@@ -1,65 +1,68 @@
 //! Occlusion and shadow rays that distance fields answer: of which maps, and when they are made.
 
-use super::FieldSettings;
-use super::maps::FieldMaps;
-use crate::frame::Renderer;
-use crate::kernels::FrameExecutor;
-use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step};
-use crate::secondary::occupancy::Cascades;
-use crate::secondary::roma::answer::Roma;
-use bricks::SceneFile;
+use super::DfSettings;
+use super::maps::DfMaps;
+use crate::frame::{Displaced, Engine, Plan, Secondary};
+use crate::kernels::View;
+use crate::scene::Camera;
+use crate::schedule::{ExecutorError, Lamp, Pass};
+use crate::secondary::occupancy::{BaseMaps, Cascades, Source};
 use std::sync::Arc;
 
-/// The distance fields that the executor has.
-#[derive(Default)]
-pub struct Field {
-    /// What they were made of.
+/// Rays answered by distance fields.
+pub struct Df {
+    settings: DfSettings,
+    /// The base maps.
+    pub base: BaseMaps,
+    /// What the fields that the executor has were made of.
     made: Option<Arc<Cascades>>,
 }
 
-impl Field {
+impl Df {
+    /// With base maps that are made of `source`.
+    pub fn new(settings: DfSettings, source: Source) -> Self {
+        Self { settings, base: BaseMaps::new(source), made: None }
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &DfSettings {
+        &self.settings
+    }
+
     /// Look-ups of a ray of `pass` at most; `None` where rays are traced.
-    pub fn steps_of(settings: &FieldSettings, pass: Pass) -> Option<u32> {
+    fn steps_of(&self, pass: Pass) -> Option<u32> {
         match pass {
-            Pass::Occlusion(_) => Some(settings.occlusion_steps),
+            Pass::Occlusion(_) => Some(self.settings.occlusion_steps),
             Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
-                Some(settings.shadow_steps)
+                Some(self.settings.shadow_steps)
             }
             _ => None,
         }
     }
-
-    /// Has the executor take the fields of the base maps of `roma`; the step that makes them, unless it has made them.
-    ///
-    /// # Errors
-    /// The executor's.
-    pub fn prepare(
-        &mut self,
-        roma: &mut Roma,
-        executor: &mut dyn FrameExecutor,
-        scene: &Arc<SceneFile>,
-        settings: &FieldSettings,
-    ) -> Result<Option<Step>, ExecutorError> {
-        let Some((cascades, frame)) = roma.base_maps(scene, settings.size)? else { return Ok(None) };
-        executor.set_field(&FieldMaps::new(&cascades, &frame, settings))?;
-        if self.made.as_ref().is_some_and(|made| Arc::ptr_eq(made, &cascades)) {
-            return Ok(None);
-        }
-        self.made = Some(cascades);
-        Ok(Some(Step::FieldMake))
-    }
 }
 
-impl Renderer {
-    /// Has fields answer the rays of `pass`, if settings ask for it, and `add`s the light that comes through; whether
-    /// they did.
-    pub(crate) fn add_by_field(&mut self, pass: Pass, add: Step, stats: &mut PassStats) -> Result<bool, ExecutorError> {
-        let Some(settings) = self.settings.field else { return Ok(false) };
-        let Some(steps) = Field::steps_of(&settings, pass) else { return Ok(false) };
-        let make = self.field.prepare(&mut self.roma, &mut *self.executor, &self.scene, &settings)?;
-        let steps: Vec<Step> =
-            std::iter::once(Step::Generate).chain(make).chain([Step::FieldTrace { steps }, add]).collect();
-        stats.add(self.executor.run(pass, &steps, &self.cache.states)?);
-        Ok(true)
+impl Secondary for Df {
+    fn begin(&mut self, camera: &Camera, view: &View) {
+        self.base.begin(camera.position, view);
+    }
+
+    fn plan(&mut self, engine: &mut Engine, pass: Pass, plan: &mut Plan) -> Result<(), ExecutorError> {
+        let Some(steps) = self.steps_of(pass) else { return Ok(()) };
+        let size = self.settings.size;
+        let cascades = self.base.assemble(&engine.scene, size, size)?.clone();
+        let Some(view) = self.base.view() else { return Ok(()) };
+        let maps = DfMaps::new(&cascades, &view.frame, &self.settings);
+        maps.give(&mut *engine.executor)?;
+        if self.made.as_ref().is_none_or(|made| !Arc::ptr_eq(made, &cascades)) {
+            self.made = Some(cascades);
+            plan.before.extend(maps.make());
+        }
+        plan.before.push(maps.trace(steps));
+        plan.is_whole = true;
+        Ok(())
+    }
+
+    fn scene_has_moved(&mut self, _displaced: &Displaced) {
+        self.base.scene_has_moved();
     }
 }

@@ -110,11 +110,45 @@ impl DistanceField {
         std::array::from_fn(|k| (point[k] / self.side - self.first[k] as f64) as f32)
     }
 
-    /// The distance at a point, [`local`](Self::local), of a level: of the eight cells whose middles are around it, by
+    /// Its distances.
+    pub fn view(&self) -> FieldView<'_> {
+        FieldView { cells: self.cells, levels: std::array::from_fn(|level| &self.levels[level][..]) }
+    }
+
+    /// As of [`FieldView::distance`].
+    pub fn distance(&self, level: usize, point: [f32; 3]) -> f32 {
+        self.view().distance(level, point)
+    }
+}
+
+/// The distances of a field.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldView<'a> {
+    cells: u32,
+    levels: [&'a [f16]; LEVELS],
+}
+
+impl<'a> FieldView<'a> {
+    /// Of a field of so many cells on each axis.
+    pub fn new(cells: u32, levels: [&'a [f16]; LEVELS]) -> Self {
+        Self { cells, levels }
+    }
+
+    /// Cells of a level on each axis.
+    pub fn cells(&self, level: usize) -> u32 {
+        self.cells >> level
+    }
+
+    /// Whether any cell is occupied: then flooding has found one near every cell.
+    pub fn has_seed(&self) -> bool {
+        self.levels[0].first().is_some_and(|distance| distance.is_finite())
+    }
+
+    /// The distance at a point, [`DistanceField::local`], of a level: of the eight cells whose middles are around it, by
     /// their nearness; beyond the outermost middles as there. Cells of the finest level; infinite of a map without
     /// occupied cells.
     pub fn distance(&self, level: usize, point: [f32; 3]) -> f32 {
-        if !self.has_seed {
+        if !self.has_seed() {
             return f32::INFINITY;
         }
         let count = self.cells(level);

@@ -17,13 +17,12 @@ pub(crate) fn squared([x, y, z]: [u32; 3], seed: u32) -> u32 {
     of(x, seed).wrapping_add(of(y, seed >> 10)).wrapping_add(of(z, seed >> 20))
 }
 
-/// Begins flooding: the nearest occupied cell to one that is occupied is itself, to others none is known. Twin of
+/// Begins flooding a map of these words: the nearest occupied cell to one that is occupied is itself, to others none is known. Twin of
 /// `shaders/df/flood_seeds.wgsl`.
-pub fn seeds(map: &Bom, nearest: &mut [u32]) {
-    let cells = map.cells();
+pub fn seeds(cells: u32, words: &[u32], nearest: &mut [u32]) {
     nearest.par_chunks_mut(plane(cells)).zip(0..cells).for_each(|(out, x)| {
         for (cell, (y, z)) in out.iter_mut().zip((0..cells).flat_map(|y| (0..cells).map(move |z| (y, z)))) {
-            let is_seed = map.is_occupied([x, y, z].map(i64::from));
+            let is_seed = words[((x + y * cells) * (cells / 32) + z / 32) as usize] >> (z % 32) & 1 != 0;
             *cell = if is_seed { pack([x, y, z]) } else { NO_SEED };
         }
     });
@@ -50,7 +49,7 @@ fn plane(cells: u32) -> usize {
 pub fn jump_flood(map: &Bom) -> Vec<u32> {
     let cells = map.cells();
     let mut nearest = vec![NO_SEED; cells.pow(3) as usize];
-    seeds(map, &mut nearest);
+    seeds(cells, map.words(), &mut nearest);
     if nearest.iter().all(|&seed| seed == NO_SEED) {
         return nearest;
     }

@@ -1,34 +1,37 @@
 //! Distance fields as kernels see them: placed in a frame.
 
-use super::{FieldSettings, LEVELS};
+use super::kernels::{BOMS, FAMILY, MAPS};
+use super::{DfSettings, LEVELS};
+use crate::kernels::FrameExecutor;
 use crate::kernels::frame::Frame;
-use crate::kernels::layout::{Params, RomaLevel};
+use crate::kernels::layout::Level;
+use crate::schedule::ExecutorError;
 use crate::secondary::occupancy::{Bom, Cascades};
 use glam::DVec3;
 use std::sync::Arc;
 
 /// Fields of all base maps, placed in a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct FieldMaps {
+pub struct DfMaps {
     /// The base maps, of which the fields are made.
     pub cascades: Arc<Cascades>,
     /// Where they lie, the finest first.
-    pub levels: Vec<RomaLevel>,
+    pub levels: Vec<Level>,
     /// How near something is met, cells.
     pub hit: f32,
 }
 
-impl FieldMaps {
+impl DfMaps {
     /// Those of `cascades`.
-    pub fn new(cascades: &Arc<Cascades>, frame: &Frame, settings: &FieldSettings) -> Self {
+    pub fn new(cascades: &Arc<Cascades>, frame: &Frame, settings: &DfSettings) -> Self {
         let level = |bom: &Bom| {
             let first = frame.origin / bom.side() - DVec3::from_array(bom.first.map(|x| x as f64));
             let per_unit = frame.unit / bom.side();
-            RomaLevel {
+            Level {
                 first: first.as_vec3().to_array(),
                 scale: per_unit as f32,
                 lift: (settings.lift / per_unit) as f32,
-                ..RomaLevel::default()
+                ..Level::default()
             }
         };
         let levels = cascades.levels.iter().map(level).collect();
@@ -40,9 +43,27 @@ impl FieldMaps {
         self.cascades.levels.first().map_or(0, Bom::cells)
     }
 
-    /// `params` with what kernels need to know of them.
-    pub fn params(&self, params: Params) -> Params {
-        Params { field_cells: self.cells(), field_levels: self.levels.len() as u32, field_hit: self.hit, ..params }
+    /// Gives an executor the base maps, unless it has them, and places the fields. Those that were made last stay as long
+    /// as their maps do.
+    ///
+    /// # Errors
+    /// More than the device holds in one buffer, with how much it does.
+    pub fn give(&self, executor: &mut dyn FrameExecutor) -> Result<(), ExecutorError> {
+        let held = executor.held(&FAMILY).as_ref().and_then(|held| held.downcast_ref::<Arc<Cascades>>());
+        let is_held = held.is_some_and(|held| Arc::ptr_eq(held, &self.cascades));
+        let boms = self.cascades.levels.iter().map(|bom| bom.words().len()).sum();
+        let lengths = [self.levels.len(), boms, self.nearest_words() as usize, self.distance_words() as usize];
+        executor.reserve(&FAMILY, &lengths)?;
+        executor.write(&FAMILY, MAPS, 0, bytemuck::cast_slice(&self.levels));
+        if !is_held {
+            let mut at = 0;
+            for words in self.cascades.levels.iter().map(Bom::words) {
+                executor.write(&FAMILY, BOMS, at, bytemuck::cast_slice(words));
+                at += size_of_val(words);
+            }
+            *executor.held(&FAMILY) = Some(Box::new(self.cascades.clone()));
+        }
+        Ok(())
     }
 
     /// Words of the nearest cells that flooding keeps: those of one field, twice.
@@ -66,8 +87,8 @@ mod tests {
         let frame = Frame { reference: [0; 3], unit: 0.25, origin: DVec3::new(5.0, -3.0, 2.0) };
         let boms = vec![Bom::new(64, -2, [-4, -20, 1]), Bom::new(64, -1, [-10, -18, -7])];
         let cascades = Arc::new(Cascades { levels: boms });
-        let settings = FieldSettings { size: 64, occlusion_steps: 64, shadow_steps: 16, lift: 2.0, hit: 0.75 };
-        let maps = FieldMaps::new(&cascades, &frame, &settings);
+        let settings = DfSettings { size: 64, occlusion_steps: 64, shadow_steps: 16, lift: 2.0, hit: 0.75 };
+        let maps = DfMaps::new(&cascades, &frame, &settings);
         for (bom, level) in cascades.levels.iter().zip(&maps.levels) {
             // A point of the world and how far along it lies in the frame.
             let world = DVec3::new(1.0, 2.0, -3.0);
@@ -79,6 +100,6 @@ mod tests {
         }
         assert_eq!(maps.nearest_words(), 2 * 64 * 64 * 64);
         assert_eq!(2 * maps.distance_words(), 2 * (64 * 64 * 64 + 32 * 32 * 32 + 16 * 16 * 16));
-        assert_eq!(FieldMaps::default().distance_words(), 0);
+        assert_eq!(DfMaps::default().distance_words(), 0);
     }
 }

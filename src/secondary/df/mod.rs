@@ -9,9 +9,9 @@
 //! middle is near. What the paper tuned by hand for each scene are parameters: [`Tracing`].
 
 pub mod answer;
-pub mod device;
 mod field;
 mod flood;
+pub mod kernels;
 pub mod maps;
 #[cfg(test)]
 mod tests;
@@ -24,7 +24,7 @@ pub use trace::{LEAST_STEP, LocalRay, LocalTraced, Traced, Tracing, Way};
 
 /// How distance fields answer the rays of walks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldSettings {
+pub struct DfSettings {
     /// Cells of a field on each axis: a multiple of 32 up to 256.
     pub size: u32,
     /// Look-ups of an occlusion ray at most.

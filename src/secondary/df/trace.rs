@@ -1,6 +1,6 @@
 //! Sphere tracing.
 
-use super::field::{DistanceField, LEVELS};
+use super::field::{DistanceField, FieldView, LEVELS};
 use crate::math::exact::{divide, most, square_root};
 
 /// Least way between two look-ups, cells.
@@ -68,36 +68,7 @@ pub struct LocalTraced {
     pub is_capped: bool,
 }
 
-impl DistanceField {
-    /// Traces the ray from `origin`, world units, along `direction`, which has length 1, from `t_min` to `t_max`, world
-    /// units. Outside of the field there is nothing.
-    pub fn trace(&self, tracing: &Tracing, origin: [f64; 3], direction: [f64; 3], t_min: f64, t_max: f64) -> Traced {
-        let [t_min, t_max] = [t_min, t_max].map(|t| (t / self.side()) as f32);
-        let ray = LocalRay { origin: self.local(origin), t_min, direction: direction.map(|x| x as f32), t_max };
-        let LocalTraced { t, iterations, is_capped } = self.trace_local(tracing, &ray);
-        Traced { t: t.map(|t| f64::from(t) * self.side()), iterations, is_capped }
-    }
-
-    /// [`Self::trace`] in f32.
-    pub fn trace_local(&self, tracing: &Tracing, ray: &LocalRay) -> LocalTraced {
-        let size = self.cells(0) as f32;
-        let (mut t, mut end) = (ray.t_min, ray.t_max);
-        let mut is_in = true;
-        for k in 0..3 {
-            let (origin, along) = (ray.origin[k], ray.direction[k]);
-            if along == 0.0 {
-                is_in &= (0.0..=size).contains(&origin);
-            } else {
-                let [a, b] = [-origin / along, (size - origin) / along];
-                (t, end) = (t.max(a.min(b)), end.min(a.max(b)));
-            }
-        }
-        let mut way = Way { level: LEVELS - 1, look_ups: 0 };
-        let found = is_in.then(|| self.through(tracing, ray.origin, ray.direction, [t, end], &mut way));
-        let (t, is_capped) = found.unwrap_or_default();
-        LocalTraced { t, iterations: way.look_ups, is_capped }
-    }
-
+impl FieldView<'_> {
     /// Where a ray meets something, and whether it made as many look-ups as it may and was not at its end: `at` and
     /// `speed` in cells of the finest level, `range` of t within the field. Twin of `through` in
     /// `shaders/df/field_trace.wgsl`.
@@ -133,6 +104,37 @@ impl DistanceField {
             }
         }
         (None, t <= range[1])
+    }
+}
+
+impl DistanceField {
+    /// Traces the ray from `origin`, world units, along `direction`, which has length 1, from `t_min` to `t_max`, world
+    /// units. Outside of the field there is nothing.
+    pub fn trace(&self, tracing: &Tracing, origin: [f64; 3], direction: [f64; 3], t_min: f64, t_max: f64) -> Traced {
+        let [t_min, t_max] = [t_min, t_max].map(|t| (t / self.side()) as f32);
+        let ray = LocalRay { origin: self.local(origin), t_min, direction: direction.map(|x| x as f32), t_max };
+        let LocalTraced { t, iterations, is_capped } = self.trace_local(tracing, &ray);
+        Traced { t: t.map(|t| f64::from(t) * self.side()), iterations, is_capped }
+    }
+
+    /// [`Self::trace`] in f32.
+    pub fn trace_local(&self, tracing: &Tracing, ray: &LocalRay) -> LocalTraced {
+        let size = self.cells(0) as f32;
+        let (mut t, mut end) = (ray.t_min, ray.t_max);
+        let mut is_in = true;
+        for k in 0..3 {
+            let (origin, along) = (ray.origin[k], ray.direction[k]);
+            if along == 0.0 {
+                is_in &= (0.0..=size).contains(&origin);
+            } else {
+                let [a, b] = [-origin / along, (size - origin) / along];
+                (t, end) = (t.max(a.min(b)), end.min(a.max(b)));
+            }
+        }
+        let mut way = Way { level: LEVELS - 1, look_ups: 0 };
+        let found = is_in.then(|| self.view().through(tracing, ray.origin, ray.direction, [t, end], &mut way));
+        let (t, is_capped) = found.unwrap_or_default();
+        LocalTraced { t, iterations: way.look_ups, is_capped }
     }
 
     /// Whether anything is hit; as [`Self::trace`].

@@ -1,6 +1,7 @@
 //! Fields of visibility: how they are made, by passes of their own, and which rays of frames they answer.
 
 use super::field::best;
+use super::kernels;
 use super::maps::{DvfMaps, directions, sum};
 use super::mask;
 use super::renew::{Marked, Renewal};
@@ -8,12 +9,10 @@ use super::source::{Group, groups, groups_of_moved, triangles};
 use super::strew::{Strewing, Strewn, Traced};
 use super::{Areas, Cells, DvfField, DvfKept, DvfSettings, DvfUse, Fresh, MOST_TRIAL_BYTES, Shape, TRIAL_CELLS, Trial};
 use crate::counters::Record;
-use crate::frame::Renderer;
-use crate::frame::pass_record::FrameRecords;
-use crate::frame::render::{RenderError, Schedule};
+use crate::frame::{Displaced, Engine, FrameRecords, Plan as RayPlan, RenderError, Schedule, Secondary};
+use crate::kernels::View;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::NONE;
-use crate::kernels::{FrameExecutor, View};
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, demand, plain};
 use bricks::SceneFile;
@@ -38,6 +37,7 @@ pub struct Dvf {
     pub(crate) renewal: Option<Renewal>,
     pub(crate) how: DvfUse,
     frame: Option<Frame>,
+    sample: u32,
 }
 
 impl Dvf {
@@ -66,35 +66,43 @@ impl Dvf {
         self.marked.iter().flat_map(|marked| marked.renewed.iter().copied())
     }
 
-    /// Notes that the instances `displaced`, ascending, stand elsewhere than in `still`, where the field was made, and
-    /// that what was in some of `boxes`, world units, then is in others of them now.
-    pub fn scene_has_moved(&mut self, still: &Arc<SceneFile>, displaced: &[u32], boxes: &[[DVec3; 2]]) {
-        let field = self.field.as_ref().filter(|_| !boxes.is_empty());
-        self.marked = field.map(|field| Marked::new(field, still, displaced, boxes));
+    /// Whether the rays of `pass` are made and light is added as in the paper.
+    fn is_paper(&self, pass: Pass) -> bool {
+        self.how.paper && self.field.is_some() && pass == Pass::Shadow(Lamp::Environment)
+    }
+}
+
+impl Secondary for Dvf {
+    fn begin(&mut self, _camera: &Camera, view: &View) {
+        (self.frame, self.sample) = (Some(view.frame), view.params.sample);
     }
 
-    /// Begins a sample.
-    pub fn begin(&mut self, view: &View) {
-        self.frame = Some(view.frame);
+    fn after_camera_rays(
+        &mut self,
+        engine: &mut Engine,
+        records: &mut FrameRecords,
+        view: &View,
+    ) -> Result<(), ExecutorError> {
+        self.renew(engine, records, view)
     }
 
-    /// Has the executor take the field for the rays of `pass`; the step that answers those which it tells. `None` where
-    /// all are traced.
-    ///
-    /// # Errors
-    /// The executor's.
-    pub fn prepare(&self, executor: &mut dyn FrameExecutor, pass: Pass) -> Result<Option<Step>, ExecutorError> {
+    fn plan(&mut self, engine: &mut Engine, pass: Pass, plan: &mut RayPlan) -> Result<(), ExecutorError> {
         let is_of_pass = matches!(pass, Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment));
-        let (Some(field), Some(frame), true) = (&self.field, &self.frame, is_of_pass) else { return Ok(None) };
+        let (Some(field), Some(frame), true) = (&self.field, &self.frame, is_of_pass) else { return Ok(()) };
         let how = DvfUse { paper: self.is_paper(pass), ..self.how };
         let field = self.marked.as_ref().map_or(field, |marked| &marked.field);
-        executor.set_dvf(&DvfMaps::to_answer(field, frame, how))?;
-        Ok(Some(Step::DvfSift))
+        DvfMaps::to_answer(field, frame, how).give(&mut *engine.executor)?;
+        if how.paper {
+            (plan.generate, plan.add) = (kernels::cosine(self.sample), kernels::light());
+        }
+        plan.before.push(kernels::sift());
+        Ok(())
     }
 
-    /// Whether the rays of `pass` are made and light is added as in the paper.
-    pub fn is_paper(&self, pass: Pass) -> bool {
-        self.how.paper && self.field.is_some() && pass == Pass::Shadow(Lamp::Environment)
+    fn scene_has_moved(&mut self, displaced: &Displaced) {
+        let Displaced { still, instances, boxes, .. } = displaced;
+        let field = self.field.as_ref().filter(|_| !boxes.is_empty());
+        self.marked = field.map(|field| Marked::new(field, still, instances, boxes));
     }
 }
 
@@ -180,7 +188,7 @@ pub(crate) fn unread(error: bricks::Error) -> ExecutorError {
     ExecutorError::Device(format!("got no triangles: {error}"))
 }
 
-impl Renderer {
+impl Engine {
     /// What cameras see: the box of the points that their rays meet, and the bricks that these lie in.
     ///
     /// # Errors
@@ -242,25 +250,25 @@ impl Renderer {
         };
         let place = Frame::near(self.scene.resident(), 0.5 * (region.min + region.max));
         let empty = DvfMaps { is_new: true, ..plan.maps(&shape, &place, settings, tracing.lanes) };
-        self.executor.set_dvf(&empty)?;
+        empty.give(&mut *self.executor)?;
         let start = Instant::now();
         self.sum_areas(&mut plan, &shape)?;
         let areas = start.elapsed().as_secs_f64();
         let (strewn, record) = self.strew(&plan, &shape, watch)?;
         let mut trials = Vec::new();
-        let mut kept = DvfField { shape, masks: self.executor.read_dvf()?.0, labels: Vec::new() };
+        let mut kept = DvfField { shape, masks: kernels::read_field(&mut *self.executor)?.0, labels: Vec::new() };
         if settings.cells == Cells::Auto {
             kept = choose(kept, &strewn.trials, settings.dilate, &mut trials);
             let chosen = Arc::new(kept.clone());
-            self.executor.set_dvf(&DvfMaps::to_answer(&chosen, &place, DvfUse::default()))?;
+            DvfMaps::to_answer(&chosen, &place, DvfUse::default()).give(&mut *self.executor)?;
         }
         let before = start.elapsed().as_secs_f64();
-        let finish = Step::DvfFinish { cells: kept.shape.cells() as u32, dilate: settings.dilate };
-        self.executor.run(PASS, &[finish], &self.cache.states)?;
-        let (masks, labels) = self.executor.read_dvf()?;
+        let finish = kernels::finish(kept.shape.cells() as u32, settings.dilate);
+        self.executor.run(PASS, &finish, &self.cache.states)?;
+        let (masks, labels) = kernels::read_field(&mut *self.executor)?;
         let seconds = [areas, before - areas, start.elapsed().as_secs_f64() - before];
         // The masks on the device are no field's any more.
-        self.executor.set_dvf(&empty)?;
+        empty.give(&mut *self.executor)?;
         let field = DvfField { shape: kept.shape, masks, labels };
         kept.labels = vec![mask::UNKNOWN; field.labels.len()];
         kept.finish(false);
@@ -291,11 +299,11 @@ impl Renderer {
             frame: 0,
         };
         let place = Frame::near(resident, 0.5 * (region.min + region.max));
-        self.executor.set_dvf(&DvfMaps { is_new: true, ..plan.maps(&shape, &place, settings, 1) })?;
+        DvfMaps { is_new: true, ..plan.maps(&shape, &place, settings, 1) }.give(&mut *self.executor)?;
         self.strew(&plan, &shape, &mut |_, _| true)?;
-        let finish = Step::DvfFinish { cells: shape.cells() as u32, dilate: settings.dilate };
-        self.executor.run(PASS, &[finish], &self.cache.states)?;
-        let (masks, labels) = self.executor.read_dvf()?;
+        let finish = kernels::finish(shape.cells() as u32, settings.dilate);
+        self.executor.run(PASS, &finish, &self.cache.states)?;
+        let (masks, labels) = kernels::read_field(&mut *self.executor)?;
         Ok(DvfField { shape, masks, labels })
     }
 
@@ -308,7 +316,7 @@ impl Renderer {
     ) -> Result<(Strewn, Record), RenderError> {
         let mut records = FrameRecords::new(plan.frame);
         let mut strewn = Strewn::default();
-        records.pass(self, EFFECT, |r, stats| {
+        records.work(self, EFFECT, |r, stats| {
             let about = u64::from(plan.settings.points).max(plan.triangles) * u64::from(plan.all_rays());
             let mut watch = |rays: u64| watch(rays, about);
             strewn = Strewing::new(r, plan, shape, stats, &mut watch).run()?;
@@ -333,11 +341,11 @@ impl Renderer {
             if triangles.is_empty() {
                 continue;
             }
-            self.executor.set_dvf(&plan.maps(shape, &group.frame, &plan.settings, 1))?;
-            self.executor.set_dvf_triangles(&triangles, 0)?;
-            let step = Step::DvfAreas { triangles: triangles.len() as u32 };
-            self.executor.run(PASS, &[step], &self.cache.states)?;
-            total += self.executor.read_dvf_sums()?.last().map_or(0, |&words| sum(words));
+            plan.maps(shape, &group.frame, &plan.settings, 1).give(&mut *self.executor)?;
+            kernels::give_triangles(&mut *self.executor, &triangles, 0)?;
+            let steps = kernels::areas(triangles.len() as u32);
+            self.executor.run(PASS, &steps, &self.cache.states)?;
+            total += kernels::read_sums(&mut *self.executor)?.last().map_or(0, |&words| sum(words));
             count += triangles.len() as u64;
         }
         plan.areas = plan.areas.with_sum(total.max(1));

@@ -53,20 +53,23 @@ impl Fresh {
         &self.words
     }
 
+    fn view(&self) -> FreshView<'_> {
+        FreshView { words: &self.words, first: self.first, stride: self.stride }
+    }
+
     /// The entry of a cell; `None`: it is not made anew.
     pub fn entry(&self, cell: usize) -> Option<usize> {
-        let entry = self.words[cell];
-        (entry != NONE).then_some(entry as usize)
+        self.view().entry(cell)
     }
 
     /// The texels in which an entry is made anew.
     pub fn texels(&self, entry: usize) -> &[u32] {
-        &self.words[self.first + entry * self.stride..][..self.stride]
+        self.view().texels(entry)
     }
 
     /// Whether an entry is made anew in a texel.
     pub fn has(&self, entry: usize, texel: u32) -> bool {
-        mask::has(self.texels(entry), texel)
+        self.view().has(entry, texel)
     }
 
     /// Enters what an entry's rays met into its cell of `field`; other bits are those of `kept`.
@@ -81,6 +84,37 @@ impl Fresh {
             masks.chunks_exact_mut(self.stride).for_each(|mask| mask::dilate(mask, side));
         }
         field.labels[cell] = mask::label(masks);
+    }
+}
+
+/// [`Fresh::words`], as kernels read them.
+#[derive(Clone, Copy)]
+pub struct FreshView<'a> {
+    words: &'a [u32],
+    first: usize,
+    stride: usize,
+}
+
+impl<'a> FreshView<'a> {
+    /// Of a grid of so many cells, whose masks have so many texels on both axes.
+    pub fn new(words: &'a [u32], cells: usize, octahedral: u32) -> Self {
+        Self { words, first: cells, stride: mask::words(octahedral) }
+    }
+
+    /// The entry of a cell; `None`: it is not made anew.
+    pub fn entry(self, cell: usize) -> Option<usize> {
+        let entry = self.words[cell];
+        (entry != NONE).then_some(entry as usize)
+    }
+
+    /// The texels in which an entry is made anew.
+    pub fn texels(self, entry: usize) -> &'a [u32] {
+        &self.words[self.first + entry * self.stride..][..self.stride]
+    }
+
+    /// Whether an entry is made anew in a texel.
+    pub fn has(self, entry: usize, texel: u32) -> bool {
+        mask::has(self.texels(entry), texel)
     }
 }
 

@@ -20,10 +20,10 @@
 
 pub mod answer;
 mod areas;
-pub mod device;
 pub mod field;
 pub mod file;
 mod fresh;
+pub mod kernels;
 pub mod maps;
 pub mod mask;
 mod movers;

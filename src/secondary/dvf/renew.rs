@@ -19,15 +19,15 @@
 
 use super::answer::Dvf;
 use super::answer::{DvfTracing, EFFECT, PASS, Plan, Region};
+use super::kernels;
 use super::maps::{DvfMaps, directions};
 use super::source::{groups, groups_of_moved};
 use super::strew::Strewing;
 use super::worth::{Candidate, MADE, Worth};
 use super::{Cells, Concerned, DvfField, DvfKept, DvfSettings, DvfUse, Fresh};
-use crate::frame::Renderer;
-use crate::frame::pass_record::FrameRecords;
+use crate::frame::{Engine, FrameRecords};
 use crate::kernels::View;
-use crate::schedule::{ExecutorError, PassStats, Step};
+use crate::schedule::{ExecutorError, PassStats};
 use bricks::SceneFile;
 use glam::DVec3;
 use std::cmp::Reverse;
@@ -85,111 +85,116 @@ impl Marked {
     }
 }
 
-impl Renderer {
-    /// Makes cells of the field of visibility anew, where something has moved and primary hits of the frame, which are
-    /// traced, lie.
+impl Dvf {
+    /// Makes cells of the field anew, where something has moved and primary hits of the frame, which are traced, lie.
     ///
     /// # Errors
     /// A brick that cannot be read, the device's.
-    pub(crate) fn renew_dvf(&mut self, records: &mut FrameRecords, view: &View) -> Result<(), ExecutorError> {
-        let Dvf { renewal: Some(renewal), marked: Some(_), .. } = &self.dvf else { return Ok(()) };
-        if renewal.rays == 0 || !self.draws_environment() {
+    pub(crate) fn renew(
+        &mut self,
+        engine: &mut Engine,
+        records: &mut FrameRecords,
+        view: &View,
+    ) -> Result<(), ExecutorError> {
+        let (Some(renewal), Some(marked)) = (&self.renewal, &mut self.marked) else { return Ok(()) };
+        if renewal.rays == 0 || !engine.draws_environment() {
             return Ok(());
         }
         let frame = records.frame();
-        records.pass(self, EFFECT, |r, stats| {
-            // What is made anew is taken out meanwhile: the renderer is at work.
-            let (renewal, marked) = (r.dvf.renewal.take(), r.dvf.marked.take());
-            let (Some(renewal), Some(mut marked)) = (renewal, marked) else { return Ok(()) };
-            let done = r.renew(frame, view, &renewal, &mut marked, stats);
+        let answers = (self.field.as_ref(), self.how);
+        records.work(engine, EFFECT, |engine, stats| {
+            let done = renew(engine, frame, view, renewal, marked, answers, stats);
             marked.frames = marked.frames.saturating_add(1);
-            (r.dvf.renewal, r.dvf.marked) = (Some(renewal), Some(marked));
             done
         })
     }
+}
 
-    fn renew(
-        &mut self,
-        frame: u32,
-        view: &View,
-        renewal: &Renewal,
-        marked: &mut Marked,
-        stats: &mut PassStats,
-    ) -> Result<(), ExecutorError> {
-        let Renewal { kept, settings, .. } = renewal;
-        let shape = kept.field.shape;
-        let frames = f64::from(marked.frames) + f64::from(renewal.frames.max(1));
-        let hits = frames * f64::from(self.settings.samples);
-        let candidates = self.candidates(view, kept, marked, hits)?;
-        let all = candidates.len() as u64;
-        stats.cells_left = all;
-        let resident = self.scene.resident();
-        let still = groups(marked.still.resident(), &renewal.region);
-        let groups = groups_of_moved(&still, resident, &renewal.region, &marked.displaced);
-        let leaves: Vec<_> = groups.iter().flat_map(|group| group.boxes(resident)).collect();
-        let Worth { candidates, read } = Worth::of(renewal, &leaves, candidates);
-        if candidates.is_empty() {
-            return Ok(());
-        }
-        let texels = candidates.iter().map(|candidate| (candidate.cell, &candidate.texels[..]));
-        let fresh = Arc::new(Fresh::new(&shape, texels));
-        let meets = |bounds: [DVec3; 2]| shape.cells_of(bounds).any(|cell| fresh.entry(cell as usize).is_some());
-        let rests = groups.iter().map(|group| group.only(resident, |_, bounds| meets(bounds)));
-        let plan = Plan {
-            settings: DvfSettings { cells: Cells::Longest(1), ..*settings },
-            tracing: DvfTracing { pool: renewal.tracing.pool.min(4 * renewal.rays), ..renewal.tracing },
-            region: renewal.region.clone(),
-            groups: rests.filter(|group| group.bricks() > 0).collect(),
-            directions: Arc::new(directions(settings.rays)),
-            areas: kept.areas,
-            triangles: 0,
-            fresh: Some(fresh.clone()),
-            frame,
-        };
-        let empty = plan.maps(&shape, &view.frame, settings, 1);
-        self.executor.set_dvf(&DvfMaps { is_new: true, ..empty })?;
-        let saves: Vec<f64> = candidates.iter().map(|candidate| candidate.saves).collect();
-        let choose = |costs: &[u64]| within(renewal.rays.saturating_sub(read), costs, &saves);
-        let chosen = Strewing::new(self, &plan, &shape, stats, &mut |_| true).renew(&fresh, choose)?;
-        let (met, _) = self.executor.read_dvf()?;
-        let (field, words) = (Arc::make_mut(&mut marked.field), shape.words());
-        for (entry, met) in met.chunks_exact(words).enumerate().filter(|(entry, _)| chosen[*entry]) {
-            fresh.enter(entry, met, kept, settings.dilate, field);
-            marked.renewed.insert(fresh.cells()[entry]);
-        }
-        stats.cells_renewed = chosen.iter().filter(|is_chosen| **is_chosen).count() as u64;
-        stats.cells_left = all - stats.cells_renewed;
-        self.executor.begin_frame(view);
-        Ok(())
-    }
+/// What the field answered before something moved, and how.
+type Answers<'a> = (Option<&'a Arc<DvfField>>, DvfUse);
 
-    /// The cells in which primary hits of the frame lie and that what has moved concerns, but for those that are
-    /// renewed and those in which nothing would be saved: first those with the most hits, then by number. Each primary
-    /// hit stands for `hits` rays.
-    fn candidates(
-        &mut self,
-        view: &View,
-        kept: &DvfKept,
-        marked: &Marked,
-        hits: f64,
-    ) -> Result<Vec<Candidate>, ExecutorError> {
-        self.executor.set_dvf(&DvfMaps::to_answer(&marked.field, &view.frame, DvfUse::default()))?;
-        self.executor.set_dvf_tally(&vec![0; kept.field.labels.len()])?;
-        self.executor.run(PASS, &[Step::DvfSeen], &self.cache.states)?;
-        let counts = self.executor.read_dvf_tally()?;
-        let is_open = |(cell, seen): &(u32, u32)| *seen > 0 && !marked.renewed.contains(cell);
-        let (field, how) = (self.dvf.field.clone(), self.dvf.how);
-        let candidate = |(cell, seen): (u32, u32)| {
-            let texels = marked.concerned.texels(cell)?.to_vec();
-            let mut candidate = Candidate { cell, seen, texels, saves: 0.0, takes: 0.0 };
-            let answered = field.as_ref().and_then(|field| field.answered(cell, &candidate.texels, how));
-            candidate.saves = hits * f64::from(seen) * answered.unwrap_or(NEW * candidate.share());
-            (candidate.saves > 0.0).then_some(candidate)
-        };
-        let mut all: Vec<Candidate> = (0..).zip(counts).filter(is_open).filter_map(candidate).collect();
-        all.sort_by_key(|candidate| (Reverse(candidate.seen), candidate.cell));
-        Ok(all)
+fn renew(
+    engine: &mut Engine,
+    frame: u32,
+    view: &View,
+    renewal: &Renewal,
+    marked: &mut Marked,
+    answers: Answers,
+    stats: &mut PassStats,
+) -> Result<(), ExecutorError> {
+    let Renewal { kept, settings, .. } = renewal;
+    let shape = kept.field.shape;
+    let frames = f64::from(marked.frames) + f64::from(renewal.frames.max(1));
+    let hits = frames * f64::from(engine.settings.samples);
+    let candidates = candidates(engine, view, kept, marked, hits, answers)?;
+    let all = candidates.len() as u64;
+    stats.cells_left = all;
+    let resident = engine.scene.resident();
+    let still = groups(marked.still.resident(), &renewal.region);
+    let groups = groups_of_moved(&still, resident, &renewal.region, &marked.displaced);
+    let leaves: Vec<_> = groups.iter().flat_map(|group| group.boxes(resident)).collect();
+    let Worth { candidates, read } = Worth::of(renewal, &leaves, candidates);
+    if candidates.is_empty() {
+        return Ok(());
     }
+    let texels = candidates.iter().map(|candidate| (candidate.cell, &candidate.texels[..]));
+    let fresh = Arc::new(Fresh::new(&shape, texels));
+    let meets = |bounds: [DVec3; 2]| shape.cells_of(bounds).any(|cell| fresh.entry(cell as usize).is_some());
+    let rests = groups.iter().map(|group| group.only(resident, |_, bounds| meets(bounds)));
+    let plan = Plan {
+        settings: DvfSettings { cells: Cells::Longest(1), ..*settings },
+        tracing: DvfTracing { pool: renewal.tracing.pool.min(4 * renewal.rays), ..renewal.tracing },
+        region: renewal.region.clone(),
+        groups: rests.filter(|group| group.bricks() > 0).collect(),
+        directions: Arc::new(directions(settings.rays)),
+        areas: kept.areas,
+        triangles: 0,
+        fresh: Some(fresh.clone()),
+        frame,
+    };
+    let empty = plan.maps(&shape, &view.frame, settings, 1);
+    DvfMaps { is_new: true, ..empty }.give(&mut *engine.executor)?;
+    let saves: Vec<f64> = candidates.iter().map(|candidate| candidate.saves).collect();
+    let choose = |costs: &[u64]| within(renewal.rays.saturating_sub(read), costs, &saves);
+    let chosen = Strewing::new(engine, &plan, &shape, stats, &mut |_| true).renew(&fresh, choose)?;
+    let (met, _) = kernels::read_field(&mut *engine.executor)?;
+    let (field, words) = (Arc::make_mut(&mut marked.field), shape.words());
+    for (entry, met) in met.chunks_exact(words).enumerate().filter(|(entry, _)| chosen[*entry]) {
+        fresh.enter(entry, met, kept, settings.dilate, field);
+        marked.renewed.insert(fresh.cells()[entry]);
+    }
+    stats.cells_renewed = chosen.iter().filter(|is_chosen| **is_chosen).count() as u64;
+    stats.cells_left = all - stats.cells_renewed;
+    engine.executor.begin_frame(view);
+    Ok(())
+}
+
+/// The cells in which primary hits of the frame lie and that what has moved concerns, but for those that are
+/// renewed and those in which nothing would be saved: first those with the most hits, then by number. Each primary
+/// hit stands for `hits` rays.
+fn candidates(
+    engine: &mut Engine,
+    view: &View,
+    kept: &DvfKept,
+    marked: &Marked,
+    hits: f64,
+    (field, how): Answers,
+) -> Result<Vec<Candidate>, ExecutorError> {
+    DvfMaps::to_answer(&marked.field, &view.frame, DvfUse::default()).give(&mut *engine.executor)?;
+    kernels::give_tally(&mut *engine.executor, &vec![0; kept.field.labels.len()])?;
+    engine.executor.run(PASS, &[kernels::seen()], &engine.cache.states)?;
+    let counts = kernels::read_tally(&mut *engine.executor)?;
+    let is_open = |(cell, seen): &(u32, u32)| *seen > 0 && !marked.renewed.contains(cell);
+    let candidate = |(cell, seen): (u32, u32)| {
+        let texels = marked.concerned.texels(cell)?.to_vec();
+        let mut candidate = Candidate { cell, seen, texels, saves: 0.0, takes: 0.0 };
+        let answered = field.and_then(|field| field.answered(cell, &candidate.texels, how));
+        candidate.saves = hits * f64::from(seen) * answered.unwrap_or(NEW * candidate.share());
+        (candidate.saves > 0.0).then_some(candidate)
+    };
+    let mut all: Vec<Candidate> = (0..).zip(counts).filter(is_open).filter_map(candidate).collect();
+    all.sort_by_key(|candidate| (Reverse(candidate.seen), candidate.cell));
+    Ok(all)
 }
 
 /// Which of cells that take `costs` rays and save `saves` are made anew, in their order, for at most `rays` rays in

@@ -6,10 +6,10 @@
 //! read for them again.
 
 use super::answer::{EFFECT, PASS, Plan, unread};
+use super::kernels;
 use super::source::{Group, triangles};
 use super::{DvfSettings, Fresh, Shape};
-use crate::frame::Renderer;
-use crate::frame::render::Schedule;
+use crate::frame::{Engine, Schedule};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{DvfTriangle, Hit, NONE, Params, Ray};
 use crate::kernels::{Directions, View};
@@ -82,7 +82,7 @@ struct Block {
 
 /// Strews the points of a plan.
 pub(crate) struct Strewing<'a> {
-    pub(crate) renderer: &'a mut Renderer,
+    pub(crate) renderer: &'a mut Engine,
     pub(crate) plan: &'a Plan,
     pub(crate) shape: &'a Shape,
     pub(crate) stats: &'a mut PassStats,
@@ -113,13 +113,13 @@ struct State {
 
 /// What a frame of its own is seen from.
 fn view(frame: Frame, seed: u32) -> View {
-    View { frame, params: Params { seed, surface_share: 1.0, ..Params::default() }, directions: Directions::default() }
+    View { frame, params: Params { seed, ..Params::default() }, directions: Directions::default() }
 }
 
 impl<'a> Strewing<'a> {
     /// Of a plan.
     pub fn new(
-        renderer: &'a mut Renderer,
+        renderer: &'a mut Engine,
         plan: &'a Plan,
         shape: &'a Shape,
         stats: &'a mut PassStats,
@@ -207,14 +207,14 @@ impl<'a> Strewing<'a> {
         // The executor is to know how many points there are.
         self.state.at = None;
         self.place(site, Kind::Masks)?;
-        let Renderer { executor, cache, .. } = &mut *self.renderer;
+        let Engine { executor, cache, .. } = &mut *self.renderer;
         let sides = if self.plan.settings.both { 2 } else { 1 } * self.state.sites[site].count;
         let mut found = Vec::new();
         for first in (0..sides).step_by(SIDES_AT_ONCE) {
             let count = (sides - first).min(SIDES_AT_ONCE as u32);
-            executor.set_dvf_tally(&vec![0; 2 * count as usize])?;
-            executor.run(PASS, &[Step::DvfPoints { first, count }], &cache.states)?;
-            let tally = executor.read_dvf_tally()?;
+            kernels::give_tally(&mut **executor, &vec![0; 2 * count as usize])?;
+            executor.run(PASS, &[kernels::points(first, count)], &cache.states)?;
+            let tally = kernels::read_tally(&mut **executor)?;
             for (side, [entry, rays]) in (first..).zip(tally.as_chunks::<2>().0).filter(|(_, [_, rays])| *rays > 0) {
                 costs[*entry as usize] += u64::from(*rays);
                 found.push((side, *entry as usize));
@@ -228,7 +228,7 @@ impl<'a> Strewing<'a> {
         let site = self.state.sites.len();
         self.state.sites.push(Site { frame, triangles, count: 0, lanes: 1, listed: None });
         self.place(site, Kind::Masks)?;
-        let count = self.renderer.executor.read_dvf_sums()?.last().map_or(0, |words| words[0]);
+        let count = kernels::read_sums(&mut *self.renderer.executor)?.last().map_or(0, |words| words[0]);
         self.state.sites[site].count = count;
         Ok(site)
     }
@@ -287,12 +287,12 @@ impl<'a> Strewing<'a> {
         executor.begin_frame(&view(*frame, settings.seed));
         let mut maps = plan.maps(shape, frame, &settings, lanes);
         maps.waiting_words = state.waiting_words;
-        executor.set_dvf(&maps)?;
-        executor.set_dvf_triangles(triangles, *count)?;
-        let counts = Step::DvfCounts { triangles: triangles.len() as u32 };
-        executor.run(PASS, &[counts], &renderer.cache.states)?;
+        maps.give(&mut **executor)?;
+        kernels::give_triangles(&mut **executor, triangles, *count)?;
+        let counts = kernels::counts(triangles.len() as u32);
+        executor.run(PASS, &counts, &renderer.cache.states)?;
         if let Some(listed) = listed {
-            executor.set_dvf_tally(listed)?;
+            kernels::give_tally(&mut **executor, listed)?;
         }
         state.at = Some((site, kind));
         Ok(())
@@ -326,10 +326,10 @@ impl<'a> Strewing<'a> {
     fn first(&mut self, mut block: Block) -> Result<bool, ExecutorError> {
         self.place(block.site, block.kind)?;
         let (tracing, schedule) = (self.renderer.settings.tracing, self.renderer.settings.schedule);
-        let make = Step::DvfRays { first: block.first, turn: block.turn, waiting: None };
+        let make = kernels::rays(block.first, block.turn, None);
         let enters = block.kind == Kind::Masks;
         let words = self.words();
-        let Renderer { executor, cache, .. } = &mut *self.renderer;
+        let Engine { executor, cache, .. } = &mut *self.renderer;
         let trace = match schedule {
             Schedule::Plain => plain::trace,
             Schedule::PlainBinary => plain::trace_binary,
@@ -339,14 +339,14 @@ impl<'a> Strewing<'a> {
                 // There is a free one: room has been made.
                 block.place = may_wait.then(|| self.state.places.pop()).flatten();
                 let waiting = block.place.map(|place| place * words);
-                let steps = [&[make], steps, &[Step::DvfWrite { waiting, enters }]].concat();
+                let steps = [&[make], steps, &[kernels::write(waiting, enters)]].concat();
                 let report = executor.run(PASS, &steps, &cache.states)?;
                 cache.touch_geometry(&report.used, may_wait, self.stats);
                 return self.traced(block, report, tracing.measure_needed);
             }
         };
         trace(&mut **executor, cache, PASS, &[make], &tracing, self.stats)?;
-        let report = executor.run(PASS, &[Step::DvfWrite { waiting: None, enters }], &cache.states)?;
+        let report = executor.run(PASS, &[kernels::write(None, enters)], &cache.states)?;
         self.traced(block, report, false)
     }
 
@@ -370,7 +370,7 @@ impl<'a> Strewing<'a> {
             state.strewn.trials.extend(ended.map(|(_, (ray, hit))| in_world(frame, ray, hit)));
         }
         if measure {
-            let Renderer { executor, cache, .. } = &mut **renderer;
+            let Engine { executor, cache, .. } = &mut **renderer;
             measure_needed(&mut **executor, cache, PASS, &[Step::Lists], &state.resident, stats)?;
         }
         state.answered += block.left - left;
@@ -390,17 +390,17 @@ impl<'a> Strewing<'a> {
         self.state.strewn.drains += u64::from(!self.state.blocks.is_empty());
         loop {
             let Self { renderer, state, stats, .. } = self;
-            let Renderer { executor, cache, .. } = &mut **renderer;
+            let Engine { executor, cache, .. } = &mut **renderer;
             if !state.pool.load(&mut **executor, cache, stats)? {
                 return Ok(true);
             }
             for block in std::mem::take(&mut state.blocks) {
                 self.place(block.site, block.kind)?;
                 let waiting = block.place.map(|place| place * words);
-                let make = Step::DvfRays { first: block.first, turn: block.turn, waiting };
-                let write = Step::DvfWrite { waiting, enters: block.kind == Kind::Masks };
+                let make = kernels::rays(block.first, block.turn, waiting);
+                let write = kernels::write(waiting, block.kind == Kind::Masks);
                 let steps = [&[make], Pool::NEXT, &[write]].concat();
-                let Renderer { executor, cache, .. } = &mut *self.renderer;
+                let Engine { executor, cache, .. } = &mut *self.renderer;
                 let report = executor.run(PASS, &steps, &cache.states)?;
                 if !self.traced(block, report, measure)? {
                     return Ok(false);

@@ -2,97 +2,78 @@
 //! `dvf_down.wgsl`, `dvf_rays.wgsl`, `dvf_write.wgsl`, `dvf_dilate.wgsl`, `dvf_labels.wgsl`, `dvf_sift.wgsl`,
 //! `dvf_seen.wgsl` and `dvf_points.wgsl`.
 
-use super::maps::{CIRCLE, DvfMaps, TILE, sum, sweep_elements};
+use super::fresh::FreshView;
+use super::maps::{CIRCLE, TILE, sum};
 use super::mask;
 use super::mask::{OCCLUDED, UNKNOWN};
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::dispatch::{DVF_AREAS, DVF_COUNTS, DVF_DILATE, DVF_DOWN, DVF_LABELS, DVF_UP};
 use crate::kernels::layout::{
-    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_HIT, DVF_PAPER, DVF_ROUND, DVF_WALK, DvfGrid,
-    DvfTriangle, GBuffer, INSTANCE_MIRRORED, NONE, Params, Ray, T_INFINITE,
+    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_RENEW, DVF_ROUND, DVF_WALK, DvfGrid,
+    DvfOwn, DvfTriangle, GBuffer, INSTANCE_MIRRORED, MET, NONE, Params, Ray, T_INFINITE,
 };
 use crate::kernels::rays::{RaySet, is_traced, start_hit};
 use crate::kernels::shade::generate::{for_each_leaving, leaving};
+use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::shade::lamps::unit;
+use crate::kernels::shade::light::{ambient, background};
+use crate::kernels::shade::shade::{Pixels, for_each_pixel, is_traced as is_ray};
+use crate::kernels::table::{atomic, words};
 use crate::kernels::vector::{Vec3, each, most3};
 use crate::math::exact::{
     TriangleHit, barrier, diffprod, divide, length_of, offset_origin, scaled, square_root, surface_point,
 };
 use crate::math::sampling::{pcg, random4};
+use crate::schedule::ExecutorError;
+use bricks::Material;
 use rayon::prelude::*;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Rays that a task handles in a row.
 const RUN: usize = 1024;
 
-/// A field, and what is made of it.
-#[derive(Default)]
-pub struct DvfTables {
+/// A field, and what is made of it: the buffers of its kernels.
+pub struct Tables<'a> {
     /// How it is placed.
-    pub maps: DvfMaps,
+    grid: &'a DvfGrid,
     /// Of all cells.
-    pub masks: Vec<AtomicU32>,
+    masks: &'a [AtomicU32],
     /// Of all cells.
-    pub labels: Vec<u32>,
+    labels: &'a mut [u32],
     /// Of the group at hand.
-    pub triangles: Vec<DvfTriangle>,
+    triangles: &'a [DvfTriangle],
     /// Level by level.
-    pub sums: Vec<[u32; 2]>,
+    pub sums: &'a mut [[u32; 2]],
+    /// Of rays about z, then points of the unit circle.
+    directions: &'a [[f32; 4]],
     /// A bit for each ray of some blocks: whether it waits for bricks.
-    pub waiting: Vec<AtomicU32>,
+    waiting: &'a [AtomicU32],
+    /// The cells that are made anew, where some are.
+    fresh: Option<FreshView<'a>>,
     /// Hits in cells, points in cells that are made anew, or those of these that rays start from.
-    tally: Vec<AtomicU32>,
+    tally: &'a [AtomicU32],
 }
 
-impl DvfTables {
-    /// Places a field.
-    pub fn set(&mut self, maps: &DvfMaps) {
-        let is_same = match (&maps.field, &self.maps.field) {
-            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-            (None, _) => !maps.is_new && self.masks.len() == maps.mask_words() && self.labels.len() == maps.cells(),
-            _ => false,
-        };
-        match &maps.field {
-            _ if is_same => {}
-            Some(field) => {
-                self.masks = field.masks.iter().map(|&word| AtomicU32::new(word)).collect();
-                self.labels.clone_from(&field.labels);
-            }
-            None => {
-                self.masks = (0..maps.mask_words()).map(|_| AtomicU32::new(0)).collect();
-                self.labels = vec![UNKNOWN; maps.cells()];
-            }
-        }
-        if self.waiting.len() < maps.waiting_words {
-            self.waiting.resize_with(maps.waiting_words, AtomicU32::default);
-        }
-        let triangles = self.maps.grid.triangles;
-        self.maps = maps.clone();
-        self.maps.grid.triangles = triangles;
-    }
-
-    /// Takes the triangles of a group.
-    pub fn set_triangles(&mut self, triangles: &[DvfTriangle], point_count: u32) {
-        self.triangles = triangles.to_vec();
-        (self.maps.grid.triangles, self.maps.grid.point_count) = (triangles.len() as u32, point_count);
-        self.sums.resize(sweep_elements(triangles.len() as u32) as usize, [0; 2]);
-    }
-
-    /// Takes what kernels count on, or the points that are listed.
-    pub fn set_tally(&mut self, words: &[u32]) {
-        self.tally = words.iter().map(|&word| AtomicU32::new(word)).collect();
-        self.maps.grid.listed = words.len() as u32;
-    }
-
-    /// What they have counted.
-    pub fn tally(&self) -> Vec<u32> {
-        self.tally.iter().map(|word| word.load(Ordering::Relaxed)).collect()
-    }
-
-    /// The masks.
-    pub fn masks(&self) -> Vec<u32> {
-        self.masks.iter().map(|word| word.load(Ordering::Relaxed)).collect()
+impl<'a> Tables<'a> {
+    /// Those of a dispatch.
+    ///
+    /// # Errors
+    /// A defect: other buffers.
+    pub fn of(buffers: &'a mut [Vec<u32>]) -> Result<Self, ExecutorError> {
+        let [grid, masks, labels, triangles, sums, directions, waiting, fresh, tally] = words(buffers)?;
+        let grid: &DvfGrid = &bytemuck::cast_slice(grid)[0];
+        let cells = grid.size.iter().product::<u32>() as usize;
+        let is_renewed = grid.flags & DVF_RENEW != 0;
+        Ok(Self {
+            grid,
+            masks: atomic(masks),
+            labels: &mut labels[..cells],
+            triangles: &bytemuck::cast_slice(triangles)[..grid.triangles as usize],
+            sums: bytemuck::cast_slice_mut(sums),
+            directions: bytemuck::cast_slice(directions),
+            waiting: atomic(waiting),
+            fresh: is_renewed.then(|| FreshView::new(fresh, cells, grid.octahedral)),
+            tally: &atomic(tally)[..grid.listed as usize],
+        })
     }
 }
 
@@ -148,21 +129,21 @@ fn plus(a: [u32; 2], b: [u32; 2]) -> [u32; 2] {
 }
 
 /// Sums each block of the level at hand into an element of the level above.
-pub fn up(params: &Params, sums: &mut [[u32; 2]]) {
-    let (first, count) = (params.dvf_first as usize, params.dvf_count as usize);
+pub fn up(own: &DvfOwn, sums: &mut [[u32; 2]]) {
+    let (first, count) = (own.first as usize, own.count as usize);
     for (block, at) in (first..first + count).step_by(DVF_WALK as usize).enumerate() {
         let end = (at + DVF_WALK as usize).min(first + count);
         let total = sums[at..end].iter().fold([0; 2], |all, one| plus(all, *one));
-        sums[params.dvf_next as usize + block] = total;
+        sums[own.next as usize + block] = total;
     }
 }
 
 /// Makes each element of the level at hand the sum of all before it.
-pub fn down(params: &Params, sums: &mut [[u32; 2]]) {
-    let (first, count) = (params.dvf_first as usize, params.dvf_count as usize);
+pub fn down(own: &DvfOwn, sums: &mut [[u32; 2]]) {
+    let (first, count) = (own.first as usize, own.count as usize);
     for (block, at) in (first..first + count).step_by(DVF_WALK as usize).enumerate() {
         let end = (at + DVF_WALK as usize).min(first + count);
-        let mut before = if params.dvf_next == NONE { [0; 2] } else { sums[params.dvf_next as usize + block] };
+        let mut before = if own.next == NONE { [0; 2] } else { sums[own.next as usize + block] };
         for element in &mut sums[at..end] {
             let own = std::mem::replace(element, before);
             before = plus(before, own);
@@ -170,38 +151,42 @@ pub fn down(params: &Params, sums: &mut [[u32; 2]]) {
     }
 }
 
-/// Runs a kernel that works on triangles, sums or cells.
-pub fn make(kernel: &str, bound: &Bound, tables: &mut DvfTables) {
-    let DvfTables { maps, masks, labels, triangles, sums, .. } = tables;
-    let grid = &maps.grid;
-    match kernel {
-        DVF_AREAS => {
-            let all = sums.par_iter_mut().zip(&*triangles);
-            all.for_each(|(steps, t)| *steps = steps_of(grid, twice_area(t)));
-        }
-        DVF_COUNTS => sums.par_iter_mut().zip(&*triangles).for_each(|(count, t)| *count = [points_on(grid, t), 0]),
-        DVF_UP => up(bound.params, sums),
-        DVF_DOWN => down(bound.params, sums),
-        DVF_DILATE => masks.par_chunks_exact_mut(mask::words(grid.octahedral)).for_each(|words| {
-            let mut mask: Vec<u32> = words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
-            mask::dilate(&mut mask, grid.octahedral);
-            words.iter_mut().zip(mask).for_each(|(word, dilated)| *word.get_mut() = dilated);
-        }),
-        DVF_LABELS => {
-            let cells = masks.par_chunks_exact(2 * mask::words(grid.octahedral)).zip(labels);
-            cells.for_each(|(words, label)| {
-                let masks: Vec<u32> = words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
-                *label = mask::label(&masks);
-            });
-        }
-        _ => unreachable!("no kernel of fields of visibility"),
-    }
+/// Areas of triangles, in steps of their sums.
+pub fn areas(tables: Tables) {
+    let Tables { grid, triangles, sums, .. } = tables;
+    sums.par_iter_mut().zip(triangles).for_each(|(steps, t)| *steps = steps_of(grid, twice_area(t)));
+}
+
+/// Numbers of points on triangles.
+pub fn counts(tables: Tables) {
+    let Tables { grid, triangles, sums, .. } = tables;
+    sums.par_iter_mut().zip(triangles).for_each(|(count, t)| *count = [points_on(grid, t), 0]);
+}
+
+/// Widens the masks of all cells.
+pub fn dilate(tables: Tables) {
+    let side = tables.grid.octahedral;
+    let cells = tables.masks[..2 * mask::words(side) * tables.labels.len()].par_chunks_exact(mask::words(side));
+    cells.for_each(|words| {
+        let mut mask: Vec<u32> = words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
+        mask::dilate(&mut mask, side);
+        words.iter().zip(mask).for_each(|(word, dilated)| word.store(dilated, Ordering::Relaxed));
+    });
+}
+
+/// Labels all cells.
+pub fn labels(tables: Tables) {
+    let cells = tables.masks.par_chunks_exact(2 * mask::words(tables.grid.octahedral)).zip(tables.labels);
+    cells.for_each(|(words, label)| {
+        let masks: Vec<u32> = words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
+        *label = mask::label(&masks);
+    });
 }
 
 /// Whether a ray is made: all, or those that wait.
-fn is_made(tables: &DvfTables, params: &Params, index: usize) -> bool {
+fn is_made(tables: &Tables, own: &DvfOwn, index: usize) -> bool {
     let word = |first: u32| tables.waiting[first as usize + index / 32].load(Ordering::Relaxed);
-    params.dvf_next == NONE || word(params.dvf_next) >> (index % 32) & 1 != 0
+    own.next == NONE || word(own.next) >> (index % 32) & 1 != 0
 }
 
 /// No ray.
@@ -232,8 +217,8 @@ struct Start {
 }
 
 /// Where the rays of a point start, on the front of its triangle or behind it; `None`: no ray does.
-fn start_of(tables: &DvfTables, point: u32, is_behind: bool) -> Option<Start> {
-    let grid = &tables.maps.grid;
+fn start_of(tables: &Tables, point: u32, is_behind: bool) -> Option<Start> {
+    let grid = tables.grid;
     let sums = &tables.sums[..tables.triangles.len()];
     let number = sums.partition_point(|sum| sum[0] <= point).max(1) - 1;
     let t = &tables.triangles[number];
@@ -257,24 +242,24 @@ fn start_of(tables: &DvfTables, point: u32, is_behind: bool) -> Option<Start> {
     let start = surface_point(t.a, t.b, t.c, &weights, toward);
     let origin = offset_origin(&start);
     let cell = cell_of(grid, origin)?;
-    let [x, y, ..] = tables.maps.directions[(grid.rays + words[2] % CIRCLE) as usize];
+    let [x, y, ..] = tables.directions[(grid.rays + words[2] % CIRCLE) as usize];
     Some(Start { origin, cell, n: start.n, source: t.id, around: [x, y] })
 }
 
 /// Direction `turn` of the rays that start there.
-fn direction_of(tables: &DvfTables, start: &Start, turn: u32) -> Vec3 {
-    let [x, y, z, _] = tables.maps.directions[turn as usize];
+fn direction_of(tables: &Tables, start: &Start, turn: u32) -> Vec3 {
+    let [x, y, z, _] = tables.directions[turn as usize];
     turned(start.around, [x, y, z], start.n)
 }
 
 /// The ray of lane `slot` of the block, and the triangle that it starts from.
-fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> Option<(Ray, u32)> {
-    let grid = &tables.maps.grid;
+fn ray_of(tables: &Tables, own: &DvfOwn, slot: u32) -> Option<(Ray, u32)> {
+    let grid = tables.grid;
     let mut point = slot / grid.lanes;
-    let mut turn = slot % grid.lanes + params.dvf_turn * grid.lanes;
+    let mut turn = slot % grid.lanes + own.turn * grid.lanes;
     let sides = sides_of(grid);
     let is_behind;
-    if tables.maps.fresh.is_some() {
+    if tables.fresh.is_some() {
         if point >= grid.listed || turn >= grid.rays {
             return None;
         }
@@ -291,7 +276,7 @@ fn ray_of(tables: &DvfTables, params: &Params, slot: u32) -> Option<(Ray, u32)> 
     }
     let start = start_of(tables, point, is_behind)?;
     let direction = direction_of(tables, &start, turn);
-    if let Some(fresh) = &tables.maps.fresh {
+    if let Some(fresh) = &tables.fresh {
         let entry = fresh.entry(start.cell)?;
         if !fresh.has(entry, mask::texel(direction, grid.octahedral)) {
             return None;
@@ -307,13 +292,14 @@ fn sides_of(grid: &DvfGrid) -> u32 {
 
 /// Finds of every side of every point of a group the cell that its rays start in, if that is made anew, and how many of
 /// them are made.
-pub fn points(bound: &Bound, tables: &DvfTables) {
-    let Some(fresh) = &tables.maps.fresh else { return };
-    let grid = &tables.maps.grid;
-    let (sides, params) = (sides_of(grid), bound.params);
+pub fn points(bound: &Bound, tables: &Tables) {
+    let own: &DvfOwn = bound.own();
+    let Some(fresh) = &tables.fresh else { return };
+    let grid = tables.grid;
+    let sides = sides_of(grid);
     let all = tables.tally.as_chunks::<2>().0.par_iter().enumerate().with_min_len(RUN);
-    all.take(params.dvf_count as usize).for_each(|(i, [found, count])| {
-        let number = params.dvf_first + i as u32;
+    all.take(own.count as usize).for_each(|(i, [found, count])| {
+        let number = own.first + i as u32;
         let start = start_of(tables, number / sides, number % sides == 1);
         let start = start.and_then(|start| Some((fresh.entry(start.cell)?, start)));
         let texel = |start: &Start, turn: u32| mask::texel(direction_of(tables, start, turn), grid.octahedral);
@@ -330,11 +316,11 @@ pub fn points(bound: &Bound, tables: &DvfTables) {
 }
 
 /// Counts the primary hits in each cell.
-pub fn seen(bound: &Bound, tables: &DvfTables, seen: &RaySet) {
+pub fn seen(bound: &Bound, tables: &Tables, seen: &RaySet) {
     let pixels = (bound.params.width * bound.params.height) as usize;
     seen.surfaces.par_iter().take(pixels).with_min_len(RUN).filter(|surface| surface.leaf != NONE).for_each(
         |surface| {
-            if let Some(count) = cell_of(&tables.maps.grid, surface.point).and_then(|cell| tables.tally.get(cell)) {
+            if let Some(count) = cell_of(tables.grid, surface.point).and_then(|cell| tables.tally.get(cell)) {
                 count.fetch_add(1, Ordering::Relaxed);
             }
         },
@@ -342,12 +328,13 @@ pub fn seen(bound: &Bound, tables: &DvfTables, seen: &RaySet) {
 }
 
 /// Makes a block of the rays of a group.
-pub fn rays(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
-    let RaySet { rays, hits, surfaces } = own;
+pub fn rays(bound: &Bound, tables: &Tables, set: &mut RaySet) {
+    let own: &DvfOwn = bound.own();
+    let RaySet { rays, hits, surfaces } = set;
     let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
     all.enumerate().with_min_len(RUN).for_each(|(index, ((ray, hit), surface))| {
-        let is_made = is_made(tables, bound.params, index);
-        let made = is_made.then(|| ray_of(tables, bound.params, bound.params.dvf_first + index as u32)).flatten();
+        let is_made = is_made(tables, own, index);
+        let made = is_made.then(|| ray_of(tables, own, own.first + index as u32)).flatten();
         let source;
         (*ray, source) = made.unwrap_or((NO_RAY, NONE));
         (*hit, *surface) = start_hit(ray.t_max, source);
@@ -355,20 +342,20 @@ pub fn rays(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
 }
 
 /// By which the rays of a pixel are turned: a point of the unit circle.
-fn turn_of(tables: &DvfTables, params: &Params, index: usize) -> [f32; 2] {
+fn turn_of(tables: &Tables, params: &Params, index: usize) -> [f32; 2] {
     let moved = pcg(params.seed);
     let pixel = [index as u32 % params.width, index as u32 / params.width];
     let [x, y] = [pixel[0].wrapping_add(moved) % TILE, pixel[1].wrapping_add(moved >> 8) % TILE];
     let place = (y * TILE + x) as usize;
-    let (first, directions) = (tables.maps.grid.rays as usize, &tables.maps.directions);
+    let (first, directions) = (tables.grid.rays as usize, tables.directions);
     let number = directions[first + CIRCLE as usize + place / 4][place % 4] as usize;
     [directions[first + number][0], directions[first + number][1]]
 }
 
 /// Makes a ray from every primary hit, about its normal.
-pub fn cosine(bound: &Bound, tables: &DvfTables, own: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer]) {
-    let around = bound.params.around;
-    for_each_leaving(own, seen, |index, surface| {
+pub fn cosine(bound: &Bound, tables: &Tables, set: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer]) {
+    let around = bound.own::<DvfOwn>().around;
+    for_each_leaving(set, seen, |index, surface| {
         let turn = turn_of(tables, bound.params, index);
         let direction = turned(turn, [around[0], around[1], around[2]], gbuffer[index].normal);
         leaving(surface, direction, T_INFINITE)
@@ -376,7 +363,7 @@ pub fn cosine(bound: &Bound, tables: &DvfTables, own: &mut RaySet, seen: &RaySet
 }
 
 /// Notes whether a ray waits.
-fn note(tables: &DvfTables, first: u32, index: usize, waits: bool) {
+fn note(tables: &Tables, first: u32, index: usize, waits: bool) {
     let (word, bit) = (&tables.waiting[first as usize + index / 32], 1 << (index % 32));
     if waits {
         word.fetch_or(bit, Ordering::Relaxed);
@@ -386,11 +373,12 @@ fn note(tables: &DvfTables, first: u32, index: usize, waits: bool) {
 }
 
 /// Enters what a block's rays met into the masks of the cells that they start in; those that wait are noted and ended.
-pub fn write(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
-    let RaySet { rays, hits, surfaces } = own;
-    let grid = &tables.maps.grid;
+pub fn write(bound: &Bound, tables: &Tables, set: &mut RaySet) {
+    let own: &DvfOwn = bound.own();
+    let RaySet { rays, hits, surfaces } = set;
+    let grid = tables.grid;
     let words = mask::words(grid.octahedral);
-    let first = bound.params.dvf_next;
+    let first = own.next;
     let rays = rays.par_iter().zip(hits.par_iter_mut()).zip(&*surfaces).enumerate().with_min_len(RUN);
     rays.for_each(|(index, ((ray, hit), surface))| {
         if first != NONE {
@@ -402,11 +390,11 @@ pub fn write(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
             }
         }
         let is_ray = ray.t_min <= ray.t_max;
-        if bound.params.dvf_count == 0 || !is_ray {
+        if own.count == 0 || !is_ray {
             return;
         }
         // The masks of a cell that is made anew are those of its entry.
-        let fresh = tables.maps.fresh.as_ref();
+        let fresh = tables.fresh.as_ref();
         let cell = cell_of(grid, ray.origin).and_then(|cell| fresh.map_or(Some(cell), |fresh| fresh.entry(cell)));
         if let Some(cell) = cell {
             let texel = mask::texel(ray.direction, grid.octahedral);
@@ -417,8 +405,8 @@ pub fn write(bound: &Bound, tables: &DvfTables, own: &mut RaySet) {
 }
 
 /// Answers a ray: whether it meets something; `None`: it is to be traced.
-fn answer(tables: &DvfTables, ray: &Ray) -> Option<bool> {
-    let grid = &tables.maps.grid;
+fn answer(tables: &Tables, ray: &Ray) -> Option<bool> {
+    let grid = tables.grid;
     let cell = cell_of(grid, ray.origin)?;
     let label = tables.labels[cell];
     if label == UNKNOWN {
@@ -434,8 +422,8 @@ fn answer(tables: &DvfTables, ray: &Ray) -> Option<bool> {
 }
 
 /// Whether a ray, as the paper has it, is traced, and whether its cell is mostly occluded.
-fn as_in_paper(tables: &DvfTables, ray: &Ray) -> (bool, bool) {
-    let grid = &tables.maps.grid;
+fn as_in_paper(tables: &Tables, ray: &Ray) -> (bool, bool) {
+    let grid = tables.grid;
     let Some(cell) = cell_of(grid, ray.origin) else { return (false, false) };
     let texel = mask::texel(ray.direction, grid.octahedral);
     let words = mask::words(grid.octahedral);
@@ -446,9 +434,9 @@ fn as_in_paper(tables: &DvfTables, ray: &Ray) -> (bool, bool) {
 }
 
 /// Answers the rays of the pass that the field tells; those are not traced.
-pub fn sift(bound: &Bound, tables: &DvfTables, own: &mut RaySet, gbuffer: &mut [GBuffer]) {
-    let is_paper = tables.maps.grid.flags & DVF_PAPER != 0;
-    let all = own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).zip(gbuffer.par_chunks_mut(RUN));
+pub fn sift(bound: &Bound, tables: &Tables, set: &mut RaySet, gbuffer: &mut [GBuffer]) {
+    let is_paper = tables.grid.flags & DVF_PAPER != 0;
+    let all = set.hits.par_chunks_mut(RUN).zip(set.rays.par_chunks(RUN)).zip(gbuffer.par_chunks_mut(RUN));
     all.for_each(|((hits, rays), gbuffer)| {
         let mut tally = Tally::default();
         for ((hit, ray), g) in hits.iter_mut().zip(rays).zip(gbuffer) {
@@ -462,10 +450,36 @@ pub fn sift(bound: &Bound, tables: &DvfTables, own: &mut RaySet, gbuffer: &mut [
             let Some(is_met) = is_met else { continue };
             hit.t = -1.0;
             if is_met {
-                hit.id = DVF_HIT;
+                hit.id = MET;
             }
             tally.add(COUNTER_DVF_ANSWERED, 1);
         }
         bound.counters.add(&tally);
+    });
+}
+
+/// Adds the light of the environment to the primary hits as the paper of visibility fields has it: twin of
+/// `shaders/dvf/dvf_light.wgsl`.
+pub fn dvf_light(
+    bound: &Bound,
+    pixels: &mut Pixels,
+    shaded: usize,
+    (seen, own): (&RaySet, &RaySet),
+    materials: &[Material],
+) {
+    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
+        if seen.surfaces[index].leaf == NONE {
+            return None;
+        }
+        let ray = &own.rays[index];
+        let is_met = !is_ray(ray) || own.hits[index].id != NONE;
+        let is_occluded_cell = g.padding0 == 1;
+        let mut light = if is_met != is_occluded_cell { background(bound, ray.direction) } else { [0.0; 3] };
+        if !is_occluded_cell {
+            let all = ambient(bound.params, g.normal);
+            light = each(|k| all[k] - light[k]);
+        }
+        let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
+        Some(each(|k| s.diffuse[k] * light[k]))
     });
 }

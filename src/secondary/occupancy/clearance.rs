@@ -5,6 +5,11 @@ use super::Bom;
 /// Cells of a block on each axis.
 pub const BLOCK_CELLS: u32 = 4;
 
+/// Bytes of the [`clearance`] of a map of so many cells on each axis.
+pub fn clearance_bytes(cells: u32) -> usize {
+    ((cells / BLOCK_CELLS) as usize).pow(3)
+}
+
 /// Of every block of [`BLOCK_CELLS`]³ cells of a map, blocks along x first, then y, z fastest: the number of blocks to
 /// the nearest one with an occupied cell, by the axis on which they are furthest apart; 255 where there is none within
 /// so many.

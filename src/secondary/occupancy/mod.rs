@@ -14,6 +14,7 @@
 mod assemble;
 #[cfg(test)]
 mod assemble_tests;
+mod base;
 mod boxes;
 mod clearance;
 mod maps;
@@ -24,7 +25,8 @@ mod region;
 mod voxelise;
 
 pub use assemble::{Assembler, Assembly, BomError, assemble};
-pub use clearance::{BLOCK_CELLS, clearance};
+pub use base::{BaseMaps, BaseView, MOST_LEVELS};
+pub use clearance::{BLOCK_CELLS, clearance, clearance_bytes};
 pub use plan::{Detail, MAX_LEVELS, SNAP_CELLS, Settings};
 pub use voxelise::{Voxelisation, voxelise};
 

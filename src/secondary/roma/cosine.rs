@@ -10,7 +10,7 @@
 //! the sphere, one in each stratum, those that are travelled are drawn by the cosine. Two tries are made on the
 //! average, however many maps there are; of some 200 rays one is refused by all, and takes the nearest map.
 
-use super::twin::{Maps, RUN, RomaTables, Taken, normal_of};
+use super::twin::{Maps, RUN, Taken, normal_of};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{COUNTER_RAYS, COUNTER_ROMA_CAPPED, PARAM_ANY_HIT, Params, Ray, RomaMap};
 use crate::kernels::rays::RaySet;
@@ -18,6 +18,7 @@ use crate::kernels::shade::shade::Pixels;
 use crate::kernels::vector::{Vec3, dot, each, most};
 use crate::math::exact::square_root;
 use crate::math::sampling::{pcg, random4};
+use crate::schedule::ExecutorError;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 
@@ -62,7 +63,7 @@ pub(crate) fn drawn_map(maps: &[RomaMap], first: u32, [shading, normal]: [Vec3; 
 impl Maps<'_> {
     /// The map that is drawn by the cosine to normals, as of [`drawn_map`]; the nearest where all are refused.
     fn drawn(&self, index: u32, ray: &Ray, normals: [Vec3; 2]) -> Taken {
-        let maps = &self.maps[..(self.params.roma_k * self.params.roma_k) as usize];
+        let maps = &self.maps[..(self.own.k * self.own.k) as usize];
         let Some(map) = drawn_map(maps, drawn_word(self.params, index), normals) else {
             return self.nearest(ray, normals[1]);
         };
@@ -75,13 +76,13 @@ impl Maps<'_> {
 /// direction they were answered in.
 pub fn roma_draw(
     bound: &Bound,
-    tables: &RomaTables,
+    buffers: &mut [Vec<u32>],
     own: &mut RaySet,
     seen: &RaySet,
     (pixels, shaded): (&mut Pixels, usize),
-) {
+) -> Result<(), ExecutorError> {
     let p = bound.params;
-    let of = tables.maps_of(p);
+    let of = Maps::of(bound, buffers)?;
     // Where nothing is asked of what is met, nothing is of where it is.
     let is_turned = !bound.has(PARAM_ANY_HIT);
     let Pixels { gbuffers, densities, .. } = pixels;
@@ -112,6 +113,7 @@ pub fn roma_draw(
             *density = p.diffuse_count * most(dot(g.normal, ray.direction), 0.0) * FRAC_1_PI;
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]

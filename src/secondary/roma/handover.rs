@@ -1,7 +1,7 @@
 //! Up to where rays that occupancy maps do not find free are traced: as far as measured errors ask for.
 
+use super::Pilots;
 use crate::kernels::layout::HANDOVERS;
-use crate::schedule::Pilots;
 use std::fmt::{Display, Formatter};
 
 /// One ray in so many is traced to its end, to measure by.

@@ -1,12 +1,17 @@
 //! Base and ray-aligned occupancy maps as kernels see them: placed in a frame.
 
 use super::directions::{Drawn, draw};
+use super::kernels::{BOMS, FAMILY, LEVELS, MAPS};
 use super::{LIFT, RomaPass};
+use crate::kernels::FrameExecutor;
 use crate::kernels::frame::Frame;
-use crate::kernels::layout::{Params, RomaLevel, RomaMap};
-use crate::secondary::occupancy::{Bom, Cascades};
+use crate::kernels::layout::{Level, RomaMap};
+use crate::schedule::ExecutorError;
+use crate::secondary::occupancy::{Bom, Cascades, clearance, clearance_bytes};
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// What is drawn for ROMA takes random numbers of its own.
 const STREAM: u32 = 9 << 24;
@@ -25,7 +30,7 @@ pub struct RomaMaps {
     /// Whether coarser base maps were left out, so that these do not hold the scene.
     pub is_part: bool,
     /// Base maps, the finest first.
-    pub levels: Vec<RomaLevel>,
+    pub levels: Vec<Level>,
     /// Maps of the finest level, by their strata, then those of the next.
     pub maps: Vec<RomaMap>,
 }
@@ -43,11 +48,11 @@ impl RomaMaps {
         };
         let scale = if cells == 0 { 0.0 } else { grid.scale(cells) };
         let levels: Vec<(DVec3, f64)> = cascades.levels.iter().take(count).map(level).collect();
-        let record = |&(first, per_unit): &(DVec3, f64)| RomaLevel {
+        let record = |&(first, per_unit): &(DVec3, f64)| Level {
             first: first.as_vec3().to_array(),
             scale: per_unit as f32,
             lift: (LIFT / (scale * per_unit)) as f32,
-            ..RomaLevel::default()
+            ..Level::default()
         };
         let middle = DVec3::splat(f64::from(cells) / 2.0);
         let map = |&(first, per_unit): &(DVec3, f64), drawn: &Drawn| {
@@ -76,22 +81,36 @@ impl RomaMaps {
         }
     }
 
-    /// `params` with what kernels need to know of them.
-    pub fn params(&self, params: Params) -> Params {
-        Params {
-            roma_k: self.k,
-            roma_size: self.size,
-            roma_cells: self.cells,
-            roma_levels: self.levels.len() as u32,
-            roma_samples: self.samples,
-            roma_is_part: self.is_part.into(),
-            ..params
-        }
-    }
-
     /// Words of all columns.
     pub fn words(&self) -> u64 {
         self.maps.len() as u64 * u64::from(self.size * self.size) * u64::from(self.size / 32)
+    }
+
+    /// Gives an executor the base maps, unless it has them, and places these maps, which are made next.
+    ///
+    /// # Errors
+    /// More than the device holds in one buffer, with how much it does.
+    pub fn give(&self, executor: &mut dyn FrameExecutor, cascades: &Arc<Cascades>) -> Result<(), ExecutorError> {
+        let clearances: Vec<Vec<u8>>;
+        let held = executor.held(&FAMILY).as_ref().and_then(|held| held.downcast_ref::<Arc<Cascades>>());
+        let is_held = held.is_some_and(|held| Arc::ptr_eq(held, cascades));
+        let boms =
+            cascades.levels.iter().map(|bom| bom.words().len() + clearance_bytes(bom.cells()) / 4).sum::<usize>();
+        executor.reserve(&FAMILY, &[self.levels.len(), self.maps.len(), boms, self.words() as usize])?;
+        if !is_held {
+            clearances = cascades.levels.par_iter().map(clearance).collect();
+            let mut at = 0;
+            for (bom, clearance) in cascades.levels.iter().zip(&clearances) {
+                for bytes in [bytemuck::cast_slice(bom.words()), clearance] {
+                    executor.write(&FAMILY, BOMS, at, bytes);
+                    at += bytes.len();
+                }
+            }
+            *executor.held(&FAMILY) = Some(Box::new(cascades.clone()));
+        }
+        executor.write(&FAMILY, LEVELS, 0, bytemuck::cast_slice(&self.levels));
+        executor.write(&FAMILY, MAPS, 0, bytemuck::cast_slice(&self.maps));
+        Ok(())
     }
 }
 

@@ -19,11 +19,13 @@
 pub mod answer;
 pub mod bits;
 pub mod cosine;
-pub mod device;
 pub mod directions;
 pub mod handover;
+pub mod kernels;
 pub mod maps;
 pub mod twin;
+
+pub use kernels::{Pilots, RomaPart, Sift};
 
 use super::rsm::RsmSettings;
 
@@ -83,9 +85,6 @@ pub const THIN: f64 = 2.0;
 pub enum Role {
     /// They answer them.
     Answer,
-    /// They answer what lies beyond so many cells of the base map that holds a ray's start from it; up to there rays
-    /// are traced.
-    Far(u32),
     /// They say which rays meet nothing, and answer what lies so far from their start that they err little.
     Sift {
         /// Of a million rays, how many may be answered otherwise than exact ones, as far as it is measured; `None`:
@@ -136,9 +135,6 @@ pub struct RomaSettings {
     pub rsm: RsmSettings,
 }
 
-/// Most base maps: those of 8 x 8 directions and 128 cells take 96 MiB then.
-pub const MOST_LEVELS: u32 = 6;
-
 /// Most cells of a map on each axis.
 pub const MOST_CELLS: u32 = 256;
 
@@ -152,9 +148,6 @@ pub const LONG_CELLS: f64 = 32.0;
 
 /// Most rays of which one is traced to correct maps by.
 pub const MOST_ONE_IN: u32 = 16;
-
-/// Most cells up to which a ray may be traced exactly.
-pub const MOST_NEAR: u32 = 256;
 
 /// Most columns that a ray may be given.
 pub const MOST_STEPS: u32 = 64;

@@ -3,19 +3,19 @@
 use super::bits::{cells_between, first_cell};
 use super::cosine::{GOLDEN, length_of};
 use super::directions::stratum_of;
-use super::maps::RomaMaps;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
-    COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, NONE, PARAM_ANY_HIT, Params, ROMA_CORRECT,
-    ROMA_FAR, ROMA_HIT, ROMA_SIFT, Ray, RomaLevel, RomaMap, Surface, T_INFINITE,
+    COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, Level, MET, NONE, PARAM_ANY_HIT, Params,
+    ROMA_CORRECT, ROMA_FAR, ROMA_SIFT, Ray, RomaMap, RomaOwn, Surface, T_INFINITE,
 };
 use crate::kernels::rays::RaySet;
+use crate::kernels::table::words;
 use crate::kernels::vector::{Vec3, each, least, most};
 use crate::math::exact::{barrier, divide, square_root};
 use crate::math::sampling::{random2, random4};
-use crate::secondary::occupancy::{BLOCK_CELLS, Cascades};
+use crate::schedule::ExecutorError;
+use crate::secondary::occupancy::{BLOCK_CELLS, clearance_bytes};
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// Steps of a column along an axis of the base map that are too short to bound it by.
 const LEAST_STEP: f32 = 1.0 / 1024.0;
@@ -44,19 +44,6 @@ const LEAST_SPEED: f32 = f32::from_bits((127 - 60) << 23);
 /// Rays that a task traces in a row.
 pub(crate) const RUN: usize = 256;
 
-/// The maps.
-#[derive(Default)]
-pub struct RomaTables {
-    /// The base maps.
-    pub cascades: Arc<Cascades>,
-    /// What is empty in them, level by level.
-    pub clearances: Vec<Vec<u8>>,
-    /// How the maps are placed.
-    pub maps: RomaMaps,
-    /// The words of all columns.
-    pub columns: Vec<u32>,
-}
-
 fn linear(row: &[f32; 4], v: Vec3) -> f32 {
     row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
 }
@@ -76,27 +63,23 @@ fn bounded(cells: u32, range: [f32; 2], start: f32, step: f32) -> [f32; 2] {
     [most(range[0], least(a, b) - 1.0), least(range[1], most(a, b) + 1.0)]
 }
 
-/// Makes the ray-aligned maps of all levels from their base maps (Zeng et al., Algorithm 1): a cell is occupied where
-/// one of its look-ups, evenly spaced along the column, finds an occupied cell of the base map.
-pub fn roma_rotate(bound: &Bound, tables: &mut RomaTables) {
-    let p = bound.params;
-    let RomaTables { cascades, clearances, maps, columns } = tables;
-    let words = p.roma_size / 32;
-    columns.resize(maps.words() as usize, 0);
-    let row = (p.roma_size * words) as usize;
-    columns.par_chunks_mut(row.max(1)).enumerate().for_each(|(number, row)| {
-        let (map, y) = (number as u32 / p.roma_size, number as u32 % p.roma_size);
-        let level = map / (p.roma_k * p.roma_k);
-        let base = BaseMap {
-            cells: p.roma_cells,
-            words: cascades.levels[level as usize].words(),
-            clearance: &clearances[level as usize],
-        };
-        let rows = &maps.maps[map as usize].base_from_cell;
+/// Makes the ray-aligned maps of all levels from their base maps (Zeng et al., Algorithm 1): a cell is occupied where one
+/// of its look-ups, evenly spaced along the column, finds an occupied cell of the base map.
+pub fn roma_rotate(bound: &Bound, buffers: &mut [Vec<u32>]) -> Result<(), ExecutorError> {
+    let own: &RomaOwn = bound.own();
+    let [_, maps, boms, columns] = words(buffers)?;
+    let (maps, words) = (bytemuck::cast_slice::<_, RomaMap>(maps), own.size / 32);
+    let row = (own.size * words) as usize;
+    let rows = (own.levels * own.k * own.k * own.size) as usize;
+    columns.par_chunks_mut(row.max(1)).take(rows).enumerate().for_each(|(number, row)| {
+        let (map, y) = (number as u32 / own.size, number as u32 % own.size);
+        let base = BaseMap::of(own.cells, boms, map / (own.k * own.k));
+        let rows = &maps[map as usize].base_from_cell;
         for (x, column) in row.chunks_mut(words as usize).enumerate() {
-            rotate_column(p, &base, rows, [x as f32 + 0.5, y as f32 + 0.5, 0.0], column);
+            rotate_column(own, &base, rows, [x as f32 + 0.5, y as f32 + 0.5, 0.0], column);
         }
     });
+    Ok(())
 }
 
 /// A base map in cells of its own.
@@ -106,7 +89,14 @@ struct BaseMap<'a> {
     clearance: &'a [u8],
 }
 
-impl BaseMap<'_> {
+impl<'a> BaseMap<'a> {
+    /// That of a level, of all base maps with what is empty behind each.
+    fn of(cells: u32, boms: &'a [u32], level: u32) -> Self {
+        let (words, bytes) = ((cells * cells * (cells / 32)) as usize, clearance_bytes(cells));
+        let own = &boms[level as usize * (words + bytes / 4)..];
+        Self { cells, words: &own[..words], clearance: &bytemuck::cast_slice(&own[words..])[..bytes] }
+    }
+
     /// The cell that a point lies in; `None` outside.
     fn cell(&self, point: Vec3) -> Option<[u32; 3]> {
         let c = point.map(|x| x.floor() as i32 as u32);
@@ -127,22 +117,22 @@ impl BaseMap<'_> {
     }
 }
 
-fn rotate_column(p: &Params, base: &BaseMap, rows: &[[f32; 4]; 3], foot: Vec3, column: &mut [u32]) {
+fn rotate_column(own: &RomaOwn, base: &BaseMap, rows: &[[f32; 4]; 3], foot: Vec3, column: &mut [u32]) {
     let start = each(|k| affine(&rows[k], foot));
     let step = each(|k| rows[k][2]);
-    let whole = [0.0, p.roma_size as f32];
-    let range = (0..3).fold(whole, |range, k| bounded(p.roma_cells, range, start[k], step[k]));
-    let part = 1.0 / p.roma_samples as f32;
+    let whole = [0.0, own.size as f32];
+    let range = (0..3).fold(whole, |range, k| bounded(own.cells, range, start[k], step[k]));
+    let part = 1.0 / own.samples as f32;
     let per_cell = 1.0 / step.iter().fold(0.0, |greatest, &x| most(greatest, x.abs()));
     column.fill(0);
     let mut i = 0;
-    while i < p.roma_size {
+    while i < own.size {
         let depth = i as f32;
         i += 1;
         if depth + 1.0 < range[0] || depth > range[1] {
             continue;
         }
-        for s in 0..p.roma_samples {
+        for s in 0..own.samples {
             let at = depth + (s as f32 + 0.5) * part;
             let Some(cell) = base.cell(each(|k| start[k] + at * step[k])) else { continue };
             if base.is_occupied(cell) {
@@ -193,7 +183,7 @@ impl Answer {
     /// direction travelled as its normal, and the level's lift as its area.
     pub fn write(&self, hit: &mut Hit, surface: Option<&mut Surface>) {
         let Some(Met { t, point, lift }) = self.met else { return };
-        *hit = Hit { t, id: ROMA_HIT, u: 0.0, v: 0.0 };
+        *hit = Hit { t, id: MET, u: 0.0, v: 0.0 };
         if let Some(surface) = surface {
             (surface.point, surface.normal, surface.area) = (point, self.direction.map(|x| -x), lift);
         }
@@ -234,21 +224,21 @@ fn border(at: f32, speed: f32, cell: i32) -> f32 {
 }
 
 /// Cells before its sides at which a level ends for ray `index`.
-fn margin_of(p: &Params, index: u32) -> f32 {
-    BLEND * (p.roma_cells as f32 * random2(index, !p.stream, p.seed)[0])
+fn margin_of(p: &Params, own: &RomaOwn, index: u32) -> f32 {
+    BLEND * (own.cells as f32 * random2(index, !p.stream, p.seed)[0])
 }
 
 /// Whether a ray is traced to its end, whatever maps say of it, and shows what they get wrong: of the directions of a
 /// pixel one in so many, the first at random, and those of a workgroup together. Where pilots alone are traced, those
 /// of as many pixels as a tile mostly has are together, since for tiles without any no query is made; which one of so
 /// many directions goes on by the golden section, so that over samples all have their turn.
-fn is_pilot(p: &Params, index: u32) -> bool {
-    let n = p.roma_pilots;
+fn is_pilot(p: &Params, own: &RomaOwn, index: u32) -> bool {
+    let n = own.pilots;
     if n == 0 {
         return false;
     }
     let block = |side: u32| index / p.width / side * p.width + index % p.width / side;
-    if p.roma_part == ROMA_CORRECT {
+    if own.part == ROMA_CORRECT {
         let first = random4(block(64), !p.stream.wrapping_sub(p.sample), p.seed)[2];
         let word = first.wrapping_add((p.direction / n).wrapping_mul(GOLDEN));
         return p.direction % n == ((word >> 8) as f32 / 16_777_216.0 * n as f32) as u32;
@@ -287,14 +277,14 @@ fn trimmed(range: [f32; 2], speed: Vec3, [is_first, is_last]: [bool; 2]) -> [f32
 }
 
 /// The finest level that holds the start; the number of levels where none does.
-fn start_level_of(p: &Params, levels: &[RomaLevel], origin: Vec3, normal: Vec3, margin: f32) -> usize {
-    let side = p.roma_cells as f32;
-    let holds = |level: &RomaLevel| {
+fn start_level_of(own: &RomaOwn, levels: &[Level], origin: Vec3, normal: Vec3, margin: f32) -> usize {
+    let side = own.cells as f32;
+    let holds = |level: &Level| {
         let start = lifted(origin, normal, level.lift);
         let at = each(|k| start[k] * level.scale + level.first[k]);
         at.iter().all(|&x| x >= margin && x <= side - margin)
     };
-    levels.iter().position(holds).unwrap_or(levels.len() - usize::from(p.roma_is_part == 0))
+    levels.iter().position(holds).unwrap_or(levels.len() - usize::from(own.is_part == 0))
 }
 
 pub(crate) fn normal_of(seen: &RaySet, index: usize) -> Vec3 {
@@ -304,28 +294,36 @@ pub(crate) fn normal_of(seen: &RaySet, index: usize) -> Vec3 {
 /// What rays are traced against.
 pub(crate) struct Maps<'a> {
     pub params: &'a Params,
-    pub levels: &'a [RomaLevel],
+    pub own: &'a RomaOwn,
+    pub levels: &'a [Level],
     pub maps: &'a [RomaMap],
     columns: &'a [u32],
 }
 
-impl RomaTables {
-    pub(crate) fn maps_of<'a>(&'a self, params: &'a Params) -> Maps<'a> {
-        let RomaMaps { levels, maps, .. } = &self.maps;
-        Maps { params, levels, maps, columns: &self.columns }
+impl<'a> Maps<'a> {
+    /// Those of a dispatch.
+    ///
+    /// # Errors
+    /// A defect: other buffers.
+    pub fn of(bound: &'a Bound, buffers: &'a mut [Vec<u32>]) -> Result<Self, ExecutorError> {
+        let own: &RomaOwn = bound.own();
+        let [levels, maps, _, columns] = words(buffers)?;
+        let levels = &bytemuck::cast_slice(levels)[..own.levels as usize];
+        let maps = &bytemuck::cast_slice(maps)[..(own.levels * own.k * own.k) as usize];
+        Ok(Self { params: bound.params, own, levels, maps, columns })
     }
 }
 
 impl Maps<'_> {
     /// First word of column (x, y) of a map.
     fn first_word(&self, map: u32, x: i32, y: i32) -> u32 {
-        let n = self.params.roma_size;
+        let n = self.own.size;
         ((map * n + y as u32) * n + x as u32) * (n / 32)
     }
 
     /// The first cell of a column that a ray at height `at` with vertical `speed` meets in a range of t; below 0: none.
     fn met(&self, column: u32, at: f32, speed: f32, [from, to]: [f32; 2]) -> f32 {
-        let cells = cells_between(along(at, speed, from), along(at, speed, to), self.params.roma_size);
+        let cells = cells_between(along(at, speed, from), along(at, speed, to), self.own.size);
         let word = |w: u32| self.columns[(column + w) as usize];
         let Some(depth) = cells.and_then(|cells| first_cell(word, cells, speed >= 0.0)) else { return -1.0 };
         if speed.abs() < LEAST_SPEED {
@@ -339,7 +337,7 @@ impl Maps<'_> {
         if range[0] > range[1] {
             return Found { t: -1.0, is_capped: false };
         }
-        let last = self.params.roma_size as i32 - 1;
+        let last = self.own.size as i32 - 1;
         let mut x = (along(at[0], speed[0], range[0]).floor() as i32).clamp(0, last);
         let mut y = (along(at[1], speed[1], range[0]).floor() as i32).clamp(0, last);
         let mut t = range[0];
@@ -368,9 +366,9 @@ impl Maps<'_> {
     /// The map of the stratum that a ray lies in. A snapped ray takes its direction, unless that leads below the
     /// surface.
     pub fn nearest(&self, ray: &Ray, normal: Vec3) -> Taken {
-        let p = self.params;
-        let (map, is_upper) = stratum_of(ray.direction, p.roma_k);
-        if p.roma_steps == 0 {
+        let own = self.own;
+        let (map, is_upper) = stratum_of(ray.direction, own.k);
+        if own.steps == 0 {
             let signed = if is_upper { length_of(ray.direction) } else { -length_of(ray.direction) };
             let snapped = each(|k| signed * self.maps[map as usize].direction[k]);
             let above = snapped[0] * normal[0] + snapped[1] * normal[1] + snapped[2] * normal[2];
@@ -378,19 +376,19 @@ impl Maps<'_> {
                 return Taken { map, direction: snapped, steps: 0 };
             }
         }
-        Taken { map, direction: ray.direction, steps: if p.roma_steps == 0 { GRAZING_STEPS } else { p.roma_steps } }
+        Taken { map, direction: ray.direction, steps: if own.steps == 0 { GRAZING_STEPS } else { own.steps } }
     }
 
     /// Asks for a ray from t = `from` on: in the finest level that holds its start, then in the next where it leaves
     /// one. Rays are off their surface by the level's lift where they enter it, so that no level meets what they leave;
     /// with `is_sifted` by less, and must be free to their own ends.
     pub fn answer(&self, index: u32, ray: &Ray, taken: &Taken, normal: Vec3, from: f32, is_sifted: bool) -> Answer {
-        let p = self.params;
-        let maps = p.roma_k * p.roma_k;
+        let (p, own) = (self.params, self.own);
+        let maps = own.k * own.k;
         let &Taken { map: stratum, direction, steps } = taken;
-        let side = p.roma_cells as f32;
-        let margin = margin_of(p, index);
-        let start_level = start_level_of(p, self.levels, ray.origin, normal, margin);
+        let side = own.cells as f32;
+        let margin = margin_of(p, own, index);
+        let start_level = start_level_of(own, self.levels, ray.origin, normal, margin);
         let rise = direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2];
         let squares = direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2];
         let mut t = most(ray.t_min, from);
@@ -401,7 +399,7 @@ impl Maps<'_> {
             let end = if is_sifted { ray.t_max } else { end_of(ray.t_max, lift, squares, rise) };
             let at = each(|k| start[k] * level.scale + level.first[k]);
             let speed = direction.map(|x| x * level.scale);
-            let low = if l + 1 == self.levels.len() && p.roma_is_part == 0 { 0.0 } else { margin };
+            let low = if l + 1 == self.levels.len() && own.is_part == 0 { 0.0 } else { margin };
             let high = side - low;
             let range = (0..3).fold([t, end], |range, k| clipped(range, at[k], speed[k], low, high));
             if range[0] <= range[1] {
@@ -424,34 +422,28 @@ impl Maps<'_> {
                 }
             }
         }
-        Answer { met: None, direction, is_capped, is_known: p.roma_is_part == 0 || t >= ray.t_max }
+        Answer { met: None, direction, is_capped, is_known: own.is_part == 0 || t >= ray.t_max }
     }
 }
 
 /// t at which a ray is so many cells of the base map that holds its start from there; [`T_INFINITE`] where none holds
 /// it.
-fn near_end(p: &Params, levels: &[RomaLevel], index: u32, ray: &Ray, normal: Vec3, cells: u32) -> f32 {
+fn near_end(p: &Params, own: &RomaOwn, levels: &[Level], index: u32, ray: &Ray, normal: Vec3, cells: u32) -> f32 {
     let d = ray.direction;
     let length = square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    let level = levels.get(start_level_of(p, levels, ray.origin, normal, margin_of(p, index)));
+    let level = levels.get(start_level_of(own, levels, ray.origin, normal, margin_of(p, own, index)));
     level.map_or(T_INFINITE, |level| divide(cells as f32, level.scale * length))
 }
 
-/// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those
-/// that no base map holds are traced whole. Where there are pilots only these are traced.
-pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
-    let (p, levels) = (bound.params, &tables.maps.levels);
-    if levels.is_empty() {
+/// Ends those of the pass's rays that are no pilots before they are traced: maps answer them.
+pub fn roma_pilots(bound: &Bound, set: &mut RaySet) {
+    let (p, own) = (bound.params, bound.own::<RomaOwn>());
+    if own.levels == 0 {
         return;
     }
-    own.hits.par_chunks_mut(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
-        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
-            let index = run * RUN + i;
-            if p.roma_near != NONE {
-                let end = near_end(p, levels, index as u32, ray, normal_of(seen, index), p.roma_near);
-                hit.t = least(ray.t_max, end);
-            }
-            if p.roma_pilots != 0 && !is_pilot(p, index as u32) {
+    set.hits.par_chunks_mut(RUN).zip(set.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
+        for (i, (hit, _)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
+            if own.pilots != 0 && !is_pilot(p, own, (run * RUN + i) as u32) {
                 hit.t = ANSWERED;
             }
         }
@@ -459,13 +451,18 @@ pub fn roma_near(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &Ra
 }
 
 /// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are
-/// sifted: there, those that meet nothing are ended, and others are traced up to `roma_near` cells from their start.
+/// sifted: there, those that meet nothing are ended, and others are traced up to `near` cells from their start.
 /// Where pilots have been traced, these count for what maps get wrong.
-pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &RaySet) {
-    let p = bound.params;
-    let of = tables.maps_of(p);
-    let (is_far, is_sifted) = (p.roma_part == ROMA_FAR, p.roma_part == ROMA_SIFT);
-    let RaySet { rays, hits, surfaces } = own;
+pub fn roma_trace(
+    bound: &Bound,
+    buffers: &mut [Vec<u32>],
+    set: &mut RaySet,
+    seen: &RaySet,
+) -> Result<(), ExecutorError> {
+    let (p, own) = (bound.params, bound.own::<RomaOwn>());
+    let of = Maps::of(bound, buffers)?;
+    let (is_far, is_sifted) = (own.part == ROMA_FAR, own.part == ROMA_SIFT);
+    let RaySet { rays, hits, surfaces } = set;
     let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
     all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();
@@ -473,7 +470,7 @@ pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &R
             let (hit, surface, index) = (&mut hits[i], &mut surfaces[i], run * RUN + i);
             // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
             let is_done = hit.id != NONE || hit.t == ANSWERED || hit.t >= ray.t_max;
-            if is_far && is_done || is_sifted && is_pilot(p, index as u32) {
+            if is_far && is_done || is_sifted && is_pilot(p, own, index as u32) {
                 continue;
             }
             tally.add(COUNTER_RAYS, 1);
@@ -487,20 +484,21 @@ pub fn roma_trace(bound: &Bound, tables: &RomaTables, own: &mut RaySet, seen: &R
             tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
             if is_sifted {
                 of.sift(index as u32, ray, normal, &found, hit);
-            } else if p.roma_part == ROMA_CORRECT && is_pilot(p, index as u32) {
-                correct(p, found.met.is_some(), hit);
+            } else if own.part == ROMA_CORRECT && is_pilot(p, own, index as u32) {
+                correct(own, found.met.is_some(), hit);
             } else {
                 found.write(hit, (!bound.has(PARAM_ANY_HIT)).then_some(surface));
             }
         }
         bound.counters.add(&tally);
     });
+    Ok(())
 }
 
 /// Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or
 /// 0. So the mean is that of traced rays, and its noise that of what maps get wrong (a control variate).
-fn correct(p: &Params, is_met: bool, hit: &mut Hit) {
-    let n = p.roma_pilots as f32;
+fn correct(own: &RomaOwn, is_met: bool, hit: &mut Hit) {
+    let n = own.pilots as f32;
     match (hit.id == NONE, is_met) {
         (true, true) => hit.u = n - 1.0,
         (false, false) => *hit = Hit { id: NONE, u: -n, v: 0.0, ..*hit },
@@ -511,17 +509,17 @@ fn correct(p: &Params, is_met: bool, hit: &mut Hit) {
 impl Maps<'_> {
     /// Ends a ray that maps find free; what they do not is traced.
     fn sift(&self, index: u32, ray: &Ray, normal: Vec3, found: &Answer, hit: &mut Hit) {
-        let p = self.params;
+        let (p, own) = (self.params, self.own);
         if found.met.is_none() {
             if found.is_known {
                 hit.t = ANSWERED;
             }
             return;
         }
-        if p.roma_near == 0 {
+        if own.near == 0 {
             hit.t = WAITING;
-        } else if p.roma_near != NONE {
-            hit.t = least(ray.t_max, near_end(p, self.levels, index, ray, normal, p.roma_near));
+        } else if own.near != NONE {
+            hit.t = least(ray.t_max, near_end(p, own, self.levels, index, ray, normal, own.near));
         }
     }
 }
@@ -529,14 +527,14 @@ impl Maps<'_> {
 /// Counts, of the pilots, which were traced to their ends, how many maps would have answered wrongly: those that meet
 /// something though they were found free, and for each of several distances up to which rays in doubt may be traced,
 /// those that are free and meet something in the maps from there on.
-pub fn roma_measure(bound: &Bound, tables: &RomaTables, own: &RaySet, seen: &RaySet) {
-    let p = bound.params;
-    let of = tables.maps_of(p);
-    own.hits.par_chunks(RUN).zip(own.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
+pub fn roma_measure(bound: &Bound, buffers: &mut [Vec<u32>], set: &RaySet, seen: &RaySet) -> Result<(), ExecutorError> {
+    let (p, own) = (bound.params, bound.own::<RomaOwn>());
+    let of = Maps::of(bound, buffers)?;
+    set.hits.par_chunks(RUN).zip(set.rays.par_chunks(RUN)).enumerate().for_each(|(run, (hits, rays))| {
         let mut tally = Tally::default();
         for (i, (hit, ray)) in hits.iter().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
             let index = (run * RUN + i) as u32;
-            if !is_pilot(p, index) {
+            if !is_pilot(p, own, index) {
                 continue;
             }
             tally.add(COUNTER_PILOTS, 1);
@@ -547,11 +545,12 @@ pub fn roma_measure(bound: &Bound, tables: &RomaTables, own: &RaySet, seen: &Ray
             tally.add(COUNTER_PILOTS + 1, u32::from(!is_free && !is_met && found.is_known));
             for i in 0..if is_free && is_met { HANDOVERS } else { 0 } {
                 let cells = if i == 0 { 0 } else { 1 << i };
-                let from = near_end(p, of.levels, index, ray, normal, cells * p.roma_near);
+                let from = near_end(p, own, of.levels, index, ray, normal, cells * own.near);
                 let is_wrong = from < ray.t_max && of.answer(index, ray, &taken, normal, from, false).met.is_some();
                 tally.add(COUNTER_PILOTS + 2 + i, u32::from(is_wrong));
             }
         }
         bound.counters.add(&tally);
     });
+    Ok(())
 }

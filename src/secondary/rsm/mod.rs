@@ -11,7 +11,7 @@
 //! *Practice.* Spots have one map, points, and spots that are too wide, the six sides of a cube.
 
 pub mod answer;
-pub mod device;
+pub mod kernels;
 pub mod maps;
 pub mod twin;
 

@@ -1,15 +1,16 @@
 //! Reflective shadow maps: twins of `shaders/rsm/rsm_write.wgsl` and `rsm_light.wgsl`.
 
-use super::maps::RsmMaps;
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::layout::{NONE, ROMA_HIT, RSM_PERSPECTIVE, RsmTexel};
+use crate::kernels::layout::{MET, NONE, RSM_PERSPECTIVE, RsmMap, RsmOwn, RsmTexel};
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::shade::lamps::{lamp_words, shines, unit};
 use crate::kernels::shade::light::{add_light, sunlight};
 use crate::kernels::shade::shade::Pixels;
+use crate::kernels::table::words;
 use crate::kernels::vector::{Vec3, dot, each, most};
 use crate::math::exact::divide;
+use crate::schedule::ExecutorError;
 use bricks::Material;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -24,39 +25,27 @@ const IN_DEPTH: f32 = 3.6;
 /// Pixels that a task lights in a row.
 const RUN: usize = 1024;
 
-/// The maps and their texels.
-#[derive(Default)]
-pub struct RsmTables {
-    /// How they are placed.
-    pub maps: RsmMaps,
-    /// Of all maps, row by row.
-    pub texels: Vec<RsmTexel>,
-}
-
-impl RsmTables {
-    /// Takes maps; as many texels as before keep what they hold.
-    pub fn set(&mut self, maps: &RsmMaps) {
-        if self.texels.len() != maps.texels as usize {
-            self.texels.clear();
-        }
-        self.texels.resize(maps.texels as usize, RsmTexel::default());
-        self.maps = maps.clone();
-    }
-}
-
 /// Writes a block of texels of a map from the hits of set 0.
-pub fn rsm_write(bound: &Bound, tables: &mut RsmTables, pixels: &Pixels, seen: &RaySet, materials: &[Material]) {
-    let p = bound.params;
-    let map = &tables.maps.maps[p.rsm_map as usize];
-    let (width, height) = (map.width.saturating_sub(p.rsm_x), map.height.saturating_sub(p.rsm_y));
-    let rows =
-        tables.texels[map.first as usize..][..(map.width * map.height) as usize].par_chunks_mut(map.width as usize);
-    rows.skip(p.rsm_y as usize).take(height.min(p.height) as usize).enumerate().for_each(|(y, row)| {
-        for (x, texel) in row.iter_mut().skip(p.rsm_x as usize).take(width.min(p.width) as usize).enumerate() {
+pub fn rsm_write(
+    bound: &Bound,
+    buffers: &mut [Vec<u32>],
+    pixels: &Pixels,
+    seen: &RaySet,
+    materials: &[Material],
+) -> Result<(), ExecutorError> {
+    let (p, own) = (bound.params, bound.own::<RsmOwn>());
+    let [maps, texels] = words(buffers)?;
+    let map = &bytemuck::cast_slice::<_, RsmMap>(maps)[own.map as usize];
+    let texels: &mut [RsmTexel] = bytemuck::cast_slice_mut(texels);
+    let (width, height) = (map.width.saturating_sub(own.x), map.height.saturating_sub(own.y));
+    let rows = texels[map.first as usize..][..(map.width * map.height) as usize].par_chunks_mut(map.width as usize);
+    rows.skip(own.y as usize).take(height.min(p.height) as usize).enumerate().for_each(|(y, row)| {
+        for (x, texel) in row.iter_mut().skip(own.x as usize).take(width.min(p.width) as usize).enumerate() {
             let index = y * p.width as usize + x;
             *texel = seen_by_lamp(bound, (map.lamp, map.flags), pixels, seen, index, materials);
         }
     });
+    Ok(())
 }
 
 fn seen_by_lamp(
@@ -94,10 +83,10 @@ fn row_at(row: &[f32; 4], p: Vec3) -> f32 {
 }
 
 /// What is reflected to a ray along `-view` from near `p`, which is known to within `lift`.
-fn reflected(bound: &Bound, tables: &RsmTables, p: Vec3, view: Vec3, lift: f32) -> Vec3 {
+fn reflected(bound: &Bound, (maps, texels): (&[RsmMap], &[RsmTexel]), p: Vec3, view: Vec3, lift: f32) -> Vec3 {
     let mut light = [0.0; 3];
     let mut done = bound.params.emitter_count;
-    for map in &tables.maps.maps {
+    for map in maps {
         if map.lamp == done {
             continue;
         }
@@ -112,7 +101,7 @@ fn reflected(bound: &Bound, tables: &RsmTables, p: Vec3, view: Vec3, lift: f32) 
             continue;
         }
         done = map.lamp;
-        let texel = &tables.texels[(map.first + v as u32 * map.width + u as u32) as usize];
+        let texel = &texels[(map.first + v as u32 * map.width + u as u32) as usize];
         let n = texel.normal;
         let turned = n[0] * view[0] + n[1] * view[1] + n[2] * view[2];
         let apart = (depth - texel.depth).abs();
@@ -125,7 +114,15 @@ fn reflected(bound: &Bound, tables: &RsmTables, p: Vec3, view: Vec3, lift: f32) 
 }
 
 /// Adds what the hits that occupancy maps gave reflect of the lamps, by their maps.
-pub fn rsm_light(bound: &Bound, tables: &RsmTables, pixels: &mut Pixels, seen: &RaySet) {
+pub fn rsm_light(
+    bound: &Bound,
+    buffers: &mut [Vec<u32>],
+    pixels: &mut Pixels,
+    seen: &RaySet,
+) -> Result<(), ExecutorError> {
+    let [maps, texels] = words(buffers)?;
+    let maps = &bytemuck::cast_slice(maps)[..bound.own::<RsmOwn>().maps as usize];
+    let looked_up = (maps, bytemuck::cast_slice(texels));
     let Pixels { radiance, throughput, .. } = pixels;
     radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
         let mut tally = Tally::default();
@@ -133,17 +130,18 @@ pub fn rsm_light(bound: &Bound, tables: &RsmTables, pixels: &mut Pixels, seen: &
             let index = run * RUN + i;
             let ray = &seen.rays[index];
             let is_traced = ray.t_min <= ray.t_max;
-            if !is_traced || seen.hits[index].id != ROMA_HIT {
+            if !is_traced || seen.hits[index].id != MET {
                 continue;
             }
             let met = &seen.surfaces[index];
             let words = lamp_words(bound, index, throughput);
             let p = each(|k| met.point[k] + MOVED * met.area * (unit(words[k]) - 0.5));
-            let light = reflected(bound, tables, p, met.normal, met.area);
+            let light = reflected(bound, looked_up, p, met.normal, met.area);
             if light.iter().any(|&c| c != 0.0) {
                 add_light(bound, &mut tally, radiance, throughput.get(index), light);
             }
         }
         bound.counters.add(&tally);
     });
+    Ok(())
 }

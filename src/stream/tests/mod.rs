@@ -2,7 +2,6 @@
 
 mod host_cache;
 mod model;
-mod prefetch;
 mod residency;
 mod scene_file;
 mod trace;

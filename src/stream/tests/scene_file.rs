@@ -34,7 +34,7 @@ fn payloads_arrive_as_the_file_gives_them() {
     let (_folder, scene) = open(SCENE);
     let items = items(&scene);
     assert_eq!(items.iter().filter(|item| item.kind == Kind::Tile).count(), 2);
-    let workers = Workers::new(scene.clone(), HostCache::new(1 << 20), 2, 0).unwrap();
+    let workers = Workers::new(scene.clone(), HostCache::new(1 << 20), 2).unwrap();
     for _ in 0..2 {
         let loaded = workers.load(items.iter().map(|&item| (item, Sink::default())).collect()).unwrap();
         for (item, sink) in loaded {
@@ -61,7 +61,7 @@ fn a_damaged_brick_is_named_and_the_others_load() {
         bytes[whole.span(bad.into()).offset as usize] ^= 1;
         let (_folder, scene) = open(&bytes);
         let items = items(&scene);
-        let workers = Workers::new(scene, HostCache::new(1 << 20), 2, 0).unwrap();
+        let workers = Workers::new(scene, HostCache::new(1 << 20), 2).unwrap();
         for one in workers.load_each(items.iter().map(|&item| (item, Sink::default())).collect()) {
             match one.result {
                 Ok(()) => assert_ne!(one.item, bad),

@@ -1,10 +1,9 @@
-//! The workers: order, corrupt payloads, panics, lost and late answers, host cache, prefetch, shutdown.
+//! The workers: order, corrupt payloads, panics, lost and late answers, host cache, shutdown.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::model::Random;
 use crate::stream::workers::collect;
@@ -26,8 +25,6 @@ struct Mock {
     tiles: u32,
     faults: HashMap<Item, Fault>,
     copies: AtomicU64,
-    /// When set, every copy waits for one message.
-    gate: Option<Mutex<Receiver<()>>>,
 }
 
 /// Panics when dropped.
@@ -62,9 +59,6 @@ impl PayloadSource for Mock {
     }
 
     fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError> {
-        if let Some(gate) = &self.gate {
-            gate.lock().unwrap().recv()?;
-        }
         self.copies.fetch_add(1, Ordering::Relaxed);
         out.copy_from_slice(&payload(item));
         match self.faults.get(&item) {
@@ -100,7 +94,7 @@ impl Destination for Sink {
 
 fn start(mock: Mock, host_bytes: u64, threads: usize) -> (Workers<Sink>, Arc<Mock>) {
     let mock = Arc::new(mock);
-    (Workers::new(mock.clone(), HostCache::new(host_bytes), threads, 64).unwrap(), mock)
+    (Workers::new(mock.clone(), HostCache::new(host_bytes), threads).unwrap(), mock)
 }
 
 fn requests(items: impl IntoIterator<Item = Item>) -> Vec<(Item, Sink)> {
@@ -109,15 +103,6 @@ fn requests(items: impl IntoIterator<Item = Item>) -> Vec<(Item, Sink)> {
 
 fn all_items(bricks: u32) -> impl Iterator<Item = Item> {
     (0..bricks).flat_map(|brick| [Item::geometry(brick), Item::attributes(brick)])
-}
-
-/// Waits until `done`, for things that happen on other threads; fails after ten seconds.
-fn wait_until(what: &str, done: impl Fn() -> bool) {
-    let begin = Instant::now();
-    while !done() {
-        assert!(begin.elapsed() < Duration::from_secs(10), "waited in vain: {what}");
-        std::thread::yield_now();
-    }
 }
 
 #[test]
@@ -186,7 +171,6 @@ fn a_brick_beyond_the_last_is_an_error() {
     let loaded = workers.load_each(requests([Item::geometry(4), Item::geometry(3)]));
     assert!(matches!(loaded[0].result, Err(StreamError::NoSuchItem { bricks: 4, .. })));
     assert!(loaded[1].result.is_ok());
-    assert_eq!(workers.prefetch(&[Item::geometry(9)]), 0);
     assert_eq!(mock.copies.load(Ordering::Relaxed), 1);
 }
 
@@ -224,7 +208,7 @@ fn threads_that_end_lose_items_and_hang_nobody() {
     let mock = Arc::new(Mock { bricks: 100, ..Mock::default() });
     let cache = HostCache::new(1 << 20);
     // The only thread takes three jobs, answers none and ends: with jobs queued, and more to come than the queue holds.
-    let workers: Workers<Sink> = Workers::with_body(mock.clone(), cache.clone(), 1, 0, |_, jobs, _| {
+    let workers: Workers<Sink> = Workers::with_body(mock.clone(), cache.clone(), 1, |_, jobs| {
         (0..3).for_each(|_| drop(jobs.recv()));
     })
     .unwrap();
@@ -284,84 +268,10 @@ fn counters_do_not_depend_on_threads() {
 }
 
 #[test]
-fn prefetched_payloads_are_not_read_again() {
-    let (workers, mock) = start(Mock { bricks: 20, ..Mock::default() }, 1 << 20, 2);
-    let items: Vec<Item> = (0..20).map(Item::geometry).collect();
-    assert_eq!(workers.prefetch(&items), 20);
-    wait_until("prefetches", || workers.host_cache().stats().prefetched == 20);
-    assert_eq!(workers.prefetch(&items), 0, "all are held");
-    workers.load(requests(items)).unwrap();
-    let stats = workers.stats();
-    assert_eq!((stats.read, stats.cached, mock.copies.load(Ordering::Relaxed)), (0, 20, 20));
-    let stats = workers.host_cache().stats();
-    assert_eq!((stats.prefetched_used, stats.prefetched_used_bytes), (20, stats.prefetched_bytes));
-}
-
-#[test]
-fn a_failing_prefetch_is_told_by_the_load() {
-    let faults = HashMap::from([(Item::geometry(1), Fault::Corrupt), (Item::geometry(2), Fault::PanicWithBomb)]);
-    let (workers, _) = start(Mock { bricks: 4, faults, ..Mock::default() }, 1 << 20, 1);
-    workers.prefetch(&[1, 2].map(Item::geometry));
-    wait_until("dropped prefetches", || workers.stats().prefetch_dropped == 2);
-    assert_eq!(workers.host_cache().stats().used_bytes, 0);
-    assert!(workers.load(requests([Item::geometry(1)])).is_err());
-    assert!(workers.load(requests([Item::geometry(3)])).is_ok());
-}
-
-/// Workers whose source waits for the returned sender.
-fn gated(prefetch_queue: usize) -> (Workers<Sink>, Arc<Mock>, Sender<()>) {
-    let (open, gate) = channel();
-    let mock = Arc::new(Mock { bricks: 50, gate: Some(Mutex::new(gate)), ..Mock::default() });
-    (Workers::new(mock.clone(), HostCache::new(1 << 20), 1, prefetch_queue).unwrap(), mock, open)
-}
-
-#[test]
-fn prefetching_never_waits_and_loads_go_first() {
-    let (workers, mock, open) = gated(4);
-    // One is taken by the thread and stands at the gate; four wait; the rest is dropped.
-    assert_eq!(workers.prefetch(&[Item::geometry(0)]), 1);
-    wait_until("the first to be taken", || workers.host_cache().stats().used_bytes > 0);
-    let many: Vec<Item> = (1..40).map(Item::geometry).collect();
-    assert_eq!(workers.prefetch(&many), 4);
-    assert_eq!(workers.stats().prefetch_dropped, 35);
-    // A load overtakes what waits: with the gate open twice, the first prefetch and the load get through.
-    std::thread::scope(|scope| {
-        let load = scope.spawn(|| workers.load(requests([Item::geometry(45)])).map(|loaded| loaded.len()));
-        wait_until("the load's reservation", || {
-            let both = payload(Item::geometry(0)).len() + payload(Item::geometry(45)).len();
-            workers.host_cache().stats().used_bytes == both as u64
-        });
-        // The job is sent right after its reservation; give it the time to be queued.
-        std::thread::sleep(Duration::from_millis(20));
-        open.send(()).unwrap();
-        open.send(()).unwrap();
-        assert_eq!(load.join().unwrap().unwrap(), 1);
-    });
-    assert_eq!(mock.copies.load(Ordering::Relaxed), 2);
-    // What is cancelled is not read.
-    workers.cancel_prefetch();
-    open.send(()).unwrap();
-    open.send(()).unwrap();
-    assert!(workers.stats().prefetch_dropped >= 35 + 3, "one may have been under way");
-    assert!(mock.copies.load(Ordering::Relaxed) <= 3, "one may have been under way");
-    assert!(workers.prefetch(&many) >= 4, "cancelling makes room at once");
-    assert_eq!(gated(0).0.prefetch(&many), 0, "no queue, no prefetch");
-}
-
-#[test]
-fn shutdown_drops_what_is_queued() {
-    let (workers, mock, open) = gated(40);
-    assert_eq!(workers.prefetch(&(0..40).map(Item::geometry).collect::<Vec<_>>()), 40);
-    let cache = workers.host_cache().clone();
-    wait_until("the first to be taken", || cache.stats().used_bytes > 0);
-    let end = std::thread::spawn(move || drop(workers));
-    std::thread::sleep(Duration::from_millis(20));
-    open.send(()).unwrap();
-    // Were the queue worked off, the gate would hold the thread for ever.
-    wait_until("the threads to end", || end.is_finished());
-    end.join().unwrap();
-    assert_eq!(mock.copies.load(Ordering::Relaxed), 1);
+fn threads_end_with_the_pool() {
+    let (workers, mock) = start(Mock { bricks: 20, ..Mock::default() }, 1 << 20, 3);
+    workers.load(requests(all_items(20))).unwrap();
+    assert!(Arc::strong_count(&mock) > 1, "control: the pool holds its source");
+    drop(workers);
     assert_eq!(Arc::strong_count(&mock), 1, "a thread outlived the pool");
-    let stats = cache.stats();
-    assert_eq!(stats.used_bytes, payload(Item::geometry(0)).len() as u64);
 }

@@ -13,7 +13,7 @@ const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 const NONE: &str = "–";
 
 /// What a field of the records means, with its unit. Fields that are not listed are shown without.
-const MEANINGS: [(&str, &str); 50] = [
+const MEANINGS: [(&str, &str); 47] = [
     ("rays", "rays traced"),
     ("rays_answered", "rays besides that a field of visibility answered"),
     ("ms", "wall time from submission to fence, ms"),
@@ -39,9 +39,6 @@ const MEANINGS: [(&str, &str); 50] = [
     ("bricks_reloaded_frame", "payloads loaded that had been loaded in the same frame before"),
     ("bytes_reloaded_frame", "bytes of those"),
     ("cache_passes", "most fillings of the cache that one pass took; 1 where all it used fitted"),
-    ("prefetched_bytes", "bytes brought into the host cache ahead of need"),
-    ("prefetched_used_bytes", "bytes brought ahead of need that loads found there"),
-    ("prefetched_wasted_bytes", "bytes brought ahead of need and put out before they were asked for"),
     ("bricks_evicted", "payloads evicted"),
     ("bricks_resident_start", "payloads resident at the start"),
     ("bricks_resident_end", "payloads resident at the end"),

@@ -62,7 +62,7 @@ impl Truth {
         for frame in 0..FRAMES {
             view.renderer.place(&still, &movers.at(time(frame)))?;
             // After what has moved, which it is not to be told.
-            view.renderer.dvf = brute_force(&still, how);
+            view.renderer.methods.set(brute_force(&still, how));
             let picture = view.picture(0)?;
             let is_unchanged = |i: usize, before: &Picture| {
                 let (id, bits) = (picture.ids[i], picture.image.rgb[i].map(f32::to_bits));
@@ -75,7 +75,7 @@ impl Truth {
             frames.push(Brute { picture, unchanged });
         }
         view.renderer.place(&still, &movers.at(0.0))?;
-        view.renderer.dvf = brute_force(&still, how);
+        view.renderer.methods.set(brute_force(&still, how));
         let other = view.picture(1)?.image;
         let first = &frames[0].picture;
         let shown: Vec<bool> = first.ids.iter().map(|&id| id != NONE).collect();
@@ -137,7 +137,7 @@ pub fn measure(view: &mut View, options: &str) -> Result<Values> {
     };
     let values = of_truth(view, &options, way, &truth);
     view.renderer.place(&truth.still, &truth.movers.at(0.0))?;
-    view.renderer.dvf = Dvf::default();
+    view.renderer.methods.remove::<Dvf>();
     view.truth[of_mode] = Some(truth);
     values
 }
@@ -153,19 +153,20 @@ fn of_truth(view: &mut View, options: &WalkArgs, way: Way, truth: &Truth) -> Res
     for (frame, brute) in (0..FRAMES).zip(&truth.frames) {
         view.renderer.place(&truth.still, &truth.movers.at(time(frame)))?;
         if way == Way::Anew || frame == 0 {
-            view.renderer.dvf = Dvf::default();
+            view.renderer.methods.remove::<Dvf>();
             let region = view.region(options)?;
             let (made, _) = view.make(options)?;
             (points, longest) = (made.points, made.field.shape.size.into_iter().max().unwrap_or(0));
-            view.renderer.dvf = Dvf::new(Arc::new(made.field), how);
+            let mut dvf = Dvf::new(Arc::new(made.field), how);
             match way {
                 Way::Anew => of_fields += made.record.rays as f64,
                 Way::Renewed => {
                     let renewal = renewal(options, Arc::new(made.kept), region);
-                    view.renderer.dvf = std::mem::take(&mut view.renderer.dvf).renewed_by(renewal);
+                    dvf = dvf.renewed_by(renewal);
                 }
                 Way::Told => {}
             }
+            view.renderer.methods.set(dvf);
         }
         let picture = view.picture(0)?;
         (rays, traced) = (rays + brute.picture.traced, traced + picture.traced);

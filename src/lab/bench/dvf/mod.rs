@@ -249,21 +249,21 @@ impl<'a> View<'a> {
     /// Makes the field that `options` ask for, and a picture by it; the values, and the picture.
     fn measure(&mut self, stage: Stage, options: &str) -> Result<(Values, Image)> {
         let options = walk_args(options, &self.place.scene, &self.args.adapter)?;
-        self.renderer.dvf = Dvf::default();
+        self.renderer.methods.remove::<Dvf>();
         let (made, seconds) = self.make(&options)?;
         let known = made.field.known_cells();
         let longest = made.field.shape.size.into_iter().max().unwrap_or(0);
         let field = Arc::new(made.field);
-        self.renderer.dvf = Dvf::new(field.clone(), options.dvf.how());
+        self.renderer.methods.set(Dvf::new(field.clone(), options.dvf.how()));
         let picture = self.picture(0)?;
         let mut times = [vec![self.exact.ms], vec![picture.ms]];
         for _ in 1..self.args.repeat {
-            self.renderer.dvf = Dvf::default();
+            self.renderer.methods.remove::<Dvf>();
             times[0].push(self.picture(0)?.ms);
-            self.renderer.dvf = Dvf::new(field.clone(), options.dvf.how());
+            self.renderer.methods.set(Dvf::new(field.clone(), options.dvf.how()));
             times[1].push(self.picture(0)?.ms);
         }
-        self.renderer.dvf = Dvf::default();
+        self.renderer.methods.remove::<Dvf>();
         let [exact_ms, ms] = times.map(median);
         let exact = &self.exact;
         let errors = pixel_errors(&picture.image, &exact.image)?;

@@ -363,7 +363,6 @@ fn error_over_time(job: &Job, rows: &Rows) -> Option<Graph> {
     };
     let lines = vec![
         line("maps alone", |way| matches!(way, Way::Roma { .. })),
-        line("traced near, maps beyond 1 to 16 cells", |way| matches!(way, Way::Handed { .. })),
         line("auto: maps corrected by one ray in 2 to 8", |way| matches!(way, Way::Corrected { .. })),
         line("auto: those in doubt traced", |way| *way == Way::Sifted),
         line("auto: 2 to 10 % wrong", |way| matches!(way, Way::Bounded { .. })),

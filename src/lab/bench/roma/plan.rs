@@ -85,11 +85,6 @@ pub enum Way {
         /// Whether rays keep their direction.
         is_unsnapped: bool,
     },
-    /// By tracing them up to so many cells from their start, by maps from there on.
-    Handed {
-        /// Cells.
-        cells: u32,
-    },
     /// By tracing those that maps do not find free.
     Sifted,
     /// By maps, and one of so many is traced to correct them by.
@@ -116,7 +111,6 @@ impl fmt::Display for Way {
             Self::Roma { k, size, is_unsnapped } => {
                 write!(f, "roma {size} K={k}{}", if *is_unsnapped { " unsnapped" } else { "" })
             }
-            Self::Handed { cells } => write!(f, "roma beyond {cells} cells"),
             Self::Sifted => f.write_str("auto, in doubt traced"),
             Self::Corrected { one_in } => write!(f, "auto, one in {one_in}"),
             Self::Bounded { percent } => write!(f, "auto, {percent} % wrong"),
@@ -136,7 +130,6 @@ impl Way {
                     "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-diffuse-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
                 )
             }
-            Self::Handed { cells } => format!("--secondary roma --roma-near {cells}"),
             Self::Sifted => "--secondary auto --auto-error off".into(),
             Self::Corrected { one_in } => format!("--secondary auto --auto-one-in {one_in}"),
             Self::Bounded { percent } => format!("--secondary auto --auto-error {percent}"),
@@ -302,11 +295,10 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
     let own = job(Stage::OutOfCore, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
     jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
     jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
-    let handed = [1, 2, 4, 8, 16].map(|cells| Way::Handed { cells });
     let corrected = [2, 4, 6, 8].map(|one_in| Way::Corrected { one_in });
     let bounded = [2, 5, 10].map(|percent| Way::Bounded { percent });
     for length in [length, 4.0 * length] {
-        let ways = with_exact(&[&[USUAL][..], &corrected, &handed, &[Way::Sifted], &bounded].concat());
+        let ways = with_exact(&[&[USUAL][..], &corrected, &[Way::Sifted], &bounded].concat());
         let own = job(Stage::Handover, SceneId::City, format!("rays of {length}, cache 15 %"), length, ways);
         // As many rays a sample as make the maps a small part, and as are chosen among.
         let options = own.options.replace("--ao-rays 1", "--ao-rays 16");

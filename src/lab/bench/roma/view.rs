@@ -13,8 +13,8 @@ use crate::lab::bench::scenes::Place;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::scene::{Camera, CameraPath};
 use crate::schedule::cache::Cache;
-use crate::secondary::df::answer::Field;
-use crate::secondary::rsm::answer::Rsm;
+use crate::secondary::occupancy::BaseMaps;
+use crate::secondary::roma::answer::Roma;
 use crate::session::device::Adapter;
 use crate::session::open::{Session, open_scene};
 use crate::stream::Residency;
@@ -84,10 +84,13 @@ impl<'a> View<'a> {
         let args = walk_args(&line(self.job, options, way, self.settings, samples, seed), &self.scene, self.adapter)?;
         let renderer = &mut self.renderer;
         renderer.settings = walk::settings(&args, Schedule::Chc);
-        // A field stays as long as the camera does: its making is measured.
-        renderer.field = Field::default();
+        let warm = renderer.methods.remove::<Roma>();
+        // A distance field stays as long as the camera does: its making is measured.
+        renderer.methods = walk::methods(&args);
+        if let (Some(roma), Some(warm)) = (renderer.methods.get_mut::<Roma>(), warm) {
+            roma.keep(warm, self.job.is_cold);
+        }
         if self.job.is_cold {
-            renderer.rsm = Rsm::default();
             let old = &renderer.cache;
             let sizes = old.bytes.sizes();
             let page_bytes = renderer.executor.page_bytes();
@@ -132,7 +135,7 @@ impl<'a> View<'a> {
     /// Length of rays of occlusion, in cells that bricks have; of other effects none.
     pub fn cells(&mut self) -> Option<(String, f64)> {
         let renderer = &mut self.renderer;
-        let cell = renderer.roma.brick_cell(&renderer.scene).filter(|_| self.job.effect == "ao");
+        let cell = BaseMaps::default().brick_cell(&renderer.scene).filter(|_| self.job.effect == "ao");
         cell.map(|cell| ("cells".into(), self.job.length / cell))
     }
 
@@ -146,7 +149,9 @@ impl<'a> View<'a> {
             depth.is_finite().then(|| (self.camera.position + along * f64::from(depth)).to_array())
         };
         let points: Vec<Option<[f64; 3]>> = one.depth.iter().enumerate().map(point).collect();
-        seams.add(self.renderer.roma.levels(), &points, &one.image, &reference.image);
+        if let Some(roma) = self.renderer.methods.get::<Roma>() {
+            seams.add(roma.base.levels(), &points, &one.image, &reference.image);
+        }
     }
 
     /// Errors of a picture against another, named after what it is.

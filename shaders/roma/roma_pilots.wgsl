@@ -1,19 +1,18 @@
-// Ends the pass's rays, before they are traced, so many cells of the base map that holds their start from it; those
-// that no base map holds are traced whole. Where there are pilots only these are traced.
+// Ends those of the pass's rays that are no pilots before they are traced: maps answer them.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
 #include "common/exact.wgsl"
 #include "common/random.wgsl"
 #include "roma/roma.wgsl"
-#include "roma/levels.wgsl"
+#include "occupancy/levels.wgsl"
 #include "roma/roma_start.wgsl"
 #include "roma/roma_pilot.wgsl"
 
 // One thread a ray.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
-    if global.x >= params.width || global.y >= params.height || params.roma_levels == 0u {
+    if global.x >= params.width || global.y >= params.height || own.levels == 0u {
         return;
     }
     let index = global.y * params.width + global.x;
@@ -21,10 +20,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if !(ray.t_min <= ray.t_max) {
         return;
     }
-    if params.roma_near != NONE {
-        hits[index].t = min(ray.t_max, near_end(index, ray, params.roma_near));
-    }
-    if params.roma_pilots != 0u && !is_pilot(index) {
+    if own.pilots != 0u && !is_pilot(index) {
         hits[index].t = ANSWERED;
     }
 }

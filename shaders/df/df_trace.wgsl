@@ -7,7 +7,7 @@
 #include "common/exact.wgsl"
 #include "common/random.wgsl"
 #include "df/field.wgsl"
-#include "roma/levels.wgsl"
+#include "occupancy/levels.wgsl"
 
 const COARSEST: u32 = 2u;
 // Least way between two look-ups, cells.
@@ -39,7 +39,7 @@ fn between(a: f32, b: f32, t: f32) -> f32 {
 // The distance at a point, cells of the finest level: of the eight cells whose middles are around it, by their
 // nearness.
 fn distance_at(level: u32, mip: u32, point: vec3<f32>) -> f32 {
-    let count = params.field_cells >> mip;
+    let count = own.cells >> mip;
     let first = first_distance(level, mip);
     let per_cell = 1.0 / f32(1u << mip);
     let at = clamp(barrier3(point * per_cell) - 0.5, vec3<f32>(0.0), vec3<f32>(f32(count - 1u)));
@@ -64,7 +64,7 @@ fn through(level: u32, at: vec3<f32>, speed: vec3<f32>, range: vec2<f32>, way: p
     let squares = barrier(barrier(speed.x * speed.x) + barrier(speed.y * speed.y)) + barrier(speed.z * speed.z);
     let per_cell = divide(1.0, square_root(barrier(squares)));
     var t = range.x;
-    while (*way).look_ups < params.field_steps && t <= range.y {
+    while (*way).look_ups < own.steps && t <= range.y {
         let point = vec3<f32>(along(at.x, speed.x, t), along(at.y, speed.y, t), along(at.z, speed.z, t));
         let distance = distance_at(level, (*way).mip, point);
         (*way).look_ups += 1u;
@@ -74,7 +74,7 @@ fn through(level: u32, at: vec3<f32>, speed: vec3<f32>, range: vec2<f32>, way: p
             (*way).mip -= 1u;
             continue;
         }
-        if distance <= params.field_hit {
+        if distance <= own.hit {
             return Found(t, false);
         }
         t = barrier(t + barrier(max(distance, LEAST_STEP) * per_cell));
@@ -88,10 +88,10 @@ fn through(level: u32, at: vec3<f32>, speed: vec3<f32>, range: vec2<f32>, way: p
 // Answers a ray; whether it was capped.
 fn trace(index: u32, ray: Ray) -> bool {
     let normal = seen_surfaces[index].normal;
-    let side = f32(params.field_cells);
+    let side = f32(own.cells);
     let margin = barrier(BLEND * barrier(side * random2(index, ~params.stream, params.seed).x));
-    var start_level = params.field_levels - 1u;
-    for (var l = 0u; l < params.field_levels; l++) {
+    var start_level = own.levels - 1u;
+    for (var l = 0u; l < own.levels; l++) {
         let level = field_levels[l];
         let start = barrier3(ray.origin + barrier3(level.lift * normal));
         let at = barrier3(barrier3(start * level.scale) + level.first);
@@ -106,12 +106,12 @@ fn trace(index: u32, ray: Ray) -> bool {
     // A ray starts near a surface.
     var way = Way(0u, 0u);
     var t = ray.t_min;
-    for (var l = start_level; l < params.field_levels; l++) {
+    for (var l = start_level; l < own.levels; l++) {
         let level = field_levels[l];
         let start = barrier3(ray.origin + barrier3(level.lift * normal));
         let at = barrier3(barrier3(start * level.scale) + level.first);
         let speed = barrier3(ray.direction * level.scale);
-        let low = select(margin, 0.0, l + 1u == params.field_levels);
+        let low = select(margin, 0.0, l + 1u == own.levels);
         let high = side - low;
         let end = end_of(ray.t_max, level.lift, squares, rise);
         var range = vec2<f32>(t, end);
@@ -121,7 +121,7 @@ fn trace(index: u32, ray: Ray) -> bool {
         if range.x <= range.y {
             let found = through(l, at, speed, range, &way);
             if found.t >= 0.0 {
-                hits[index] = Hit(found.t, FIELD_HIT, 0.0, 0.0);
+                hits[index] = Hit(found.t, MET, 0.0, 0.0);
             }
             if found.t >= 0.0 || found.is_capped || range.y >= end {
                 return found.is_capped;

@@ -1,0 +1,148 @@
+//! What passes are traced with: a scene, an executor, a cache, a schedule.
+
+use super::{Captures, Effects, Light, Moved};
+use crate::kernels::FrameExecutor;
+use crate::schedule::auto::{Auto, Fixed};
+use crate::schedule::cache::Cache;
+use crate::schedule::fronts::{FrontPass, Fronts};
+use crate::schedule::{ExecutorError, Pass, PassStats, Shading, Step, Tracing, chc, demand, plain};
+use bricks::SceneFile;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Which schedule traces a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Schedule {
+    /// Tile lists, queries, loads nearest first.
+    Chc,
+    /// Every ray from the root over what is resident, then asking for what is missing.
+    Demand,
+    /// Everything resident, every ray from the root.
+    Plain,
+    /// Everything resident, every ray from the root, over binary trees; the executor has been made ready for it.
+    PlainBinary,
+    /// The cheapest of the first three, pass by pass.
+    Auto,
+}
+
+/// How frames are rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct RenderSettings {
+    /// The schedule of every pass.
+    pub schedule: Schedule,
+    /// What is traced beside camera rays.
+    pub effects: Effects,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Ask which bricks every pass needed; which optimisations are on.
+    pub tracing: Tracing,
+    /// Read depth, normals, ids and albedo back.
+    pub aov: bool,
+    /// Read back what guides denoising and temporal anti-aliasing, and give every pixel directions of its own for ao
+    /// and diffuse.
+    pub guides: bool,
+    /// Samples lie at other points of their pixels in every frame.
+    pub taa: bool,
+    /// Interactive: bytes of tiles of textures that a frame may load. Coarser levels stand for the others, and the
+    /// frame is exact only where `unresolved_pixels` says 0.
+    pub tile_bytes: Option<u64>,
+}
+
+/// A scene, an executor and a cache that passes are traced with. It knows no method of secondary visibility.
+pub struct Engine {
+    /// The scene.
+    pub scene: Arc<SceneFile>,
+    /// The executor.
+    pub executor: Box<dyn FrameExecutor>,
+    /// The cache.
+    pub cache: Cache,
+    /// Settings of all frames.
+    pub settings: RenderSettings,
+    /// Sun and sky.
+    pub light: Light,
+    /// Picture size in pixels.
+    pub size: (u32, u32),
+    /// Edge of a tile in pixels.
+    pub tile: u32,
+    /// The temporal fronts, when they are on.
+    pub fronts: Option<Fronts>,
+    /// What [`Schedule::Auto`] has measured.
+    pub auto: Auto,
+    /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
+    pub captures: Option<Captures>,
+    /// What has moved since the frame before.
+    pub moved: Moved,
+}
+
+impl Engine {
+    /// Whether rays lead to the environment.
+    pub fn draws_environment(&self) -> bool {
+        self.settings.effects.environment && self.light.lamps.environment.is_some()
+    }
+
+    /// Shades the hits of the set before that of `pass`.
+    pub fn shade(&mut self, pass: Pass, light: Shading, stats: &mut PassStats) -> Result<(), ExecutorError> {
+        stats.add(self.executor.run(pass, &[Step::Shade(light)], &self.cache.states)?);
+        Ok(())
+    }
+
+    /// Traces the rays of a pass, which the steps in `first` make, by the schedule in force.
+    ///
+    /// # Errors
+    /// A brick that cannot be read, or the device's.
+    pub fn trace(
+        &mut self,
+        frame: u32,
+        pass: Pass,
+        first: &[Step],
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
+        let fixed = match self.settings.schedule {
+            Schedule::Chc => Fixed::Chc,
+            Schedule::Demand => Fixed::Demand,
+            Schedule::Plain => Fixed::Plain,
+            Schedule::PlainBinary => {
+                let tracing = &self.settings.tracing;
+                return plain::trace_binary(&mut *self.executor, &mut self.cache, pass, first, tracing, stats);
+            }
+            Schedule::Auto => {
+                let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
+                let start = Instant::now();
+                // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the
+                // schedule.
+                let besides = stats.ms_stream - stats.ms;
+                let rays = stats.report.rays;
+                self.trace_by(chosen, frame, pass, first, stats)?;
+                let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
+                self.auto.note(pass, ms, stats.report.rays - rays);
+                return Ok(());
+            }
+        };
+        self.trace_by(fixed, frame, pass, first, stats)
+    }
+
+    fn trace_by(
+        &mut self,
+        schedule: Fixed,
+        frame: u32,
+        pass: Pass,
+        first: &[Step],
+        stats: &mut PassStats,
+    ) -> Result<(), ExecutorError> {
+        let tracing = &self.settings.tracing;
+        let (executor, cache) = (&mut *self.executor, &mut self.cache);
+        match (schedule, &mut self.fronts) {
+            (Fixed::Plain, _) => plain::trace(executor, cache, pass, first, tracing, stats),
+            (Fixed::Demand, _) => demand::trace(executor, cache, pass, first, tracing, stats),
+            (Fixed::Chc, None) => chc::trace(executor, cache, pass, first, tracing, stats),
+            (Fixed::Chc, Some(fronts)) => {
+                let resident = self.scene.resident();
+                let extent = (self.size.0, self.size.1, self.tile);
+                let setup = FrontPass { resident, extent, frame, pass, tracing };
+                fronts.trace(executor, cache, &setup, first, stats)
+            }
+        }
+    }
+}
