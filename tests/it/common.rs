@@ -1,5 +1,4 @@
 //! What the integration tests share: the command as a user runs it, scenes made once, folders that vanish.
-#![allow(dead_code)]
 
 use brickwalk::cli::options::args::{Cli, Command as AppCommand};
 use brickwalk::frame::{Equirectangular, Renderer, environment};

@@ -1,9 +1,7 @@
 //! All ways of reading give the same bytes, from many threads, and refuse requests that make no sense.
 
-mod common;
-
+use crate::common::{self, written};
 use bricks::{Access, Error, Payload, SceneFile};
-use common::written;
 
 #[test]
 fn map_read_and_bytes_agree() {

@@ -1,7 +1,5 @@
 //! A small scene with everything that the format has, and a way to spoil files while their checksums stay right.
 
-#![allow(dead_code)] // Each test program uses a part of this.
-
 use bricks::layout::{DirectoryEntry, Header, PAGE_BYTES};
 use bricks::*;
 use bytemuck::Pod;

@@ -1,10 +1,8 @@
 //! Damage of every kind is found and named, and never anything worse.
 
-mod common;
-
+use crate::common::{self, Image, Scene, written};
 use bricks::layout::{DIRECTORY_BYTES, PAGE_BYTES};
 use bricks::{Access, Error, Part, Payload, SceneFile, Section, verify_file};
-use common::{Image, Scene, written};
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;

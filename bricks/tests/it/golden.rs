@@ -1,8 +1,7 @@
 //! The format does not change by accident: today's writer makes the very bytes of the committed file, and today's
 //! reader reads them. `BRICKS_REGENERATE_GOLDEN=1` writes the file anew; do so only with a new format version.
 
-mod common;
-
+use crate::common;
 use bricks::{SceneFile, verify_file};
 use std::path::Path;
 

@@ -1,10 +1,8 @@
 //! Data that breaks a rule of the format is refused even where every checksum is right.
 
-mod common;
-
+use crate::common::{self, Image, scene, written};
 use bricks::layout::{KIND_LEVELS_OF_DETAIL, KIND_VISIBILITY_FIELDS};
 use bricks::*;
-use common::{Image, scene, written};
 use std::fs;
 use std::mem::offset_of;
 

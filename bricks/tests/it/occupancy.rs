@@ -1,9 +1,7 @@
 //! Occupancy maps in files: read, refused when they break a rule, left out.
 
-mod common;
-
+use crate::common::{self, Scene, scene};
 use bricks::*;
-use common::{Scene, scene};
 use std::path::Path;
 
 /// Every level of a map, one after the other.

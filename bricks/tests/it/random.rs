@@ -1,12 +1,8 @@
 //! Whatever the bytes of a file, reading it ends in an error or in data that obeys the format; never in a panic.
 
-mod common;
-#[path = "common/exercise.rs"]
-mod exercise;
-
+use crate::common::{Image, written};
+use crate::exercise::{exercise, seal, traverse};
 use bricks::*;
-use common::{Image, written};
-use exercise::{exercise, seal, traverse};
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::OnceLock;

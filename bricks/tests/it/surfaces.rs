@@ -1,9 +1,7 @@
 //! Materials, details of attributes and lights that break a rule of the format are refused.
 
-mod common;
-
+use crate::common::{self, scene, written};
 use bricks::*;
-use common::{scene, written};
 
 /// The spoiled resident part is refused with a message that names the record and says `found`.
 #[track_caller]

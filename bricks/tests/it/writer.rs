@@ -1,9 +1,7 @@
 //! A scene file appears whole or not at all.
 
-mod common;
-
+use crate::common::{self, scene, written};
 use bricks::{Error, Payload, SceneFile, Writer};
-use common::{scene, written};
 use std::fs;
 use std::path::Path;
 

@@ -1,8 +1,6 @@
 //! The command line as a user runs it, above all on bad input: one line, exit 1 or 2, nothing half-written.
 
-mod common;
-
-use common::{brickwalk, city, folder, walk};
+use crate::common::{self, brickwalk, city, folder, walk};
 use std::ffi::OsString;
 use std::path::Path;
 

@@ -1,9 +1,7 @@
 //! What a walk makes of radiance: exposure, tone maps, a video, sums of many samples.
 
-mod common;
-
+use crate::common::{self, brickwalk, city, folder, frames, succeed, walk};
 use brickwalk::metrics::{Channel, load};
-use common::{brickwalk, city, folder, frames, succeed, walk};
 use std::path::Path;
 
 /// A Y4M file, read here: its header's words, and its frames as planes Y', Cb, Cr.

@@ -1,9 +1,7 @@
 //! Caches much smaller than what a pass works on: every frame is finished, in as many fillings of the cache as it
 //! takes, and the records say how many.
 
-mod common;
-
-use common::{city, folder, frames, walk};
+use crate::common::{city, folder, frames, walk};
 use serde_json::Value;
 use std::path::Path;
 

@@ -1,9 +1,7 @@
 //! Damaged scene files that are rebuilt from what they were converted from.
 
-mod common;
-
+use crate::common::{brickwalk, city, folder, succeed};
 use bricks::{Payload, SceneFile};
-use common::{brickwalk, city, folder, succeed};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

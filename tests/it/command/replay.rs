@@ -1,9 +1,7 @@
 //! Prefetching and replay through the command line: prefetching changes no output but the host cache's numbers, and a
 //! replay of the recorded requests in the recorded cache does what the walk's own records say.
 
-mod common;
-
-use common::{brickwalk, city, folder, frames, succeed, walk};
+use crate::common::{brickwalk, city, folder, frames, succeed, walk};
 use serde_json::Value;
 use std::path::Path;
 

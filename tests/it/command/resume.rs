@@ -1,8 +1,6 @@
 //! Conversions that are killed, continued, or out of disk space.
 
-mod common;
-
-use common::{brickwalk, folder};
+use crate::common::{brickwalk, folder};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

@@ -1,9 +1,7 @@
 //! The invariant that everything hangs on: pixels, ids and depths do not depend on schedule, cache size, eviction,
 //! fronts, tile size, threads or run; ids and depths not on brick size.
 
-mod common;
-
-use common::{city, folder, frames, walk};
+use crate::common::{self, city, folder, frames, walk};
 use std::path::Path;
 
 const VIEW: &str = "--frames 3 --size 104x72 --aov";

@@ -2,8 +2,7 @@
 //! lattice-rounded triangles and the very f32 rays that the kernels used. Unexcused mismatches: none. Excused ones are
 //! counted and printed.
 
-mod common;
-
+use crate::common;
 use bricks::SceneFile;
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::cli::trace::{EXTENT, device_ray, trace};

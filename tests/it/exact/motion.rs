@@ -2,8 +2,7 @@
 //! instance where it is, whatever the schedule and cache, on both executors; a scene whose trees are not fitted to its
 //! instances does not.
 
-mod common;
-
+use crate::common;
 use bricks::layout::{DirectoryEntry, Header, PAGE_BYTES, Section};
 use bricks::{Instance, SceneFile};
 use brickwalk::cli::motion::WalkMotion;

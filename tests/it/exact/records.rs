@@ -2,8 +2,7 @@
 //! keeps a cache of its own by the addresses written to, takes sizes from the scene file, and truth in f64 says which
 //! bricks hold hits and which could be needed. A record that is off by one is noticed.
 
-mod common;
-
+use crate::common;
 use bricks::{AttributeLayout, GeometryLayout, INSTANCE_IDENTITY, Node, Payload, SceneFile, TOP_LEAF};
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::cli::walk::renderer;

@@ -1,9 +1,7 @@
 //! What `--query-threshold` costs, as `--measure-error` records it: nothing at 0; else what a comparison of the
 //! pictures of two walks finds; and the walk itself is as without the measurement.
 
-mod common;
-
-use common::{city, folder, frames, walk};
+use crate::common::{city, folder, frames, walk};
 use serde_json::Value;
 use std::path::Path;
 

@@ -2,9 +2,7 @@
 //! few pixels, the same bricks loaded by the same queries; and it does so whatever the number of its threads, and where
 //! there is no driver.
 
-mod common;
-
-use common::{brickwalk, city, folder, frames, shared_scenes, succeed, walk};
+use crate::common::{brickwalk, city, folder, frames, shared_scenes, succeed, walk};
 use exr::prelude::{FlatSamples, read_all_flat_layers_from_file};
 use serde_json::Value;
 use std::collections::BTreeMap;

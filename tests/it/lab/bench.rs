@@ -1,9 +1,7 @@
 //! `bench chc` and `bench roma` as a user runs them, on tiny scenes: their files agree with each other and with what
 //! was measured, and a run that was bounded is gone on with.
 
-mod common;
-
-use common::{brickwalk, folder, succeed};
+use crate::common::{brickwalk, folder, succeed};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;

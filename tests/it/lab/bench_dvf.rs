@@ -1,9 +1,7 @@
 //! `bench dvf` as a user runs it, on a tiny Cornell box: its files agree with each other, what is measured is not
 //! measured again, and pictures of what moves flicker in the paper's mode alone.
 
-mod common;
-
-use common::{folder, succeed};
+use crate::common::{folder, succeed};
 use serde_json::Value;
 use std::path::Path;
 

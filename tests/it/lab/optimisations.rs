@@ -1,8 +1,7 @@
 //! The optimisations of CHC+RT: each acts and is counted, none nor any of their combinations changes a hit; the fronts
 //! partition rays and bricks after every frame; a cut of the camera is a cold start.
 
-mod common;
-
+use crate::common;
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::cli::walk::renderer;
 use brickwalk::counters::Record;

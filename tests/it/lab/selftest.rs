@@ -1,7 +1,6 @@
 //! The selftest passes with few rays, prints what scripts read, and fails with every planted defect.
 
-mod common;
-
+use crate::common;
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::gpu::device::candidates;
 use brickwalk::lab::selftest::args::SelftestArgs;

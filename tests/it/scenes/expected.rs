@@ -1,8 +1,6 @@
 //! What converting does with every file of the shared scenes, good and bad: `expected.toml` says it and why.
 
-mod common;
-
-use common::{folder, shared_scenes, succeed};
+use crate::common::{folder, shared_scenes, succeed};
 use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,6 @@
 //! Lights that a scene file brings (KHR_lights_punctual), from glTF to the picture, against closed forms.
 
-mod common;
-
+use crate::common;
 use exr::prelude::*;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};

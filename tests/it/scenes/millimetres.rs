@@ -1,10 +1,8 @@
 //! Meshes ten thousand kilometres from the origin keep their millimetres, whatever file they come from.
 
-mod common;
-
+use crate::common::{folder, succeed};
 use brickwalk::reference::Truth;
 use brickwalk::session::open::open_scene;
-use common::{folder, succeed};
 use std::fmt::Write;
 use std::path::Path;
 

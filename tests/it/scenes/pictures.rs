@@ -1,11 +1,9 @@
 //! What every file of the shared scenes shows on its default path, and that mirrored nodes show their front.
 
-mod common;
-
+use crate::common::{folder, shared_scenes, succeed, walk};
 use brickwalk::metrics::{Channel, load};
 use brickwalk::scene::Camera;
 use brickwalk::scene::path::path_from_bounds;
-use common::{folder, shared_scenes, succeed, walk};
 use glam::{DMat4, DVec3};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,6 @@
 //! The sample models of other projects: each shows the feature that it is there for.
 
-mod common;
-
+use crate::common;
 use exr::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

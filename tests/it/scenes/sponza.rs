@@ -1,8 +1,6 @@
 //! Real input: Sponza is converted, checked, streamed through a small cache, and looks the same however it is streamed.
 
-mod common;
-
-use common::{brickwalk, folder, frames, shared_scenes, succeed, walk};
+use crate::common::{brickwalk, folder, frames, shared_scenes, succeed, walk};
 
 #[test]
 fn sponza_converts_streams_and_verifies() {

@@ -1,10 +1,8 @@
 //! Textures out of core: pictures do not depend on which tiles fit into the cache, records count what is loaded, damage
 //! is named.
 
-mod common;
-
+use crate::common::{brickwalk, folder, frames, succeed, walk};
 use bricks::{Payload, SceneFile};
-use common::{brickwalk, folder, frames, succeed, walk};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

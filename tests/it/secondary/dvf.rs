@@ -1,8 +1,7 @@
 //! Fields of visibility (`walk --secondary dvf`): closed forms, equality with exact rays where masks cover, files,
 //! independence of cache, picture and lanes.
 
-mod common;
-
+use crate::common::{self, city, converted, folder};
 use brickwalk::frame::{FrameOutput, RenderError, Renderer};
 use brickwalk::scene::Camera;
 use brickwalk::scene::path::CameraPath;
@@ -11,7 +10,6 @@ use brickwalk::secondary::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings, generate};
-use common::{city, converted, folder};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,14 +1,12 @@
 //! `--dvf-mode paper` against closed forms: a plane under an even sky, a plane beside a wall, a sky that spherical
 //! harmonics of order 2 hold.
 
-mod common;
-
+use crate::common::{self, converted, folder, sheet};
 use brickwalk::frame::{Equirectangular, Renderer, environment};
 use brickwalk::kernels::Lamps;
 use brickwalk::scene::Camera;
 use brickwalk::secondary::dvf::answer::{Dvf, DvfTracing, Region};
 use brickwalk::secondary::dvf::{Cells, DvfField, DvfSettings, DvfUse};
-use common::{converted, folder, sheet};
 use glam::DVec3;
 use std::path::Path;
 use std::sync::Arc;

@@ -1,8 +1,7 @@
 //! Cells of fields of visibility that are made anew for what moves: the bits of a field made from scratch, pictures,
 //! rays, the budget.
 
-mod common;
-
+use crate::common::{self, folder};
 use bricks::SceneFile;
 use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::scene::Camera;
@@ -13,7 +12,6 @@ use brickwalk::secondary::dvf::{Cells, DvfField, DvfSettings, DvfUse};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings, generate};
-use common::folder;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

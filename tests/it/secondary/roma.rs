@@ -1,8 +1,7 @@
 //! `walk --secondary roma` and `--secondary df`, the baseline: pictures against closed forms, what it loads and
 //! records, that it is the same again and again.
 
-mod common;
-
+use crate::common::{self, city, converted, folder, frames, sheet};
 use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::kernels::layout::NONE;
 use brickwalk::reference::Truth;
@@ -11,7 +10,6 @@ use brickwalk::schedule::{Pass, RomaPart, Step};
 use brickwalk::secondary::occupancy::{Settings, assemble};
 use brickwalk::secondary::roma::handover::Trust;
 use brickwalk::session::open::open_scene;
-use common::{city, converted, folder, frames, sheet};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

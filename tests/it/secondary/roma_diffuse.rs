@@ -1,12 +1,10 @@
 //! Diffuse light by `walk --secondary roma`, whose hits reflective shadow maps light: against closed forms and exact
 //! rays, what it loads, that it is the same again and again.
 
-mod common;
-
+use crate::common::{self, city, converted, folder, sheet};
 use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::kernels::lamps::{Emitter, Lamps, Shape};
 use brickwalk::scene::Camera;
-use common::{city, converted, folder, sheet};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -125,8 +123,8 @@ fn a_sunlit_wall_lights_the_floor_as_the_closed_form_says_but_for_cells() {
         let [exact, roma, unsnapped] = [&exact, &roma, &unsnapped].map(|(light, frame)| near(light, frame, d));
         println!("{d} m: closed form {expected:.5}, exact {exact:.5}, roma {roma:.5}, unsnapped {unsnapped:.5}");
         assert!((exact / expected - 1.0).abs() < 0.05, "{exact} instead of {expected}");
-        // As occlusion by it (tests/roma.rs): cells are thicker than the wall, and rays start above the floor; points
-        // that are looked up, moved by half a cell, leave it at its upper edge.
+        // As occlusion by it (tests/it/secondary/roma.rs): cells are thicker than the wall, and rays start above the
+        // floor; points that are looked up, moved by half a cell, leave it at its upper edge.
         let brightest = shown * form_factor(d - 2.75 / 8.0, HEIGHT + 2.75 / 8.0);
         let darkest = shown * form_factor(d + 1.0 * cell, HEIGHT - 3.0 * cell);
         for found in [roma, unsnapped] {

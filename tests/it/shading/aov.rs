@@ -1,8 +1,7 @@
 //! The EXR layers of a walk against truth: rays made here in f64 from the camera path's definition, hits by exact
 //! predicates.
 
-mod common;
-
+use crate::common;
 use brickwalk::metrics::{Channel, load};
 use brickwalk::reference::{Truth, TruthRay};
 use brickwalk::session::open::open_scene;

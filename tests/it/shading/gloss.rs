@@ -1,8 +1,7 @@
 //! What metals, polished and coated surfaces reflect: against closed forms and integrals in f64, in furnaces, and by
 //! two ways to draw the same light.
 
-mod common;
-
+use crate::common;
 use exr::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;

@@ -2,8 +2,7 @@
 //! under rectangular lights, surfaces that emit, points, spots and distant lights, in uniform environments and under a
 //! single bright texel.
 
-mod common;
-
+use crate::common;
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::cli::walk::renderer;
 use brickwalk::kernels::Extent;

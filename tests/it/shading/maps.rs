@@ -1,8 +1,7 @@
 //! The textures of materials beside the base colour's, against closed forms: normals with their tangents on turned and
 //! mirrored things, metal, occlusion, emission, second coordinates and transformations; surfaces that are unlit.
 
-mod common;
-
+use crate::common;
 use bricks::{MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, Material};
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::cli::walk::renderer;

@@ -1,7 +1,6 @@
 //! What lets rays pass by chance, and by alpha that a closed form gives.
 
-mod common;
-
+use crate::common;
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::cli::trace::{EXTENT, trace};
 use brickwalk::output::npy;

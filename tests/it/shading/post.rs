@@ -1,7 +1,6 @@
 //! Denoising and temporal anti-aliasing, frame after frame, against pictures of many samples.
 
-mod common;
-
+use crate::common;
 use brickwalk::frame::{FrameOutput, Light, Renderer};
 use brickwalk::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr};
 use brickwalk::picture::denoise::{Denoiser, Guides, Taa};

@@ -1,6 +1,6 @@
 //! Reports of synthetic walks: complete, interrupted, with fields missing, and malformed.
 
-mod markup;
+use crate::markup;
 
 use brickwalk_report::{ReportError, write};
 use serde_json::{Value, json};

@@ -1,11 +1,9 @@
 //! The generated city as a whole: counts, determinism, the fixed centre, sound geometry, and the way through it.
 
-mod common;
-
+use crate::common::{clearance, position, same_mesh, triangles};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source, SourceScene};
 use brickwalk_scenes::{CameraPath, Error, Kind, Scene, Settings, generate, write_paths};
-use common::{clearance, position, same_mesh, triangles};
 use glam::DVec3;
 
 fn lazy(triangles: u64, seed: u64, instanced: bool) -> Scene {

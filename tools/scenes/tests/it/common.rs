@@ -1,5 +1,4 @@
 //! What tests of generated scenes measure.
-#![allow(dead_code, reason = "each test file uses some of it")]
 
 use brickwalk_convert::source::{Mesh, SourceScene};
 use brickwalk_scenes::CameraPath;

@@ -1,12 +1,10 @@
 //! What holds for generated scenes of every kind: counts, parts, determinism, sound geometry, and the ways through
 //! them.
 
-mod common;
-
+use crate::common::{clearance, position, same_mesh, triangles};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source};
 use brickwalk_scenes::{Kind, Scene, Settings, generate};
-use common::{clearance, position, same_mesh, triangles};
 use glam::DVec3;
 
 fn scene(kind: Kind, triangles: u64, seed: u64) -> Scene {

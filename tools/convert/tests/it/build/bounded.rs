@@ -1,7 +1,7 @@
 //! Conversions that do not fit in memory: the same file as in memory, whatever the memory; within that memory;
 //! continued after an interruption.
 
-use crate::scenes::*;
+use super::scenes::*;
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{

@@ -1,8 +1,8 @@
 //! Scenes of unpleasant shape: huge beside tiny, duplicates, equal centroids, nothing.
 
-use crate::decode::decode;
-use crate::scenes::*;
-use crate::structure::check;
+use super::decode::decode;
+use super::scenes::*;
+use super::structure::check;
 use bricks::{BRICK_WIDE, MAX_BRICK_HEIGHT};
 use brickwalk_convert::build::BuildSettings;
 

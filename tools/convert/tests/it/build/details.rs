@@ -1,9 +1,9 @@
 //! Tangents and second texture coordinates: stored where a material needs them, turned as the mesh is.
 
-use crate::bounded::{Computed, bounded, bytes};
-use crate::decode::{Decoded, decode};
-use crate::placement::octahedral;
-use crate::scenes::*;
+use super::bounded::{Computed, bounded, bytes};
+use super::decode::{Decoded, decode};
+use super::placement::octahedral;
+use super::scenes::*;
 use bricks::{AttributeDetail, BRICK_DETAIL, Material, NO_NORMAL, NORMAL, OCCLUSION};
 use brickwalk_convert::source::{IDENTITY, Outline, Primitive, Source, SourceError, SourceScene, SourceTexture};
 use std::borrow::Cow;

@@ -1,8 +1,8 @@
 //! Bad input ends with an error that names what is wrong.
 
-use crate::decode::decode;
-use crate::scenes::*;
-use crate::structure::check;
+use super::decode::decode;
+use super::scenes::*;
+use super::structure::check;
 use brickwalk_convert::build::{BuildError, BuildSettings};
 use brickwalk_convert::source::{IDENTITY, SourceScene};
 

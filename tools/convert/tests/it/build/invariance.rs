@@ -1,9 +1,9 @@
 //! What must not change: bytes with the number of threads; ids and positions with the size of bricks; anything with
 //! where a scene lies.
 
-use crate::decode::decode;
-use crate::scenes::*;
-use crate::structure::check;
+use super::decode::decode;
+use super::scenes::*;
+use super::structure::check;
 use brickwalk_convert::build::BuildSettings;
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, SourceScene};
@@ -38,7 +38,7 @@ fn ids_and_positions_do_not_depend_on_bricks() {
     assert_eq!(small.resident.instances, large.resident.instances);
     assert_eq!(small.resident.objects.len(), 2);
     for object in 0..2 {
-        let lattice = |scene: &crate::decode::Decoded| {
+        let lattice = |scene: &super::decode::Decoded| {
             let object = scene.resident.objects[object as usize];
             (object.step_log2, object.unit_log2)
         };

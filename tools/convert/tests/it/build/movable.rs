@@ -1,6 +1,6 @@
 //! What is kept movable, and what moving it does to the resident part.
 
-use crate::scenes::*;
+use super::scenes::*;
 use bricks::{Error, PlaceError, Resident, SceneFile, TOP_LEAF, validate};
 use brickwalk_convert::build::{BuildError, BuildSettings, build};
 use brickwalk_convert::progress::Progress;

@@ -1,8 +1,8 @@
 //! What is baked and what is instanced, and where either lies.
 
-use crate::decode::{Decoded, decode, source_order};
-use crate::scenes::*;
-use crate::structure::check;
+use super::decode::{Decoded, decode, source_order};
+use super::scenes::*;
+use super::structure::check;
 use bricks::{INSTANCE_IDENTITY, INSTANCE_MIRRORED, NO_NORMAL, NONE};
 use brickwalk_convert::build::BuildSettings;
 use brickwalk_convert::source::{IDENTITY, Primitive, SourceScene, SourceTexture};

@@ -1,6 +1,6 @@
 //! What a triangle takes in the file.
 
-use crate::scenes::*;
+use super::scenes::*;
 use bricks::{AttributeLayout, Resident, SceneFile};
 use brickwalk_convert::build::BuildSettings;
 use brickwalk_convert::source::Primitive;

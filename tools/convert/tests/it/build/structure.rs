@@ -1,7 +1,7 @@
 //! Boxes contain what is below them, in integers; ids are complete; attributes belong to their triangles.
 
-use crate::decode::{Decoded, DecodedBrick, decode, source_order};
-use crate::scenes::*;
+use super::decode::{Decoded, DecodedBrick, decode, source_order};
+use super::scenes::*;
 use bricks::{BRICK_INDEX32, BRICK_WIDE, LATTICE_LIMIT, Node, TOP_LEAF, TopNode8};
 use brickwalk_convert::source::IDENTITY;
 

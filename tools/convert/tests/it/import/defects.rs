@@ -1,6 +1,6 @@
 //! What is refused: the error names the file, the thing and the remedy in one line.
 
-use crate::writer::*;
+use super::writer::*;
 use serde_json::{Value, json};
 
 /// The error after `value` was put at `pointer` of a sound file, which itself must import.

@@ -1,6 +1,6 @@
 //! What is read, feature by feature.
 
-use crate::writer::*;
+use super::writer::*;
 use brickwalk_convert::import::{ImportSettings, import};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, PART_TRIANGLES, Primitive, Source, SourceScene};

@@ -1,7 +1,7 @@
 //! OBJ, PLY and STL: what is read, and what is refused.
 
-use crate::scenes::scenes;
-use crate::writer::*;
+use super::scenes::scenes;
+use super::writer::*;
 use brickwalk_convert::import::{Input, Up};
 use brickwalk_convert::source::{IDENTITY, SourceScene};
 

@@ -1,8 +1,8 @@
 //! Mutated bytes: importing may fail, but neither panics nor allocates out of proportion.
 
-use crate::formats::{ply, stl};
-use crate::scenes::scenes;
-use crate::writer::*;
+use super::formats::{ply, stl};
+use super::scenes::scenes;
+use super::writer::*;
 use brickwalk_convert::source::SourceScene;
 use proptest::prelude::*;
 use serde_json::json;
@@ -15,7 +15,7 @@ struct Largest;
 
 static LARGEST_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-/// No file of these tests has as many bytes, and none is decoded to as many at once.
+/// More than any test of this binary asks for at once: inputs are small, and so is what is decoded from them.
 const MOST_BYTES: usize = 256 << 20;
 
 // SAFETY: every request is passed on to the system's allocator as it is.

@@ -1,7 +1,7 @@
 //! Our reading of geometry against that of the `gltf` crate, on files that both accept.
 
-use crate::scenes::{files, scenes};
-use crate::writer::import_one;
+use super::scenes::{files, scenes};
+use super::writer::import_one;
 use brickwalk_convert::source::{Primitive, SourceScene};
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! The scene files of BRICKWALK_SCENES.
 
-use crate::writer::import_one;
+use super::writer::import_one;
 use brickwalk_convert::source::SourceScene;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

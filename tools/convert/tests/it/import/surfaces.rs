@@ -1,6 +1,6 @@
 //! Materials with all their textures, tangents, and lights.
 
-use crate::writer::*;
+use super::writer::*;
 use bricks::{LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_BLEND, Material, NONE};
 use brickwalk_convert::import::Input;
 use brickwalk_convert::source::{Primitive, SourceScene};

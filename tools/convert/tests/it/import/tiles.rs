@@ -1,6 +1,6 @@
 //! Sets of 3D Tiles, written here.
 
-use crate::writer::*;
+use super::writer::*;
 use brickwalk_convert::import::{Input, Up};
 use brickwalk_convert::source::SourceScene;
 use proptest::prelude::*;
