@@ -2,7 +2,7 @@
 //! them are reached.
 #![no_main]
 
-#[path = "../../bricks/tests/common/exercise.rs"]
+#[path = "../../bricks/tests/it/exercise.rs"]
 mod exercise;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

@@ -1,7 +1,7 @@
 //! Light that changes: the long average gives way to the short one. The test radius, the chance and the
 //! length of the long average are those of thirteen settings that leave the least error ten frames after the sun of
-//! `tests/post.rs` jumps, among those with which its still view is no worse. They were chosen on that scene, so it does
-//! not confirm them.
+//! `tests/it/shading/post.rs` jumps, among those with which its still view is no worse. They were chosen on that scene,
+//! so it does not confirm them.
 
 use super::grid::Grid;
 use super::{Seen, lerp, luminance};

@@ -1,0 +1,31 @@
+//! The format does not change by accident: today's writer makes the very bytes of the committed file, and today's
+//! reader reads them. `BRICKS_REGENERATE_GOLDEN=1` writes the file anew; do so only with a new format version.
+
+use crate::common;
+use bricks::{SceneFile, verify_file};
+use std::path::Path;
+
+#[test]
+fn golden_file_of_version_4() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/version-4.bricks");
+    let (_folder, path, scene) = common::written();
+    if std::env::var_os("BRICKS_REGENERATE_GOLDEN").is_some() {
+        std::fs::copy(&path, &golden).unwrap();
+    }
+    let bytes = std::fs::read(&golden).unwrap();
+    assert!(bytes.len() < 96 << 10);
+    assert!(bytes == std::fs::read(&path).unwrap(), "the writer's bytes are not those of {}", golden.display());
+
+    let file = SceneFile::open(&golden).unwrap();
+    assert_eq!(*file.resident(), scene.resident);
+    assert_eq!(file.file_bytes(), bytes.len() as u64);
+    assert_eq!(file.resident().payloads().count(), scene.payloads.len());
+    for (payload, expected) in &scene.payloads {
+        let mut out = vec![0xaa; file.loaded_bytes(*payload) as usize];
+        file.copy(*payload, &mut out).unwrap();
+        assert_eq!(out, *expected, "{payload}");
+    }
+    let report = verify_file(&golden, &mut |_, _| {}).unwrap();
+    assert!(report.is_ok(), "{:?}", report.problems);
+    assert_eq!(report.payloads, scene.payloads.len() as u64);
+}

@@ -1,0 +1,13 @@
+//! The scene file: its layout, what the writer writes, what the reader refuses.
+
+mod access;
+mod common;
+mod corruption;
+mod exercise;
+mod format;
+mod golden;
+mod malformed;
+mod occupancy;
+mod random;
+mod surfaces;
+mod writer;

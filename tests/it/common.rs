@@ -1,0 +1,117 @@
+//! What the integration tests share: the command as a user runs it, scenes made once, folders that vanish.
+
+use brickwalk::cli::options::args::{Cli, Command as AppCommand};
+use brickwalk::frame::{Equirectangular, Renderer, environment};
+use brickwalk::kernels::{Extent, Lamps};
+use brickwalk::session::open::{Session, open_scene};
+use clap::Parser;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::Arc;
+
+/// Runs `brickwalk` with the given words.
+pub fn brickwalk<S: AsRef<std::ffi::OsStr>>(words: impl IntoIterator<Item = S>) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_brickwalk")).args(words).output().expect("the command starts")
+}
+
+/// Runs `brickwalk` and insists on success.
+pub fn succeed<S: AsRef<std::ffi::OsStr>>(words: impl IntoIterator<Item = S>) -> String {
+    let output = brickwalk(words);
+    assert!(
+        output.status.success(),
+        "exit {:?}\n{}{}",
+        output.status.code(),
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// A folder that is removed when the test ends.
+pub fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// The shared scenes, or `None` with a word of why.
+pub fn shared_scenes() -> Option<PathBuf> {
+    match std::env::var_os("BRICKWALK_SCENES") {
+        Some(path) => Some(PathBuf::from(path)),
+        None => {
+            println!("skipped: BRICKWALK_SCENES is not set");
+            None
+        }
+    }
+}
+
+/// A generated city in `folder`.
+pub fn city(folder: &Path, triangles: &str, brick_triangles: &str) -> PathBuf {
+    let scene = folder.join(format!("city-{triangles}-{brick_triangles}.bricks"));
+    let words = ["scene", "city", "--triangles", triangles, "--brick-triangles", brick_triangles, "-o"];
+    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
+    scene
+}
+
+/// The scene of an OBJ file, with options of `convert`.
+pub fn converted(folder: &Path, shape: &str, options: &str) -> PathBuf {
+    let (input, scene) = (folder.join("shape.obj"), folder.join("shape.bricks"));
+    std::fs::write(&input, shape).expect("a shape");
+    let words = ["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()];
+    succeed(words.into_iter().chain(options.split_whitespace().map(std::ffi::OsStr::new)));
+    scene
+}
+
+/// Adds a sheet of squares to the text of an OBJ file of `count` vertices: its corner, its two edges, and how many
+/// squares along them.
+pub fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3; 2], squares: [usize; 2]) {
+    for j in 0..=squares[1] {
+        for i in 0..=squares[0] {
+            let p = corner + edges[0] * (i as f64 / squares[0] as f64) + edges[1] * (j as f64 / squares[1] as f64);
+            *text += &format!("v {} {} {}\n", p.x, p.y, p.z);
+        }
+    }
+    let row = squares[0] + 1;
+    for (i, j) in (0..squares[0]).flat_map(|i| (0..squares[1]).map(move |j| (i, j))) {
+        let p = *count + 1 + i + j * row;
+        *text += &format!("f {p} {} {}\nf {p} {} {}\n", p + 1, p + row + 1, p + row + 1, p + row);
+    }
+    *count += row * (squares[1] + 1);
+}
+
+/// The renderer of a walk on the processor with these options.
+pub fn renderer(scene: &Path, options: &str) -> Renderer {
+    let words = format!("brickwalk walk {} -o o --adapter cpu {options}", scene.display());
+    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
+        panic!("a walk")
+    };
+    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
+    brickwalk::cli::walk::renderer(session, &args).expect("lamps")
+}
+
+/// One of these effects where an environment is the only light, and 1 everywhere.
+pub fn evenly_lit(scene: &Path, effects: &str, options: &str) -> Renderer {
+    let mut renderer = renderer(scene, &format!("--tile 16 --aov --sun-intensity 0 --effects {effects} {options}"));
+    let even = Equirectangular::of(16, 8, |_| [1.0; 3]);
+    renderer.light.lamps = Arc::new(Lamps::new(Some(environment(even, 1.0, 0.0).0), Vec::new(), 1.0));
+    renderer
+}
+
+/// Options of a walk beside scene and output.
+pub fn walk(scene: &Path, output: &Path, options: &str) -> String {
+    let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()];
+    succeed(words.into_iter().chain(options.split_whitespace().map(std::ffi::OsStr::new)))
+}
+
+/// Every frame of a walk, PNG and EXR, by name.
+pub fn frames(output: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<_> = std::fs::read_dir(output.join("frames"))
+        .expect("a folder of frames")
+        .map(|entry| entry.expect("an entry").path())
+        .map(|path| {
+            (path.file_name().expect("a name").to_string_lossy().into_owned(), std::fs::read(&path).expect("a frame"))
+        })
+        .collect();
+    files.sort();
+    files
+}

@@ -1,0 +1,65 @@
+//! What only the whole can show, in one binary: the commands as a user runs them, and frames of a session against
+//! truth.
+//!
+//! A family of tests is a folder. `cargo test --release --test it -- exact::records::` runs one file.
+
+mod common;
+
+/// Commands on good and bad input: outputs, progress, interruption, repair.
+mod command {
+    mod command_line;
+    mod outputs;
+    mod progress;
+    mod repair;
+    mod replay;
+    mod resume;
+    mod scene_commands;
+}
+
+/// Hits and records against truth; equal bits whatever the cache, the schedule, the executor and the motion.
+mod exact {
+    mod cache_independence;
+    mod exactness;
+    mod motion;
+    mod records;
+    mod threshold;
+    mod twins;
+}
+
+/// Files of the shared scenes and models of other projects: what converting does, what the picture shows.
+mod scenes {
+    mod expected;
+    mod file_lights;
+    mod millimetres;
+    mod pictures;
+    mod samples;
+    mod sponza;
+    mod textures;
+}
+
+/// Light, materials and filters of the picture against closed forms.
+mod shading {
+    mod aov;
+    mod gloss;
+    mod light;
+    mod maps;
+    mod opacity;
+    mod post;
+}
+
+/// Methods of secondary visibility against closed forms and exact rays.
+mod secondary {
+    mod dvf;
+    mod dvf_paper;
+    mod dvf_renew;
+    mod roma;
+    mod roma_diffuse;
+}
+
+/// Bench, selftest and switchable optimisations.
+mod lab {
+    mod bench;
+    mod bench_dvf;
+    mod optimisations;
+    mod selftest;
+}

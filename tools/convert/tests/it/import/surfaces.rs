@@ -1,0 +1,269 @@
+//! Materials with all their textures, tangents, and lights.
+
+use super::writer::*;
+use bricks::{LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_BLEND, Material, NONE};
+use brickwalk_convert::import::Input;
+use brickwalk_convert::source::{Primitive, SourceScene};
+use serde_json::{Value, json};
+
+/// Two triangles, a square of x and y, whose coordinates of set 0 run along x and down y, those of set 1 the other way
+/// round.
+fn square(material: Value) -> Writer {
+    let mut file = Writer::new();
+    let positions = file.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0]);
+    let normals = file.floats("VEC3", &[0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    let uvs = file.floats("VEC2", &[0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+    let uvs1 = file.floats("VEC2", &[1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0]);
+    let indices = file.accessor(&le16(&[0, 1, 2, 0, 2, 3]), U16, "SCALAR", 6);
+    let attributes = json!({"POSITION": positions, "NORMAL": normals, "TEXCOORD_0": uvs, "TEXCOORD_1": uvs1});
+    let mesh = file.mesh(json!({"attributes": attributes, "indices": indices, "material": 0}));
+    file.node(json!({"mesh": mesh}));
+    for _ in 0..3 {
+        let image = file.view(&png(1, 1, &[128, 128, 255, 255]));
+        file.push("images", json!({"bufferView": image}));
+    }
+    for image in 0..3 {
+        file.push("textures", json!({"source": image}));
+    }
+    file.root["materials"] = json!([material]);
+    file
+}
+
+fn only(scene: &SourceScene) -> (&Primitive, Material) {
+    assert_eq!((scene.meshes[0].primitives.len(), scene.materials.len()), (1, 1));
+    (&scene.meshes[0].primitives[0], scene.materials[0])
+}
+
+/// The material alone.
+fn material(json: Value) -> (Material, Vec<String>) {
+    let scene = square(json).scene();
+    (only(&scene).1, scene.warnings)
+}
+
+#[test]
+fn all_textures_with_their_sets_and_transformations() {
+    let scene = square(json!({
+        "pbrMetallicRoughness": {
+            "baseColorTexture": {"index": 0},
+            "metallicRoughnessTexture": {"index": 1, "texCoord": 1}
+        },
+        "normalTexture": {"index": 2, "scale": -0.5, "extensions": {"KHR_texture_transform": {"scale": [2, 4], "offset": [0.5, 0.25]}}},
+        "occlusionTexture": {"index": 1, "strength": 0.25},
+        "emissiveTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1, "rotation": std::f64::consts::FRAC_PI_2}}},
+        "emissiveFactor": [1, 0.5, 0],
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}
+    }))
+    .scene();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let (primitive, material) = only(&scene);
+    // An image used in several ways is one texture here.
+    assert_eq!(material.textures(), [0, 1, 2, 2, 0]);
+    assert_eq!(scene.textures.len(), 3);
+    assert_eq!(material.uv_sets, 1 << bricks::METALLIC_ROUGHNESS | 1 << bricks::EMISSIVE);
+    assert_eq!((material.normal_scale, material.occlusion_strength), (-0.5, 0.25));
+    assert_eq!(material.emission, [4.0, 2.0, 0.0]);
+    let rows = |place: usize| [material.uv_from_set[2 * place], material.uv_from_set[2 * place + 1]];
+    assert_eq!(rows(bricks::NORMAL), [[2.0, 0.0, 0.5, 8.0], [0.0, 4.0, 0.25, 0.0]]);
+    assert_eq!(rows(bricks::OCCLUSION), [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]]);
+    let [[cos, sin, ..], [minus_sin, ..]] = rows(bricks::EMISSIVE);
+    assert!(cos.abs() < 1e-6 && (sin - 1.0).abs() < 1e-6 && (minus_sin + 1.0).abs() < 1e-6);
+    // Coordinates are those of the file.
+    assert_eq!(primitive.uvs.as_ref().unwrap()[..2], [[0.0, 1.0], [1.0, 1.0]]);
+    assert_eq!(primitive.uvs1.as_ref().unwrap()[..2], [[1.0, 0.0], [1.0, 1.0]]);
+    // The second set of coordinates is read where it is used.
+    let plain = square(json!({"occlusionTexture": {"index": 0}})).scene();
+    assert!(only(&plain).0.uvs1.is_none() && only(&plain).0.tangents.is_none());
+    assert_eq!(only(&plain).1.textures(), [NONE, NONE, NONE, 0, NONE]);
+}
+
+#[test]
+fn tangents_are_read_or_made() {
+    let normal = |set: u32| json!({"normalTexture": {"index": 0, "texCoord": set}});
+    let made = square(normal(0)).scene();
+    assert_eq!(only(&made).0.tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 6][..]));
+    // Of the second set u runs along -y, v along x: cross(z, -y) = x, down in the image.
+    let made = square(normal(1)).scene();
+    assert_eq!(only(&made).0.tangents.as_deref(), Some(&[[0.0, -1.0, 0.0, -1.0]; 6][..]));
+
+    let mut file = square(normal(0));
+    let values: Vec<f32> = (0..4).flat_map(|i| [0.0, i as f32, 1.0, if i == 3 { -1.0 } else { 1.0 }]).collect();
+    let tangents = file.floats("VEC4", &values);
+    file.root["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(tangents);
+    let scene = file.scene();
+    let vertex = |i: usize| <[f32; 4]>::try_from(&values[4 * i..4 * i + 4]).unwrap();
+    assert_eq!(only(&scene).0.tangents, Some([0, 1, 2, 0, 2, 3].map(vertex).to_vec()), "by corner");
+    // Without normals they mean nothing: others are made by the triangles'.
+    let attributes = file.root["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap();
+    let normals = attributes.remove("NORMAL").unwrap();
+    assert_eq!(only(&file.scene()).0.tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 6][..]));
+    file.root["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals;
+    // As integers, and not finite.
+    let bytes = [127i8, 0, 0, 127].repeat(4).iter().map(|b| *b as u8).collect::<Vec<_>>();
+    let packed = file.accessor(&bytes, 5120, "VEC4", 4);
+    file.root["accessors"][packed]["normalized"] = json!(true);
+    file.root["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(packed);
+    assert_eq!(only(&file.scene()).0.tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 6][..]));
+    let nan = file.floats("VEC4", &[f32::NAN; 16]);
+    file.root["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(nan);
+    let scene = file.scene();
+    assert_eq!(only(&scene).0.tangents.as_deref(), Some(&[[0.0; 4]; 6][..]));
+    assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("tangents"), "{:?}", scene.warnings);
+    // As many as vertices, and vectors of four.
+    for (kind, values) in [("VEC4", 12), ("VEC3", 12)] {
+        let wrong = file.floats(kind, &vec![1.0; values]);
+        file.root["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(wrong);
+        assert!(file.error().contains("TANGENT"));
+    }
+    // Not asked for, they are not looked at.
+    file.root["materials"] = json!([{}]);
+    assert!(only(&file.scene()).0.tangents.is_none());
+}
+
+#[test]
+fn sets_beyond_the_second_are_left_out() {
+    let (found, warnings) =
+        material(json!({"normalTexture": {"index": 0, "texCoord": 2}, "occlusionTexture": {"index": 1}}));
+    assert_eq!(found.textures(), [NONE, NONE, NONE, 0, NONE]);
+    assert!(warnings.len() == 1 && warnings[0].contains("beyond the second"), "{warnings:?}");
+    let mut file = square(json!({"emissiveTexture": {"index": 0, "texCoord": 1}}));
+    file.root["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove("TEXCOORD_1");
+    let warnings = file.scene().warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("without texture coordinates"), "{warnings:?}");
+}
+
+#[test]
+fn dielectrics_reflect_by_their_index_and_their_factors() {
+    let of = |extensions: Value| {
+        let (material, warnings) = material(json!({"extensions": extensions}));
+        (material.specular, material.specular_weight, warnings.len())
+    };
+    assert_eq!(of(json!({})), ([0.04; 3], 1.0, 0));
+    assert_eq!(of(json!({"KHR_materials_ior": {}})), ([0.04; 3], 1.0, 0));
+    assert_eq!(of(json!({"KHR_materials_ior": {"ior": 3}})), ([0.25; 3], 1.0, 0));
+    assert_eq!(of(json!({"KHR_materials_ior": {"ior": 1}})), ([0.0; 3], 1.0, 0));
+    assert_eq!(of(json!({"KHR_materials_ior": {"ior": 0}})), ([1.0; 3], 1.0, 0));
+    assert_eq!(of(json!({"KHR_materials_specular": {"specularFactor": 0}})), ([0.0; 3], 0.0, 0));
+    let colored = json!({"specularFactor": 0.5, "specularColorFactor": [1, 2, 100], "specularTexture": {"index": 0}});
+    let (specular, weight, warnings) = of(json!({"KHR_materials_ior": {"ior": 3}, "KHR_materials_specular": colored}));
+    assert_eq!((specular, weight, warnings), ([0.125, 0.25, 0.5], 0.5, 1));
+    let coat = json!({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25, "clearcoatTexture": {"index": 0}});
+    let (coated, warnings) = material(json!({"extensions": {"KHR_materials_clearcoat": coat}}));
+    assert_eq!((coated.clearcoat, coated.clearcoat_roughness, warnings.len()), (0.5, 0.25, 1));
+    let gloss = json!({"diffuseFactor": [0.5, 0.25, 0, 1], "specularFactor": [0.75, 0.5, 0.25], "glossinessFactor": 0.75,
+        "diffuseTexture": {"index": 1}, "specularGlossinessTexture": {"index": 0}});
+    let pbr = json!({"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}});
+    let extensions = json!({"KHR_materials_pbrSpecularGlossiness": gloss});
+    let (found, warnings) = material(json!({"pbrMetallicRoughness": pbr, "extensions": extensions}));
+    assert_eq!((found.base_color, found.metallic, found.roughness), ([0.5, 0.25, 0.0, 1.0], 0.0, 0.25));
+    assert_eq!((found.specular, found.specular_weight), ([0.75, 0.5, 0.25], 1.0));
+    assert_eq!((found.textures(), warnings.len()), ([0, NONE, NONE, NONE, NONE], 1));
+}
+
+/// What passes and what is reflected, seen along the normal, is what the material says.
+#[test]
+fn transmission_keeps_energy() {
+    let of = |transmission: f64, color: [f64; 4], mode: &str| {
+        material(json!({
+            "pbrMetallicRoughness": {"baseColorFactor": color, "metallicFactor": 0}, "alphaMode": mode,
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": transmission}}
+        }))
+    };
+    for (share, tone) in [(1.0, 1.0), (0.5, 1.0), (0.5, 0.5), (1.0, 0.25)] {
+        let (found, warnings) = of(share, [tone, tone, tone, 0.5], "OPAQUE");
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert_eq!((found.flags, f64::from(found.transmission)), (MATERIAL_BLEND, share));
+        let [alpha, color, specular] = [found.base_color[3], found.base_color[0], found.specular[0]].map(f64::from);
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-6, "{share} {tone}: {a} is not {b}");
+        close(1.0 - alpha, 0.96 * share * tone);
+        close(alpha * specular, 0.04);
+        close(alpha * (1.0 - specular) * color, 0.96 * (1.0 - share) * tone);
+    }
+    let (half, _) = of(1.0, [1.0, 1.0, 1.0, 0.5], "BLEND");
+    assert!((half.base_color[3] - 0.02).abs() < 1e-6, "its own alpha counts: {}", half.base_color[3]);
+    let (tinted, warnings) = of(1.0, [1.0, 0.5, 0.5, 1.0], "OPAQUE");
+    assert!(warnings.len() == 1 && warnings[0].contains("tinted") && tinted.flags == MATERIAL_BLEND);
+    let (masked, warnings) = of(1.0, [1.0; 4], "MASK");
+    assert!(warnings.len() == 1 && masked.transmission == 0.0 && masked.base_color == [1.0; 4]);
+    assert_eq!(of(0.0, [1.0; 4], "OPAQUE").0.flags, 0);
+}
+
+#[test]
+fn lights_are_placed_by_their_nodes() {
+    let mut file = square(json!({}));
+    file.root["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    file.root["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+        {"type": "point", "color": [1, 0.5, 0], "intensity": 20, "range": 8},
+        {"type": "spot", "spot": {"innerConeAngle": 0.25, "outerConeAngle": 0.5}},
+        {"type": "directional", "intensity": 3},
+        {"type": "spot"},
+        {"type": "spot", "spot": {"innerConeAngle": 1, "outerConeAngle": 2}},
+        {"type": "area"}, {"type": "point", "intensity": -1}, 5
+    ]}});
+    let mut node = |light: Value, mut node: Value| {
+        node["extensions"] = json!({"KHR_lights_punctual": {"light": light}});
+        file.node(node)
+    };
+    node(json!(0), json!({"translation": [1, 2, 3], "scale": [2, 2, 2]}));
+    let child = node(json!(0), json!({"translation": [1, 0, 0]}));
+    // A quarter turn about x takes -z to y.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    node(json!(1), json!({"rotation": [half, 0, 0, half], "translation": [0, 5, 0]}));
+    node(json!(2), json!({"scale": [1, 1, 3]}));
+    node(json!(3), json!({}));
+    node(json!(4), json!({}));
+    for bad in [json!(5), json!(6), json!(7), json!(8), json!("x")] {
+        node(bad, json!({}));
+    }
+    // The second node of light 0 becomes a child of the first.
+    file.root["nodes"][1]["children"] = json!([child]);
+    file.root["scenes"][0]["nodes"].as_array_mut().unwrap().retain(|node| *node != json!(child));
+    let scene = file.scene();
+    let kinds: Vec<u32> = scene.lights.iter().map(|light| light.kind).collect();
+    assert_eq!(kinds, [LIGHT_POINT, LIGHT_POINT, LIGHT_SPOT, LIGHT_DISTANT, LIGHT_SPOT, LIGHT_SPOT]);
+    let [first, second, spot, distant, default, wide] = scene.lights[..] else { panic!() };
+    assert_eq!((first.position, first.color, first.range), ([1.0, 2.0, 3.0], [20.0, 10.0, 0.0], 8.0));
+    assert_eq!((second.position, second.range), ([3.0, 2.0, 3.0], 8.0));
+    assert!((spot.direction[1] - 1.0).abs() < 1e-12 && spot.position == [0.0, 5.0, 0.0], "{spot:?}");
+    assert_eq!((spot.cone, spot.color), ([0.25, 0.5], [1.0; 3]));
+    assert_eq!((distant.direction, distant.color), ([0.0, 0.0, -1.0], [3.0; 3]));
+    assert_eq!(default.cone, [0.0, std::f32::consts::FRAC_PI_4]);
+    assert_eq!(wide.cone, [1.0, std::f32::consts::FRAC_PI_2]);
+    assert_eq!(scene.warnings.len(), 2, "five left out, one cone clamped: {:?}", scene.warnings);
+    assert!(scene.warnings.iter().any(|warning| warning.contains("and 4 more: its light is left out")));
+
+    // Placements of the whole input move lights too.
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), "test.glb", &file.glb());
+    let mut input = Input::from(path);
+    input.transform = [0.0, 0.0, 1.0, 10.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0];
+    let moved = import_all(&[input]).unwrap();
+    assert_eq!(moved.lights[0].position, [13.0, 2.0, -1.0]);
+    assert_eq!(moved.lights[3].direction, [-1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn obj_maps_become_textures() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = "newmtl a\nKd 1 1 1\nmap_Ke e.png\nmap_Pr r.png\nmap_Pm m.png\nnorm n.png\nmap_Kd c.png\n\
+        newmtl b\nmap_Pr r.png\nmap_Pm m.png\nmap_Kd n.png\n";
+    write(folder.path(), "m.mtl", library.as_bytes());
+    for (name, value) in [("e", 1), ("n", 2), ("c", 3)] {
+        write(folder.path(), &format!("{name}.png"), &png(1, 1, &[value; 4]));
+    }
+    write(folder.path(), "r.png", &png(2, 1, &[10, 0, 0, 255, 20, 0, 0, 255]));
+    write(folder.path(), "m.png", &png(1, 2, &[30, 0, 0, 255, 40, 0, 0, 255]));
+    let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\n";
+    let scene = import_one(&write(folder.path(), "a.obj", text.as_bytes())).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let textures = |material: usize| scene.materials[material].textures();
+    let [color, normal, gloss, none, glow] = textures(0);
+    assert_eq!([color, normal, glow].map(|t| scene.textures[t as usize].rgba[0]), [3, 2, 1]);
+    assert_eq!((none, textures(1)), (NONE, [normal, NONE, gloss, NONE, NONE]));
+    let combined = &scene.textures[gloss as usize];
+    assert_eq!((combined.width, combined.height), (2, 2));
+    let channels: Vec<[u8; 2]> = combined.rgba.chunks(4).map(|texel| [texel[1], texel[2]]).collect();
+    assert_eq!(channels, [[10, 30], [20, 30], [10, 40], [20, 40]]);
+    let primitives = &scene.meshes[0].primitives;
+    assert_eq!(primitives[0].tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 3][..]));
+    assert!(primitives[1].tangents.is_none());
+}

@@ -1,0 +1,4 @@
+//! Importing and building: what input files become, and what scene files hold.
+
+mod build;
+mod import;

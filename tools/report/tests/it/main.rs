@@ -1,0 +1,4 @@
+//! Reports, as a reader of HTML sees them.
+
+mod markup;
+mod report;

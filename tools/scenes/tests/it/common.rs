@@ -1,0 +1,63 @@
+//! What tests of generated scenes measure.
+
+use brickwalk_convert::source::{Mesh, SourceScene};
+use brickwalk_scenes::CameraPath;
+use glam::{DAffine3, DMat3, DVec3};
+
+/// Whether two meshes are equal to the bit.
+pub fn same_mesh(a: &Mesh, b: &Mesh) -> bool {
+    a.name == b.name
+        && a.primitives.len() == b.primitives.len()
+        && a.primitives.iter().zip(&b.primitives).all(|(p, q)| {
+            p.material == q.material
+                && p.positions == q.positions
+                && p.normals == q.normals
+                && p.colors == q.colors
+                && p.indices == q.indices
+        })
+}
+
+/// Every triangle in world space.
+pub fn triangles(scene: &SourceScene) -> impl Iterator<Item = [DVec3; 3]> {
+    scene.placements.iter().flat_map(|placement| {
+        let m = placement.world_from_mesh;
+        let column = |c: usize| DVec3::new(m[c], m[4 + c], m[8 + c]);
+        let a = DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
+        scene.meshes[placement.mesh as usize].primitives.iter().flat_map(move |p| {
+            p.indices
+                .chunks_exact(3)
+                .map(move |t| [0, 1, 2].map(|k| a.transform_point3(DVec3::from_array(p.positions[t[k] as usize]))))
+        })
+    })
+}
+
+/// Distance from a point to a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+pub fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let n = ab.cross(ac);
+    let inside = |u: DVec3, v: DVec3| (v - u).cross(p - u).dot(n) >= 0.0;
+    if inside(a, b) && inside(b, c) && inside(c, a) {
+        return ap.dot(n).abs() / n.length();
+    }
+    let edge = |u: DVec3, v: DVec3| {
+        let t = ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0);
+        (p - u - (v - u) * t).length()
+    };
+    edge(a, b).min(edge(b, c)).min(edge(c, a))
+}
+
+/// Distance from `p` to the nearest of `all`, infinite beyond `radius`.
+pub fn clearance(all: &[[DVec3; 3]], p: DVec3, radius: f64) -> f64 {
+    all.iter()
+        .filter(|t| {
+            let (low, high) = (t[0].min(t[1]).min(t[2]) - radius, t[0].max(t[1]).max(t[2]) + radius);
+            p.cmpge(low).all() && p.cmple(high).all()
+        })
+        .map(|t| distance(p, *t))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Where the camera is in keyframe `k`.
+pub fn position(path: &CameraPath, k: usize) -> DVec3 {
+    DVec3::from_array(path.keyframes[k].position)
+}

@@ -1,0 +1,8 @@
+//! Generated scenes: their size, their determinism, their camera paths, and glTF written from them.
+
+mod city;
+mod common;
+mod gltf;
+mod kinds;
+mod soup;
+mod stiff;
