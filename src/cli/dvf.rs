@@ -122,7 +122,7 @@ fn read(file: &Path, key: u64) -> Option<DvfKept> {
 /// Makes a field, with progress on a terminal; how many seconds it took.
 ///
 /// # Errors
-/// As of [`Renderer::make_dvf`].
+/// As of [`crate::frame::Engine::make_dvf`].
 pub fn make(
     renderer: &mut Renderer,
     settings: &DvfSettings,

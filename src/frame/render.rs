@@ -80,7 +80,7 @@ impl DerefMut for Renderer {
 
 impl Renderer {
     /// Renders one frame. Without ROMA and distance fields it is exact; with them, too, pixels depend on scene, camera,
-    /// lights and settings alone, unless [`RenderSettings::tile_bytes`] bounds what is loaded.
+    /// lights and settings alone, unless [`super::RenderSettings::tile_bytes`] bounds what is loaded.
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.

@@ -69,7 +69,7 @@ pub struct Report {
     pub rays_capped: u64,
     /// What kernels of a method counted for it, from its first counter on.
     pub own: [u64; OWN_COUNTERS],
-    /// Rays traced; counted by [`Step::Lists`], [`Step::ShortLists`], [`Step::CountRays`], by kernels of
+    /// Rays traced; counted by [`Step::Lists`](super::Step::Lists), [`Step::ShortLists`](super::Step::ShortLists), [`Step::CountRays`](super::Step::CountRays), by kernels of
     /// methods.
     pub rays: u64,
     /// Rays that a method answered.
@@ -80,9 +80,9 @@ pub struct Report {
     pub triangles: u64,
     /// Pixels whose radiance was not finite.
     pub non_finite: u64,
-    /// Hits with a texture of which [`Step::SampleCoarser`] took a coarser level than they ask for.
+    /// Hits with a texture of which [`Step::SampleCoarser`](super::Step::SampleCoarser) took a coarser level than they ask for.
     pub unresolved: u64,
-    /// Rays that see each node, after [`Step::QueryPairs`].
+    /// Rays that see each node, after [`Step::QueryPairs`](super::Step::QueryPairs).
     pub pair_rays: Vec<u32>,
     /// Nodes that no ray sees although one enters the node's own box.
     pub queries_tightened: u64,

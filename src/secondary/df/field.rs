@@ -115,7 +115,7 @@ impl DistanceField {
         FieldView { cells: self.cells, levels: std::array::from_fn(|level| &self.levels[level][..]) }
     }
 
-    /// As of [`FieldView::distance`].
+    /// The distance at a point of a level, as of its [`view`](Self::view).
     pub fn distance(&self, level: usize, point: [f32; 3]) -> f32 {
         self.view().distance(level, point)
     }

@@ -18,7 +18,7 @@ mod tests;
 mod trace;
 pub mod twin;
 
-pub use field::{DistanceField, LEVELS, distance_f16};
+pub use field::{DistanceField, FieldView, LEVELS, distance_f16};
 pub use flood::{NO_SEED, flood, flood_steps, jump_flood, seeds};
 pub use trace::{LEAST_STEP, LocalRay, LocalTraced, Traced, Tracing, Way};
 

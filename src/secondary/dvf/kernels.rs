@@ -247,7 +247,7 @@ pub fn counts(triangles: u32) -> Vec<Step> {
 }
 
 /// Makes the rays of so many lanes of the points, from `first` on, in place of [`Step::Generate`]. `turn`: which of its
-/// directions each takes. `waiting`: only those that [`write`] noted from this word on to wait for bricks; else all.
+/// directions each takes. `waiting`: only those that [`write()`] noted from this word on to wait for bricks; else all.
 pub fn rays(first: u32, turn: u32, waiting: Option<u32>) -> Step {
     Own::new(names::dvf_rays, &DvfOwn { first, turn, next: waiting.unwrap_or(NONE), ..DvfOwn::default() }).into()
 }
