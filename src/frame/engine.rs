@@ -113,10 +113,10 @@ impl Engine {
                 // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the
                 // schedule.
                 let besides = stats.ms_stream - stats.ms;
-                let rays = stats.report.rays;
+                let rays = stats.rays_traced;
                 self.trace_by(chosen, frame, pass, first, stats)?;
                 let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
-                self.auto.note(pass, ms, stats.report.rays - rays);
+                self.auto.note(pass, ms, stats.rays_traced - rays);
                 return Ok(());
             }
         };

@@ -284,7 +284,7 @@ fn trace_and_add(
     let last = [&[Step::QueryHits], &plan.after[..], &[plan.add]].concat();
     let report = engine.executor.run(pass, &last, &engine.cache.states)?;
     methods.learn(pass, &report);
-    stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
+    stats.bricks_hit.extend(report.demand.iter().map(|d| d.brick));
     stats.add(report);
     Ok(())
 }

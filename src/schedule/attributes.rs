@@ -43,7 +43,7 @@ pub fn resolve(
         None => sample(executor, cache, next, report, stats)?,
         Some(allowance) => sample_within(allowance, executor, cache, next, report, stats)?,
     }
-    stats.bricks_hit.get_or_insert_default().extend(hit);
+    stats.bricks_hit.extend(hit);
     Ok(())
 }
 

@@ -116,7 +116,7 @@ impl Cache {
         if ahead {
             stats.bricks_resident_first += used.len() as u64;
         }
-        stats.bricks_intersected.extend(used);
+        stats.bricks_entered.extend(used.iter().copied());
     }
 
     /// Loads as many of `items` as fit without evicting each other, at least one and at most `most` and 64 MiB; returns
@@ -214,15 +214,15 @@ impl Cache {
                 Kind::Tile => stats.bytes_textures += bytes,
             }
             if std::mem::replace(&mut self.loaded_in[load.item.index()], self.frame) == self.frame {
-                stats.reloaded_frame += 1;
+                stats.bricks_reloaded_frame += 1;
                 stats.bytes_reloaded_frame += self.residency.bytes(load.item);
             }
         }
         let change = self.residency.counters().since(&before).total();
-        stats.loaded += change.loaded;
-        stats.reloaded += change.reloaded;
-        stats.evicted += change.evicted;
-        stats.batches += 1;
+        stats.bricks_loaded += change.loaded;
+        stats.bricks_reloaded += change.reloaded;
+        stats.bricks_evicted += change.evicted;
+        stats.load_batches += 1;
         stats.ms_stream += start.elapsed().as_secs_f64() * 1e3;
         Ok(taken)
     }

@@ -96,7 +96,7 @@ impl Fronts {
                     next.extend(tree.split(index, top, setup.frame));
                 }
             }
-            stats.report.pairs_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
+            stats.queries_interval_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
             if next.is_empty() && terminal.is_empty() {
                 break;
             }

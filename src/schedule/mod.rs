@@ -26,9 +26,10 @@ mod report;
 mod states;
 mod step;
 
+pub use crate::counters::Counters as PassStats;
 pub use executor::{Executor, ExecutorError, Load, Tracing};
 pub use optimisations::{Optimisation, Optimisations, PartOf};
 pub use pass::{Lamp, Pass};
-pub use report::{Demand, OWN_COUNTERS, PassStats, Report, TileDemand};
+pub use report::{Demand, OWN_COUNTERS, Report, TileDemand};
 pub use states::BrickStates;
 pub use step::{Over, Own, PairQuery, Query, Shading, Step};

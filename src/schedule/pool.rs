@@ -62,7 +62,7 @@ impl Pool {
         }
         batch.truncate(cache.fill(executor, &items, stats)?);
         cache.states.set_batch(&batch);
-        stats.bricks_intersected.extend(&batch);
+        stats.bricks_entered.extend(batch.iter().copied());
         Ok(true)
     }
 }

@@ -39,7 +39,7 @@ const FIELDS: [&str; 17] = [
     "ms_phase2",
     "ms_phase3",
     "ms_stream",
-    "rays",
+    "rays_traced",
     "queries",
     "multi_queries",
     "pairs_intersected",
