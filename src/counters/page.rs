@@ -6,7 +6,7 @@ use std::fmt::Write;
 const HEAD: &str = "\
 # Fields of `records.jsonl`
 
-Generated from [the table of counters](../src/counters/table.rs). `BRICKWALK_WRITE=1 cargo test counters` writes this page
+Generated from [the table of counters](../src/counters/table.rs). `BRICKWALK_WRITE=1 cargo test --lib counters` writes this page
 anew.
 
 A walk appends a line, a JSON object, for each frame and effect. `report.html` and the totals of `summary.json` are made of
@@ -72,7 +72,7 @@ mod tests {
             std::fs::write(&path, page()).expect("docs/records.md can be written");
         }
         let committed = std::fs::read_to_string(&path).expect("docs/records.md");
-        assert!(committed == page(), "docs/records.md is out of date: BRICKWALK_WRITE=1 cargo test counters");
+        assert!(committed == page(), "docs/records.md is out of date: BRICKWALK_WRITE=1 cargo test --lib counters");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The statistics of the effects of one frame.
 
 use super::Engine;
-use crate::counters::Record;
-use crate::schedule::{ExecutorError, PassStats};
+use crate::counters::{Counters, Record};
+use crate::schedule::ExecutorError;
 use std::time::Instant;
 
 /// Collects the statistics of the effects of a frame, each over all its samples, directions and lamps.
@@ -13,7 +13,7 @@ pub struct FrameRecords {
 
 struct EffectRecord {
     name: &'static str,
-    stats: PassStats,
+    stats: Counters,
 }
 
 impl FrameRecords {
@@ -35,7 +35,7 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         engine.cache.begin_pass(name, self.frame);
         self.more(engine, name, work)
@@ -49,7 +49,7 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         engine.cache.begin_pass(name, self.frame);
         self.count(engine, name, work)
@@ -63,7 +63,7 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         self.count(engine, name, work)?;
         match &mut engine.captures {
@@ -77,13 +77,13 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         let resident = |engine: &Engine| engine.cache.residency.resident().count() as u64;
         let before = resident(engine);
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
             let (bricks_resident_start, bricks_resident_end) = (before, before);
-            let stats = PassStats { bricks_resident_start, bricks_resident_end, ..PassStats::default() };
+            let stats = Counters { bricks_resident_start, bricks_resident_end, ..Counters::default() };
             self.effects.push(EffectRecord { name, stats });
             self.effects.len() - 1
         });
@@ -101,7 +101,7 @@ impl FrameRecords {
         let residency = &engine.cache.residency;
         let record = |EffectRecord { name, stats }| {
             let (cache_bytes, cache_used_bytes) = (residency.budget_bytes(), residency.used_bytes());
-            Record::of(self.frame, name, PassStats { cache_bytes, cache_used_bytes, ..stats })
+            Record::of(self.frame, name, Counters { cache_bytes, cache_used_bytes, ..stats })
         };
         self.effects.into_iter().map(record).collect()
     }

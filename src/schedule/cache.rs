@@ -1,6 +1,7 @@
 //! The cache as a schedule uses it: residency, brick states, and the request trace.
 
-use super::{BrickStates, Executor, ExecutorError, Load, PassStats};
+use super::{BrickStates, Executor, ExecutorError, Load};
+use crate::counters::Counters;
 use crate::stream::{Item, Kind, Residency, Sizes, Trace};
 use std::time::Instant;
 
@@ -103,13 +104,13 @@ impl Cache {
 
     /// Marks what is resident as done, its intersection being under way, and notes the use of the bricks that rays
     /// entered. `ahead`: some bricks are missing, which are asked for only now.
-    pub fn finish_resident(&mut self, used: &[u32], ahead: bool, stats: &mut PassStats) {
+    pub fn finish_resident(&mut self, used: &[u32], ahead: bool, stats: &mut Counters) {
         self.states.finish_resident();
         self.touch_geometry(used, ahead, stats);
     }
 
     /// Notes the use of resident bricks that rays entered.
-    pub fn touch_geometry(&mut self, used: &[u32], ahead: bool, stats: &mut PassStats) {
+    pub fn touch_geometry(&mut self, used: &[u32], ahead: bool, stats: &mut Counters) {
         for &brick in used {
             self.touch(Item::geometry(brick));
         }
@@ -129,7 +130,7 @@ impl Cache {
         executor: &mut dyn Executor,
         items: &[Item],
         most: usize,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         self.begin_batch();
         self.load_beside(executor, items, most, stats)
@@ -143,7 +144,7 @@ impl Cache {
         &mut self,
         executor: &mut dyn Executor,
         items: &[Item],
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         self.begin_batch();
         let mut taken = 0;
@@ -170,7 +171,7 @@ impl Cache {
         executor: &mut dyn Executor,
         items: &[Item],
         most: usize,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         let start = Instant::now();
         let before = self.residency.counters();

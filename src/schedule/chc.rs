@@ -3,7 +3,8 @@
 
 use super::cache::{BATCH_BRICKS, Cache};
 use super::optimisations::{Optimisations, run};
-use super::{Demand, Executor, ExecutorError, Pass, PassStats, Query, Report, Step, Tracing};
+use super::{Demand, Executor, ExecutorError, Pass, Query, Report, Step, Tracing};
+use crate::counters::Counters;
 use crate::stream::Item;
 use std::time::Instant;
 
@@ -17,7 +18,7 @@ pub fn trace(
     pass: Pass,
     first: &[Step],
     tracing: &Tracing,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
     let optimisations = &tracing.optimisations;
@@ -84,7 +85,7 @@ impl<'a> Batches<'a> {
         executor: &mut dyn Executor,
         cache: &mut Cache,
         mut report: Report,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
         let on = self.on;
         let (mut wanted, mut most) = in_order(&report.demand, on.nearest_first);
@@ -124,7 +125,7 @@ pub fn measure_needed(
     pass: Pass,
     first: &[Step],
     resident_before: &[bool],
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let start = Instant::now();
     let mut steps = first.to_vec();

@@ -26,7 +26,6 @@ mod report;
 mod states;
 mod step;
 
-pub use crate::counters::Counters as PassStats;
 pub use executor::{Executor, ExecutorError, Load, Tracing};
 pub use optimisations::{Optimisation, Optimisations, PartOf};
 pub use pass::{Lamp, Pass};

@@ -6,7 +6,7 @@ use crate::common;
 use bricks::{AttributeLayout, GeometryLayout, INSTANCE_IDENTITY, Node, Payload, SceneFile, TOP_LEAF};
 use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::cli::walk::renderer;
-use brickwalk::counters::Record;
+use brickwalk::counters::{Counters, Record};
 use brickwalk::frame::{Renderer, camera_view};
 use brickwalk::kernels::Extent;
 use brickwalk::kernels::frame::Frame;
@@ -15,8 +15,8 @@ use brickwalk::reference::{Truth, TruthRay, Verdict, judge};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::auto::Fixed;
 use brickwalk::schedule::{
-    BrickStates, Executor, ExecutorError, Load, Optimisations, PairQuery, Pass, PassStats, Report, Step, Tracing,
-    attributes, chc, demand,
+    BrickStates, Executor, ExecutorError, Load, Optimisations, PairQuery, Pass, Report, Step, Tracing, attributes, chc,
+    demand,
 };
 use brickwalk::session::open::{Session, open_scene};
 use brickwalk::stream::{Item, Kind, Slot};
@@ -247,7 +247,7 @@ fn records_are_what_a_spy_counts() {
             // Two passes over the same rays: the second finds what is left of the first.
             for pass_of_frame in 0..2 {
                 let tracing = Tracing { measure_needed: true, ..Tracing::default() };
-                let (start, mut stats) = (Instant::now(), PassStats::default());
+                let (start, mut stats) = (Instant::now(), Counters::default());
                 let cache = &mut renderer.engine.cache;
                 let resident_start = cache.residency.resident().count() as u64;
                 cache.begin_pass("primary", number);
@@ -319,7 +319,7 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
             renderer.cache.begin_pass("primary", number);
             let optimisations = Optimisations { nearest_first, ..Optimisations::default() };
             let tracing = Tracing { measure_needed: true, optimisations };
-            let mut stats = PassStats::default();
+            let mut stats = Counters::default();
             let inner = &mut *renderer.engine.executor;
             let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
             let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
