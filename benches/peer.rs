@@ -8,13 +8,14 @@
 
 use bricks::Payload;
 use brickwalk::cli::options::args::{Cli, Command};
+use brickwalk::counters::Counters;
 use brickwalk::kernels::frame::{Frame, Placement};
 use brickwalk::kernels::layout::{Hit, NONE, Params, Ray, Surface, T_INFINITE};
 use brickwalk::kernels::trace::brick::BrickView;
 use brickwalk::kernels::trace::leaf::rows_point;
 use brickwalk::kernels::{Directions, Extent, View};
 use brickwalk::scene::path::CameraPath;
-use brickwalk::schedule::{Lamp, Pass, PassStats, Step, plain};
+use brickwalk::schedule::{Lamp, Pass, Step, plain};
 use brickwalk::session::open::{Session, open_scene};
 use clap::Parser;
 use glam::DVec3;
@@ -80,7 +81,7 @@ impl Ours {
         let frame = Frame::near(scene.resident(), camera.position);
         session.executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
         let Session { executor, cache, .. } = &mut session;
-        plain::make_all_resident(&mut **executor, cache, &mut PassStats::default()).expect("room for all");
+        plain::make_all_resident(&mut **executor, cache, &mut Counters::default()).expect("room for all");
         let basis = camera.ray_basis(EXTENT.width, EXTENT.height);
         let origin = frame.point(camera.position);
         let ray = |i: usize| {

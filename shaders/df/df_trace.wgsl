@@ -134,7 +134,7 @@ fn trace(index: u32, ray: Ray) -> bool {
     return false;
 }
 
-var<workgroup> counted: atomic<u32>; // rays, and in the upper half those that were capped
+var<workgroup> counted: atomic<u32>; // rays answered, and in the upper half those that were capped
 
 // One thread a ray.
 @compute @workgroup_size(8, 8)
@@ -149,7 +149,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
     workgroupBarrier();
     if lane == 0u {
         let sum = atomicLoad(&counted);
-        atomicAdd(&counters[COUNTER_RAYS], sum & 0xffffu);
-        atomicAdd(&counters[COUNTER_FIELD_CAPPED], sum >> 16u);
+        atomicAdd(&counters[COUNTER_RAYS_ANSWERED], sum & 0xffffu);
+        atomicAdd(&counters[COUNTER_RAYS_CAPPED], sum >> 16u);
     }
 }

@@ -80,6 +80,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
     }
     workgroupBarrier();
     if lane == 0u {
-        atomicAdd(&counters[COUNTER_DVF_ANSWERED], atomicLoad(&counted));
+        atomicAdd(&counters[COUNTER_RAYS_ANSWERED], atomicLoad(&counted));
     }
 }

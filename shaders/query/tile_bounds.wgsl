@@ -57,6 +57,6 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     }
     if lane == 0u && tile < params.tiles {
         tile_bounds[tile] = TileBounds(origin_min[0], range[0].x, origin_max[0], range[0].y, direction_min[0], traced[0], direction_max[0], 0u);
-        atomicAdd(&counters[COUNTER_RAYS], traced[0]);
+        atomicAdd(&counters[COUNTER_RAYS_TRACED], traced[0]);
     }
 }

@@ -36,7 +36,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
                 write(index, found);
                 is_capped = found.is_capped;
             }
-            count(is_capped);
+            count(true, is_capped);
         }
     }
     sum_up(lane);

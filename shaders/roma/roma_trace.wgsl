@@ -13,19 +13,20 @@
 #include "roma/roma_pilot.wgsl"
 #include "roma/roma_write.wgsl"
 
-// Ends a ray that maps find free; what they do not is traced.
-fn sift(index: u32, ray: Ray, found: Answer) {
+// Ends a ray that maps find free, and says whether they do; what they do not is traced.
+fn sift(index: u32, ray: Ray, found: Answer) -> bool {
     if found.t < 0.0 {
         if found.is_known {
             hits[index].t = ANSWERED;
         }
-        return;
+        return found.is_known;
     }
     if own.near == 0u {
         hits[index].t = WAITING;
     } else if own.near != NONE {
         hits[index].t = min(ray.t_max, near_end(index, ray, own.near));
     }
+    return false;
 }
 
 // Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or
@@ -55,14 +56,16 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
         let is_done = hits[index].id != NONE || hits[index].t == ANSWERED || hits[index].t >= ray.t_max;
         if ray.t_min <= ray.t_max && !(is_far && is_done) && !(is_sifted && is_pilot(index)) {
             let found = answer(index, ray, nearest(index, ray), select(ray.t_min, hits[index].t, is_far), is_sifted);
+            // What has been traced is not answered, though maps go on with it or correct it.
+            var is_answered = own.part == ROMA_WHOLE || !is_traced(index, ray);
             if is_sifted {
-                sift(index, ray, found);
+                is_answered = sift(index, ray, found);
             } else if own.part == ROMA_CORRECT && is_pilot(index) {
                 correct(index, found);
             } else {
                 write(index, found);
             }
-            count(found.is_capped);
+            count(is_answered, found.is_capped);
         }
     }
     sum_up(lane);

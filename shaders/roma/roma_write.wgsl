@@ -1,4 +1,4 @@
-// What rays through ray-aligned occupancy maps meet, and how many there were.
+// What rays through ray-aligned occupancy maps meet, and how many they answer.
 
 // Writes what a ray meets. Where the closest is asked for, with the point, against the direction travelled as its
 // normal, and the level's lift as its area: such a hit is known to a cell.
@@ -14,18 +14,18 @@ fn write(index: u32, found: Answer) {
     }
 }
 
-var<workgroup> counted: atomic<u32>; // rays, and in the upper half those that were capped
+var<workgroup> counted: atomic<u32>; // rays answered, and in the upper half those that were capped
 
-fn count(is_capped: bool) {
-    atomicAdd(&counted, select(1u, 65537u, is_capped));
+fn count(is_answered: bool, is_capped: bool) {
+    atomicAdd(&counted, select(0u, 1u, is_answered) + select(0u, 65536u, is_capped));
 }
 
-// Adds the workgroup's rays to the counters. All threads call it, at their end.
+// Adds the workgroup's to the counters. All threads call it, at their end.
 fn sum_up(lane: u32) {
     workgroupBarrier();
     if lane == 0u {
         let sum = atomicLoad(&counted);
-        atomicAdd(&counters[COUNTER_RAYS], sum & 0xffffu);
-        atomicAdd(&counters[COUNTER_ROMA_CAPPED], sum >> 16u);
+        atomicAdd(&counters[COUNTER_RAYS_ANSWERED], sum & 0xffffu);
+        atomicAdd(&counters[COUNTER_RAYS_CAPPED], sum >> 16u);
     }
 }

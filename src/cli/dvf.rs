@@ -177,7 +177,7 @@ impl Note {
             "trust": args.dvf.dvf_trust.name(),
             "renew": args.motion.as_ref().map(|_| json!({
                 "rays_a_frame": args.dvf.dvf_renew,
-                "rays": sum(&|record| record.rays),
+                "rays": sum(&|record| record.rays()),
                 "cells": sum(&|record| record.cells_renewed),
                 "cells_left": sum(&|record| record.cells_left),
             })),

@@ -4,7 +4,7 @@ use super::options::args::WalkArgs;
 use super::options::optimisation_args::names;
 use super::pictures::Pictures;
 use super::walk::finest_cell;
-use crate::counters::Record;
+use crate::counters::{COLUMNS, Column, Kind, Record};
 use crate::frame::{Renderer, Schedule};
 use crate::picture::denoise::Resolve;
 use crate::secondary::df::answer::Df;
@@ -12,10 +12,11 @@ use crate::secondary::roma::Role;
 use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::handover::{Handover, Trust};
 use crate::session::lighting::Lighting;
+use brickwalk_report::Field;
 use serde_json::{Map, Value, json};
 
 /// Raised when a field changes its meaning.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// The summary of a walk of `frames` finished frames, with what was left out.
 pub fn of_walk(
@@ -144,6 +145,17 @@ fn errors(records: &[Record]) -> Value {
         });
     }
     Value::Object(effects)
+}
+
+/// What reports say of the fields of records.
+pub fn fields() -> Vec<Field> {
+    let written = COLUMNS.iter().filter(|column| column.is_written);
+    let of = |column: &Column| Field {
+        name: column.name,
+        meaning: format!("{} Unit: {}.", column.description(), column.unit),
+        adds_up: !matches!(column.kind, Kind::State | Kind::Max),
+    };
+    written.map(of).collect()
 }
 
 /// Totals, medians and 95th percentiles of every numeric field, per pass.

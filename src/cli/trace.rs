@@ -1,6 +1,7 @@
 //! `brickwalk trace`: closest hits, or occlusion, of given rays.
 
 use super::options::args::TraceArgs;
+use crate::counters::Counters;
 use crate::frame::Schedule;
 use crate::kernels::Extent;
 use crate::kernels::frame::Frame;
@@ -9,7 +10,7 @@ use crate::kernels::layout::{NONE, Params, T_INFINITE};
 use crate::kernels::{Directions, View};
 use crate::output::npy;
 use crate::output::npy::{Hit, Ray};
-use crate::schedule::{Lamp, Pass, PassStats, Step, Tracing, attributes, chc, demand, plain};
+use crate::schedule::{Lamp, Pass, Step, Tracing, attributes, chc, demand, plain};
 use crate::session::open::{Session, open_scene, write_requests};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
@@ -52,8 +53,8 @@ pub fn run(args: &TraceArgs) -> Result<()> {
             "rays": rays.len(),
             "hits": hit,
             "ms": stats.ms,
-            "round_trips": stats.report.round_trips,
-            "bricks_loaded": stats.loaded,
+            "round_trips": stats.round_trips,
+            "bricks_loaded": stats.bricks_loaded,
             "bytes_bvh": stats.bytes_bvh,
             "bytes_geometry": stats.bytes_geometry,
             "bytes_attributes": stats.bytes_attributes,
@@ -113,11 +114,11 @@ pub fn device_ray(ray: &Ray, frame: &Frame) -> DeviceRay {
 ///
 /// # Errors
 /// A damaged brick, or the device's.
-pub fn trace(session: &mut Session, rays: &[Ray], any: bool, progress: &Progress) -> Result<(Vec<Hit>, PassStats)> {
+pub fn trace(session: &mut Session, rays: &[Ray], any: bool, progress: &Progress) -> Result<(Vec<Hit>, Counters)> {
     let start = std::time::Instant::now();
     let miss = Hit { t: f64::INFINITY, triangle: NONE, u: 0.0, v: 0.0 };
     let mut hits = vec![miss; rays.len()];
-    let mut stats = PassStats::default();
+    let mut stats = Counters::default();
     // One reference point a cell: the rounding of an origin depends on the ray alone, not on its neighbours in the
     // file.
     let mut groups: BTreeMap<[i64; 3], (Frame, Vec<usize>)> = BTreeMap::new();
@@ -147,7 +148,7 @@ fn trace_chunk(
     frame: &Frame,
     rays: &[DeviceRay],
     any: bool,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<Vec<(layout::Hit, [f32; 2])>> {
     let device: Vec<layout::Ray> = rays.iter().map(|r| r.ray).collect();
     let hits = trace_device(session, frame, &device, any, stats)?;
@@ -169,7 +170,7 @@ pub fn trace_device(
     frame: &Frame,
     rays: &[layout::Ray],
     any: bool,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<Vec<layout::Hit>> {
     let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
     let (executor, cache) = (&mut *session.executor, &mut session.cache);

@@ -291,6 +291,6 @@ fn finish(args: &WalkArgs, renderer: &Renderer, summary: &serde_json::Value) -> 
     let text = serde_json::to_string_pretty(summary)? + "\n";
     atomic::write(&args.output.join("summary.json"), text.as_bytes())?;
     write_requests(&args.stream, &renderer.cache)?;
-    brickwalk_report::write(&args.output)?;
+    brickwalk_report::write(&args.output, &summary::fields())?;
     Ok(())
 }

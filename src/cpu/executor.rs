@@ -259,7 +259,8 @@ impl Executor for CpuExecutor {
             }
         }
         let demand: Vec<layout::Demand> = demand.iter().map(Demand::get).collect();
-        let mut report = Report { ms_phases, ..report::of_counters(&counters.get(), &demand)? };
+        let mut report = report::of_counters(&counters.get(), &demand)?;
+        report.counters.add_phases(ms_phases);
         report::take_used(&mut report, steps, bricks);
         report.tiles = textures::demand(&tile_demand.iter().map(TileDemand::get).collect::<Vec<_>>());
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) {

@@ -1,11 +1,12 @@
 //! What passes are traced with: a scene, an executor, a cache, a schedule.
 
 use super::{Captures, Effects, Light, Moved};
+use crate::counters::Counters;
 use crate::kernels::FrameExecutor;
 use crate::schedule::auto::{Auto, Fixed};
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{ExecutorError, Pass, PassStats, Shading, Step, Tracing, chc, demand, plain};
+use crate::schedule::{ExecutorError, Pass, Shading, Step, Tracing, chc, demand, plain};
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -83,7 +84,7 @@ impl Engine {
     }
 
     /// Shades the hits of the set before that of `pass`.
-    pub fn shade(&mut self, pass: Pass, light: Shading, stats: &mut PassStats) -> Result<(), ExecutorError> {
+    pub fn shade(&mut self, pass: Pass, light: Shading, stats: &mut Counters) -> Result<(), ExecutorError> {
         stats.add(self.executor.run(pass, &[Step::Shade(light)], &self.cache.states)?);
         Ok(())
     }
@@ -92,13 +93,7 @@ impl Engine {
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.
-    pub fn trace(
-        &mut self,
-        frame: u32,
-        pass: Pass,
-        first: &[Step],
-        stats: &mut PassStats,
-    ) -> Result<(), ExecutorError> {
+    pub fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
         let fixed = match self.settings.schedule {
             Schedule::Chc => Fixed::Chc,
             Schedule::Demand => Fixed::Demand,
@@ -113,10 +108,10 @@ impl Engine {
                 // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the
                 // schedule.
                 let besides = stats.ms_stream - stats.ms;
-                let rays = stats.report.rays;
+                let rays = stats.rays_traced;
                 self.trace_by(chosen, frame, pass, first, stats)?;
                 let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
-                self.auto.note(pass, ms, stats.report.rays - rays);
+                self.auto.note(pass, ms, stats.rays_traced - rays);
                 return Ok(());
             }
         };
@@ -129,7 +124,7 @@ impl Engine {
         frame: u32,
         pass: Pass,
         first: &[Step],
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
         let tracing = &self.settings.tracing;
         let (executor, cache) = (&mut *self.executor, &mut self.cache);

@@ -1,8 +1,8 @@
 //! The statistics of the effects of one frame.
 
 use super::Engine;
-use crate::counters::Record;
-use crate::schedule::{ExecutorError, PassStats};
+use crate::counters::{Counters, Record};
+use crate::schedule::ExecutorError;
 use std::time::Instant;
 
 /// Collects the statistics of the effects of a frame, each over all its samples, directions and lamps.
@@ -13,9 +13,7 @@ pub struct FrameRecords {
 
 struct EffectRecord {
     name: &'static str,
-    stats: PassStats,
-    resident_start: u64,
-    resident_end: u64,
+    stats: Counters,
 }
 
 impl FrameRecords {
@@ -37,7 +35,7 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         engine.cache.begin_pass(name, self.frame);
         self.more(engine, name, work)
@@ -51,7 +49,7 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         engine.cache.begin_pass(name, self.frame);
         self.count(engine, name, work)
@@ -65,7 +63,7 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         self.count(engine, name, work)?;
         match &mut engine.captures {
@@ -79,33 +77,31 @@ impl FrameRecords {
         &mut self,
         engine: &mut Engine,
         name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut PassStats) -> Result<(), ExecutorError>,
+        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         let resident = |engine: &Engine| engine.cache.residency.resident().count() as u64;
         let before = resident(engine);
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
-            let stats = PassStats::default();
-            self.effects.push(EffectRecord { name, stats, resident_start: before, resident_end: before });
+            let (bricks_resident_start, bricks_resident_end) = (before, before);
+            let stats = Counters { bricks_resident_start, bricks_resident_end, ..Counters::default() };
+            self.effects.push(EffectRecord { name, stats });
             self.effects.len() - 1
         });
-        let effect = &mut self.effects[index];
+        let stats = &mut self.effects[index].stats;
         let start = Instant::now();
-        work(engine, &mut effect.stats)?;
-        effect.stats.ms += start.elapsed().as_secs_f64() * 1e3;
-        effect.stats.cache_passes = effect.stats.cache_passes.max(engine.cache.residency.fillings());
-        effect.resident_end = effect.resident_end + resident(engine) - before;
+        work(engine, stats)?;
+        stats.ms += start.elapsed().as_secs_f64() * 1e3;
+        stats.cache_passes = stats.cache_passes.max(engine.cache.residency.fillings());
+        stats.bricks_resident_end = stats.bricks_resident_end + resident(engine) - before;
         Ok(())
     }
 
     /// The records, in the order in which effects began.
     pub fn finish(self, engine: &Engine) -> Vec<Record> {
         let residency = &engine.cache.residency;
-        let record = |effect: EffectRecord| Record {
-            cache_bytes: residency.budget_bytes(),
-            cache_used_bytes: residency.used_bytes(),
-            bricks_resident_start: effect.resident_start,
-            bricks_resident_end: effect.resident_end,
-            ..Record::of(self.frame, effect.name, &effect.stats)
+        let record = |EffectRecord { name, stats }| {
+            let (cache_bytes, cache_used_bytes) = (residency.budget_bytes(), residency.used_bytes());
+            Record::of(self.frame, name, Counters { cache_bytes, cache_used_bytes, ..stats })
         };
         self.effects.into_iter().map(record).collect()
     }

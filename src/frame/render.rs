@@ -1,11 +1,11 @@
 //! The frame loop.
 
 use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, Methods, Moved, camera_view};
-use crate::counters::Record;
+use crate::counters::{Counters, Record};
 use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::picture::denoise::{GuideReader, Guides, taa_jitter};
 use crate::scene::Camera;
-use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Shading, Step, attributes};
+use crate::schedule::{ExecutorError, Lamp, Pass, Shading, Step, attributes};
 use std::ops::{Deref, DerefMut};
 use thiserror::Error;
 
@@ -272,7 +272,7 @@ fn trace_and_add(
     methods: &mut Methods,
     frame: u32,
     pass: Pass,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let plan = methods.plan(engine, pass)?;
     if plan.is_whole {
@@ -284,7 +284,7 @@ fn trace_and_add(
     let last = [&[Step::QueryHits], &plan.after[..], &[plan.add]].concat();
     let report = engine.executor.run(pass, &last, &engine.cache.states)?;
     methods.learn(pass, &report);
-    stats.bricks_hit.get_or_insert_default().extend(report.demand.iter().map(|d| d.brick));
+    stats.bricks_hit.extend(report.demand.iter().map(|d| d.brick));
     stats.add(report);
     Ok(())
 }

@@ -321,11 +321,13 @@ impl GpuExecutor {
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
         }
         let times = self.timing.read(&self.gpu, dispatches.len())?;
+        let mut ms_phases = [0.0; 3];
         for (dispatch, ms) in dispatches.iter().zip(times) {
             if let Some(phase) = dispatch.phase {
-                report.ms_phases[phase] += ms;
+                ms_phases[phase] += ms;
             }
         }
+        report.counters.add_phases(ms_phases);
         Ok(report)
     }
 
@@ -532,9 +534,9 @@ impl Executor for GpuExecutor {
         }
         // The lists did not fit and were left empty, so nothing has been intersected: once more, with room.
         self.grow_lists(report.list_entries)?;
-        let round_trips = report.round_trips;
+        let round_trips = report.counters.round_trips;
         let mut report = self.submit(pass, steps, bricks)?;
-        report.round_trips += round_trips;
+        report.counters.round_trips += round_trips;
         Ok(report)
     }
 }

@@ -1,7 +1,11 @@
 //! What an executor is told of bricks before a submission, and what its counters say after it.
 
 use super::layout;
+use crate::counters::{Counters, device_words};
 use crate::schedule::{BrickStates, Demand, ExecutorError, Report, Step};
+
+/// The words of the device that are counters, and which.
+const DEVICE_WORDS: &[(u32, fn(&mut Counters) -> &mut u64)] = device_words!();
 
 /// Where every brick lies and its part in the pass.
 pub fn slots(bricks: &BrickStates) -> Vec<layout::Slot> {
@@ -51,33 +55,17 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
         nearest: f32::from_bits(d.nearest),
         next: d.next,
     };
+    let mut counted = Counters { round_trips: 1, ..Counters::default() };
+    for (word, counter) in DEVICE_WORDS {
+        *counter(&mut counted) = count(*word);
+    }
     Ok(Report {
-        round_trips: 1,
-        rays_capped: count(layout::COUNTER_ROMA_CAPPED) + count(layout::COUNTER_FIELD_CAPPED),
+        counters: counted,
         own: std::array::from_fn(|i| count(layout::COUNTER_PILOTS + i as u32)),
         demand: wanted.map(asked).collect(),
-        tiles: Vec::new(),
-        used: Vec::new(),
         list_entries: counters[layout::COUNTER_LIST_ENTRIES as usize],
-        pairs_tested: count(layout::COUNTER_PAIRS_TESTED),
-        pairs_culled: count(layout::COUNTER_PAIRS_CULLED),
-        pairs_visible: count(layout::COUNTER_PAIRS_VISIBLE),
-        pairs_invisible: count(layout::COUNTER_PAIRS_INVISIBLE),
-        pairs_intersected: count(layout::COUNTER_PAIRS_INTERSECTED),
         most_selected: counters[layout::COUNTER_MOST_SELECTED as usize],
-        tiles_from_root: count(layout::COUNTER_TILES_FROM_ROOT),
-        pairs_front_to_back: count(layout::COUNTER_FRONT_TO_BACK),
-        tile_batches: count(layout::COUNTER_TILE_BATCHES),
-        tile_batch_leaves: count(layout::COUNTER_TILE_BATCH_LEAVES),
-        rays: count(layout::COUNTER_RAYS),
-        rays_answered: count(layout::COUNTER_DVF_ANSWERED),
-        nodes: count(layout::COUNTER_NODES),
-        triangles: count(layout::COUNTER_TRIANGLES),
-        non_finite: count(layout::COUNTER_NON_FINITE),
-        unresolved: count(layout::COUNTER_UNRESOLVED),
-        ms_phases: [0.0; 3],
-        pair_rays: Vec::new(),
-        queries_tightened: count(layout::COUNTER_TIGHTENED),
+        ..Report::default()
     })
 }
 
@@ -87,4 +75,29 @@ pub fn too_many_pairs(tiles: u32, leaves: usize) -> ExecutorError {
         "cannot count which of {leaves} leaves each of {tiles} tiles sees; use a larger --tile, or no --query-threshold"
     );
     ExecutorError::Device(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::counters::{COLUMNS, Source};
+
+    #[test]
+    fn what_kernels_count_arrives_under_its_name() {
+        let mut words: Vec<u32> = (0..layout::COUNTERS as u32).map(|word| 100 + word).collect();
+        words[layout::COUNTER_STACK_OVERFLOW as usize] = 0;
+        let report = of_counters(&words, &[]).expect("no overflow");
+        let traced = 100 + u64::from(layout::COUNTER_RAYS_TRACED);
+        let not_finite = 100 + u64::from(layout::COUNTER_NON_FINITE);
+        assert_eq!((report.counters.rays_traced, report.counters.non_finite), (traced, not_finite));
+        let counted = report.counters.counted_by_device();
+        let of_table = COLUMNS.iter().filter(|column| column.source == Source::Device);
+        assert!(of_table.map(|column| column.name).eq(counted.iter().map(|(name, _)| *name)));
+        let mut values: Vec<u64> = counted.iter().map(|(_, value)| *value).collect();
+        values.sort_unstable();
+        values.dedup();
+        assert_eq!(values.len(), counted.len(), "each has a word of its own: {counted:?}");
+        words[layout::COUNTER_STACK_OVERFLOW as usize] = 1;
+        assert!(matches!(of_counters(&words, &[]), Err(ExecutorError::StackOverflow(1))));
+    }
 }

@@ -4,7 +4,8 @@
 //! Where a frame may load so many bytes of tiles only, coarser levels stand for the tiles that it does not load.
 
 use super::cache::Cache;
-use super::{Executor, ExecutorError, Lamp, Pass, PassStats, Report, Step, TileDemand};
+use super::{Executor, ExecutorError, Lamp, Pass, Report, Step, TileDemand};
+use crate::counters::Counters;
 use crate::stream::Item;
 use std::cmp::Reverse;
 
@@ -16,7 +17,7 @@ pub fn resolve(
     executor: &mut dyn Executor,
     cache: &mut Cache,
     pass: Pass,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     // Steps that shade work on the hits of the set before.
     let next = if pass.set() == 0 { Pass::Shadow(Lamp::Sun) } else { Pass::BounceShadow(Lamp::Sun) };
@@ -43,7 +44,7 @@ pub fn resolve(
         None => sample(executor, cache, next, report, stats)?,
         Some(allowance) => sample_within(allowance, executor, cache, next, report, stats)?,
     }
-    stats.bricks_hit.get_or_insert_default().extend(hit);
+    stats.bricks_hit.extend(hit);
     Ok(())
 }
 
@@ -58,7 +59,7 @@ fn sample(
     cache: &mut Cache,
     next: Pass,
     mut report: Report,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let mut before = None;
     loop {
@@ -87,7 +88,7 @@ fn sample_within(
     cache: &mut Cache,
     next: Pass,
     mut report: Report,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let mut left = allowance;
     loop {
@@ -121,7 +122,7 @@ fn sample_within(
 }
 
 /// Notes the use of tiles that were read; what lookups ask of tiles.
-fn note(mut report: Report, cache: &mut Cache, stats: &mut PassStats) -> Vec<TileDemand> {
+fn note(mut report: Report, cache: &mut Cache, stats: &mut Counters) -> Vec<TileDemand> {
     let tiles = std::mem::take(&mut report.tiles);
     stats.add(report);
     for tile in tiles.iter().filter(|tile| tile.is_used) {

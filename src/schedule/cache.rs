@@ -1,6 +1,7 @@
 //! The cache as a schedule uses it: residency, brick states, and the request trace.
 
-use super::{BrickStates, Executor, ExecutorError, Load, PassStats};
+use super::{BrickStates, Executor, ExecutorError, Load};
+use crate::counters::Counters;
 use crate::stream::{Item, Kind, Residency, Sizes, Trace};
 use std::time::Instant;
 
@@ -103,20 +104,20 @@ impl Cache {
 
     /// Marks what is resident as done, its intersection being under way, and notes the use of the bricks that rays
     /// entered. `ahead`: some bricks are missing, which are asked for only now.
-    pub fn finish_resident(&mut self, used: &[u32], ahead: bool, stats: &mut PassStats) {
+    pub fn finish_resident(&mut self, used: &[u32], ahead: bool, stats: &mut Counters) {
         self.states.finish_resident();
         self.touch_geometry(used, ahead, stats);
     }
 
     /// Notes the use of resident bricks that rays entered.
-    pub fn touch_geometry(&mut self, used: &[u32], ahead: bool, stats: &mut PassStats) {
+    pub fn touch_geometry(&mut self, used: &[u32], ahead: bool, stats: &mut Counters) {
         for &brick in used {
             self.touch(Item::geometry(brick));
         }
         if ahead {
             stats.bricks_resident_first += used.len() as u64;
         }
-        stats.bricks_intersected.extend(used);
+        stats.bricks_entered.extend(used.iter().copied());
     }
 
     /// Loads as many of `items` as fit without evicting each other, at least one and at most `most` and 64 MiB; returns
@@ -129,7 +130,7 @@ impl Cache {
         executor: &mut dyn Executor,
         items: &[Item],
         most: usize,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         self.begin_batch();
         self.load_beside(executor, items, most, stats)
@@ -143,7 +144,7 @@ impl Cache {
         &mut self,
         executor: &mut dyn Executor,
         items: &[Item],
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         self.begin_batch();
         let mut taken = 0;
@@ -170,7 +171,7 @@ impl Cache {
         executor: &mut dyn Executor,
         items: &[Item],
         most: usize,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         let start = Instant::now();
         let before = self.residency.counters();
@@ -214,15 +215,15 @@ impl Cache {
                 Kind::Tile => stats.bytes_textures += bytes,
             }
             if std::mem::replace(&mut self.loaded_in[load.item.index()], self.frame) == self.frame {
-                stats.reloaded_frame += 1;
+                stats.bricks_reloaded_frame += 1;
                 stats.bytes_reloaded_frame += self.residency.bytes(load.item);
             }
         }
         let change = self.residency.counters().since(&before).total();
-        stats.loaded += change.loaded;
-        stats.reloaded += change.reloaded;
-        stats.evicted += change.evicted;
-        stats.batches += 1;
+        stats.bricks_loaded += change.loaded;
+        stats.bricks_reloaded += change.reloaded;
+        stats.bricks_evicted += change.evicted;
+        stats.load_batches += 1;
         stats.ms_stream += start.elapsed().as_secs_f64() * 1e3;
         Ok(taken)
     }

@@ -3,7 +3,8 @@
 
 use super::cache::{BATCH_BRICKS, Cache};
 use super::optimisations::{Optimisations, run};
-use super::{Demand, Executor, ExecutorError, Pass, PassStats, Query, Report, Step, Tracing};
+use super::{Demand, Executor, ExecutorError, Pass, Query, Report, Step, Tracing};
+use crate::counters::Counters;
 use crate::stream::Item;
 use std::time::Instant;
 
@@ -17,7 +18,7 @@ pub fn trace(
     pass: Pass,
     first: &[Step],
     tracing: &Tracing,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
     let optimisations = &tracing.optimisations;
@@ -84,11 +85,11 @@ impl<'a> Batches<'a> {
         executor: &mut dyn Executor,
         cache: &mut Cache,
         mut report: Report,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
         let on = self.on;
         let (mut wanted, mut most) = in_order(&report.demand, on.nearest_first);
-        stats.add(std::mem::take(&mut report));
+        stats.add(&report);
         while !wanted.is_empty() {
             let count = cache.load(executor, &wanted, if on.requery { most } else { BATCH_BRICKS }, stats)?;
             let rest = wanted.split_off(count);
@@ -97,7 +98,7 @@ impl<'a> Batches<'a> {
                 stats.bricks_nearest_first += batch.iter().filter(|&&brick| brick > lowest).count() as u64;
             }
             cache.states.set_batch(&batch);
-            stats.bricks_intersected.extend(&batch);
+            stats.bricks_entered.extend(batch.iter().copied());
             if on.requery {
                 report = run(executor, self.pass, &[self.intersect, self.query()], &cache.states, on, stats)?;
                 let still = |item: &&Item| report.demand.binary_search_by_key(&item.number, |d| d.brick).is_ok();
@@ -107,7 +108,7 @@ impl<'a> Batches<'a> {
                 report = run(executor, self.pass, &[self.intersect], &cache.states, on, stats)?;
                 wanted = rest;
             }
-            stats.add(std::mem::take(&mut report));
+            stats.add(&report);
         }
         Ok(())
     }
@@ -124,7 +125,7 @@ pub fn measure_needed(
     pass: Pass,
     first: &[Step],
     resident_before: &[bool],
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let start = Instant::now();
     let mut steps = first.to_vec();
@@ -136,7 +137,7 @@ pub fn measure_needed(
         if !resident_before[brick as usize] {
             stats.bytes_needed_missing += bytes;
         }
-        stats.bricks_needed.get_or_insert_default().push(brick);
+        stats.bricks_needed.extend([brick]);
     }
     stats.ms -= start.elapsed().as_secs_f64() * 1e3;
     Ok(())

@@ -7,7 +7,8 @@
 
 use super::cache::Cache;
 use super::chc::{Batches, measure_needed};
-use super::{Executor, ExecutorError, Pass, PassStats, Step, Tracing};
+use super::{Executor, ExecutorError, Pass, Step, Tracing};
+use crate::counters::Counters;
 
 /// Traces the rays of `pass`, after the steps in `first` have made them.
 ///
@@ -19,7 +20,7 @@ pub fn trace(
     pass: Pass,
     first: &[Step],
     tracing: &Tracing,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
     let optimisations = &tracing.optimisations;

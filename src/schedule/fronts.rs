@@ -10,7 +10,8 @@ use super::chc::{Batches, measure_needed};
 use super::multi_query::batches;
 use super::optimisations::run;
 use super::pair_tree::{Front, PairTree, Square};
-use super::{Executor, ExecutorError, PairQuery, Pass, PassStats, Step, Tracing};
+use super::{Executor, ExecutorError, PairQuery, Pass, Step, Tracing};
+use crate::counters::Counters;
 use bricks::Resident;
 use std::collections::BTreeMap;
 
@@ -53,7 +54,7 @@ impl Fronts {
         cache: &mut Cache,
         setup: &FrontPass,
         first: &[Step],
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
         let (width, height, tile) = setup.extent;
         let top = &setup.resident.top2;
@@ -96,7 +97,7 @@ impl Fronts {
                     next.extend(tree.split(index, top, setup.frame));
                 }
             }
-            stats.report.pairs_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
+            stats.queries_interval_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
             if next.is_empty() && terminal.is_empty() {
                 break;
             }
@@ -146,7 +147,7 @@ impl Fronts {
         cache: &mut Cache,
         setup: &FrontPass,
         resident_before: &[bool],
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
         let Some((tree, _)) = self.trees.get_mut(&setup.pass.visibility_state()) else { return Ok(()) };
         let on = &setup.tracing.optimisations;
@@ -198,7 +199,7 @@ impl Found<'_> {
         &mut self,
         executor: &mut dyn Executor,
         cache: &Cache,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<super::Report, ExecutorError> {
         let steps = std::mem::take(&mut self.steps);
         run(executor, self.setup.pass, &steps, &cache.states, &self.setup.tracing.optimisations, stats)
@@ -213,7 +214,7 @@ impl Found<'_> {
         tree: &PairTree,
         pairs: &mut [u32],
         is_front: bool,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<Vec<u32>, ExecutorError> {
         let on = &self.setup.tracing.optimisations;
         let queries = if is_front && on.multi_queries {
@@ -247,7 +248,7 @@ impl Found<'_> {
         cache: &mut Cache,
         tree: &PairTree,
         pairs: &[u32],
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
         if !self.setup.tracing.optimisations.resident_first && !cache.states.all_geometry_resident() {
             return self.load(executor, cache, tree, pairs, stats);
@@ -273,7 +274,7 @@ impl Found<'_> {
         cache: &mut Cache,
         tree: &PairTree,
         pairs: &[u32],
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
         if pairs.is_empty() {
             return Ok(());

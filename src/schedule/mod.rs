@@ -29,6 +29,6 @@ mod step;
 pub use executor::{Executor, ExecutorError, Load, Tracing};
 pub use optimisations::{Optimisation, Optimisations, PartOf};
 pub use pass::{Lamp, Pass};
-pub use report::{Demand, OWN_COUNTERS, PassStats, Report, TileDemand};
+pub use report::{Demand, OWN_COUNTERS, Report, TileDemand};
 pub use states::BrickStates;
 pub use step::{Over, Own, PairQuery, Query, Shading, Step};

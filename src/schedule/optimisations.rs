@@ -1,7 +1,8 @@
 //! The optimisations of CHC+RT, each of which can be switched off by itself. They change what is asked, loaded
 //! and intersected when, never a hit.
 
-use super::{BrickStates, Executor, ExecutorError, Pass, PassStats, Report, Step};
+use super::{BrickStates, Executor, ExecutorError, Pass, Report, Step};
+use crate::counters::Counters;
 
 /// What an optimisation is a part of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,7 +105,7 @@ pub fn run(
     steps: &[Step],
     bricks: &BrickStates,
     optimisations: &Optimisations,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<Report, ExecutorError> {
     if optimisations.by_tile {
         return executor.run(pass, steps, bricks);

@@ -2,7 +2,8 @@
 
 use super::cache::Cache;
 use super::chc::measure_needed;
-use super::{Executor, ExecutorError, Pass, PassStats, Step, Tracing};
+use super::{Executor, ExecutorError, Pass, Step, Tracing};
+use crate::counters::Counters;
 use crate::stream::Item;
 
 /// Loads every brick's geometry that is missing.
@@ -12,7 +13,7 @@ use crate::stream::Item;
 pub fn make_all_resident(
     executor: &mut dyn Executor,
     cache: &mut Cache,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let missing: Vec<Item> = (0..cache.states.len())
         .filter(|&b| cache.states.geometry(b).is_none())
@@ -36,7 +37,7 @@ pub fn trace(
     pass: Pass,
     first: &[Step],
     tracing: &Tracing,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     trace_by(Step::IntersectAll, executor, cache, pass, first, tracing, stats)
 }
@@ -51,7 +52,7 @@ pub fn trace_binary(
     pass: Pass,
     first: &[Step],
     tracing: &Tracing,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     trace_by(Step::IntersectBinary, executor, cache, pass, first, tracing, stats)
 }
@@ -63,7 +64,7 @@ fn trace_by(
     pass: Pass,
     first: &[Step],
     tracing: &Tracing,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let resident_before = cache.resident_geometry();
     make_all_resident(executor, cache, stats)?;

@@ -7,7 +7,8 @@
 //! is done for all of them, so that any of it may be evicted and none is loaded twice until no ray waits.
 
 use super::cache::Cache;
-use super::{Executor, ExecutorError, PassStats, Query, Report, Step};
+use super::{Executor, ExecutorError, Query, Report, Step};
+use crate::counters::Counters;
 use crate::stream::Item;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -51,7 +52,7 @@ impl Pool {
         &mut self,
         executor: &mut dyn Executor,
         cache: &mut Cache,
-        stats: &mut PassStats,
+        stats: &mut Counters,
     ) -> Result<bool, ExecutorError> {
         // All blocks have met what is resident.
         cache.states.finish_resident();
@@ -62,7 +63,7 @@ impl Pool {
         }
         batch.truncate(cache.fill(executor, &items, stats)?);
         cache.states.set_batch(&batch);
-        stats.bricks_intersected.extend(&batch);
+        stats.bricks_entered.extend(batch.iter().copied());
         Ok(true)
     }
 }

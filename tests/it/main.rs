@@ -21,6 +21,7 @@ mod exact {
     mod cache_independence;
     mod exactness;
     mod motion;
+    mod rays;
     mod records;
     mod threshold;
     mod twins;

@@ -7,12 +7,13 @@
 use super::rays::{RAYS, rays};
 use super::twin::{Twin, closest};
 use super::{Check, no_results, scene};
+use crate::counters::Counters;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{Hit, NONE, Params, Ray, Surface};
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::schedule::cache::{Cache, SceneBytes};
-use crate::schedule::{Executor, ExecutorError, Lamp, Pass, PassStats, Step, Tracing, chc, demand, plain};
+use crate::schedule::{Executor, ExecutorError, Lamp, Pass, Step, Tracing, chc, demand, plain};
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use glam::DVec3;
@@ -62,7 +63,7 @@ struct Way {
     is_cold: bool,
 }
 
-type Schedule = fn(&mut dyn Executor, &mut Cache, Pass, &[Step], &Tracing, &mut PassStats) -> Result<(), ExecutorError>;
+type Schedule = fn(&mut dyn Executor, &mut Cache, Pass, &[Step], &Tracing, &mut Counters) -> Result<(), ExecutorError>;
 
 /// Every pipeline that intersects. The first makes everything resident for the second.
 const WAYS: [Way; 5] = [
@@ -138,7 +139,7 @@ fn trace(
             executor.set_rays(pass, rays);
             cache.begin_pass("probe", 0);
             let tracing = Tracing::default();
-            (way.schedule)(&mut executor, &mut cache, pass, &[Step::StartHits], &tracing, &mut PassStats::default())?;
+            (way.schedule)(&mut executor, &mut cache, pass, &[Step::StartHits], &tracing, &mut Counters::default())?;
             let name = if pass == Pass::Primary { way.closest } else { way.any };
             let (hits, mut surfaces) = (executor.read_hits(pass)?, executor.read_surfaces(pass)?);
             // What a ray still asks for is no part of its hit.

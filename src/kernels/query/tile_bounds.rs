@@ -2,7 +2,7 @@
 //! distances in which they can still hit.
 
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::layout::{COUNTER_RAYS, T_INFINITE, TileBounds};
+use crate::kernels::layout::{COUNTER_RAYS_TRACED, T_INFINITE, TileBounds};
 use crate::kernels::rays::{RaySet, is_traced};
 use crate::kernels::vector::{each, least, most};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ pub fn tile_bounds(bound: &Bound, set: &RaySet, bounds: &mut [TileBounds]) {
     bounds.par_iter_mut().enumerate().for_each(|(tile, out)| {
         *out = bounds_of(bound, set, tile as u32);
         let mut tally = Tally::default();
-        tally.add(COUNTER_RAYS, out.rays);
+        tally.add(COUNTER_RAYS_TRACED, out.rays);
         bound.counters.add(&tally);
     });
 }

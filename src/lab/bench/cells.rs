@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Raised when a field changes its meaning.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// Values of the frames of a walk by field of the records, and these by pass.
 pub type Passes = BTreeMap<String, BTreeMap<String, Vec<f64>>>;

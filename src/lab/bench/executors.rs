@@ -117,7 +117,7 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
                     continue;
                 }
                 for record in output.records {
-                    let one = (record.rays, record.ms);
+                    let one = (record.rays_traced, record.ms);
                     match side.passes.iter_mut().find(|(name, _)| *name == record.pass) {
                         Some((_, all)) => all.push(one),
                         None => side.passes.push((record.pass, vec![one])),

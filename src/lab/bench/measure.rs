@@ -7,16 +7,16 @@ use super::plan::{Case, PLAIN, PLAIN_BVH2, Variant};
 use super::scenes::Place;
 use crate::cli::options::args::{Cli, Command, WalkArgs};
 use crate::cli::walk;
-use crate::counters::Record;
+use crate::counters::{Counters, Record};
 use crate::frame::Engine;
 use crate::frame::{Renderer, Schedule};
 use crate::kernels::Extent;
 use crate::output::srgb;
 use crate::scene::path::CameraPath;
+use crate::schedule::ExecutorError;
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
-use crate::schedule::{ExecutorError, PassStats};
 use crate::session::device::Adapter;
 use crate::session::open::{Session, open_scene, scaled_threshold};
 use crate::stream::{Item, Residency};
@@ -39,7 +39,7 @@ const FIELDS: [&str; 17] = [
     "ms_phase2",
     "ms_phase3",
     "ms_stream",
-    "rays",
+    "rays_traced",
     "queries",
     "multi_queries",
     "pairs_intersected",
@@ -120,7 +120,7 @@ impl<'a> Bench<'a> {
         let items: Vec<Item> = cache.bytes.sizes().items().map(|(item, _)| item).collect();
         let mut rest = &items[..];
         while !rest.is_empty() {
-            let count = cache.load(&mut **executor, rest, AT_A_TIME, &mut PassStats::default())?;
+            let count = cache.load(&mut **executor, rest, AT_A_TIME, &mut Counters::default())?;
             rest = &rest[count..];
         }
         Ok(())

@@ -122,7 +122,7 @@ fn table3(cases: &[Case], measured: &Measured) -> Table {
         let [bvh, triangles, attributes] = ["bytes_bvh", "bytes_geometry", "bytes_attributes"].map(field);
         let bytes = [bvh, triangles, attributes].into_iter().flatten().sum::<f64>();
         let ms = measured.median(case, effect, Metric::Wall);
-        let mrays = field("rays").zip(ms).map(|(rays, ms)| rays / ms * 1e-3);
+        let mrays = field("rays_traced").zip(ms).map(|(rays, ms)| rays / ms * 1e-3);
         let near = Case { view: View::Near, ..*case };
         let far = (case.view == View::Far).then_some(case);
         let traffic = case.scene.paper().and_then(|scene| paper::traffic(scene, case.view, effect));

@@ -136,32 +136,12 @@ impl Findings {
     fn report(&mut self, context: &str, gpu: &Report, cpu: &Report) {
         // The kernel of binary trees, a baseline, does not count.
         let counts = !context.contains("IntersectBinary");
-        let counted = |count: u64| if counts { count } else { 0 };
         let numbers = |r: &Report| {
-            [
-                r.list_entries.into(),
-                r.pairs_tested,
-                r.pairs_culled,
-                r.pairs_visible,
-                r.pairs_invisible,
-                r.pairs_intersected,
-                r.most_selected.into(),
-                r.tiles_from_root,
-                r.pairs_front_to_back,
-                r.tile_batches,
-                r.tile_batch_leaves,
-                r.rays,
-                counted(r.nodes),
-                counted(r.triangles),
-                r.non_finite,
-                r.unresolved,
-                r.queries_tightened,
-                r.rays_capped,
-                r.rays_answered,
-            ]
-            .into_iter()
-            .chain(r.own)
-            .collect::<Vec<u64>>()
+            let by_kernels = r.counters.counted_by_device().into_iter();
+            let compared =
+                by_kernels.filter(|(name, _)| counts || !["nodes_visited", "triangles_tested"].contains(name));
+            let own = [r.list_entries.into(), r.most_selected.into()];
+            compared.map(|(_, count)| count).chain(own).chain(r.own).collect::<Vec<u64>>()
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
         let demand = |r: &Report| -> Vec<[u32; 4]> {
@@ -387,13 +367,14 @@ impl Executor for Lockstep {
             return self.both(&context, pass, rest, bricks);
         };
         let mut report = match before {
-            [] => Report { round_trips: 0, ..Report::default() },
+            [] => Report::default(),
             before => self.both(&context, pass, before, bricks)?,
         };
         self.align(&context, pass)?;
-        let Report { round_trips, tiles, unresolved, .. } = self.both(&context, pass, &[last], bricks)?;
-        (report.tiles, report.unresolved) = (tiles, unresolved);
-        report.round_trips = report.round_trips.max(round_trips);
+        let Report { tiles, counters, .. } = self.both(&context, pass, &[last], bricks)?;
+        report.tiles = tiles;
+        report.counters.unresolved_pixels = counters.unresolved_pixels;
+        report.counters.round_trips = report.counters.round_trips.max(counters.round_trips);
         Ok(report)
     }
 }

@@ -366,7 +366,7 @@ fn render(
         let output = renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
         let renewed = output.records.iter().find(|record| record.pass == "dvf");
         if renderer.methods.get::<Dvf>().is_some_and(|dvf| dvf.moved_field().is_some()) {
-            assert!(renewed.is_some_and(|record| record.cells_renewed > 0 && record.rays > 0), "{renewed:?}");
+            assert!(renewed.is_some_and(|record| record.cells_renewed > 0 && record.rays() > 0), "{renewed:?}");
         }
     }
 }

@@ -4,6 +4,7 @@ use super::defects::{Defect, Faulty};
 use crate::cli::options::args::{Cli, Command, WalkArgs};
 use crate::cli::trace::{EXTENT, trace_device};
 use crate::cli::walk::renderer;
+use crate::counters::Counters;
 use crate::cpu::CpuExecutor;
 use crate::frame::Renderer;
 use crate::gpu::executor::GpuExecutor;
@@ -13,7 +14,6 @@ use crate::kernels::frame::Frame;
 use crate::kernels::layout::{Hit, NONE, Ray, T_INFINITE};
 use crate::kernels::{Extent, FrameExecutor};
 use crate::reference::{Tally, Truth, TruthRay, judge, judge_any};
-use crate::schedule::PassStats;
 use crate::session::device::{Adapter, Device};
 use crate::session::open::{Needs, Session, open_scene};
 use crate::stream::Workers;
@@ -203,7 +203,7 @@ impl Stage {
     pub fn trace(&mut self, frame: &Frame, rays: &[Ray], any: bool) -> Result<Vec<Hit>> {
         let mut hits = Vec::with_capacity(rays.len());
         for chunk in rays.chunks(EXTENT.rays()) {
-            hits.extend(trace_device(&mut self.session, frame, chunk, any, &mut PassStats::default())?);
+            hits.extend(trace_device(&mut self.session, frame, chunk, any, &mut Counters::default())?);
         }
         Ok(hits)
     }

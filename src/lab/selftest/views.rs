@@ -249,7 +249,7 @@ fn odd_sizes(lab: &mut Lab, checks: &mut Checks, sizes: &[(u32, u32)], tiles: &[
                 let (tally, out) = judge_picture(&mut *renderer.executor, &truth, &frame)?;
                 wrong += tally.mismatches;
                 missed += out;
-                rays += output.records.iter().map(|record| record.rays).sum::<u64>();
+                rays += output.records.iter().map(|record| record.rays_traced).sum::<u64>();
                 pixels += u64::from(w) * u64::from(h);
             }
         }

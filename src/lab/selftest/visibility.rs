@@ -70,7 +70,7 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
         checks.equal(&format!("{what}: nothing was met"), hit.id == NONE, true);
     }
     let expected = cases.iter().filter(|case| case.2).count() as u64;
-    checks.equal("rays answered", report.rays_answered, expected);
+    checks.equal("rays answered", report.counters.rays_answered, expected);
     Ok(checks)
 }
 
@@ -200,7 +200,7 @@ pub fn closed_box(lab: &mut Lab) -> Result<Checks> {
         checks.equal("the least that is seen", least, 0.0);
         checks.equal("the most", most, 0.0);
         let record = frame.records.iter().find(|record| record.pass == "environment");
-        let [traced, answered] = record.map_or([0; 2], |record| [record.rays, record.rays_answered]);
+        let [traced, answered] = record.map_or([0; 2], |record| [record.rays_traced, record.rays_answered]);
         checks.at_least("rays", traced + answered, 64 * 64);
         if doubt {
             // The outside of the walls, which sees the environment, lies in the same cells.

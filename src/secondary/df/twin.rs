@@ -4,7 +4,7 @@
 use super::field::{FieldView, distances, halve};
 use super::{LEAST_STEP, LEVELS, Tracing, Way, flood, seeds};
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::layout::{COUNTER_FIELD_CAPPED, COUNTER_RAYS, DfOwn, Hit, Level, MET, Params, Ray};
+use crate::kernels::layout::{COUNTER_RAYS_ANSWERED, COUNTER_RAYS_CAPPED, DfOwn, Hit, Level, MET, Params, Ray};
 use crate::kernels::rays::RaySet;
 use crate::kernels::table::words;
 use crate::kernels::vector::{Vec3, each};
@@ -140,12 +140,12 @@ pub fn df_trace(bound: &Bound, buffers: &mut [Vec<u32>], own: &mut RaySet, seen:
         let mut tally = Tally::default();
         for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate().filter(|(_, (_, ray))| ray.t_min <= ray.t_max) {
             let index = run * RUN + i;
-            tally.add(COUNTER_RAYS, 1);
+            tally.add(COUNTER_RAYS_ANSWERED, 1);
             if of.levels.is_empty() {
                 continue;
             }
             let (found, is_capped) = of.trace(index as u32, ray, normal(index));
-            tally.add(COUNTER_FIELD_CAPPED, u32::from(is_capped));
+            tally.add(COUNTER_RAYS_CAPPED, u32::from(is_capped));
             if let Some(t) = found {
                 *hit = Hit { t, id: MET, u: 0.0, v: 0.0 };
             }

@@ -8,13 +8,13 @@ use super::renew::{Marked, Renewal};
 use super::source::{Group, groups, groups_of_moved, triangles};
 use super::strew::{Strewing, Strewn, Traced};
 use super::{Areas, Cells, DvfField, DvfKept, DvfSettings, DvfUse, Fresh, MOST_TRIAL_BYTES, Shape, TRIAL_CELLS, Trial};
-use crate::counters::Record;
+use crate::counters::{Counters, Record};
 use crate::frame::{Displaced, Engine, FrameRecords, Plan as RayPlan, RenderError, Schedule, Secondary};
 use crate::kernels::View;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::NONE;
 use crate::scene::Camera;
-use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, demand, plain};
+use crate::schedule::{ExecutorError, Lamp, Pass, Step, demand, plain};
 use bricks::SceneFile;
 use glam::DVec3;
 use std::sync::Arc;
@@ -204,7 +204,7 @@ impl Engine {
             let frame = view.frame;
             self.executor.begin_frame(&view);
             self.cache.begin_pass(EFFECT, 0);
-            self.trace_block(Pass::Primary, &[Step::Generate], &mut PassStats::default())?;
+            self.trace_block(Pass::Primary, &[Step::Generate], &mut Counters::default())?;
             let report = self.executor.run(Pass::Primary, &[Step::QueryHits], &self.cache.states)?;
             if let Some(bricks) = &mut region.bricks {
                 bricks.extend(report.demand.iter().map(|demand| demand.brick));
@@ -354,7 +354,7 @@ impl Engine {
     }
 
     /// Traces rays that have nothing in common with those of a frame.
-    fn trace_block(&mut self, pass: Pass, first: &[Step], stats: &mut PassStats) -> Result<(), ExecutorError> {
+    fn trace_block(&mut self, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
         let (executor, cache) = (&mut *self.executor, &mut self.cache);
         let trace = match self.settings.schedule {
             Schedule::Plain => plain::trace,

@@ -25,9 +25,10 @@ use super::source::{groups, groups_of_moved};
 use super::strew::Strewing;
 use super::worth::{Candidate, MADE, Worth};
 use super::{Cells, Concerned, DvfField, DvfKept, DvfSettings, DvfUse, Fresh};
+use crate::counters::Counters;
 use crate::frame::{Engine, FrameRecords};
 use crate::kernels::View;
-use crate::schedule::{ExecutorError, PassStats};
+use crate::schedule::ExecutorError;
 use bricks::SceneFile;
 use glam::DVec3;
 use std::cmp::Reverse;
@@ -120,7 +121,7 @@ fn renew(
     renewal: &Renewal,
     marked: &mut Marked,
     answers: Answers,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let Renewal { kept, settings, .. } = renewal;
     let shape = kept.field.shape;

@@ -9,13 +9,14 @@ use super::answer::{EFFECT, PASS, Plan, unread};
 use super::kernels;
 use super::source::{Group, triangles};
 use super::{DvfSettings, Fresh, Shape};
+use crate::counters::Counters;
 use crate::frame::{Engine, Schedule};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{DvfTriangle, Hit, NONE, Params, Ray};
 use crate::kernels::{Directions, View};
 use crate::schedule::chc::measure_needed;
 use crate::schedule::pool::Pool;
-use crate::schedule::{ExecutorError, PassStats, Report, Step, plain};
+use crate::schedule::{ExecutorError, Report, Step, plain};
 use glam::DVec3;
 
 /// Most triangles that are kept of groups in which rays wait: 192 MiB.
@@ -85,7 +86,7 @@ pub(crate) struct Strewing<'a> {
     pub(crate) renderer: &'a mut Engine,
     pub(crate) plan: &'a Plan,
     pub(crate) shape: &'a Shape,
-    pub(crate) stats: &'a mut PassStats,
+    pub(crate) stats: &'a mut Counters,
     /// Told how many rays are answered; says whether to go on.
     pub watch: &'a mut dyn FnMut(u64) -> bool,
     state: State,
@@ -122,7 +123,7 @@ impl<'a> Strewing<'a> {
         renderer: &'a mut Engine,
         plan: &'a Plan,
         shape: &'a Shape,
-        stats: &'a mut PassStats,
+        stats: &'a mut Counters,
         watch: &'a mut dyn FnMut(u64) -> bool,
     ) -> Self {
         let capacity = u64::from(renderer.size.0 * renderer.size.1);

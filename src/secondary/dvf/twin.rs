@@ -8,7 +8,7 @@ use super::mask;
 use super::mask::{OCCLUDED, UNKNOWN};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
-    COUNTER_DVF_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_RENEW, DVF_ROUND, DVF_WALK, DvfGrid,
+    COUNTER_RAYS_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_RENEW, DVF_ROUND, DVF_WALK, DvfGrid,
     DvfOwn, DvfTriangle, GBuffer, INSTANCE_MIRRORED, MET, NONE, Params, Ray, T_INFINITE,
 };
 use crate::kernels::rays::{RaySet, is_traced, start_hit};
@@ -452,7 +452,7 @@ pub fn sift(bound: &Bound, tables: &Tables, set: &mut RaySet, gbuffer: &mut [GBu
             if is_met {
                 hit.id = MET;
             }
-            tally.add(COUNTER_DVF_ANSWERED, 1);
+            tally.add(COUNTER_RAYS_ANSWERED, 1);
         }
         bound.counters.add(&tally);
     });

@@ -12,7 +12,7 @@
 
 use super::twin::{Maps, RUN, Taken, normal_of};
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::layout::{COUNTER_RAYS, COUNTER_ROMA_CAPPED, PARAM_ANY_HIT, Params, Ray, RomaMap};
+use crate::kernels::layout::{COUNTER_RAYS_ANSWERED, COUNTER_RAYS_CAPPED, PARAM_ANY_HIT, Params, Ray, RomaMap};
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::vector::{Vec3, dot, each, most};
@@ -93,14 +93,14 @@ pub fn roma_draw(
         let mut tally = Tally::default();
         for (i, ray) in rays.iter_mut().enumerate().filter(|(_, ray)| ray.t_min <= ray.t_max) {
             let index = run * RUN + i;
-            tally.add(COUNTER_RAYS, 1);
+            tally.add(COUNTER_RAYS_ANSWERED, 1);
             if of.levels.is_empty() {
                 continue;
             }
             let normal = normal_of(seen, index);
             let taken = of.drawn(index as u32, ray, [gbuffer[index].normal, normal]);
             let found = of.answer(index as u32, ray, &taken, normal, ray.t_min, false);
-            tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
+            tally.add(COUNTER_RAYS_CAPPED, u32::from(found.is_capped));
             if is_turned {
                 ray.direction = found.direction;
             }

@@ -5,10 +5,10 @@ use super::cosine::{GOLDEN, length_of};
 use super::directions::stratum_of;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
-    COUNTER_PILOTS, COUNTER_RAYS, COUNTER_ROMA_CAPPED, HANDOVERS, Hit, Level, MET, NONE, PARAM_ANY_HIT, Params,
-    ROMA_CORRECT, ROMA_FAR, ROMA_SIFT, Ray, RomaMap, RomaOwn, Surface, T_INFINITE,
+    COUNTER_PILOTS, COUNTER_RAYS_ANSWERED, COUNTER_RAYS_CAPPED, HANDOVERS, Hit, Level, MET, NONE, PARAM_ANY_HIT,
+    Params, ROMA_CORRECT, ROMA_FAR, ROMA_SIFT, ROMA_WHOLE, Ray, RomaMap, RomaOwn, Surface, T_INFINITE,
 };
-use crate::kernels::rays::RaySet;
+use crate::kernels::rays::{RaySet, is_traced};
 use crate::kernels::table::words;
 use crate::kernels::vector::{Vec3, each, least, most};
 use crate::math::exact::{barrier, divide, square_root};
@@ -473,22 +473,25 @@ pub fn roma_trace(
             if is_far && is_done || is_sifted && is_pilot(p, own, index as u32) {
                 continue;
             }
-            tally.add(COUNTER_RAYS, 1);
+            // What has been traced is not answered, though maps go on with it or correct it.
+            let mut is_answered = own.part == ROMA_WHOLE || !is_traced(ray, hit);
             if of.levels.is_empty() {
+                tally.add(COUNTER_RAYS_ANSWERED, u32::from(is_answered));
                 continue;
             }
             let normal = normal_of(seen, index);
             let taken = of.nearest(ray, normal);
             let from = if is_far { hit.t } else { ray.t_min };
             let found = of.answer(index as u32, ray, &taken, normal, from, is_sifted);
-            tally.add(COUNTER_ROMA_CAPPED, u32::from(found.is_capped));
+            tally.add(COUNTER_RAYS_CAPPED, u32::from(found.is_capped));
             if is_sifted {
-                of.sift(index as u32, ray, normal, &found, hit);
+                is_answered = of.sift(index as u32, ray, normal, &found, hit);
             } else if own.part == ROMA_CORRECT && is_pilot(p, own, index as u32) {
                 correct(own, found.met.is_some(), hit);
             } else {
                 found.write(hit, (!bound.has(PARAM_ANY_HIT)).then_some(surface));
             }
+            tally.add(COUNTER_RAYS_ANSWERED, u32::from(is_answered));
         }
         bound.counters.add(&tally);
     });
@@ -507,20 +510,21 @@ fn correct(own: &RomaOwn, is_met: bool, hit: &mut Hit) {
 }
 
 impl Maps<'_> {
-    /// Ends a ray that maps find free; what they do not is traced.
-    fn sift(&self, index: u32, ray: &Ray, normal: Vec3, found: &Answer, hit: &mut Hit) {
+    /// Ends a ray that maps find free, and says whether they do; what they do not is traced.
+    fn sift(&self, index: u32, ray: &Ray, normal: Vec3, found: &Answer, hit: &mut Hit) -> bool {
         let (p, own) = (self.params, self.own);
         if found.met.is_none() {
             if found.is_known {
                 hit.t = ANSWERED;
             }
-            return;
+            return found.is_known;
         }
         if own.near == 0 {
             hit.t = WAITING;
         } else if own.near != NONE {
             hit.t = least(ray.t_max, near_end(p, own, self.levels, index, ray, normal, own.near));
         }
+        false
     }
 }
 

@@ -3,12 +3,13 @@
 
 use super::maps::{LampView, RsmMaps};
 use super::{LampViews, RsmSettings};
+use crate::counters::Counters;
 use crate::frame::{Engine, FrameRecords, Schedule};
 use crate::kernels::frame::Frame;
 use crate::kernels::lamps::Emitter;
 use crate::kernels::layout::{NONE, Params, Ray, RsmMap};
 use crate::kernels::{Directions, View};
-use crate::schedule::{ExecutorError, Lamp, Pass, PassStats, Step, attributes, chc, demand, plain};
+use crate::schedule::{ExecutorError, Lamp, Pass, Step, attributes, chc, demand, plain};
 use crate::secondary::occupancy::Cascades;
 use bricks::Resident;
 use glam::DVec3;
@@ -150,7 +151,7 @@ fn make(
     number: u32,
     map: u32,
     lamp: &LampView,
-    stats: &mut PassStats,
+    stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let frame = lamp_frame(engine.scene.resident(), lamp);
     engine.executor.begin_frame(&lamp_view(engine, lamp, frame));
@@ -203,7 +204,7 @@ fn lamp_view(engine: &Engine, lamp: &LampView, frame: Frame) -> View {
 }
 
 /// Traces rays that were given, which have nothing in common with the frame before.
-fn trace_given(engine: &mut Engine, stats: &mut PassStats) -> Result<(), ExecutorError> {
+fn trace_given(engine: &mut Engine, stats: &mut Counters) -> Result<(), ExecutorError> {
     let trace = match engine.settings.schedule {
         Schedule::Chc => chc::trace,
         Schedule::Demand | Schedule::Auto => demand::trace,

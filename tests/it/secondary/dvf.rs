@@ -56,7 +56,7 @@ fn made(renderer: &mut Renderer, settings: &DvfSettings, lanes: u32) -> DvfMade 
 /// Rays to the environment: traced, and answered.
 fn rays(output: &FrameOutput) -> [u64; 2] {
     let found = output.records.iter().find(|record| record.pass == "environment").expect("a record");
-    [found.rays, found.rays_answered]
+    [found.rays_traced, found.rays_answered]
 }
 
 /// A frame by exact rays and by a field: pixels that differ, rays of the first, traced and answered ones of the second.
@@ -271,7 +271,9 @@ fn the_field_of_a_view_out_of_core_is_that_in_core() {
         let frame = renderer.frame(0, &camera).expect("a frame");
         println!(
             "{cache}: {} bricks loaded, {} needed, {} read",
-            made.record.bricks_loaded, made.record.bricks_needed, made.bricks_read
+            made.record.bricks_loaded,
+            made.record.bricks_needed.count(),
+            made.bricks_read
         );
         fields.push((made.field, frame.pixels));
     }
@@ -298,11 +300,11 @@ fn bricks_are_loaded_once_for_all_rays_that_wait() {
         };
         let made = renderer.make_dvf(&asked, &region, tracing(pool), &mut watch).expect("a field");
         // No ray is told of twice, and in the end all of them.
-        assert!(told.is_sorted() && told.last().is_some_and(|&last| last >= made.record.rays), "{told:?}");
+        assert!(told.is_sorted() && told.last().is_some_and(|&last| last >= made.record.rays()), "{told:?}");
         (made, told.len())
     };
     let (in_core, blocks) = make("--cache 100% --schedule plain --measure-needed", 1);
-    let needed = in_core.record.bricks_needed;
+    let needed = in_core.record.bricks_needed.count();
     assert!(blocks > 100 && in_core.drains == 0, "{blocks} blocks, {} drains", in_core.drains);
     let mut loads = Vec::new();
     for pool in [512_000_000, 100_000, 1] {
@@ -322,11 +324,11 @@ fn bricks_are_loaded_once_for_all_rays_that_wait() {
     let mut most = 0;
     let mut watch = |rays, _| {
         most = rays;
-        rays < in_core.record.rays / 2
+        rays < in_core.record.rays() / 2
     };
     let stopped = renderer.make_dvf(&asked, &region, tracing(1 << 29), &mut watch);
     assert!(matches!(stopped, Err(RenderError::Interrupted)));
-    assert!(most < in_core.record.rays, "{most} rays");
+    assert!(most < in_core.record.rays(), "{most} rays");
     let made = renderer.make_dvf(&asked, &region, tracing(1 << 29), &mut |_, _| true).expect("a field");
     assert_eq!(made.field, in_core.field);
 }

@@ -101,7 +101,7 @@ fn renewed_cells_are_those_of_a_field_made_from_scratch() {
             let renewed: Vec<u32> = renderer.methods.get::<Dvf>().expect("a field").renewed_cells().collect();
             assert_eq!((own.cells_renewed, own.cells_left), (renewed.len() as u64, 0));
             let field = renderer.methods.get::<Dvf>().expect("a field").moved_field().expect("a field").clone();
-            fields.push((field, renewed, own.rays));
+            fields.push((field, renewed, own.rays()));
             if fields.len() > 1 {
                 assert!(fields[0] == fields[fields.len() - 1], "{options}: another field");
                 continue;
@@ -157,11 +157,11 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
         }
         let [exact, told, nothing, renewed] = all.each_mut().map(|r| r.frame(step, &camera()).expect("a frame"));
         assert!(told.pixels == nothing.pixels && record(&nothing, "dvf").is_none());
-        let rays = |output: &FrameOutput| record(output, "environment").map_or(0, |record| record.rays);
+        let rays = |output: &FrameOutput| record(output, "environment").map_or(0, |record| record.rays_traced);
         assert_eq!(rays(&told), rays(&nothing));
         let own = record(&renewed, "dvf").expect("a record");
-        assert!(own.rays <= budget && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
-        (left[0], left[1], spent) = (left[0] + rays(&told), left[1] + rays(&renewed), spent + own.rays);
+        assert!(own.rays() <= budget && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
+        (left[0], left[1], spent) = (left[0] + rays(&told), left[1] + rays(&renewed), spent + own.rays());
         let differ = |a: &FrameOutput, b: &FrameOutput| {
             a.pixels.radiance.iter().zip(&b.pixels.radiance).filter(|(a, b)| a != b).count()
         };
@@ -180,7 +180,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
         for frame in 0..30 {
             let output = resting.frame(frame, &camera()).expect("a frame");
             let own = record(&output, "dvf").expect("a record");
-            assert!(own.rays <= budget && left.last().is_none_or(|before| own.cells_left <= *before), "{own:?}");
+            assert!(own.rays() <= budget && left.last().is_none_or(|before| own.cells_left <= *before), "{own:?}");
             left.push(own.cells_left);
             if own.cells_left == 0 {
                 break;
@@ -198,7 +198,7 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     for frame in 0..3 {
         let output = all[2].frame(frame, &camera()).expect("a frame");
         let own = record(&output, "dvf").expect("a record");
-        assert!((1000..=3000).contains(&own.rays) && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
+        assert!((1000..=3000).contains(&own.rays()) && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
     }
     // Back where it was it is the field that was made.
     let own = still.resident().instances[1].world_from_object;

@@ -26,7 +26,19 @@ pub use sheet::{Graph, GraphShape, Line, Section, Sheet, Table, Value, write_she
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes `dir/report.html` from `dir/records.jsonl`, `dir/summary.json` and `dir/frames/*.png`.
+/// What is known of a field of records; others are shown without.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Its name.
+    pub name: &'static str,
+    /// What it means, and its unit.
+    pub meaning: String,
+    /// Whether its sum over frames means anything; that of a state does not.
+    pub adds_up: bool,
+}
+
+/// Writes `dir/report.html` from `dir/records.jsonl`, `dir/summary.json` and `dir/frames/*.png`. `fields` says what
+/// fields of records mean.
 ///
 /// The page appears complete or not at all: it is written under a temporary name in `dir`, then renamed, and an older
 /// report is replaced. A walk without a finished frame gives a page that says so.
@@ -34,10 +46,10 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// [`ReportError`]: a file is missing or cannot be read, a line of the records or the summary is malformed (the message
 /// names file and line), or the page cannot be written.
-pub fn write(dir: &Path) -> Result<(), ReportError> {
+pub fn write(dir: &Path, fields: &[Field]) -> Result<(), ReportError> {
     let walk = walk::Walk::read(dir)?;
     let gallery = frames::Gallery::read(dir, &walk)?;
-    let html = page::render(&walk, &gallery)?;
+    let html = page::render(&walk, &gallery, fields)?;
     publish(dir.join("report.html"), html.as_bytes())
 }
 

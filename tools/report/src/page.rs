@@ -4,7 +4,7 @@ use crate::chart::{self, Drawing, Shape};
 use crate::frames::{Gallery, Picture, dimensions};
 use crate::plots::{self, Plot};
 use crate::walk::{Statistics, Walk};
-use crate::{ReportError, format, tables};
+use crate::{Field, ReportError, format, tables};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
 
@@ -17,7 +17,7 @@ const SHOWN_APART: [&str; 7] =
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn render(walk: &Walk, gallery: &Gallery) -> Result<String, ReportError> {
+pub fn render(walk: &Walk, gallery: &Gallery, fields: &[Field]) -> Result<String, ReportError> {
     let scene = walk.text("scene/file").unwrap_or_else(|| "unnamed scene".into());
     let head = html! {
         p.kicker { "brickwalk · walk" }
@@ -29,7 +29,7 @@ pub fn render(walk: &Walk, gallery: &Gallery) -> Result<String, ReportError> {
         (medians(walk))
         section { h2 { "Frames" } (frames(walk, gallery)) }
         (all_plots(walk)?)
-        (all_tables(walk))
+        (all_tables(walk, fields))
     };
     Ok(whole(&format!("Walk through {scene}"), &head, &main))
 }
@@ -285,14 +285,14 @@ pub fn key(shape: Shape, colour: &str) -> Markup {
     }
 }
 
-fn all_tables(walk: &Walk) -> Markup {
+fn all_tables(walk: &Walk, fields: &[Field]) -> Markup {
     html! {
         @if !walk.passes.is_empty() {
             section {
                 h2 { "Throughput, queries and bytes moved" }
                 p.reading {
                     "The columns of Table 3 of CHC+RT, in MiB. Median and p95 are per frame; for Mray/s a high p95 is the "
-                    "fast end, and its total is all rays over all time."
+                    "fast end, and its total is all rays traced over all time."
                 }
                 (tables::out_of_core(walk))
             }
@@ -313,7 +313,7 @@ fn all_tables(walk: &Walk) -> Markup {
                 h2 { "Every field" }
                 details {
                     summary { "Total, median and p95 of " (walk.fields.len()) " fields" }
-                    (tables::all_fields(walk))
+                    (tables::all_fields(walk, fields))
                 }
                 details { summary { "Frame by frame" } (tables::per_frame(walk)) }
             }

@@ -1,7 +1,7 @@
 //! The tables of a report.
 
-use crate::format;
 use crate::walk::{Pass, Statistics, Walk};
+use crate::{Field, format};
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -11,65 +11,6 @@ pub const MOVED: [&str; 4] = ["bytes_bvh", "bytes_geometry", "bytes_attributes",
 const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 /// What stands for a value that is not recorded.
 const NONE: &str = "–";
-
-/// What a field of the records means, with its unit. Fields that are not listed are shown without.
-const MEANINGS: [(&str, &str); 47] = [
-    ("rays", "rays traced"),
-    ("rays_answered", "rays besides that a field of visibility answered"),
-    ("ms", "wall time from submission to fence, ms"),
-    ("ms_phase1", "device time of phase 1: what was known and resident, ms"),
-    ("ms_phase2", "device time of phase 2: queries, ms"),
-    ("ms_phase3", "device time of phase 3: what was loaded or found visible, ms"),
-    ("ms_stream", "wall time of loading, ms"),
-    ("mrays_per_s", "millions of rays per second of wall time"),
-    ("queries", "pairs (tile, node) queried"),
-    ("queries_visible", "queries that found a ray"),
-    ("queries_interval_culled", "pairs culled by the interval test"),
-    ("multi_queries", "queries over several nodes at once"),
-    ("multi_queries_failed", "of these, repeated node by node"),
-    ("pairs_visible", "visible pairs (tile, leaf) at the end"),
-    ("pairs_invisible", "invisible pairs at the end"),
-    ("pulled_up", "pairs whose children were merged"),
-    ("pairs_intersected", "pairs (tile, leaf) intersected"),
-    ("round_trips", "submissions that the host waited for"),
-    ("bricks_needed", "distinct bricks that the rays needed, where known, else entered"),
-    ("bricks_hit", "distinct bricks that hold a final hit"),
-    ("bricks_loaded", "payloads loaded"),
-    ("bricks_reloaded", "payloads loaded twice or more in one pass"),
-    ("bricks_reloaded_frame", "payloads loaded that had been loaded in the same frame before"),
-    ("bytes_reloaded_frame", "bytes of those"),
-    ("cache_passes", "most fillings of the cache that one pass took; 1 where all it used fitted"),
-    ("bricks_evicted", "payloads evicted"),
-    ("bricks_resident_start", "payloads resident at the start"),
-    ("bricks_resident_end", "payloads resident at the end"),
-    ("rays_capped", "rays that ROMA finished along their map's direction, after as many columns as they may pass"),
-    ("cells_renewed", "cells of the field of visibility made anew for what moves"),
-    ("cells_left", "cells in sight that were not, although it concerns them"),
-    ("load_batches", "batches of loads"),
-    ("bytes_needed", "bytes of BVH and geometry of the needed bricks, where measured"),
-    ("bytes_needed_missing", "of these, bytes not resident when the pass began"),
-    ("bytes_bvh", "bytes of BVH moved"),
-    ("bytes_geometry", "bytes of geometry moved"),
-    ("bytes_attributes", "bytes of attributes moved"),
-    ("bytes_textures", "bytes of textures moved"),
-    ("nodes_visited", "BVH nodes visited, where counted"),
-    ("triangles_tested", "triangles tested, where counted"),
-    ("cache_bytes", "the cache's budget, bytes"),
-    ("cache_used_bytes", "bytes of the cache in use at the end"),
-    ("error_mean", "mean absolute error of the effect's picture, linear radiance, where measured"),
-    ("error_worst_tile", "the same over the worst tile"),
-    ("error_pixels", "pixels of which a ray hit something else than in the exact rendering, where measured"),
-    ("unresolved_pixels", "pixels that are not final"),
-    ("non_finite", "pixels whose radiance was not finite"),
-];
-
-/// Fields that tell a state, not an amount: their sum over the frames means nothing.
-const STATES: [&str; 6] =
-    ["bricks_resident_start", "bricks_resident_end", "cache_bytes", "cache_used_bytes", "cache_passes", "cells_left"];
-
-fn meaning(field: &str) -> &'static str {
-    MEANINGS.iter().find(|(name, _)| *name == field).map_or("", |(_, text)| text)
-}
 
 fn cell(value: Option<f64>, show: fn(f64) -> String) -> String {
     value.map_or_else(|| NONE.into(), show)
@@ -85,7 +26,8 @@ pub fn out_of_core(walk: &Walk) -> Markup {
     html! {
         div.wide { table {
             thead { tr {
-                th.text { "Pass" } th.text { "Over the frames" } th { "Mray/s" } th { "ms" } th { "Queries" }
+                th.text { "Pass" } th.text { "Over the frames" } th { "Rays traced" } th { "answered" } th { "Mray/s" }
+                th { "ms" } th { "Queries" }
                 th { "MiB moved" } th { "of it BVH" } th { "geometry" } th { "attributes" } th { "textures" }
             } }
             @for pass in &walk.passes {
@@ -94,6 +36,7 @@ pub fn out_of_core(walk: &Walk) -> Markup {
                         tr {
                             @if row == 0 { th scope="rowgroup" rowspan=(PICKS.len()) { (pass.name) } }
                             th scope="row" { (name) }
+                            @for field in RAYS { td { (picked(pass, field, *pick, value)) } }
                             @if *name == "total" { td { (cell(overall_throughput(pass), format::number)) } }
                             @else { td { (picked(pass, "mrays_per_s", *pick, format::number)) } }
                             td { (picked(pass, "ms", *pick, format::number)) }
@@ -108,6 +51,9 @@ pub fn out_of_core(walk: &Walk) -> Markup {
     }
 }
 
+/// Rays that were traced, and those that a method answered besides.
+const RAYS: [&str; 2] = ["rays_traced", "rays_answered"];
+
 /// Picks one of a field's statistics.
 type Pick = fn(Statistics) -> f64;
 
@@ -120,13 +66,13 @@ fn picked(pass: &Pass, field: &str, pick: Pick, show: fn(f64) -> String) -> Stri
 }
 
 /// The total of a field whose values add up to `sum`; `None` where a total has no meaning.
-fn total(pass: &Pass, field: &str, sum: f64) -> Option<f64> {
-    if field == "mrays_per_s" { overall_throughput(pass) } else { (!STATES.contains(&field)).then_some(sum) }
+fn total(pass: &Pass, field: &str, known: Option<&Field>, sum: f64) -> Option<f64> {
+    if field == "mrays_per_s" { overall_throughput(pass) } else { known.is_none_or(|f| f.adds_up).then_some(sum) }
 }
 
-/// All rays of a pass over all of its time, millions per second; `None` where either is unknown or no time passed.
+/// All rays traced in a pass over all of its time, millions per second; `None` where either is unknown or no time passed.
 fn overall_throughput(pass: &Pass) -> Option<f64> {
-    let (rays, ms) = (pass.statistics("rays")?.total, pass.statistics("ms")?.total);
+    let (rays, ms) = (pass.statistics("rays_traced")?.total, pass.statistics("ms")?.total);
     (ms > 0.0).then(|| rays / ms * 1e-3)
 }
 
@@ -164,7 +110,7 @@ pub fn needs(walk: &Walk) -> Option<Markup> {
 }
 
 /// Total, median and 95th percentile of every field of every pass.
-pub fn all_fields(walk: &Walk) -> Markup {
+pub fn all_fields(walk: &Walk, known: &[Field]) -> Markup {
     html! {
         div.wide { table.fields {
             thead {
@@ -177,18 +123,19 @@ pub fn all_fields(walk: &Walk) -> Markup {
             }
             tbody {
                 @for field in &walk.fields {
+                    @let known = known.iter().find(|known| known.name == field);
                     tr {
                         th scope="row" { code { (field) } }
                         @for pass in &walk.passes {
                             @match pass.statistics(field) {
                                 Some(s) => {
-                                    td { (cell(total(pass, field, s.total), value)) }
+                                    td { (cell(total(pass, field, known, s.total), value)) }
                                     td { (value(s.median)) } td { (value(s.p95)) }
                                 }
                                 None => { td { (NONE) } td { (NONE) } td { (NONE) } }
                             }
                         }
-                        td.text { (meaning(field)) }
+                        td.text { @if let Some(known) = known { (known.meaning) } }
                     }
                 }
             }
@@ -201,8 +148,8 @@ pub fn per_frame(walk: &Walk) -> Markup {
     html! {
         div.wide { table {
             thead { tr {
-                th { "Frame" } th.text { "Pass" } th { "Mray/s" } th { "ms" } th { "Queries" } th { "MiB moved" }
-                th { "of it BVH" } th { "geometry" } th { "Loaded" } th { "Evicted" }
+                th { "Frame" } th.text { "Pass" } th { "Rays traced" } th { "answered" } th { "Mray/s" } th { "ms" }
+                th { "Queries" } th { "MiB moved" } th { "of it BVH" } th { "geometry" } th { "Loaded" } th { "Evicted" }
             } }
             tbody {
                 @for frame in &walk.frames {
@@ -212,6 +159,7 @@ pub fn per_frame(walk: &Walk) -> Markup {
                         @for row in pass.rows[start..].iter().take_while(|row| row.frame == *frame) {
                             tr {
                                 th scope="row" { (frame) } td.text { (pass.name) }
+                                @for field in RAYS { td { (cell(row.get(field), value)) } }
                                 @for field in ["mrays_per_s", "ms"] { td { (cell(row.get(field), format::number)) } }
                                 td { (cell(row.get("queries"), value)) } td { (format::mebibytes(row.sum(&MOVED))) }
                                 @for field in MOVED_GEOMETRY { td { (cell(row.get(field), format::mebibytes)) } }

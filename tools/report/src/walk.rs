@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 /// The summary's format that this crate knows; a higher number means that a field has another meaning.
-const SUMMARY_FORMAT: u64 = 1;
+const SUMMARY_FORMAT: u64 = 2;
 
 /// One frame of one pass.
 #[derive(Debug)]

@@ -159,7 +159,7 @@ fn of_truth(view: &mut View, options: &WalkArgs, way: Way, truth: &Truth) -> Res
             (points, longest) = (made.points, made.field.shape.size.into_iter().max().unwrap_or(0));
             let mut dvf = Dvf::new(Arc::new(made.field), how);
             match way {
-                Way::Anew => of_fields += made.record.rays as f64,
+                Way::Anew => of_fields += made.record.rays() as f64,
                 Way::Renewed => {
                     let renewal = renewal(options, Arc::new(made.kept), region);
                     dvf = dvf.renewed_by(renewal);

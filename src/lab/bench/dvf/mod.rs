@@ -225,9 +225,9 @@ impl<'a> View<'a> {
         let record = output.records.iter().find(|record| record.pass == "environment");
         let record = record.context("no rays lead to the environment")?;
         let renewal = output.records.iter().find(|record| record.pass == DVF_EFFECT);
-        let renewal = renewal.map_or([0.0; 2], |record| [record.rays as f64, record.cells_renewed as f64]);
+        let renewal = renewal.map_or([0.0; 2], |record| [record.rays() as f64, record.cells_renewed as f64]);
         let (width, height) = (self.renderer.size.0 as usize, self.renderer.size.1 as usize);
-        let (traced, answered, ms) = (record.rays as f64, record.rays_answered as f64, record.ms);
+        let (traced, answered, ms) = (record.rays_traced as f64, record.rays_answered as f64, record.ms);
         let image = Image { width, height, rgb: output.pixels.radiance };
         Ok(Picture { image, ids: output.pixels.id, traced, answered, renewal, ms })
     }
@@ -273,7 +273,7 @@ impl<'a> View<'a> {
             ("points", made.points as f64),
             ("longest", f64::from(longest)),
             ("known_cells", known as f64),
-            ("rays_of_field", made.record.rays as f64),
+            ("rays_of_field", made.record.rays() as f64),
             ("seconds", seconds),
             ("seconds_areas", areas),
             ("seconds_rays", rays),
@@ -293,7 +293,7 @@ impl<'a> View<'a> {
                 differing(&picture.image, &exact.image) as f64 / exact.image.rgb.len().max(1) as f64,
             ),
             ("bricks_loaded", made.record.bricks_loaded as f64),
-            ("bricks_needed", made.record.bricks_needed as f64),
+            ("bricks_needed", made.record.bricks_needed.count() as f64),
             ("bricks_read", made.bricks_read as f64),
         ];
         let mut values: Values = values.map(|(name, value)| (name.to_string(), value)).into();

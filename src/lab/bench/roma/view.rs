@@ -116,7 +116,7 @@ impl<'a> View<'a> {
         let values = [
             (
                 "rays",
-                output.records.iter().filter(|record| record.pass == effect).map(|record| record.rays as f64).sum(),
+                output.records.iter().filter(|record| record.pass == effect).map(|record| record.rays() as f64).sum(),
             ),
             ("ms", sum(|record| record.ms)),
             ("ms_generation", if is_exact { 0.0 } else { sum(|record| record.ms_phase1) }),

@@ -2,16 +2,18 @@
 
 use crate::markup;
 
-use brickwalk_report::{ReportError, write};
+use brickwalk_report::{Field, ReportError, write};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
 /// Every field of a record, in the order of the interface.
-const FIELDS: [&str; 38] = [
+const FIELDS: [&str; 40] = [
     "frame",
     "pass",
     "rays",
+    "rays_traced",
+    "rays_answered",
     "ms",
     "ms_phase1",
     "ms_phase2",
@@ -75,7 +77,7 @@ fn records(frames: u64, passes: &[&str]) -> Vec<Value> {
 
 fn summary(frames: u64) -> Value {
     json!({
-        "format": 1, "version": "0.1.0", "commit": "0123abc",
+        "format": 2, "version": "0.1.0", "commit": "0123abc",
         "adapter": { "name": "Test <adapter> & co", "driver": "drv", "driver_info": "1.2.3", "backend": "vulkan" },
         "scene": { "file": "city \"<1M>\".bricks", "file_bytes": 123456789, "bricks": 84,
                    "brick_bytes": 104857600, "triangles": 1000003 },
@@ -109,7 +111,8 @@ fn walk(records: &[Value], summary: &Value, frames: u64) -> tempfile::TempDir {
 
 /// Writes the report, checks what every report has to be, and returns it.
 fn report(dir: &Path) -> String {
-    write(dir).unwrap();
+    let field = |name, adds_up| Field { name, meaning: format!("what {name} means"), adds_up };
+    write(dir, &[field("ms", true), field("cache_bytes", false)]).unwrap();
     let html = fs::read_to_string(dir.join("report.html")).unwrap();
     markup::check(&html).unwrap();
     for outside in ["http", "<script", "<link", "@import", "url(", "src=\"/", "href=\"/"] {
@@ -166,7 +169,7 @@ fn a_complete_walk_has_every_plot_field_and_frame() {
 fn the_statistics_are_those_of_the_records() {
     let with = |frame: u64, rays: u64, ms: f64| {
         let rate = rays as f64 / ms * 1e-3;
-        json!({ "frame": frame, "pass": "primary", "rays": rays, "ms": ms, "mrays_per_s": rate, "cache_bytes": 7 })
+        json!({ "frame": frame, "pass": "primary", "rays_traced": rays, "rays_answered": 7 * frame, "ms": ms, "mrays_per_s": rate, "cache_bytes": 7 })
     };
     // Median 3 ms, p95 linear between the fourth and fifth: 4 + 0.8·(14 − 4) = 12 ms; 24 ms and 60M rays in all.
     let rows: Vec<Value> =
@@ -174,14 +177,15 @@ fn the_statistics_are_those_of_the_records() {
     let html = report(walk(&rows, &summary(5), 0).path());
     for cells in [
         "<code>ms</code></th><td>24</td><td>3</td><td>12.0</td>",
-        "<code>rays</code></th><td>60,000,000</td><td>12,000,000</td><td>12,000,000</td>",
+        "<code>rays_traced</code></th><td>60,000,000</td><td>12,000,000</td><td>12,000,000</td>",
     ] {
         assert!(html.contains(cells), "{cells}");
     }
+    assert_eq!(html.matches("what ms means").count(), 1);
     // A state has no total.
     assert!(html.contains("<code>cache_bytes</code></th><td>–</td><td>7</td><td>7</td>"));
     // All rays over all time, not the sum of rates.
-    assert!(html.contains("<th scope=\"row\">total</th><td>2,500</td><td>24.0</td>"));
+    assert!(html.contains("<th scope=\"row\">total</th><td>60,000,000</td><td>70</td><td>2,500</td><td>24.0</td>"));
 }
 
 #[test]
@@ -334,7 +338,7 @@ fn malformed_lines_are_named() {
         let dir = walk(&[], &summary(1), 0);
         // The blank line counts but is no error.
         fs::write(dir.path().join("records.jsonl"), format!("{good}\n\n{line}\n{good}\n")).unwrap();
-        let error = write(dir.path()).unwrap_err();
+        let error = write(dir.path(), &[]).unwrap_err();
         assert!(matches!(error, ReportError::Record { line: 3, .. }), "{line}: {error:?}");
         let text = error.to_string();
         assert!(text.contains("records.jsonl: line 3: ") && text.contains(reason), "{text}");
@@ -346,17 +350,17 @@ fn malformed_lines_are_named() {
 fn a_bad_or_missing_file_is_named() {
     let dir = walk(&records(1, &["primary"]), &summary(1), 1);
     for (text, reason) in
-        [("{\n\"format\": 1,\n}", "line 3: "), ("[]", "must be a JSON object"), ("{\"format\": 2}", "format 1, not 2")]
+        [("{\n\"format\": 2,\n}", "line 3: "), ("[]", "must be a JSON object"), ("{\"format\": 1}", "format 2, not 1")]
     {
         fs::write(dir.path().join("summary.json"), text).unwrap();
-        let error = write(dir.path()).unwrap_err().to_string();
+        let error = write(dir.path(), &[]).unwrap_err().to_string();
         assert!(error.contains("summary.json: line ") && error.contains(reason), "{error}");
     }
     fs::remove_file(dir.path().join("summary.json")).unwrap();
-    assert!(write(dir.path()).unwrap_err().to_string().contains("summary.json: cannot read this file"));
+    assert!(write(dir.path(), &[]).unwrap_err().to_string().contains("summary.json: cannot read this file"));
     fs::write(dir.path().join("summary.json"), "{}").unwrap();
     fs::remove_file(dir.path().join("records.jsonl")).unwrap();
-    assert!(write(dir.path()).unwrap_err().to_string().contains("records.jsonl: cannot read this file"));
+    assert!(write(dir.path(), &[]).unwrap_err().to_string().contains("records.jsonl: cannot read this file"));
 }
 
 #[test]
