@@ -4,8 +4,8 @@ use super::dvf::args::DvfBenchArgs;
 use super::plan::Stage;
 use super::roma::args::RomaBenchArgs;
 use crate::cli::options::args::{UNITS, ranged};
-use crate::cli::options::sizes::{ImageSize, positive_count};
-use crate::session::device::Adapter;
+use crate::settings::sizes::positive_count;
+use crate::settings::{Adapter, CacheSize, EffectList, ImageSize, Rule, Schedule, Value};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
@@ -59,17 +59,17 @@ pub struct ExecutorsArgs {
     #[arg(long, value_name = "N", value_parser = repetitions)]
     pub repeat: Option<u32>,
     /// What is traced, as `walk --effects` has it
-    #[arg(long, value_name = "LIST", default_value = "primary,ao,diffuse")]
-    pub effects: String,
+    #[arg(long, value_name = "LIST", default_value = "primary,ao,diffuse", value_parser = value::<EffectList>)]
+    pub effects: EffectList,
     /// Occlusion and diffuse rays a pixel
     #[arg(long, value_name = "N", default_value = "1", value_parser = repetitions)]
     pub rays: u32,
     /// Device bytes for bricks, as `walk --cache` has it
     #[arg(long, value_name = "SIZE|P%", default_value = "100%")]
-    pub cache: String,
+    pub cache: CacheSize,
     /// The schedule, as `walk --schedule` has it
     #[arg(long, value_name = "NAME", default_value = "chc")]
-    pub schedule: String,
+    pub schedule: Schedule,
     /// A device to be measured, as `walk --adapter` has it; repeated: each of them, and the pictures of the others are
     /// compared with those of the first [default: cpu, then every graphics adapter]
     #[arg(long = "adapter", value_name = "NAME")]
@@ -170,6 +170,11 @@ pub(crate) fn minutes(text: &str) -> Result<f64, String> {
     if (0.0..=100_000.0).contains(&minutes) { Ok(minutes) } else { Err("it must be from 0 to 100000".into()) }
 }
 
+/// Reads the value of a setting.
+fn value<T: Value>(text: &str) -> Result<T, String> {
+    T::read(text, Rule::Any, "")
+}
+
 fn frames(text: &str) -> Result<u32, String> {
     ranged(text, 1, 300)
 }
@@ -243,7 +248,7 @@ impl Settings {
         let ImageSize { width, height } = self.size;
         unless((width, height) == (1920, 1080), format!("{width}x{height} pixels, not the paper's 1920x1080"));
         unless(self.rays == 20, format!("{} secondary rays a pixel, not the paper's 20", self.rays));
-        let counts = self.triangles.map(crate::cli::options::sizes::human_count).join(", ");
+        let counts = self.triangles.map(crate::settings::sizes::human_count).join(", ");
         let alike = [11_000_000, 130_000_000, 12_000_000].iter().zip(self.triangles).all(|(&least, own)| own >= least);
         unless(alike, format!("scenes of {counts} triangles, smaller than the paper's"));
         unmet

@@ -21,10 +21,10 @@ mod scenes;
 mod tables;
 
 use crate::cli::interrupt;
-use crate::cli::options::sizes::human_count;
 use crate::kernels::DeviceInfo;
 use crate::output::atomic;
 use crate::session::device::Device;
+use crate::settings::sizes::human_count;
 use anyhow::{Result, bail};
 use args::{BenchArgs, ChcArgs, Experiments, Settings};
 use brickwalk_convert::progress::Progress;

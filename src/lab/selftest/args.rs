@@ -2,7 +2,7 @@
 
 use super::defects::Defect;
 use crate::cli::options::args::{UNITS, ranged};
-use crate::session::device::Adapter;
+use crate::settings::Adapter;
 use clap::Args;
 use std::path::PathBuf;
 

@@ -1,18 +1,47 @@
 //! Options of `bench dvf`.
 
 use crate::cli::options::args::{UNITS, ranged};
-use crate::cli::options::named::named_values;
-use crate::cli::options::sizes::{CacheSize, ImageSize};
 use crate::lab::bench::args as bench;
-use crate::session::device::Adapter;
+use crate::secondary::dvf::{Cells, Count, Mode, Options, RegionKind, Sequence, Sides, Trust};
+use crate::settings::Adapter;
+use crate::settings::names::names;
+use crate::settings::{CacheSize, Field, Group, ImageSize};
 use clap::Args;
 use std::path::PathBuf;
 
-/// What begins the options of a field that is made anew in every frame, as in the paper.
-pub const ANEW: &str = "anew ";
+names! {
+    /// What becomes of a field while something moves.
+    Way {
+        /// It is that of the scene as it is at first, and knows of what has moved.
+        Told = "",
+        /// Of it, cells are made anew, within a budget of rays a frame.
+        Renewed = "renewed ",
+        /// All of it is made anew in every frame, as in the paper.
+        Anew = "anew ",
+    }
+}
 
-/// What begins the options of a field whose cells are made anew for what moves, within a budget of rays a frame.
-pub const RENEWED: &str = "renewed ";
+/// A field that is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measurement {
+    /// What becomes of it.
+    pub way: Way,
+    /// How it is made.
+    pub options: Options,
+    /// The settings that it is told from others by.
+    keys: Vec<&'static str>,
+}
+
+/// As the options of `walk` would have it.
+impl std::fmt::Display for Measurement {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let of = |key: &&str| {
+            let flag = Options::FIELDS.iter().find(|field| field.key == *key).map(Field::flag)?;
+            Some(format!("--{flag} {}", self.options.get(key)?))
+        };
+        write!(f, "{}{}", self.way, self.keys.iter().filter_map(of).collect::<Vec<_>>().join(" "))
+    }
+}
 
 /// Options of `bench dvf`.
 #[derive(Clone, Debug, Args)]
@@ -68,7 +97,7 @@ pub struct DvfBenchArgs {
     pub adapter: Adapter,
 }
 
-named_values! {
+names! {
     /// What is measured.
     Stage {
         /// Points.
@@ -87,14 +116,10 @@ named_values! {
         Flicker = "flicker",
         /// Out of core.
         Memory = "memory",
-    } later &[]
+    }
 }
 
 impl Stage {
-    /// All of them, in the order of the paper.
-    pub const ALL: [Self; 8] =
-        [Self::Points, Self::Grid, Self::Rays, Self::Lanes, Self::Masks, Self::Modes, Self::Flicker, Self::Memory];
-
     /// Its heading.
     pub fn title(self) -> &'static str {
         match self {
@@ -111,48 +136,71 @@ impl Stage {
 }
 
 impl DvfBenchArgs {
-    /// The options of each measurement of a stage, beside those of all: as they would be given to `walk`.
-    pub fn measurements(&self, stage: Stage) -> Vec<String> {
-        let (points, rays) = (self.points, self.rays);
-        let of = |options: &str| format!("--dvf-points {points} --dvf-rays {rays} {options}");
+    /// The measurements of a stage.
+    pub fn measurements(&self, stage: Stage) -> Vec<Measurement> {
+        let base = Options { points: self.points, rays: self.rays, ..Options::default() };
+        let with = |keys: &[&'static str], options: Options| Measurement {
+            way: Way::Told,
+            options,
+            keys: [&["points", "rays"], keys].concat(),
+        };
+        let cells = |cells| Options { cells: Cells::Longest(cells), ..base.clone() };
         match stage {
             Stage::Points => [25, 5, 1]
                 .into_iter()
                 .flat_map(|part| {
-                    [("rounding", "hash"), ("ceiling", "hash"), ("ceiling", "hammersley")].map(|(count, sequence)| {
-                        let points = (points / part).max(100);
-                        format!("--dvf-points {points} --dvf-rays {rays} --dvf-cells 40 --dvf-count {count} --dvf-sequence {sequence}")
+                    let sets = [
+                        (Count::Rounding, Sequence::Hash),
+                        (Count::Ceiling, Sequence::Hash),
+                        (Count::Ceiling, Sequence::Hammersley),
+                    ];
+                    let points = (self.points / part).max(100);
+                    sets.map(|(count, sequence)| {
+                        with(&["cells", "count", "sequence"], Options { points, count, sequence, ..cells(40) })
                     })
                 })
                 .collect(),
-            Stage::Grid => [155, 77, 40, 21, 12].map(|cells| of(&format!("--dvf-cells {cells}"))).into_iter().chain([of("--dvf-cells auto")]).collect(),
-            Stage::Rays => [8, 32, 64, 128, 256]
-                .map(|rays| format!("--dvf-points {points} --dvf-rays {rays} --dvf-cells 40"))
-                .to_vec(),
-            Stage::Lanes => [1, 8, 32, 128].map(|lanes| of(&format!("--dvf-cells 40 --dvf-lanes {lanes}"))).to_vec(),
-            Stage::Masks => [
-                "--dvf-octahedral 8",
-                "--dvf-octahedral 16",
-                "--dvf-octahedral 32",
-                "--dvf-octahedral 8 --dvf-dilate off",
-                "--dvf-octahedral 16 --dvf-dilate off",
-                "--dvf-octahedral 32 --dvf-dilate off",
-                "--dvf-trust masks",
-                "--dvf-sides both",
-            ]
-            .map(|options| of(&format!("--dvf-cells 40 {options}")))
-            .to_vec(),
-            Stage::Modes => ["same-sample", "paper"].map(|mode| of(&format!("--dvf-cells 40 --dvf-mode {mode}"))).to_vec(),
-            // The paper's cells of the Cornell box, and masks so coarse that what labels do is to be seen.
-            Stage::Flicker => ["", RENEWED, ANEW]
+            Stage::Grid => [155, 77, 40, 21, 12]
+                .map(cells)
                 .into_iter()
-                .flat_map(|way| ["same-sample", "paper"].map(|mode| (way, mode)))
+                .chain([base.clone()])
+                .map(|options| with(&["cells"], options))
+                .collect(),
+            Stage::Rays => [8, 32, 64, 128, 256].map(|rays| with(&["cells"], Options { rays, ..cells(40) })).to_vec(),
+            Stage::Lanes => {
+                [1, 8, 32, 128].map(|lanes| with(&["cells", "lanes"], Options { lanes, ..cells(40) })).to_vec()
+            }
+            Stage::Masks => {
+                let sizes = [8, 16, 32];
+                let of = |octahedral| Options { octahedral, ..cells(40) };
+                let dilated = sizes.map(|size| with(&["cells", "octahedral"], of(size)));
+                let others =
+                    sizes.map(|size| with(&["cells", "octahedral", "dilate"], Options { dilate: false, ..of(size) }));
+                let masks = with(&["cells", "trust"], Options { trust: Trust::Masks, ..cells(40) });
+                let both = with(&["cells", "sides"], Options { sides: Sides::Both, ..cells(40) });
+                dilated.into_iter().chain(others).chain([masks, both]).collect()
+            }
+            Stage::Modes => [Mode::SameSample, Mode::Paper]
+                .map(|mode| with(&["cells", "mode"], Options { mode, ..cells(40) }))
+                .to_vec(),
+            // The paper's cells of the Cornell box, and masks so coarse that what labels do is to be seen.
+            Stage::Flicker => Way::ALL
+                .iter()
+                .flat_map(|&way| [Mode::SameSample, Mode::Paper].map(|mode| (way, mode)))
                 .map(|(way, mode)| {
-                    let points = (points / 25).max(100);
-                    format!("{way}--dvf-points {points} --dvf-rays {rays} --dvf-cells 16 --dvf-octahedral 16 --dvf-mode {mode}")
+                    let points = (self.points / 25).max(100);
+                    let options = Options { points, octahedral: 16, mode, ..cells(16) };
+                    Measurement { way, ..with(&["cells", "octahedral", "mode"], options) }
                 })
                 .collect(),
-            Stage::Memory => vec![of("--dvf-region view --dvf-cells 40")],
+            Stage::Memory => {
+                vec![with(&["region", "cells"], Options { region: RegionKind::View, ..cells(40) })]
+            }
         }
+    }
+
+    /// Their names.
+    pub fn names(&self, stage: Stage) -> Vec<String> {
+        self.measurements(stage).iter().map(Measurement::to_string).collect()
     }
 }

@@ -1,9 +1,9 @@
 //! Options of `bench roma`.
 
 use crate::cli::options::args::{UNITS, ranged};
-use crate::cli::options::sizes::{ImageSize, positive_count};
 use crate::lab::bench::args as bench;
-use crate::session::device::Adapter;
+use crate::settings::sizes::positive_count;
+use crate::settings::{Adapter, ImageSize, Rule, Value};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -50,12 +50,16 @@ pub struct RomaBenchArgs {
     #[arg(long, value_name = "N", value_parser = |s: &str| ranged(s, 2, 65_536))]
     pub samples: Option<u32>,
     /// Length of ambient-occlusion rays, world units
-    #[arg(long, value_name = "LENGTH", default_value = "16", value_parser = crate::cli::options::light_args::ray_length)]
+    #[arg(long, value_name = "LENGTH", default_value = "16", value_parser = ray_length)]
     pub ao_length: f64,
     /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
     /// adapter whose name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
     #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
     pub adapter: Adapter,
+}
+
+fn ray_length(text: &str) -> Result<f64, String> {
+    f64::read(text, Rule::Real(1e-6, 1e9), "")
 }
 
 /// What the options come to.

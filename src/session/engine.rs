@@ -1,20 +1,18 @@
-//! Everything a walk or a trace works with, opened from the command line's options.
+//! A scene on a device: file, executor, cache and schedule, as settings ask for them.
 
 use super::device::Device;
-use crate::cli::options::args::{Schedule as ScheduleArg, StreamArgs};
-use crate::cli::options::sizes::{CacheSize, option_bytes};
-use crate::frame::Schedule;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::schedule::cache::{BrickBytes, Cache, SceneBytes};
-use crate::stream::{HostCache, Policy, Residency, ResidencyError, Sizes, Trace};
+use crate::settings::sizes::option_bytes;
+use crate::settings::{CacheSize, Schedule, Settings};
+use crate::stream::{HostCache, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
-use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
 /// A scene on a device.
-pub struct Session {
+pub struct Engine {
     /// The scene.
     pub scene: Arc<SceneFile>,
     /// The executor.
@@ -23,6 +21,10 @@ pub struct Session {
     pub cache: Cache,
     /// The schedule in force.
     pub schedule: Schedule,
+    /// Rays of a dispatch, and their tiles.
+    pub extent: Extent,
+    /// What a person should know, a line each.
+    pub warnings: Vec<String>,
 }
 
 /// What an executor is made for.
@@ -72,91 +74,70 @@ pub fn cache_budget(cache: CacheSize, sizes: &Sizes, page_bytes: u64) -> u64 {
     if asked >= all { asked.max(for_all).min(for_all.max(16)) } else { asked }
 }
 
-/// Writes the trace of requests, if one was asked for.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_requests(args: &StreamArgs, cache: &Cache) -> Result<()> {
-    if let (Some(file), Some(trace)) = (&args.requests_out, &cache.trace) {
-        trace.write_file(file).with_context(|| file.display().to_string())?;
-    }
-    Ok(())
-}
-
 /// The rays of a tile with edges of `tile` rays that `--query-threshold` comes to: it counts those of a tile of 200 x
 /// 200.
 pub fn scaled_threshold(threshold: u32, tile: u32) -> u32 {
     (f64::from(threshold) * f64::from(tile).powi(2) / 40_000.0) as u32
 }
 
-impl Session {
-    /// Opens device, cache and workers for `scene`.
+impl Engine {
+    /// Opens device, cache and workers for `scene`, the file `path`.
     ///
     /// # Errors
     /// No device, a device that fails the start-up probe, a cache too small or too large.
-    pub fn open(scene: Arc<SceneFile>, path: &Path, args: &StreamArgs, extent: Extent) -> Result<Self> {
-        Self::open_keeping(scene, path, args, extent, Keep::default())
+    pub fn open(scene: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Self> {
+        Self::open_keeping(scene, path, settings, Keep::default())
     }
 
-    /// [`Session::open`] with what `keep` says though the scene does not need it.
+    /// [`Engine::open`] with what `keep` says though the scene does not need it.
     ///
     /// # Errors
-    /// As [`Session::open`].
-    pub fn open_keeping(
-        scene: Arc<SceneFile>,
-        path: &Path,
-        args: &StreamArgs,
-        extent: Extent,
-        keep: Keep,
-    ) -> Result<Self> {
-        if let Some(file) = &args.requests_out {
+    /// As [`Engine::open`].
+    pub fn open_keeping(scene: Arc<SceneFile>, path: &Path, settings: &Settings, keep: Keep) -> Result<Self> {
+        if let Some(file) = &settings.requests_out {
             // Said before the work rather than after it.
             let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
             if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
                 bail!("{}: --requests-out needs a file in a folder that exists", file.display());
             }
         }
-        let device = Device::open(&args.adapter)?;
+        let device = Device::open(&settings.adapter)?;
         let page_bytes = device.page_bytes();
-        let mut session = Self::open_on(scene, path, args, extent, page_bytes, |needs| {
+        let mut engine = Self::open_on(scene, path, settings, page_bytes, |needs| {
             device.executor(needs.scene, needs.host, needs.threads, needs.page_sizes, Setup { keep, ..needs.setup })
         })?;
-        session.cache.states.keep_asking(keep.queries);
-        Ok(session)
+        engine.cache.states.keep_asking(keep.queries);
+        Ok(engine)
     }
 
-    /// As [`Session::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
+    /// As [`Engine::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
     ///
     /// # Errors
-    /// As [`Session::open`].
+    /// As [`Engine::open`].
     pub fn open_on(
         scene: Arc<SceneFile>,
         path: &Path,
-        args: &StreamArgs,
-        extent: Extent,
+        settings: &Settings,
         page_bytes: u64,
         make: impl FnOnce(Needs) -> Result<Box<dyn FrameExecutor>>,
     ) -> Result<Self> {
         let name = path.display();
+        let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
         let bytes = scene_bytes(&scene);
         let sizes = bytes.sizes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
-        let budget = cache_budget(args.cache, &sizes, page_bytes);
-        let schedule = match args.schedule {
-            ScheduleArg::Plain | ScheduleArg::PlainBvh2 if budget < for_all => bail!(
+        let budget = cache_budget(settings.cache, &sizes, page_bytes);
+        let schedule = match settings.schedule {
+            Schedule::Plain | Schedule::PlainBinary if budget < for_all => bail!(
                 "{name}: --schedule {} keeps everything resident: give --cache 100% ({for_all} bytes) rather than \
                  {budget} bytes, or use --schedule chc",
-                args.schedule.name()
+                settings.schedule
             ),
-            ScheduleArg::Plain => Schedule::Plain,
-            ScheduleArg::PlainBvh2 => Schedule::PlainBinary,
-            ScheduleArg::Chc => Schedule::Chc,
-            ScheduleArg::Demand => Schedule::Demand,
             // Fronts and thresholds belong to chc; with a threshold the schedule shows in the picture.
-            ScheduleArg::Auto if args.fronts == "on" || args.query_threshold > 0 => Schedule::Chc,
-            ScheduleArg::Auto => Schedule::Auto,
+            Schedule::Auto if settings.fronts || settings.query_threshold > 0 => Schedule::Chc,
+            schedule => schedule,
         };
-        let policy: Policy = args.evict.parse().map_err(|error: String| anyhow!(error).context("--evict"))?;
+        let policy = settings.evict;
         let residency = Residency::new(&sizes, budget, page_bytes, policy).map_err(|error| match error {
             ResidencyError::CacheTooSmall { what, needed, given } => anyhow!(
                 "{name}: a cache of {given} bytes is too small: {what} need {needed} bytes; give --cache {} or more, or \
@@ -165,25 +146,35 @@ impl Session {
             ),
             other => anyhow!(other).context(format!("{name}: --cache")),
         })?;
-        let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
-        let threshold = scaled_threshold(args.query_threshold, extent.tile);
-        if args.query_threshold > threshold && threshold == 0 {
-            let _ = writeln!(
-                std::io::stderr(),
-                "brickwalk: warning: --query-threshold {} is less than one ray of a tile of {}: nothing is left out; use a larger --tile",
-                args.query_threshold,
-                extent.tile
-            );
+        let trace = settings.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
+        let threshold = scaled_threshold(settings.query_threshold, extent.tile);
+        let mut warnings = Vec::new();
+        if settings.query_threshold > threshold && threshold == 0 {
+            warnings.push(format!(
+                "--query-threshold {} is less than one ray of a tile of {}: nothing is left out; use a larger --tile",
+                settings.query_threshold, extent.tile
+            ));
         }
-        let setup = Setup { extent, threshold, count: args.count, keep: Keep::default() };
+        let setup = Setup { extent, threshold, count: settings.count, keep: Keep::default() };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
-        let host = HostCache::new(args.host_cache);
-        let threads = args.worker_count();
+        let host = HostCache::new(settings.host_cache);
+        let threads = settings.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
         let mut executor = make(needs).with_context(|| format!("{name}"))?;
         if schedule == Schedule::PlainBinary {
             executor.make_binary().with_context(|| format!("{name}"))?;
         }
-        Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule })
+        Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule, extent, warnings })
+    }
+
+    /// Writes the trace of requests, if the settings ask for one.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_requests(settings: &Settings, cache: &Cache) -> Result<()> {
+        if let (Some(file), Some(trace)) = (&settings.requests_out, &cache.trace) {
+            trace.write_file(file).with_context(|| file.display().to_string())?;
+        }
+        Ok(())
     }
 }
