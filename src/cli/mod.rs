@@ -2,6 +2,8 @@
 //! line on standard error), 2 wrong usage.
 
 pub mod adapters;
+#[cfg(feature = "lab")]
+pub mod bench;
 pub mod compare;
 pub mod convert;
 pub mod demo;
@@ -76,10 +78,10 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),
         #[cfg(feature = "lab")]
-        Command::Bench(args) => crate::lab::bench::run(args),
+        Command::Bench(args) => bench::run(args),
         Command::Adapters(args) => adapters::run(args),
         #[cfg(feature = "lab")]
-        Command::Selftest(args) => crate::lab::selftest::run(args),
+        Command::Selftest(args) => bench::test(args),
     }
 }
 

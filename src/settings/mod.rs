@@ -23,6 +23,6 @@ pub use all::{Settings, TRACE};
 pub use declare::{Entry, Field, Group, Heading, Level, SettingsError};
 pub use sizes::{CacheSize, ImageSize};
 pub use types::{Adapter, Direction, Effect, EffectList, Environment, Rectangle, Schedule, Secondary, Turn};
-pub use value::{Plain, Rule, Value};
+pub use value::{Lines, Plain, Rule, Value};
 
 pub(crate) use declare::settings;

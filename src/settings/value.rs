@@ -278,11 +278,36 @@ impl<T: Value> Value for Vec<T> {
         if text == NONE && !T::NAMES.contains(&NONE) {
             return Ok(Vec::new());
         }
-        text.split(',').map(|part| T::read(part.trim(), rule, unit)).collect()
+        text.split([',', LINE]).map(|part| T::read(part.trim(), rule, unit)).collect()
     }
 
     fn plain(&self) -> Plain {
         Plain::List(self.iter().map(T::plain).collect())
+    }
+}
+
+/// What stands between values that are given one by one.
+pub const LINE: char = '\n';
+
+/// Values that are given one by one and may have commas in them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lines<T>(pub Vec<T>);
+
+impl<T> Default for Lines<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: Value> Value for Lines<T> {
+    const IS_LIST: bool = true;
+
+    fn read(text: &str, rule: Rule, unit: &str) -> Result<Self, String> {
+        text.split(LINE).map(|line| T::read(line, rule, unit)).collect::<Result<_, _>>().map(Self)
+    }
+
+    fn plain(&self) -> Plain {
+        self.0.plain()
     }
 }
 

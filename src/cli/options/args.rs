@@ -5,7 +5,7 @@ use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
 use super::scene_kind::{SceneKind, scene_help};
 #[cfg(feature = "lab")]
-use crate::lab::{bench::args::BenchArgs, selftest::args::SelftestArgs};
+use crate::cli::bench::{BenchArgs, TestArgs};
 use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
 use crate::settings::{Adapter, CacheSize, ImageSize, Settings, SettingsError};
 use brickwalk_convert::build::TextureEncoding;
@@ -59,7 +59,7 @@ pub enum Command {
     Adapters(AdaptersArgs),
     /// Check the numerical stability of this machine's device, case by case
     #[cfg(feature = "lab")]
-    Selftest(SelftestArgs),
+    Selftest(TestArgs),
 }
 
 /// Options of `adapters`.
@@ -315,8 +315,8 @@ pub struct WalkArgs {
     #[arg(long, hide_short_help = true)]
     pub json: bool,
     /// Show all options
-    #[arg(long)]
-    help_all: bool,
+    #[arg(long, action = clap::ArgAction::HelpLong)]
+    pub help_all: Option<bool>,
     /// Everything that renders.
     #[command(flatten)]
     given: GroupArgs<OfWalk>,

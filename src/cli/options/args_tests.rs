@@ -270,7 +270,8 @@ fn help_explains_units_and_defaults() {
             if let Some(long) = long.filter(|_| !argument.is_hide_long_help_set()) {
                 assert!(text.contains(&long), "{name}: {long}");
             }
-            let optional = !argument.is_required_set() && argument.get_action().takes_values();
+            let is_switch = argument.get_num_args().is_some_and(|count| count.min_values() == 0);
+            let optional = !argument.is_required_set() && argument.get_action().takes_values() && !is_switch;
             let has_default = !argument.get_default_values().is_empty()
                 || argument.get_help().is_some_and(|h| h.to_string().contains("[default:"));
             let filter = ["path", "adapter", "id"].contains(&argument.get_id().as_str());

@@ -1,6 +1,7 @@
 //! The command line as a view of settings: each is an option, with the text, the range and the default that the table
 //! of settings has for it.
 
+use crate::settings::value::LINE;
 use crate::settings::{Entry, Group, Level, Settings, TRACE, file};
 use clap::builder::StyledStr;
 use clap::parser::ValueSource;
@@ -12,6 +13,11 @@ use std::path::Path;
 pub trait View: Clone + Send + Sync + 'static {
     /// The settings.
     type Group: Group;
+
+    /// Whether a setting is an option.
+    fn has(_: &Entry) -> bool {
+        true
+    }
 
     /// Who is shown a setting; `None`: nobody, it is known to be refused.
     fn level(entry: &Entry) -> Option<Level> {
@@ -73,14 +79,14 @@ impl<V: View> GroupArgs<V> {
     }
 
     fn of(matches: &ArgMatches) -> Self {
-        let given = |entry: Entry| {
-            let flag = entry.field.flag();
+        let given = |entry: &Entry| {
+            let (flag, separator) = (entry.field.flag(), LINE.to_string());
             let source = matches.value_source(flag)?;
             let is_given = matches!(source, ValueSource::CommandLine | ValueSource::EnvVariable);
             let values: Vec<&str> = matches.get_many::<String>(flag)?.map(String::as_str).collect();
-            is_given.then(|| (entry.key(), values.join(",")))
+            is_given.then(|| (entry.key(), values.join(&separator)))
         };
-        Self { given: V::Group::entries().into_iter().filter_map(given).collect(), view: PhantomData }
+        Self { given: entries::<V>().iter().filter_map(given).collect(), view: PhantomData }
     }
 }
 
@@ -97,14 +103,20 @@ impl<V: View> FromArgMatches for GroupArgs<V> {
 
 impl<V: View> Args for GroupArgs<V> {
     fn augment_args(command: Command) -> Command {
-        let mut entries = V::Group::entries();
-        entries.sort_by_key(|entry| (entry.field.heading, entry.table));
-        entries.iter().fold(command, |command, entry| command.arg(argument::<V>(entry)))
+        entries::<V>().iter().fold(command, |command, entry| command.arg(argument::<V>(entry)))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
         Self::augment_args(command)
     }
+}
+
+/// The settings of a view, those under one heading together.
+fn entries<V: View>() -> Vec<Entry> {
+    let mut entries = V::Group::entries();
+    entries.retain(V::has);
+    entries.sort_by_key(|entry| (entry.field.heading, entry.table));
+    entries
 }
 
 /// A setting as an option.
@@ -130,7 +142,10 @@ fn argument<V: View>(entry: &Entry) -> Arg {
         .hide(level.is_none())
         .value_parser(check);
     argument = match field.value_name() {
-        Some(name) => argument.value_name(name),
+        Some(name) => match name.strip_suffix("...") {
+            Some(name) => argument.value_name(name).num_args(1..),
+            None => argument.value_name(name),
+        },
         // A file may switch on what is to be off: --denoise=off.
         None => argument.num_args(0..=1).require_equals(true).default_missing_value("on").value_name("on|off"),
     };

@@ -93,7 +93,7 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
     for adapter in wanted(args) {
         match open(args, &settings, &place.scene, &adapter) {
             Ok(side) => sides.push(side),
-            Err(error) if args.adapters.is_empty() => notes.push(format!("{adapter}: left out: {error:#}")),
+            Err(error) if args.adapters.0.is_empty() => notes.push(format!("{adapter}: left out: {error:#}")),
             Err(error) => return Err(error),
         }
     }
@@ -134,8 +134,8 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
 
 /// The devices to be measured: those asked for, else the processor and every graphics adapter that has what is needed.
 fn wanted(args: &ExecutorsArgs) -> Vec<Adapter> {
-    if !args.adapters.is_empty() {
-        return args.adapters.clone();
+    if !args.adapters.0.is_empty() {
+        return args.adapters.0.clone();
     }
     let mut all = vec![Adapter::Cpu];
     for candidate in candidates().iter().filter(|candidate| candidate.flaw.is_none()) {

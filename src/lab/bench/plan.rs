@@ -3,7 +3,7 @@
 use super::paper;
 use super::paper::PaperScene;
 use crate::schedule::Optimisation;
-use crate::settings::Schedule;
+use crate::settings::{Plain, Rule, Schedule, Value};
 use std::fmt;
 
 /// A part of the measurements that can be asked for alone.
@@ -44,13 +44,15 @@ impl Stage {
     }
 }
 
-impl std::str::FromStr for Stage {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
+impl Value for Stage {
+    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
         let names = Self::ALL.map(Self::name);
-        let found = Self::ALL.into_iter().find(|stage| stage.name() == text.trim());
+        let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
         found.ok_or_else(|| crate::settings::names::unknown(text, &names, &[]))
+    }
+
+    fn plain(&self) -> Plain {
+        Plain::Text(self.name().into())
     }
 }
 

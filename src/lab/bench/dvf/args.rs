@@ -1,12 +1,9 @@
 //! Options of `bench dvf`.
 
-use crate::cli::options::args::{UNITS, ranged};
 use crate::lab::bench::args as bench;
 use crate::secondary::dvf::{Cells, Count, Mode, Options, RegionKind, Sequence, Sides, Trust};
-use crate::settings::Adapter;
 use crate::settings::names::names;
-use crate::settings::{CacheSize, Field, Group, ImageSize};
-use clap::Args;
+use crate::settings::{Adapter, CacheSize, Field, Group, ImageSize, Lines, Rule, settings};
 use std::path::PathBuf;
 
 names! {
@@ -43,58 +40,43 @@ impl std::fmt::Display for Measurement {
     }
 }
 
-/// Options of `bench dvf`.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = UNITS)]
-pub struct DvfBenchArgs {
-    /// Converted scenes; a Cornell box in which a box orbits (`scene cornell`) is measured beside them. Where
-    /// S.motion.json lies beside a scene its flicker is measured
-    #[arg(value_name = "S.bricks")]
-    pub scenes: Vec<PathBuf>,
-    /// Folder for the results: dvf.json, dvf.md, report.html, a CSV a table, and rows.jsonl, which grows with every
-    /// measurement. Started again with the same folder and settings, the bench goes on where it stopped
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Camera paths (JSON) of the scenes, in their order; of scenes without, S.near.json beside it, or one made from
-    /// its bounds
-    #[arg(long, value_name = "P.json", value_delimiter = ',')]
-    pub paths: Vec<PathBuf>,
-    /// The environment [default: the sky over the ground]
-    #[arg(long, value_name = "FILE")]
-    pub environment: Option<PathBuf>,
-    /// What to measure in this run, separated by commas: points (figure 13 and table 2: points, rounding, hash and
-    /// Hammersley), grid (figure 14), rays (figure 15), lanes (figure 16), masks (their resolution, dilation, which
-    /// answers count), modes (same-sample and the paper's), flicker (of scenes in which something moves: what pictures
-    /// change from frame to frame that exact rays do not), memory (a cache of --cache, the field of what is seen)
-    /// [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    pub stages: Vec<Stage>,
-    /// Begin no measurement after so many minutes; the results hold what is measured until then [default: no limit]
-    #[arg(long, value_name = "N", value_parser = bench::minutes)]
-    pub minutes: Option<f64>,
-    /// Width and height of the pictures
-    #[arg(long, value_name = "WxH", default_value = "320x180")]
-    pub size: ImageSize,
-    /// Rays to the environment a pixel, 1 to 65536
-    #[arg(long, value_name = "N", default_value = "128", value_parser = |s: &str| ranged(s, 1, 65_536))]
-    pub samples: u32,
-    /// The most points that are strewn, 1000 to 16M: a fifth and a 25th of it beside it
-    #[arg(long, value_name = "N", default_value = "400K", value_parser = |s: &str| ranged(s, 1000, 16_000_000))]
-    pub points: u32,
-    /// Rays of a point
-    #[arg(long, value_name = "N", default_value = "128", value_parser = |s: &str| ranged(s, 1, 1024))]
-    pub rays: u32,
-    /// Turns of a measurement in which a picture without a field and one with it are timed, one after the other, 1 to
-    /// 100: times are medians
-    #[arg(long, value_name = "N", default_value = "3", value_parser = |s: &str| ranged(s, 1, 100))]
-    pub repeat: u32,
-    /// The cache of memory, as --cache of walk
-    #[arg(long, value_name = "SIZE|P%", default_value = "15%")]
-    pub cache: CacheSize,
-    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
-    /// adapter whose name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
-    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
-    pub adapter: Adapter,
+settings! {
+    /// Options of `bench dvf`.
+    pub struct DvfBenchArgs {
+        /// Converted scenes; a Cornell box in which a box orbits (`scene cornell`) is measured beside them. Where
+        /// S.motion.json lies beside a scene its flicker is measured.
+        scenes: Lines<PathBuf> = Lines::default(), "--scenes S.bricks", Rule::Any, "", Output, Common;
+        /// Folder for the results: dvf.json, dvf.md, report.html, a CSV a table, and rows.jsonl, which grows with every
+        /// measurement. Started again with the same folder and settings, the bench goes on where it stopped.
+        output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
+        /// Camera paths (JSON) of the scenes, in their order, with commas between them. [default: S.near.json beside each,
+        /// or one made from its bounds]
+        paths: Vec<PathBuf> = Vec::new(), "--paths P.json", Rule::Any, "", Camera, Common;
+        /// The environment. [default: the sky over the ground]
+        environment: Option<PathBuf> = None, "--environment FILE", Rule::Any, "", Light, Common;
+        /// What to measure in this run, with commas between them. points (figure 13 and table 2: points, rounding, hash and
+        /// Hammersley), grid (figure 14), rays (figure 15), lanes (figure 16), masks (their resolution, dilation, which
+        /// answers count), modes (same-sample and the paper's), flicker (of scenes in which something moves: what pictures
+        /// change from frame to frame that exact rays do not), memory (a cache of --cache, the field of what is seen).
+        /// [default: all]
+        stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
+        /// Begin no measurement after so many minutes. The results hold what is measured until then. [default: no limit]
+        minutes: Option<f64> = None, "--minutes N", bench::MINUTES, "", Measurement, Common;
+        /// Width and height of the pictures.
+        size: ImageSize = ImageSize { width: 320, height: 180 }, "--size WxH", Rule::Any, "pixels", Camera, Common;
+        /// Rays to the environment per pixel.
+        samples: u32 = 128, "--samples N", Rule::Whole(1, 65_536), "", Quality, Common;
+        /// The most points that are strewn: a fifth and a 25th of it beside it.
+        points: u32 = 400_000, "--points N", Rule::Whole(1000, 16_000_000), "", Methods, Common;
+        /// Rays of a point.
+        rays: u32 = 128, "--rays N", Rule::Whole(1, 1024), "", Methods, Common;
+        /// Turns of a measurement in which a picture without a field and one with it are timed; times are medians.
+        repeat: u32 = 3, "--repeat N", Rule::Whole(1, 100), "", Measurement, Common;
+        /// The cache of memory, as `walk --cache` has it.
+        cache: CacheSize = CacheSize::Percent(15.0), "--cache SIZE|P%", Rule::Any, "", Cache, Common;
+        /// What renders, as `walk --adapter` has it.
+        adapter: Adapter = Adapter::Auto, "--adapter NAME", Rule::Any, "", Device, Common;
+    }
 }
 
 names! {

@@ -163,7 +163,7 @@ fn header(args: &DvfBenchArgs, places: &[Place]) -> Result<Header> {
 /// The scenes, and the box, which is built if it is not there.
 fn places(args: &DvfBenchArgs) -> Result<Vec<Place>> {
     let mut places = Vec::new();
-    for (i, scene) in args.scenes.iter().enumerate() {
+    for (i, scene) in args.scenes.0.iter().enumerate() {
         let file = open_scene(scene)?;
         let near = scene.with_extension("near.json");
         let path = match args.paths.get(i) {

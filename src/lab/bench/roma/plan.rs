@@ -3,7 +3,7 @@
 use super::args::Settings as Scale;
 use crate::lab::bench::plan::SceneId;
 use crate::secondary::roma::{self, Unsnapped};
-use crate::settings::{Effect, EffectList, Secondary, Settings, Turn};
+use crate::settings::{Effect, EffectList, Plain, Rule, Secondary, Settings, Turn, Value};
 use std::fmt;
 
 /// A part of the measurements that can be asked for alone.
@@ -63,13 +63,15 @@ impl Stage {
     }
 }
 
-impl std::str::FromStr for Stage {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
+impl Value for Stage {
+    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
         let names = Self::ALL.map(Self::name);
-        let found = Self::ALL.into_iter().find(|stage| stage.name() == text.trim());
+        let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
         found.ok_or_else(|| crate::settings::names::unknown(text, &names, &[]))
+    }
+
+    fn plain(&self) -> Plain {
+        Plain::Text(self.name().into())
     }
 }
 
