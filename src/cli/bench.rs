@@ -82,9 +82,7 @@ struct MeasuredScenes {
 /// Those of the experiment.
 pub fn run(args: &BenchArgs) -> Result<()> {
     bench::run(&match &args.experiments {
-        Experiments::Chc(own) => {
-            Experiment::Chc(ChcArgs { output: own.output.clone(), ..own.options.over(None)? })
-        }
+        Experiments::Chc(own) => Experiment::Chc(ChcArgs { output: own.output.clone(), ..own.options.over(None)? }),
         Experiments::Executors(own) => {
             Experiment::Executors(ExecutorsArgs { output: own.output.clone(), ..own.options.over(None)? })
         }

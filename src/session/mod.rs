@@ -5,13 +5,13 @@ pub mod engine;
 pub mod left_out;
 pub mod lighting;
 pub mod motion;
+mod open;
 mod pictures;
 pub mod renderer;
-mod session;
 pub mod summary;
 pub mod trace;
 
 pub use crate::output::npy::{Hit, Ray};
 pub use engine::{Engine, open_scene};
+pub use open::{Frame, Session, Watch, developed};
 pub use pictures::Pictures;
-pub use session::{Frame, Session, Watch, developed};

@@ -1,6 +1,6 @@
 //! What becomes of a session's frames: a PNG and an EXR each, a frame of a video.
 
-use super::session::{Frame, developed};
+use super::open::{Frame, developed};
 use crate::output::png;
 use crate::output::video::{Video, ffmpeg_of_frames, ffmpeg_of_video};
 use crate::picture::exposure::{Exposure, Meter};

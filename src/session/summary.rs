@@ -1,6 +1,6 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
-use super::session::Session;
+use super::open::Session;
 use crate::counters::Record;
 use crate::frame::Renderer;
 use crate::picture::exposure::Exposure;

@@ -34,7 +34,7 @@ settings! {
         size: ImageSize = ImageSize { width: 1280, height: 720 }, "--size WxH", Rule::Any, "pixels", Camera, Common;
         /// Vertical field of view. [default: the path's]
         fov: Option<f64> = None, "--fov DEG", Rule::Real(MIN_FOV_Y_DEGREES, MAX_FOV_Y_DEGREES), "degrees", Camera, Usual;
-        /// Motion of instances (JSON); README.md has the form. What moves is an instance: see `info --instances` and
+        /// Motion of instances (JSON); docs/using.md has the form. What moves is an instance: see `info --instances` and
         /// `convert --movable`. [default: nothing moves]
         motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
 
@@ -138,7 +138,7 @@ settings! {
         query_threshold: u32 = 0, "--query-threshold PIXELS", Rule::Whole(0, 40_000), "pixels", Schedule, Expert;
         /// Optimisations to switch off, with commas between them, to measure what each is worth. Pictures are the same.
         /// Of loading: nearest-first, requery, resident-first. Of lists (chc): front-to-back, by-tile, root-walk. Of
-        /// --fronts on: multi-queries, tighter-bounds, lazy-requery, pull-up. ARCHITECTURE.md says what each does.
+        /// --fronts on: multi-queries, tighter-bounds, lazy-requery, pull-up. docs/methods/chc.md says what each does.
         without: Vec<Optimisation> = Vec::new(), "--without LIST", Rule::Any, "", Schedule, Expert;
 
         /// How secondary rays are answered: exact, roma, auto, df, dvf. `exact`: all are traced. `roma`: those of `ao`,

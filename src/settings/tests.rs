@@ -46,8 +46,22 @@ fn others() -> Settings {
     let mut settings = Settings::default();
     for entry in Settings::entries() {
         let field = entry.field;
-        let candidates =
-            ["on", "off", "7", "3", "8", "64", "0.25", "2", "1,2,3", "0,0,0,1,0,0,0,0,1", "64x48", "a \"b\\c"];
+        let candidates = [
+            "1000",
+            "4",
+            "on",
+            "off",
+            "7",
+            "3",
+            "8",
+            "64",
+            "0.25",
+            "2",
+            "1,2,3",
+            "0,0,0,1,0,0,0,0,1",
+            "64x48",
+            "a \"b\\c",
+        ];
         let text = candidates.into_iter().chain(field.names.iter().copied()).rev();
         let other = text.into_iter().find(|text| {
             let mut one = Settings::default();

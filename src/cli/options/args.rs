@@ -458,11 +458,6 @@ fn brick_triangles(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1 << 20)
 }
 
-pub(crate) fn tile(text: &str) -> Result<u32, String> {
-    let wrong = || "a tile is a power of two from 8 to 512 pixels".to_string();
-    ranged(text, 8, 512).ok().filter(|n| n.is_power_of_two()).ok_or_else(wrong)
-}
-
 #[cfg(test)]
 #[path = "args_tests.rs"]
 mod tests;

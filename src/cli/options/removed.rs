@@ -18,8 +18,8 @@ pub fn explained(error: clap::Error) -> clap::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::removed::REMOVED;
     use crate::cli::options::args::Cli;
+    use crate::settings::removed::REMOVED;
     use clap::Parser;
 
     /// A walk that uses what is gone.
