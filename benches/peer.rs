@@ -16,7 +16,7 @@ use brickwalk::kernels::trace::leaf::rows_point;
 use brickwalk::kernels::{Directions, Extent, View};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::{Lamp, Pass, PassStats, Step, plain};
-use brickwalk::session::engine::{Engine, open_scene};
+use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::settings::{Adapter, CacheSize, ImageSize, Schedule, Settings};
 use glam::DVec3;
 use std::fs::File;
@@ -61,7 +61,7 @@ fn city(triangles: &str) -> PathBuf {
 
 /// The scene on the processor, and the rays.
 struct Ours {
-    session: Engine,
+    session: Opened,
     frame: Frame,
     sets: [Vec<Ray>; 3],
 }
@@ -77,11 +77,11 @@ impl Ours {
             ..Settings::default()
         };
         let scene = open_scene(path).expect("the scene");
-        let mut session = Engine::open(scene.clone(), path, &settings).expect("a session");
+        let mut session = Opened::open(scene.clone(), path, &settings).expect("a session");
         let camera = CameraPath::read(&path.with_extension("near.json")).expect("its path").frame(0, 30);
         let frame = Frame::near(scene.resident(), camera.position);
         session.executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
-        let Engine { executor, cache, .. } = &mut session;
+        let Opened { executor, cache, .. } = &mut session;
         plain::make_all_resident(&mut **executor, cache, &mut PassStats::default()).expect("room for all");
         let basis = camera.ray_basis(EXTENT.width, EXTENT.height);
         let origin = frame.point(camera.position);

@@ -6,7 +6,7 @@ mod common;
 
 use brickwalk::gpu::device::Gpu;
 use brickwalk::schedule::Load;
-use brickwalk::session::engine::{Engine, brick_bytes, open_scene};
+use brickwalk::session::opened::{Opened, brick_bytes, open_scene};
 use brickwalk::settings::{CacheSize, ImageSize, Settings};
 use brickwalk::stream::{Item, Slot};
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
@@ -62,7 +62,7 @@ fn streaming(c: &mut Criterion) {
     for (name, host_cache) in [("file", 0), ("host cache", 4 << 30)] {
         let size = ImageSize { width: 64, height: 64 };
         let settings = Settings { cache: CacheSize::Percent(100.0), host_cache, size, ..Settings::default() };
-        let mut session = Engine::open(file.clone(), &path, &settings).expect("a session");
+        let mut session = Opened::open(file.clone(), &path, &settings).expect("a session");
         let upload = session.executor.device().upload;
         let loads = place(&session, &bricks);
         group.bench_function(BenchmarkId::new(format!("brickwalk from the {name}"), upload), |b| {
@@ -78,7 +78,7 @@ fn streaming(c: &mut Criterion) {
 }
 
 /// All geometry one after the other in the pages of an empty cache.
-fn place(session: &Engine, bricks: &[brickwalk::schedule::cache::BrickBytes]) -> Vec<Load> {
+fn place(session: &Opened, bricks: &[brickwalk::schedule::cache::BrickBytes]) -> Vec<Load> {
     let pages: Vec<u64> = session.cache.residency.page_sizes().collect();
     let (mut page, mut offset) = (0usize, 0u64);
     let mut loads = Vec::new();

@@ -4,7 +4,7 @@ use super::Options;
 use brickwalk::frame::Renderer;
 use brickwalk::output::atomic;
 use brickwalk::scene::Camera;
-use brickwalk::session::engine::{Engine, open_scene};
+use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::session::renderer;
 use brickwalk::settings::{Adapter, CacheSize, Group, ImageSize, Schedule, Settings};
 use std::io::Write;
@@ -29,7 +29,7 @@ pub fn renderer(options: &Options, words: &str) -> Renderer {
     };
     settings.set_options(words).expect("options of walk");
     let scene = open_scene(&options.scene).expect("the scene");
-    let engine = Engine::open(scene, &options.scene, &settings).expect("a session");
+    let engine = Opened::open(scene, &options.scene, &settings).expect("a session");
     renderer::renderer(engine, &options.scene, &settings).expect("lamps")
 }
 

@@ -3,7 +3,7 @@
 use super::instances;
 use super::options::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
-use crate::session::engine::scene_bytes;
+use crate::session::opened::scene_bytes;
 use crate::settings::sizes::{human_bytes, human_count};
 use crate::stream::Residency;
 use anyhow::{Context, Result};

@@ -1,7 +1,7 @@
 //! `brickwalk replay`: a recorded trace of requests against other cache sizes and policies.
 
 use super::options::args::ReplayArgs;
-use crate::session::engine::cache_budget;
+use crate::session::opened::cache_budget;
 use crate::settings::sizes::{CacheSize, human_bytes, human_count};
 use crate::stream::{Replay, ReplayResult, Residency, ResidencyError, Trace, TraceError, replay};
 use anyhow::{Context, Result, ensure};

@@ -4,7 +4,7 @@ use super::options::args::TraceArgs;
 use crate::kernels::layout::NONE;
 use crate::output::npy;
 use crate::session::trace::{check, for_rays, trace};
-use crate::session::{Engine, open_scene};
+use crate::session::{Opened, open_scene};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 
@@ -18,11 +18,11 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     for (row, ray) in rays.iter().enumerate() {
         check(ray).with_context(|| format!("{}: row {row}", args.rays.display()))?;
     }
-    let mut engine = Engine::open(open_scene(&args.scene)?, &args.scene, &settings)?;
-    super::walk::warn(std::mem::take(&mut engine.warnings));
+    let mut opened = Opened::open(open_scene(&args.scene)?, &args.scene, &settings)?;
+    super::walk::warn(std::mem::take(&mut opened.warnings));
     let progress = Progress::new();
     progress.phase("rays", rays.len() as u64);
-    let traced = trace(&mut engine.traced(), &rays, args.any, &mut |rays| progress.advance(rays));
+    let traced = trace(&mut opened.traced(), &rays, args.any, &mut |rays| progress.advance(rays));
     let (hits, stats) = traced.with_context(|| args.scene.display().to_string())?;
     progress.finish();
     if let Some(row) = hits.iter().position(|hit| hit.t.is_nan() || hit.u.is_nan() || hit.v.is_nan()) {
@@ -34,7 +34,7 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     } else {
         npy::write_hits(&args.output, &hits)?;
     }
-    Engine::write_requests(&settings, &engine.cache)?;
+    Opened::write_requests(&settings, &opened.cache)?;
     if args.json {
         let hit = hits.iter().filter(|h| h.triangle != NONE).count();
         super::print_json(&serde_json::json!({

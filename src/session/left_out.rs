@@ -1,6 +1,6 @@
 //! What rendering leaves out because a scene does not need it, and what that saves.
 
-use super::engine::Engine;
+use super::opened::Opened;
 use super::renderer::lit_renderer;
 use crate::frame::{Light, Renderer};
 use crate::kernels::{Keep, opacity, reflectance};
@@ -119,8 +119,8 @@ pub fn measure(
 ) -> Result<Vec<Map<String, Value>>> {
     let settings = Settings { requests_out: None, ..settings.clone() };
     let open = |keep: Keep| -> Result<Renderer> {
-        let engine = Engine::open_keeping(scene.clone(), path, &settings, keep)?;
-        Ok(lit_renderer(engine, &settings, light.clone()))
+        let opened = Opened::open_keeping(scene.clone(), path, &settings, keep)?;
+        Ok(lit_renderer(opened, &settings, light.clone()))
     };
     let mut renderers = vec![open(Keep::default())?];
     let can = renderers[0].executor.leaves_out();

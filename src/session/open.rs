@@ -1,13 +1,13 @@
 //! A scene, opened for frames and for rays.
 
-use super::engine::{Engine, open_scene};
 use super::left_out::{self, LeftOut};
 use super::lighting::{Lighting, lighting};
 use super::motion::SceneMotion;
-use super::renderer::lit_renderer;
+use super::opened::{Opened, open_scene};
+use super::renderer::{finest_cell, lit_renderer};
 use super::trace::{self, Traced};
 use crate::counters::Record;
-use crate::frame::{Accumulation, Captures, Light, Pixels, RenderError, Renderer};
+use crate::frame::{Accumulation, Captures, Engine, Light, Pixels, RenderError, Renderer};
 use crate::output::npy::{Hit, Ray};
 use crate::output::{exr, png, srgb};
 use crate::picture::denoise::Resolve;
@@ -17,6 +17,7 @@ use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::secondary::dvf::prepare::{Note, prepare};
 use crate::secondary::roma::LEAST_CELLS;
+use crate::secondary::roma::answer::Roma;
 use crate::settings::{Secondary, Settings};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
@@ -136,10 +137,10 @@ impl Session {
         let lighting = lighting(settings, &scene, file)?;
         let motion = settings.motion.as_ref().map(|file| SceneMotion::open(file, &scene, &lighting.sources));
         let motion = motion.transpose()?;
-        let engine = Engine::open(scene.clone(), file, settings)?;
-        let warnings = lighting.warnings.iter().chain(&engine.warnings).cloned().collect();
+        let opened = Opened::open(scene.clone(), file, settings)?;
+        let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned().collect();
         let reference = settings.measure_error.then(|| reference(scene, file, settings, lighting.light.clone()));
-        let mut renderer = lit_renderer(engine, settings, lighting.light.clone());
+        let mut renderer = lit_renderer(opened, settings, lighting.light.clone());
         renderer.captures = settings.measure_error.then(Captures::default);
         Ok(Self {
             file: file.into(),
@@ -264,7 +265,7 @@ impl Session {
         for (number, ray) in rays.iter().enumerate() {
             trace::check(ray).with_context(|| format!("ray {number}"))?;
         }
-        let Renderer { scene, executor, cache, settings, size, .. } = &mut self.renderer;
+        let Engine { scene, executor, cache, settings, size, .. } = &mut self.renderer.engine;
         // What frames may leave out given rays must find.
         let threshold = std::mem::take(&mut executor.tuning().threshold);
         let mut traced = Traced {
@@ -299,7 +300,7 @@ impl Session {
     /// # Errors
     /// The file cannot be written.
     pub fn write_requests(&self) -> Result<()> {
-        Engine::write_requests(&self.settings, &self.renderer.cache)
+        Opened::write_requests(&self.settings, &self.renderer.cache)
     }
 }
 
@@ -328,8 +329,8 @@ fn reference(scene: Arc<SceneFile>, file: &Path, settings: &Settings, light: Lig
         aov: false,
         ..settings.clone()
     };
-    let engine = Engine::open(scene, file, &settings)?;
-    let mut reference = lit_renderer(engine, &settings, light);
+    let opened = Opened::open(scene, file, &settings)?;
+    let mut reference = lit_renderer(opened, &settings, light);
     reference.captures = Some(Captures::default());
     Ok(reference)
 }
@@ -349,7 +350,7 @@ fn note_errors(records: &mut [Record], renderer: &Renderer, reference: &Renderer
 /// Says that rays of ao are too short for the cells that they are to meet.
 fn short_rays(renderer: &Renderer) -> Option<String> {
     let length = renderer.settings.effects.occlusion.map_or(f64::INFINITY, |occlusion| occlusion.length);
-    let cell = renderer.roma.finest_cell().filter(|cell| length < LEAST_CELLS * cell)?;
+    let cell = finest_cell(&renderer.methods).filter(|cell| length < LEAST_CELLS * cell)?;
     Some(format!(
         "--ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has here: \
          ao is coarse; make it longer, or use --secondary exact"
@@ -358,7 +359,8 @@ fn short_rays(renderer: &Renderer) -> Option<String> {
 
 /// Says which lamps do not light what diffuse rays meet.
 fn dark_lamps(renderer: &Renderer) -> Vec<String> {
-    let [others, areas] = renderer.rsm.left_out();
+    let Some(roma) = renderer.methods.get::<Roma>() else { return Vec::new() };
+    let [others, areas] = roma.rsm.left_out();
     let others = (others > 0).then(|| {
         format!(
             "what {others} weaker points, spots and distant lights light does not light diffuse rays; raise --rsm-lamps"

@@ -1,36 +1,34 @@
 //! The renderer that settings ask for.
 
-use super::engine::Engine;
 use super::lighting::lighting;
-use crate::frame::{Effects, Light, Moved, Occlusion, RenderSettings, Renderer, Schedule};
+use super::opened::Opened;
+use crate::frame::{Effects, Engine, Light, Methods, Moved, Occlusion, RenderSettings, Renderer};
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
-use crate::secondary::df::answer::Field;
-use crate::secondary::dvf::answer::Dvf;
+use crate::secondary::df::answer::Df;
 use crate::secondary::roma::answer::Roma;
-use crate::secondary::rsm::answer::Rsm;
-use crate::settings::{Secondary, Settings};
+use crate::settings::{Schedule, Secondary, Settings};
 use anyhow::Result;
 use std::path::Path;
 
-/// The renderer of the scene that `engine` has, the file `path`.
+/// The renderer of the scene that `opened` has, the file `path`.
 ///
 /// # Errors
 /// Those of [`lighting`].
-pub fn renderer(engine: Engine, path: &Path, settings: &Settings) -> Result<Renderer> {
-    let light = lighting(settings, &engine.scene, path)?.light;
-    Ok(lit_renderer(engine, settings, light))
+pub fn renderer(opened: Opened, path: &Path, settings: &Settings) -> Result<Renderer> {
+    let light = lighting(settings, &opened.scene, path)?.light;
+    Ok(lit_renderer(opened, settings, light))
 }
 
 /// The same with this light.
-pub fn lit_renderer(engine: Engine, settings: &Settings, light: Light) -> Renderer {
-    let Engine { scene, mut executor, cache, schedule, extent, .. } = engine;
+pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Renderer {
+    let Opened { scene, mut executor, cache, schedule, extent, .. } = opened;
     let render = render_settings(settings, schedule);
     if render.effects.has_bounces() {
         executor.allow_bounces();
     }
-    Renderer {
+    let engine = Engine {
         scene,
         executor,
         cache,
@@ -42,17 +40,33 @@ pub fn lit_renderer(engine: Engine, settings: &Settings, light: Light) -> Render
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
-        roma: Roma::new(settings.roma.bom),
-        field: Field::default(),
-        rsm: Rsm::default(),
-        dvf: Dvf::default(),
+    };
+    Renderer { engine, methods: methods(settings) }
+}
+
+/// The methods that answer secondary rays; a field of visibility is made or read later.
+pub fn methods(settings: &Settings) -> Methods {
+    let mut methods = Methods::default();
+    let (roma, df) = (&settings.roma, &settings.df);
+    match settings.secondary {
+        Secondary::Roma | Secondary::Auto => {
+            let is_auto = settings.secondary == Secondary::Auto;
+            methods.set(Roma::new(roma.settings(settings.rsm.settings(), is_auto), roma.bom));
+        }
+        Secondary::Df => methods.set(Df::new(df.settings(), roma.bom)),
+        Secondary::Exact | Secondary::Dvf => {}
     }
+    methods
+}
+
+/// Side of the finest base map of a method that has some, world units.
+pub fn finest_cell(methods: &Methods) -> Option<f64> {
+    let roma = methods.get::<Roma>().and_then(|roma| roma.base.finest_cell());
+    roma.or_else(|| methods.get::<Df>().and_then(|df| df.base.finest_cell()))
 }
 
 /// How frames are rendered, with this schedule in force.
 pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSettings {
-    let is_auto = settings.secondary == Secondary::Auto;
-    let has_maps = is_auto || settings.secondary == Secondary::Roma;
     RenderSettings {
         schedule,
         effects: effects(settings),
@@ -64,8 +78,6 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         guides: settings.denoise || settings.taa,
         taa: settings.taa,
         tile_bytes: settings.interactive,
-        roma: has_maps.then(|| settings.roma.settings(settings.rsm.settings(), is_auto)),
-        field: (settings.secondary == Secondary::Df).then(|| settings.df.settings()),
     }
 }
 

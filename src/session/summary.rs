@@ -1,9 +1,11 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
 use super::open::Session;
+use super::renderer::finest_cell;
 use crate::counters::Record;
 use crate::frame::Renderer;
 use crate::picture::exposure::Exposure;
+use crate::secondary::df::answer::Df;
 use crate::secondary::roma::Role;
 use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::handover::{Handover, Trust};

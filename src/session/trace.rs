@@ -1,6 +1,6 @@
 //! Rays that are given: closest hits, or occlusion.
 
-use super::engine::Engine;
+use super::opened::Opened;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout;
 use crate::kernels::layout::{NONE, Params, T_INFINITE};
@@ -37,7 +37,7 @@ pub struct Traced<'a> {
     pub most: usize,
 }
 
-impl Engine {
+impl Opened {
     /// For tracing.
     pub fn traced(&mut self) -> Traced<'_> {
         Traced {
@@ -103,7 +103,7 @@ pub fn device_ray(ray: &Ray, frame: &Frame) -> DeviceRay {
 /// # Errors
 /// A damaged brick, or the device's.
 pub fn trace(
-    engine: &mut Traced,
+    traced: &mut Traced,
     rays: &[Ray],
     any: bool,
     watch: &mut dyn FnMut(u64),
@@ -116,13 +116,13 @@ pub fn trace(
     // file.
     let mut groups: BTreeMap<[i64; 3], (Frame, Vec<usize>)> = BTreeMap::new();
     for (i, ray) in rays.iter().enumerate() {
-        let frame = Frame::near(engine.resident, DVec3::from_array(ray.origin));
+        let frame = Frame::near(traced.resident, DVec3::from_array(ray.origin));
         groups.entry(frame.reference).or_insert_with(|| (frame, Vec::new())).1.push(i);
     }
     for (frame, members) in groups.values() {
-        for chunk in members.chunks(engine.most) {
+        for chunk in members.chunks(traced.most) {
             let given: Vec<DeviceRay> = chunk.iter().map(|&i| device_ray(&rays[i], frame)).collect();
-            let found = trace_chunk(engine, frame, &given, any, &mut stats)?;
+            let found = trace_chunk(traced, frame, &given, any, &mut stats)?;
             for ((&i, given), (hit, weights)) in chunk.iter().zip(&given).zip(found) {
                 if hit.id != NONE {
                     let t = f64::from(hit.t) * given.t_scale;
@@ -137,18 +137,18 @@ pub fn trace(
 }
 
 fn trace_chunk(
-    engine: &mut Traced,
+    traced: &mut Traced,
     frame: &Frame,
     rays: &[DeviceRay],
     any: bool,
     stats: &mut PassStats,
 ) -> Result<Vec<(layout::Hit, [f32; 2])>> {
     let device: Vec<layout::Ray> = rays.iter().map(|r| r.ray).collect();
-    let hits = trace_device(engine, frame, &device, any, stats)?;
+    let hits = trace_device(traced, frame, &device, any, stats)?;
     if any {
         return Ok(hits.into_iter().map(|h| (h, [0.0; 2])).collect());
     }
-    let (executor, cache) = (&mut *engine.executor, &mut *engine.cache);
+    let (executor, cache) = (&mut *traced.executor, &mut *traced.cache);
     attributes::resolve(executor, cache, Pass::Primary, stats)?;
     let gbuffer = executor.read_gbuffer()?;
     Ok(hits.into_iter().zip(gbuffer).map(|(h, g)| (h, g.weights)).collect())
@@ -159,18 +159,18 @@ fn trace_chunk(
 /// # Errors
 /// A damaged brick, or the device's.
 pub fn trace_device(
-    engine: &mut Traced,
+    traced: &mut Traced,
     frame: &Frame,
     rays: &[layout::Ray],
     any: bool,
     stats: &mut PassStats,
 ) -> Result<Vec<layout::Hit>> {
     let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
-    let (executor, cache) = (&mut *engine.executor, &mut *engine.cache);
+    let (executor, cache) = (&mut *traced.executor, &mut *traced.cache);
     executor.begin_frame(&View { frame: *frame, params: Params::default(), directions: Directions::default() });
     executor.set_rays(pass, rays);
     cache.begin_pass("trace", 0);
-    let trace = match engine.schedule {
+    let trace = match traced.schedule {
         // Rays that are given have nothing in common that tiles could use.
         Schedule::Demand | Schedule::Auto => demand::trace,
         Schedule::Chc => chc::trace,

@@ -11,7 +11,7 @@ use crate::frame::{Pixels, Renderer};
 use crate::gpu::device::candidates;
 use crate::kernels::DeviceInfo;
 use crate::output::atomic;
-use crate::session::engine::{Engine, open_scene};
+use crate::session::opened::{Opened, open_scene};
 use crate::session::renderer::renderer;
 use crate::settings::sizes::human_count;
 use crate::settings::{Adapter, Settings as WalkSettings};
@@ -161,8 +161,8 @@ fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapt
         adapter: adapter.clone(),
         ..WalkSettings::default()
     };
-    let engine = Engine::open(open_scene(scene)?, scene, &own)?;
-    let renderer = renderer(engine, scene, &own)?;
+    let opened = Opened::open(open_scene(scene)?, scene, &own)?;
+    let renderer = renderer(opened, scene, &own)?;
     let info = renderer.executor.device();
     Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
 }

@@ -13,7 +13,7 @@ use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
 use crate::schedule::{ExecutorError, PassStats};
-use crate::session::engine::{Engine, open_scene, scaled_threshold};
+use crate::session::opened::{Opened, open_scene, scaled_threshold};
 use crate::session::renderer::{render_settings, renderer};
 use crate::settings::{Adapter, CacheSize, Effect, EffectList, Settings as WalkSettings, Turn};
 use crate::stream::{Item, Residency};
@@ -76,8 +76,8 @@ impl<'a> Bench<'a> {
     ) -> Result<Self> {
         let open = |variant: Variant| -> Result<Renderer> {
             let own = of_case(&Case { variant, ..*case }, settings, adapter);
-            let engine = Engine::open(open_scene(&place.scene)?, &place.scene, &own)?;
-            let mut renderer = renderer(engine, &place.scene, &own)?;
+            let opened = Opened::open(open_scene(&place.scene)?, &place.scene, &own)?;
+            let mut renderer = renderer(opened, &place.scene, &own)?;
             renderer.executor.allow_bounces();
             Ok(renderer)
         };

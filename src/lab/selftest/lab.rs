@@ -12,7 +12,7 @@ use crate::kernels::layout::{Hit, NONE, Ray, T_INFINITE};
 use crate::reference::{Tally, Truth, TruthRay, judge, judge_any};
 use crate::schedule::PassStats;
 use crate::session::device::Device;
-use crate::session::engine::{Engine, Needs, open_scene};
+use crate::session::opened::{Needs, Opened, open_scene};
 use crate::session::renderer::renderer;
 use crate::session::trace::{EXTENT, for_rays, trace_device};
 use crate::settings::{Adapter, CacheSize, Effect, EffectList, ImageSize, Schedule, Settings};
@@ -52,7 +52,7 @@ pub struct Stage {
     /// The file.
     pub file: Arc<SceneFile>,
     /// What traces.
-    pub engine: Engine,
+    pub opened: Opened,
 }
 
 impl Lab {
@@ -114,8 +114,8 @@ impl Lab {
     /// # Errors
     /// The cache's, the device's.
     pub fn open_stage(&mut self, file: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Stage> {
-        let engine = self.engine(file.clone(), path, &for_rays(settings))?;
-        Ok(Stage { file, engine })
+        let opened = self.opened(file.clone(), path, &for_rays(settings))?;
+        Ok(Stage { file, opened })
     }
 
     /// Opens a scene for frames.
@@ -123,13 +123,13 @@ impl Lab {
     /// # Errors
     /// The cache's, the device's.
     pub fn renderer(&mut self, file: &Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Renderer> {
-        let engine = self.engine(file.clone(), path, settings)?;
-        renderer(engine, path, settings)
+        let opened = self.opened(file.clone(), path, settings)?;
+        renderer(opened, path, settings)
     }
 
-    fn engine(&mut self, file: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Engine> {
+    fn opened(&mut self, file: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Opened> {
         let page_bytes = self.device.page_bytes();
-        Engine::open_on(file, path, settings, page_bytes, |needs| self.executor(needs))
+        Opened::open_on(file, path, settings, page_bytes, |needs| self.executor(needs))
     }
 
     fn executor(&mut self, needs: Needs) -> Result<Box<dyn FrameExecutor>> {
@@ -206,7 +206,7 @@ impl Stage {
     pub fn trace(&mut self, frame: &Frame, rays: &[Ray], any: bool) -> Result<Vec<Hit>> {
         let mut hits = Vec::with_capacity(rays.len());
         for chunk in rays.chunks(EXTENT.rays()) {
-            hits.extend(trace_device(&mut self.engine.traced(), frame, chunk, any, &mut PassStats::default())?);
+            hits.extend(trace_device(&mut self.opened.traced(), frame, chunk, any, &mut PassStats::default())?);
         }
         Ok(hits)
     }

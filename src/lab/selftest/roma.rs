@@ -55,21 +55,21 @@ fn stage(lab: &mut Lab) -> Result<Stage> {
 /// Has the stage's device make the maps.
 fn make(stage: &mut Stage, boms: Vec<Bom>, maps: &RomaMaps) -> Result<()> {
     let frame = stage.frame(DVec3::ZERO);
-    let executor = &mut *stage.engine.executor;
+    let executor = &mut *stage.opened.executor;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     maps.give(executor, &Arc::new(Cascades { levels: boms }))?;
-    executor.run(Pass::Shadow(Lamp::Sun), &[maps.rotate()], &stage.engine.cache.states)?;
+    executor.run(Pass::Shadow(Lamp::Sun), &[maps.rotate()], &stage.opened.cache.states)?;
     Ok(())
 }
 
 /// What the maps that were made answer.
 fn answers(stage: &mut Stage, maps: &RomaMaps, rays: &[Ray], steps: u32) -> Result<Vec<Hit>> {
     let pass = Pass::Shadow(Lamp::Sun);
-    let executor = &mut *stage.engine.executor;
+    let executor = &mut *stage.opened.executor;
     let mut hits = Vec::with_capacity(rays.len());
     for chunk in rays.chunks(EXTENT.rays()) {
         executor.set_rays(pass, chunk);
-        executor.run(pass, &[Step::StartHits, maps.trace(steps, RomaPart::Whole)], &stage.engine.cache.states)?;
+        executor.run(pass, &[Step::StartHits, maps.trace(steps, RomaPart::Whole)], &stage.opened.cache.states)?;
         hits.extend_from_slice(&executor.read_hits(pass)?[..chunk.len()]);
     }
     Ok(hits)

@@ -7,7 +7,7 @@ use super::views::{city, in_city, pixels_unlike};
 use crate::frame::{Pixels, Renderer};
 use crate::kernels::layout::Ray;
 use crate::schedule::Optimisation;
-use crate::session::engine::open_scene;
+use crate::session::opened::open_scene;
 use crate::settings::{CacheSize, Schedule, Settings};
 use crate::stream::{Item, PayloadSource, Policy, Residency};
 use anyhow::{Context, Result, anyhow};

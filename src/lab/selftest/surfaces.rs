@@ -21,7 +21,7 @@ use glam::{DVec3, Vec3};
 fn surfaces(stage: &mut Stage, frame: &Frame, rays: &[Ray]) -> Result<Vec<(Hit, Surface)>> {
     let rays = &rays[..rays.len().min(EXTENT.rays())];
     let hits = stage.trace(frame, rays, false)?;
-    let surfaces = stage.engine.executor.read_surfaces(Pass::Primary)?;
+    let surfaces = stage.opened.executor.read_surfaces(Pass::Primary)?;
     Ok(hits.into_iter().zip(surfaces).collect())
 }
 

@@ -106,13 +106,13 @@ pub fn directions(lab: &mut Lab) -> Result<Checks> {
             t_max: f64::INFINITY,
         })
         .collect();
-    let (expected, _) = trace(&mut stage.engine.traced(), &base, false, &mut |_| ())?;
+    let (expected, _) = trace(&mut stage.opened.traced(), &base, false, &mut |_| ())?;
     let (mut unlike, mut of) = (0, 0);
     for power in [-1000, -300, -60, -1, 1, 60, 300, 1000] {
         let length = f64::from(power / 2).exp2() * f64::from(power - power / 2).exp2();
         let scaled: Vec<npy::Ray> =
             base.iter().map(|ray| npy::Ray { direction: ray.direction.map(|x| x * length), ..*ray }).collect();
-        let (hits, _) = trace(&mut stage.engine.traced(), &scaled, false, &mut |_| ())?;
+        let (hits, _) = trace(&mut stage.opened.traced(), &scaled, false, &mut |_| ())?;
         let same = |(a, b): &(&npy::Hit, &npy::Hit)| a.triangle == b.triangle && a.t / length == b.t && a.u == b.u;
         unlike += expected.iter().zip(&hits).filter(|pair| !same(pair)).count() as u64;
         of += count as u64;

@@ -43,7 +43,7 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
     field.masks[up as usize / 32] |= 1 << (up % 32);
     field.finish(false);
     checks.equal("cells of which something is known", field.known_cells(), 1);
-    let executor = &mut *stage.engine.executor;
+    let executor = &mut *stage.opened.executor;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let ray = |origin: [f32; 3], direction: [f32; 3]| Ray { origin, t_min: 0.0, direction, t_max: f32::MAX };
     let (upward, aside) = ([1e-3, 1.0, 1e-3], [1.0, 0.1, 0.1]);
@@ -63,7 +63,7 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
     let field = Arc::new(field);
     DvfMaps::to_answer(&field, &frame, DvfUse { doubt: true, ..DvfUse::default() }).give(executor)?;
     executor.set_rays(PASS, &rays);
-    let report = executor.run(PASS, &[Step::StartHits, kernels::sift()], &stage.engine.cache.states)?;
+    let report = executor.run(PASS, &[Step::StartHits, kernels::sift()], &stage.opened.cache.states)?;
     let hits = executor.read_hits(PASS)?;
     for ((what, ray, is_answered), hit) in cases.iter().zip(&hits) {
         checks.equal(&format!("{what}: answered"), hit.t < ray.t_min, *is_answered);
@@ -96,8 +96,8 @@ pub fn prefix_sums(lab: &mut Lab) -> Result<Checks> {
     let area = |t: &DvfTriangle| f64::from(t.b[0]) * f64::from(t.c[1]);
     let truth: f64 = triangles.iter().map(area).sum();
     let frame = stage.frame(DVec3::ZERO);
-    let executor = &mut *stage.engine.executor;
-    let states = &stage.engine.cache.states;
+    let executor = &mut *stage.opened.executor;
+    let states = &stage.opened.cache.states;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let shape = Shape::new(DVec3::ZERO, DVec3::ONE, 1, 8);
     let plan = DvfSettings { points: 10_000_000, rays: 1, ..DvfSettings::default() };

@@ -1,6 +1,6 @@
 //! Options of `--secondary df`.
 
-use super::{FieldSettings, Tracing};
+use super::{DfSettings, Tracing};
 use crate::settings::{Rule, settings};
 
 /// Look-ups of shadow rays (Zeng et al., §7).
@@ -26,8 +26,8 @@ settings! {
 
 impl Options {
     /// How rays are answered.
-    pub fn settings(&self) -> FieldSettings {
-        FieldSettings {
+    pub fn settings(&self) -> DfSettings {
+        DfSettings {
             size: self.size,
             occlusion_steps: self.steps.unwrap_or(Tracing::default().iterations),
             shadow_steps: self.steps.unwrap_or(SHADOW_STEPS),

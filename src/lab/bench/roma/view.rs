@@ -12,7 +12,7 @@ use crate::scene::{Camera, CameraPath};
 use crate::schedule::cache::Cache;
 use crate::secondary::occupancy::BaseMaps;
 use crate::secondary::roma::answer::Roma;
-use crate::session::engine::{Engine, open_scene};
+use crate::session::opened::{Opened, open_scene};
 use crate::session::renderer::{methods, render_settings, renderer};
 use crate::settings::{Adapter, CacheSize, Schedule, Settings};
 use crate::stream::Residency;
@@ -48,8 +48,8 @@ impl<'a> View<'a> {
     pub fn open(job: &'a Job, place: &Place, settings: &'a Scale, adapter: &'a Adapter) -> Result<Self> {
         let scene = place.scene.clone();
         let own = of_job(job, &job.settings, &Way::Exact, settings, adapter);
-        let engine = Engine::open(open_scene(&scene)?, &scene, &own)?;
-        let renderer = renderer(engine, &scene, &own)?;
+        let opened = Opened::open(open_scene(&scene)?, &scene, &own)?;
+        let renderer = renderer(opened, &scene, &own)?;
         let path = place.path(Path::Near)?;
         let camera = path.frame(job.frames[0], 30);
         Ok(Self { job, scene, renderer, path, camera, settings, adapter })

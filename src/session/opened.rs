@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// A scene on a device.
-pub struct Engine {
+pub struct Opened {
     /// The scene.
     pub scene: Arc<SceneFile>,
     /// The executor.
@@ -80,7 +80,7 @@ pub fn scaled_threshold(threshold: u32, tile: u32) -> u32 {
     (f64::from(threshold) * f64::from(tile).powi(2) / 40_000.0) as u32
 }
 
-impl Engine {
+impl Opened {
     /// Opens device, cache and workers for `scene`, the file `path`.
     ///
     /// # Errors
@@ -89,10 +89,10 @@ impl Engine {
         Self::open_keeping(scene, path, settings, Keep::default())
     }
 
-    /// [`Engine::open`] with what `keep` says though the scene does not need it.
+    /// [`Opened::open`] with what `keep` says though the scene does not need it.
     ///
     /// # Errors
-    /// As [`Engine::open`].
+    /// As [`Opened::open`].
     pub fn open_keeping(scene: Arc<SceneFile>, path: &Path, settings: &Settings, keep: Keep) -> Result<Self> {
         if let Some(file) = &settings.requests_out {
             // Said before the work rather than after it.
@@ -103,17 +103,17 @@ impl Engine {
         }
         let device = Device::open(&settings.adapter)?;
         let page_bytes = device.page_bytes();
-        let mut engine = Self::open_on(scene, path, settings, page_bytes, |needs| {
+        let mut opened = Self::open_on(scene, path, settings, page_bytes, |needs| {
             device.executor(needs.scene, needs.host, needs.threads, needs.page_sizes, Setup { keep, ..needs.setup })
         })?;
-        engine.cache.states.keep_asking(keep.queries);
-        Ok(engine)
+        opened.cache.states.keep_asking(keep.queries);
+        Ok(opened)
     }
 
-    /// As [`Engine::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
+    /// As [`Opened::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
     ///
     /// # Errors
-    /// As [`Engine::open`].
+    /// As [`Opened::open`].
     pub fn open_on(
         scene: Arc<SceneFile>,
         path: &Path,
