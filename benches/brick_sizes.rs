@@ -10,7 +10,7 @@
 mod common;
 
 use brickwalk::output::atomic;
-use brickwalk::session::open::{brick_bytes, open_scene};
+use brickwalk::session::opened::{brick_bytes, open_scene};
 use clap::Parser;
 use common::{brickwalk, bytes_moved, device_ms, median, number, records, summary, walk};
 use std::fmt::Write;

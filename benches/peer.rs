@@ -6,8 +6,9 @@
 //! resident. Rates are rays by processor time of all threads, the best of the repetitions: of ours with the walk from
 //! the root (`plain`) and with tiles' lists (`chc`), of Embree with single rays and with packets of 4, 8 and 16.
 
+mod common;
+
 use bricks::Payload;
-use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::counters::Counters;
 use brickwalk::kernels::frame::{Frame, Placement};
 use brickwalk::kernels::layout::{Hit, NONE, Params, Ray, Surface, T_INFINITE};
@@ -16,10 +17,9 @@ use brickwalk::kernels::trace::leaf::rows_point;
 use brickwalk::kernels::{Directions, Extent, View};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::{Lamp, Pass, Step, plain};
-use brickwalk::session::open::{Session, open_scene};
-use clap::Parser;
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::settings::{Adapter, CacheSize, ImageSize, Schedule, Settings};
 use glam::DVec3;
-use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -55,32 +55,34 @@ fn random(state: &mut u64) -> f64 {
 fn city(triangles: &str) -> PathBuf {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("peer-{triangles}.bricks"));
     if !path.exists() {
-        let words = ["brickwalk", "scene", "city", "--triangles", triangles, "-o"].map(OsString::from);
-        let cli = Cli::parse_from(words.into_iter().chain([path.clone().into()]));
-        brickwalk::cli::run(&cli.command).expect("a city");
+        common::city(triangles, &path);
     }
     path
 }
 
 /// The scene on the processor, and the rays.
 struct Ours {
-    session: Session,
+    session: Opened,
     frame: Frame,
     sets: [Vec<Ray>; 3],
 }
 
 impl Ours {
     fn new(path: &Path) -> Self {
-        let words = "brickwalk walk s -o o --adapter cpu --cache 100% --schedule plain";
-        let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else {
-            unreachable!("it says walk")
+        let settings = Settings {
+            adapter: Adapter::Cpu,
+            cache: CacheSize::Percent(100.0),
+            schedule: Schedule::Plain,
+            size: ImageSize { width: EXTENT.width, height: EXTENT.height },
+            tile: EXTENT.tile,
+            ..Settings::default()
         };
         let scene = open_scene(path).expect("the scene");
-        let mut session = Session::open(scene.clone(), path, &args.stream, EXTENT).expect("a session");
+        let mut session = Opened::open(scene.clone(), path, &settings).expect("a session");
         let camera = CameraPath::read(&path.with_extension("near.json")).expect("its path").frame(0, 30);
         let frame = Frame::near(scene.resident(), camera.position);
         session.executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
-        let Session { executor, cache, .. } = &mut session;
+        let Opened { executor, cache, .. } = &mut session;
         plain::make_all_resident(&mut **executor, cache, &mut Counters::default()).expect("room for all");
         let basis = camera.ray_basis(EXTENT.width, EXTENT.height);
         let origin = frame.point(camera.position);

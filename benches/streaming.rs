@@ -2,13 +2,13 @@
 //! buffer: the physical limit of a verified copy by one thread. The upload path is named. The indices in a payload are
 //! checked when it is loaded for the first time, which is in the warm-up.
 
-use brickwalk::cli::options::args::{Cli, Command};
+mod common;
+
 use brickwalk::gpu::device::Gpu;
-use brickwalk::kernels::Extent;
 use brickwalk::schedule::Load;
-use brickwalk::session::open::{Session, brick_bytes, open_scene};
+use brickwalk::session::opened::{Opened, brick_bytes, open_scene};
+use brickwalk::settings::{CacheSize, ImageSize, Settings};
 use brickwalk::stream::{Item, Slot};
-use clap::Parser;
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -17,9 +17,7 @@ use std::time::Duration;
 fn scene() -> PathBuf {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("streaming-6M.bricks");
     if !path.exists() {
-        let words = ["brickwalk", "scene", "city", "--triangles", "6M", "-o"].map(std::ffi::OsString::from);
-        let cli = Cli::parse_from(words.into_iter().chain([path.clone().into()]));
-        brickwalk::cli::run(&cli.command).expect("a city");
+        common::city("6M", &path);
     }
     path
 }
@@ -61,13 +59,10 @@ fn streaming(c: &mut Criterion) {
     }
     mapped.unmap();
 
-    for (name, options) in [("file", "--host-cache 0"), ("host cache", "--host-cache 4G")] {
-        let words = format!("brickwalk walk s -o o --cache 100% {options}");
-        let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else {
-            unreachable!("it says walk")
-        };
-        let extent = Extent { width: 64, height: 64, tile: 64 };
-        let mut session = Session::open(file.clone(), &path, &args.stream, extent).expect("a session");
+    for (name, host_cache) in [("file", 0), ("host cache", 4 << 30)] {
+        let size = ImageSize { width: 64, height: 64 };
+        let settings = Settings { cache: CacheSize::Percent(100.0), host_cache, size, ..Settings::default() };
+        let mut session = Opened::open(file.clone(), &path, &settings).expect("a session");
         let upload = session.executor.device().upload;
         let loads = place(&session, &bricks);
         group.bench_function(BenchmarkId::new(format!("brickwalk from the {name}"), upload), |b| {
@@ -83,7 +78,7 @@ fn streaming(c: &mut Criterion) {
 }
 
 /// All geometry one after the other in the pages of an empty cache.
-fn place(session: &Session, bricks: &[brickwalk::schedule::cache::BrickBytes]) -> Vec<Load> {
+fn place(session: &Opened, bricks: &[brickwalk::schedule::cache::BrickBytes]) -> Vec<Load> {
     let pages: Vec<u64> = session.cache.residency.page_sizes().collect();
     let (mut page, mut offset) = (0usize, 0u64);
     let mut loads = Vec::new();

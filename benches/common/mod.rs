@@ -15,6 +15,11 @@ pub fn brickwalk(command: &str, paths: &[&Path], words: &str) {
     assert!(status.expect("the command starts").success(), "{command} {paths:?} {words}");
 }
 
+/// Generates a city of so many triangles.
+pub fn city(triangles: &str, scene: &Path) {
+    brickwalk("scene city -o", &[scene], &format!("--triangles {triangles}"));
+}
+
 /// Walks `scene` along `path` into `output`.
 pub fn walk(scene: &Path, path: &Path, output: &Path, words: &str) {
     brickwalk("walk", &[scene, Path::new("--path"), path, Path::new("-o"), output], words);

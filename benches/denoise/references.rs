@@ -1,14 +1,12 @@
 //! Pictures of many samples, kept on disk and not made twice.
 
 use super::Options;
-use brickwalk::cli::options::args::{Cli, Command};
-use brickwalk::cli::walk;
 use brickwalk::frame::Renderer;
-use brickwalk::kernels::Extent;
 use brickwalk::output::atomic;
 use brickwalk::scene::Camera;
-use brickwalk::session::open::{Session, open_scene};
-use clap::Parser;
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::renderer;
+use brickwalk::settings::{Adapter, CacheSize, Group, ImageSize, Schedule, Settings};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -21,14 +19,18 @@ const SEEDS: [u32; 2] = [101, 202];
 /// Renders the scene with the options of `walk` in `words`.
 pub fn renderer(options: &Options, words: &str) -> Renderer {
     let (width, height) = options.size();
-    let words = format!(
-        "brickwalk walk scene -o o --size {width}x{height} --tile 32 --cache 100% --schedule plain --adapter cpu {words}"
-    );
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    let extent = Extent { width, height, tile: args.stream.tile };
+    let mut settings = Settings {
+        size: ImageSize { width, height },
+        tile: 32,
+        cache: CacheSize::Percent(100.0),
+        schedule: Schedule::Plain,
+        adapter: Adapter::Cpu,
+        ..Settings::default()
+    };
+    settings.set_options(words).expect("options of walk");
     let scene = open_scene(&options.scene).expect("the scene");
-    let session = Session::open(scene, &options.scene, &args.stream, extent).expect("a session");
-    walk::renderer(session, &args).expect("lamps")
+    let engine = Opened::open(scene, &options.scene, &settings).expect("a session");
+    renderer::renderer(engine, &options.scene, &settings).expect("lamps")
 }
 
 /// The pictures of one setting.

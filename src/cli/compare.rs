@@ -1,8 +1,8 @@
 //! `compare`: how far an image is from a reference.
 
 use super::options::args::CompareArgs;
-use super::options::sizes::human_count;
 use crate::metrics::{Comparison, FlipKind, compare, load};
+use crate::settings::sizes::human_count;
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt::Write;

@@ -2,7 +2,7 @@
 
 use super::interrupt;
 use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
-use super::options::sizes::{human_bytes, human_count};
+use crate::settings::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
 use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, TILESET, import};

@@ -2,9 +2,9 @@
 
 use super::instances;
 use super::options::args::InfoArgs;
-use super::options::sizes::{human_bytes, human_count};
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
-use crate::session::open::scene_bytes;
+use crate::session::opened::scene_bytes;
+use crate::settings::sizes::{human_bytes, human_count};
 use crate::stream::Residency;
 use anyhow::{Context, Result};
 use bricks::{

@@ -2,27 +2,24 @@
 //! line on standard error), 2 wrong usage.
 
 pub mod adapters;
+#[cfg(feature = "lab")]
+pub mod bench;
 pub mod compare;
 pub mod convert;
 pub mod demo;
-pub mod dvf;
 pub mod info;
 pub mod instances;
 pub mod interrupt;
-pub mod left_out;
-pub mod motion;
 pub mod options;
-pub mod pictures;
 pub mod quality;
 pub mod repair;
 pub mod replay;
 pub mod scene;
-pub mod summary;
 pub mod trace;
 pub mod verify;
 pub mod walk;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use options::args::{Cli, Command};
 use options::removed;
 use std::io::Write;
@@ -41,7 +38,14 @@ pub struct Usage(pub String);
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     install_panic_hook();
-    let cli = match Cli::try_parse().map_err(removed::explained) {
+    let words: Vec<_> = std::env::args_os().collect();
+    if words.get(1).is_some_and(|word| word == "walk") && words.iter().any(|word| word == "--help-all") {
+        return match print(&walk_help_all()) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => report(&error),
+        };
+    }
+    let cli = match Cli::try_parse_from(words).map_err(removed::explained) {
         Ok(cli) => cli,
         Err(error) => {
             // A closed pipe is no reason to fail, and there is nobody to tell.
@@ -69,21 +73,24 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Repair(args) => repair::run(args),
-        Command::Walk(args) => {
-            args.optimisations.check(&args.stream)?;
-            args.check()?;
-            walk::run(args)
-        }
-        Command::Trace(args) => {
-            args.check()?;
-            trace::run(args)
-        }
+        Command::Walk(args) => walk::run(args),
+        Command::Trace(args) => trace::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),
-        Command::Bench(args) => crate::lab::bench::run(args),
+        #[cfg(feature = "lab")]
+        Command::Bench(args) => bench::run(args),
         Command::Adapters(args) => adapters::run(args),
-        Command::Selftest(args) => crate::lab::selftest::run(args),
+        #[cfg(feature = "lab")]
+        Command::Selftest(args) => bench::test(args),
     }
+}
+
+/// The help of `walk` with all its options.
+fn walk_help_all() -> String {
+    let mut cli = Cli::command();
+    cli.build();
+    let walk = cli.find_subcommand("walk").cloned().unwrap_or(cli);
+    walk.mut_args(|argument| argument.hide_long_help(false)).render_long_help().to_string()
 }
 
 /// Prints an error as one line and chooses the exit status.

@@ -1,7 +1,7 @@
 //! What a scene takes and how well its trees are built: sizes by section, bytes a triangle, the sizes of bricks,
 //! depths, surface-area costs.
 
-use super::options::sizes::{human_bytes, human_count};
+use crate::settings::sizes::{human_bytes, human_count};
 use anyhow::Result;
 use bricks::layout::{DIRECTORY_BYTES, PAGE_BYTES};
 use bricks::{AttributeLayout, Brick, GeometryLayout, Node, Payload, Resident, SceneFile, Section};

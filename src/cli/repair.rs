@@ -7,8 +7,8 @@
 
 use super::convert::{expand, mesh_settings, usage, work_settings};
 use super::options::args::RepairArgs;
-use super::options::sizes::human_bytes;
 use super::{interrupt, verify};
+use crate::settings::sizes::human_bytes;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::layout::PAGE_BYTES;
 use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};

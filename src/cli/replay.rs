@@ -1,8 +1,8 @@
 //! `brickwalk replay`: a recorded trace of requests against other cache sizes and policies.
 
 use super::options::args::ReplayArgs;
-use super::options::sizes::{CacheSize, human_bytes, human_count};
-use crate::session::open::cache_budget;
+use crate::session::opened::cache_budget;
+use crate::settings::sizes::{CacheSize, human_bytes, human_count};
 use crate::stream::{Replay, ReplayResult, Residency, ResidencyError, Trace, TraceError, replay};
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};

@@ -5,7 +5,7 @@ use super::convert::{build_settings, refuse_folder, summarise, usage};
 use super::interrupt;
 use super::options::args::{BuildArgs, SceneArgs};
 use super::options::scene_kind::SceneKind;
-use super::options::sizes::human_count;
+use crate::settings::sizes::human_count;
 use anyhow::{Context, Result};
 use brickwalk_convert::build::{BuildSettings, BuildSummary, build_source};
 use brickwalk_convert::progress::Progress;

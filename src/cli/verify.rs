@@ -1,7 +1,7 @@
 //! `verify`: every checksum and reference of a `.bricks` file.
 
 use super::options::args::VerifyArgs;
-use super::options::sizes::{human_bytes, human_count};
+use crate::settings::sizes::{human_bytes, human_count};
 use anyhow::{Result, bail};
 use bricks::{Error, Part, Payload, Section, VerifyReport};
 use brickwalk_convert::progress::Progress;

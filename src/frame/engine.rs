@@ -11,20 +11,7 @@ use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Which schedule traces a pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Schedule {
-    /// Tile lists, queries, loads nearest first.
-    Chc,
-    /// Every ray from the root over what is resident, then asking for what is missing.
-    Demand,
-    /// Everything resident, every ray from the root.
-    Plain,
-    /// Everything resident, every ray from the root, over binary trees; the executor has been made ready for it.
-    PlainBinary,
-    /// The cheapest of the first three, pass by pass.
-    Auto,
-}
+pub use crate::settings::Schedule;
 
 /// How frames are rendered.
 #[derive(Clone, Copy, Debug)]

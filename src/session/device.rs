@@ -6,50 +6,11 @@ use crate::gpu::device::{Candidate, Gpu, candidates};
 use crate::gpu::executor::GpuExecutor;
 use crate::gpu::probe;
 use crate::kernels::{DeviceInfo, FrameExecutor, Setup};
+use crate::settings::Adapter;
 use crate::stream::{HostCache, Workers};
 use anyhow::{Result, bail};
 use bricks::SceneFile;
-use std::convert::Infallible;
-use std::fmt;
-use std::str::FromStr;
 use std::sync::Arc;
-
-/// The name of the processor among the adapters.
-const CPU: &str = "cpu";
-
-/// What `--adapter` asks for.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Adapter {
-    /// A hardware GPU if there is one, else the processor.
-    #[default]
-    Auto,
-    /// The processor.
-    Cpu,
-    /// The graphics adapter whose name contains this, in any case.
-    Named(String),
-}
-
-impl FromStr for Adapter {
-    type Err = Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(match text {
-            "auto" => Self::Auto,
-            CPU => Self::Cpu,
-            name => Self::Named(name.into()),
-        })
-    }
-}
-
-impl fmt::Display for Adapter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Auto => "auto",
-            Self::Cpu => CPU,
-            Self::Named(name) => name,
-        })
-    }
-}
 
 /// What was chosen, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,14 +138,5 @@ mod tests {
         assert_eq!(chosen(&[(IntegratedGpu, true), (DiscreteGpu, false)]), Some(0));
         assert_eq!(chosen(&[(DiscreteGpu, false), (Cpu, true)]), None);
         assert_ne!(automatic(&found(&[(DiscreteGpu, false)])).why, automatic(&[]).why);
-    }
-
-    #[test]
-    fn names_are_read_and_written() {
-        for (text, adapter) in [("auto", Adapter::Auto), ("cpu", Adapter::Cpu), ("llvm", Adapter::Named("llvm".into()))]
-        {
-            assert_eq!(text.parse::<Adapter>(), Ok(adapter.clone()));
-            assert_eq!(adapter.to_string(), text);
-        }
     }
 }

@@ -1,13 +1,12 @@
-//! Sun, sky, environment and emitters of a walk, from the command line's options and from the scene.
+//! Sun, sky, environment and emitters of a session, from its settings and from the scene.
 
-use crate::cli::options::args::WalkArgs;
-use crate::cli::options::light_args::EnvironmentChoice;
 use crate::frame::{
     EnvironmentNotes, Equirectangular, Light, MOST_TRIANGLES, ShiningTriangles, SkyModel, emissive_triangles,
     environment,
 };
 use crate::kernels::Lamps;
 use crate::kernels::lamps::{Emitter, Shape};
+use crate::settings::{self, Settings};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::{LIGHT_DISTANT, LIGHT_SPOT, PunctualLight, Resident, SceneFile};
 use exr::prelude::{MetaData, ReadChannels, ReadLayers};
@@ -68,24 +67,20 @@ fn radius(resident: &Resident) -> f64 {
     0.5 * (DVec3::from_array(manifest.max) - DVec3::from_array(manifest.min)).length()
 }
 
-/// The light that the options of a walk through `file` ask for.
+/// The light of the scene `file`, whose name is `path`, by `settings`.
 ///
 /// # Errors
 /// An image that cannot be read or is too large; a brick that cannot be read.
-pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
-    let (options, effects) = (&args.light, args.effects.effects());
+pub fn lighting(settings: &Settings, file: &SceneFile, path: &Path) -> Result<Lighting> {
+    let effects = settings.effects;
+    let (sun_intensity, sky_intensity) = (settings.sun_intensity(), settings.sky_intensity);
     let mut warnings = Vec::new();
-    let mut light = Light::new(
-        DVec3::from_array(options.sun.0),
-        options.sun_angle,
-        options.sun_intensity() as f32,
-        options.sky_intensity as f32,
-    );
+    let mut light = Light::new(settings.sun.unit(), settings.sun_angle, sun_intensity as f32, sky_intensity as f32);
     let mut turn = 0.0;
-    let image = match &options.environment {
-        Some(EnvironmentChoice::Sky) => Some(physical_sky(&mut light, options.sun_intensity(), options.sky_intensity)),
-        Some(EnvironmentChoice::File(path)) => {
-            turn = options.environment_rotation;
+    let image = match &settings.environment {
+        Some(settings::Environment::Sky) => Some(physical_sky(&mut light, sun_intensity, sky_intensity)),
+        Some(settings::Environment::File(path)) => {
+            turn = settings.environment_rotation;
             let image = read(path)?;
             if image.width != 2 * image.height {
                 let (width, height) = (image.width, image.height);
@@ -98,9 +93,9 @@ pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
         }
         None => effects.environment.then(|| light.sky_image()),
     };
-    let prepared = image.map(|image| environment(image, options.environment_intensity, turn));
+    let prepared = image.map(|image| environment(image, settings.environment_intensity, turn));
     let (environment, notes) = prepared.unzip();
-    if let (Some(notes), Some(choice)) = (notes, &options.environment) {
+    if let (Some(notes), Some(choice)) = (notes, &settings.environment) {
         if notes.bad_texels > 0 {
             let count = notes.bad_texels;
             warnings.push(format!(
@@ -112,20 +107,20 @@ pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
         }
     }
     let mut sources = LampSources::default();
-    sources.fixed.extend(options.rectangle());
-    sources.fixed.extend(file.resident().lights.iter().map(|light| punctual(light, options.lights_intensity)));
+    sources.fixed.extend(rectangle(settings));
+    sources.fixed.extend(file.resident().lights.iter().map(|light| punctual(light, settings.lights_intensity)));
     if effects.shadow {
-        let found = emissive_triangles(file, MOST_TRIANGLES).with_context(|| args.scene.display().to_string())?;
+        let found = emissive_triangles(file, MOST_TRIANGLES).with_context(|| path.display().to_string())?;
         match found {
             Ok(triangles) => sources.shining = triangles,
             Err(count) => warnings.push(format!(
                 "{}: {count} triangles emit light, of which at most {MOST_TRIANGLES} can be lamps; their light comes by --effects \
                  diffuse alone",
-                args.scene.display()
+                path.display()
             )),
         }
     }
-    if effects.environment && args.effects.effects.ao {
+    if effects.environment && effects.ao {
         warnings.push(
             "--effects ao adds nothing beside environment, whose light has its own shadows: it is left out".into(),
         );
@@ -133,6 +128,13 @@ pub fn lighting(args: &WalkArgs, file: &SceneFile) -> Result<Lighting> {
     let resident = file.resident();
     light.lamps = Arc::new(Lamps::new(environment, sources.emitters(resident), radius(resident)));
     Ok(Lighting { light, sources, environment: notes, warnings })
+}
+
+/// The rectangular light, if there is one.
+fn rectangle(settings: &Settings) -> Option<Emitter> {
+    let radiance = [settings.rect_light_intensity as f32; 3];
+    let shape = |settings::Rectangle { corner, edges }| Shape::Parallelogram { corner, edges };
+    settings.rect_light.map(|light| Emitter { shape: shape(light), two_sided: false, radiance })
 }
 
 /// A light of the scene file, `scale` times as bright. Photometric units are taken as radiometric ones: 1 candela as 1

@@ -1,5 +1,17 @@
-//! The front door: opens a scene with an executor and a cache.
+//! The front door: open a scene, render frames, trace rays.
 
 pub mod device;
+pub mod left_out;
 pub mod lighting;
-pub mod open;
+pub mod motion;
+mod open;
+pub mod opened;
+mod pictures;
+pub mod renderer;
+pub mod summary;
+pub mod trace;
+
+pub use crate::output::npy::{Hit, Ray};
+pub use open::{Frame, Session, Watch, developed};
+pub use opened::{Opened, open_scene};
+pub use pictures::Pictures;

@@ -1,189 +1,392 @@
-//! Everything a walk or a trace works with, opened from the command line's options.
+//! A scene, opened for frames and for rays.
 
-use super::device::Device;
-use crate::cli::options::args::{Schedule as ScheduleArg, StreamArgs};
-use crate::cli::options::sizes::{CacheSize, option_bytes};
-use crate::frame::Schedule;
-use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
-use crate::schedule::cache::{BrickBytes, Cache, SceneBytes};
-use crate::stream::{HostCache, Policy, Residency, ResidencyError, Sizes, Trace};
+use super::left_out::{self, LeftOut};
+use super::lighting::{Lighting, lighting};
+use super::motion::SceneMotion;
+use super::opened::{Opened, open_scene};
+use super::renderer::{finest_cell, lit_renderer};
+use super::trace::{self, Traced};
+use crate::counters::Record;
+use crate::frame::{Accumulation, Captures, Engine, Light, Pixels, RenderError, Renderer};
+use crate::output::npy::{Hit, Ray};
+use crate::output::{exr, png, srgb};
+use crate::picture::denoise::Resolve;
+use crate::picture::exposure::Meter;
+use crate::picture::tone_map::ToneMap;
+use crate::scene::Camera;
+use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::secondary::dvf::prepare::{Note, prepare};
+use crate::secondary::roma::LEAST_CELLS;
+use crate::secondary::roma::answer::Roma;
+use crate::settings::{Secondary, Settings};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
-use std::io::Write;
-use std::path::Path;
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A scene on a device.
+/// Who watches long work, and may stop it. `()` does neither.
+pub trait Watch {
+    /// So many samples of the frame are finished, and this is their sum; whether to go on.
+    fn samples(&mut self, _finished: u32, _sum: &Accumulation) -> bool {
+        true
+    }
+
+    /// So many rays of a field of visibility have been traced, of about so many; whether to go on.
+    fn field(&mut self, _rays: u64, _about: u64) -> bool {
+        true
+    }
+}
+
+impl Watch for () {}
+
+/// A rendered frame.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Its number.
+    pub number: u32,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Radiance, and what else the settings ask for.
+    pub pixels: Pixels,
+    /// What each pass did.
+    pub records: Vec<Record>,
+    /// Stops (EV) that pictures of it are exposed by.
+    pub exposure_ev: f64,
+    /// How pictures of it show what is brighter than a display.
+    pub tone_map: ToneMap,
+}
+
+impl Frame {
+    /// The picture, 8-bit sRGB, row by row from the top.
+    pub fn picture(&self) -> Vec<[u8; 3]> {
+        developed(&self.pixels.radiance, self.exposure_ev, self.tone_map)
+    }
+
+    /// Writes the picture as a PNG.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_png(&self, file: &Path) -> Result<()> {
+        Ok(png::write(file, self.size.0, self.size.1, &self.picture())?)
+    }
+
+    /// Writes radiance, depth, normals, ids and albedo as an EXR; of a frame that was rendered with `aov`.
+    ///
+    /// # Errors
+    /// The file cannot be written; the frame has no AOVs.
+    pub fn write_exr(&self, file: &Path) -> Result<()> {
+        let Pixels { radiance, depth, normal, id, albedo } = &self.pixels;
+        if depth.len() != radiance.len() {
+            bail!("{}: the frame has no AOVs; render it with aov", file.display());
+        }
+        let (width, height) = self.size;
+        Ok(exr::write(file, &exr::Aovs { width, height, radiance, depth, normal, triangle: id, albedo })?)
+    }
+}
+
+/// Radiance as sRGB bytes: exposed by so many stops, mapped, encoded.
+pub fn developed(radiance: &[[f32; 3]], stops: f64, tone_map: ToneMap) -> Vec<[u8; 3]> {
+    if stops == 0.0 && tone_map == ToneMap::None {
+        return srgb::pixels(radiance);
+    }
+    let gain = stops.exp2() as f32;
+    let shown: Vec<[f32; 3]> = radiance.iter().map(|c| tone_map.apply(c.map(|x| x * gain))).collect();
+    srgb::pixels(&shown)
+}
+
+/// A scene on a device, with settings: it renders frames and traces rays.
 pub struct Session {
-    /// The scene.
-    pub scene: Arc<SceneFile>,
-    /// The executor.
-    pub executor: Box<dyn FrameExecutor>,
-    /// The cache.
-    pub cache: Cache,
-    /// The schedule in force.
-    pub schedule: Schedule,
+    pub(super) file: PathBuf,
+    pub(super) settings: Settings,
+    pub(super) path: CameraPath,
+    pub(super) renderer: Renderer,
+    pub(super) lighting: Lighting,
+    pub(super) resolve: Resolve,
+    /// What is known of the field of visibility; `None` before it is prepared.
+    pub(super) field: Option<Option<Note>>,
+    /// The stops of every frame so far.
+    pub(super) stops: Vec<f64>,
+    meter: Meter,
+    motion: Option<SceneMotion>,
+    /// Renders every frame exactly as well.
+    reference: Option<Renderer>,
+    /// What the first frame showed, to be rendered once more.
+    first: Option<(Arc<SceneFile>, Light)>,
+    warnings: Vec<String>,
 }
 
-/// What an executor is made for.
-pub struct Needs<'a> {
-    /// The scene.
-    pub scene: Arc<SceneFile>,
-    /// The host's cache.
-    pub host: Arc<HostCache>,
-    /// Threads that read payloads.
-    pub threads: usize,
-    /// Bytes of the cache's pages.
-    pub page_sizes: &'a [u64],
-    /// Picture, tiles and counting.
-    pub setup: Setup,
+impl Session {
+    /// Opens the scene file `file`, a device and a cache.
+    ///
+    /// # Errors
+    /// Settings that do not go together; a bad scene, path, motion, environment or cache; the device's.
+    pub fn open(file: impl AsRef<Path>, settings: &Settings) -> Result<Self> {
+        let file = file.as_ref();
+        settings.check()?;
+        let scene = open_scene(file)?;
+        check_occupancy(&scene, file, settings)?;
+        let manifest = &scene.resident().manifest;
+        let mut path = match &settings.path {
+            Some(file) => CameraPath::read(file)?,
+            None => path_from_bounds(manifest.min, manifest.max),
+        };
+        if let Some(fov) = settings.fov {
+            path = path.with_fov_y_degrees(fov)?;
+        }
+        let lighting = lighting(settings, &scene, file)?;
+        let motion = settings.motion.as_ref().map(|file| SceneMotion::open(file, &scene, &lighting.sources));
+        let motion = motion.transpose()?;
+        let opened = Opened::open(scene.clone(), file, settings)?;
+        let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned().collect();
+        let reference = settings.measure_error.then(|| reference(scene, file, settings, lighting.light.clone()));
+        let mut renderer = lit_renderer(opened, settings, lighting.light.clone());
+        renderer.captures = settings.measure_error.then(Captures::default);
+        Ok(Self {
+            file: file.into(),
+            settings: settings.clone(),
+            path,
+            renderer,
+            lighting,
+            resolve: Resolve::new(settings.denoise, settings.taa),
+            field: (settings.secondary != Secondary::Dvf).then_some(None),
+            stops: Vec::new(),
+            meter: Meter::new(settings.exposure),
+            motion,
+            reference: reference.transpose()?,
+            first: None,
+            warnings,
+        })
+    }
+
+    /// The camera path: that of the settings, or one made from the scene's bounds.
+    pub fn path(&self) -> &CameraPath {
+        &self.path
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// What renders, for measurements that go deeper.
+    pub fn renderer(&mut self) -> &mut Renderer {
+        &mut self.renderer
+    }
+
+    /// What a person should know since this was asked last, a line each.
+    pub fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// Makes or reads what `--secondary dvf` needs, which may take long; the first frame does so otherwise.
+    ///
+    /// # Errors
+    /// A brick that cannot be read; the device's; `watch` stopped it.
+    pub fn prepare(&mut self, watch: &mut dyn Watch) -> Result<()> {
+        if self.field.is_none() {
+            let Self { file, settings, path, renderer, warnings, .. } = self;
+            let note = prepare(renderer, file, settings, path, warnings, &mut |rays, about| watch.field(rays, about))?;
+            self.field = Some(note);
+        }
+        Ok(())
+    }
+
+    /// Renders the next frame, as `camera` sees it.
+    ///
+    /// # Errors
+    /// A brick that cannot be read, or the device's.
+    pub fn frame(&mut self, camera: &Camera) -> Result<Frame> {
+        let number = self.stops.len() as u32;
+        self.render(number, camera, &mut ())?.ok_or_else(|| anyhow!("interrupted"))
+    }
+
+    /// Renders frame `number` of the camera path, with what moves where it is then.
+    ///
+    /// # Errors
+    /// As [`Session::frame`]; a place that is too far out.
+    pub fn frame_at(&mut self, number: u32) -> Result<Frame> {
+        self.frame_watched(number, &mut ())?.ok_or_else(|| anyhow!("interrupted"))
+    }
+
+    /// [`Session::frame_at`], watched; `None`: it was stopped.
+    ///
+    /// # Errors
+    /// As [`Session::frame_at`].
+    pub fn frame_watched(&mut self, number: u32, watch: &mut dyn Watch) -> Result<Option<Frame>> {
+        let frames = self.settings.frames;
+        if let Some(motion) = &self.motion {
+            let time = self.path.time(number, frames);
+            motion.place(&mut self.renderer, time)?;
+            if let Some(reference) = &mut self.reference {
+                motion.place(reference, time)?;
+            }
+        }
+        self.render(number, &self.path.frame(number, frames), watch)
+    }
+
+    fn render(&mut self, number: u32, camera: &Camera, watch: &mut dyn Watch) -> Result<Option<Frame>> {
+        self.prepare(watch)?;
+        let name = || self.file.display().to_string();
+        let is_first = self.stops.is_empty();
+        let renderer = &mut self.renderer;
+        if is_first && self.settings.measure_left_out {
+            self.first = Some((renderer.scene.clone(), renderer.light.clone()));
+        }
+        let mut output = match renderer.frame_watched(number, camera, &mut |done, sum| watch.samples(done, sum)) {
+            Err(RenderError::Interrupted) => return Ok(None),
+            output => output.with_context(name)?,
+        };
+        if is_first {
+            self.warnings.extend(short_rays(renderer).into_iter().chain(dark_lamps(renderer)));
+        }
+        if let Some(reference) = &mut self.reference {
+            reference.frame(number, camera).with_context(name)?;
+            note_errors(&mut output.records, renderer, reference);
+        }
+        self.resolve.frame(&mut output);
+        let stops = self.meter.stops(&output.pixels.radiance, self.path.frame_time(self.settings.frames));
+        self.stops.push(stops);
+        Ok(Some(Frame {
+            number,
+            size: renderer.size,
+            pixels: output.pixels,
+            records: output.records,
+            exposure_ev: stops,
+            tone_map: self.settings.tone_map,
+        }))
+    }
+
+    /// Finds the closest hits of rays in world space, in their order; with `any` only whether there is one.
+    ///
+    /// # Errors
+    /// A ray that is none, by its number; a brick that cannot be read; the device's.
+    pub fn trace(&mut self, rays: &[Ray], any: bool) -> Result<Vec<Hit>> {
+        for (number, ray) in rays.iter().enumerate() {
+            trace::check(ray).with_context(|| format!("ray {number}"))?;
+        }
+        let Engine { scene, executor, cache, settings, size, .. } = &mut self.renderer.engine;
+        // What frames may leave out given rays must find.
+        let threshold = std::mem::take(&mut executor.tuning().threshold);
+        let mut traced = Traced {
+            resident: scene.resident(),
+            executor: &mut **executor,
+            cache,
+            schedule: settings.schedule,
+            most: (size.0 * size.1) as usize,
+        };
+        let found = trace::trace(&mut traced, rays, any, &mut |_| ());
+        self.renderer.executor.tuning().threshold = threshold;
+        let (hits, _) = found.with_context(|| self.file.display().to_string())?;
+        Ok(hits)
+    }
+
+    /// What was left out because the scene does not need it, as summaries list it; measured where settings ask for it.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn left_out(&mut self) -> Result<Vec<Value>> {
+        let all: Vec<LeftOut> = left_out::left_out(&mut self.renderer);
+        let camera = self.path.frame(0, self.settings.frames);
+        let measured: Vec<Map<String, Value>> = match &self.first {
+            Some((scene, light)) => left_out::measure(&all, scene, &self.file, &self.settings, light, &camera)?,
+            None => Vec::new(),
+        };
+        Ok(left_out::listed(&all, &measured))
+    }
+
+    /// Writes the trace of requests, if settings ask for one.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_requests(&self) -> Result<()> {
+        Opened::write_requests(&self.settings, &self.renderer.cache)
+    }
 }
 
-/// Opens a scene file.
-///
-/// # Errors
-/// It is missing, no scene, or damaged.
-pub fn open_scene(path: &Path) -> Result<Arc<SceneFile>> {
-    Ok(Arc::new(SceneFile::open(path)?))
-}
-
-/// Bytes of every brick's payloads as they are loaded.
-pub fn brick_bytes(scene: &SceneFile) -> Vec<BrickBytes> {
-    let record = |b: &bricks::Brick| BrickBytes {
-        bvh: u64::from(b.node_count) * size_of::<bricks::Node>() as u64,
-        geometry: b.geometry.bytes,
-        attributes: bricks::AttributeLayout::of(b).bytes,
-    };
-    scene.resident().bricks.iter().map(record).collect()
-}
-
-/// Bytes of everything that is streamed of a scene, as it is loaded.
-pub fn scene_bytes(scene: &SceneFile) -> SceneBytes {
-    let tiles = scene.resident().tiles.iter().map(|tile| tile.bytes).collect();
-    SceneBytes { bricks: brick_bytes(scene), tiles }
-}
-
-/// Bytes of the cache that `--cache` asks for, of a scene with bricks and tiles of `sizes`. Pages end before what does
-/// not fit into them: a cache that is to hold everything gets that room, too, and no more.
-pub fn cache_budget(cache: CacheSize, sizes: &Sizes, page_bytes: u64) -> u64 {
-    let all = sizes.sum();
-    let for_all = Residency::budget_for_all(sizes, page_bytes);
-    let asked = cache.bytes(all);
-    if asked >= all { asked.max(for_all).min(for_all.max(16)) } else { asked }
-}
-
-/// Writes the trace of requests, if one was asked for.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_requests(args: &StreamArgs, cache: &Cache) -> Result<()> {
-    if let (Some(file), Some(trace)) = (&args.requests_out, &cache.trace) {
-        trace.write_file(file).with_context(|| file.display().to_string())?;
+/// Refuses a scene without what methods need.
+fn check_occupancy(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()> {
+    let resident = scene.resident();
+    let has_occupancy = resident.bricks.is_empty() || !resident.occupancy.is_empty();
+    if !matches!(settings.secondary, Secondary::Exact | Secondary::Dvf) && !has_occupancy {
+        bail!(
+            "{}: --secondary {} needs the occupancy of bricks; convert the scene again without --no-proxies",
+            file.display(),
+            settings.secondary
+        );
     }
     Ok(())
 }
 
-/// The rays of a tile with edges of `tile` rays that `--query-threshold` comes to: it counts those of a tile of 200 x
-/// 200.
-pub fn scaled_threshold(threshold: u32, tile: u32) -> u32 {
-    (f64::from(threshold) * f64::from(tile).powi(2) / 40_000.0) as u32
+/// A renderer of the same frames, exactly, with a cache and a device session of its own.
+fn reference(scene: Arc<SceneFile>, file: &Path, settings: &Settings, light: Light) -> Result<Renderer> {
+    let settings = Settings {
+        query_threshold: 0,
+        requests_out: None,
+        secondary: Secondary::Exact,
+        interactive: None,
+        measure_needed: false,
+        aov: false,
+        ..settings.clone()
+    };
+    let opened = Opened::open(scene, file, &settings)?;
+    let mut reference = lit_renderer(opened, &settings, light);
+    reference.captures = Some(Captures::default());
+    Ok(reference)
 }
 
-impl Session {
-    /// Opens device, cache and workers for `scene`.
-    ///
-    /// # Errors
-    /// No device, a device that fails the start-up probe, a cache too small or too large.
-    pub fn open(scene: Arc<SceneFile>, path: &Path, args: &StreamArgs, extent: Extent) -> Result<Self> {
-        Self::open_keeping(scene, path, args, extent, Keep::default())
+/// Enters how far the effects of the frame just rendered are from the `reference`'s.
+fn note_errors(records: &mut [Record], renderer: &Renderer, reference: &Renderer) {
+    let (Some(captures), Some(exact)) = (&renderer.captures, &reference.captures) else { return };
+    for record in records {
+        let samples = renderer.settings.samples;
+        let error = captures.error(exact, record.pass, renderer.size.0, renderer.tile, samples);
+        record.error_mean = error.mean;
+        record.error_worst_tile = error.worst_tile;
+        record.error_pixels = error.pixels;
     }
+}
 
-    /// [`Session::open`] with what `keep` says though the scene does not need it.
-    ///
-    /// # Errors
-    /// As [`Session::open`].
-    pub fn open_keeping(
-        scene: Arc<SceneFile>,
-        path: &Path,
-        args: &StreamArgs,
-        extent: Extent,
-        keep: Keep,
-    ) -> Result<Self> {
-        if let Some(file) = &args.requests_out {
-            // Said before the work rather than after it.
-            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
-            if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
-                bail!("{}: --requests-out needs a file in a folder that exists", file.display());
-            }
-        }
-        let device = Device::open(&args.adapter)?;
-        let page_bytes = device.page_bytes();
-        let mut session = Self::open_on(scene, path, args, extent, page_bytes, |needs| {
-            device.executor(needs.scene, needs.host, needs.threads, needs.page_sizes, Setup { keep, ..needs.setup })
-        })?;
-        session.cache.states.keep_asking(keep.queries);
-        Ok(session)
-    }
+/// Says that rays of ao are too short for the cells that they are to meet.
+fn short_rays(renderer: &Renderer) -> Option<String> {
+    let length = renderer.settings.effects.occlusion.map_or(f64::INFINITY, |occlusion| occlusion.length);
+    let cell = finest_cell(&renderer.methods).filter(|cell| length < LEAST_CELLS * cell)?;
+    Some(format!(
+        "--ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has here: \
+         ao is coarse; make it longer, or use --secondary exact"
+    ))
+}
 
-    /// As [`Session::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
-    ///
-    /// # Errors
-    /// As [`Session::open`].
-    pub fn open_on(
-        scene: Arc<SceneFile>,
-        path: &Path,
-        args: &StreamArgs,
-        extent: Extent,
-        page_bytes: u64,
-        make: impl FnOnce(Needs) -> Result<Box<dyn FrameExecutor>>,
-    ) -> Result<Self> {
-        let name = path.display();
-        let bytes = scene_bytes(&scene);
-        let sizes = bytes.sizes();
-        let for_all = Residency::budget_for_all(&sizes, page_bytes);
-        let budget = cache_budget(args.cache, &sizes, page_bytes);
-        let schedule = match args.schedule {
-            ScheduleArg::Plain | ScheduleArg::PlainBvh2 if budget < for_all => bail!(
-                "{name}: --schedule {} keeps everything resident: give --cache 100% ({for_all} bytes) rather than \
-                 {budget} bytes, or use --schedule chc",
-                args.schedule.name()
-            ),
-            ScheduleArg::Plain => Schedule::Plain,
-            ScheduleArg::PlainBvh2 => Schedule::PlainBinary,
-            ScheduleArg::Chc => Schedule::Chc,
-            ScheduleArg::Demand => Schedule::Demand,
-            // Fronts and thresholds belong to chc; with a threshold the schedule shows in the picture.
-            ScheduleArg::Auto if args.fronts == "on" || args.query_threshold > 0 => Schedule::Chc,
-            ScheduleArg::Auto => Schedule::Auto,
-        };
-        let policy: Policy = args.evict.parse().map_err(|error: String| anyhow!(error).context("--evict"))?;
-        let residency = Residency::new(&sizes, budget, page_bytes, policy).map_err(|error| match error {
-            ResidencyError::CacheTooSmall { what, needed, given } => anyhow!(
-                "{name}: a cache of {given} bytes is too small: {what} need {needed} bytes; give --cache {} or more, or \
-                 convert the scene with fewer --brick-triangles",
-                option_bytes(needed)
-            ),
-            other => anyhow!(other).context(format!("{name}: --cache")),
-        })?;
-        let trace = args.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
-        let threshold = scaled_threshold(args.query_threshold, extent.tile);
-        if args.query_threshold > threshold && threshold == 0 {
-            let _ = writeln!(
-                std::io::stderr(),
-                "brickwalk: warning: --query-threshold {} is less than one ray of a tile of {}: nothing is left out; use a larger --tile",
-                args.query_threshold,
-                extent.tile
-            );
-        }
-        let setup = Setup { extent, threshold, count: args.count, keep: Keep::default() };
-        let page_sizes: Vec<u64> = residency.page_sizes().collect();
-        let host = HostCache::new(args.host_cache);
-        let threads = args.worker_count();
-        let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
-        let mut executor = make(needs).with_context(|| format!("{name}"))?;
-        if schedule == Schedule::PlainBinary {
-            executor.make_binary().with_context(|| format!("{name}"))?;
-        }
-        Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule })
+/// Says which lamps do not light what diffuse rays meet.
+fn dark_lamps(renderer: &Renderer) -> Vec<String> {
+    let Some(roma) = renderer.methods.get::<Roma>() else { return Vec::new() };
+    let [others, areas] = roma.rsm.left_out();
+    let others = (others > 0).then(|| {
+        format!(
+            "what {others} weaker points, spots and distant lights light does not light diffuse rays; raise --rsm-lamps"
+        )
+    });
+    let areas = (areas > 0).then(|| {
+        format!(
+            "what {areas} areas and surfaces that shine light does not light diffuse rays by --secondary roma; use \
+             --secondary exact for it"
+        )
+    });
+    others.into_iter().chain(areas).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposure_comes_before_the_tone_map() {
+        let radiance = [[0.25, 0.5, 1.0], [0.0, 4.0, f32::NAN]];
+        assert_eq!(developed(&radiance, 0.0, ToneMap::None), srgb::pixels(&radiance));
+        assert_eq!(developed(&radiance, -1.0, ToneMap::None), srgb::pixels(&radiance.map(|c| c.map(|x| 0.5 * x))));
+        let mapped = radiance.map(|c| ToneMap::Aces.apply(c.map(|x| 2.0 * x)));
+        assert_eq!(developed(&radiance, 1.0, ToneMap::Aces), srgb::pixels(&mapped));
+        // The control: the other way round it is something else.
+        assert_ne!(srgb::pixels(&mapped), srgb::pixels(&radiance.map(|c| ToneMap::Aces.apply(c).map(|x| 2.0 * x))));
     }
 }

@@ -1,10 +1,9 @@
 //! What the integration tests share: the command as a user runs it, scenes made once, folders that vanish.
 
-use brickwalk::cli::options::args::{Cli, Command as AppCommand};
 use brickwalk::frame::{Equirectangular, Renderer, environment};
-use brickwalk::kernels::{Extent, Lamps};
-use brickwalk::session::open::{Session, open_scene};
-use clap::Parser;
+use brickwalk::kernels::Lamps;
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::settings::{Adapter, Group, Settings};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -78,15 +77,21 @@ pub fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3;
     *count += row * (squares[1] + 1);
 }
 
+/// Settings that options of the command line stand for; the adapter is that of the environment unless they name one.
+pub fn settings(options: &str) -> Settings {
+    let mut settings = Settings::default();
+    if let Ok(adapter) = std::env::var("BRICKWALK_ADAPTER") {
+        settings.set("adapter", &adapter).expect("an adapter");
+    }
+    settings.set_options(options).expect("options");
+    settings
+}
+
 /// The renderer of a walk on the processor with these options.
 pub fn renderer(scene: &Path, options: &str) -> Renderer {
-    let words = format!("brickwalk walk {} -o o --adapter cpu {options}", scene.display());
-    let AppCommand::Walk(args) = Cli::try_parse_from(words.split_whitespace()).expect("options").command else {
-        panic!("a walk")
-    };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    brickwalk::cli::walk::renderer(session, &args).expect("lamps")
+    let settings = Settings { adapter: Adapter::Cpu, ..settings(options) };
+    let opened = Opened::open(open_scene(scene).expect("a scene"), scene, &settings).expect("a session");
+    brickwalk::session::renderer::renderer(opened, scene, &settings).expect("lamps")
 }
 
 /// One of these effects where an environment is the only light, and 1 everywhere.

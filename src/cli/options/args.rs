@@ -1,25 +1,17 @@
 //! The command line: every subcommand, every option with its unit and default. Values are validated here, so that
 //! commands receive only what they can use; what is wrong ends as usage with exit status 2.
 
-use super::dvf_args::DvfArgs;
-use super::field_args::FieldArgs;
+use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
-use super::light_args::{EffectArgs, LightArgs};
-use super::named::{named_values, unknown};
-use super::optimisation_args::OptimisationArgs;
-use super::picture_args::PictureArgs;
-use super::roma_args::RomaArgs;
 use super::scene_kind::{SceneKind, scene_help};
-use super::sizes::{CacheSize, ImageSize, positive_count, positive_count32, size_bytes};
-use crate::lab::bench::args::BenchArgs;
-use crate::lab::selftest::args::SelftestArgs;
-use crate::scene::camera::check_fov_y_degrees;
-use crate::session::device::Adapter;
-use crate::stream::Policy;
+#[cfg(feature = "lab")]
+use crate::cli::bench::{BenchArgs, TestArgs};
+use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
+use crate::settings::{Adapter, CacheSize, ImageSize, Settings, SettingsError};
 use brickwalk_convert::build::TextureEncoding;
 use brickwalk_scenes::Stiff;
 use clap::{Args, Parser, Subcommand};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Said at the end of every help text.
 pub(crate) const UNITS: &str = "Sizes are bytes and take K, M, G (powers of 1024); counts take K, M (powers of 1000).\n\
@@ -61,11 +53,13 @@ pub enum Command {
     /// Measure how far an image is from a reference: RMSE, relMSE, bias, FLIP
     Compare(CompareArgs),
     /// Measure: the experiments of the CHC+RT paper, repeated
+    #[cfg(feature = "lab")]
     Bench(BenchArgs),
     /// List what can render, and what is chosen
     Adapters(AdaptersArgs),
     /// Check the numerical stability of this machine's device, case by case
-    Selftest(SelftestArgs),
+    #[cfg(feature = "lab")]
+    Selftest(TestArgs),
 }
 
 /// Options of `adapters`.
@@ -242,6 +236,16 @@ pub struct SceneArgs {
     pub build: BuildArgs,
 }
 
+impl SceneArgs {
+    /// Those of a city of so many triangles, else the defaults.
+    pub fn city(output: PathBuf, triangles: u64, seed: u64) -> Self {
+        let work = WorkArgs { threads: None, lattice: None, memory: None, scratch: None, fast: false };
+        let build = BuildArgs { brick_triangles: None, no_proxies: false, resume: false, work };
+        let (kind, triangles) = (SceneKind::Generated(brickwalk_scenes::Kind::City), Some(triangles));
+        Self { kind, case: None, output, triangles, seed, instanced: false, copies: 1, build }
+    }
+}
+
 /// Options of `info`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
@@ -291,178 +295,59 @@ pub struct RepairArgs {
     pub mesh: MeshArgs,
 }
 
-/// Options of what streams bricks to a device.
-#[derive(Clone, Debug, Args)]
-pub struct StreamArgs {
-    /// Device memory for bricks and tiles of textures: a size, or a share P% of all of them; it must hold the two
-    /// largest bricks
-    #[arg(long, value_name = "SIZE|P%", default_value = "25%")]
-    pub cache: CacheSize,
-    /// Host memory for verified bricks; 0 keeps none
-    #[arg(long, value_name = "SIZE", default_value = "1G",
-        value_parser = |s: &str| if s == "0" { Ok(0) } else { size_bytes(s) })]
-    pub host_cache: u64,
-    /// How bricks to intersect are found: chc (tiles against the top level, loading what rays need), demand (one
-    /// traversal per ray over what is resident, loading what rays ask for), plain (everything resident, one traversal
-    /// per ray; the cache must hold the scene), auto (the cheapest of these by measurement, for each effect; chc with
-    /// --fronts on or a
-    /// --query-threshold). For measurements: plain-bvh2 (as plain, over binary trees made at the start, which take
-    /// memory beside the cache: the kind of baseline of the CHC+RT paper). Pictures are the same
-    #[arg(long, value_name = "NAME", default_value = "auto")]
-    pub schedule: Schedule,
-    /// Width and height of a screen tile in pixels, a power of two from 8 to 512
-    #[arg(long, value_name = "PIXELS", default_value = "64", value_parser = tile)]
-    pub tile: u32,
-    /// Threads that read bricks and check them [default: one per core, at most 4]
-    #[arg(long, value_name = "N", alias = "hash-threads", value_parser = threads)]
-    pub workers: Option<u32>,
-    /// Which brick makes room for another: round-robin (the next one in the cache), second-chance (the next one that
-    /// was not used since its turn came last), lru (the one not used for longest)
-    #[arg(long, value_name = "NAME", default_value = "round-robin",
-        value_parser = |s: &str| one_of(s, &Policy::ALL.map(Policy::name)))]
-    pub evict: String,
-    /// Keep query pairs of tiles and nodes from frame to frame (walk, with schedule chc): on, off
-    #[arg(long, value_name = "on|off", default_value = "off", value_parser = |s: &str| one_of(s, &["on", "off"]))]
-    pub fronts: String,
-    /// Leave a brick out of a tile where at most this many of its rays could see it, scaled to a tile of 200x200
-    /// pixels; 0 is exact, more loads less and misses hits
-    #[arg(long, value_name = "PIXELS", default_value = "0", value_parser = query_threshold)]
-    pub query_threshold: u32,
-    /// Write the trace of brick requests to this file, for replay against other caches [default: none]
-    #[arg(long, value_name = "F")]
-    pub requests_out: Option<PathBuf>,
-    /// Count the nodes that rays visit and the triangles that they test (nodes_visited, triangles_tested), which takes
-    /// time
-    #[arg(long)]
-    pub count: bool,
-    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
-    /// adapter whose name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
-    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
-    pub adapter: Adapter,
-}
-
-impl StreamArgs {
-    /// Threads that read bricks, at least 1.
-    pub fn worker_count(&self) -> usize {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        self.workers.map_or(cores.min(4), |n| n as usize)
-    }
-}
-
 /// Options of `walk`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct WalkArgs {
     /// The scene
-    #[arg(value_name = "S.bricks")]
-    pub scene: PathBuf,
+    #[arg(value_name = "S.bricks", required_unless_present = "print_settings")]
+    scene: Option<PathBuf>,
     /// Folder for frames, records and report; created when missing
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Camera path (JSON) [default: one made from the scene's bounds]
-    #[arg(long, value_name = "P.json")]
-    pub path: Option<PathBuf>,
-    /// Motion of instances (JSON): {"instances": [{"node": NAME or "instance": N, "pivot": [x,y,z], "keyframes":
-    /// [{"time": T, "translation": [x,y,z], "rotation": [x,y,z,w], "scale": S}, ...]}]}, in world units and in the time
-    /// of the camera path. A motion is applied to where the scene has the instance: it turns and scales about the
-    /// pivot, by default the middle of what it moves, and then goes by the translation, so that no translation,
-    /// rotation 0,0,0,1 and scale 1 (1e-6 to 1e6), the defaults, leave it there. Translations lie on a Catmull-Rom
-    /// spline, rotations turn the shorter way, and before the first keyframe and after the last it rests. What moves is
-    /// an instance: see info --instances and convert
-    /// --movable [default: nothing moves]
-    #[allow(rustdoc::broken_intra_doc_links)]
-    #[arg(long, value_name = "M.json")]
-    pub motion: Option<PathBuf>,
-    /// Frames along the path
-    #[arg(long, value_name = "N", default_value = "30", value_parser = frames)]
-    pub frames: u32,
-    /// Width and height of the frames in pixels, each 1 to 16384
-    #[arg(long, value_name = "WxH", default_value = "1280x720")]
-    pub size: ImageSize,
-    /// Vertical field of view in degrees, 1e-6 to 179.99 [default: the path's]
-    #[arg(long, value_name = "DEG", value_parser = fov)]
-    pub fov: Option<f64>,
-    /// What is traced.
-    #[command(flatten)]
-    pub effects: EffectArgs,
-    /// How secondary rays are answered: exact (all are traced), roma (those of ao, shadow and diffuse by maps of what
-    /// cells are occupied, with a bias of a few cells, and without a brick loaded for them; what diffuse rays meet is
-    /// lit by maps of what the sun, points and spots light, which load what these see; others are traced), auto (those
-    /// of ao and shadow that these maps find free are not traced: an error of the nearest cell alone), df (those of ao
-    /// and shadow by distances to occupied cells: the baseline that roma is compared with), dvf (those to the
-    /// environment by what a field knows of the directions around them: most are not traced; the field is made on the
-    /// first walk and kept beside the scene)
-    #[arg(long, value_name = "METHOD", default_value = "exact")]
-    pub secondary: Secondary,
-    /// Occupancy maps.
-    #[command(flatten)]
-    pub roma: RomaArgs,
-    /// Distance fields.
-    #[command(flatten)]
-    pub df: FieldArgs,
-    /// Fields of visibility.
-    #[command(flatten)]
-    pub dvf: DvfArgs,
-    /// Samples per pixel, 1 to 1M; beyond 64 they are summed in f64, so that no number of them makes the sum drift
-    #[arg(long, value_name = "N", default_value = "1", value_parser = samples)]
-    pub spp: u32,
-    /// Seed of random sampling
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
-    /// Write an EXR with radiance, depth, normal, triangle id and albedo beside each PNG
+    #[arg(short, long, value_name = "DIR", required_unless_present = "print_settings")]
+    output: Option<PathBuf>,
+    /// Take settings from a file (TOML), which options of the command line go before [default: none]
+    #[arg(long = "settings", value_name = "F.toml")]
+    file: Option<PathBuf>,
+    /// Print the settings in force as such a file, and end
     #[arg(long)]
-    pub aov: bool,
-    /// Pictures.
-    #[command(flatten)]
-    pub pictures: PictureArgs,
-    /// Interactive: a frame loads at most SIZE of texture tiles, those first that most hits ask for, and one at least;
-    /// the next coarser level that is resident stands for the others. unresolved_pixels in the records counts such
-    /// hits. While the camera rests, frames become the exact ones, if the cache holds what they need. Bricks are waited
-    /// for [default: off, tiles are waited for as well]
-    #[arg(long, value_name = "SIZE", value_parser = size_bytes)]
-    pub interactive: Option<u64>,
-    /// Ask after every pass which bricks it needed (bricks_needed in the records); takes a traversal more a pass
-    #[arg(long)]
-    pub measure_needed: bool,
-    /// Render every frame exactly as well, in a second session with a cache of its own, and record how far each effect
-    /// is from it (error_mean, error_worst_tile, error_pixels): what --query-threshold costs. Takes twice the time and
-    /// device memory; the walk's times and counters leave it out
-    #[arg(long)]
-    pub measure_error: bool,
-    /// Show frames of more than 64 samples a pixel while they are made: DIR/preview.png is replaced after 64, 128, 256
-    /// samples and so on, and removed at the end
-    #[arg(long)]
-    pub progressive: bool,
-    /// Render the first frame six times more as it is and with each thing that was left out because the scene does not
-    /// need it, turn by turn, and state under left_out in summary.json what leaving it out saves (ms_saved, of medians
-    /// of five). Takes a session and a cache for each
-    #[arg(long)]
-    pub measure_left_out: bool,
+    pub print_settings: bool,
     /// Print the records on standard output too, one JSON object a line
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub json: bool,
-    /// Light.
+    /// Show all options
+    #[arg(long, action = clap::ArgAction::HelpLong)]
+    pub help_all: Option<bool>,
+    /// Everything that renders.
     #[command(flatten)]
-    pub light: LightArgs,
-    /// Streaming.
-    #[command(flatten)]
-    pub stream: StreamArgs,
-    /// Optimisations.
-    #[command(flatten)]
-    pub optimisations: OptimisationArgs,
+    given: GroupArgs<OfWalk>,
 }
 
 impl WalkArgs {
-    /// Refuses options that do not go together.
+    /// The settings: what was given, else what the file says, else the defaults.
     ///
     /// # Errors
-    /// Which option to leave out.
-    pub fn check(&self) -> Result<(), crate::cli::Usage> {
-        if self.pictures.taa && self.aov {
-            let text = "--aov: depth, normals, ids and albedo are taken through the centres of pixels, which --taa moves; leave one out";
-            return Err(crate::cli::Usage(text.into()));
-        }
-        Ok(())
+    /// A bad file; settings that do not go together.
+    pub fn settings(&self) -> anyhow::Result<Settings> {
+        let settings = self.given.over(self.file.as_deref())?;
+        settings.check().map_err(usage)?;
+        Ok(settings)
+    }
+
+    /// The scene and the folder for what is written.
+    ///
+    /// # Errors
+    /// There are none, which the parser sees to but for `--print-settings`.
+    pub fn files(&self) -> Result<(&Path, &Path), crate::cli::Usage> {
+        let missing = || crate::cli::Usage("walk needs a scene and --output".into());
+        self.scene.as_deref().zip(self.output.as_deref()).ok_or_else(missing)
+    }
+}
+
+/// Settings that do not go together are wrong usage.
+fn usage(error: SettingsError) -> anyhow::Error {
+    match error {
+        SettingsError::Conflict(text) => crate::cli::Usage(text).into(),
+        error => error.into(),
     }
 }
 
@@ -486,23 +371,25 @@ pub struct TraceArgs {
     /// Print what was loaded as a JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Streaming.
+    /// Take settings from a file (TOML), which options of the command line go before [default: none]
+    #[arg(long = "settings", value_name = "F.toml")]
+    file: Option<PathBuf>,
+    /// What streams bricks.
     #[command(flatten)]
-    pub stream: StreamArgs,
+    given: GroupArgs<OfTrace>,
 }
 
 impl TraceArgs {
-    /// Refuses options of the streaming that mean nothing without frames.
+    /// The settings: what was given, else what the file says, else the defaults.
     ///
     /// # Errors
-    /// Which option to leave out.
-    pub fn check(&self) -> Result<(), crate::cli::Usage> {
-        let meaningless =
-            [(self.stream.fronts == "on", "--fronts on"), (self.stream.query_threshold > 0, "--query-threshold")];
-        match meaningless.iter().find(|(given, _)| *given) {
-            Some((_, option)) => Err(crate::cli::Usage(format!("{option} is for walk; leave it out of trace"))),
-            None => Ok(()),
+    /// A bad file; an option that means nothing without frames.
+    pub fn settings(&self) -> anyhow::Result<Settings> {
+        if let Some(entry) = self.given.over(None)?.for_frames_alone() {
+            let flag = entry.field.flag();
+            return Err(crate::cli::Usage(format!("--{flag} is for walk; leave it out of trace")).into());
         }
+        self.given.over(self.file.as_deref())
     }
 }
 
@@ -546,46 +433,9 @@ pub struct CompareArgs {
     pub json: bool,
 }
 
-named_values! {
-    /// How the bricks to intersect are found.
-    Schedule {
-        /// Tiles against the top level; loads what rays need.
-        Chc = "chc",
-        /// One traversal per ray over what is resident; loads what rays ask for.
-        Demand = "demand",
-        /// Everything resident, one traversal per ray.
-        Plain = "plain",
-        /// The same over binary trees.
-        PlainBvh2 = "plain-bvh2",
-        /// The cheaper one.
-        Auto = "auto",
-    } later &[]
-}
-
-named_values! {
-    /// How secondary rays are answered.
-    Secondary {
-        /// By tracing them.
-        Exact = "exact",
-        /// Those that occupancy maps can answer by these.
-        Roma = "roma",
-        /// Those that occupancy maps find free by these, others by tracing them.
-        Auto = "auto",
-        /// Those that occupancy maps can answer by distance fields.
-        Df = "df",
-        /// Those to the environment by fields of visibility.
-        Dvf = "dvf",
-    } later &["displacement"]
-}
-
-/// Accepts the values of a list.
-fn one_of(text: &str, known: &[&str]) -> Result<String, String> {
-    if known.contains(&text) { Ok(text.into()) } else { Err(unknown(text, known, &[])) }
-}
-
 /// Parses a whole number or count and checks its range.
 pub(crate) fn ranged(text: &str, least: u64, most: u64) -> Result<u32, String> {
-    let n = super::sizes::count(text)?;
+    let n = count(text)?;
     match u32::try_from(n) {
         Ok(n32) if (least..=most).contains(&n) => Ok(n32),
         _ => Err(format!("it must be from {least} to {most}")),
@@ -600,30 +450,12 @@ fn copies(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1024)
 }
 
-fn samples(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 1_000_000)
-}
-
 fn threads(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1024)
 }
 
-fn query_threshold(text: &str) -> Result<u32, String> {
-    ranged(text, 0, 40_000)
-}
-
 fn brick_triangles(text: &str) -> Result<u32, String> {
     ranged(text, 1, 1 << 20)
-}
-
-pub(crate) fn tile(text: &str) -> Result<u32, String> {
-    let wrong = || "a tile is a power of two from 8 to 512 pixels".to_string();
-    ranged(text, 8, 512).ok().filter(|n| n.is_power_of_two()).ok_or_else(wrong)
-}
-
-fn fov(text: &str) -> Result<f64, String> {
-    let degrees: f64 = text.parse().map_err(|_| "it must be a number of degrees".to_string())?;
-    check_fov_y_degrees(degrees).map(|()| degrees).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

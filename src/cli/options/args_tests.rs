@@ -1,5 +1,7 @@
 use crate::cli::options::args::*;
-use crate::cli::options::sizes::Direction;
+use crate::schedule::Optimisation;
+use crate::settings::{Direction, EffectList, Level, Schedule};
+use crate::stream::Policy;
 use brickwalk_scenes::Kind;
 use clap::CommandFactory;
 use clap::error::ErrorKind;
@@ -8,11 +10,15 @@ fn parse(line: &str) -> Result<Command, clap::Error> {
     Cli::try_parse_from(std::iter::once("brickwalk").chain(line.split_whitespace())).map(|cli| cli.command)
 }
 
-fn walk(options: &str) -> Result<WalkArgs, clap::Error> {
+fn walk_args(options: &str) -> Result<WalkArgs, clap::Error> {
     parse(&format!("walk s.bricks -o out {options}")).map(|command| match command {
         Command::Walk(args) => *args,
         other => panic!("{other:?}"),
     })
+}
+
+fn walk(options: &str) -> Result<Settings, clap::Error> {
+    Ok(walk_args(options)?.settings().unwrap())
 }
 
 #[test]
@@ -21,47 +27,95 @@ fn the_definition_is_consistent() {
 }
 
 #[test]
-fn defaults_of_walk_are_the_documented_ones() {
-    let w = walk("").unwrap();
-    assert_eq!(w.frames, 30);
-    assert_eq!(w.size, ImageSize { width: 1280, height: 720 });
-    assert_eq!(w.effects.effects.to_string(), "primary,shadow");
-    assert_eq!((w.spp, w.seed), (1, 0));
-    assert_eq!(w.stream.cache, CacheSize::Percent(25.0));
-    assert_eq!(w.stream.host_cache, 1 << 30);
-    assert_eq!(w.secondary, Secondary::Exact);
-    assert_eq!(
-        (w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()),
-        ("off", 0, "round-robin")
-    );
-    let Direction(sun) = "0.4,0.8,0.45".parse().unwrap();
-    assert_eq!(w.light.sun.0, sun);
-    assert_eq!(w.light.sun_angle, 0.53);
-    assert!(w.path.is_none() && !w.aov && !w.json && w.fov.is_none());
+fn without_options_settings_are_the_defaults() {
+    // The adapter may be that of the environment.
+    let adapter = walk("").unwrap().adapter;
+    assert_eq!(walk("").unwrap(), Settings { adapter, ..Settings::default() });
 }
 
 #[test]
 fn options_arrive() {
     let w = walk(
         "--path p.json --frames 3 --size 64x32 --cache 12M --host-cache 2G --schedule plain --effects primary --spp 4 \
-         --seed 9 --aov --json --sun -1,2,-3 --sun-angle 0 --sun-intensity 5 --sky-intensity 0 --tile 32 --workers 2 \
-         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru \
-         --requests-out f.jsonl --measure-needed",
+         --seed 9 --aov --sun -1,2,-3 --sun-angle 0 --sun-intensity 5 --sky-intensity 0 --tile 32 --workers 2 \
+         --fov 1e-6 --adapter llvm --secondary exact --fronts on --query-threshold 20 --evict lru --dvf-cells 40 \
+         --requests-out f.jsonl --measure-needed --roma-unsnapped ao,shadow",
     )
     .unwrap();
-    assert_eq!(w.path, Some("p.json".into()));
-    assert_eq!((w.frames, w.spp, w.seed, w.stream.tile), (3, 4, 9, 32));
-    assert_eq!(w.stream.cache, CacheSize::Bytes(12 << 20));
-    assert_eq!(w.stream.host_cache, 2 << 30);
-    assert_eq!(w.stream.schedule, Schedule::Plain);
-    assert_eq!(w.effects.effects.to_string(), "primary");
-    assert!(w.aov && w.json && w.light.sun.0[0] < 0.0);
-    assert_eq!((w.fov, w.stream.worker_count()), (Some(1e-6), 2));
-    assert_eq!(w.stream.adapter, Adapter::Named("llvm".into()));
-    assert_eq!((w.stream.fronts.as_str(), w.stream.query_threshold, w.stream.evict.as_str()), ("on", 20, "lru"));
-    assert!(w.measure_needed && w.stream.requests_out == Some("f.jsonl".into()));
-    assert_eq!(walk("--hash-threads 3").unwrap().stream.worker_count(), 3);
-    assert!(walk("").unwrap().stream.worker_count() >= 1);
+    let expected = Settings {
+        path: Some("p.json".into()),
+        frames: 3,
+        size: ImageSize { width: 64, height: 32 },
+        cache: CacheSize::Bytes(12 << 20),
+        host_cache: 2 << 30,
+        schedule: Schedule::Plain,
+        effects: EffectList::PRIMARY,
+        spp: 4,
+        seed: 9,
+        aov: true,
+        sun: Direction([-1.0, 2.0, -3.0]),
+        sun_angle: 0.0,
+        sun_intensity: Some(5.0),
+        sky_intensity: 0.0,
+        tile: 32,
+        workers: Some(2),
+        fov: Some(1e-6),
+        adapter: Adapter::Named("llvm".into()),
+        fronts: true,
+        query_threshold: 20,
+        evict: Policy::Lru,
+        requests_out: Some("f.jsonl".into()),
+        measure_needed: true,
+        ..w.clone()
+    };
+    assert_eq!(w, expected);
+    assert_eq!(w.dvf.cells, crate::secondary::dvf::Cells::Longest(40));
+    assert_eq!(w.roma.unsnapped.len(), 2);
+    assert_eq!(walk("--hash-threads 3").unwrap().worker_count(), 3);
+    assert!(walk_args("--json").unwrap().json && !walk("--aov=off").unwrap().aov);
+}
+
+#[test]
+fn the_command_line_wins_over_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("f.toml");
+    std::fs::write(&file, "frames = 7\nspp = 2\ndenoise = true\n[dvf]\nrays = 8\n").unwrap();
+    let w = walk(&format!("--settings {} --spp 4 --denoise=off", file.display())).unwrap();
+    assert_eq!((w.frames, w.spp, w.denoise, w.dvf.rays, w.tile), (7, 4, false, 8, 64));
+    let wrong = walk_args("--settings missing.toml").unwrap().settings().unwrap_err();
+    assert!(format!("{wrong:#}").contains("missing.toml"));
+    // What is printed needs neither scene nor output, and is read again.
+    let Command::Walk(args) = parse("walk --print-settings --spp 3").unwrap() else { panic!() };
+    let printed = args.settings().unwrap();
+    assert!(args.print_settings && args.files().is_err());
+    assert_eq!(Settings::from_toml(&printed.to_toml()), Ok(printed));
+}
+
+#[test]
+fn help_has_three_lengths() {
+    let options = |command: &clap::Command, is_shown: fn(&clap::Arg) -> bool| {
+        command.get_arguments().filter(|argument| !argument.is_hide_set() && is_shown(argument)).count()
+    };
+    let mut cli = Cli::command();
+    cli.build();
+    let walk = cli.find_subcommand("walk").unwrap();
+    let short = options(walk, |argument| !argument.is_hide_short_help_set());
+    let long = options(walk, |argument| !argument.is_hide_long_help_set());
+    assert!(short <= 17 && long <= 45, "{short} and {long} options");
+    let text = parse("walk -h").unwrap_err().to_string();
+    assert!(text.lines().count() <= 45 && text.contains("--cache") && !text.contains("--dvf-points"), "{text}");
+    let text = parse("walk --help").unwrap_err().to_string();
+    for part in
+        ["1280x720", "[default: 25%]", "[default: 30]", "degrees", "[default: 0.4,0.8,0.45]", "Camera:", "Light:"]
+    {
+        assert!(text.contains(part), "walk --help lacks {part}: {text}");
+    }
+    assert!(!text.contains("--dvf-points"));
+    let text = crate::cli::walk_help_all();
+    for entry in <Settings as crate::settings::Group>::entries() {
+        assert!(text.contains(&format!("--{}", entry.field.flag())), "{}", entry.key());
+    }
+    assert!(<Settings as crate::settings::Group>::entries().iter().any(|e| e.field.level == Level::Expert));
 }
 
 #[test]
@@ -146,11 +200,11 @@ fn other_commands_check_too() {
 #[test]
 fn trace_refuses_what_is_for_walks() {
     let check = |options: &str| match parse(&format!("trace s.bricks --rays r.npy -o h.npy {options}")).unwrap() {
-        Command::Trace(args) => args.check(),
+        Command::Trace(args) => args.settings(),
         other => panic!("{other:?}"),
     };
     assert!(check("").is_ok() && check("--any --cache 1M --evict lru --requests-out f").is_ok());
-    for options in ["--fronts on", "--query-threshold 20"] {
+    for options in ["--fronts on", "--query-threshold 20", "--spp 4"] {
         assert!(check(options).unwrap_err().to_string().contains(options.split(' ').next().unwrap()), "{options}");
     }
 }
@@ -213,19 +267,16 @@ fn help_explains_units_and_defaults() {
             let described = argument.get_help().is_some_and(|h| h.to_string().len() > 5);
             assert!(described, "{name}: {} has no help", argument.get_id());
             let long = argument.get_long().map(|l| format!("--{l}"));
-            if let Some(long) = long {
+            if let Some(long) = long.filter(|_| !argument.is_hide_long_help_set()) {
                 assert!(text.contains(&long), "{name}: {long}");
             }
-            let optional = !argument.is_required_set() && argument.get_action().takes_values();
+            let is_switch = argument.get_num_args().is_some_and(|count| count.min_values() == 0);
+            let optional = !argument.is_required_set() && argument.get_action().takes_values() && !is_switch;
             let has_default = !argument.get_default_values().is_empty()
                 || argument.get_help().is_some_and(|h| h.to_string().contains("[default:"));
             let filter = ["path", "adapter", "id"].contains(&argument.get_id().as_str());
             assert!(!optional || has_default || filter, "{name}: {} states no default", argument.get_id());
         }
-    }
-    let help = parse("walk --help").unwrap_err().to_string();
-    for part in ["1280x720", "[default: 25%]", "[default: 30]", "degrees", "pixels", "[default: 1G]", "0.4,0.8,0.45"] {
-        assert!(help.contains(part), "walk --help lacks {part}");
     }
 }
 
@@ -238,31 +289,10 @@ fn version_is_printed() {
 #[test]
 fn optimisations_are_switched_by_name() {
     let w = walk("--without requery,nearest-first").unwrap();
-    let on = w.optimisations.optimisations();
-    assert!(!on.requery && !on.nearest_first && on.by_tile && on.resident_first);
-    assert_eq!(crate::cli::options::optimisation_args::names(&w.optimisations.without), ["nearest-first", "requery"]);
-    assert_eq!(walk("").unwrap().optimisations.optimisations(), crate::schedule::Optimisations::default());
+    assert_eq!(w.without, [Optimisation::Requery, Optimisation::NearestFirst]);
+    assert_eq!(walk("--without requery --without nearest-first").unwrap().without, w.without);
     let error = walk("--without haste").unwrap_err().to_string();
     assert!(error.contains("known: nearest-first, requery"), "{error}");
-}
-
-#[test]
-fn optimisations_without_meaning_are_refused_with_what_they_belong_to() {
-    let check = |options: &str| {
-        let w = walk(options).unwrap();
-        w.optimisations.check(&w.stream).map_err(|error| error.to_string())
-    };
-    for (options, part) in [
-        ("--schedule plain --without requery", "chc, demand or auto"),
-        ("--schedule demand --without by-tile", "chc or auto"),
-        ("--schedule demand --without root-walk", "chc or auto"),
-    ] {
-        let error = check(options).unwrap_err();
-        assert!(error.contains(part), "{options}: {error}");
-    }
-    for options in
-        ["--schedule demand --without requery", "--schedule chc --without by-tile", "--without front-to-back"]
-    {
-        check(options).unwrap();
-    }
+    let conflict = walk_args("--schedule plain --without requery").unwrap().settings().unwrap_err();
+    assert!(conflict.is::<crate::cli::Usage>() && conflict.to_string().contains("chc, demand or auto"));
 }

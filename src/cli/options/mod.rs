@@ -1,14 +1,7 @@
-//! Options of the commands.
+//! Options of the commands. Those of what renders are views of [`crate::settings`].
 
 pub mod args;
-pub mod dvf_args;
-pub mod field_args;
+pub mod group_args;
 pub mod inputs;
-pub mod light_args;
-pub mod named;
-pub mod optimisation_args;
-pub mod picture_args;
 pub mod removed;
-pub mod roma_args;
 pub mod scene_kind;
-pub mod sizes;

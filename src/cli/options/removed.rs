@@ -1,24 +1,7 @@
-//! Options and named values that are gone, and what stands in their place.
+//! What is said where an option is gone.
 
+use crate::settings::removed::removed;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-
-/// Each name as it was written on the command line, and what to write now.
-const REMOVED: &[(&str, &str)] = &[
-    ("mirror", "glossy shows what smooth metals mirror"),
-    ("leaf-cache", "triangles are tested where they are found, which is faster"),
-    ("--with", "every optimisation is on; --without LIST switches some off"),
-    ("--prefetch", "bricks are read when rays ask for them, and --host-cache keeps them"),
-    ("--roma-near", HANDED_OVER),
-    ("--roma-shadow-near", HANDED_OVER),
-];
-
-const HANDED_OVER: &str = "--secondary auto hands rays over to maps where their measured error allows it";
-
-/// What to say to somebody who writes `name`, if it is gone.
-pub fn removed(name: &str) -> Option<String> {
-    let (_, instead) = REMOVED.iter().find(|(gone, _)| *gone == name)?;
-    Some(format!("{name} was removed: {instead}"))
-}
 
 /// `error`, or where it refuses an option that is gone, what stands in its place. The exit status stays.
 pub fn explained(error: clap::Error) -> clap::Error {
@@ -36,6 +19,7 @@ pub fn explained(error: clap::Error) -> clap::Error {
 mod tests {
     use super::*;
     use crate::cli::options::args::Cli;
+    use crate::settings::removed::REMOVED;
     use clap::Parser;
 
     /// A walk that uses what is gone.

@@ -1,79 +1,50 @@
 //! Options of `bench`.
 
-use super::dvf::args::DvfBenchArgs;
 use super::plan::Stage;
-use super::roma::args::RomaBenchArgs;
-use crate::cli::options::args::{UNITS, ranged};
-use crate::cli::options::sizes::{ImageSize, positive_count};
-use crate::session::device::Adapter;
-use clap::{Args, Subcommand};
+use crate::settings::sizes::positive_count;
+use crate::settings::{
+    Adapter, CacheSize, Effect, EffectList, ImageSize, Lines, Plain, Rule, Schedule, Value, settings,
+};
 use std::path::PathBuf;
 
-/// Options of `bench`.
-#[derive(Clone, Debug, Args)]
-pub struct BenchArgs {
-    /// What to measure.
-    #[command(subcommand)]
-    pub experiments: Experiments,
-}
+/// Numbers of triangles.
+pub const TRIANGLES: Rule = Rule::Whole(1, u64::MAX);
+/// Numbers of frames.
+const FRAMES: Rule = Rule::Whole(1, 300);
+/// Numbers of repetitions.
+pub const REPETITIONS: Rule = Rule::Whole(1, 1000);
+/// Minutes.
+pub const MINUTES: Rule = Rule::Real(0.0, 100_000.0);
 
-/// What can be measured.
-#[derive(Clone, Debug, Subcommand)]
-pub enum Experiments {
-    /// The experiments of the CHC+RT paper: its tables 2 to 5 and figures 5, 7 and 8, each ratio beside the paper's
-    Chc(Box<ChcArgs>),
-    /// The same frames on every device that is present: rates, and how far pictures differ from those of the first
-    /// device
-    Executors(Box<ExecutorsArgs>),
-    /// The experiments of the ROMA paper: times of ray-aligned occupancy maps, and how far pictures by them are from
-    /// exact ones
-    Roma(Box<RomaBenchArgs>),
-    /// The experiments of the paper of discrete visibility fields: rays to the environment that are left to be traced,
-    /// and errors
-    Dvf(Box<DvfBenchArgs>),
-}
-
-/// Options of `bench executors`.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = UNITS)]
-pub struct ExecutorsArgs {
-    /// Folder for the results: executors.md, executors.json
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// A small scene, small pictures, few frames
-    #[arg(long)]
-    pub quick: bool,
-    /// Triangles of the city [default: 1M; with --quick 50K]
-    #[arg(long, value_name = "N", value_parser = positive_count)]
-    pub triangles: Option<u64>,
-    /// Folder of the generated scene; if it is missing it is generated there [default: DIR/scenes]
-    #[arg(long, value_name = "DIR")]
-    pub scenes: Option<PathBuf>,
-    /// Width and height of the pictures [default: 1280x720; with --quick 96x54]
-    #[arg(long, value_name = "WxH")]
-    pub size: Option<ImageSize>,
-    /// Frames of a walk [default: 5; with --quick 2]
-    #[arg(long, value_name = "N", value_parser = frames)]
-    pub frames: Option<u32>,
-    /// Walks of each device, beside one that brings in what frames need [default: 5; with --quick 1]
-    #[arg(long, value_name = "N", value_parser = repetitions)]
-    pub repeat: Option<u32>,
-    /// What is traced, as `walk --effects` has it
-    #[arg(long, value_name = "LIST", default_value = "primary,ao,diffuse")]
-    pub effects: String,
-    /// Occlusion and diffuse rays a pixel
-    #[arg(long, value_name = "N", default_value = "1", value_parser = repetitions)]
-    pub rays: u32,
-    /// Device bytes for bricks, as `walk --cache` has it
-    #[arg(long, value_name = "SIZE|P%", default_value = "100%")]
-    pub cache: String,
-    /// The schedule, as `walk --schedule` has it
-    #[arg(long, value_name = "NAME", default_value = "chc")]
-    pub schedule: String,
-    /// A device to be measured, as `walk --adapter` has it; repeated: each of them, and the pictures of the others are
-    /// compared with those of the first [default: cpu, then every graphics adapter]
-    #[arg(long = "adapter", value_name = "NAME")]
-    pub adapters: Vec<Adapter>,
+settings! {
+    /// Options of `bench executors`.
+    pub struct ExecutorsArgs {
+        /// Folder for the results: executors.md, executors.json.
+        output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
+        /// A small scene, small pictures, few frames.
+        quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
+        /// Triangles of the city. [default: 1M; with --quick 50K]
+        triangles: Option<u64> = None, "--triangles N", TRIANGLES, "", Quality, Common;
+        /// Folder of the generated scene; if it is missing it is generated there. [default: DIR/scenes]
+        scenes: Option<PathBuf> = None, "--scenes DIR", Rule::Any, "", Output, Common;
+        /// Width and height of the pictures. [default: 1280x720; with --quick 96x54]
+        size: Option<ImageSize> = None, "--size WxH", Rule::Any, "pixels", Camera, Common;
+        /// Frames of a walk. [default: 5; with --quick 2]
+        frames: Option<u32> = None, "--frames N", FRAMES, "", Camera, Common;
+        /// Walks of each device, beside one that brings in what frames need. [default: 5; with --quick 1]
+        repeat: Option<u32> = None, "--repeat N", REPETITIONS, "", Measurement, Common;
+        /// What is traced, as `walk --effects` has it.
+        effects: EffectList = EffectList::of(&[Effect::Ao, Effect::Diffuse]), "--effects LIST", Rule::Any, "", Effects, Common;
+        /// Occlusion and diffuse rays per pixel.
+        rays: u32 = 1, "--rays N", REPETITIONS, "", Effects, Common;
+        /// Device bytes for bricks, as `walk --cache` has it.
+        cache: CacheSize = CacheSize::Percent(100.0), "--cache SIZE|P%", Rule::Any, "", Cache, Common;
+        /// The schedule, as `walk --schedule` has it.
+        schedule: Schedule = Schedule::Chc, "--schedule NAME", Rule::Any, "", Schedule, Common;
+        /// A device to be measured, as `walk --adapter` has it. Given again: each of them, and the pictures of the others
+        /// are compared with those of the first. [default: cpu, then every graphics adapter]
+        adapters: Lines<Adapter> = Lines::default(), "--adapter NAME", Rule::Any, "", Device, Common;
+    }
 }
 
 impl ExecutorsArgs {
@@ -93,89 +64,65 @@ impl ExecutorsArgs {
     }
 }
 
-/// Options of `bench chc`.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = UNITS)]
-pub struct ChcArgs {
-    /// Folder for the results: chc.json, chc.md, report.html, a CSV a table, and cells.jsonl, which grows with every
-    /// walk. Started again with the same folder and settings, the bench goes on where it stopped
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Small scenes, small pictures, few frames: under 10 minutes on two cores without a GPU. The results say which
-    /// rules of measuring are not met
-    #[arg(long)]
-    pub quick: bool,
-    /// Triangles of the city, of the city out of core, and of the plant of pipes, of which 16 copies are out of core
-    /// [default: 12M,139M,13M; with --quick 100K,200K,100K]
-    #[arg(long, value_name = "A,B,C", value_parser = three_counts)]
-    pub triangles: Option<Counts>,
-    /// Folder of the generated scenes; what is missing is generated there [default: DIR/scenes]
-    #[arg(long, value_name = "DIR")]
-    pub scenes: Option<PathBuf>,
-    /// A converted Sponza, measured beside the generated scenes [default: none]
-    #[arg(long, value_name = "S.bricks")]
-    pub sponza: Option<PathBuf>,
-    /// What to measure in this run, separated by commas: table2 (in core against both baselines), table3 (out of core),
-    /// table4 (aggressive culling), table5 (random turns), figure5 (tile sizes), targets (bytes moved against needed),
-    /// scale (the large city all resident) [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    pub stages: Vec<Stage>,
-    /// Measure only cases whose names contain every word of TEXT; repeated: those of any TEXT. Names are such as
-    /// "table2/city/100%/tile 64/near/primary,ao,diffuse/chc+fronts/threshold 0/turn 36"; cells.jsonl holds them
-    /// [default: all]
-    #[arg(long, value_name = "TEXT")]
-    pub only: Vec<String>,
-    /// Begin no walk after so many minutes; the results hold what is measured until then [default: no limit]
-    #[arg(long, value_name = "N", value_parser = minutes)]
-    pub minutes: Option<f64>,
-    /// Insist that DIR holds measurements to go on with
-    #[arg(long)]
-    pub resume: bool,
-    /// Width and height of the pictures [default: 1920x1080; with --quick 96x54]
-    #[arg(long, value_name = "WxH")]
-    pub size: Option<ImageSize>,
-    /// Frames of a walk [default: 30; with --quick 4]
-    #[arg(long, value_name = "N", value_parser = frames)]
-    pub frames: Option<u32>,
-    /// Walks of each case [default: 5; with --quick 2]
-    #[arg(long, value_name = "N", value_parser = repetitions)]
-    pub repeat: Option<u32>,
-    /// Width and height of a screen tile in pixels, a power of two from 8 to 512 [default: 64; with --quick 16]
-    #[arg(long, value_name = "PIXELS", value_parser = crate::cli::options::args::tile)]
-    pub tile: Option<u32>,
-    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
-    /// adapter whose name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
-    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
-    pub adapter: Adapter,
-    /// Occlusion and diffuse rays a pixel [default: 20; with --quick 2].
-    #[arg(long, hide = true, value_parser = repetitions)]
-    pub rays: Option<u32>,
-    /// Frames at the start of a walk left out of times [default: 5; with --quick 1].
-    #[arg(long, hide = true)]
-    pub skip: Option<u32>,
+settings! {
+    /// Options of `bench chc`.
+    pub struct ChcArgs {
+        /// Folder for the results: chc.json, chc.md, report.html, a CSV a table, and cells.jsonl, which grows with every
+        /// walk. Started again with the same folder and settings, the bench goes on where it stopped.
+        output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
+        /// Small scenes, small pictures, few frames. It takes under 10 minutes on two cores without a GPU. The results say
+        /// which rules of measuring are not met.
+        quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
+        /// Triangles of the city, of the city out of core, and of the plant of pipes. Of the latter 16 copies are out of
+        /// core. [default: 12M,139M,13M; with --quick 100K,200K,100K]
+        triangles: Option<Counts> = None, "--triangles A,B,C", Rule::Any, "", Quality, Common;
+        /// Folder of the generated scenes; what is missing is generated there. [default: DIR/scenes]
+        scenes: Option<PathBuf> = None, "--scenes DIR", Rule::Any, "", Output, Common;
+        /// A converted Sponza, measured beside the generated scenes. [default: none]
+        sponza: Option<PathBuf> = None, "--sponza S.bricks", Rule::Any, "", Output, Common;
+        /// What to measure in this run, with commas between them. table2 (in core against both baselines), table3 (out of
+        /// core), table4 (aggressive culling), table5 (random turns), figure5 (tile sizes), targets (bytes moved against
+        /// needed), scale (the large city all resident). [default: all]
+        stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
+        /// Measure only cases whose names contain every word of TEXT. Given again: those of any TEXT. Names are such as
+        /// "table2/city/100%/tile 64/near/primary,ao,diffuse/chc+fronts/threshold 0/turn 36"; cells.jsonl holds them.
+        /// [default: all]
+        only: Lines<String> = Lines::default(), "--only TEXT", Rule::Any, "", Measurement, Common;
+        /// Begin no walk after so many minutes. The results hold what is measured until then. [default: no limit]
+        minutes: Option<f64> = None, "--minutes N", MINUTES, "", Measurement, Common;
+        /// Insist that DIR holds measurements to go on with.
+        resume: bool = false, "--resume", Rule::Any, "", Measurement, Common;
+        /// Width and height of the pictures. [default: 1920x1080; with --quick 96x54]
+        size: Option<ImageSize> = None, "--size WxH", Rule::Any, "pixels", Camera, Common;
+        /// Frames of a walk. [default: 30; with --quick 4]
+        frames: Option<u32> = None, "--frames N", FRAMES, "", Camera, Common;
+        /// Walks of each case. [default: 5; with --quick 2]
+        repeat: Option<u32> = None, "--repeat N", REPETITIONS, "", Measurement, Common;
+        /// Width and height of a screen tile. [default: 64; with --quick 16]
+        tile: Option<u32> = None, "--tile PIXELS", Rule::PowerOfTwo(8, 512), "pixels", Schedule, Common;
+        /// What renders, as `walk --adapter` has it.
+        adapter: Adapter = Adapter::Auto, "--adapter NAME", Rule::Any, "", Device, Common;
+        /// Occlusion and diffuse rays per pixel. [default: 20; with --quick 2]
+        rays: Option<u32> = None, "--rays N", REPETITIONS, "", Effects, Expert;
+        /// Frames at the start of a walk left out of times. [default: 5; with --quick 1]
+        skip: Option<u32> = None, "--skip N", Rule::Any, "", Measurement, Expert;
+    }
 }
 
 /// Numbers of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counts(pub [u64; 3]);
 
-fn three_counts(text: &str) -> Result<Counts, String> {
-    let counts: Vec<u64> = text.split(',').map(|count| positive_count(count.trim())).collect::<Result<_, _>>()?;
-    let three = <[u64; 3]>::try_from(counts).map_err(|_| "it must be three counts, such as 12M,139M,13M")?;
-    Ok(Counts(three))
-}
+impl Value for Counts {
+    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
+        let counts: Vec<u64> = text.split(',').map(|count| positive_count(count.trim())).collect::<Result<_, _>>()?;
+        let three = <[u64; 3]>::try_from(counts).map_err(|_| "it must be three counts, such as 12M,139M,13M")?;
+        Ok(Self(three))
+    }
 
-pub(crate) fn minutes(text: &str) -> Result<f64, String> {
-    let minutes: f64 = text.parse().map_err(|_| "it must be a number of minutes")?;
-    if (0.0..=100_000.0).contains(&minutes) { Ok(minutes) } else { Err("it must be from 0 to 100000".into()) }
-}
-
-fn frames(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 300)
-}
-
-pub(crate) fn repetitions(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 1000)
+    fn plain(&self) -> Plain {
+        self.0.to_vec().plain()
+    }
 }
 
 /// What the options come to.
@@ -224,7 +171,7 @@ impl ChcArgs {
 
     /// Whether a case of this name is wanted.
     pub fn wants(&self, name: &str) -> bool {
-        self.only.is_empty() || self.only.iter().any(|text| text.split_whitespace().all(|word| name.contains(word)))
+        self.only.0.is_empty() || self.only.0.iter().any(|text| text.split_whitespace().all(|word| name.contains(word)))
     }
 }
 
@@ -243,7 +190,7 @@ impl Settings {
         let ImageSize { width, height } = self.size;
         unless((width, height) == (1920, 1080), format!("{width}x{height} pixels, not the paper's 1920x1080"));
         unless(self.rays == 20, format!("{} secondary rays a pixel, not the paper's 20", self.rays));
-        let counts = self.triangles.map(crate::cli::options::sizes::human_count).join(", ");
+        let counts = self.triangles.map(crate::settings::sizes::human_count).join(", ");
         let alike = [11_000_000, 130_000_000, 12_000_000].iter().zip(self.triangles).all(|(&least, own)| own >= least);
         unless(alike, format!("scenes of {counts} triangles, smaller than the paper's"));
         unmet

@@ -4,17 +4,17 @@
 //! are those of the others.
 
 use super::args::{ExecutorsArgs, Settings};
-use super::measure::walk_args;
 use super::plan::{SceneId, View};
 use super::scenes;
-use crate::cli::options::sizes::human_count;
-use crate::cli::{interrupt, walk};
+use crate::cli::interrupt;
 use crate::frame::{Pixels, Renderer};
 use crate::gpu::device::candidates;
-use crate::kernels::{DeviceInfo, Extent};
+use crate::kernels::DeviceInfo;
 use crate::output::atomic;
-use crate::session::device::Adapter;
-use crate::session::open::{Session, open_scene};
+use crate::session::opened::{Opened, open_scene};
+use crate::session::renderer::renderer;
+use crate::settings::sizes::human_count;
+use crate::settings::{Adapter, Settings as WalkSettings};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use brickwalk_report::{Table, Value};
@@ -93,7 +93,7 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
     for adapter in wanted(args) {
         match open(args, &settings, &place.scene, &adapter) {
             Ok(side) => sides.push(side),
-            Err(error) if args.adapters.is_empty() => notes.push(format!("{adapter}: left out: {error:#}")),
+            Err(error) if args.adapters.0.is_empty() => notes.push(format!("{adapter}: left out: {error:#}")),
             Err(error) => return Err(error),
         }
     }
@@ -134,8 +134,8 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
 
 /// The devices to be measured: those asked for, else the processor and every graphics adapter that has what is needed.
 fn wanted(args: &ExecutorsArgs) -> Vec<Adapter> {
-    if !args.adapters.is_empty() {
-        return args.adapters.clone();
+    if !args.adapters.0.is_empty() {
+        return args.adapters.0.clone();
     }
     let mut all = vec![Adapter::Cpu];
     for candidate in candidates().iter().filter(|candidate| candidate.flaw.is_none()) {
@@ -149,19 +149,20 @@ fn wanted(args: &ExecutorsArgs) -> Vec<Adapter> {
 }
 
 fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapter) -> Result<Side> {
-    let line = format!(
-        "--effects {} --cache {} --schedule {} --tile {} --size {} --ao-rays {rays} --diffuse-rays {rays} --aov",
-        args.effects,
-        args.cache,
-        args.schedule,
-        settings.tile,
-        settings.size,
-        rays = settings.rays
-    );
-    let walk_args = walk_args(&line, scene, adapter)?;
-    let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
-    let session = Session::open(open_scene(scene)?, scene, &walk_args.stream, extent)?;
-    let renderer = walk::renderer(session, &walk_args)?;
+    let own = WalkSettings {
+        effects: args.effects,
+        cache: args.cache,
+        schedule: args.schedule,
+        tile: settings.tile,
+        size: settings.size,
+        ao_rays: settings.rays,
+        diffuse_rays: settings.rays,
+        aov: true,
+        adapter: adapter.clone(),
+        ..WalkSettings::default()
+    };
+    let opened = Opened::open(open_scene(scene)?, scene, &own)?;
+    let renderer = renderer(opened, scene, &own)?;
     let info = renderer.executor.device();
     Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
 }
@@ -241,9 +242,9 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
         "settings": {
             "triangles": settings.triangles[0],
             "size": settings.size.to_string(),
-            "cache": args.cache,
-            "schedule": args.schedule,
-            "effects": args.effects,
+            "cache": args.cache.to_string(),
+            "schedule": args.schedule.name(),
+            "effects": args.effects.to_string(),
             "frames": settings.frames,
             "repetitions": settings.repeat,
             "rays": settings.rays,

@@ -3,27 +3,22 @@
 use super::args::Settings;
 use super::cells::{Passes, PictureError};
 use super::paper::THRESHOLDS;
-use super::plan::{Case, PLAIN, PLAIN_BVH2, Variant};
+use super::plan::{self, Case, PLAIN, PLAIN_BVH2, Variant};
 use super::scenes::Place;
-use crate::cli::options::args::{Cli, Command, WalkArgs};
-use crate::cli::walk;
-use crate::counters::{Counters, Record};
-use crate::frame::Engine;
-use crate::frame::{Renderer, Schedule};
-use crate::kernels::Extent;
+use crate::counters::Counters;
+use crate::counters::Record;
+use crate::frame::{Engine, Renderer};
 use crate::output::srgb;
 use crate::scene::path::CameraPath;
 use crate::schedule::ExecutorError;
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
-use crate::session::device::Adapter;
-use crate::session::open::{Session, open_scene, scaled_threshold};
+use crate::session::opened::{Opened, open_scene, scaled_threshold};
+use crate::session::renderer::{render_settings, renderer};
+use crate::settings::{Adapter, CacheSize, Effect, EffectList, Settings as WalkSettings, Turn};
 use crate::stream::{Item, Residency};
 use anyhow::{Context, Result, bail};
-use clap::Parser;
-use std::ffi::OsString;
-use std::path::Path;
 use std::sync::atomic::Ordering;
 
 /// Frames of the walk that a path is made for: the camera moves as fast in a shorter one, which ends earlier.
@@ -81,10 +76,9 @@ impl<'a> Bench<'a> {
         wants_binary: bool,
     ) -> Result<Self> {
         let open = |variant: Variant| -> Result<Renderer> {
-            let args = words(&Case { variant, ..*case }, place, settings, adapter)?;
-            let extent = Extent { width: args.size.width, height: args.size.height, tile: case.tile };
-            let session = Session::open(open_scene(&args.scene)?, &args.scene, &args.stream, extent)?;
-            let mut renderer = walk::renderer(session, &args)?;
+            let own = of_case(&Case { variant, ..*case }, settings, adapter);
+            let opened = Opened::open(open_scene(&place.scene)?, &place.scene, &own)?;
+            let mut renderer = renderer(opened, &place.scene, &own)?;
             renderer.executor.allow_bounces();
             Ok(renderer)
         };
@@ -128,16 +122,9 @@ impl<'a> Bench<'a> {
 
     /// Sets the renderer up for a walk; a cache that does not hold everything is emptied.
     fn prepare(&mut self, case: &Case) -> Result<()> {
-        let args = words(case, self.place, self.settings, self.adapter)?;
-        let schedule = match case.variant {
-            Variant { schedule: "plain", .. } => Schedule::Plain,
-            Variant { schedule: "plain-bvh2", .. } => Schedule::PlainBinary,
-            Variant { schedule: "chc", .. } => Schedule::Chc,
-            Variant { schedule: "demand", .. } => Schedule::Demand,
-            _ => Schedule::Auto,
-        };
+        let own = of_case(case, self.settings, self.adapter);
         let renderer = &mut self.renderer;
-        renderer.settings = walk::settings(&args, schedule);
+        renderer.settings = render_settings(&own, own.schedule);
         renderer.fronts = case.variant.fronts.then(Fronts::default);
         renderer.auto = Auto::default();
         renderer.executor.tuning().threshold = scaled_threshold(case.variant.threshold, case.tile);
@@ -247,39 +234,26 @@ fn of_device(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| matches!(cause.downcast_ref(), Some(ExecutorError::Device(_))))
 }
 
-/// The options of the walk that a user would type.
-fn words(case: &Case, place: &Place, settings: &Settings, adapter: &Adapter) -> Result<WalkArgs> {
+/// The settings of a walk.
+fn of_case(case: &Case, settings: &Settings, adapter: &Adapter) -> WalkSettings {
     let Variant { schedule, threshold, rotation, without, needed, fronts } = case.variant;
-    let rays = settings.rays;
-    let mut line = format!(
-        "--effects {} --schedule {schedule} --cache {}% --tile {} --size {} --query-threshold {threshold} --rotation {rotation} \
-         --ao-rays {rays} --diffuse-rays {rays} --fronts {}",
-        case.effects_option(),
-        case.cache,
-        case.tile,
-        settings.size,
-        if fronts { "on" } else { "off" }
-    );
-    if needed {
-        line += " --measure-needed";
-    }
-    if !without.is_empty() {
-        line += &format!(" --without {without}");
-    }
-    walk_args(&line, &place.scene, adapter)
-}
-
-/// The options of a walk as a user would type them, words separated by spaces.
-///
-/// # Errors
-/// They are none.
-pub(crate) fn walk_args(line: &str, scene: &Path, adapter: &Adapter) -> Result<WalkArgs> {
-    let mut words: Vec<OsString> = ["brickwalk", "walk", "-o", "."].map(OsString::from).to_vec();
-    words.push(scene.into());
-    words.extend(line.split_whitespace().map(OsString::from));
-    words.extend(["--adapter".into(), adapter.to_string().into()]);
-    match Cli::try_parse_from(words).context("the bench's own walk")?.command {
-        Command::Walk(args) => Ok(*args),
-        _ => bail!("the bench's own walk is none"),
+    let has = |effect: plan::Effect| case.effects.contains(&effect);
+    let effects = [(plan::Effect::Ao, Effect::Ao), (plan::Effect::Diffuse, Effect::Diffuse)];
+    let effects: Vec<Effect> = effects.into_iter().filter(|(own, _)| has(*own)).map(|(_, effect)| effect).collect();
+    WalkSettings {
+        effects: EffectList::of(&effects),
+        schedule,
+        cache: CacheSize::Percent(case.cache.into()),
+        tile: case.tile,
+        size: settings.size,
+        query_threshold: threshold,
+        rotation: Turn(rotation as f32),
+        ao_rays: settings.rays,
+        diffuse_rays: settings.rays,
+        fronts,
+        measure_needed: needed,
+        without: without.to_vec(),
+        adapter: adapter.clone(),
+        ..WalkSettings::default()
     }
 }

@@ -7,44 +7,59 @@
 
 pub mod args;
 mod cells;
-mod dvf;
+pub mod dvf;
 mod executors;
 mod measure;
 mod output;
 mod paper;
-mod plan;
+pub mod plan;
 mod plots;
 mod results;
-mod roma;
+pub mod roma;
 mod rows;
 mod scenes;
 mod tables;
 
 use crate::cli::interrupt;
-use crate::cli::options::sizes::human_count;
 use crate::kernels::DeviceInfo;
 use crate::output::atomic;
 use crate::session::device::Device;
+use crate::settings::sizes::human_count;
 use anyhow::{Result, bail};
-use args::{BenchArgs, ChcArgs, Experiments, Settings};
+use args::{ChcArgs, ExecutorsArgs, Settings};
 use brickwalk_convert::progress::Progress;
 use cells::{Cells, Header};
+use dvf::args::DvfBenchArgs;
 use measure::{Bench, DoesNotFit};
 use plan::{Case, Group, PLAIN_BVH2, Scope};
+use roma::args::RomaBenchArgs;
 use serde_json::json;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Runs the command.
+/// What can be measured.
+#[derive(Clone, Debug)]
+pub enum Experiment {
+    /// The experiments of the CHC+RT paper.
+    Chc(ChcArgs),
+    /// The same frames on every device.
+    Executors(ExecutorsArgs),
+    /// The experiments of the ROMA paper.
+    Roma(RomaBenchArgs),
+    /// The experiments of the paper of discrete visibility fields.
+    Dvf(DvfBenchArgs),
+}
+
+/// Runs an experiment.
 ///
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
-pub fn run(args: &BenchArgs) -> Result<()> {
-    let args = match &args.experiments {
-        Experiments::Chc(args) => args,
-        Experiments::Executors(args) => return executors::run(args),
-        Experiments::Roma(args) => return roma::run(args),
-        Experiments::Dvf(args) => return dvf::run(args),
+pub fn run(experiment: &Experiment) -> Result<()> {
+    let args = match experiment {
+        Experiment::Chc(args) => args,
+        Experiment::Executors(args) => return executors::run(args),
+        Experiment::Roma(args) => return roma::run(args),
+        Experiment::Dvf(args) => return dvf::run(args),
     };
     let settings = args.settings();
     if settings.frames <= settings.skip {
@@ -66,7 +81,7 @@ fn chc(args: &ChcArgs, settings: &Settings) -> Result<()> {
     if wanted.is_empty() {
         return Err(crate::cli::Usage(format!(
             "--only {}: no case of these stages has such a name",
-            args.only.join(", ")
+            args.only.0.join(", ")
         ))
         .into());
     }

@@ -2,6 +2,8 @@
 
 use super::paper;
 use super::paper::PaperScene;
+use crate::schedule::Optimisation;
+use crate::settings::{Plain, Rule, Schedule, Value};
 use std::fmt;
 
 /// A part of the measurements that can be asked for alone.
@@ -42,13 +44,15 @@ impl Stage {
     }
 }
 
-impl std::str::FromStr for Stage {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
+impl Value for Stage {
+    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
         let names = Self::ALL.map(Self::name);
-        let found = Self::ALL.into_iter().find(|stage| stage.name() == text.trim());
-        found.ok_or_else(|| crate::cli::options::named::unknown(text, &names, &[]))
+        let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
+        found.ok_or_else(|| crate::settings::names::unknown(text, &names, &[]))
+    }
+
+    fn plain(&self) -> Plain {
+        Plain::Text(self.name().into())
     }
 }
 
@@ -140,53 +144,55 @@ impl Effect {
 /// How rays are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
-    /// Value of `--schedule`.
-    pub schedule: &'static str,
+    /// The schedule.
+    pub schedule: Schedule,
     /// Temporal fronts: Algorithm 1 of the paper.
     pub fronts: bool,
-    /// Value of `--query-threshold`.
+    /// The query threshold, pixels.
     pub threshold: u32,
-    /// Value of `--rotation`, degrees.
+    /// Greatest turn of directions, degrees.
     pub rotation: u32,
-    /// Optimisation that is left out; empty: none.
-    pub without: &'static str,
+    /// Optimisations that are left out.
+    pub without: &'static [Optimisation],
     /// Whether needs are measured, which costs time.
     pub needed: bool,
 }
 
 impl Variant {
-    const fn of(schedule: &'static str) -> Self {
-        Self { schedule, fronts: false, threshold: 0, rotation: 36, without: "", needed: false }
+    const fn of(schedule: Schedule) -> Self {
+        Self { schedule, fronts: false, threshold: 0, rotation: 36, without: &[], needed: false }
     }
 }
 
 /// Every ray from the root, over wide trees.
-pub const PLAIN: Variant = Variant::of("plain");
+pub const PLAIN: Variant = Variant::of(Schedule::Plain);
 /// Every ray from the root, over binary trees: the paper's kind of baseline.
-pub const PLAIN_BVH2: Variant = Variant::of("plain-bvh2");
+pub const PLAIN_BVH2: Variant = Variant::of(Schedule::PlainBinary);
 /// Lists and queries of every frame anew.
-pub const CHC: Variant = Variant::of("chc");
+pub const CHC: Variant = Variant::of(Schedule::Chc);
 /// Algorithm 1 of the paper.
 pub const FRONTS: Variant = Variant { fronts: true, ..CHC };
 /// Ray by ray over what is resident.
-pub const DEMAND: Variant = Variant::of("demand");
+pub const DEMAND: Variant = Variant::of(Schedule::Demand);
 /// The cheapest by measurement.
-pub const AUTO: Variant = Variant::of("auto");
+pub const AUTO: Variant = Variant::of(Schedule::Auto);
 /// What is compared in core.
 pub const IN_CORE: [Variant; 6] = [PLAIN, PLAIN_BVH2, CHC, FRONTS, DEMAND, AUTO];
 /// What is compared out of core.
 pub const OUT_OF_CORE: [Variant; 4] = [CHC, FRONTS, DEMAND, AUTO];
 /// Optimisations of loading that are left out, each and both.
-pub const WITHOUT: [&str; 3] = ["requery", "nearest-first", "requery,nearest-first"];
+pub const WITHOUT: [&[Optimisation]; 3] =
+    [&[Optimisation::Requery], &[Optimisation::NearestFirst], &[Optimisation::Requery, Optimisation::NearestFirst]];
 
 impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.schedule)?;
+        f.write_str(self.schedule.name())?;
         if self.fronts {
             f.write_str("+fronts")?;
         }
         if !self.without.is_empty() {
-            write!(f, " without {}", self.without)?;
+            let names: Vec<&str> = self.without.iter().map(|which| which.name()).collect();
+            write!(f, " without {}", names.join(","))?;
         }
         Ok(())
     }
@@ -217,7 +223,7 @@ impl Case {
         self.effects
     }
 
-    /// Value of `--effects`.
+    /// Their names.
     pub fn effects_option(&self) -> String {
         let names: Vec<&str> = self.effects.iter().map(|effect| effect.name()).collect();
         names.join(",")

@@ -2,12 +2,12 @@
 
 use super::args::Settings;
 use super::plan::{SceneId, View};
-use crate::cli::options::args::Cli;
+use crate::cli::interrupt;
 use crate::output::atomic;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use anyhow::{Context, Result};
-use clap::Parser;
-use std::ffi::OsString;
+use brickwalk_convert::build::{BuildSettings, build_source};
+use brickwalk_scenes::{Kind, Settings as Generated, generate, write_motion, write_paths};
 use std::path::{Path, PathBuf};
 
 /// Copies of the plant in [`SceneId::Pipes16`].
@@ -47,14 +47,14 @@ pub fn place(scene: SceneId, folder: &Path, settings: &Settings, sponza: Option<
     let (kind, triangles, copies) = match scene {
         SceneId::Sponza => {
             let scene = sponza.context("there is no Sponza; give it with --sponza")?.to_path_buf();
-            let manifest = crate::session::open::open_scene(&scene)?.resident().manifest.clone();
+            let manifest = crate::session::open_scene(&scene)?.resident().manifest.clone();
             let otherwise = Some(path_from_bounds(manifest.min, manifest.max));
             return Ok(Place { scene, otherwise });
         }
-        SceneId::City => ("city", city, 1),
-        SceneId::CityLarge => ("city", large, 1),
-        SceneId::Pipes => ("pipes", pipes, 1),
-        SceneId::Pipes16 => ("pipes", pipes, COPIES),
+        SceneId::City => (Kind::City, city, 1),
+        SceneId::CityLarge => (Kind::City, large, 1),
+        SceneId::Pipes => (Kind::Pipes, pipes, 1),
+        SceneId::Pipes16 => (Kind::Pipes, pipes, COPIES),
     };
     let file = folder.join(match copies {
         1 => format!("{kind}-{triangles}.bricks"),
@@ -63,15 +63,26 @@ pub fn place(scene: SceneId, folder: &Path, settings: &Settings, sponza: Option<
     // Paths are written after the scene.
     if !file.with_extension("far.json").exists() || !file.exists() {
         atomic::create_folder(folder)?;
-        let mut words: Vec<OsString> = ["brickwalk", "scene", kind, "-o"].map(OsString::from).to_vec();
-        words.push(file.clone().into());
         // Small scenes are cut finer, so that shares of the cache hold several bricks.
-        let brick_triangles = (triangles / LEAST_BRICKS).clamp(1, 16_384).to_string();
-        let (triangles, copies) = (triangles.to_string(), copies.to_string());
-        let options = ["--triangles", &triangles, "--copies", &copies, "--brick-triangles", &brick_triangles];
-        words.extend(options.map(OsString::from));
-        let cli = Cli::try_parse_from(words).context("the bench's own scene")?;
-        crate::cli::run(&cli.command).with_context(|| file.display().to_string())?;
+        let brick_triangles = (triangles / LEAST_BRICKS).clamp(1, 16_384) as u32;
+        make(&Generated { kind, triangles, copies, ..Generated::default() }, brick_triangles, &file)?;
     }
     Ok(Place { scene: file, otherwise: None })
+}
+
+/// Generates a scene with bricks of at most so many triangles, its paths and its motion beside it.
+///
+/// # Errors
+/// It cannot have so many triangles; the file cannot be written.
+pub fn make(settings: &Generated, brick_triangles: u32, file: &Path) -> Result<()> {
+    let name = || file.display().to_string();
+    let progress = interrupt::job();
+    let scene = generate(settings, &progress).with_context(name)?;
+    let movable = settings.kind.movable().iter().map(|&name| name.to_owned()).collect();
+    let build = BuildSettings { movable, brick_triangles, ..BuildSettings::default() };
+    build_source(&scene, &build, file, &progress).with_context(name)?;
+    progress.finish();
+    write_paths(&scene, file)?;
+    write_motion(&scene, file)?;
+    Ok(())
 }

@@ -1,37 +1,27 @@
 //! Options of `selftest`.
 
 use super::defects::Defect;
-use crate::cli::options::args::{UNITS, ranged};
-use crate::session::device::Adapter;
-use clap::Args;
+use crate::settings::{Adapter, Rule, settings};
 use std::path::PathBuf;
 
-/// Options of `selftest`.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = UNITS)]
-pub struct SelftestArgs {
-    /// Only the cases of these numbers [default: all]
-    #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', value_parser = |s: &str| ranged(s, 1, 60))]
-    pub case: Vec<u32>,
-    /// Seed of the generated scenes and rays; the same seed makes the same ones
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
-    /// Rays aimed at edges and vertices of closed meshes (case 20); other cases take a share of them, at most 1/50
-    #[arg(long, value_name = "COUNT", default_value = "10M", value_parser = |s: &str| ranged(s, 1000, 1_000_000_000))]
-    pub rays: u32,
-    /// Instead of the cases: measure the error against scale and against the distance from the origin, of this
-    /// program's arithmetic, of plain f32 in world space and of Möller-Trumbore, and write tables and plots into this
-    /// folder, which is made if missing [default: none]
-    #[arg(long, value_name = "DIR")]
-    pub errors: Option<PathBuf>,
-    /// Print JSON
-    #[arg(long)]
-    pub json: bool,
-    /// What is tested: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
-    /// adapter whose name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
-    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
-    pub adapter: Adapter,
-    /// A defect planted on purpose, which the cases must notice.
-    #[arg(long, hide = true)]
-    pub plant: Option<Defect>,
+settings! {
+    /// Options of `selftest`.
+    pub struct SelftestArgs {
+        /// Only the cases of these numbers, 1 to 60. [default: all]
+        case: Vec<u32> = Vec::new(), "--case N...", Rule::Whole(1, 60), "", Measurement, Common;
+        /// Seed of the generated scenes and rays; the same seed makes the same ones.
+        seed: u64 = 1, "--seed N", Rule::Any, "", Measurement, Common;
+        /// Rays aimed at edges and vertices of closed meshes (case 20). Other cases take a share of them, at most 1/50.
+        rays: u32 = 10_000_000, "--rays COUNT", Rule::Whole(1000, 1_000_000_000), "", Measurement, Common;
+        /// Instead of the cases: measure the error against scale and against the distance from the origin. It measures
+        /// this program's arithmetic, plain f32 in world space and Möller-Trumbore, and writes tables and plots into this
+        /// folder, which is made if missing. [default: none]
+        errors: Option<PathBuf> = None, "--errors DIR", Rule::Any, "", Measurement, Common;
+        /// Print JSON.
+        json: bool = false, "--json", Rule::Any, "", Output, Common;
+        /// What is tested, as `walk --adapter` has it.
+        adapter: Adapter = Adapter::Auto, "--adapter NAME", Rule::Any, "", Device, Common;
+        /// A defect planted on purpose, which the cases must notice. [default: none]
+        plant: Option<Defect> = None, "--plant NAME", Rule::Any, "", Measurement, Expert;
+    }
 }

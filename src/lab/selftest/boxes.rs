@@ -11,7 +11,7 @@
 //! is added. A box that is entered must therefore be met when it is grown by 2δ.
 
 use super::case::Checks;
-use super::lab::{Lab, settings};
+use super::lab::{Lab, cached, settings};
 use super::meshes::note;
 use super::rays::{Aim, Targets, ray};
 use crate::gpu::kernels;
@@ -251,7 +251,7 @@ fn nodes(lab: &mut Lab, checks: &mut Checks, kind: Kind) -> Result<()> {
 /// Judges rays through whole trees over axis-aligned boxes, most of them flat.
 fn scene(lab: &mut Lab, checks: &mut Checks, kind: Kind) -> Result<()> {
     let count = lab.share(12_000);
-    let mut stage = lab.stage(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(32, -10), "--cache 50%")?;
+    let mut stage = lab.stage(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(32, -10), &cached(50))?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let targets = Targets::of(&truth, &frame);
     let mut rng = lab.random(&[16, kind as i64]);

@@ -19,7 +19,7 @@ use glam::DVec3;
 use std::any::Any;
 use std::sync::Arc;
 
-crate::cli::options::named::named_values! {
+crate::settings::names::names! {
     /// What is planted.
     Defect {
         /// Vertices and origins in f32 relative to the world's origin.
@@ -48,7 +48,7 @@ crate::cli::options::named::named_values! {
         TileRemainder = "tile-remainder",
         /// Points that rays leave from are not moved in from the triangle's edges.
         NoInset = "no-inset",
-    } later &[]
+    }
 }
 
 /// Every defect.

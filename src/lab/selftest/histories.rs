@@ -1,16 +1,21 @@
 //! Histories of the denoiser (cases 52, 53 and 55).
 
 use super::case::Checks;
-use super::lab::{Lab, settings};
+use super::lab::{Lab, picture, settings};
 use super::views::{city, in_city};
 use crate::kernels::layout::NONE;
 use crate::picture::denoise::{Denoiser, Moments};
 use crate::scene::Camera;
+use crate::settings::{Effect, EffectList, Settings};
 use anyhow::{Context, Result};
 use brickwalk_scenes::{Stiff, stiff};
 use glam::DVec3;
 
-const OPTIONS: &str = "--size 64x64 --tile 16 --cache 100% --denoise --effects shadow,diffuse --diffuse-rays 1";
+/// Settings of frames with guides.
+fn options() -> Settings {
+    let effects = EffectList::of(&[Effect::Shadow, Effect::Diffuse]);
+    Settings { denoise: true, effects, diffuse_rays: 1, ..picture(64, 64, 100) }
+}
 
 /// Pixels that are not finite.
 fn not_finite(radiance: &[[f32; 3]]) -> u64 {
@@ -21,7 +26,7 @@ fn not_finite(radiance: &[[f32; 3]]) -> u64 {
 pub fn not_a_number(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let (file, path, _) = lab.build(city(lab.seed, [0.0; 3])?, &settings(1024, -14))?;
-    let mut renderer = lab.renderer(&file, &path, OPTIONS)?;
+    let mut renderer = lab.renderer(&file, &path, &options())?;
     let mut denoiser = Denoiser::default();
     let (mut found, mut shown) = (0, 0);
     for frame in 0..4 {
@@ -89,7 +94,7 @@ pub fn black(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
         let mut source = stiff(Stiff::Shell, 2, lab.seed);
         source.materials.iter_mut().for_each(|material| material.base_color = [albedo, albedo, albedo, 1.0]);
         let (file, path, _) = lab.build(source, &settings(64, 0))?;
-        let mut renderer = lab.renderer(&file, &path, OPTIONS)?;
+        let mut renderer = lab.renderer(&file, &path, &options())?;
         let mut denoiser = Denoiser::default();
         let (mut lit, mut met, mut bad) = (0, 0, 0);
         for frame in 0..3 {

@@ -1,29 +1,28 @@
 //! What cases work with: a device, scenes built for them, sessions that trace or render.
 
 use super::defects::{Defect, Faulty};
-use crate::cli::options::args::{Cli, Command, WalkArgs};
-use crate::cli::trace::{EXTENT, trace_device};
-use crate::cli::walk::renderer;
 use crate::counters::Counters;
 use crate::cpu::CpuExecutor;
 use crate::frame::Renderer;
 use crate::gpu::executor::GpuExecutor;
 use crate::gpu::kernels::Kernels;
 use crate::gpu::wgsl::Pages;
+use crate::kernels::FrameExecutor;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{Hit, NONE, Ray, T_INFINITE};
-use crate::kernels::{Extent, FrameExecutor};
 use crate::reference::{Tally, Truth, TruthRay, judge, judge_any};
-use crate::session::device::{Adapter, Device};
-use crate::session::open::{Needs, Session, open_scene};
+use crate::session::device::Device;
+use crate::session::opened::{Needs, Opened, open_scene};
+use crate::session::renderer::renderer;
+use crate::session::trace::{EXTENT, for_rays, trace_device};
+use crate::settings::{Adapter, CacheSize, Effect, EffectList, ImageSize, Schedule, Settings};
 use crate::stream::Workers;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, BuildSummary, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
 use brickwalk_scenes::Rng;
-use clap::Parser;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -53,7 +52,7 @@ pub struct Stage {
     /// The file.
     pub file: Arc<SceneFile>,
     /// What traces.
-    pub session: Session,
+    pub opened: Opened,
 }
 
 impl Lab {
@@ -101,41 +100,36 @@ impl Lab {
         Ok((open_scene(&path)?, path, summary))
     }
 
-    /// Builds a scene and opens it for rays, with the options of `trace`.
+    /// Builds a scene and opens it for rays.
     ///
     /// # Errors
     /// The builder's, the cache's, the device's.
-    pub fn stage(&mut self, source: SourceScene, settings: &BuildSettings, options: &str) -> Result<Stage> {
-        let (file, path, _) = self.build(source, settings)?;
-        self.open_stage(file, &path, options)
+    pub fn stage(&mut self, source: SourceScene, build: &BuildSettings, settings: &Settings) -> Result<Stage> {
+        let (file, path, _) = self.build(source, build)?;
+        self.open_stage(file, &path, settings)
     }
 
-    /// Opens a scene for rays, with the options of `trace`.
+    /// Opens a scene for rays.
     ///
     /// # Errors
     /// The cache's, the device's.
-    pub fn open_stage(&mut self, file: Arc<SceneFile>, path: &Path, options: &str) -> Result<Stage> {
-        let words = format!("brickwalk trace s --rays r -o h {options}");
-        let Command::Trace(args) = Cli::try_parse_from(words.split_whitespace())?.command else {
-            bail!("these are the options of trace");
-        };
-        let page_bytes = self.device.page_bytes();
-        let make = |needs: Needs| self.executor(needs);
-        let session = Session::open_on(file.clone(), path, &args.stream, EXTENT, page_bytes, make)?;
-        Ok(Stage { file, session })
+    pub fn open_stage(&mut self, file: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Stage> {
+        let opened = self.opened(file.clone(), path, &for_rays(settings))?;
+        Ok(Stage { file, opened })
     }
 
-    /// Opens a scene for frames, with the options of `walk`.
+    /// Opens a scene for frames.
     ///
     /// # Errors
     /// The cache's, the device's.
-    pub fn renderer(&mut self, file: &Arc<SceneFile>, path: &Path, options: &str) -> Result<Renderer> {
-        let args = walk_args(options)?;
-        let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    pub fn renderer(&mut self, file: &Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Renderer> {
+        let opened = self.opened(file.clone(), path, settings)?;
+        renderer(opened, path, settings)
+    }
+
+    fn opened(&mut self, file: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Opened> {
         let page_bytes = self.device.page_bytes();
-        let make = |needs: Needs| self.executor(needs);
-        let session = Session::open_on(file.clone(), path, &args.stream, extent, page_bytes, make)?;
-        renderer(session, &args)
+        Opened::open_on(file, path, settings, page_bytes, |needs| self.executor(needs))
     }
 
     fn executor(&mut self, needs: Needs) -> Result<Box<dyn FrameExecutor>> {
@@ -170,16 +164,25 @@ impl Lab {
     }
 }
 
-/// The options of a walk.
-///
-/// # Errors
-/// They are none.
-pub fn walk_args(options: &str) -> Result<WalkArgs> {
-    let words = format!("brickwalk walk s -o o {options}");
-    match Cli::try_parse_from(words.split_whitespace())?.command {
-        Command::Walk(args) => Ok(*args),
-        _ => Err(anyhow!("these are the options of walk")),
-    }
+/// Settings with a cache of so many per cent.
+pub fn cached(percent: u32) -> Settings {
+    Settings { cache: CacheSize::Percent(percent.into()), ..Settings::default() }
+}
+
+/// The same by a schedule.
+pub fn scheduled(percent: u32, schedule: Schedule) -> Settings {
+    Settings { schedule, ..cached(percent) }
+}
+
+/// Settings of a small picture in tiles of 16 pixels.
+pub fn picture(width: u32, height: u32, percent: u32) -> Settings {
+    Settings { size: ImageSize { width, height }, tile: 16, ..cached(percent) }
+}
+
+/// The same with several effects of so many rays, and AOVs.
+pub fn lit(width: u32, height: u32, percent: u32, rays: u32) -> Settings {
+    let effects = EffectList::of(&[Effect::Shadow, Effect::Ao, Effect::Diffuse]);
+    Settings { effects, ao_rays: rays, diffuse_rays: rays, aov: true, ..picture(width, height, percent) }
 }
 
 impl Stage {
@@ -203,7 +206,7 @@ impl Stage {
     pub fn trace(&mut self, frame: &Frame, rays: &[Ray], any: bool) -> Result<Vec<Hit>> {
         let mut hits = Vec::with_capacity(rays.len());
         for chunk in rays.chunks(EXTENT.rays()) {
-            hits.extend(trace_device(&mut self.session, frame, chunk, any, &mut Counters::default())?);
+            hits.extend(trace_device(&mut self.opened.traced(), frame, chunk, any, &mut Counters::default())?);
         }
         Ok(hits)
     }

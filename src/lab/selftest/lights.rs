@@ -1,11 +1,12 @@
 //! Light with a great range (case 50).
 
 use super::case::Checks;
-use super::lab::{Lab, settings};
+use super::lab::{Lab, picture, settings};
 use crate::frame::{Equirectangular, environment};
 use crate::kernels::Lamps;
 use crate::kernels::layout::NONE;
 use crate::scene::Camera;
+use crate::settings::{Effect, EffectList, Settings};
 use anyhow::Result;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::one_mesh;
@@ -38,8 +39,9 @@ pub fn sun_texel(lab: &mut Lab) -> Result<Checks> {
     let floor = Primitive { positions, indices: vec![0, 1, 2, 0, 2, 3], ..Primitive::default() };
     let (file, path, _) = lab.build(one_mesh("floor", floor), &settings(16, 0))?;
     let camera = Camera { position: DVec3::Y * 3.0, target: DVec3::ZERO, up: DVec3::Z, fov_y: 0.2 };
-    let options = "--size 64x64 --tile 16 --cache 100% --aov --spp 4 --sun-intensity 0 --effects environment";
-    let mut renderer = lab.renderer(&file, &path, options)?;
+    let effects = EffectList::of(&[Effect::Environment]);
+    let options = Settings { aov: true, spp: 4, sun_intensity: Some(0.0), effects, ..picture(64, 64, 100) };
+    let mut renderer = lab.renderer(&file, &path, &options)?;
     // Lookups are bilinear: the integral of a tent over its four texels, in both angles.
     let (rows, steps) = (128.0, 1000);
     let tent = |i: u32| {

@@ -8,10 +8,11 @@
 //! = n u / (1 − n u), u = 2⁻²⁴; a difference is excused only where f32 could not have told.
 
 use super::case::Checks;
-use super::lab::{Lab, Stage, different, misses, settings};
+use super::lab::{Lab, Stage, cached, different, misses, scheduled, settings};
 use super::rays::{Aim, Targets, lattice_point, ray};
 use crate::kernels::layout::Ray;
 use crate::reference::Tally;
+use crate::settings::Schedule;
 use anyhow::Result;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Rng, Stiff, moved, one_mesh, rotated_instances, stiff};
@@ -58,7 +59,7 @@ pub fn far_origin(lab: &mut Lab) -> Result<Checks> {
     let mut expected = None;
     for shift in [[0.0; 3], SHIFTS[0], SHIFTS[1]] {
         let source = moved(stiff(Stiff::Shell, 3, lab.seed), 1.0 / 16384.0, 1.0, shift);
-        let mut stage = lab.stage(source, &settings(64, -14), "--cache 100% --schedule plain")?;
+        let mut stage = lab.stage(source, &settings(64, -14), &scheduled(100, Schedule::Plain))?;
         let (truth, frame) = (stage.truth()?, stage.frame(DVec3::from(shift)));
         let targets = Targets::of(&truth, &frame);
         let half = 0.3 / frame.unit;
@@ -74,7 +75,7 @@ pub fn far_origin(lab: &mut Lab) -> Result<Checks> {
     // Elsewhere the lattice lies otherwise in the mesh, and hits are those of the mesh there.
     for shift in OTHER_SHIFTS {
         let source = moved(stiff(Stiff::Shell, 3, lab.seed), 0.0, 1.0, shift);
-        let mut stage = lab.stage(source, &settings(64, -14), "--cache 100% --schedule plain")?;
+        let mut stage = lab.stage(source, &settings(64, -14), &scheduled(100, Schedule::Plain))?;
         let (truth, frame) = (stage.truth()?, stage.frame(DVec3::from(shift)));
         let targets = Targets::of(&truth, &frame);
         let (middle, half) = ((DVec3::from(shift) - frame.origin) / frame.unit, 0.3 / frame.unit);
@@ -93,15 +94,11 @@ pub fn cuts(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let count = lab.share(100_000);
     let mut expected = None;
-    let ways = [
-        (8192, "--cache 100% --schedule plain"),
-        (100, "--cache 100% --schedule chc --tile 32"),
-        (16, "--cache 30% --schedule demand"),
-        (1, "--cache 20% --schedule chc"),
-    ];
-    for (bricks, options) in ways {
+    let ways =
+        [(8192, 100, Schedule::Plain), (100, 100, Schedule::Chc), (16, 30, Schedule::Demand), (1, 20, Schedule::Chc)];
+    for (bricks, cache, schedule) in ways {
         let source = stiff(Stiff::Shell, 3, lab.seed);
-        let mut stage = lab.stage(source, &settings(bricks, -20), options)?;
+        let mut stage = lab.stage(source, &settings(bricks, -20), &scheduled(cache, schedule))?;
         let frame = stage.frame(DVec3::ZERO);
         let targets = Targets::of(&stage.truth()?, &frame);
         let half = 0.3 / frame.unit;
@@ -119,7 +116,7 @@ pub fn cuts(lab: &mut Lab) -> Result<Checks> {
 pub fn scale_mix(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let count = lab.share(1000);
-    let mut stage = lab.stage(stiff(Stiff::ScaleMix, 1, lab.seed), &settings(64, -19), "--cache 50%")?;
+    let mut stage = lab.stage(stiff(Stiff::ScaleMix, 1, lab.seed), &settings(64, -19), &cached(50))?;
     let truth = stage.truth()?;
     let mut rng = lab.random(&[3]);
     for (number, decade) in (-4..=6).enumerate() {
@@ -145,7 +142,7 @@ pub fn scale_sweep(lab: &mut Lab) -> Result<Checks> {
     let count = lab.share(4000);
     let mut run = |scale: f64| -> Result<_> {
         let source = moved(stiff(Stiff::Shell, 2, lab.seed), 0.0, scale, [0.0; 3]);
-        let mut stage = lab.stage(source, &settings(64, 0), "--cache 100%")?;
+        let mut stage = lab.stage(source, &settings(64, 0), &cached(100))?;
         let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
         let targets = Targets::of(&truth, &frame);
         let half = 0.3 * scale / frame.unit;
@@ -180,7 +177,7 @@ pub fn scale_sweep(lab: &mut Lab) -> Result<Checks> {
 pub fn slivers(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let count = lab.share(5000);
-    let mut stage = lab.stage(stiff(Stiff::Slivers, 4000, lab.seed), &settings(256, -32), "--cache 50%")?;
+    let mut stage = lab.stage(stiff(Stiff::Slivers, 4000, lab.seed), &settings(256, -32), &cached(50))?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let targets = Targets::of(&truth, &frame);
     let mut rng = lab.random(&[5]);
@@ -203,7 +200,7 @@ pub fn slivers(lab: &mut Lab) -> Result<Checks> {
 pub fn denormals(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let count = lab.share(20_000);
-    let mut stage = lab.stage(stiff(Stiff::Shell, 2, lab.seed), &settings(64, 0), "--cache 100%")?;
+    let mut stage = lab.stage(stiff(Stiff::Shell, 2, lab.seed), &settings(64, 0), &cached(100))?;
     let frame = stage.frame(DVec3::ZERO);
     let mut rng = lab.random(&[8]);
     let rays: Vec<[Ray; 2]> = (0..count)
@@ -241,7 +238,7 @@ pub fn edges(lab: &mut Lab) -> Result<Checks> {
     for (name, kind, n, half, bricks) in meshes {
         for shift in [[0.0; 3], SHIFTS[0]] {
             let source = moved(stiff(kind, n, lab.seed), 0.0, 1.0, shift);
-            let mut stage = lab.stage(source, &settings(bricks, -14), "--cache 100% --schedule plain")?;
+            let mut stage = lab.stage(source, &settings(bricks, -14), &scheduled(100, Schedule::Plain))?;
             let (truth, frame) = (stage.truth()?, stage.frame(DVec3::from(shift)));
             let targets = Targets::of(&truth, &frame);
             let (half, step) = (half / frame.unit, step_of(&stage));
@@ -303,7 +300,7 @@ pub fn grazing(lab: &mut Lab) -> Result<Checks> {
     let count = lab.share(20_000);
     // A cube of side 64 whose floor is at y = 0, where f32 has steps fine enough for such rays.
     let source = moved(stiff(Stiff::Cube, 16, lab.seed), 0.0, 32.0, [0.0, 32.0, 0.0]);
-    let mut stage = lab.stage(source, &settings(128, -20), "--cache 100%")?;
+    let mut stage = lab.stage(source, &settings(128, -20), &cached(100))?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let mut rng = lab.random(&[23]);
     let rays: Vec<Ray> = (0..count)
@@ -345,7 +342,7 @@ fn needles(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let positions: Vec<[f64; 3]> = needles.iter().flat_map(|n| [n[3], n[4], n[5]].map(|p| p.to_array())).collect();
     let indices = (0..positions.len() as u32).collect();
     let source = one_mesh("needles", Primitive { positions, indices, ..Primitive::default() });
-    let mut stage = lab.stage(source, &settings(32, -20), "--cache 40% --schedule chc")?;
+    let mut stage = lab.stage(source, &settings(32, -20), &scheduled(40, Schedule::Chc))?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let rays: Vec<Ray> = (0..lab.share(20_000))
         .map(|i| {
@@ -374,7 +371,7 @@ fn needles(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
 pub fn instances(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let count = lab.share(12_000);
-    let mut stage = lab.stage(rotated_instances(lab.seed), &settings(256, 0), "--cache 40%")?;
+    let mut stage = lab.stage(rotated_instances(lab.seed), &settings(256, 0), &cached(40))?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let targets = Targets::of(&truth, &frame);
     let rays = aimed(&mut lab.random(&[59]), &targets, DVec3::ZERO, 8.0 / frame.unit, step_of(&stage), count);

@@ -1,8 +1,7 @@
 //! Ray-aligned occupancy maps against walks cell by cell (cases 41 and 42).
 
 use super::case::Checks;
-use super::lab::{Lab, Stage, settings};
-use crate::cli::trace::EXTENT;
+use super::lab::{Lab, Stage, cached, settings};
 use crate::kernels::layout::{Hit, Level, MET, NONE, Params, Ray, RomaMap};
 use crate::kernels::{Directions, View};
 use crate::math::sampling::pcg;
@@ -10,6 +9,7 @@ use crate::schedule::{Lamp, Pass, Step};
 use crate::secondary::occupancy::{Bom, Cascades};
 use crate::secondary::roma::maps::RomaMaps;
 use crate::secondary::roma::{MOST_STEPS, RomaPart};
+use crate::session::trace::EXTENT;
 use anyhow::Result;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Rng, one_mesh};
@@ -49,27 +49,27 @@ fn aligned(cells: u32, levels: &[(f32, f32)], axis: usize) -> RomaMaps {
 fn stage(lab: &mut Lab) -> Result<Stage> {
     let positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let triangle = Primitive { positions, indices: vec![0, 1, 2], ..Primitive::default() };
-    lab.stage(one_mesh("triangle", triangle), &settings(4, 0), "--cache 100%")
+    lab.stage(one_mesh("triangle", triangle), &settings(4, 0), &cached(100))
 }
 
 /// Has the stage's device make the maps.
 fn make(stage: &mut Stage, boms: Vec<Bom>, maps: &RomaMaps) -> Result<()> {
     let frame = stage.frame(DVec3::ZERO);
-    let executor = &mut *stage.session.executor;
+    let executor = &mut *stage.opened.executor;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     maps.give(executor, &Arc::new(Cascades { levels: boms }))?;
-    executor.run(Pass::Shadow(Lamp::Sun), &[maps.rotate()], &stage.session.cache.states)?;
+    executor.run(Pass::Shadow(Lamp::Sun), &[maps.rotate()], &stage.opened.cache.states)?;
     Ok(())
 }
 
 /// What the maps that were made answer.
 fn answers(stage: &mut Stage, maps: &RomaMaps, rays: &[Ray], steps: u32) -> Result<Vec<Hit>> {
     let pass = Pass::Shadow(Lamp::Sun);
-    let executor = &mut *stage.session.executor;
+    let executor = &mut *stage.opened.executor;
     let mut hits = Vec::with_capacity(rays.len());
     for chunk in rays.chunks(EXTENT.rays()) {
         executor.set_rays(pass, chunk);
-        executor.run(pass, &[Step::StartHits, maps.trace(steps, RomaPart::Whole)], &stage.session.cache.states)?;
+        executor.run(pass, &[Step::StartHits, maps.trace(steps, RomaPart::Whole)], &stage.opened.cache.states)?;
         hits.extend_from_slice(&executor.read_hits(pass)?[..chunk.len()]);
     }
     Ok(hits)

@@ -1,11 +1,12 @@
 //! Sums of many samples (case 54).
 
 use super::case::Checks;
-use super::lab::{Lab, settings};
+use super::lab::{Lab, picture, settings};
 use crate::frame::Engine;
 use crate::frame::{Accumulation, BATCH_SAMPLES, Renderer, camera_view};
 use crate::scene::Camera;
 use crate::schedule::{Lamp, Pass, Shading, Step};
+use crate::settings::{EffectList, Schedule, Settings};
 use anyhow::Result;
 use brickwalk_scenes::{Stiff, stiff};
 use glam::DVec3;
@@ -55,17 +56,18 @@ pub fn accumulation(lab: &mut Lab) -> Result<Checks> {
     }
     let (file, path, _) = lab.build(source, &settings(64, 0))?;
     let camera = Camera { position: DVec3::new(0.1, 0.2, -0.3), target: DVec3::X, up: DVec3::Y, fov_y: 1.0 };
-    let options = "--size 8x8 --tile 8 --cache 100% --schedule plain --effects primary --spp";
+    let (schedule, effects) = (Schedule::Plain, EffectList::PRIMARY);
+    let options = |spp| Settings { tile: 8, schedule, effects, spp, ..picture(8, 8, 100) };
 
     // Rendered, sample by sample; not a whole number of batches.
     let samples = lab.share(10_000) as u32 / BATCH_SAMPLES * BATCH_SAMPLES + 1;
-    let mut renderer = lab.renderer(&file, &path, &format!("{options} {samples}"))?;
+    let mut renderer = lab.renderer(&file, &path, &options(samples))?;
     let mean = renderer.frame(0, &camera)?.pixels.radiance;
     checks.at_most(&format!("{samples} samples of a frame: relative drift"), drift(&mean), BOUND);
 
     // Shaded again and again: batches of the same frame.
     let frames = (lab.rays as u32).min(1_000_000) / BATCH_SAMPLES * BATCH_SAMPLES;
-    let mut renderer = lab.renderer(&file, &path, &format!("{options} 1"))?;
+    let mut renderer = lab.renderer(&file, &path, &options(1))?;
     renderer.frame(0, &camera)?;
     let mut accumulation = Accumulation::default();
     for first in (0..frames).step_by(BATCH_SAMPLES as usize) {

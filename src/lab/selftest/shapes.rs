@@ -1,13 +1,14 @@
 //! Shapes that are hard for the builder, and what it must refuse (cases 6, 7, 9 to 14, 38, 43).
 
 use super::case::Checks;
-use super::lab::{Lab, different, misses, settings};
+use super::lab::{Lab, cached, different, misses, scheduled, settings};
 use super::meshes::{aimed, note, step_of};
 use super::rays::{Aim, Targets, lattice_point, ray};
 use crate::kernels::layout::Ray;
 use crate::scene::path::path_from_bounds;
 use crate::secondary::occupancy::Bom;
 use crate::secondary::occupancy::{Settings, assemble};
+use crate::settings::{Group, Schedule};
 use anyhow::{Context, Result};
 use bricks::MAX_BRICK_HEIGHT;
 use brickwalk_convert::source::{Primitive, SourceScene};
@@ -71,12 +72,13 @@ pub fn coincident(lab: &mut Lab) -> Result<Checks> {
     let own = 2 * n * n;
     let mut expected = None;
     let ways = [
-        (7, "--cache 30% --schedule chc"),
-        (64, "--cache 100% --schedule plain"),
-        (3, "--cache 40% --schedule demand"),
+        (7, scheduled(30, Schedule::Chc)),
+        (64, scheduled(100, Schedule::Plain)),
+        (3, scheduled(40, Schedule::Demand)),
     ];
     for (bricks, options) in ways {
-        let mut stage = lab.stage(stiff(Stiff::Sheets, n, lab.seed), &settings(bricks, -20), options)?;
+        let mut stage = lab.stage(stiff(Stiff::Sheets, n, lab.seed), &settings(bricks, -20), &options)?;
+        let options = options.options();
         let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
         let targets = Targets::of(&truth, &frame);
         let (step, unit) = (step_of(&stage), 1.0 / frame.unit);
@@ -93,7 +95,7 @@ pub fn coincident(lab: &mut Lab) -> Result<Checks> {
             })
             .collect();
         let (tally, hits) = stage.judge(&truth, &frame, &rays)?;
-        note(&mut checks, options, &tally);
+        note(&mut checks, &options, &tally);
         let higher = hits.iter().filter(|hit| hit.id != crate::kernels::layout::NONE && hit.id >= own).count() as u64;
         checks.none(&format!("{options}: hits of a copy with a higher id"), higher, hits.len() as u64);
         // Where a ray starts on a vertex everything is exact, and so is the choice.
@@ -125,8 +127,8 @@ fn build_and_judge(lab: &mut Lab, checks: &mut Checks, kind: Stiff, n: u32, bric
     let report = file.verify(&mut |_, _| ())?;
     checks.holds(&format!("{kind}: every checksum and reference"), report.is_ok());
     let count = lab.share(4000);
-    let cache = if resident.bricks.len() > 8 { "--cache 50%" } else { "--cache 100%" };
-    let mut stage = lab.open_stage(file, &path, cache)?;
+    let cache = if resident.bricks.len() > 8 { 50 } else { 100 };
+    let mut stage = lab.open_stage(file, &path, &cached(cache))?;
     let frame = stage.frame(DVec3::ZERO);
     if kind == Stiff::Duplicates {
         // Truth over a million copies of one triangle, all of which a ray meets: the first.
@@ -182,14 +184,14 @@ pub fn series(lab: &mut Lab) -> Result<Checks> {
 /// Case 38: nothing, and one triangle.
 pub fn least_scenes(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    let mut stage = lab.stage(stiff(Stiff::Empty, 0, lab.seed), &settings(16, 0), "--cache 100%")?;
+    let mut stage = lab.stage(stiff(Stiff::Empty, 0, lab.seed), &settings(16, 0), &cached(100))?;
     let frame = stage.frame(DVec3::ZERO);
     let mut rng = lab.random(&[38]);
     let rays: Vec<Ray> = (0..512).map(|_| ray(10.0 * rng.direction(), 10.0 * rng.direction())).collect();
     let hits = stage.trace(&frame, &rays, false)?;
     checks.equal("nothing: misses", misses(&hits), 512);
 
-    let mut stage = lab.stage(stiff(Stiff::Triangle, 1, lab.seed), &settings(16, -20), "--cache 100%")?;
+    let mut stage = lab.stage(stiff(Stiff::Triangle, 1, lab.seed), &settings(16, -20), &cached(100))?;
     let frame = stage.frame(DVec3::ZERO);
     let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) / frame.unit;
     // The triangle (-1, -1), (1, -1), (0, 1) of the plane z = 0, seen from z = 4 and from behind: t is exactly 1/2.
@@ -214,7 +216,7 @@ pub fn flat_scene(lab: &mut Lab) -> Result<Checks> {
         [[-4.0, 0.0, -4.0], [4.0, 0.0, -4.0], [4.0, 0.0, 4.0]],
         [[-4.0, 0.0, -4.0], [4.0, 0.0, 4.0], [-4.0, 0.0, 4.0]],
     ];
-    let mut stage = lab.stage(triangles(&square), &settings(16, 0), "--cache 100%")?;
+    let mut stage = lab.stage(triangles(&square), &settings(16, 0), &cached(100))?;
     let manifest = stage.file.resident().manifest.clone();
     let path = path_from_bounds(manifest.min, manifest.max);
     let cameras: Vec<_> = (0..5).map(|k| path.frame(k, 5)).collect();

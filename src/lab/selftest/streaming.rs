@@ -1,12 +1,14 @@
 //! Queries, lists, caches and damaged files (cases 31 to 37).
 
 use super::case::Checks;
-use super::lab::{Lab, misses, settings};
+use super::lab::{Lab, lit, misses, scheduled, settings};
 use super::rays::{Aim, Targets};
 use super::views::{city, in_city, pixels_unlike};
 use crate::frame::{Pixels, Renderer};
 use crate::kernels::layout::Ray;
-use crate::session::open::open_scene;
+use crate::schedule::Optimisation;
+use crate::session::opened::open_scene;
+use crate::settings::{CacheSize, Schedule, Settings};
 use crate::stream::{Item, PayloadSource, Policy, Residency};
 use anyhow::{Context, Result, anyhow};
 use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Payload, SceneFile};
@@ -17,8 +19,10 @@ use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Options of pictures with several effects.
-const OPTIONS: &str = "--size 72x48 --aov --effects shadow,ao,diffuse --ao-rays 1 --diffuse-rays 1";
+/// Settings of pictures with several effects.
+fn options(percent: u32) -> Settings {
+    lit(72, 48, percent, 1)
+}
 
 /// A city of many bricks, and what it looks like from three places with everything resident.
 struct Place {
@@ -29,7 +33,7 @@ struct Place {
 
 fn place(lab: &mut Lab, bricks: u32) -> Result<Place> {
     let (file, path, _) = lab.build(city(lab.seed, [0.0; 3])?, &settings(bricks, -14))?;
-    let mut plain = lab.renderer(&file, &path, &format!("{OPTIONS} --cache 100% --schedule plain"))?;
+    let mut plain = lab.renderer(&file, &path, &Settings { schedule: Schedule::Plain, tile: 64, ..options(100) })?;
     let expected = (0..3).map(|k| Ok(plain.frame(k, &in_city(k, [0.0; 3]))?.pixels)).collect::<Result<_>>()?;
     Ok(Place { file, path, expected })
 }
@@ -44,7 +48,7 @@ fn unlike(renderer: &mut Renderer, place: &Place, k: u32) -> Result<u64> {
 pub fn fronts(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let place = place(lab, 128)?;
-    let options = format!("{OPTIONS} --tile 8 --cache 25% --schedule chc --fronts on");
+    let options = Settings { tile: 8, schedule: Schedule::Chc, fronts: true, ..options(25) };
     let mut renderer = lab.renderer(&place.file, &place.path, &options)?;
     let (mut defects, mut pixels, mut states) = (0, 0, 0);
     // Still, then from place to place.
@@ -63,15 +67,15 @@ pub fn fronts(lab: &mut Lab) -> Result<Checks> {
 pub fn cut(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let place = place(lab, 256)?;
-    for fronts in ["off", "on"] {
-        let options = format!("{OPTIONS} --tile 16 --cache 25% --schedule chc --fronts {fronts}");
+    for (fronts, name) in [(false, "off"), (true, "on")] {
+        let options = Settings { schedule: Schedule::Chc, fronts, ..options(25) };
         let mut walking = lab.renderer(&place.file, &place.path, &options)?;
         for k in [0, 0, 1] {
             unlike(&mut walking, &place, k)?;
         }
         let after = walking.frame(2, &in_city(2, [0.0; 3]))?.pixels;
         let cold = lab.renderer(&place.file, &place.path, &options)?.frame(2, &in_city(2, [0.0; 3]))?.pixels;
-        checks.none(&format!("fronts {fronts}: pixels unlike a cold start's"), pixels_unlike(&cold, &after), 72 * 48);
+        checks.none(&format!("fronts {name}: pixels unlike a cold start's"), pixels_unlike(&cold, &after), 72 * 48);
     }
     Ok(checks)
 }
@@ -83,8 +87,8 @@ pub fn cut(lab: &mut Lab) -> Result<Checks> {
 pub fn late_queries(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let place = place(lab, 256)?;
-    let options = format!("{OPTIONS} --tile 16 --cache 25% --schedule chc");
-    let mut late = lab.renderer(&place.file, &place.path, &format!("{options} --fronts on"))?;
+    let options = Settings { schedule: Schedule::Chc, ..options(25) };
+    let mut late = lab.renderer(&place.file, &place.path, &Settings { fronts: true, ..options.clone() })?;
     let (mut differ, mut deferred) = (0, 0);
     for k in [0, 0, 0, 0, 1, 1, 1, 0] {
         let output = late.frame(k, &in_city(k, [0.0; 3]))?;
@@ -109,7 +113,8 @@ pub fn overflow(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let place = place(lab, 32)?;
     // One tile, whose list starts with room for 64 leaves.
-    let options = format!("{OPTIONS} --tile 128 --cache 25% --schedule chc --without root-walk");
+    let without = vec![Optimisation::RootWalk];
+    let options = Settings { tile: 128, schedule: Schedule::Chc, without, ..options(25) };
     let mut renderer = lab.renderer(&place.file, &place.path, &options)?;
     checks.at_least("leaves", place.file.resident().leaves.len(), 256);
     let differ = unlike(&mut renderer, &place, 2)? + unlike(&mut renderer, &place, 0)?;
@@ -123,10 +128,11 @@ pub fn least_cache(lab: &mut Lab) -> Result<Checks> {
     let place = place(lab, 256)?;
     let sizes = place.file.sizes();
     let least = Residency::least_budget(&sizes);
-    let small = lab.renderer(&place.file, &place.path, &format!("{OPTIONS} --cache {}", least - 16));
+    let of_bytes = |bytes| Settings { cache: CacheSize::Bytes(bytes), ..options(100) };
+    let small = lab.renderer(&place.file, &place.path, &of_bytes(least - 16));
     checks.refuses("one unit less than two bricks", small.map(|_| ()), &["too small", "two largest bricks"]);
-    for evict in ["round-robin", "second-chance", "lru"] {
-        let options = format!("{OPTIONS} --tile 16 --cache {least} --schedule chc --evict {evict}");
+    for evict in Policy::ALL {
+        let options = Settings { schedule: Schedule::Chc, evict, ..of_bytes(least) };
         let mut renderer = lab.renderer(&place.file, &place.path, &options)?;
         let differ = unlike(&mut renderer, &place, 0)? + unlike(&mut renderer, &place, 2)?;
         checks.none(&format!("two bricks, {evict}: pixels unlike those with all"), differ, 2 * 72 * 48);
@@ -181,7 +187,7 @@ pub fn damage(lab: &mut Lab) -> Result<Checks> {
     let report = file.verify(&mut |_, _| ())?;
     checks.equal("parts that verify finds damaged", report.problems.len(), 1);
 
-    let mut stage = lab.open_stage(file.clone(), &damaged, "--cache 60% --schedule demand")?;
+    let mut stage = lab.open_stage(file.clone(), &damaged, &scheduled(60, Schedule::Demand))?;
     let truth = SceneFile::open(&path)?;
     let truth = crate::reference::Truth::load(&truth)?;
     let frame = stage.frame(DVec3::ZERO);

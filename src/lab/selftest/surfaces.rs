@@ -1,16 +1,17 @@
 //! Rays that start on surfaces, and the places they start from (cases 21, 22, 26, 55).
 
 use super::case::Checks;
-use super::lab::{Lab, Stage, settings};
+use super::lab::{Lab, Stage, lit, scheduled, settings};
 use super::meshes::{aimed, note, step_of};
 use super::rays::{Aim, Targets, lattice_point, ray};
-use crate::cli::trace::EXTENT;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{Hit, NONE, Ray, Surface};
 use crate::math::exact::{SurfacePoint, offset_origin};
 use crate::reference::Truth;
 use crate::scene::Camera;
 use crate::schedule::Pass;
+use crate::session::trace::EXTENT;
+use crate::settings::{Effect, EffectList, Schedule, Settings, Turn};
 use anyhow::Result;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Rng, Stiff, moved, one_mesh, stiff};
@@ -20,7 +21,7 @@ use glam::{DVec3, Vec3};
 fn surfaces(stage: &mut Stage, frame: &Frame, rays: &[Ray]) -> Result<Vec<(Hit, Surface)>> {
     let rays = &rays[..rays.len().min(EXTENT.rays())];
     let hits = stage.trace(frame, rays, false)?;
-    let surfaces = stage.session.executor.read_surfaces(Pass::Primary)?;
+    let surfaces = stage.opened.executor.read_surfaces(Pass::Primary)?;
     Ok(hits.into_iter().zip(surfaces).collect())
 }
 
@@ -52,7 +53,7 @@ pub fn leaving_rays(lab: &mut Lab) -> Result<Checks> {
         [("cube", Stiff::Cube, 9, 0.8), ("bumpy sphere", Stiff::Shell, 3, 0.4), ("two fans", Stiff::Fans, 300, 0.2)]
     {
         let source = moved(stiff(kind, n, lab.seed), 0.0, 8.0, [3.0, -5.0, 7.0]);
-        let mut stage = lab.stage(source, &settings(100, 0), "--cache 100% --schedule plain")?;
+        let mut stage = lab.stage(source, &settings(100, 0), &scheduled(100, Schedule::Plain))?;
         let middle = DVec3::new(3.0, -5.0, 7.0);
         let (truth, frame) = (stage.truth()?, stage.frame(middle));
         let targets = Targets::of(&truth, &frame);
@@ -87,7 +88,7 @@ fn thin_gap(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let positions = [wall(x), wall(x + 2.0 * h)].concat();
     let indices = vec![0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7];
     let source = one_mesh("two walls", Primitive { positions, indices, ..Primitive::default() });
-    let mut stage = lab.stage(source, &settings(16, -20), "--cache 100% --schedule plain")?;
+    let mut stage = lab.stage(source, &settings(16, -20), &scheduled(100, Schedule::Plain))?;
     let frame = stage.frame(DVec3::ZERO);
     let mut rng = lab.random(&[21, 100]);
     let count = lab.share(20_000);
@@ -128,11 +129,13 @@ fn sky_in_a_box(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
         up: DVec3::Y,
         fov_y: 1.7,
     };
-    let options = "--size 64x48 --tile 16 --cache 100% --sun-intensity 0 --rotation full --ao-rays 2 --ao-length 10 --diffuse-rays 2";
+    let (sun_intensity, rotation) = (Some(0.0), Turn::FULL);
+    let options = Settings { sun_intensity, rotation, ao_length: 10.0, aov: false, ..lit(64, 48, 100, 2) };
     let mut lit = 0u64;
     let mut pixels = 0u64;
-    for effects in ["ao", "diffuse"] {
-        let mut renderer = lab.renderer(&file, &path, &format!("{options} --effects {effects}"))?;
+    for effect in [Effect::Ao, Effect::Diffuse] {
+        let options = Settings { effects: EffectList::of(&[effect]), ..options.clone() };
+        let mut renderer = lab.renderer(&file, &path, &options)?;
         for k in 0..3 {
             let output = renderer.frame(k, &camera(k))?;
             lit += output.pixels.radiance.iter().filter(|c| c.iter().any(|&x| x != 0.0)).count() as u64;
@@ -158,7 +161,7 @@ pub fn offsets(lab: &mut Lab) -> Result<Checks> {
     let count = lab.share(30_000);
     let (mut behind, mut of) = (0, 0);
     for (kind, n) in [(Stiff::Shell, 3), (Stiff::Cube, 8)] {
-        let mut stage = lab.stage(stiff(kind, n, lab.seed), &settings(100, -20), "--cache 100% --schedule plain")?;
+        let mut stage = lab.stage(stiff(kind, n, lab.seed), &settings(100, -20), &scheduled(100, Schedule::Plain))?;
         let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
         let targets = Targets::of(&truth, &frame);
         let step = step_of(&stage);
@@ -200,7 +203,7 @@ pub fn inside(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let count = lab.share(8000);
     let mut stage =
-        lab.stage(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(16, -10), "--cache 40% --schedule chc")?;
+        lab.stage(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(16, -10), &scheduled(40, Schedule::Chc))?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let targets = Targets::of(&truth, &frame);
     let mut rng = lab.random(&[26]);
@@ -226,8 +229,7 @@ pub fn black(lab: &mut Lab) -> Result<Checks> {
     source.materials.iter_mut().for_each(|material| material.base_color = [0.0, 0.0, 0.0, 1.0]);
     let (file, path, _) = lab.build(source, &settings(64, 0))?;
     let camera = Camera { position: DVec3::new(0.0, 1.0, 4.0), target: DVec3::ZERO, up: DVec3::Y, fov_y: 0.6 };
-    let options = "--size 64x64 --tile 16 --cache 100% --aov --effects shadow,ao,diffuse --ao-rays 2 --diffuse-rays 2";
-    let output = lab.renderer(&file, &path, options)?.frame(0, &camera)?;
+    let output = lab.renderer(&file, &path, &lit(64, 64, 100, 2))?.frame(0, &camera)?;
     let met = || output.pixels.radiance.iter().zip(&output.pixels.id).filter(|(_, id)| **id != NONE);
     let lit = met().filter(|(c, _)| c.iter().any(|&x| x != 0.0)).count() as u64;
     checks.none("pixels of a black sphere that are not black", lit, met().count() as u64);

@@ -1,10 +1,9 @@
 //! Rays as they are given, cameras, pictures (cases 24, 25, 27 to 30, 60, and the pictures of case 1).
 
 use super::case::Checks;
-use super::lab::{Lab, settings, truth_ray};
+use super::lab::{Lab, cached, lit, picture, scheduled, settings, truth_ray};
 use super::meshes::{OTHER_SHIFTS, SHIFTS, aimed, note, step_of};
 use super::rays::Targets;
-use crate::cli::trace::{check, device_ray, trace};
 use crate::frame::Pixels;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{NONE, Ray};
@@ -12,10 +11,12 @@ use crate::output::npy;
 use crate::reference::{Tally, Truth, judge};
 use crate::scene::Camera;
 use crate::schedule::Pass;
+use crate::session::trace::{check, device_ray, trace};
+use crate::settings::{EffectList, Schedule, Settings};
 use anyhow::Result;
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
-use brickwalk_scenes::{Kind, Settings, Stiff, generate, moved, stiff};
+use brickwalk_scenes::{Kind, Settings as Generated, Stiff, generate, moved, stiff};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -24,7 +25,7 @@ use rayon::prelude::*;
 /// # Errors
 /// It cannot be generated.
 pub fn city(seed: u64, shift: [f64; 3]) -> Result<SourceScene> {
-    let settings = Settings { kind: Kind::City, triangles: 10_000, seed, ..Settings::default() };
+    let settings = Generated { kind: Kind::City, triangles: 10_000, seed, ..Generated::default() };
     Ok(moved(generate(&settings, &Progress::hidden())?.whole(), 1.0 / 16384.0, 1.0, shift))
 }
 
@@ -54,11 +55,11 @@ pub fn pixels_unlike(a: &Pixels, b: &Pixels) -> u64 {
 /// # Errors
 /// The builder's, the device's.
 pub fn far_city(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
-    let options = "--size 96x64 --tile 16 --cache 30% --schedule chc --aov --effects shadow,ao,diffuse --ao-rays 1 --diffuse-rays 1";
+    let options = Settings { schedule: Schedule::Chc, ..lit(96, 64, 30, 1) };
     let mut expected: Vec<Pixels> = Vec::new();
     for shift in [[0.0; 3], SHIFTS[0], SHIFTS[1]] {
         let (file, path, _) = lab.build(city(lab.seed, shift)?, &settings(1024, -14))?;
-        let mut renderer = lab.renderer(&file, &path, options)?;
+        let mut renderer = lab.renderer(&file, &path, &options)?;
         let (mut unlike, mut of, mut met) = (0, 0, 0);
         for k in 0..3 {
             let pixels = renderer.frame(k, &in_city(k, shift))?.pixels;
@@ -77,8 +78,9 @@ pub fn far_city(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     for shift in OTHER_SHIFTS {
         let (file, path, _) = lab.build(city(lab.seed, shift)?, &settings(1024, -14))?;
         let truth = Truth::load(&file)?;
-        let options = "--size 96x64 --tile 16 --cache 30% --schedule chc --effects primary";
-        let mut renderer = lab.renderer(&file, &path, options)?;
+        let (schedule, effects) = (Schedule::Chc, EffectList::PRIMARY);
+        let options = Settings { schedule, effects, ..picture(96, 64, 30) };
+        let mut renderer = lab.renderer(&file, &path, &options)?;
         let camera = in_city(0, shift);
         renderer.frame(0, &camera)?;
         let frame = Frame::near(file.resident(), camera.position);
@@ -93,7 +95,7 @@ pub fn far_city(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
 /// Case 24: directions of all lengths; none at all.
 pub fn directions(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    let mut stage = lab.stage(stiff(Stiff::Shell, 2, lab.seed), &settings(64, 0), "--cache 100%")?;
+    let mut stage = lab.stage(stiff(Stiff::Shell, 2, lab.seed), &settings(64, 0), &cached(100))?;
     let mut rng = lab.random(&[24]);
     let count = lab.share(4000);
     let base: Vec<npy::Ray> = (0..count)
@@ -104,14 +106,13 @@ pub fn directions(lab: &mut Lab) -> Result<Checks> {
             t_max: f64::INFINITY,
         })
         .collect();
-    let progress = Progress::hidden();
-    let (expected, _) = trace(&mut stage.session, &base, false, &progress)?;
+    let (expected, _) = trace(&mut stage.opened.traced(), &base, false, &mut |_| ())?;
     let (mut unlike, mut of) = (0, 0);
     for power in [-1000, -300, -60, -1, 1, 60, 300, 1000] {
         let length = f64::from(power / 2).exp2() * f64::from(power - power / 2).exp2();
         let scaled: Vec<npy::Ray> =
             base.iter().map(|ray| npy::Ray { direction: ray.direction.map(|x| x * length), ..*ray }).collect();
-        let (hits, _) = trace(&mut stage.session, &scaled, false, &progress)?;
+        let (hits, _) = trace(&mut stage.opened.traced(), &scaled, false, &mut |_| ())?;
         let same = |(a, b): &(&npy::Hit, &npy::Hit)| a.triangle == b.triangle && a.t / length == b.t && a.u == b.u;
         unlike += expected.iter().zip(&hits).filter(|pair| !same(pair)).count() as u64;
         of += count as u64;
@@ -127,7 +128,7 @@ pub fn directions(lab: &mut Lab) -> Result<Checks> {
 /// Case 25: intervals: empty, a single point, endless.
 pub fn intervals(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
-    let mut stage = lab.stage(stiff(Stiff::Shell, 3, lab.seed), &settings(64, -20), "--cache 40% --schedule chc")?;
+    let mut stage = lab.stage(stiff(Stiff::Shell, 3, lab.seed), &settings(64, -20), &scheduled(40, Schedule::Chc))?;
     let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
     let targets = Targets::of(&truth, &frame);
     let count = lab.share(20_000);
@@ -205,8 +206,9 @@ pub fn fields_of_view(lab: &mut Lab) -> Result<Checks> {
         let basis = camera.ray_basis(64, 48);
         let vectors = [basis.b, basis.dx, basis.dy].into_iter().all(|v| v.is_finite() && v != DVec3::ZERO);
         checks.holds(&format!("{degrees} degrees: rays are finite"), vectors);
-        let mut renderer =
-            lab.renderer(&file, &path, "--size 64x48 --tile 16 --cache 40% --schedule chc --aov --effects primary")?;
+        let (schedule, effects) = (Schedule::Chc, EffectList::PRIMARY);
+        let options = Settings { schedule, effects, aov: true, ..picture(64, 48, 40) };
+        let mut renderer = lab.renderer(&file, &path, &options)?;
         let pixels = renderer.frame(0, &camera)?.pixels;
         let (tally, missed) =
             judge_picture(&mut *renderer.executor, &truth, &Frame::near(file.resident(), camera.position))?;
@@ -240,9 +242,9 @@ fn odd_sizes(lab: &mut Lab, checks: &mut Checks, sizes: &[(u32, u32)], tiles: &[
     for &(w, h) in sizes {
         let (mut wrong, mut missed, mut rays, mut pixels) = (0, 0, 0, 0);
         for &tile in tiles {
-            for schedule in ["chc", "demand", "plain"] {
-                let options =
-                    format!("--size {w}x{h} --tile {tile} --cache 100% --schedule {schedule} --effects primary --aov");
+            for schedule in [Schedule::Chc, Schedule::Demand, Schedule::Plain] {
+                let effects = EffectList::PRIMARY;
+                let options = Settings { tile, schedule, effects, aov: true, ..picture(w, h, 100) };
                 let mut renderer = lab.renderer(&file, &path, &options)?;
                 let output = renderer.frame(0, &camera)?;
                 let frame = Frame::near(file.resident(), camera.position);
@@ -278,11 +280,11 @@ pub fn tile_remainder(lab: &mut Lab) -> Result<Checks> {
 pub fn ten_runs(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let (file, path, _) = lab.build(city(lab.seed, [0.0; 3])?, &settings(512, -14))?;
-    let options = "--size 80x56 --tile 16 --cache 25% --schedule chc --aov --effects shadow,ao,diffuse --ao-rays 1 --diffuse-rays 1";
+    let options = Settings { schedule: Schedule::Chc, ..lit(80, 56, 25, 1) };
     let mut expected: Option<Pixels> = None;
     let (mut unlike, mut of) = (0, 0);
     for _ in 0..10 {
-        let pixels = lab.renderer(&file, &path, options)?.frame(0, &in_city(0, [0.0; 3]))?.pixels;
+        let pixels = lab.renderer(&file, &path, &options)?.frame(0, &in_city(0, [0.0; 3]))?.pixels;
         of += pixels.radiance.len() as u64;
         unlike += pixels_unlike(expected.get_or_insert_with(|| pixels.clone()), &pixels);
     }

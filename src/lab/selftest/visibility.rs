@@ -1,7 +1,7 @@
 //! Fields of visibility (cases 47, 48, 49 and 51).
 
 use super::case::Checks;
-use super::lab::{Lab, Stage, settings};
+use super::lab::{Lab, Stage, cached, picture, settings};
 use crate::frame::{Equirectangular, environment};
 use crate::kernels::layout::{DvfTriangle, MET, NONE, Params, Ray};
 use crate::kernels::{Directions, Lamps, View};
@@ -11,6 +11,7 @@ use crate::secondary::dvf::answer::{Dvf, DvfTracing, Region};
 use crate::secondary::dvf::kernels;
 use crate::secondary::dvf::maps::{DvfMaps, directions, sum};
 use crate::secondary::dvf::{Areas, Cells, DvfField, DvfSettings, DvfUse, Shape, mask};
+use crate::settings::{Effect, EffectList, Settings};
 use anyhow::Result;
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Stiff, one_mesh, stiff};
@@ -24,7 +25,7 @@ const PASS: Pass = Pass::Shadow(Lamp::Environment);
 fn stage(lab: &mut Lab) -> Result<Stage> {
     let positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let triangle = Primitive { positions, indices: vec![0, 1, 2], ..Primitive::default() };
-    lab.stage(one_mesh("triangle", triangle), &settings(4, 0), "--cache 100%")
+    lab.stage(one_mesh("triangle", triangle), &settings(4, 0), &cached(100))
 }
 
 /// Case 47: of two cells one knows a way out upward and nothing else: rays upward from it are answered, also from its
@@ -42,7 +43,7 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
     field.masks[up as usize / 32] |= 1 << (up % 32);
     field.finish(false);
     checks.equal("cells of which something is known", field.known_cells(), 1);
-    let executor = &mut *stage.session.executor;
+    let executor = &mut *stage.opened.executor;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let ray = |origin: [f32; 3], direction: [f32; 3]| Ray { origin, t_min: 0.0, direction, t_max: f32::MAX };
     let (upward, aside) = ([1e-3, 1.0, 1e-3], [1.0, 0.1, 0.1]);
@@ -62,7 +63,7 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
     let field = Arc::new(field);
     DvfMaps::to_answer(&field, &frame, DvfUse { doubt: true, ..DvfUse::default() }).give(executor)?;
     executor.set_rays(PASS, &rays);
-    let report = executor.run(PASS, &[Step::StartHits, kernels::sift()], &stage.session.cache.states)?;
+    let report = executor.run(PASS, &[Step::StartHits, kernels::sift()], &stage.opened.cache.states)?;
     let hits = executor.read_hits(PASS)?;
     for ((what, ray, is_answered), hit) in cases.iter().zip(&hits) {
         checks.equal(&format!("{what}: answered"), hit.t < ray.t_min, *is_answered);
@@ -95,8 +96,8 @@ pub fn prefix_sums(lab: &mut Lab) -> Result<Checks> {
     let area = |t: &DvfTriangle| f64::from(t.b[0]) * f64::from(t.c[1]);
     let truth: f64 = triangles.iter().map(area).sum();
     let frame = stage.frame(DVec3::ZERO);
-    let executor = &mut *stage.session.executor;
-    let states = &stage.session.cache.states;
+    let executor = &mut *stage.opened.executor;
+    let states = &stage.opened.cache.states;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let shape = Shape::new(DVec3::ZERO, DVec3::ONE, 1, 8);
     let plan = DvfSettings { points: 10_000_000, rays: 1, ..DvfSettings::default() };
@@ -182,8 +183,9 @@ pub fn closed_box(lab: &mut Lab) -> Result<Checks> {
     let mut checks = Checks::default();
     let (file, path, _) = lab.build(stiff(Stiff::Cube, 4, lab.seed), &settings(64, 0))?;
     let camera = Camera { position: DVec3::new(0.1, 0.2, -0.3), target: DVec3::X, up: DVec3::Y, fov_y: 1.5 };
-    let options = "--size 64x64 --tile 16 --cache 100% --spp 4 --sun-intensity 0 --effects environment";
-    let mut renderer = lab.renderer(&file, &path, options)?;
+    let effects = EffectList::of(&[Effect::Environment]);
+    let options = Settings { spp: 4, sun_intensity: Some(0.0), effects, ..picture(64, 64, 100) };
+    let mut renderer = lab.renderer(&file, &path, &options)?;
     let image = Equirectangular::of(32, 16, |[x, y, z]| [1e4 * (1.1 + x), 1e4 * (1.1 + y), 1e4 * (1.1 + z)]);
     renderer.light.lamps = Arc::new(Lamps::new(Some(environment(image, 1.0, 0.0).0), Vec::new(), 1.0));
     // The front of the cube is outside.

@@ -13,6 +13,7 @@ mod field;
 mod flood;
 pub mod kernels;
 pub mod maps;
+mod settings;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -20,6 +21,7 @@ pub mod twin;
 
 pub use field::{DistanceField, FieldView, LEVELS, distance_f16};
 pub use flood::{NO_SEED, flood, flood_steps, jump_flood, seeds};
+pub use settings::Options;
 pub use trace::{LEAST_STEP, LocalRay, LocalTraced, Traced, Tracing, Way};
 
 /// How distance fields answer the rays of walks.

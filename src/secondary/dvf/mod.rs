@@ -27,7 +27,9 @@ pub mod kernels;
 pub mod maps;
 pub mod mask;
 mod movers;
+pub mod prepare;
 pub mod renew;
+mod settings;
 pub mod shape;
 pub mod source;
 pub mod strew;
@@ -38,6 +40,7 @@ pub use areas::Areas;
 pub use field::{Answer, DvfField, DvfKept, Trial};
 pub use fresh::Fresh;
 pub use movers::Concerned;
+pub use settings::{Count, Mode, Options, RegionKind, Sequence, Sides, Trust};
 pub use shape::Shape;
 
 /// Which cells a field has.

@@ -100,14 +100,20 @@ impl Bom {
     }
 }
 
-/// What base maps are made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Source {
-    /// The maps that bricks carry. No geometry is read, and no occupied cell is missed.
-    #[default]
-    Bricks,
-    /// All triangles, in every sample anew: [`Voxelisation::Raster`].
-    Triangles,
+crate::settings::names::names! {
+    /// What base maps are made of.
+    Source {
+        /// The maps that bricks carry. No geometry is read, and no occupied cell is missed.
+        Bricks = "bricks",
+        /// All triangles, in every sample anew: [`Voxelisation::Raster`].
+        Triangles = "raster",
+    }
+}
+
+impl Default for Source {
+    fn default() -> Self {
+        Self::Bricks
+    }
 }
 
 /// Maps around the camera, each with cells twice as large as the one before, which lies in its middle.

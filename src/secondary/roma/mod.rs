@@ -23,9 +23,11 @@ pub mod directions;
 pub mod handover;
 pub mod kernels;
 pub mod maps;
+mod settings;
 pub mod twin;
 
 pub use kernels::{Pilots, RomaPart, Sift};
+pub use settings::{Options, Unsnapped};
 
 use super::rsm::RsmSettings;
 

@@ -13,7 +13,10 @@
 pub mod answer;
 pub mod kernels;
 pub mod maps;
+mod settings;
 pub mod twin;
+
+pub use settings::Options;
 
 use super::occupancy::Cascades;
 use super::rsm::maps::LampView;

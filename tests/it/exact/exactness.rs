@@ -4,23 +4,20 @@
 
 use crate::common;
 use bricks::SceneFile;
-use brickwalk::cli::options::args::{Cli, Command};
-use brickwalk::cli::trace::{EXTENT, device_ray, trace};
-use brickwalk::cli::walk::renderer;
 use brickwalk::frame::Effects;
-use brickwalk::kernels::Extent;
 use brickwalk::kernels::frame::Frame;
 use brickwalk::kernels::layout::{Hit, NONE, Ray, T_INFINITE};
 use brickwalk::output::npy;
 use brickwalk::reference::{Tally, Truth, TruthRay, Verdict, judge, judge_any};
 use brickwalk::scene::path::{CameraPath, path_from_bounds};
 use brickwalk::schedule::{Lamp, Pass};
-use brickwalk::session::open::{Session, open_scene};
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::renderer::renderer;
+use brickwalk::session::trace::{device_ray, for_rays, trace};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{SourceScene, SourceTexture};
 use brickwalk_scenes::{SoupKind, rotated_instances, soup};
-use clap::Parser;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -67,18 +64,16 @@ fn check(name: &str, scene: &Path, size: &str, path: Option<CameraPath>, rays: u
 
 /// Frames along a path: every primary and every shadow ray.
 fn check_walk(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, size: &str, path: Option<CameraPath>) {
-    let words = format!("brickwalk walk s -o o {OPTIONS} {size}");
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(file.clone(), scene, &args.stream, extent).expect("a session");
-    let mut renderer = renderer(session, &args).expect("lamps");
+    let settings = common::settings(&format!("{OPTIONS} {size}"));
+    let opened = Opened::open(file.clone(), scene, &settings).expect("a session");
+    let mut renderer = renderer(opened, scene, &settings).expect("lamps");
     let manifest = &file.resident().manifest;
     let path = path.unwrap_or_else(|| path_from_bounds(manifest.min, manifest.max));
     let (mut primary, mut shadow) = (Tally::default(), Tally::default());
     let (mut hit_count, mut shadow_count) = (0, 0);
     let mut spoiled = Tally::default();
-    for k in 0..args.frames {
-        let camera = path.frame(k, args.frames);
+    for k in 0..settings.frames {
+        let camera = path.frame(k, settings.frames);
         renderer.frame(k, &camera).expect("a frame");
         let frame = Frame::near(file.resident(), camera.position);
         let rays = renderer.executor.read_rays(Pass::Primary).expect("rays");
@@ -117,11 +112,9 @@ fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
     let truth = Truth::load(&file).expect("truth");
     let light =
         "--rect-light 0,60,0,9,0,0,0,0,9 --environment sky --rotation full --ao-rays 2 --diffuse-rays 2 --ao-length 5";
-    let words = format!("brickwalk walk s -o o {OPTIONS} {size} {light} --effects shadow,ao,diffuse,glossy");
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(file.clone(), scene, &args.stream, extent).expect("a session");
-    let mut renderer = renderer(session, &args).expect("lamps");
+    let settings = common::settings(&format!("{OPTIONS} {size} {light} --effects shadow,ao,diffuse,glossy"));
+    let opened = Opened::open(file.clone(), scene, &settings).expect("a session");
+    let mut renderer = renderer(opened, scene, &settings).expect("lamps");
     let all = renderer.settings.effects;
     let none = Effects { shadow: false, environment: false, occlusion: None, diffuse: None, glossy: false, ..all };
     let cases = [
@@ -134,8 +127,8 @@ fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
     for (effect, effects, pass) in cases {
         renderer.settings.effects = effects;
         let (mut tally, mut spoiled) = (Tally::default(), Tally::default());
-        for k in 0..args.frames {
-            let camera = path.frame(k, args.frames);
+        for k in 0..settings.frames {
+            let camera = path.frame(k, settings.frames);
             renderer.frame(k, &camera).expect("a frame");
             let frame = Frame::near(file.resident(), camera.position);
             let mut passes = vec![(Pass::Primary, pass)];
@@ -167,12 +160,8 @@ fn check_effects(name: &str, scene: &Path, size: &str, path: &CameraPath) {
 /// Rays between random points of the scene's bounds, half of them aimed at points of triangles: inside, on edges, at
 /// vertices.
 fn check_trace(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, rays: usize) {
-    let Command::Trace(args) =
-        Cli::parse_from("brickwalk trace s --rays r -o h --cache 35%".split_whitespace()).command
-    else {
-        unreachable!("it says trace")
-    };
-    let mut session = Session::open(file.clone(), scene, &args.stream, EXTENT).expect("a session");
+    let settings = for_rays(&common::settings("--cache 35%"));
+    let mut opened = Opened::open(file.clone(), scene, &settings).expect("a session");
     let manifest = &file.resident().manifest;
     let (min, max) = (DVec3::from_array(manifest.min), DVec3::from_array(manifest.max));
     let mut state = 0x2545_F491_4F6C_DD1Du64;
@@ -201,9 +190,8 @@ fn check_trace(name: &str, scene: &Path, file: &Arc<SceneFile>, truth: &Truth, r
             npy::Ray { origin: from.to_array(), direction: direction.to_array(), t_min: 0.0, t_max }
         })
         .collect();
-    let progress = Progress::hidden();
-    let (closest, _) = trace(&mut session, &rays, false, &progress).expect("hits");
-    let (any, _) = trace(&mut session, &rays, true, &progress).expect("hits");
+    let (closest, _) = trace(&mut opened.traced(), &rays, false, &mut |_| ()).expect("hits");
+    let (any, _) = trace(&mut opened.traced(), &rays, true, &mut |_| ()).expect("hits");
     let judged = |((ray, hit), any): ((&npy::Ray, &npy::Hit), &npy::Hit)| {
         let frame = Frame::near(file.resident(), DVec3::from_array(ray.origin));
         let device = device_ray(ray, &frame);

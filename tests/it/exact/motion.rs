@@ -5,21 +5,18 @@
 use crate::common;
 use bricks::layout::{DirectoryEntry, Header, PAGE_BYTES, Section};
 use bricks::{Instance, SceneFile};
-use brickwalk::cli::motion::WalkMotion;
-use brickwalk::cli::options::args::{Cli, Command, WalkArgs};
-use brickwalk::cli::walk::lit_renderer;
 use brickwalk::frame::{Moved, Pixels, Renderer};
-use brickwalk::kernels::Extent;
 use brickwalk::picture::denoise::Resolve;
 use brickwalk::scene::motion::Motion;
 use brickwalk::scene::{Camera, CameraPath};
 use brickwalk::session::lighting::lighting;
-use brickwalk::session::open::{Session, open_scene};
+use brickwalk::session::motion::SceneMotion;
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::renderer::lit_renderer;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
 use brickwalk_scenes::{Kind, Settings, generate};
-use clap::Parser;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -79,12 +76,6 @@ fn scenes(folder: &Path, shines: bool) -> Scenes {
     Scenes { moved: moved.collect(), still, motion }
 }
 
-fn args(options: &str) -> WalkArgs {
-    let words = format!("brickwalk walk s -o o --size 96x64 --frames 3 {options}");
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    *args
-}
-
 fn camera(frame: usize) -> Camera {
     let path = r#"{"fov_y_degrees": 70, "keyframes": [{"time": 0, "position": [-0.4, 1.6, 3.0], "target": [0, 2, -1]},
         {"time": 3, "position": [0.5, 1.9, 2.8], "target": [-0.2, 1.8, -1]}]}"#;
@@ -92,14 +83,13 @@ fn camera(frame: usize) -> Camera {
 }
 
 /// A renderer of a scene, and its motion, if it has one.
-fn renderer(scene: &Path, motion: Option<&Path>, options: &str) -> (Renderer, Option<WalkMotion>) {
-    let args = args(options);
-    let extent = Extent { width: 96, height: 64, tile: args.stream.tile };
+fn renderer(scene: &Path, motion: Option<&Path>, options: &str) -> (Renderer, Option<SceneMotion>) {
+    let settings = common::settings(&format!("--size 96x64 --frames 3 {options}"));
     let file = open_scene(scene).expect("the scene");
-    let lighting = lighting(&args, &file).expect("lamps");
-    let motion = motion.map(|motion| WalkMotion::open(motion, &file, &lighting.sources).expect("a motion"));
-    let session = Session::open(file, scene, &args.stream, extent).expect("a session");
-    (lit_renderer(session, &args, lighting.light), motion)
+    let lighting = lighting(&settings, &file, scene).expect("lamps");
+    let motion = motion.map(|motion| SceneMotion::open(motion, &file, &lighting.sources).expect("a motion"));
+    let opened = Opened::open(file, scene, &settings).expect("a session");
+    (lit_renderer(opened, &settings, lighting.light), motion)
 }
 
 /// The frames of a walk with motion.

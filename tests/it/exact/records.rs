@@ -4,11 +4,8 @@
 
 use crate::common;
 use bricks::{AttributeLayout, GeometryLayout, INSTANCE_IDENTITY, Node, Payload, SceneFile, TOP_LEAF};
-use brickwalk::cli::options::args::{Cli, Command};
-use brickwalk::cli::walk::renderer;
 use brickwalk::counters::{Counters, Record};
 use brickwalk::frame::{Renderer, camera_view};
-use brickwalk::kernels::Extent;
 use brickwalk::kernels::frame::Frame;
 use brickwalk::kernels::layout::{NONE, Ray, T_INFINITE};
 use brickwalk::reference::{Truth, TruthRay, Verdict, judge};
@@ -18,9 +15,9 @@ use brickwalk::schedule::{
     BrickStates, Executor, ExecutorError, Load, Optimisations, PairQuery, Pass, Report, Step, Tracing, attributes, chc,
     demand,
 };
-use brickwalk::session::open::{Session, open_scene};
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::renderer::renderer;
 use brickwalk::stream::{Item, Kind, Slot};
-use clap::Parser;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Instant;
@@ -214,11 +211,9 @@ fn truly(renderer: &mut Renderer, truth: &Truth, frame: &Frame, holders: &BTreeM
 }
 
 fn open(scene: &Path, options: &str) -> Renderer {
-    let words = format!("brickwalk walk s -o o --size 64x48 --tile 16 {options}");
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let settings = common::settings(&format!("--size 64x48 --tile 16 {options}"));
     let file = open_scene(scene).expect("the scene");
-    renderer(Session::open(file, scene, &args.stream, extent).expect("a session"), &args).expect("lamps")
+    renderer(Opened::open(file, scene, &settings).expect("a session"), scene, &settings).expect("lamps")
 }
 
 #[test]

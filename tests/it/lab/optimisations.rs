@@ -2,17 +2,14 @@
 //! partition rays and bricks after every frame; a cut of the camera is a cold start.
 
 use crate::common;
-use brickwalk::cli::options::args::{Cli, Command};
-use brickwalk::cli::walk::renderer;
 use brickwalk::counters::Record;
 use brickwalk::frame::{Effects, FrameOutput, Pixels, Renderer, Schedule};
-use brickwalk::kernels::Extent;
 use brickwalk::kernels::layout::{Hit, NONE};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::fronts::Fronts;
 use brickwalk::schedule::{Optimisation, Optimisations, PartOf, Pass};
-use brickwalk::session::open::{Session, open_scene};
-use clap::Parser;
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::renderer::renderer;
 use std::path::Path;
 
 /// Every effect, with few rays.
@@ -21,20 +18,15 @@ const OPTIONS: &str = "--aov --effects shadow,ao,diffuse,glossy --ao-rays 2 --ao
 
 /// A renderer of a scene with all effects, as `walk` makes it.
 fn open(scene: &Path, options: &str) -> Renderer {
-    let words = format!("brickwalk walk s -o o {OPTIONS} {options}");
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
+    let settings = common::settings(&format!("{OPTIONS} {options}"));
     let file = open_scene(scene).expect("the scene");
-    renderer(Session::open(file, scene, &args.stream, extent).expect("a session"), &args).expect("lamps")
+    renderer(Opened::open(file, scene, &settings).expect("a session"), scene, &settings).expect("lamps")
 }
 
 /// The least cache of a scene, bytes, from the error that asks for it.
 fn least_cache(scene: &Path) -> u64 {
-    let Command::Walk(args) = Cli::parse_from("brickwalk walk s -o o --cache 1K".split_whitespace()).command else {
-        unreachable!("it says walk")
-    };
-    let extent = Extent { width: 16, height: 16, tile: 16 };
-    let refused = Session::open(open_scene(scene).expect("the scene"), scene, &args.stream, extent).err();
+    let settings = common::settings("--cache 1K");
+    let refused = Opened::open(open_scene(scene).expect("the scene"), scene, &settings).err();
     let message = format!("{:#}", refused.expect("a cache of 1K is too small"));
     let needed = message.split("two largest bricks need ").nth(1).and_then(|rest| rest.split(' ').next());
     needed.and_then(|bytes| bytes.parse().ok()).expect("the message names what is needed")

@@ -1,21 +1,19 @@
 //! The selftest passes with few rays, prints what scripts read, and fails with every planted defect.
 
 use crate::common;
-use brickwalk::cli::options::args::{Cli, Command};
 use brickwalk::gpu::device::candidates;
 use brickwalk::lab::selftest::args::SelftestArgs;
 use brickwalk::lab::selftest::case::Status;
 use brickwalk::lab::selftest::defects::{ALL, Defect};
 use brickwalk::lab::selftest::{Report, test};
 use brickwalk::session::device::Device;
-use clap::Parser;
+use brickwalk::settings::Group;
 
 fn args(options: &str) -> SelftestArgs {
-    let words = format!("brickwalk selftest --rays 30K {options}");
-    match Cli::parse_from(words.split_whitespace()).command {
-        Command::Selftest(args) => args,
-        _ => unreachable!("it says selftest"),
-    }
+    let adapter = common::settings("").adapter;
+    let mut args = SelftestArgs { rays: 30_000, adapter, ..SelftestArgs::default() };
+    args.set_options(options).expect("options");
+    args
 }
 
 fn failed(report: &Report) -> Vec<u32> {

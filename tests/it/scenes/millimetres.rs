@@ -2,7 +2,7 @@
 
 use crate::common::{folder, succeed};
 use brickwalk::reference::Truth;
-use brickwalk::session::open::open_scene;
+use brickwalk::session::open_scene;
 use std::fmt::Write;
 use std::path::Path;
 

@@ -11,7 +11,7 @@ use brickwalk::secondary::occupancy::{Settings, assemble};
 use brickwalk::secondary::roma::RomaPart;
 use brickwalk::secondary::roma::answer::Roma;
 use brickwalk::secondary::roma::handover::Trust;
-use brickwalk::session::open::open_scene;
+use brickwalk::session::open_scene;
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

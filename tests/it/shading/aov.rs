@@ -4,7 +4,7 @@
 use crate::common;
 use brickwalk::metrics::{Channel, load};
 use brickwalk::reference::{Truth, TruthRay};
-use brickwalk::session::open::open_scene;
+use brickwalk::session::open_scene;
 use glam::DVec3;
 
 const WIDTH: usize = 64;

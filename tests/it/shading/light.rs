@@ -3,13 +3,10 @@
 //! single bright texel.
 
 use crate::common;
-use brickwalk::cli::options::args::{Cli, Command};
-use brickwalk::cli::walk::renderer;
-use brickwalk::kernels::Extent;
 use brickwalk::kernels::lamps::{Emitter, Lamps, Shape};
 use brickwalk::scene::path::CameraPath;
-use brickwalk::session::open::{Session, open_scene};
-use clap::Parser;
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::renderer::renderer;
 use exr::prelude::*;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -147,11 +144,9 @@ fn polygon(radiance: f64, corners: &[DVec3]) -> f64 {
 
 /// The red radiance of a frame of 16 x 16 with these emitters beside the options.
 fn lit(scene: &Path, path: &str, options: &str, emitters: &[Emitter]) -> Vec<f32> {
-    let words = format!("brickwalk walk s -o o --size 16x16 --cache 100% --frames 1 {options}");
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    let extent = Extent { width: 16, height: 16, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("the scene"), scene, &args.stream, extent).expect("a session");
-    let mut renderer = renderer(session, &args).expect("lamps");
+    let settings = common::settings(&format!("--size 16x16 --cache 100% --frames 1 {options}"));
+    let opened = Opened::open(open_scene(scene).expect("the scene"), scene, &settings).expect("a session");
+    let mut renderer = renderer(opened, scene, &settings).expect("lamps");
     renderer.light.lamps = Arc::new(Lamps::new(None, emitters.to_vec(), 10.0));
     let camera = CameraPath::read(Path::new(path)).expect("a path").frame(0, 1);
     renderer.frame(0, &camera).expect("a frame").pixels.radiance.iter().map(|c| c[0]).collect()

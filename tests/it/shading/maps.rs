@@ -3,15 +3,12 @@
 
 use crate::common;
 use bricks::{MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, Material};
-use brickwalk::cli::options::args::{Cli, Command};
-use brickwalk::cli::walk::renderer;
-use brickwalk::kernels::Extent;
 use brickwalk::scene::Camera;
-use brickwalk::session::open::{Session, open_scene};
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::renderer::renderer;
 use brickwalk_convert::build::{BuildSettings, TextureEncoding, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene, SourceTexture};
-use clap::Parser;
 use glam::DVec3;
 
 /// Pixels each way.
@@ -68,17 +65,15 @@ fn seen_as(textures: TextureEncoding, sheet: &Sheet, x: f64, from_below: bool, o
     let path = folder.path().join("scene.bricks");
     let settings = BuildSettings { instance_min_triangles: 1, textures, ..BuildSettings::default() };
     build(source, &settings, &path, &Progress::hidden()).expect("a scene");
-    let words = format!("brickwalk walk s -o o --size {SIDE}x{SIDE} --adapter cpu --cache 100% --frames 1 {options}");
-    let Command::Walk(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says walk") };
-    let extent = Extent { width: SIDE, height: SIDE, tile: args.stream.tile };
-    let session = Session::open(open_scene(&path).expect("the scene"), &path, &args.stream, extent).expect("a session");
+    let settings = common::settings(&format!("--size {SIDE}x{SIDE} --adapter cpu --cache 100% --frames 1 {options}"));
+    let opened = Opened::open(open_scene(&path).expect("the scene"), &path, &settings).expect("a session");
     let camera = Camera {
         position: DVec3::new(x, if from_below { -4.0 } else { 4.0 }, 0.0),
         target: DVec3::new(x, 0.0, 0.0),
         up: DVec3::NEG_Z,
         fov_y: 10f64.to_radians(),
     };
-    let output = renderer(session, &args).expect("lamps").frame(0, &camera).expect("a frame");
+    let output = renderer(opened, &path, &settings).expect("lamps").frame(0, &camera).expect("a frame");
     output.pixels.radiance.iter().map(|c| c[0]).collect()
 }
 

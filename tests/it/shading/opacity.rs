@@ -1,14 +1,12 @@
 //! What lets rays pass by chance, and by alpha that a closed form gives.
 
 use crate::common;
-use brickwalk::cli::options::args::{Cli, Command};
-use brickwalk::cli::trace::{EXTENT, trace};
 use brickwalk::output::npy;
-use brickwalk::session::open::{Session, open_scene};
+use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::session::trace::{for_rays, trace};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene, SourceTexture};
-use clap::Parser;
 use std::path::{Path, PathBuf};
 
 /// Flags, factor, cutoff and texture of a material.
@@ -76,11 +74,10 @@ fn rays(side: u32) -> Vec<npy::Ray> {
 }
 
 fn traced(scene: &Path, options: &str, rays: &[npy::Ray], any: bool) -> Vec<npy::Hit> {
-    let words = format!("brickwalk trace s --rays r -o h {options}");
-    let Command::Trace(args) = Cli::parse_from(words.split_whitespace()).command else { unreachable!("it says trace") };
+    let settings = for_rays(&common::settings(options));
     let file = open_scene(scene).expect("the scene");
-    let mut session = Session::open(file, scene, &args.stream, EXTENT).expect("a session");
-    trace(&mut session, rays, any, &Progress::hidden()).expect("hits").0
+    let mut opened = Opened::open(file, scene, &settings).expect("a session");
+    trace(&mut opened.traced(), rays, any, &mut |_| ()).expect("hits").0
 }
 
 const SIDE: u32 = 160;

@@ -9,16 +9,14 @@
 //! one scene by other rays. A pixel *jumps* where it changes by more than 99 of 100 pixels differ by noise. The paper's
 //! mode draws rays otherwise than exact ones are, so it has a brute force of its own.
 
-use super::args::{ANEW, RENEWED};
+use super::args::{Measurement, Way};
 use super::{Picture, Values, View};
-use crate::cli::dvf::renewal;
-use crate::cli::options::args::WalkArgs;
 use crate::kernels::layout::NONE;
-use crate::lab::bench::measure::walk_args;
 use crate::metrics::{Change, Image, PIXELS_PER_DEGREE, flicker, flip_ldr};
 use crate::scene::motion::{Motion, Movers};
 use crate::secondary::dvf::answer::Dvf;
-use crate::secondary::dvf::{DvfField, DvfUse, Shape, mask};
+use crate::secondary::dvf::prepare::renewal;
+use crate::secondary::dvf::{DvfField, DvfUse, Options, Shape, mask};
 use anyhow::{Context, Result};
 use bricks::SceneFile;
 use glam::DVec3;
@@ -110,40 +108,26 @@ fn time(frame: u32) -> f64 {
     STEP * f64::from(frame)
 }
 
-/// What becomes of a field while something moves.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Way {
-    /// It is that of the scene as it is at first, and knows of what has moved.
-    Told,
-    /// Of it, cells are made anew.
-    Renewed,
-    /// All of it is made anew in every frame.
-    Anew,
-}
-
-/// The flicker of the field that `options` ask for, and which rays are traced.
+/// The flicker of a field, and which rays are traced.
 ///
 /// # Errors
 /// As of [`Truth`], and those of making fields.
-pub fn measure(view: &mut View, options: &str) -> Result<Values> {
-    let ways = [(Way::Anew, ANEW), (Way::Renewed, RENEWED), (Way::Told, "")];
-    let of_way = ways.into_iter().find_map(|(way, prefix)| Some((way, options.strip_prefix(prefix)?)));
-    let (way, options) = of_way.unwrap_or((Way::Told, options));
-    let options = walk_args(options, &view.place.scene, &view.args.adapter)?;
-    let of_mode = usize::from(options.dvf.how().paper);
+pub fn measure(view: &mut View, own: &Measurement) -> Result<Values> {
+    let (way, options) = (own.way, &own.options);
+    let of_mode = usize::from(options.how().paper);
     let truth = match view.truth[of_mode].take() {
         Some(truth) => truth,
-        None => Truth::of(view, options.dvf.how())?,
+        None => Truth::of(view, options.how())?,
     };
-    let values = of_truth(view, &options, way, &truth);
+    let values = of_truth(view, options, way, &truth);
     view.renderer.place(&truth.still, &truth.movers.at(0.0))?;
     view.renderer.methods.remove::<Dvf>();
     view.truth[of_mode] = Some(truth);
     values
 }
 
-fn of_truth(view: &mut View, options: &WalkArgs, way: Way, truth: &Truth) -> Result<Values> {
-    let how = options.dvf.how();
+fn of_truth(view: &mut View, options: &Options, way: Way, truth: &Truth) -> Result<Values> {
+    let how = options.how();
     let noise = truth.noise.p99;
     let mut values = Values::from([("noise_p99".into(), noise), ("noise_mean".into(), truth.noise.mean)]);
     let (mut rays, mut traced, mut points, mut longest) = (0.0, 0.0, 0, 0);

@@ -10,29 +10,27 @@ mod output;
 mod plots;
 
 use super::cells::Header;
-use super::measure::walk_args;
 use super::rows::{Row, Rows};
-use crate::cli::dvf as field;
+use super::scenes;
 use crate::cli::interrupt;
-use crate::cli::options::args::{Cli, WalkArgs};
-use crate::cli::options::dvf_args::RegionKind;
-use crate::cli::walk;
 use crate::frame::Renderer;
-use crate::kernels::{DeviceInfo, Extent};
+use crate::kernels::DeviceInfo;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::output::atomic;
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::secondary::dvf::answer::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Region};
+use crate::secondary::dvf::{Options, RegionKind, prepare};
 use crate::session::device::Device;
-use crate::session::open::{Session, open_scene};
+use crate::session::opened::{Opened, open_scene};
+use crate::session::renderer::renderer;
+use crate::settings::{CacheSize, Effect, EffectList, Environment, Settings};
 use anyhow::{Context, Result, bail};
-use args::{DvfBenchArgs, Stage};
+use args::{DvfBenchArgs, Measurement, Stage};
 use brickwalk_convert::progress::Progress;
-use clap::Parser;
+use brickwalk_scenes::{Kind, Settings as Generated};
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -45,7 +43,7 @@ const FORMAT: u32 = 3;
 const BOX: &str = "cornell";
 
 /// Its triangles, and those of a brick, so that shares of the cache hold several.
-const BOX_SIZE: [&str; 4] = ["--triangles", "10K", "--brick-triangles", "100"];
+const BOX_SIZE: [u32; 2] = [10_000, 100];
 
 /// A scene with its path.
 struct Place {
@@ -89,19 +87,19 @@ pub fn run(args: &DvfBenchArgs) -> Result<()> {
     let mut rows = Rows::open(&args.output, header(args, &places)?)?;
     let deadline = args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
     let stages: Vec<Stage> =
-        Stage::ALL.into_iter().filter(|stage| args.stages.is_empty() || args.stages.contains(stage)).collect();
-    let jobs: Vec<(&Place, Stage, String)> = places
+        Stage::ALL.iter().copied().filter(|stage| args.stages.is_empty() || args.stages.contains(stage)).collect();
+    let jobs: Vec<(&Place, Stage, Measurement)> = places
         .iter()
         .flat_map(|place| stages.iter().map(move |&stage| (place, stage)))
         .filter(|(place, stage)| *stage != Stage::Flicker || place.motion.is_some())
-        .flat_map(|(place, stage)| args.measurements(stage).into_iter().map(move |options| (place, stage, options)))
+        .flat_map(|(place, stage)| args.measurements(stage).into_iter().map(move |own| (place, stage, own)))
         .collect();
     let progress = Progress::new();
     progress.phase("measurements", jobs.len() as u64);
     let mut view: Option<View> = None;
     let mut ended = "";
-    for (place, stage, options) in &jobs {
-        let key = key(&place.name, *stage, options);
+    for (place, stage, own) in &jobs {
+        let key = key(&place.name, *stage, &own.to_string());
         if !rows.has(&key) {
             if interrupt::flag().load(Ordering::Relaxed) {
                 ended = "Interrupted: the same command goes on where this one stopped.\n";
@@ -112,17 +110,17 @@ pub fn run(args: &DvfBenchArgs) -> Result<()> {
                 break;
             }
             if *stage == Stage::Memory {
-                rows.push(Row { key, values: memory(place, args, options)? })?;
+                rows.push(Row { key, values: memory(place, args, &own.options)? })?;
             } else {
                 let of_place = view.take().filter(|view| std::ptr::eq(view.place, *place));
                 let open = match of_place {
                     Some(view) => view,
-                    None => View::open(place, args, "100%")?,
+                    None => View::open(place, args, CacheSize::Percent(100.0))?,
                 };
                 let open = view.insert(open);
                 let values = match stage {
-                    Stage::Flicker => flicker::measure(open, options)?,
-                    _ => open.measure(*stage, options)?.0,
+                    Stage::Flicker => flicker::measure(open, own)?,
+                    _ => open.measure(*stage, &own.options)?.0,
                 };
                 rows.push(Row { key, values })?;
             }
@@ -165,7 +163,7 @@ fn header(args: &DvfBenchArgs, places: &[Place]) -> Result<Header> {
 /// The scenes, and the box, which is built if it is not there.
 fn places(args: &DvfBenchArgs) -> Result<Vec<Place>> {
     let mut places = Vec::new();
-    for (i, scene) in args.scenes.iter().enumerate() {
+    for (i, scene) in args.scenes.0.iter().enumerate() {
         let file = open_scene(scene)?;
         let near = scene.with_extension("near.json");
         let path = match args.paths.get(i) {
@@ -180,10 +178,9 @@ fn places(args: &DvfBenchArgs) -> Result<Vec<Place>> {
     let near = scene.with_extension("near.json");
     // Paths are written after the scene.
     if !scene.with_extension("motion.json").exists() || open_scene(&scene).is_err() {
-        let words = ["brickwalk", "scene", BOX].into_iter().chain(BOX_SIZE).chain(["-o"]);
-        let words = words.map(OsString::from).chain([scene.clone().into()]);
-        let cli = Cli::try_parse_from(words).context("the bench's own scene")?;
-        crate::cli::run(&cli.command).with_context(|| scene.display().to_string())?;
+        let [triangles, brick_triangles] = BOX_SIZE;
+        let cornell = Generated { kind: Kind::Cornell, triangles: triangles.into(), ..Generated::default() };
+        scenes::make(&cornell, brick_triangles, &scene)?;
     }
     places.push(Place::of(BOX.into(), scene, CameraPath::read(&near)?.frame(0, 1)));
     Ok(places)
@@ -199,18 +196,21 @@ impl Place {
 type Values = BTreeMap<String, f64>;
 
 impl<'a> View<'a> {
-    fn open(place: &'a Place, args: &'a DvfBenchArgs, cache: &str) -> Result<Self> {
-        let environment = args.environment.as_ref().map(|file| format!(" --environment {}", file.display()));
-        let line = format!(
-            "--size {} --tile 16 --spp {} --sun-intensity 0 --effects environment --aov --cache {cache}{}",
-            args.size,
-            args.samples,
-            environment.unwrap_or_default()
-        );
-        let options = walk_args(&line, &place.scene, &args.adapter)?;
-        let extent = Extent { width: args.size.width, height: args.size.height, tile: 16 };
-        let session = Session::open(open_scene(&place.scene)?, &place.scene, &options.stream, extent)?;
-        let renderer = walk::renderer(session, &options)?;
+    fn open(place: &'a Place, args: &'a DvfBenchArgs, cache: CacheSize) -> Result<Self> {
+        let settings = Settings {
+            size: args.size,
+            tile: 16,
+            spp: args.samples,
+            sun_intensity: Some(0.0),
+            effects: EffectList::of(&[Effect::Environment]),
+            environment: args.environment.clone().map(Environment::File),
+            aov: true,
+            cache,
+            adapter: args.adapter.clone(),
+            ..Settings::default()
+        };
+        let opened = Opened::open(open_scene(&place.scene)?, &place.scene, &settings)?;
+        let renderer = renderer(opened, &place.scene, &settings)?;
         let image = Image { width: 0, height: 0, rgb: Vec::new() };
         let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, renewal: [0.0; 2], ms: 0.0 };
         let mut view = Self { place, args, renderer, exact: nothing, truth: [None, None] };
@@ -233,34 +233,45 @@ impl<'a> View<'a> {
     }
 
     /// Where the field is that `options` ask for.
-    fn region(&mut self, options: &WalkArgs) -> Result<Region> {
-        Ok(match options.dvf.dvf_region {
+    fn region(&mut self, options: &Options) -> Result<Region> {
+        Ok(match options.region {
             RegionKind::Scene => Region::scene(self.renderer.scene.resident()),
             RegionKind::View => self.renderer.visible_region(&[self.place.camera])?,
         })
     }
 
-    /// Makes the field that `options` ask for, which are those of a walk.
-    fn make(&mut self, options: &WalkArgs) -> Result<(DvfMade, f64)> {
+    /// Makes the field that `options` ask for.
+    fn make(&mut self, options: &Options) -> Result<(DvfMade, f64)> {
         let region = self.region(options)?;
-        field::make(&mut self.renderer, &options.dvf.settings(), &region, options.dvf.tracing())
+        let progress = Progress::new();
+        let mut told = None;
+        let mut watch = |rays: u64, about: u64| {
+            if told.is_none() {
+                progress.phase("rays of the field", about);
+            }
+            progress.advance(rays - told.unwrap_or(0));
+            told = Some(rays);
+            !interrupt::flag().load(Ordering::Relaxed)
+        };
+        let made = prepare::make(&mut self.renderer, &options.settings(), &region, options.tracing(), &mut watch);
+        progress.finish();
+        made
     }
 
     /// Makes the field that `options` ask for, and a picture by it; the values, and the picture.
-    fn measure(&mut self, stage: Stage, options: &str) -> Result<(Values, Image)> {
-        let options = walk_args(options, &self.place.scene, &self.args.adapter)?;
+    fn measure(&mut self, stage: Stage, options: &Options) -> Result<(Values, Image)> {
         self.renderer.methods.remove::<Dvf>();
-        let (made, seconds) = self.make(&options)?;
+        let (made, seconds) = self.make(options)?;
         let known = made.field.known_cells();
         let longest = made.field.shape.size.into_iter().max().unwrap_or(0);
         let field = Arc::new(made.field);
-        self.renderer.methods.set(Dvf::new(field.clone(), options.dvf.how()));
+        self.renderer.methods.set(Dvf::new(field.clone(), options.how()));
         let picture = self.picture(0)?;
         let mut times = [vec![self.exact.ms], vec![picture.ms]];
         for _ in 1..self.args.repeat {
             self.renderer.methods.remove::<Dvf>();
             times[0].push(self.picture(0)?.ms);
-            self.renderer.methods.set(Dvf::new(field.clone(), options.dvf.how()));
+            self.renderer.methods.set(Dvf::new(field.clone(), options.how()));
             times[1].push(self.picture(0)?.ms);
         }
         self.renderer.methods.remove::<Dvf>();
@@ -320,10 +331,9 @@ fn differing(a: &Image, b: &Image) -> usize {
 }
 
 /// What is seen, with a small cache and with all resident: values of the first, and how many pixels of both differ.
-fn memory(place: &Place, args: &DvfBenchArgs, options: &str) -> Result<Values> {
-    let (mut values, out_of_core) =
-        View::open(place, args, &args.cache.to_string())?.measure(Stage::Memory, options)?;
-    let mut resident = View::open(place, args, "100%")?;
+fn memory(place: &Place, args: &DvfBenchArgs, options: &Options) -> Result<Values> {
+    let (mut values, out_of_core) = View::open(place, args, args.cache)?.measure(Stage::Memory, options)?;
+    let mut resident = View::open(place, args, CacheSize::Percent(100.0))?;
     resident.renderer.settings.tracing.measure_needed = true;
     let (of_resident, in_core) = resident.measure(Stage::Memory, options)?;
     // Which bricks rays need is known where all are resident.

@@ -2,9 +2,9 @@
 
 use super::args::{DvfBenchArgs, Stage};
 use super::{key, plots};
-use crate::cli::options::sizes::human_count;
 use crate::lab::bench::results::Results;
 use crate::lab::bench::rows::Rows;
+use crate::settings::sizes::human_count;
 use anyhow::Result;
 use brickwalk_report::{Section, Table, Value};
 
@@ -81,7 +81,7 @@ pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) 
         let making = tables.map(|tables| Section { title: MAKING_TITLE.into(), tables, ..Section::default() });
         [Some(own), making].into_iter().flatten()
     };
-    let sections: Vec<Section> = Stage::ALL.into_iter().flat_map(section).collect();
+    let sections: Vec<Section> = Stage::ALL.iter().copied().flat_map(section).collect();
     let sections = sections.into_iter().filter(|section| !section.tables[0].rows.is_empty()).collect();
     let facts = vec![
         ("Resolution", args.size.to_string()),
@@ -121,7 +121,7 @@ fn table(args: &DvfBenchArgs, scenes: &[&str], stage: Stage, rows: &Rows) -> Tab
     }
     let mut lines = Vec::new();
     for scene in scenes {
-        for options in args.measurements(stage) {
+        for options in args.names(stage) {
             let key = key(scene, stage, &options);
             if !rows.has(&key) {
                 continue;
@@ -178,7 +178,7 @@ fn making(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Table {
     ];
     let mut lines = Vec::new();
     for scene in scenes {
-        for options in args.measurements(Stage::Points) {
+        for options in args.names(Stage::Points) {
             let key = key(scene, Stage::Points, &options);
             if !rows.has(&key) {
                 continue;
@@ -231,7 +231,7 @@ fn flickering(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Table {
     ];
     let mut lines = Vec::new();
     for scene in scenes {
-        for options in args.measurements(Stage::Flicker) {
+        for options in args.names(Stage::Flicker) {
             let key = key(scene, Stage::Flicker, &options);
             if !rows.has(&key) {
                 continue;

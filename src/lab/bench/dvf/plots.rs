@@ -1,6 +1,6 @@
 //! Plots of the bench: what its figures show, of every scene that was measured.
 
-use super::args::{ANEW, DvfBenchArgs, RENEWED, Stage};
+use super::args::{DvfBenchArgs, Stage, Way};
 use super::flicker::FRAMES;
 use super::key;
 use crate::lab::bench::rows::Rows;
@@ -85,7 +85,7 @@ pub fn of(stage: Stage, args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Ve
 
 fn drawn(plot: &Plot, stage: Stage, args: &DvfBenchArgs, scene: &str, rows: &Rows) -> Option<Graph> {
     let mut lines: Vec<Line> = Vec::new();
-    for options in args.measurements(stage) {
+    for options in args.names(stage) {
         let Some((x, rest)) = split(&options, plot.option) else { continue };
         let Some(y) = rows.value(&key(scene, stage, &options), plot.value.0) else { continue };
         let (name, point) = (rest.replace("--dvf-", ""), (x, plot.value.1 * y));
@@ -109,11 +109,11 @@ fn over_frames(args: &DvfBenchArgs, scene: &str, rows: &Rows) -> Option<Graph> {
         let at =
             |frame: u32| Some((f64::from(frame), rows.value(&key, &format!("change_greatest at {frame}"))? / noise));
         let name = options.split("--dvf-mode ").last().unwrap_or_default();
-        let way = [ANEW, RENEWED].into_iter().find(|way| options.starts_with(way));
-        let name = way.map_or_else(|| name.to_string(), |way| format!("{name}, {}", way.trim_end()));
+        let way = [Way::Anew, Way::Renewed].into_iter().find(|way| options.starts_with(way.name()));
+        let name = way.map_or_else(|| name.to_string(), |way| format!("{name}, {}", way.name().trim_end()));
         Some((name, (1..FRAMES).filter_map(at).collect()))
     };
-    let lines: Vec<Line> = args.measurements(Stage::Flicker).into_iter().filter_map(line).collect();
+    let lines: Vec<Line> = args.names(Stage::Flicker).into_iter().filter_map(line).collect();
     (!lines.is_empty()).then(|| Graph {
         title: format!("Greatest change over frames, {scene}"),
         reading: "Of pixels whose rays have the same answers, in parts of what 99 of 100 pixels differ by noise."

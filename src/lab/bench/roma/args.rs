@@ -1,61 +1,44 @@
 //! Options of `bench roma`.
 
-use crate::cli::options::args::{UNITS, ranged};
-use crate::cli::options::sizes::{ImageSize, positive_count};
+use super::plan::Stage;
 use crate::lab::bench::args as bench;
-use crate::session::device::Adapter;
-use clap::Args;
+use crate::settings::{Adapter, ImageSize, Rule, settings};
 use std::path::PathBuf;
 
-use super::plan::Stage;
-
-/// Options of `bench roma`.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = UNITS)]
-pub struct RomaBenchArgs {
-    /// Folder for the results: roma.json, roma.md, report.html, a CSV a table, and rows.jsonl, which grows with every
-    /// job. Started again with the same folder and settings, the bench goes on where it stopped
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Small scenes, small pictures, few samples: minutes on two cores without a GPU
-    #[arg(long)]
-    pub quick: bool,
-    /// Triangles of the city, and of the plant of pipes [default: 12M; with --quick 100K]
-    #[arg(long, value_name = "N", value_parser = positive_count)]
-    pub triangles: Option<u64>,
-    /// Folder of the generated scenes; what is missing is generated there [default: DIR/scenes]
-    #[arg(long, value_name = "DIR")]
-    pub scenes: Option<PathBuf>,
-    /// A converted Sponza, measured beside the generated scenes [default: none]
-    #[arg(long, value_name = "S.bricks")]
-    pub sponza: Option<PathBuf>,
-    /// What to measure in this run, separated by commas: speed (times over resolutions and numbers of directions), ao
-    /// (errors by scenes), resolution (errors by resolutions and numbers of directions), radius (errors by the length
-    /// of rays), shadows (snapped and unsnapped rays to an area light), diffuse (light of the sun by one bounce, its
-    /// errors without the sun's own), out-of-core (a cache of 15 %), handover (maps and bricks together, out of core),
-    /// seams (errors by the distance from where larger cells take over), leaks (columns that pass through single
-    /// sheets) [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    pub stages: Vec<Stage>,
-    /// Begin no job after so many minutes; the results hold what is measured until then [default: no limit]
-    #[arg(long, value_name = "N", value_parser = bench::minutes)]
-    pub minutes: Option<f64>,
-    /// Width and height of the pictures [default: 1920x1080; with --quick 160x90]
-    #[arg(long, value_name = "WxH")]
-    pub size: Option<ImageSize>,
-    /// Turns of every way, beside one that brings in what frames need [default: 5; with --quick 3]
-    #[arg(long, value_name = "N", value_parser = bench::repetitions)]
-    pub repeat: Option<u32>,
-    /// Samples a pixel of pictures that are converged, 2 to 65536 [default: 1024; with --quick 64]
-    #[arg(long, value_name = "N", value_parser = |s: &str| ranged(s, 2, 65_536))]
-    pub samples: Option<u32>,
-    /// Length of ambient-occlusion rays, world units
-    #[arg(long, value_name = "LENGTH", default_value = "16", value_parser = crate::cli::options::light_args::ray_length)]
-    pub ao_length: f64,
-    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
-    /// adapter whose name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
-    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
-    pub adapter: Adapter,
+settings! {
+    /// Options of `bench roma`.
+    pub struct RomaBenchArgs {
+        /// Folder for the results: roma.json, roma.md, report.html, a CSV a table, and rows.jsonl, which grows with every
+        /// job. Started again with the same folder and settings, the bench goes on where it stopped.
+        output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
+        /// Small scenes, small pictures, few samples. It takes minutes on two cores without a GPU.
+        quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
+        /// Triangles of the city, and of the plant of pipes. [default: 12M; with --quick 100K]
+        triangles: Option<u64> = None, "--triangles N", bench::TRIANGLES, "", Quality, Common;
+        /// Folder of the generated scenes; what is missing is generated there. [default: DIR/scenes]
+        scenes: Option<PathBuf> = None, "--scenes DIR", Rule::Any, "", Output, Common;
+        /// A converted Sponza, measured beside the generated scenes. [default: none]
+        sponza: Option<PathBuf> = None, "--sponza S.bricks", Rule::Any, "", Output, Common;
+        /// What to measure in this run, with commas between them. speed (times over resolutions and numbers of
+        /// directions), ao (errors by scenes), resolution (errors by resolutions and numbers of directions), radius (errors
+        /// by the length of rays), shadows (snapped and unsnapped rays to an area light), diffuse (light of the sun by one
+        /// bounce, its errors without the sun's own), out-of-core (a cache of 15 %), handover (maps and bricks together,
+        /// out of core), seams (errors by the distance from where larger cells take over), leaks (columns that pass through
+        /// single sheets). [default: all]
+        stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
+        /// Begin no job after so many minutes. The results hold what is measured until then. [default: no limit]
+        minutes: Option<f64> = None, "--minutes N", bench::MINUTES, "", Measurement, Common;
+        /// Width and height of the pictures. [default: 1920x1080; with --quick 160x90]
+        size: Option<ImageSize> = None, "--size WxH", Rule::Any, "pixels", Camera, Common;
+        /// Turns of every way, beside one that brings in what frames need. [default: 5; with --quick 3]
+        repeat: Option<u32> = None, "--repeat N", bench::REPETITIONS, "", Measurement, Common;
+        /// Samples per pixel of pictures that are converged, 2 to 65536. [default: 1024; with --quick 64]
+        samples: Option<u32> = None, "--samples N", Rule::Whole(2, 65_536), "", Quality, Common;
+        /// Length of ambient-occlusion rays, in world units.
+        ao_length: f64 = 16.0, "--ao-length LENGTH", Rule::Real(1e-6, 1e9), "", Effects, Common;
+        /// What renders, as `walk --adapter` has it.
+        adapter: Adapter = Adapter::Auto, "--adapter NAME", Rule::Any, "", Device, Common;
+    }
 }
 
 /// What the options come to.

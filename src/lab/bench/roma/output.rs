@@ -3,9 +3,9 @@
 use super::args::Settings;
 use super::plan::{FIELD, Job, Stage, USUAL, Way, jobs};
 use super::{LEAKS, leak_key, leak_name, leaks, seams};
-use crate::cli::options::sizes::human_count;
 use crate::lab::bench::results::Results;
 use crate::lab::bench::rows::Rows;
+use crate::settings::sizes::human_count;
 use anyhow::Result;
 use brickwalk_report::{Graph, GraphShape, Section, Table, Unit, Value};
 use std::path::Path;

@@ -1,7 +1,9 @@
 //! What is measured.
 
-use super::args::Settings;
+use super::args::Settings as Scale;
 use crate::lab::bench::plan::SceneId;
+use crate::secondary::roma::{self, Unsnapped};
+use crate::settings::{Effect, EffectList, Plain, Rule, Secondary, Settings, Turn, Value};
 use std::fmt;
 
 /// A part of the measurements that can be asked for alone.
@@ -61,13 +63,15 @@ impl Stage {
     }
 }
 
-impl std::str::FromStr for Stage {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
+impl Value for Stage {
+    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
         let names = Self::ALL.map(Self::name);
-        let found = Self::ALL.into_iter().find(|stage| stage.name() == text.trim());
-        found.ok_or_else(|| crate::cli::options::named::unknown(text, &names, &[]))
+        let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
+        found.ok_or_else(|| crate::settings::names::unknown(text, &names, &[]))
+    }
+
+    fn plain(&self) -> Plain {
+        Plain::Text(self.name().into())
     }
 }
 
@@ -120,21 +124,27 @@ impl fmt::Display for Way {
 }
 
 impl Way {
-    /// The options of `walk` for it.
-    pub fn options(&self) -> String {
-        match self {
-            Self::Exact => "--secondary exact".into(),
+    /// `settings` for it.
+    pub fn over(&self, settings: &Settings) -> Settings {
+        let (roma, mut settings) = (&settings.roma, settings.clone());
+        settings.secondary = match self {
+            Self::Exact => Secondary::Exact,
+            Self::Roma { .. } => Secondary::Roma,
+            Self::Sifted | Self::Corrected { .. } | Self::Bounded { .. } => Secondary::Auto,
+            Self::Field { .. } => Secondary::Df,
+        };
+        match *self {
+            Self::Exact => {}
             Self::Roma { k, size, is_unsnapped } => {
-                let unsnapped = if *is_unsnapped { "all" } else { "none" };
-                format!(
-                    "--secondary roma --roma-k {k} --roma-shadow-k {k} --roma-diffuse-k {k} --roma-size {size} --roma-unsnapped {unsnapped}"
-                )
+                let unsnapped = vec![if is_unsnapped { Unsnapped::All } else { Unsnapped::None }];
+                settings.roma = roma::Options { k, shadow_k: k, diffuse_k: k, size, unsnapped, ..roma.clone() };
             }
-            Self::Sifted => "--secondary auto --auto-error off".into(),
-            Self::Corrected { one_in } => format!("--secondary auto --auto-one-in {one_in}"),
-            Self::Bounded { percent } => format!("--secondary auto --auto-error {percent}"),
-            Self::Field { size } => format!("--secondary df --df-size {size}"),
+            Self::Sifted => settings.roma.error = None,
+            Self::Corrected { one_in } => settings.roma.one_in = Some(one_in),
+            Self::Bounded { percent } => settings.roma.error = Some(percent.into()),
+            Self::Field { size } => settings.df.size = size,
         }
+        settings
     }
 
     /// Whether bricks are asked.
@@ -190,10 +200,10 @@ pub struct Job {
     pub variant: String,
     /// The pass that is measured.
     pub effect: &'static str,
-    /// The options of `walk` for effect and light.
-    pub options: String,
-    /// Those of a picture without the effect, which is taken off; none is where empty.
-    pub without: String,
+    /// The settings for effect and light.
+    pub settings: Settings,
+    /// Those of a picture without the effect, which is taken off, where one is.
+    pub without: Option<Settings>,
     /// Length of rays of occlusion, world units.
     pub length: f64,
     /// The frames of the near path, of thirty. Times are those of the first.
@@ -218,17 +228,27 @@ impl Job {
 }
 
 /// Occlusion alone, of a sky of one brightness.
-fn occlusion(length: f64) -> String {
-    format!("--effects ao --ao-rays 1 --ao-length {length} --sun-intensity 0 --rotation full")
+fn occlusion(length: f64) -> Settings {
+    let effects = EffectList::of(&[Effect::Ao]);
+    let (sun_intensity, rotation) = (Some(0.0), Turn::FULL);
+    Settings { effects, ao_rays: 1, ao_length: length, sun_intensity, rotation, ..Settings::default() }
 }
 
 /// The sun alone, and what is lit by what it lights, if `effects` have that.
-fn bounce(effects: &str) -> String {
-    format!("--effects {effects} --diffuse-rays 1 --sky-intensity 0 --sun-angle 0 --rotation full --roma-steps 64")
+fn bounce(effects: &[Effect]) -> Settings {
+    Settings {
+        effects: EffectList::of(effects),
+        diffuse_rays: 1,
+        sky_intensity: 0.0,
+        sun_angle: 0.0,
+        rotation: Turn::FULL,
+        roma: roma::Options { steps: 64, ..roma::Options::default() },
+        ..Settings::default()
+    }
 }
 
 /// All jobs, in their order.
-pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
+pub fn jobs(settings: &Scale, has_sponza: bool) -> Vec<Job> {
     let sizes = [32, 64, 128];
     let all: Vec<Way> =
         sizes.iter().flat_map(|&size| [snapped(size, 4), snapped(size, 8), Way::Field { size }]).collect();
@@ -238,8 +258,8 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         scene,
         variant,
         effect: "ao",
-        options: occlusion(length),
-        without: String::new(),
+        settings: occlusion(length),
+        without: None,
         length,
         frames: VIEW,
         cache: 100,
@@ -276,21 +296,21 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         .flat_map(|&is_unsnapped| [4, 8].map(|k| Way::Roma { k, size: 128, is_unsnapped }))
         .chain([FIELD])
         .collect();
-    for (light, options) in [("sun of 0.5 degrees", ""), ("sun of 10 degrees", " --sun-angle 10")] {
+    for (light, sun_angle) in [("sun of 0.5 degrees", 0.53), ("sun of 10 degrees", 10.0)] {
         let own = job(Stage::Shadows, SceneId::City, light.into(), length, with_exact(&shadows));
-        let options = format!("--effects shadow --sky-intensity 0{options}");
-        jobs.push(Job { effect: "shadow", options, times: true, ..own });
+        let settings = Settings { effects: EffectList::SHADOW, sky_intensity: 0.0, sun_angle, ..Settings::default() };
+        jobs.push(Job { effect: "shadow", settings, times: true, ..own });
     }
+    let lit = [Effect::Shadow, Effect::Diffuse];
     let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
     for &scene in &scenes {
         let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped]);
         let own =
             Job { effect: "diffuse", times: true, ..job(Stage::Diffuse, scene, "all resident".into(), length, ways) };
-        jobs.push(Job { options: bounce("shadow,diffuse"), without: bounce("shadow"), ..own });
+        jobs.push(Job { settings: bounce(&lit), without: Some(bounce(&lit[..1])), ..own });
     }
     let own = job(Stage::Diffuse, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
-    let own =
-        Job { effect: "diffuse", options: bounce("shadow,diffuse"), cache: 15, times: true, errors: false, ..own };
+    let own = Job { effect: "diffuse", settings: bounce(&lit), cache: 15, times: true, errors: false, ..own };
     jobs.push(Job { is_cold: true, ..own });
     let own = job(Stage::OutOfCore, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
     jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
@@ -301,13 +321,13 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
         let ways = with_exact(&[&[USUAL][..], &corrected, &[Way::Sifted], &bounded].concat());
         let own = job(Stage::Handover, SceneId::City, format!("rays of {length}, cache 15 %"), length, ways);
         // As many rays a sample as make the maps a small part, and as are chosen among.
-        let options = own.options.replace("--ao-rays 1", "--ao-rays 16");
-        jobs.push(Job { cache: 15, times: true, options, ..own });
+        let settings = Settings { ao_rays: 16, ..own.settings.clone() };
+        jobs.push(Job { cache: 15, times: true, settings, ..own });
     }
     for scene in [SceneId::City, SceneId::Pipes] {
         let own = job(Stage::Seams, scene, format!("rays of {length}"), length, with_exact(&[USUAL, FIELD]));
-        let options = format!("{} --aov", own.options);
-        jobs.push(Job { options, frames: WALK, ..own });
+        let settings = Settings { aov: true, ..own.settings.clone() };
+        jobs.push(Job { settings, frames: WALK, ..own });
     }
     jobs
 }
@@ -315,11 +335,11 @@ pub fn jobs(settings: &Settings, has_sponza: bool) -> Vec<Job> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::options::sizes::ImageSize;
+    use crate::settings::sizes::ImageSize;
 
     #[test]
     fn measurements_have_names_of_their_own() {
-        let settings = Settings {
+        let settings = Scale {
             triangles: 1000,
             size: ImageSize { width: 16, height: 9 },
             repeat: 1,

@@ -1,13 +1,10 @@
 //! Pictures of a view, by one renderer, with what their passes took and how far they are from each other.
 
-use super::args::Settings;
+use super::args::Settings as Scale;
 use super::plan::{Job, Way};
 use super::seams::Seams;
-use crate::cli::walk;
 use crate::counters::Record;
-use crate::frame::{Renderer, Schedule};
-use crate::kernels::Extent;
-use crate::lab::bench::measure::walk_args;
+use crate::frame::Renderer;
 use crate::lab::bench::plan::View as Path;
 use crate::lab::bench::scenes::Place;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
@@ -15,8 +12,9 @@ use crate::scene::{Camera, CameraPath};
 use crate::schedule::cache::Cache;
 use crate::secondary::occupancy::BaseMaps;
 use crate::secondary::roma::answer::Roma;
-use crate::session::device::Adapter;
-use crate::session::open::{Session, open_scene};
+use crate::session::opened::{Opened, open_scene};
+use crate::session::renderer::{methods, render_settings, renderer};
+use crate::settings::{Adapter, CacheSize, Schedule, Settings};
 use crate::stream::Residency;
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
@@ -29,7 +27,7 @@ pub struct View<'a> {
     renderer: Renderer,
     path: CameraPath,
     camera: Camera,
-    settings: &'a Settings,
+    settings: &'a Scale,
     adapter: &'a Adapter,
 }
 
@@ -47,13 +45,11 @@ impl<'a> View<'a> {
     ///
     /// # Errors
     /// The scene's, the device's.
-    pub fn open(job: &'a Job, place: &Place, settings: &'a Settings, adapter: &'a Adapter) -> Result<Self> {
+    pub fn open(job: &'a Job, place: &Place, settings: &'a Scale, adapter: &'a Adapter) -> Result<Self> {
         let scene = place.scene.clone();
-        let line = line(job, &job.options, &Way::Exact, settings, 1, 0);
-        let args = walk_args(&line, &scene, adapter)?;
-        let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
-        let session = Session::open(open_scene(&scene)?, &scene, &args.stream, extent)?;
-        let renderer = walk::renderer(session, &args)?;
+        let own = of_job(job, &job.settings, &Way::Exact, settings, adapter);
+        let opened = Opened::open(open_scene(&scene)?, &scene, &own)?;
+        let renderer = renderer(opened, &scene, &own)?;
         let path = place.path(Path::Near)?;
         let camera = path.frame(job.frames[0], 30);
         Ok(Self { job, scene, renderer, path, camera, settings, adapter })
@@ -69,9 +65,9 @@ impl<'a> View<'a> {
     /// # Errors
     /// A brick that cannot be read, the device's, pixels that are not finite.
     pub fn picture(&mut self, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
-        let Picture { mut image, depth, values } = self.whole(&self.job.options, way, samples, seed)?;
-        if !self.job.without.is_empty() && self.job.errors {
-            let without = self.whole(&self.job.without, way, samples, seed)?.image;
+        let Picture { mut image, depth, values } = self.whole(&self.job.settings, way, samples, seed)?;
+        if let Some(without) = self.job.without.as_ref().filter(|_| self.job.errors) {
+            let without = self.whole(without, way, samples, seed)?.image;
             for (with, without) in image.rgb.as_flattened_mut().iter_mut().zip(without.rgb.as_flattened()) {
                 *with -= without;
             }
@@ -79,14 +75,15 @@ impl<'a> View<'a> {
         Ok(Picture { image, depth, values })
     }
 
-    /// A picture of all that `options` ask for.
-    fn whole(&mut self, options: &str, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
-        let args = walk_args(&line(self.job, options, way, self.settings, samples, seed), &self.scene, self.adapter)?;
+    /// A picture of all that `settings` ask for.
+    fn whole(&mut self, settings: &Settings, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
+        let own = of_job(self.job, settings, way, self.settings, self.adapter);
+        let own = Settings { spp: samples, seed: seed.into(), ..own };
         let renderer = &mut self.renderer;
-        renderer.settings = walk::settings(&args, Schedule::Chc);
+        renderer.settings = render_settings(&own, Schedule::Chc);
         let warm = renderer.methods.remove::<Roma>();
         // A distance field stays as long as the camera does: its making is measured.
-        renderer.methods = walk::methods(&args);
+        renderer.methods = methods(&own);
         if let (Some(roma), Some(warm)) = (renderer.methods.get_mut::<Roma>(), warm) {
             roma.keep(warm, self.job.is_cold);
         }
@@ -99,7 +96,7 @@ impl<'a> View<'a> {
         }
         let output = renderer.frame(0, &self.camera).with_context(|| self.scene.display().to_string())?;
         let effect = self.job.effect;
-        if options == self.job.options && !output.records.iter().any(|record| record.pass == effect) {
+        if *settings == self.job.settings && !output.records.iter().any(|record| record.pass == effect) {
             bail!("no rays of {effect} were traced");
         }
         // With what its hits are lit by, and the maps of lamps.
@@ -172,10 +169,14 @@ impl<'a> View<'a> {
     }
 }
 
-/// The options of the walk that a user would type.
-fn line(job: &Job, options: &str, way: &Way, settings: &Settings, samples: u32, seed: u32) -> String {
-    let cache = job.cache;
-    let Settings { tile, size, .. } = settings;
-    let way = way.options();
-    format!("{options} {way} --cache {cache}% --schedule chc --tile {tile} --size {size} --spp {samples} --seed {seed}")
+/// The settings of a picture.
+fn of_job(job: &Job, settings: &Settings, way: &Way, scale: &Scale, adapter: &Adapter) -> Settings {
+    Settings {
+        cache: CacheSize::Percent(job.cache.into()),
+        schedule: Schedule::Chc,
+        tile: scale.tile,
+        size: scale.size,
+        adapter: adapter.clone(),
+        ..way.over(settings)
+    }
 }

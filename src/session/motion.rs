@@ -1,15 +1,15 @@
-//! The motion of a walk: instances of the scene placed anew for every frame.
+//! The motion of a scene: instances of the scene placed anew for every frame.
 
+use super::lighting::LampSources;
 use crate::frame::Renderer;
 use crate::scene::motion::{Motion, Movers};
-use crate::session::lighting::LampSources;
 use anyhow::{Context, Result};
 use bricks::SceneFile;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A motion of a scene.
-pub struct WalkMotion {
+pub struct SceneMotion {
     file: PathBuf,
     movers: Movers,
     /// The scene as it was opened.
@@ -18,7 +18,7 @@ pub struct WalkMotion {
     lamps: LampSources,
 }
 
-impl WalkMotion {
+impl SceneMotion {
     /// Reads the motion of `file` for `scene`, where `lamps` shine.
     ///
     /// # Errors

@@ -1,22 +1,18 @@
 //! The field of visibility of a walk: read from its file, or made and kept there.
 
-use super::options::args::WalkArgs;
-use super::options::dvf_args::RegionKind;
+use super::answer::{Dvf, DvfMade, DvfTracing, EFFECT as DVF_EFFECT, Region};
+use super::file::{FileError, decode, encode};
+use super::renew::Renewal;
+use super::{Cells, DvfKept, DvfSettings, Options, RegionKind};
 use crate::counters::Record;
 use crate::frame::{RenderError, Renderer};
 use crate::output::atomic;
 use crate::scene::path::CameraPath;
-use crate::secondary::dvf::answer::{Dvf, DvfMade, DvfTracing, EFFECT as DVF_EFFECT, Region};
-use crate::secondary::dvf::file::{FileError, decode, encode};
-use crate::secondary::dvf::renew::Renewal;
-use crate::secondary::dvf::{Cells, DvfKept, DvfSettings};
+use crate::settings::Settings;
 use anyhow::{Context, Result, bail};
-use brickwalk_convert::progress::Progress;
 use serde_json::{Value, json};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -33,62 +29,70 @@ pub struct Note {
     made: Option<(DvfMade, f64)>,
 }
 
-/// Gives `renderer` the field that the options of its walk ask for. Nothing is done where no rays lead to an
-/// environment.
+/// Who watches rays being traced: how many have been, about how many there are; says whether to go on.
+pub type Watch<'a> = dyn FnMut(u64, u64) -> bool + 'a;
+
+/// Gives `renderer`, of the scene in `file`, the field that its settings ask for. Nothing is done where no rays lead to
+/// an environment.
 ///
 /// # Errors
-/// A brick that cannot be read, the device's, Ctrl-C.
-pub fn prepare(renderer: &mut Renderer, args: &WalkArgs, path: &CameraPath) -> Result<Option<Note>> {
+/// A brick that cannot be read; the device's; `watch` stopped it.
+pub fn prepare(
+    renderer: &mut Renderer,
+    file: &Path,
+    settings: &Settings,
+    path: &CameraPath,
+    warnings: &mut Vec<String>,
+    watch: &mut Watch,
+) -> Result<Option<Note>> {
     if !renderer.draws_environment() {
-        warn(
-            "--secondary dvf answers rays to an environment alone, and there are none; give --environment and --effects environment",
+        warnings.push(
+            "--secondary dvf answers rays to an environment alone, and there are none; give --environment and --effects environment"
+                .into(),
         );
         return Ok(None);
     }
-    if args.dvf.how().paper && renderer.settings.effects.diffuse.is_some() {
+    let options = &settings.dvf;
+    if options.how().paper && renderer.settings.effects.diffuse.is_some() {
         bail!(
             "--dvf-mode paper goes without diffuse in --effects, which would bring the environment's light again; use --dvf-mode same-sample"
         );
     }
-    let settings = args.dvf.settings();
-    let name = args.scene.display().to_string();
-    let region = match args.dvf.dvf_region {
+    let making = options.settings();
+    let name = file.display().to_string();
+    let region = match options.region {
         RegionKind::Scene => Region::scene(renderer.scene.resident()),
         RegionKind::View => {
-            let views = args.frames.min(MOST_VIEWS);
+            let views = settings.frames.min(MOST_VIEWS);
             let cameras: Vec<_> = (0..views).map(|view| path.frame(view, views)).collect();
             renderer.visible_region(&cameras).with_context(|| name.clone())?
         }
     };
-    let extension = if args.dvf.dvf_region == RegionKind::View { "view.dvf" } else { "dvf" };
-    let file = args.dvf.dvf_file.clone().unwrap_or_else(|| args.scene.with_extension(extension));
-    let key = key(renderer.scene.checksum(), &settings, &region);
-    let (kept, made) = match read(&file, key) {
+    let extension = if options.region == RegionKind::View { "view.dvf" } else { "dvf" };
+    let file = options.file.clone().unwrap_or_else(|| file.with_extension(extension));
+    let key = key(renderer.scene.checksum(), &making, &region);
+    let (kept, made) = match read(&file, key, warnings) {
         Some(kept) => (kept, None),
         None => {
-            let (made, seconds) = make(renderer, &settings, &region, args.dvf.tracing()).with_context(|| name)?;
+            let (made, seconds) = make(renderer, &making, &region, options.tracing(), watch).with_context(|| name)?;
             if let Err(error) = atomic::write(&file, &encode(&made.kept, key)) {
-                warn(&format!("the field of visibility is not kept: {error:#}"));
+                warnings.push(format!("the field of visibility is not kept: {error:#}"));
             }
             (made.kept.clone(), Some((made, seconds)))
         }
     };
-    let mut dvf = Dvf::new(Arc::new(kept.finished(settings.dilate)), args.dvf.how());
-    if args.motion.is_some() && args.dvf.dvf_renew > 0 {
-        dvf = dvf.renewed_by(renewal(args, Arc::new(kept), region));
+    let mut dvf = Dvf::new(Arc::new(kept.finished(making.dilate)), options.how());
+    if settings.motion.is_some() && options.renew > 0 {
+        dvf = dvf.renewed_by(renewal(options, Arc::new(kept), region));
     }
     renderer.methods.set(dvf);
     Ok(Some(Note { file, made }))
 }
 
-/// How the options of a walk have cells of a field made anew.
-pub fn renewal(args: &WalkArgs, kept: Arc<DvfKept>, region: Region) -> Renewal {
-    let (settings, tracing) = (args.dvf.settings(), args.dvf.tracing());
-    Renewal { kept, settings, region, tracing, rays: args.dvf.dvf_renew.into(), frames: 1 }
-}
-
-fn warn(text: &str) {
-    let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(text));
+/// How options have cells of a field made anew.
+pub fn renewal(options: &Options, kept: Arc<DvfKept>, region: Region) -> Renewal {
+    let (settings, tracing) = (options.settings(), options.tracing());
+    Renewal { kept, settings, region, tracing, rays: options.renew.into(), frames: 1 }
 }
 
 /// What a field is made of, in a number.
@@ -107,19 +111,19 @@ fn key(scene: u64, settings: &DvfSettings, region: &Region) -> u64 {
 }
 
 /// The field in `file`, if it is what `key` says; otherwise it is said why it is made anew, unless there is none.
-fn read(file: &Path, key: u64) -> Option<DvfKept> {
+fn read(file: &Path, key: u64, warnings: &mut Vec<String>) -> Option<DvfKept> {
     let found = std::fs::read(file).map_err(FileError::from).and_then(|bytes| decode(&bytes, key, MOST_BYTES));
     match found {
         Ok(kept) => Some(kept),
         Err(FileError::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => None,
         Err(error) => {
-            warn(&format!("{}: the field of visibility {error}; it is made anew", file.display()));
+            warnings.push(format!("{}: the field of visibility {error}; it is made anew", file.display()));
             None
         }
     }
 }
 
-/// Makes a field, with progress on a terminal; how many seconds it took.
+/// Makes a field; how many seconds it took.
 ///
 /// # Errors
 /// As of [`crate::frame::Engine::make_dvf`].
@@ -128,23 +132,10 @@ pub fn make(
     settings: &DvfSettings,
     region: &Region,
     tracing: DvfTracing,
+    mut watch: &mut Watch,
 ) -> Result<(DvfMade, f64)> {
-    let stop = super::interrupt::flag();
-    let progress = Progress::new();
-    let mut told = None;
-    let mut watch = |rays: u64, about: u64| {
-        let before = *told.get_or_insert_with(|| {
-            progress.phase("rays of the field", about);
-            0
-        });
-        progress.advance(rays - before);
-        told = Some(rays);
-        !stop.load(Ordering::Relaxed)
-    };
     let start = Instant::now();
-    let made = renderer.make_dvf(settings, region, tracing, &mut watch);
-    progress.finish();
-    match made {
+    match renderer.make_dvf(settings, region, tracing, &mut watch) {
         Err(RenderError::Interrupted) => {
             bail!("interrupted while the field of visibility was made; nothing of it is kept")
         }
@@ -154,29 +145,29 @@ pub fn make(
 
 impl Note {
     /// As summaries have it.
-    pub fn report(&self, renderer: &Renderer, args: &WalkArgs, records: &[Record]) -> Value {
+    pub fn report(&self, renderer: &Renderer, settings: &Settings, records: &[Record]) -> Value {
         let Some(field) = renderer.methods.get::<Dvf>().and_then(Dvf::field) else { return Value::Null };
         let own = || records.iter().filter(|record| record.pass == DVF_EFFECT);
         let sum = |of: &dyn Fn(&Record) -> u64| own().map(of).sum::<u64>();
-        let settings = args.dvf.settings();
+        let options = &settings.dvf;
         json!({
             "file": self.file.file_name().map(|name| name.to_string_lossy()),
-            "points_asked": settings.points,
-            "rays": settings.rays,
+            "points_asked": options.points,
+            "rays": options.rays,
             "cells": field.shape.size,
             "side": field.shape.side,
             "octahedral": field.shape.octahedral,
             "known_cells": field.known_cells(),
             "bytes": field.shape.bytes(),
-            "dilate": settings.dilate,
-            "sequence": args.dvf.dvf_sequence.name(),
-            "count": args.dvf.dvf_count.name(),
-            "sides": args.dvf.dvf_sides.name(),
-            "region": args.dvf.dvf_region.name(),
-            "mode": args.dvf.dvf_mode.name(),
-            "trust": args.dvf.dvf_trust.name(),
-            "renew": args.motion.as_ref().map(|_| json!({
-                "rays_a_frame": args.dvf.dvf_renew,
+            "dilate": options.dilate,
+            "sequence": options.sequence.name(),
+            "count": options.count.name(),
+            "sides": options.sides.name(),
+            "region": options.region.name(),
+            "mode": options.mode.name(),
+            "trust": options.trust.name(),
+            "renew": settings.motion.as_ref().map(|_| json!({
+                "rays_a_frame": options.renew,
                 "rays": sum(&|record| record.rays()),
                 "cells": sum(&|record| record.cells_renewed),
                 "cells_left": sum(&|record| record.cells_left),

@@ -1,33 +1,25 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
-use super::options::args::WalkArgs;
-use super::options::optimisation_args::names;
-use super::pictures::Pictures;
-use super::walk::finest_cell;
-use crate::counters::{COLUMNS, Column, Kind, Record};
-use crate::frame::{Renderer, Schedule};
-use crate::picture::denoise::Resolve;
+use super::open::Session;
+use super::renderer::finest_cell;
+use crate::counters::Record;
+use crate::frame::Renderer;
+use crate::picture::exposure::Exposure;
 use crate::secondary::df::answer::Df;
 use crate::secondary::roma::Role;
 use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::handover::{Handover, Trust};
-use crate::session::lighting::Lighting;
-use brickwalk_report::Field;
+use crate::settings::{Schedule, Settings};
 use serde_json::{Map, Value, json};
 
 /// Raised when a field changes its meaning.
 const FORMAT: u32 = 2;
 
-/// The summary of a walk of `frames` finished frames, with what was left out.
-pub fn of_walk(
-    args: &WalkArgs,
-    renderer: &mut Renderer,
-    (pictures, lighting, resolve): (&Pictures, &Lighting, &Resolve),
-    records: &[Record],
-    frames: u32,
-    left_out: Vec<Value>,
-) -> Value {
-    let host_cache = host_cache(renderer);
+/// The summary of a session with the frames of `records`; `left_out` is what was left out, `video` what became of a
+/// video.
+pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, video: Value) -> Value {
+    let host_cache = host_cache(&session.renderer);
+    let Session { file, settings: s, renderer, lighting, resolve, field, stops, .. } = session;
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let (streamed_bytes, tile_bytes) =
@@ -39,7 +31,7 @@ pub fn of_walk(
         "commit": env!("BRICKWALK_COMMIT"),
         "adapter": renderer.executor.device(),
         "scene": {
-            "file": args.scene.file_name().map(|n| n.to_string_lossy()),
+            "file": file.file_name().map(|n| n.to_string_lossy()),
             "file_bytes": renderer.scene.file_bytes(),
             "resident_bytes": renderer.scene.resident_bytes(),
             "bricks": resident.bricks.len(),
@@ -47,48 +39,44 @@ pub fn of_walk(
             "tile_bytes": tile_bytes,
             "leaves": resident.leaves.len(),
             "triangles": manifest.triangles_instanced,
-            "motion": args.motion.as_ref().map(|file| file.file_name().map(|name| name.to_string_lossy())),
+            "motion": s.motion.as_ref().map(|file| file.file_name().map(|name| name.to_string_lossy())),
         },
         "settings": {
-            "frames": args.frames,
-            "width": args.size.width,
-            "height": args.size.height,
-            "effects": args.effects.effects.to_string(),
-            "ao_rays": args.effects.ao_rays,
-            "ao_length": args.effects.ao_length,
-            "diffuse_rays": args.effects.diffuse_rays,
-            "rotation_degrees": args.effects.rotation,
-            "schedule": match renderer.settings.schedule {
-                Schedule::Chc => "chc",
-                Schedule::Demand => "demand",
-                Schedule::Plain => "plain",
-                Schedule::PlainBinary => "plain-bvh2",
-                Schedule::Auto => "auto",
-            },
-            "fronts": args.stream.fronts,
-            "without": names(&args.optimisations.without),
-            "query_threshold": args.stream.query_threshold,
-            "tile": args.stream.tile,
+            "frames": s.frames,
+            "width": s.size.width,
+            "height": s.size.height,
+            "effects": s.effects.to_string(),
+            "ao_rays": s.ao_rays,
+            "ao_length": s.ao_length,
+            "diffuse_rays": s.diffuse_rays,
+            "rotation_degrees": s.rotation.0,
+            "schedule": renderer.settings.schedule.name(),
+            "fronts": if s.fronts { "on" } else { "off" },
+            "without": without(s),
+            "query_threshold": s.query_threshold,
+            "tile": s.tile,
             "evict": renderer.cache.residency.policy().name(),
             "cache_bytes": renderer.cache.residency.budget_bytes(),
             "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
-            "host_cache_bytes": args.stream.host_cache,
-            "interactive_bytes": args.interactive,
-            "secondary": args.secondary.name(),
-            "roma": roma_settings(args, renderer),
-            "df": field_settings(args, renderer),
+            "host_cache_bytes": s.host_cache,
+            "interactive_bytes": s.interactive,
+            "secondary": s.secondary.name(),
+            "roma": roma_settings(s, renderer),
+            "df": field_settings(s, renderer),
+            "dvf": field.as_ref().and_then(Option::as_ref).map(|note| note.report(renderer, s, records)),
             "rsm": renderer.methods.get::<Roma>().and_then(|roma| roma.rsm.report()),
-            "spp": args.spp,
-            "seed": args.seed,
-            "sun": args.light.sun.0,
-            "sun_angle_degrees": args.light.sun_angle,
-            "sun_intensity": args.light.sun_intensity(),
-            "sky_intensity": args.light.sky_intensity,
-            "environment": args.light.environment.as_ref().map(ToString::to_string),
-            "environment_rotation_degrees": args.light.environment_rotation,
-            "environment_intensity": args.light.environment_intensity,
-            "rect_light": args.light.rect_light.map(|light| light.map(|v| v.to_array())),
+            "spp": s.spp,
+            "seed": s.seed,
+            "sun": s.sun.unit().to_array(),
+            "sun_angle_degrees": s.sun_angle,
+            "sun_intensity": s.sun_intensity(),
+            "sky_intensity": s.sky_intensity,
+            "environment": s.environment.as_ref().map(ToString::to_string),
+            "environment_rotation_degrees": s.environment_rotation,
+            "environment_intensity": s.environment_intensity,
+            "rect_light": s.rect_light.map(|light| [light.corner, light.edges[0], light.edges[1]].map(|v| v.to_array())),
         },
+        "options": s,
         "lamps": {
             "emitters": renderer.light.lamps.emitters().len(),
             "environment": renderer.light.lamps.environment.as_ref().zip(lighting.environment).map(|(map, notes)| json!({
@@ -98,8 +86,16 @@ pub fn of_walk(
                 "energy_change": notes.energy_change,
             })),
         },
-        "frames": frames,
-        "pictures": pictures.summary(args),
+        "frames": stops.len(),
+        "pictures": {
+            "exposure": match s.exposure {
+                Exposure::Fixed(stops) => json!(stops),
+                Exposure::Auto => json!("auto"),
+            },
+            "exposure_ev": stops,
+            "tone_map": s.tone_map.name(),
+            "video": video,
+        },
         "denoise": resolve.report(),
         "taa": resolve.taa.is_some(),
         "auto": (renderer.settings.schedule == Schedule::Auto).then(|| json!({
@@ -109,7 +105,7 @@ pub fn of_walk(
         "left_out": left_out,
         "texture_bytes_resident": renderer.executor.texture_bytes(),
         "host_cache": host_cache,
-        "error": args.measure_error.then(|| errors(records)),
+        "error": s.measure_error.then(|| errors(records)),
         "memory": memory(),
         "passes": passes(records),
         "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
@@ -117,15 +113,18 @@ pub fn of_walk(
     })
 }
 
+/// Names of the optimisations that are off, in one order, each once.
+fn without(settings: &Settings) -> Vec<&'static str> {
+    let mut list = settings.without.clone();
+    list.sort_unstable();
+    list.dedup();
+    list.into_iter().map(|which| which.name()).collect()
+}
+
 /// What the host cache did.
 fn host_cache(renderer: &Renderer) -> Value {
     let host = renderer.executor.workers().host_cache().stats();
-    json!({
-        "hits": host.hits,
-        "misses": host.misses,
-        "evicted": host.evicted,
-        "used_bytes": host.used_bytes,
-    })
+    json!({ "hits": host.hits, "misses": host.misses, "evicted": host.evicted, "used_bytes": host.used_bytes })
 }
 
 /// The errors of the effects that `--measure-error` measured: means over the frames, and the greatest.
@@ -145,17 +144,6 @@ fn errors(records: &[Record]) -> Value {
         });
     }
     Value::Object(effects)
-}
-
-/// What reports say of the fields of records.
-pub fn fields() -> Vec<Field> {
-    let written = COLUMNS.iter().filter(|column| column.is_written);
-    let of = |column: &Column| Field {
-        name: column.name,
-        meaning: format!("{} Unit: {}.", column.description(), column.unit),
-        adds_up: !matches!(column.kind, Kind::State | Kind::Max),
-    };
-    written.map(of).collect()
 }
 
 /// Totals, medians and 95th percentiles of every numeric field, per pass.
@@ -227,11 +215,11 @@ fn handover(role: Role, measured: &Handover) -> Option<Value> {
 }
 
 /// What answers rays by maps; `None` where none does.
-fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
+fn roma_settings(settings: &Settings, renderer: &Renderer) -> Option<Value> {
     let answers = renderer.methods.get::<Roma>()?;
     answers.settings.map(|roma| {
         json!({
-            "bom": args.roma.bom.name(),
+            "bom": settings.roma.bom.name(),
             "k": roma.occlusion.grid.k,
             "shadow_k": roma.shadow.grid.k,
             "size": roma.occlusion.grid.size,
@@ -250,11 +238,11 @@ fn roma_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
 }
 
 /// What answers rays by distance fields.
-fn field_settings(args: &WalkArgs, renderer: &Renderer) -> Option<Value> {
+fn field_settings(settings: &Settings, renderer: &Renderer) -> Option<Value> {
     renderer.methods.get::<Df>().map(|df| {
         let field = df.settings();
         json!({
-            "bom": args.roma.bom.name(),
+            "bom": settings.roma.bom.name(),
             "size": field.size,
             "steps": field.occlusion_steps,
             "shadow_steps": field.shadow_steps,

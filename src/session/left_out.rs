@@ -1,15 +1,16 @@
 //! What rendering leaves out because a scene does not need it, and what that saves.
 
-use super::options::args::WalkArgs;
-use super::walk::lit_renderer;
+use super::opened::Opened;
+use super::renderer::lit_renderer;
 use crate::frame::{Light, Renderer};
-use crate::kernels::{Extent, Keep, opacity, reflectance};
+use crate::kernels::{Keep, opacity, reflectance};
 use crate::scene::Camera;
 use crate::secondary::roma::answer::Roma;
-use crate::session::open::Session;
+use crate::settings::Settings;
 use anyhow::Result;
 use bricks::SceneFile;
 use serde_json::{Map, Value, json};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -102,7 +103,7 @@ pub fn listed(all: &[LeftOut], measured: &[Map<String, Value>]) -> Vec<Value> {
     all.iter().enumerate().map(one).collect()
 }
 
-/// What a frame of `camera` takes as it is rendered and with each of `all` kept, turn by turn: medians of the
+/// What a frame of `camera`, of the scene in the file `path`, takes as it is rendered and with each of `all` kept, turn by turn: medians of the
 /// milliseconds of five frames each, after one that is not counted. Nothing is stated of what kernels decide as they
 /// run.
 ///
@@ -111,16 +112,15 @@ pub fn listed(all: &[LeftOut], measured: &[Map<String, Value>]) -> Vec<Value> {
 pub fn measure(
     all: &[LeftOut],
     scene: &Arc<SceneFile>,
-    args: &WalkArgs,
+    path: &Path,
+    settings: &Settings,
     light: &Light,
     camera: &Camera,
 ) -> Result<Vec<Map<String, Value>>> {
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let mut options = args.clone();
-    options.stream.requests_out = None;
+    let settings = Settings { requests_out: None, ..settings.clone() };
     let open = |keep: Keep| -> Result<Renderer> {
-        let session = Session::open_keeping(scene.clone(), &args.scene, &options.stream, extent, keep)?;
-        Ok(lit_renderer(session, &options, light.clone()))
+        let opened = Opened::open_keeping(scene.clone(), path, &settings, keep)?;
+        Ok(lit_renderer(opened, &settings, light.clone()))
     };
     let mut renderers = vec![open(Keep::default())?];
     let can = renderers[0].executor.leaves_out();

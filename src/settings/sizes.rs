@@ -1,5 +1,5 @@
-//! Values of options: sizes in bytes, counts, image sizes, shares of a scene, directions. Exact and checked; each
-//! parser returns one sentence that says what is wrong and what is right, for clap to print.
+//! Sizes in bytes, counts, image sizes, shares of a scene: exact and checked. Each parser returns one sentence that
+//! says what is wrong and what is right.
 
 use std::fmt;
 use std::str::FromStr;
@@ -174,43 +174,6 @@ impl fmt::Display for ImageSize {
     }
 }
 
-/// A direction of unit length from `X,Y,Z`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Direction(pub [f64; 3]);
-
-impl FromStr for Direction {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Vec<f64> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
-        let wrong = || "a direction is three numbers X,Y,Z, not all 0, as in 0.4,0.8,0.45".to_string();
-        let three: [f64; 3] = numbers.try_into().map_err(|_| wrong())?;
-        if text.split(',').count() != 3 {
-            return Err(wrong());
-        }
-        let v = glam::DVec3::from(three);
-        // Scaled first, so that neither large nor small numbers leave the range when squared.
-        (v / v.abs().max_element()).try_normalize().map(|v| Self(v.to_array())).ok_or_else(wrong)
-    }
-}
-
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{},{},{}", self.0[0], self.0[1], self.0[2])
-    }
-}
-
-/// A finite number of at least 0.
-///
-/// # Errors
-/// A sentence for the user.
-pub fn non_negative(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
-        _ => Err("it must be a finite number of at least 0".into()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -266,17 +229,6 @@ mod tests {
             ["", "x", "0x1", "1x0", "16385x1", "1x16385", "1280", "-1x5", "+1x5", "1x2x3", "1.5x2", "99999999999x1"]
         {
             assert!(bad.parse::<ImageSize>().is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn directions_are_unit() {
-        let Direction(d) = "3,0,-4".parse().unwrap();
-        assert!((d[0] - 0.6).abs() < 1e-15 && d[1] == 0.0 && (d[2] + 0.8).abs() < 1e-15);
-        let Direction(d) = "1e300, 1e300, 0".parse().unwrap();
-        assert!((d[0] - 0.5f64.sqrt()).abs() < 1e-15);
-        for bad in ["", "0,0,0", "1,2", "1,2,3,4", "1,2,x", "nan,0,1", "inf,0,0", "1,2,3,"] {
-            assert!(bad.parse::<Direction>().is_err(), "{bad}");
         }
     }
 

@@ -1,0 +1,115 @@
+//! `brickwalk bench` and `brickwalk selftest`: what the laboratory does.
+
+use super::options::args::UNITS;
+use super::options::group_args::{GroupArgs, Of, View};
+use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
+use crate::lab::bench::dvf::args::DvfBenchArgs;
+use crate::lab::bench::roma::args::RomaBenchArgs;
+use crate::lab::bench::{self, Experiment};
+use crate::lab::selftest;
+use crate::lab::selftest::args::SelftestArgs;
+use crate::settings::{Entry, Group, Lines};
+use anyhow::Result;
+use clap::{Args, Subcommand};
+use std::marker::PhantomData;
+use std::path::PathBuf;
+
+/// Options of `bench`.
+#[derive(Clone, Debug, Args)]
+pub struct BenchArgs {
+    /// What to measure.
+    #[command(subcommand)]
+    experiments: Experiments,
+}
+
+/// What can be measured.
+#[derive(Clone, Debug, Subcommand)]
+enum Experiments {
+    /// The experiments of the CHC+RT paper: its tables 2 to 5 and figures 5, 7 and 8, each ratio beside the paper's
+    Chc(Measured<ChcArgs>),
+    /// The same frames on every device that is present: rates, and how far pictures differ from those of the first
+    /// device
+    Executors(Measured<ExecutorsArgs>),
+    /// The experiments of the ROMA paper: times of ray-aligned occupancy maps, and how far pictures by them are from
+    /// exact ones
+    Roma(Measured<RomaBenchArgs>),
+    /// The experiments of the paper of discrete visibility fields: rays to the environment that are left to be traced,
+    /// and errors
+    Dvf(MeasuredScenes),
+}
+
+/// The settings of an experiment, less those that are no options.
+#[derive(Clone, Copy, Debug)]
+struct OfBench<G>(PhantomData<G>);
+
+impl<G: Group> View for OfBench<G> {
+    type Group = G;
+
+    fn has(entry: &Entry) -> bool {
+        entry.field.key != "output" && entry.field.usage != "--scenes S.bricks"
+    }
+}
+
+/// Options of an experiment.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+struct Measured<G: Group> {
+    /// Folder for the results. Started again with the same folder and settings, a bench of hours goes on where it
+    /// stopped
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Everything else.
+    #[command(flatten)]
+    options: GroupArgs<OfBench<G>>,
+}
+
+/// Options of an experiment on given scenes.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+struct MeasuredScenes {
+    /// Converted scenes; a Cornell box in which a box orbits (`scene cornell`) is measured beside them. Where
+    /// S.motion.json lies beside a scene its flicker is measured
+    #[arg(value_name = "S.bricks")]
+    scenes: Vec<PathBuf>,
+    /// Everything else.
+    #[command(flatten)]
+    measured: Measured<DvfBenchArgs>,
+}
+
+/// Runs `bench`.
+///
+/// # Errors
+/// Those of the experiment.
+pub fn run(args: &BenchArgs) -> Result<()> {
+    bench::run(&match &args.experiments {
+        Experiments::Chc(own) => Experiment::Chc(ChcArgs { output: own.output.clone(), ..own.options.over(None)? }),
+        Experiments::Executors(own) => {
+            Experiment::Executors(ExecutorsArgs { output: own.output.clone(), ..own.options.over(None)? })
+        }
+        Experiments::Roma(own) => {
+            Experiment::Roma(RomaBenchArgs { output: own.output.clone(), ..own.options.over(None)? })
+        }
+        Experiments::Dvf(MeasuredScenes { scenes, measured: own }) => Experiment::Dvf(DvfBenchArgs {
+            scenes: Lines(scenes.clone()),
+            output: own.output.clone(),
+            ..own.options.over(None)?
+        }),
+    })
+}
+
+/// Options of `selftest`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct TestArgs {
+    /// All of them.
+    #[command(flatten)]
+    pub options: GroupArgs<Of<SelftestArgs>>,
+}
+
+/// Runs `selftest`.
+///
+/// # Errors
+/// Those of the test.
+pub fn test(args: &TestArgs) -> Result<()> {
+    selftest::run(&args.options.over(None)?)
+}

@@ -1,0 +1,104 @@
+//! What becomes of a session's frames: a PNG and an EXR each, a frame of a video.
+
+use super::open::{Frame, developed};
+use crate::output::png;
+use crate::output::video::{Video, ffmpeg_of_frames, ffmpeg_of_video};
+use crate::picture::exposure::{Exposure, Meter};
+use crate::picture::tone_map::ToneMap;
+use crate::settings::Settings;
+use anyhow::Result;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Writes the pictures of a walk, frame by frame.
+pub struct Pictures {
+    folder: PathBuf,
+    /// The frame in work, as it is so far.
+    preview: PathBuf,
+    size: (u32, u32),
+    aov: bool,
+    exposure: Exposure,
+    tone_map: ToneMap,
+    /// The stops of the frame before.
+    stops: Option<f64>,
+    video: Option<(PathBuf, u32, Video)>,
+    /// The commands that make an mp4 of the video and of the PNGs.
+    commands: Vec<String>,
+}
+
+impl Pictures {
+    /// Starts the pictures of a walk in `output`, where the folder `frames` exists.
+    ///
+    /// # Errors
+    /// The video cannot be written.
+    pub fn create(output: &Path, settings: &Settings) -> Result<Self> {
+        let (size, fps) = ((settings.size.width, settings.size.height), settings.video_fps);
+        let folder = output.join("frames");
+        let mut commands = Vec::new();
+        let mut video = None;
+        if let Some(file) = &settings.video {
+            let of_frames = ffmpeg_of_frames(&folder, size, fps, &output.join("frames.mp4"));
+            commands = vec![ffmpeg_of_video(file, size, &file.with_extension("mp4")), of_frames];
+            video = Some((file.clone(), fps, Video::create(file, size.0, size.1, fps)?));
+        }
+        Ok(Self {
+            folder,
+            preview: output.join("preview.png"),
+            size,
+            aov: settings.aov,
+            exposure: settings.exposure,
+            tone_map: settings.tone_map,
+            stops: None,
+            video,
+            commands,
+        })
+    }
+
+    /// Shows what the samples of a frame come to so far, in the place of what was shown before; exposed as the frame
+    /// before.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn preview(&self, radiance: &[[f32; 3]]) -> Result<()> {
+        let stops = match (self.stops, self.exposure) {
+            (Some(stops), _) | (None, Exposure::Fixed(stops)) => stops,
+            (None, Exposure::Auto) => Meter::new(Exposure::Auto).stops(radiance, 0.0),
+        };
+        png::write(&self.preview, self.size.0, self.size.1, &developed(radiance, stops, self.tone_map))
+    }
+
+    /// Writes a frame.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn frame(&mut self, frame: &Frame) -> Result<()> {
+        let name = self.folder.join(format!("{:04}.png", frame.number));
+        self.stops = Some(frame.exposure_ev);
+        let picture = frame.picture();
+        png::write(&name, self.size.0, self.size.1, &picture)?;
+        if self.aov {
+            frame.write_exr(&name.with_extension("exr"))?;
+        }
+        if let Some((_, _, video)) = &mut self.video {
+            video.push(&picture)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the video with the frames that there are; what summaries say of it, and the commands that encode it.
+    ///
+    /// # Errors
+    /// The video cannot be written.
+    pub fn finish(self) -> Result<(Value, Vec<String>)> {
+        // There is one only where it was asked for.
+        let _ = std::fs::remove_file(&self.preview);
+        let Some((file, fps, video)) = self.video else { return Ok((Value::Null, Vec::new())) };
+        video.finish()?;
+        let note = json!({
+            "file": file.to_string_lossy(),
+            "frames_per_second": fps,
+            "ffmpeg": self.commands,
+        });
+        Ok((note, self.commands))
+    }
+}

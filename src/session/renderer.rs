@@ -1,0 +1,96 @@
+//! The renderer that settings ask for.
+
+use super::lighting::lighting;
+use super::opened::Opened;
+use crate::frame::{Effects, Engine, Light, Methods, Moved, Occlusion, RenderSettings, Renderer};
+use crate::schedule::Tracing;
+use crate::schedule::auto::Auto;
+use crate::schedule::fronts::Fronts;
+use crate::secondary::df::answer::Df;
+use crate::secondary::roma::answer::Roma;
+use crate::settings::{Schedule, Secondary, Settings};
+use anyhow::Result;
+use std::path::Path;
+
+/// The renderer of the scene that `opened` has, the file `path`.
+///
+/// # Errors
+/// Those of [`lighting`].
+pub fn renderer(opened: Opened, path: &Path, settings: &Settings) -> Result<Renderer> {
+    let light = lighting(settings, &opened.scene, path)?.light;
+    Ok(lit_renderer(opened, settings, light))
+}
+
+/// The same with this light.
+pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Renderer {
+    let Opened { scene, mut executor, cache, schedule, extent, .. } = opened;
+    let render = render_settings(settings, schedule);
+    if render.effects.has_bounces() {
+        executor.allow_bounces();
+    }
+    let engine = Engine {
+        scene,
+        executor,
+        cache,
+        settings: render,
+        light,
+        size: (extent.width, extent.height),
+        tile: extent.tile,
+        fronts: settings.fronts.then(Fronts::default),
+        auto: Auto::default(),
+        captures: None,
+        moved: Moved::default(),
+    };
+    Renderer { engine, methods: methods(settings) }
+}
+
+/// The methods that answer secondary rays; a field of visibility is made or read later.
+pub fn methods(settings: &Settings) -> Methods {
+    let mut methods = Methods::default();
+    let (roma, df) = (&settings.roma, &settings.df);
+    match settings.secondary {
+        Secondary::Roma | Secondary::Auto => {
+            let is_auto = settings.secondary == Secondary::Auto;
+            methods.set(Roma::new(roma.settings(settings.rsm.settings(), is_auto), roma.bom));
+        }
+        Secondary::Df => methods.set(Df::new(df.settings(), roma.bom)),
+        Secondary::Exact | Secondary::Dvf => {}
+    }
+    methods
+}
+
+/// Side of the finest base map of a method that has some, world units.
+pub fn finest_cell(methods: &Methods) -> Option<f64> {
+    let roma = methods.get::<Roma>().and_then(|roma| roma.base.finest_cell());
+    roma.or_else(|| methods.get::<Df>().and_then(|df| df.base.finest_cell()))
+}
+
+/// How frames are rendered, with this schedule in force.
+pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSettings {
+    RenderSettings {
+        schedule,
+        effects: effects(settings),
+        samples: settings.spp,
+        // Both halves of the seed count.
+        seed: (settings.seed ^ (settings.seed >> 32)) as u32,
+        tracing: Tracing { measure_needed: settings.measure_needed, optimisations: settings.optimisations() },
+        aov: settings.aov,
+        guides: settings.denoise || settings.taa,
+        taa: settings.taa,
+        tile_bytes: settings.interactive,
+    }
+}
+
+/// The effects of every frame.
+pub fn effects(settings: &Settings) -> Effects {
+    let all = settings.effects;
+    let occlusion = Occlusion { rays: settings.ao_rays, length: settings.ao_length };
+    Effects {
+        shadow: all.shadow,
+        environment: all.environment,
+        occlusion: (all.ao && !all.environment).then_some(occlusion),
+        diffuse: all.diffuse.then_some(settings.diffuse_rays),
+        glossy: all.glossy,
+        turn_degrees: settings.rotation.0,
+    }
+}

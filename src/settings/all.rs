@@ -1,0 +1,256 @@
+//! The settings of what renders.
+
+use super::declare::{Entry, Group, SettingsError, settings};
+use super::sizes::{CacheSize, ImageSize};
+use super::types::{Adapter, Direction, EffectList, Environment, Rectangle, Schedule, Secondary, Turn};
+use super::value::Rule;
+use crate::picture::exposure::Exposure;
+use crate::picture::tone_map::ToneMap;
+use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
+use crate::schedule::{Optimisation, Optimisations, PartOf};
+use crate::secondary::{df, dvf, roma, rsm};
+use crate::stream::Policy;
+use std::path::PathBuf;
+
+/// Without an upper bound.
+const ANY: f64 = f64::INFINITY;
+/// Rays of a pixel and sample.
+const RAYS: Rule = Rule::Whole(1, 1024);
+
+settings! {
+    /// Everything that can be chosen about what renders.
+    ///
+    /// ```
+    /// use brickwalk::settings::{CacheSize, Schedule, Settings};
+    /// let settings = Settings { schedule: Schedule::Chc, cache: CacheSize::Bytes(64 << 20), ..Settings::default() };
+    /// assert_eq!(settings.spp, 1);
+    /// ```
+    pub struct Settings {
+        /// Camera path (JSON). [default: one made from the scene's bounds]
+        path: Option<PathBuf> = None, "--path P.json", Rule::Any, "", Camera, Common;
+        /// Frames along the path.
+        frames: u32 = 30, "--frames N", Rule::Whole(1, 1_000_000), "", Camera, Common;
+        /// Width and height of a frame, each 1 to 16384.
+        size: ImageSize = ImageSize { width: 1280, height: 720 }, "--size WxH", Rule::Any, "pixels", Camera, Common;
+        /// Vertical field of view. [default: the path's]
+        fov: Option<f64> = None, "--fov DEG", Rule::Real(MIN_FOV_Y_DEGREES, MAX_FOV_Y_DEGREES), "degrees", Camera, Usual;
+        /// Motion of instances (JSON); docs/using.md has the form. What moves is an instance: see `info --instances` and
+        /// `convert --movable`. [default: nothing moves]
+        motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
+
+        /// What is traced: primary, shadow, ao, diffuse, glossy, environment; with commas between them. All include
+        /// primary. `shadow`: of the sun, the lights, and surfaces that emit. `ao`: ambient occlusion of the sky's
+        /// light. `diffuse`: one bounce between surfaces, with the sky's light. `glossy`: what metals and polished
+        /// surfaces mirror. `environment`: the environment's light with shadows; it takes the place of `ao`.
+        effects: EffectList = EffectList::SHADOW, "--effects LIST", Rule::Any, "", Effects, Common;
+        /// Rays of `ao` per pixel and sample.
+        ao_rays: u32 = 20, "--ao-rays N", RAYS, "", Effects, Usual;
+        /// Length of the rays of `ao`, in world units (metres in glTF).
+        ao_length: f64 = 0.5, "--ao-length LENGTH", Rule::Real(1e-6, 1e9), "", Effects, Usual;
+        /// Rays of `diffuse` per pixel and sample; they are as long as the scene.
+        diffuse_rays: u32 = 20, "--diffuse-rays N", RAYS, "", Effects, Usual;
+        /// Greatest random turn of the directions of `ao` and `diffuse` about the normal, or full. A small one keeps
+        /// rays of neighbouring pixels alike. --denoise and --taa give every pixel directions of its own instead.
+        rotation: Turn = Turn(36.0), "--rotation DEG|full", Rule::Real(0.0, 360.0), "degrees", Effects, Expert;
+
+        /// Direction towards the sun, world space, any length.
+        sun: Direction = Direction([0.4, 0.8, 0.45]), "--sun X,Y,Z", Rule::Any, "", Light, Usual;
+        /// Angular diameter of the sun; 0 makes hard shadows.
+        sun_angle: f64 = 0.53, "--sun-angle DEG", Rule::Real(0.0, 90.0), "degrees", Light, Usual;
+        /// Irradiance of the sun on a surface that faces it. [default: 2.4; with an image as environment 0]
+        sun_intensity: Option<f64> = None, "--sun-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
+        /// Radiance of the sky. It is the same in all directions, and without `ao` and `diffuse` it has no shadows.
+        sky_intensity: f64 = 0.35, "--sky-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
+        /// What surrounds the scene: an image (.hdr, .exr), or the word sky. An image is linear, +Y up, its middle
+        /// along -Z and its right along +X. `sky` is a physical sky with the sun of --sun. With `--effects environment`
+        /// it lights with shadows, else by its spherical harmonics, or by `diffuse`. [default: none]
+        environment: Option<Environment> = None, "--environment FILE|sky", Rule::Any, "", Light, Common;
+        /// Turn of the environment's image about +Y, counter-clockwise seen from above.
+        environment_rotation: f64 = 0.0, "--environment-rotation DEG", Rule::Real(-360.0, 360.0), "degrees", Light, Usual;
+        /// Factor of the environment's radiance.
+        environment_intensity: f64 = 1.0, "--environment-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
+        /// Factor of the lights in the scene file. 1 candela is taken as 1 W/sr, 1 lux as 1 W/m2.
+        lights_intensity: f64 = 1.0, "--lights-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
+        /// A rectangular light: a corner, and the two edges U and V that start there, world space. It shines to the
+        /// side of U x V and is not seen itself. [default: none]
+        rect_light: Option<Rectangle> = None, "--rect-light X,Y,Z,UX,UY,UZ,VX,VY,VZ", Rule::Any, "", Light, Expert;
+        /// Radiance of the rectangular light.
+        rect_light_intensity: f64 = 10.0, "--rect-light-intensity X", Rule::Real(0.0, ANY), "", Light, Expert;
+
+        /// Samples per pixel. Beyond 64 they are summed in f64.
+        spp: u32 = 1, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
+        /// Seed of random sampling.
+        seed: u64 = 0, "--seed N", Rule::Any, "", Quality, Usual;
+        /// Exposure of PNGs and video in stops (EV), or auto. Radiance is multiplied by 2^EV before the tone map. `auto`
+        /// brings the log-average luminance of a frame to middle grey and adapts along the path. EXR keeps the radiance.
+        exposure: Exposure = Exposure::Fixed(0.0), "--exposure EV|auto", Rule::Real(-32.0, 32.0), "stops", Quality, Usual;
+        /// How PNGs and video show what is brighter than a display: none, agx, aces, reinhard. `none` cuts off at 1;
+        /// `agx` is AgX, base look; `aces` is Hill's fit of the ACES transforms; `reinhard` works on luminance, 4 is
+        /// white. EXR keeps the radiance.
+        tone_map: ToneMap = ToneMap::None, "--tone-map NAME", Rule::Any, "", Quality, Usual;
+        /// Take the noise of few samples out of the frames. Variance-guided filtering over frames and neighbours (SVGF)
+        /// trades noise for a small error; without it a picture is the unbiased estimate. EXR has the filtered
+        /// radiance. `summary.json` says what energy was cut off fireflies.
+        denoise: bool = false, "--denoise", Rule::Any, "", Quality, Usual;
+        /// Temporal anti-aliasing. Samples lie at other points of their pixels in every frame, and frames are averaged
+        /// where the world was seen before. Not together with --aov.
+        taa: bool = false, "--taa", Rule::Any, "", Quality, Usual;
+
+        /// Write an EXR beside each PNG: radiance, depth, normal, triangle id, albedo.
+        aov: bool = false, "--aov", Rule::Any, "", Output, Usual;
+        /// Write all frames as a video, too: YUV4MPEG2, uncompressed, 4:4:4, 8 bit, BT.709 in limited range. The
+        /// ffmpeg commands that make an mp4 are printed. [default: none]
+        video: Option<PathBuf> = None, "--video FILE.y4m", Rule::Any, "", Output, Usual;
+        /// Frames of the video per second.
+        video_fps: u32 = 30, "--video-fps N", Rule::Whole(1, 1000), "", Output, Expert;
+        /// Show frames of more than 64 samples while they are made. `DIR/preview.png` is replaced after 64, 128, 256
+        /// samples and so on, and removed at the end.
+        progressive: bool = false, "--progressive", Rule::Any, "", Output, Usual;
+
+        /// Device memory for bricks and tiles of textures: a size, or a share P% of all of them. It must hold the two
+        /// largest bricks.
+        cache: CacheSize = CacheSize::Percent(25.0), "--cache SIZE|P%", Rule::Any, "", Cache, Common;
+        /// Host memory for verified bricks; 0 keeps none.
+        host_cache: u64 = 1 << 30, "--host-cache SIZE", Rule::Bytes(0), "bytes", Cache, Usual;
+        /// Bytes of texture tiles that a frame loads at most. Tiles that most hits ask for come first; a coarser level
+        /// that is resident stands for the others, and `unresolved_pixels` counts such hits. While the camera rests,
+        /// frames become exact. Bricks are waited for. [default: off, tiles are waited for as well]
+        interactive: Option<u64> = None, "--interactive SIZE", Rule::Bytes(1), "bytes", Cache, Usual;
+        /// Which brick makes room for another: round-robin, second-chance, lru. `round-robin`: the next one in the
+        /// cache; `second-chance`: the next one not used since its last turn; `lru`: the one not used for longest.
+        evict: Policy = Policy::RoundRobin, "--evict NAME", Rule::Any, "", Cache, Expert;
+        /// Threads that read bricks and check them. [default: one per core, at most 4]
+        workers: Option<u32> = None, "--workers|--hash-threads N", Rule::Whole(1, 1024), "", Cache, Usual;
+        /// Write the trace of brick requests to a file, for `replay`. [default: none]
+        requests_out: Option<PathBuf> = None, "--requests-out F", Rule::Any, "", Cache, Usual;
+
+        /// How bricks to intersect are found: chc, demand, plain, auto; pictures are the same. `chc`: tiles against the
+        /// top level, loading what rays need. `demand`: one traversal per ray over what is resident, loading what rays
+        /// ask for. `plain`: everything resident, one traversal per ray. `auto`: the cheapest of these by measurement,
+        /// for each effect. `plain-bvh2`, for measurements: `plain` over binary trees made at the start.
+        schedule: Schedule = Schedule::Auto, "--schedule NAME", Rule::Any, "", Schedule, Usual;
+        /// Width and height of a screen tile.
+        tile: u32 = 64, "--tile PIXELS", Rule::PowerOfTwo(8, 512), "pixels", Schedule, Expert;
+        /// Keep query pairs of tiles and nodes from frame to frame (schedule chc).
+        fronts: bool = false, "--fronts on|off", Rule::Any, "", Schedule, Expert;
+        /// Leave a brick out of a tile where at most this many of its rays could see it; 0 is exact. The number is
+        /// scaled to a tile of 200x200 pixels. More loads less and misses hits.
+        query_threshold: u32 = 0, "--query-threshold PIXELS", Rule::Whole(0, 40_000), "pixels", Schedule, Expert;
+        /// Optimisations to switch off, with commas between them, to measure what each is worth. Pictures are the same.
+        /// Of loading: nearest-first, requery, resident-first. Of lists (chc): front-to-back, by-tile, root-walk. Of
+        /// --fronts on: multi-queries, tighter-bounds, lazy-requery, pull-up. docs/methods/chc.md says what each does.
+        without: Vec<Optimisation> = Vec::new(), "--without LIST", Rule::Any, "", Schedule, Expert;
+
+        /// How secondary rays are answered: exact, roma, auto, df, dvf. `exact`: all are traced. `roma`: those of `ao`,
+        /// `shadow` and `diffuse` by occupancy maps, with a bias of a few cells and without a brick loaded. `auto`: those
+        /// of `ao` and `shadow` that the maps find free are not traced. `df`: those of `ao` and `shadow` by distance
+        /// fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first walk.
+        secondary: Secondary = Secondary::Exact, "--secondary METHOD", Rule::Any, "", Methods, Common;
+
+        /// Record which bricks every pass needed (`bricks_needed`). It takes a traversal more a pass.
+        measure_needed: bool = false, "--measure-needed", Rule::Any, "", Measurement, Expert;
+        /// Record how far each effect is from the exact picture (`error_mean`, `error_worst_tile`, `error_pixels`). A
+        /// second session renders that picture: it takes twice the time and device memory.
+        measure_error: bool = false, "--measure-error", Rule::Any, "", Measurement, Usual;
+        /// State in `summary.json` what leaving out what a scene does not need saves. The first frame is rendered six
+        /// times more for each thing that is left out, in sessions of their own.
+        measure_left_out: bool = false, "--measure-left-out", Rule::Any, "", Measurement, Expert;
+        /// Record the nodes that rays visit and the triangles that they test. It takes time.
+        count: bool = false, "--count", Rule::Any, "", Measurement, Expert;
+
+        /// What renders: auto, cpu, or the graphics adapter whose name contains NAME. `auto` is a hardware GPU if there
+        /// is one, else the processor; `brickwalk adapters` lists what there is.
+        adapter: Adapter = Adapter::Auto, "--adapter NAME", Rule::Any, "", Device, Common;
+    }
+    tables {
+        /// Ray-aligned occupancy maps.
+        roma: roma::Options,
+        /// Reflective shadow maps.
+        rsm: rsm::Options,
+        /// Distance fields.
+        df: df::Options,
+        /// Fields of visibility.
+        dvf: dvf::Options,
+    }
+}
+
+impl Settings {
+    /// Refuses settings that do not go together.
+    ///
+    /// # Errors
+    /// Which one to leave out.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        if self.taa && self.aov {
+            let text = "--aov: depth, normals, ids and albedo are taken through the centres of pixels, which --taa moves; leave one out";
+            return Err(SettingsError::Conflict(text.into()));
+        }
+        let is_chc = matches!(self.schedule, Schedule::Chc | Schedule::Auto);
+        let is_plain = matches!(self.schedule, Schedule::Plain | Schedule::PlainBinary);
+        for which in &self.without {
+            let (has_meaning, belongs) = match which.part_of() {
+                PartOf::Loading => (!is_plain, "--schedule chc, demand or auto"),
+                PartOf::Lists => (is_chc, "--schedule chc or auto"),
+                PartOf::Fronts => (is_chc && self.fronts, "--fronts on (schedule chc)"),
+            };
+            if !has_meaning {
+                let text = format!("--without {}: it belongs to {belongs}", which.name());
+                return Err(SettingsError::Conflict(text));
+            }
+        }
+        Ok(())
+    }
+
+    /// Which optimisations are on.
+    pub fn optimisations(&self) -> Optimisations {
+        let mut on = Optimisations::default();
+        self.without.iter().for_each(|&which| on.set(which, false));
+        on
+    }
+
+    /// Threads that read bricks, at least 1.
+    pub fn worker_count(&self) -> usize {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        self.workers.map_or(cores.min(4), |n| n as usize)
+    }
+
+    /// The sun's irradiance: what was chosen, or what suits the environment.
+    pub fn sun_intensity(&self) -> f64 {
+        let has_image = matches!(self.environment, Some(Environment::File(_)));
+        self.sun_intensity.unwrap_or(if has_image { 0.0 } else { 2.4 })
+    }
+
+    /// Settings from options of the command line, words separated by spaces: what [`Group::options`] writes.
+    ///
+    /// # Errors
+    /// There is no such option, or its value is none of the setting.
+    pub fn from_options(text: &str) -> Result<Self, SettingsError> {
+        let mut settings = Self::default();
+        settings.set_options(text)?;
+        Ok(settings)
+    }
+
+    /// Settings from the text of a settings file.
+    ///
+    /// # Errors
+    /// It is no TOML; an unknown key; a value that is none of the setting.
+    pub fn from_toml(text: &str) -> Result<Self, SettingsError> {
+        let mut settings = Self::default();
+        super::file::read_toml(&mut settings, text)?;
+        Ok(settings)
+    }
+
+    /// The settings as a settings file, which [`Self::from_toml`] reads.
+    pub fn to_toml(&self) -> String {
+        super::file::to_toml(self)
+    }
+
+    /// What does not count for `trace`, though it is not as it is by default.
+    pub fn for_frames_alone(&self) -> Option<Entry> {
+        let is_default = |entry: &Entry| self.get(&entry.key()) == Some((entry.field.default)());
+        Self::entries().into_iter().find(|entry| !TRACE.contains(&entry.key().as_str()) && !is_default(entry))
+    }
+}
+
+/// The settings that count where rays are given.
+pub const TRACE: [&str; 9] =
+    ["cache", "host_cache", "schedule", "tile", "workers", "evict", "requests_out", "count", "adapter"];

@@ -1,0 +1,57 @@
+//! Closed sets of names.
+
+/// Declares an enum of named values: their names, reading, printing, and [`Value`](crate::settings::Value). Names after
+/// `later` are refused as not being in this version.
+macro_rules! names {
+    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* } $(later $later:expr)?) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum $name { $($(#[$vdoc])* $variant,)* }
+
+        impl $name {
+            /// All of them, in their order.
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+            /// Their names, in the same order.
+            pub const NAMES: &[&str] = &[$($text,)*];
+
+            /// The value's name.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $text,)* }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = String;
+
+            fn from_str(text: &str) -> Result<Self, String> {
+                let later: &[&[&str]] = &[$($later)?];
+                let found = Self::ALL.iter().copied().find(|value| value.name() == text);
+                found.ok_or_else(|| $crate::settings::names::unknown(text, Self::NAMES, &later.concat()))
+            }
+        }
+
+        $crate::settings::value::value_of_name!($name);
+    };
+}
+
+/// Why a value is refused that is none of `known`; those of `later` are announced, of removed ones it says what stands
+/// in their place.
+pub fn unknown(text: &str, known: &[&str], later: &[&str]) -> String {
+    if let Some(message) = super::removed::removed(text) {
+        return message;
+    }
+    let known = known.join(", ");
+    if later.contains(&text) {
+        format!("{text} is not in this version; it has: {known}")
+    } else {
+        format!("there is no '{text}'; known: {known}")
+    }
+}
+
+pub(crate) use names;

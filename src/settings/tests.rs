@@ -1,0 +1,168 @@
+use super::*;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+#[test]
+fn defaults_are_the_documented_ones() {
+    let s = Settings::default();
+    assert_eq!((s.frames, s.size), (30, ImageSize { width: 1280, height: 720 }));
+    assert_eq!(s.effects.to_string(), "primary,shadow");
+    assert_eq!((s.spp, s.seed, s.tile), (1, 0, 64));
+    assert_eq!((s.cache, s.host_cache), (CacheSize::Percent(25.0), 1 << 30));
+    assert_eq!((s.secondary, s.schedule, s.fronts), (Secondary::Exact, Schedule::Auto, false));
+    assert_eq!((s.query_threshold, s.evict), (0, crate::stream::Policy::RoundRobin));
+    assert_eq!((s.sun, s.sun_angle, s.sun_intensity()), (Direction([0.4, 0.8, 0.45]), 0.53, 2.4));
+    assert!(s.path.is_none() && !s.aov && s.fov.is_none() && s.worker_count() >= 1);
+}
+
+#[test]
+fn keys_and_flags_are_unique_and_described() {
+    let entries = Settings::entries();
+    let keys: BTreeSet<String> = entries.iter().map(Entry::key).collect();
+    let flags: BTreeSet<&str> = entries.iter().map(|entry| entry.field.flag()).collect();
+    assert_eq!((keys.len(), flags.len()), (entries.len(), entries.len()));
+    for entry in &entries {
+        let (key, field) = (entry.key(), entry.field);
+        assert!(field.usage.starts_with("--") && field.help().ends_with(['.', ']']), "{key}");
+        assert!(!field.summary().is_empty() && field.summary().len() < 110, "{key}: {}", field.summary());
+        // A switch is off by default, and says nothing of it.
+        let is_switch = field.value_name().is_none();
+        assert!(!is_switch || (field.default)() == Plain::Bool(false), "{key}");
+        let states_default = field.help().contains("[default:") || !field.default_text().is_empty();
+        assert!(is_switch || states_default, "{key} states no default");
+        // Defaults are values.
+        let mut settings = Settings::default();
+        settings.set(&key, &(field.default)().to_string()).unwrap();
+        assert_eq!(settings, Settings::default(), "{key}");
+    }
+    let common = entries.iter().filter(|entry| entry.field.level == Level::Common).count();
+    let shown = entries.iter().filter(|entry| entry.field.level <= Level::Usual).count();
+    assert!(common <= 10 && shown <= 40, "{common} and {shown} are too many for help");
+    assert!(TRACE.iter().all(|key| keys.contains(*key)));
+}
+
+/// Settings none of which is as it is by default.
+fn others() -> Settings {
+    let mut settings = Settings::default();
+    for entry in Settings::entries() {
+        let field = entry.field;
+        let candidates = [
+            "1000",
+            "4",
+            "on",
+            "off",
+            "7",
+            "3",
+            "8",
+            "64",
+            "0.25",
+            "2",
+            "1,2,3",
+            "0,0,0,1,0,0,0,0,1",
+            "64x48",
+            "a \"b\\c",
+        ];
+        let text = candidates.into_iter().chain(field.names.iter().copied()).rev();
+        let other = text.into_iter().find(|text| {
+            let mut one = Settings::default();
+            one.set(&entry.key(), text).is_ok() && one != Settings::default()
+        });
+        settings.set(&entry.key(), other.unwrap_or_else(|| panic!("{} has one value", entry.key()))).unwrap();
+    }
+    settings
+}
+
+#[test]
+fn what_is_printed_is_read_again() {
+    for settings in [Settings::default(), others()] {
+        let toml = settings.to_toml();
+        assert_eq!(Settings::from_toml(&toml), Ok(settings.clone()), "{toml}");
+        let json = serde_json::to_string(&settings).unwrap();
+        assert_eq!(serde_json::from_str::<Settings>(&json).unwrap(), settings, "{json}");
+    }
+    let toml = others().to_toml();
+    for entry in Settings::entries() {
+        assert!(toml.contains(&format!("\n{} = ", entry.field.key)), "{}", entry.key());
+    }
+    assert_eq!(Settings::default().options(), "");
+    let some = Settings { schedule: Schedule::Chc, denoise: true, ..Settings::default() };
+    assert_eq!(some.options(), "--denoise --schedule chc");
+    assert_eq!(Settings::from_options(&some.options()), Ok(some));
+    for (text, part) in [("--scedule chc", "--schedule"), ("--schedule", "needs a value"), ("chc", "no such")] {
+        assert!(Settings::from_options(text).unwrap_err().to_string().contains(part), "{text}");
+    }
+}
+
+#[test]
+fn files_are_natural_to_write() {
+    let settings = Settings::from_toml(
+        "effects = [\"primary\", \"ao\"]\nsun = [-1, 2, 3.5]\nsize = \"64x48\"\ncache = \"12M\"\nrotation = \"full\"\n\
+         exposure = -1.5\nfronts = true\nwithout = []\nhost_cache = \"2G\"\n[dvf]\ncells = 40\n[roma]\nerror = \"off\"\n",
+    );
+    let expected = Settings {
+        effects: EffectList::of(&[Effect::Ao]),
+        sun: Direction([-1.0, 2.0, 3.5]),
+        size: ImageSize { width: 64, height: 48 },
+        cache: CacheSize::Bytes(12 << 20),
+        rotation: Turn::FULL,
+        exposure: crate::picture::Exposure::Fixed(-1.5),
+        fronts: true,
+        host_cache: 2 << 30,
+        dvf: crate::secondary::dvf::Options { cells: crate::secondary::dvf::Cells::Longest(40), ..Default::default() },
+        roma: crate::secondary::roma::Options { error: None, ..Default::default() },
+        ..Settings::default()
+    };
+    assert_eq!(settings, Ok(expected));
+}
+
+#[test]
+fn what_is_wrong_is_named_with_what_is_right() {
+    for (text, parts) in [
+        ("frame = 3", vec!["frame: there is no such setting", "frames"]),
+        ("frames = 0", vec!["frames: it must be from 1 to 1000000"]),
+        ("frames = \"many\"", vec!["frames: "]),
+        ("schedule = \"fast\"", vec!["schedule: there is no 'fast'", "chc, demand"]),
+        ("[dvf]\npoints = 1", vec!["dvf.points: it must be from 100"]),
+        ("[dvf]\npoint = 1", vec!["dvf.point: there is no such setting", "dvf.points"]),
+        ("[what]\never = 1", vec!["what.ever: there is no such setting"]),
+        ("denoise = 2", vec!["denoise: there is no '2'; known: on, off"]),
+        ("frames = 3\nspp =", vec!["line 2"]),
+    ] {
+        let error = Settings::from_toml(text).unwrap_err().to_string();
+        assert!(parts.iter().all(|part| error.contains(part)) && !error.contains('\n'), "{text}: {error}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file: PathBuf = folder.path().join("f.toml");
+    let read = |settings: &mut Settings| format!("{:#}", file::read_file(settings, &file).unwrap_err());
+    assert!(read(&mut Settings::default()).contains("f.toml"));
+    std::fs::write(&file, "frames = 0").unwrap();
+    let error = read(&mut Settings::default());
+    assert!(error.contains("f.toml") && error.contains("frames"), "{error}");
+}
+
+#[test]
+fn settings_that_do_not_go_together_are_refused() {
+    let why = |settings: Settings| settings.check().map_err(|error| error.to_string());
+    assert_eq!(why(Settings::default()), Ok(()));
+    let both = Settings { taa: true, aov: true, ..Settings::default() };
+    assert!(why(both).unwrap_err().contains("--taa"));
+    let of = |schedule, without: &str| {
+        let mut settings = Settings { schedule, ..Settings::default() };
+        settings.set("without", without).unwrap();
+        why(settings)
+    };
+    for (schedule, without, part) in [
+        (Schedule::Plain, "requery", "chc, demand or auto"),
+        (Schedule::Demand, "by-tile", "chc or auto"),
+        (Schedule::Chc, "pull-up", "--fronts on"),
+    ] {
+        assert!(of(schedule, without).unwrap_err().contains(part), "{without}");
+    }
+    for (schedule, without) in
+        [(Schedule::Demand, "requery"), (Schedule::Chc, "by-tile"), (Schedule::Auto, "front-to-back")]
+    {
+        assert_eq!(of(schedule, without), Ok(()));
+    }
+    let on = Settings { without: vec![crate::schedule::Optimisation::Requery], ..Settings::default() }.optimisations();
+    assert!(!on.requery && on.nearest_first);
+}

@@ -1,0 +1,406 @@
+//! Types of settings that are no plain numbers.
+
+use super::names::{names, unknown};
+use super::sizes::{CacheSize, ImageSize};
+use super::value::{Plain, Rule, Value, value_of_text};
+use crate::picture::exposure::{Exposure, MOST_STOPS};
+use crate::picture::tone_map::ToneMap;
+use crate::schedule::Optimisation;
+use crate::stream::Policy;
+use glam::DVec3;
+use std::convert::Infallible;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+names! {
+    /// How the bricks to intersect are found.
+    Schedule {
+        /// Tiles against the top level; loads what rays need.
+        Chc = "chc",
+        /// One traversal per ray over what is resident; loads what rays ask for.
+        Demand = "demand",
+        /// Everything resident, one traversal per ray.
+        Plain = "plain",
+        /// The same over binary trees.
+        PlainBinary = "plain-bvh2",
+        /// The cheapest of the first three, pass by pass.
+        Auto = "auto",
+    }
+}
+
+names! {
+    /// How secondary rays are answered.
+    Secondary {
+        /// By tracing them.
+        Exact = "exact",
+        /// By occupancy maps, those that these can answer.
+        Roma = "roma",
+        /// By occupancy maps where these find them free, else by tracing them.
+        Auto = "auto",
+        /// By distance fields, those that occupancy maps can answer.
+        Df = "df",
+        /// By fields of visibility, those to the environment.
+        Dvf = "dvf",
+    } later &["displacement"]
+}
+
+names! {
+    /// A pass.
+    Effect {
+        /// Rays of the camera.
+        Primary = "primary",
+        /// Rays towards the lamps.
+        Shadow = "shadow",
+        /// Short rays around the normal.
+        Ao = "ao",
+        /// Rays around the normal whose hits are shaded.
+        Diffuse = "diffuse",
+        /// Rays drawn by the gloss of surfaces, whose hits are shaded.
+        Glossy = "glossy",
+        /// Rays towards the environment.
+        Environment = "environment",
+    }
+}
+
+/// The passes of a frame; primary rays are always among them, as every other pass starts where they end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EffectList {
+    /// Rays towards the lamps.
+    pub shadow: bool,
+    /// Ambient occlusion.
+    pub ao: bool,
+    /// Diffuse interreflection.
+    pub diffuse: bool,
+    /// Reflections by the gloss of surfaces.
+    pub glossy: bool,
+    /// Rays towards the environment.
+    pub environment: bool,
+}
+
+impl EffectList {
+    /// Primary rays alone.
+    pub const PRIMARY: Self = Self { shadow: false, ao: false, diffuse: false, glossy: false, environment: false };
+    /// Primary rays and shadows.
+    pub const SHADOW: Self = Self { shadow: true, ..Self::PRIMARY };
+
+    /// Primary rays and these.
+    pub fn of(effects: &[Effect]) -> Self {
+        let has = |effect| effects.contains(&effect);
+        Self {
+            shadow: has(Effect::Shadow),
+            ao: has(Effect::Ao),
+            diffuse: has(Effect::Diffuse),
+            glossy: has(Effect::Glossy),
+            environment: has(Effect::Environment),
+        }
+    }
+
+    fn list(self) -> Vec<Effect> {
+        let all = [
+            (true, Effect::Primary),
+            (self.shadow, Effect::Shadow),
+            (self.ao, Effect::Ao),
+            (self.diffuse, Effect::Diffuse),
+            (self.glossy, Effect::Glossy),
+            (self.environment, Effect::Environment),
+        ];
+        all.into_iter().filter(|(is_on, _)| *is_on).map(|(_, effect)| effect).collect()
+    }
+}
+
+impl fmt::Display for EffectList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.list().plain().to_string())
+    }
+}
+
+impl Value for EffectList {
+    const NAMES: &'static [&'static str] = Effect::NAMES;
+
+    fn read(text: &str, rule: Rule, unit: &str) -> Result<Self, String> {
+        Ok(Self::of(&Vec::<Effect>::read(text, rule, unit)?))
+    }
+
+    fn plain(&self) -> Plain {
+        self.list().plain()
+    }
+}
+
+/// A direction: three finite numbers, not all 0, as they were given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction(pub [f64; 3]);
+
+impl Direction {
+    /// The unit vector.
+    pub fn unit(self) -> DVec3 {
+        self.normalized().unwrap_or(DVec3::Y)
+    }
+
+    fn normalized(self) -> Option<DVec3> {
+        let v = DVec3::from(self.0);
+        // Scaled first, so that neither large nor small numbers leave the range when squared.
+        (v / v.abs().max_element()).try_normalize()
+    }
+}
+
+impl FromStr for Direction {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = numbers(text).map(Self).filter(|direction| direction.normalized().is_some());
+        found.ok_or_else(|| "a direction is three numbers X,Y,Z, not all 0, as in 0.4,0.8,0.45".into())
+    }
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{}", self.0[0], self.0[1], self.0[2])
+    }
+}
+
+/// So many finite numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Vec<f64> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
+    let numbers = numbers.iter().all(|number| number.is_finite()).then_some(numbers)?;
+    numbers.try_into().ok()
+}
+
+/// A corner and two edges that span an area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rectangle {
+    /// The corner, world space.
+    pub corner: DVec3,
+    /// The edges that start there.
+    pub edges: [DVec3; 2],
+}
+
+impl FromStr for Rectangle {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let values = numbers::<9>(text).filter(|values| values.iter().all(|value| value.abs() <= 1e9));
+        let values = values.ok_or("it must be nine numbers within 1e9: a corner, an edge, an edge")?;
+        let [corner, u, v] = [0, 3, 6].map(|at| DVec3::new(values[at], values[at + 1], values[at + 2]));
+        let is_area = u.cross(v).length() > 1e-12;
+        if is_area { Ok(Self { corner, edges: [u, v] }) } else { Err("its edges must span an area".into()) }
+    }
+}
+
+impl fmt::Display for Rectangle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = [self.corner, self.edges[0], self.edges[1]].map(|v| Direction(v.to_array()).to_string());
+        f.write_str(&all.join(","))
+    }
+}
+
+/// Three numbers, and nine, are lists in files.
+macro_rules! value_of_numbers {
+    ($($name:ty),*) => { $(
+        impl Value for $name {
+            const IS_SIGNED: bool = true;
+
+            fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
+                text.parse()
+            }
+
+            fn plain(&self) -> Plain {
+                Plain::List(self.to_string().split(',').filter_map(|x| x.parse().ok()).map(Plain::Real).collect())
+            }
+        }
+    )* };
+}
+
+value_of_numbers!(Direction, Rectangle);
+
+/// Degrees of a random turn, 0 to 360; `full` is all of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn(pub f32);
+
+impl Turn {
+    /// Any turn.
+    pub const FULL: Self = Self(360.0);
+}
+
+impl Value for Turn {
+    fn read(text: &str, rule: Rule, _: &str) -> Result<Self, String> {
+        if text == "full" { Ok(Self::FULL) } else { f32::read(text, rule, "degrees, or full").map(Self) }
+    }
+
+    fn plain(&self) -> Plain {
+        self.0.plain()
+    }
+}
+
+/// What surrounds a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Environment {
+    /// A physical sky.
+    Sky,
+    /// An image.
+    File(PathBuf),
+}
+
+impl FromStr for Environment {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(if text == "sky" { Self::Sky } else { Self::File(text.into()) })
+    }
+}
+
+impl fmt::Display for Environment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sky => f.write_str("sky"),
+            Self::File(path) => path.display().fmt(f),
+        }
+    }
+}
+
+/// The name of the processor among the adapters.
+const CPU: &str = "cpu";
+
+/// What renders.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Adapter {
+    /// A hardware GPU if there is one, else the processor.
+    #[default]
+    Auto,
+    /// The processor.
+    Cpu,
+    /// The graphics adapter whose name contains this, in any case.
+    Named(String),
+}
+
+impl FromStr for Adapter {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            CPU => Self::Cpu,
+            name => Self::Named(name.into()),
+        })
+    }
+}
+
+impl fmt::Display for Adapter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "auto",
+            Self::Cpu => CPU,
+            Self::Named(name) => name,
+        })
+    }
+}
+
+value_of_text!(CacheSize, ImageSize, Environment, Adapter; false);
+
+impl Value for Exposure {
+    const IS_SIGNED: bool = true;
+
+    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        f64::read(text, Rule::Real(-MOST_STOPS, MOST_STOPS), "stops, or auto").map(Self::Fixed)
+    }
+
+    fn plain(&self) -> Plain {
+        match self {
+            Self::Fixed(stops) => stops.plain(),
+            Self::Auto => Plain::Text("auto".into()),
+        }
+    }
+}
+
+/// Enums of other modules that have `ALL` and `name`.
+macro_rules! value_of_known {
+    ($($name:ident: $names:expr;)*) => { $(
+        impl Value for $name {
+            const NAMES: &'static [&'static str] = $names;
+
+            fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
+                let found = $name::ALL.iter().copied().find(|value| value.name() == text);
+                found.ok_or_else(|| unknown(text, Self::NAMES, &[]))
+            }
+
+            fn plain(&self) -> Plain {
+                Plain::Text(self.name().into())
+            }
+        }
+    )* };
+}
+
+value_of_known! {
+    Policy: &["round-robin", "second-chance", "lru"];
+    ToneMap: &["none", "agx", "aces", "reinhard"];
+    Optimisation: Optimisation::NAMES;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read<T: Value>(text: &str) -> Result<T, String> {
+        T::read(text, Rule::Any, "")
+    }
+
+    #[test]
+    fn names_of_other_modules_are_all_there() {
+        assert_eq!(Policy::ALL.map(Policy::name), Policy::NAMES);
+        assert_eq!(ToneMap::ALL.map(ToneMap::name), <ToneMap as Value>::NAMES);
+        assert!(read::<ToneMap>("filmic").unwrap_err().contains("aces"));
+        assert_eq!(read("agx"), Ok(ToneMap::AgX));
+    }
+
+    #[test]
+    fn effects_are_read_and_written_alike() {
+        for text in ["primary", "primary,shadow", "primary,ao", "primary,shadow,ao,diffuse,glossy,environment"] {
+            assert_eq!(read::<EffectList>(text).unwrap().to_string(), text);
+        }
+        assert_eq!(read::<EffectList>("ao").unwrap().to_string(), "primary,ao");
+        assert!(read::<EffectList>("glow").is_err() && read::<EffectList>("").is_err());
+    }
+
+    #[test]
+    fn directions_are_kept_as_given() {
+        let direction: Direction = "3,0,-4".parse().unwrap();
+        let [x, y, z] = direction.unit().to_array();
+        assert!((x - 0.6).abs() < 1e-15 && y == 0.0 && (z + 0.8).abs() < 1e-15);
+        assert_eq!(direction.plain().to_string(), "3,0,-4");
+        let large: Direction = "1e300, 1e300, 0".parse().unwrap();
+        assert!((large.unit().x - 0.5f64.sqrt()).abs() < 1e-15);
+        for bad in ["", "0,0,0", "1,2", "1,2,3,4", "1,2,x", "nan,0,1", "inf,0,0", "1,2,3,"] {
+            assert!(bad.parse::<Direction>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn rectangles_span_an_area() {
+        let rectangle: Rectangle = "0,0,0,1,0,0,0,0,1".parse().unwrap();
+        assert_eq!(rectangle.plain().to_string().parse(), Ok(rectangle));
+        for bad in ["0,0,0,1,0,0,2,0,0", "0,0,0,1,0,0", "0,0,0,1,0,0,0,0,x", "0,0,0,1,0,0,0,0,inf", ""] {
+            assert!(bad.parse::<Rectangle>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn other_values_are_read_and_written_alike() {
+        let rule = Rule::Real(0.0, 360.0);
+        assert_eq!(Turn::read("full", rule, ""), Ok(Turn::FULL));
+        assert!(Turn::read("361", rule, "").unwrap_err().ends_with("or full"));
+        assert!(Turn::read("nan", rule, "").is_err());
+        assert_eq!(read("auto"), Ok(Exposure::Auto));
+        assert_eq!(read("-2.5"), Ok(Exposure::Fixed(-2.5)));
+        for bad in ["", "bright", "nan", "33", "-33", "inf"] {
+            assert!(read::<Exposure>(bad).is_err(), "{bad}");
+        }
+        for (text, adapter) in [("auto", Adapter::Auto), ("cpu", Adapter::Cpu), ("llvm", Adapter::Named("llvm".into()))]
+        {
+            assert_eq!(read(text), Ok(adapter.clone()));
+            assert_eq!(adapter.to_string(), text);
+        }
+    }
+}
