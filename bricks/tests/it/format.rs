@@ -4,7 +4,7 @@ use bricks::layout::*;
 use bricks::*;
 use std::collections::BTreeMap;
 
-const FORMAT: &str = include_str!("../FORMAT.md");
+const FORMAT: &str = include_str!("../../FORMAT.md");
 
 /// A table of a record: fields with offset and size, and the size of the record.
 type Table = (Vec<(String, usize, usize)>, usize);
