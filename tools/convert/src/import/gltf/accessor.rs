@@ -1,84 +1,53 @@
 //! Accessors (glTF 2.0, sections 3.6.2 and 5.1): typed, strided, possibly sparse views of buffers. They are checked once;
 //! elements are read when they are wanted.
 
-use super::document::{Accessor as Json, Index};
 use super::file::{File, Problem, item};
-use crate::import::error::one_line;
 use crate::import::table::Table;
+use gltf::json::accessor::{self as json, ComponentType as Component, Type};
+use gltf::json::validation::Checked::Valid;
+use gltf::json::{Accessor as Json, Index, buffer};
 use std::io;
 use std::sync::atomic::Ordering;
 
-/// Type of one component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
+/// The specification's name of a type of component.
+fn name(component: Component) -> &'static str {
+    match component {
+        Component::I8 => "BYTE",
+        Component::U8 => "UNSIGNED_BYTE",
+        Component::I16 => "SHORT",
+        Component::U16 => "UNSIGNED_SHORT",
+        Component::U32 => "UNSIGNED_INT",
+        Component::F32 => "FLOAT",
+    }
 }
 
-impl Component {
-    fn of(code: u64) -> Result<Self, Problem> {
-        Ok(match code {
-            5120 => Self::I8,
-            5121 => Self::U8,
-            5122 => Self::I16,
-            5123 => Self::U16,
-            5125 => Self::U32,
-            5126 => Self::F32,
-            _ => return Err(Problem::new(format!("component type {code} is not one of glTF"))),
-        })
+/// The component at byte `at`, which the caller knows to be within `bytes`.
+fn read(component: Component, bytes: &[u8], at: usize) -> f64 {
+    match component {
+        Component::I8 => bytes[at] as i8 as f64,
+        Component::U8 => bytes[at] as f64,
+        Component::I16 => i16::from_le_bytes([bytes[at], bytes[at + 1]]) as f64,
+        Component::U16 => u16::from_le_bytes([bytes[at], bytes[at + 1]]) as f64,
+        Component::U32 => u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]) as f64,
+        Component::F32 => f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]) as f64,
     }
+}
 
-    fn bytes(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::I8 => "BYTE",
-            Self::U8 => "UNSIGNED_BYTE",
-            Self::I16 => "SHORT",
-            Self::U16 => "UNSIGNED_SHORT",
-            Self::U32 => "UNSIGNED_INT",
-            Self::F32 => "FLOAT",
-        }
-    }
-
-    /// The component at byte `at`, which the caller knows to be within `bytes`.
-    fn read(self, bytes: &[u8], at: usize) -> f64 {
-        match self {
-            Self::I8 => bytes[at] as i8 as f64,
-            Self::U8 => bytes[at] as f64,
-            Self::I16 => i16::from_le_bytes([bytes[at], bytes[at + 1]]) as f64,
-            Self::U16 => u16::from_le_bytes([bytes[at], bytes[at + 1]]) as f64,
-            Self::U32 => u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]) as f64,
-            Self::F32 => f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]) as f64,
-        }
-    }
-
-    /// What an integer component stands for when normalised (glTF 2.0, section 3.11).
-    fn scale(self) -> f64 {
-        match self {
-            Self::I8 => 127.0,
-            Self::U8 => 255.0,
-            Self::I16 => 32767.0,
-            Self::U16 => 65535.0,
-            Self::U32 | Self::F32 => 1.0,
-        }
+/// What an integer component stands for when normalised (glTF 2.0, section 3.11).
+fn scale(component: Component) -> f64 {
+    match component {
+        Component::I8 => 127.0,
+        Component::U8 => 255.0,
+        Component::I16 => 32767.0,
+        Component::U16 => 65535.0,
+        Component::U32 | Component::F32 => 1.0,
     }
 }
 
 /// What an accessor may be for its use.
 pub(super) struct Shape {
-    /// Type names with their numbers of components.
-    pub kinds: &'static [(&'static str, usize)],
+    /// Types of at most 4 components.
+    pub kinds: &'static [Type],
     /// Component types.
     pub components: &'static [Component],
     /// Integers are normalised even if the accessor does not say so.
@@ -112,7 +81,7 @@ struct Sparse {
 
 impl Sparse {
     fn index(&self, row: &[u8]) -> u64 {
-        self.component.read(row, 0) as u64
+        read(self.component, row, 0) as u64
     }
 
     /// Which of the elements `wanted`, which ascend without repetition, are replaced: their positions in that list, and
@@ -139,7 +108,7 @@ impl Sparse {
 
 impl Accessor {
     /// Checks accessor `index` of `file` against `shape` and against its buffers.
-    pub fn resolve(file: &File, index: Index, shape: &Shape) -> Result<Self, Problem> {
+    pub fn resolve(file: &File, index: Index<Json>, shape: &Shape) -> Result<Self, Problem> {
         let json = item(&file.document.accessors, index, "accessor")?;
         Self::check(file, index, json, shape)
             .map_err(|problem| Problem { what: format!("accessor {index}: {}", problem.what), ..problem })
@@ -170,21 +139,25 @@ impl Accessor {
         Self { scale, ..self }
     }
 
-    fn check(file: &File, index: Index, json: &Json, shape: &Shape) -> Result<Self, Problem> {
-        let component = Component::of(json.component_type.0)?;
-        let width = shape.kinds.iter().find(|(name, _)| *name == json.kind).map(|(_, width)| *width);
-        let (Some(width), true) = (width, shape.components.contains(&component)) else {
-            let kinds: Vec<_> = shape.kinds.iter().map(|(name, _)| *name).collect();
-            let components: Vec<_> = shape.components.iter().map(|c| c.name()).collect();
+    fn check(file: &File, index: Index<Json>, json: &Json, shape: &Shape) -> Result<Self, Problem> {
+        let types = (json.type_, json.component_type);
+        let (Valid(kind), Valid(json::GenericComponentType(component))) = types else {
+            return Err(Problem::new("its type or that of its components is not one of glTF"));
+        };
+        if !shape.kinds.contains(&kind) || !shape.components.contains(&component) {
+            let upper = |kind: &Type| format!("{kind:?}").to_uppercase();
+            let kinds: Vec<_> = shape.kinds.iter().map(upper).collect();
+            let components: Vec<_> = shape.components.iter().map(|&c| name(c)).collect();
             return Err(Problem::new(format!(
                 "is {} of {}, but must be {} of {}",
-                one_line(&json.kind),
-                component.name(),
+                upper(&kind),
+                name(component),
                 kinds.join(" or "),
                 components.join(", ")
             )));
-        };
-        let element = component.bytes() * width;
+        }
+        let width = kind.multiplicity();
+        let element = component.size() * width;
         let count = json.count.0;
         let base = match json.buffer_view {
             Some(view) => {
@@ -194,10 +167,10 @@ impl Accessor {
                     return Err(Problem::new(format!("stride {stride} is less than an element of {element} bytes")));
                 }
                 let held = bytes.len();
-                let rows = bytes.slice(json.byte_offset.0, held);
+                let offset = json.byte_offset.unwrap_or_default().0;
+                let rows = bytes.slice(offset, held);
                 let table = rows.and_then(|rows| Table::new(rows, count, stride, element));
                 Some(table.ok_or_else(|| {
-                    let offset = json.byte_offset;
                     Problem::new(format!(
                         "{count} elements at byte {offset} do not fit buffer view {view} of {held} bytes"
                     ))
@@ -211,12 +184,12 @@ impl Accessor {
             }
             None => None,
         };
-        let sparse = match json.sparse.as_deref() {
+        let sparse = match &json.sparse {
             Some(sparse) => Some(Box::new(check_sparse(file, index, sparse, count, element)?)),
             None => None,
         };
         let normalized = json.normalized || shape.always_normalized;
-        let scale = if normalized { component.scale() } else { 1.0 };
+        let scale = if normalized { self::scale(component) } else { 1.0 };
         Ok(Self { count, width, normalized, scale, component, base, sparse })
     }
 
@@ -244,9 +217,9 @@ impl Accessor {
 
     fn decode<const N: usize>(&self, row: &[u8]) -> [f64; N] {
         let mut element = [0.0; N];
-        let component = self.component.bytes();
+        let component = self.component.size();
         for (c, value) in element.iter_mut().enumerate().take(self.width) {
-            *value = self.component.read(row, c * component);
+            *value = read(self.component, row, c * component);
             if self.scale != 1.0 {
                 *value = (*value / self.scale).max(-1.0);
             }
@@ -258,39 +231,38 @@ impl Accessor {
 /// Checks the replaced elements of accessor `index` of `count` elements of `element` bytes.
 fn check_sparse(
     file: &File,
-    index: Index,
-    json: &super::document::Sparse,
+    index: Index<Json>,
+    json: &json::sparse::Sparse,
     count: u64,
     element: usize,
 ) -> Result<Sparse, Problem> {
-    let component = Component::of(json.indices.component_type.0)?;
-    if !matches!(component, Component::U8 | Component::U16 | Component::U32) {
-        return Err(Problem::new(format!("sparse indices are {}, but must be unsigned integers", component.name())));
+    let Valid(json::IndexComponentType(component)) = json.indices.component_type else {
+        return Err(Problem::new("sparse indices are of no type of unsigned integers"));
+    };
+    let replaced = json.count.0;
+    if replaced > count {
+        return Err(Problem::new(format!("replaces {replaced} of {count} elements")));
     }
-    if json.count.0 > count {
-        return Err(Problem::new(format!("replaces {} of {count} elements", json.count)));
-    }
-    let part = |view: Index, offset: u64, size: usize, what: &str| {
+    let part = |view: Index<buffer::View>, offset: u64, size: usize, what: &str| {
         let (bytes, _) = file.view(view)?;
         let held = bytes.len();
         let rows = bytes.slice(offset, held);
-        rows.and_then(|rows| Table::new(rows, json.count.0, size as u64, size)).ok_or_else(|| {
-            let count = json.count;
+        rows.and_then(|rows| Table::new(rows, replaced, size as u64, size)).ok_or_else(|| {
             Problem::new(format!(
-                "{count} sparse {what} at byte {offset} do not fit buffer view {view} of {held} bytes"
+                "{replaced} sparse {what} at byte {offset} do not fit buffer view {view} of {held} bytes"
             ))
         })
     };
-    let indices = part(json.indices.buffer_view, json.indices.byte_offset.0, component.bytes(), "indices")?;
+    let indices = part(json.indices.buffer_view, json.indices.byte_offset.0, component.size(), "indices")?;
     let values = part(json.values.buffer_view, json.values.byte_offset.0, element, "values")?;
     let sparse = Sparse { indices, component, values };
     // In range: `item` found the accessor. Many primitives may use it; once is enough to know that indices ascend.
-    let checked = &file.checked_sparse[index.0 as usize];
+    let checked = &file.checked_sparse[index.value()];
     if checked.load(Ordering::Relaxed) {
         return Ok(sparse);
     }
     let (mut next, mut wrong) = (0, None);
-    let run = sparse.indices.run(0, json.count.0, |i, row| {
+    let run = sparse.indices.run(0, replaced, |i, row| {
         let index = sparse.index(row);
         if index < next || index >= count {
             wrong = Some((i, index));

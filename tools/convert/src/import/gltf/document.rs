@@ -1,52 +1,101 @@
-//! The parts of the glTF JSON that importing reads (glTF 2.0, section 5).
+//! The glTF JSON (glTF 2.0, section 5) in the structures of [`gltf::json`], and what they lack.
 //!
-//! These are our own structures rather than those of `gltf-json` because that crate keeps node matrices in f32 and
-//! truncates indices to 32 bits, so that index 4294967296 would pass for 0. What is not listed here is skipped without
-//! being kept, so that a defect of a camera or an animation cannot spoil the geometry.
+//! - [`Document`] and [`Mesh`] skip cameras and animations, whose defects must not spoil the geometry. [`Lenient`] does
+//!   the same for materials and textures, and keeps what is wrong with them.
+//! - [`Object`] drops bounds and extras, so that memory does not grow with them. It accepts integers written as 3.0.
+//!   The crate truncates indices to 32 bits, so that 4294967296 would pass for 0; here it becomes [`BEYOND`].
+//! - [`Node`] has its matrix in f64. A [`Scene`] need not list nodes, as the specification allows.
+//! - Extensions, and factors that they multiply, are read in f64.
+//!
+//! Nothing here is checked beyond its type.
 
 use crate::import::error::one_line;
-use serde::de::{DeserializeOwned, Error, IgnoredAny, Unexpected, Visitor};
+use gltf::json::{self, Index};
+use serde::de::{DeserializeOwned, Error, IgnoredAny};
 use serde::{Deserialize, Deserializer};
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
-use std::fmt;
+use std::ops::Deref;
 
-/// An index into one of the lists of [`Document`]; not yet checked.
-pub(super) type Index = Uint;
+/// Stands for every index from this one on: no list is as long. The crate takes the one behind it for an absent image.
+pub(super) const BEYOND: u32 = u32::MAX - 1;
 
-/// An unsigned integer, which JSON may also write as 3.0.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Uint(pub u64);
+/// Fields that are not read: they must not take memory, nor spoil what is read where they are malformed.
+const UNREAD: [&str; 8] = ["copyright", "extras", "generator", "max", "mimeType", "min", "minFilter", "target"];
 
-impl<'de> Deserialize<'de> for Uint {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Digits;
-        impl Visitor<'_> for Digits {
-            type Value = Uint;
+/// A structure of the crate, and what it lacks of the same object.
+#[derive(Debug)]
+pub(super) struct Object<T, More = IgnoredAny> {
+    pub json: T,
+    pub more: More,
+}
 
-            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("a non-negative integer")
-            }
+impl<T, More> Deref for Object<T, More> {
+    type Target = T;
 
-            fn visit_u64<E: Error>(self, value: u64) -> Result<Uint, E> {
-                Ok(Uint(value))
-            }
-
-            fn visit_f64<E: Error>(self, value: f64) -> Result<Uint, E> {
-                // Beyond 2^53 a float is no exact integer any more.
-                if (0.0..=9007199254740992.0).contains(&value) && value.fract() == 0.0 {
-                    Ok(Uint(value as u64))
-                } else {
-                    Err(E::invalid_value(Unexpected::Float(value), &self))
-                }
-            }
-        }
-        deserializer.deserialize_u64(Digits)
+    fn deref(&self) -> &T {
+        &self.json
     }
 }
 
-impl fmt::Display for Uint {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        self.0.fmt(f)
+impl<'de, T: DeserializeOwned, More: DeserializeOwned> Deserialize<'de> for Object<T, More> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut value = Value::deserialize(deserializer)?;
+        tidy(&mut value, Number::Index);
+        let more = More::deserialize(&value).map_err(D::Error::custom)?;
+        Ok(Self { json: T::deserialize(value).map_err(D::Error::custom)?, more })
+    }
+}
+
+/// What a number is, by the name of its field.
+#[derive(Clone, Copy, PartialEq)]
+enum Number {
+    /// An index or a code of at most 32 bits.
+    Index,
+    /// An integer of at most 64 bits.
+    Length,
+    Float,
+}
+
+impl Number {
+    fn of(field: &str) -> Self {
+        match field {
+            "buffer" | "bufferView" | "children" | "index" | "indices" | "light" | "material" | "mesh" | "nodes"
+            | "sampler" | "skin" | "source" => Self::Index,
+            "componentType" | "magFilter" | "mode" | "texCoord" | "wrapS" | "wrapT" => Self::Index,
+            "byteLength" | "byteOffset" | "byteStride" | "count" => Self::Length,
+            _ => Self::Float,
+        }
+    }
+}
+
+/// Makes integers integers, and leaves out what is not read, also nulls, which stand for absent fields.
+fn tidy(value: &mut Value, kind: Number) {
+    match value {
+        Value::Array(values) => values.iter_mut().for_each(|value| tidy(value, kind)),
+        Value::Object(fields) => {
+            fields.retain(|name, value| !UNREAD.contains(&name.as_str()) && !value.is_null());
+            for (name, value) in fields {
+                match (name.as_str(), value) {
+                    ("attributes", Value::Object(indices)) => {
+                        indices.values_mut().for_each(|index| tidy(index, Number::Index));
+                    }
+                    // They are counted, not followed.
+                    ("targets", Value::Array(targets)) => targets.fill(Value::Object(Map::new())),
+                    (name, value) => tidy(value, Number::of(name)),
+                }
+            }
+        }
+        Value::Number(number) if kind != Number::Float => {
+            // Beyond 2^53 a float is no exact integer any more.
+            let is_exact = |x: &f64| (0.0..=9007199254740992.0).contains(x) && x.fract() == 0.0;
+            let integer = number.as_u64().or_else(|| number.as_f64().filter(is_exact).map(|x| x as u64));
+            if let Some(integer) = integer {
+                let most = if kind == Number::Index { BEYOND.into() } else { u64::MAX };
+                *number = integer.min(most).into();
+            }
+        }
+        _ => {}
     }
 }
 
@@ -56,36 +105,37 @@ pub(super) struct Lenient<T>(pub Result<T, String>);
 
 impl<'de, T: DeserializeOwned> Deserialize<'de> for Lenient<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let value = serde_json::Value::deserialize(deserializer)?;
+        let value = Value::deserialize(deserializer)?;
         Ok(Self(T::deserialize(value).map_err(|e| one_line(&e.to_string()))))
     }
 }
 
+/// What is read of a file.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Document {
-    pub asset: Asset,
-    pub scene: Option<Index>,
+    pub asset: Object<json::Asset>,
+    pub scene: Option<Object<Index<json::Scene>>>,
     #[serde(default)]
-    pub scenes: Vec<Scene>,
+    pub scenes: Vec<Object<Scene>>,
     #[serde(default)]
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<Object<Node>>,
     #[serde(default)]
     pub meshes: Vec<Mesh>,
     #[serde(default)]
-    pub accessors: Vec<Accessor>,
+    pub accessors: Vec<Object<json::Accessor>>,
     #[serde(default)]
-    pub buffer_views: Vec<BufferView>,
+    pub buffer_views: Vec<View>,
     #[serde(default)]
-    pub buffers: Vec<Buffer>,
+    pub buffers: Vec<Object<json::Buffer, BufferMore>>,
     #[serde(default)]
     pub materials: Vec<Lenient<Material>>,
     #[serde(default)]
-    pub textures: Vec<Lenient<Texture>>,
+    pub textures: Vec<Lenient<Object<json::Texture, Extended<TextureExtensions>>>>,
     #[serde(default)]
-    pub images: Vec<Lenient<Image>>,
+    pub images: Vec<Lenient<Object<json::Image, Named>>>,
     #[serde(default)]
-    pub samplers: Vec<Lenient<Sampler>>,
+    pub samplers: Vec<Lenient<Object<json::texture::Sampler>>>,
     #[serde(default)]
     pub animations: Vec<IgnoredAny>,
     #[serde(default)]
@@ -94,6 +144,23 @@ pub(super) struct Document {
     pub extensions_used: Vec<String>,
     #[serde(default)]
     pub extensions_required: Vec<String>,
+}
+
+/// A view of a buffer.
+pub(super) type View = Object<json::buffer::View, Extended<ViewExtensions>>;
+
+/// A part of a mesh.
+pub(super) type Primitive = Object<json::mesh::Primitive, Extended<PrimitiveExtensions>>;
+
+/// A material.
+pub(super) type Material = Object<json::Material, MaterialMore>;
+
+/// The extensions of an object.
+#[derive(Debug, Deserialize)]
+#[serde(bound = "E: Default + DeserializeOwned")]
+pub(super) struct Extended<E> {
+    #[serde(default)]
+    pub extensions: E,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -123,14 +190,6 @@ pub(super) struct Light {
     pub spot: Spot,
 }
 
-/// The cone of a spot.
-#[derive(Debug, Default, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Spot {
-    pub inner_cone_angle: Option<f64>,
-    pub outer_cone_angle: Option<f64>,
-}
-
 /// CESIUM_RTC: the point that all coordinates are relative to.
 #[derive(Debug, Deserialize)]
 pub(super) struct Rtc {
@@ -140,30 +199,25 @@ pub(super) struct Rtc {
 /// The version alone, for files of other versions, whose other parts have other types.
 #[derive(Debug, Deserialize)]
 pub(super) struct VersionOnly {
-    pub asset: Asset,
+    pub asset: Object<json::Asset>,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Asset {
-    pub version: String,
-    pub min_version: Option<String>,
-}
-
+/// The root nodes of a scene.
 #[derive(Debug, Deserialize)]
 pub(super) struct Scene {
     pub name: Option<String>,
     #[serde(default)]
-    pub nodes: Vec<Index>,
+    pub nodes: Vec<Index<json::Node>>,
 }
 
+/// A node.
 #[derive(Debug, Deserialize)]
 pub(super) struct Node {
     pub name: Option<String>,
-    pub mesh: Option<Index>,
-    pub skin: Option<Index>,
+    pub mesh: Option<Index<json::Mesh>>,
+    pub skin: Option<IgnoredAny>,
     #[serde(default)]
-    pub children: Vec<Index>,
+    pub children: Vec<Index<json::Node>>,
     /// Column-major; boxed because few nodes have one.
     pub matrix: Option<Box<[f64; 16]>>,
     pub translation: Option<[f64; 3]>,
@@ -185,32 +239,21 @@ pub(super) struct NodeExtensions {
 /// The light of a node.
 #[derive(Debug, Deserialize)]
 pub(super) struct LightOfNode {
-    pub light: Index,
+    pub light: Index<Light>,
 }
 
 /// EXT_mesh_gpu_instancing: accessors of one transformation an instance.
 #[derive(Debug, Deserialize)]
 pub(super) struct Instancing {
     #[serde(default)]
-    pub attributes: BTreeMap<String, Index>,
+    pub attributes: BTreeMap<String, Index<json::Accessor>>,
 }
 
+/// A mesh.
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
     pub name: Option<String>,
     pub primitives: Vec<Primitive>,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Primitive {
-    pub attributes: BTreeMap<String, Index>,
-    pub indices: Option<Index>,
-    pub material: Option<Index>,
-    pub mode: Option<Uint>,
-    #[serde(default)]
-    pub targets: Vec<IgnoredAny>,
-    #[serde(default)]
-    pub extensions: PrimitiveExtensions,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -223,74 +266,31 @@ pub(super) struct PrimitiveExtensions {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Draco {
-    pub buffer_view: Index,
+    pub buffer_view: Index<json::buffer::View>,
     /// Unique ids of attributes in the compressed mesh.
-    pub attributes: BTreeMap<String, Uint>,
+    pub attributes: BTreeMap<String, u32>,
 }
 
+/// The length of a buffer, which the crate does not ask for.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Accessor {
-    pub buffer_view: Option<Index>,
-    #[serde(default)]
-    pub byte_offset: Uint,
-    pub component_type: Uint,
-    #[serde(default)]
-    pub normalized: bool,
-    pub count: Uint,
-    #[serde(rename = "type")]
-    pub kind: String,
-    pub sparse: Option<Box<Sparse>>,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Sparse {
-    pub count: Uint,
-    pub indices: SparseIndices,
-    pub values: SparseValues,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct SparseIndices {
-    pub buffer_view: Index,
-    #[serde(default)]
-    pub byte_offset: Uint,
-    pub component_type: Uint,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct SparseValues {
-    pub buffer_view: Index,
-    #[serde(default)]
-    pub byte_offset: Uint,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct BufferView {
-    pub buffer: Index,
-    #[serde(default)]
-    pub byte_offset: Uint,
-    pub byte_length: Uint,
-    pub byte_stride: Option<Uint>,
-    #[serde(default)]
-    pub extensions: BufferViewExtensions,
+pub(super) struct BufferMore {
+    pub byte_length: u64,
 }
 
 #[derive(Debug, Default, Deserialize)]
-pub(super) struct BufferViewExtensions {
+pub(super) struct ViewExtensions {
     #[serde(rename = "EXT_meshopt_compression")]
     pub meshopt: Option<Box<Meshopt>>,
     #[serde(rename = "KHR_meshopt_compression")]
     pub khr_meshopt: Option<Box<Meshopt>>,
 }
 
-impl BufferViewExtensions {
+impl View {
     /// The compression, by either name.
     pub fn compression(&self) -> Option<&Meshopt> {
-        self.meshopt.as_deref().or(self.khr_meshopt.as_deref())
+        let extensions = &self.more.extensions;
+        extensions.meshopt.as_deref().or(extensions.khr_meshopt.as_deref())
     }
 }
 
@@ -298,51 +298,31 @@ impl BufferViewExtensions {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Meshopt {
-    pub buffer: Index,
+    pub buffer: Index<json::Buffer>,
     #[serde(default)]
-    pub byte_offset: Uint,
-    pub byte_length: Uint,
-    pub byte_stride: Uint,
-    pub count: Uint,
+    pub byte_offset: u64,
+    pub byte_length: u64,
+    pub byte_stride: u64,
+    pub count: u64,
     pub mode: String,
     #[serde(default)]
     pub filter: Option<String>,
 }
 
+/// Name, textures and extensions of a material, and what its extensions multiply.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Buffer {
-    pub uri: Option<String>,
-    pub byte_length: Uint,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Material {
+pub(super) struct MaterialMore {
     pub name: Option<String>,
     #[serde(default)]
     pub pbr_metallic_roughness: MetallicRoughness,
-    #[serde(default)]
-    pub emissive_factor: [f64; 3],
     pub normal_texture: Option<TextureInfo>,
     pub occlusion_texture: Option<TextureInfo>,
     pub emissive_texture: Option<TextureInfo>,
-    pub alpha_mode: Option<String>,
-    pub alpha_cutoff: Option<f64>,
     #[serde(default)]
-    pub double_sided: bool,
+    pub emissive_factor: [f64; 3],
     #[serde(default)]
     pub extensions: MaterialExtensions,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct MetallicRoughness {
-    pub base_color_factor: Option<[f64; 4]>,
-    pub base_color_texture: Option<TextureInfo>,
-    pub metallic_factor: Option<f64>,
-    pub roughness_factor: Option<f64>,
-    pub metallic_roughness_texture: Option<TextureInfo>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -363,68 +343,13 @@ pub(super) struct MaterialExtensions {
     pub specular_glossiness: Option<SpecularGlossiness>,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct EmissiveStrength {
-    pub emissive_strength: Option<f64>,
-}
-
-/// KHR_materials_ior.
-#[derive(Debug, Deserialize)]
-pub(super) struct Ior {
-    pub ior: Option<f64>,
-}
-
-/// KHR_materials_specular.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Specular {
-    pub specular_factor: Option<f64>,
-    pub specular_texture: Option<IgnoredAny>,
-    pub specular_color_factor: Option<[f64; 3]>,
-    pub specular_color_texture: Option<IgnoredAny>,
-}
-
-/// KHR_materials_clearcoat.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Clearcoat {
-    pub clearcoat_factor: Option<f64>,
-    pub clearcoat_texture: Option<IgnoredAny>,
-    pub clearcoat_roughness_factor: Option<f64>,
-    pub clearcoat_roughness_texture: Option<IgnoredAny>,
-    pub clearcoat_normal_texture: Option<IgnoredAny>,
-}
-
-/// KHR_materials_transmission.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Transmission {
-    pub transmission_factor: Option<f64>,
-    pub transmission_texture: Option<IgnoredAny>,
-}
-
-/// KHR_materials_pbrSpecularGlossiness.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct SpecularGlossiness {
-    pub diffuse_factor: Option<[f64; 4]>,
-    pub diffuse_texture: Option<TextureInfo>,
-    pub specular_factor: Option<[f64; 3]>,
-    pub glossiness_factor: Option<f64>,
-    pub specular_glossiness_texture: Option<IgnoredAny>,
-}
-
+/// A texture of a material; the crate has its transformation in f32, and not for all.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct TextureInfo {
-    pub index: Index,
+    pub index: Index<json::Texture>,
     #[serde(default)]
-    pub tex_coord: Uint,
-    /// Of a normal texture.
-    pub scale: Option<f64>,
-    /// Of an occlusion texture.
-    pub strength: Option<f64>,
+    pub tex_coord: u32,
     #[serde(default)]
     pub extensions: TextureInfoExtensions,
 }
@@ -435,24 +360,6 @@ pub(super) struct TextureInfoExtensions {
     pub transform: Option<TextureTransform>,
 }
 
-/// KHR_texture_transform.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct TextureTransform {
-    pub offset: Option<[f64; 2]>,
-    pub rotation: Option<f64>,
-    pub scale: Option<[f64; 2]>,
-    pub tex_coord: Option<Uint>,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Texture {
-    pub source: Option<Index>,
-    pub sampler: Option<Index>,
-    #[serde(default)]
-    pub extensions: TextureExtensions,
-}
-
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct TextureExtensions {
     #[serde(rename = "KHR_texture_basisu")]
@@ -461,24 +368,76 @@ pub(super) struct TextureExtensions {
     pub webp: Option<ImageSource>,
 }
 
-/// The image of a texture in another format.
-#[derive(Debug, Deserialize)]
-pub(super) struct ImageSource {
-    pub source: Option<Index>,
+/// Structures whose every field may be absent.
+macro_rules! optional {
+    ($($(#[$doc:meta])* $name:ident { $($field:ident: $kind:ty,)* })*) => { $(
+        $(#[$doc])*
+        #[derive(Debug, Default, Deserialize)]
+        #[serde(rename_all = "camelCase")]
+        pub(super) struct $name {
+            $(pub $field: Option<$kind>,)*
+        }
+    )* };
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Image {
-    pub name: Option<String>,
-    pub uri: Option<String>,
-    pub buffer_view: Option<Index>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Sampler {
-    pub wrap_s: Option<Uint>,
-    pub wrap_t: Option<Uint>,
-    pub mag_filter: Option<Uint>,
+optional! {
+    /// A name. Few are read; those of all structures would take memory.
+    Named {
+        name: String,
+    }
+    /// The cone of a spot.
+    Spot {
+        inner_cone_angle: f64,
+        outer_cone_angle: f64,
+    }
+    MetallicRoughness {
+        base_color_texture: TextureInfo,
+        metallic_roughness_texture: TextureInfo,
+    }
+    EmissiveStrength {
+        emissive_strength: f64,
+    }
+    /// KHR_materials_ior.
+    Ior {
+        ior: f64,
+    }
+    /// KHR_materials_specular.
+    Specular {
+        specular_factor: f64,
+        specular_texture: IgnoredAny,
+        specular_color_factor: [f64; 3],
+        specular_color_texture: IgnoredAny,
+    }
+    /// KHR_materials_clearcoat.
+    Clearcoat {
+        clearcoat_factor: f64,
+        clearcoat_texture: IgnoredAny,
+        clearcoat_roughness_factor: f64,
+        clearcoat_roughness_texture: IgnoredAny,
+        clearcoat_normal_texture: IgnoredAny,
+    }
+    /// KHR_materials_transmission.
+    Transmission {
+        transmission_factor: f64,
+        transmission_texture: IgnoredAny,
+    }
+    /// KHR_materials_pbrSpecularGlossiness.
+    SpecularGlossiness {
+        diffuse_factor: [f64; 4],
+        diffuse_texture: TextureInfo,
+        specular_factor: [f64; 3],
+        glossiness_factor: f64,
+        specular_glossiness_texture: IgnoredAny,
+    }
+    /// KHR_texture_transform.
+    TextureTransform {
+        offset: [f64; 2],
+        rotation: f64,
+        scale: [f64; 2],
+        tex_coord: u32,
+    }
+    /// The image of a texture in another format.
+    ImageSource {
+        source: Index<json::Image>,
+    }
 }

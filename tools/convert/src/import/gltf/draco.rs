@@ -1,12 +1,13 @@
 //! KHR_draco_mesh_compression: primitives compressed by Draco, decoded into the spool.
 
 use super::accessor::Accessor;
-use super::document::{Document, Draco, Index};
+use super::document::{Document, Draco};
 use super::file::{File, Problem, item};
 use crate::import::error::{EXPORT_AGAIN, one_line};
 use crate::import::quietly;
 use crate::import::table::TableWriter;
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
+use gltf::json::{Index, buffer};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -29,7 +30,7 @@ pub(super) struct Decoded {
     /// Three indices a triangle.
     pub indices: Accessor,
     /// Attributes by their unique ids.
-    attributes: BTreeMap<u64, Attribute>,
+    attributes: BTreeMap<u32, Attribute>,
 }
 
 struct Attribute {
@@ -38,27 +39,30 @@ struct Attribute {
     scale: f64,
 }
 
-/// Decoded primitives, by the bytes they are compressed to: (buffer, offset, length).
-pub(super) type Primitives = BTreeMap<(u64, u64, u64), Result<Decoded, String>>;
+/// Where compressed bytes are: buffer, offset, length.
+type Key = (usize, u64, u64);
+
+/// Decoded primitives, by the bytes they are compressed to.
+pub(super) type Primitives = BTreeMap<Key, Result<Decoded, String>>;
 
 impl Decoded {
     /// The attribute `name` of a primitive that `json` compresses.
     ///
     /// Normalised integers are left for the shapes of accessors to state: see [`scale`](Self::scale).
     pub fn attribute(&self, json: &Draco, name: &str) -> Option<&Accessor> {
-        Some(&self.attributes.get(&json.attributes.get(name)?.0)?.values)
+        Some(&self.attributes.get(json.attributes.get(name)?)?.values)
     }
 
     /// What the components of attribute `name` are divided by if they are normalised.
     pub fn scale(&self, json: &Draco, name: &str) -> f64 {
-        json.attributes.get(name).and_then(|id| self.attributes.get(&id.0)).map_or(1.0, |attribute| attribute.scale)
+        json.attributes.get(name).and_then(|id| self.attributes.get(id)).map_or(1.0, |attribute| attribute.scale)
     }
 }
 
 /// Where the bytes of a buffer view are.
-fn key(document: &Document, view: Index) -> Result<(u64, u64, u64), Problem> {
+fn key(document: &Document, view: Index<buffer::View>) -> Result<Key, Problem> {
     let view = item(&document.buffer_views, view, "buffer view")?;
-    Ok((view.buffer.0, view.byte_offset.0, view.byte_length.0))
+    Ok((view.buffer.value(), view.byte_offset.unwrap_or_default().0, view.byte_length.0))
 }
 
 /// The decoded primitive of `json`.
@@ -77,13 +81,13 @@ pub(super) fn decode(file: &File, is_used: &[bool]) -> Primitives {
     let meshes = document.meshes.iter().zip(is_used).filter(|(_, is_used)| **is_used);
     let primitives = meshes.flat_map(|(mesh, _)| &mesh.primitives);
     // Those without a buffer view are told where they are looked for.
-    let views = primitives.filter_map(|p| p.extensions.draco.as_ref()).map(|draco| draco.buffer_view);
+    let views = primitives.filter_map(|p| p.more.extensions.draco.as_ref()).map(|draco| draco.buffer_view);
     let views: BTreeMap<_, _> = views.filter_map(|view| Some((key(document, view).ok()?, view))).collect();
     let views: Vec<_> = views.into_iter().collect();
     views.into_par_iter().map(|(key, view)| (key, decode_view(file, view))).collect()
 }
 
-fn decode_view(file: &File, view: Index) -> Result<Decoded, String> {
+fn decode_view(file: &File, view: Index<buffer::View>) -> Result<Decoded, String> {
     file.spool.progress().check().map_err(|stop| stop.to_string())?;
     let (bytes, _) = file.view(view).map_err(|problem| problem.what)?;
     let bytes = bytes.read()?;
@@ -133,7 +137,7 @@ fn decode_view(file: &File, view: Index) -> Result<Decoded, String> {
             writer.push(bytemuck::cast_slice(value))?;
         }
         let values = Accessor::of_floats(writer.finish()?, width);
-        attributes.insert(u64::from(attribute.unique_id()), Attribute { values, scale });
+        attributes.insert(attribute.unique_id(), Attribute { values, scale });
     }
     Ok(Decoded { indices: Accessor::of_indices(indices.finish()?), attributes })
 }

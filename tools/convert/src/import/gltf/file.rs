@@ -1,11 +1,12 @@
 //! Opens a glTF file: its JSON, its buffers, what it requires.
 
-use super::document::{Document, Index, VersionOnly};
+use super::document::{BEYOND, Document, VersionOnly};
 use super::glb;
 use crate::import::bytes::{Bytes, Spool};
 use crate::import::error::{EXPORT_AGAIN, ImportError, one_line, show};
 use crate::import::uri;
 use crate::import::warnings::Warnings;
+use gltf::json::{self, Index};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -85,7 +86,7 @@ impl File {
         let mut buffers = Vec::with_capacity(document.buffers.len());
         let mut input_bytes = bytes.len();
         for (index, buffer) in document.buffers.iter_mut().enumerate() {
-            let data = match buffer.uri.take() {
+            let data = match buffer.json.uri.take() {
                 Some(text) => found.get(&text).and_then(|(data, is_new)| {
                     if is_new {
                         input_bytes += data.len();
@@ -96,7 +97,7 @@ impl File {
                 None if index == 0 => bin.take().ok_or(Missing::Nothing),
                 None => Err(Missing::Nothing),
             };
-            let stated = buffer.byte_length.0;
+            let stated = buffer.more.byte_length;
             let whole = data.and_then(|data| {
                 let held = data.len();
                 data.slice(0, stated)
@@ -110,7 +111,7 @@ impl File {
             }
             buffers.push(whole);
         }
-        let uris: Vec<_> = document.images.iter_mut().map(|image| image.0.as_mut().ok()?.uri.take()).collect();
+        let uris: Vec<_> = document.images.iter_mut().map(|image| image.0.as_mut().ok()?.json.uri.take()).collect();
         let located = uris.into_iter().map(|text| match text {
             Some(text) => found.get(&text).map(|(data, _)| Some(data)).map_err(|missing| missing.problem().what),
             None => Ok(None),
@@ -143,21 +144,21 @@ impl File {
     }
 
     /// The bytes and the stride of a buffer view.
-    pub fn view(&self, index: Index) -> Result<(Bytes, Option<u64>), Problem> {
+    pub fn view(&self, index: Index<json::buffer::View>) -> Result<(Bytes, Option<u64>), Problem> {
         let view = item(&self.document.buffer_views, index, "buffer view")?;
-        if let Some(compressed) = &view.extensions.compression() {
+        if let Some(compressed) = &view.compression() {
             // In range: `item` found it.
-            let decoded = self.decoded_views.get(&(index.0 as usize));
+            let decoded = self.decoded_views.get(&(index.value()));
             let bytes = decoded.ok_or_else(|| Problem::new(format!("buffer view {index} could not be decoded")))?;
-            return Ok((bytes.clone(), Some(compressed.byte_stride.0)));
+            return Ok((bytes.clone(), Some(compressed.byte_stride)));
         }
-        let bytes = self.piece(view.buffer, view.byte_offset.0, view.byte_length.0);
+        let bytes = self.piece(view.buffer, view.byte_offset.unwrap_or_default().0, view.byte_length.0);
         let bytes = bytes.map_err(|problem| Problem::new(format!("buffer view {index}: {}", problem.what)))?;
-        Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+        Ok((bytes, view.byte_stride.map(|stride| stride.0 as u64)))
     }
 
     /// `length` bytes at `offset` of a buffer.
-    pub fn piece(&self, buffer: Index, offset: u64, length: u64) -> Result<Bytes, Problem> {
+    pub fn piece(&self, buffer: Index<json::Buffer>, offset: u64, length: u64) -> Result<Bytes, Problem> {
         let data = item(&self.buffers, buffer, "buffer")?;
         let named = |problem: &Problem| Problem { what: format!("buffer {buffer}: {}", problem.what), ..*problem };
         let data = data.as_ref().map_err(named)?;
@@ -222,27 +223,29 @@ impl Found<'_> {
 }
 
 /// `list[index]`, or a problem that says how many there are.
-pub(super) fn item<'a, T>(list: &'a [T], index: Index, kind: &str) -> Result<&'a T, Problem> {
-    usize::try_from(index.0)
-        .ok()
-        .and_then(|i| list.get(i))
-        .ok_or_else(|| Problem::new(format!("refers to {kind} {index}, but the file has {}", list.len())))
+pub(super) fn item<'a, T, J>(list: &'a [T], index: Index<J>, kind: &str) -> Result<&'a T, Problem> {
+    list.get(index.value()).ok_or_else(|| {
+        let or_more = if index.value() >= BEYOND as usize { " or more" } else { "" };
+        Problem::new(format!("refers to {kind} {index}{or_more}, but the file has {}", list.len()))
+    })
 }
 
 /// Parses the JSON and checks the version.
 fn parse(json: &[u8]) -> Result<Document, String> {
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     let document = serde_json::from_slice::<Document>(json);
-    let version = match &document {
-        Ok(document) => Some((document.asset.version.clone(), document.asset.min_version.clone())),
+    let only;
+    let asset = match &document {
+        Ok(document) => Some(&document.asset),
         // Another version has other types; then it is the version that must be told.
         Err(_) => {
-            let asset = serde_json::from_slice::<VersionOnly>(json).ok().map(|only| only.asset);
-            asset.map(|asset| (asset.version, asset.min_version))
+            only = serde_json::from_slice::<VersionOnly>(json).ok();
+            only.as_ref().map(|only| &only.asset)
         }
     };
-    if let Some((version, min_version)) = version {
-        let needed = min_version.as_deref().unwrap_or(&version);
+    if let Some(asset) = asset {
+        let (version, min_version) = (&asset.version, &asset.min_version);
+        let needed = min_version.as_ref().unwrap_or(version);
         let readable = match min_version.as_deref() {
             Some(min) => min == "2.0",
             None => version.split('.').next() == Some("2"),

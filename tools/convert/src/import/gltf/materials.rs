@@ -3,7 +3,7 @@
 //!
 //! Filters of samplers are not kept: textures are averaged over what a pixel covers, whatever the sampler asks for.
 
-use super::document::{Document, Index, Lenient, Material as Json, TextureInfo, TextureTransform};
+use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform};
 use super::file::{File, Problem, item};
 use super::label;
 use crate::import::warnings::Warnings;
@@ -11,10 +11,14 @@ use bricks::{
     MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, Material, NORMAL,
 };
 use bricks::{WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT};
+use gltf::json::material::AlphaMode;
+use gltf::json::texture::{MagFilter, WrappingMode};
+use gltf::json::validation::Checked::{Invalid, Valid};
+use gltf::json::{self, Index};
 use std::collections::BTreeMap;
 
 /// Sets of texture coordinates that are read.
-const SETS: u64 = 2;
+const SETS: u32 = 2;
 
 /// An image with the way it is repeated.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,19 +58,19 @@ const SAME: [[f32; 4]; 2] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
 
 /// The textures of a material in their places.
 fn infos(material: &Json) -> [Option<&TextureInfo>; MATERIAL_TEXTURES] {
-    let pbr = &material.pbr_metallic_roughness;
-    let (color, gloss) = match &material.extensions.specular_glossiness {
+    let more = &material.more;
+    let pbr = &more.pbr_metallic_roughness;
+    let (color, gloss) = match &more.extensions.specular_glossiness {
         Some(extension) => (&extension.diffuse_texture, &None),
         None => (&pbr.base_color_texture, &pbr.metallic_roughness_texture),
     };
-    [color, &material.normal_texture, gloss, &material.occlusion_texture, &material.emissive_texture]
-        .map(Option::as_ref)
+    [color, &more.normal_texture, gloss, &more.occlusion_texture, &more.emissive_texture].map(Option::as_ref)
 }
 
 /// The set of coordinates of a texture; `None`: it is not read.
 fn set(info: &TextureInfo) -> Option<usize> {
     let transform = info.extensions.transform.as_ref();
-    let set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord).0;
+    let set = transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
     (set < SETS).then_some(set as usize)
 }
 
@@ -106,7 +110,7 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
                 continue;
             }
         };
-        let place = || label("material", index, json.name.as_deref());
+        let place = || label("material", index, json.more.name.as_deref());
         let mut material = convert(json, warnings, &place);
         for (number, info) in infos(json).into_iter().enumerate() {
             let Some(info) = info else { continue };
@@ -147,11 +151,12 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
 /// The factors and flags of a material.
 fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> Material {
     let pbr = &json.pbr_metallic_roughness;
-    let mut flags = match json.alpha_mode.as_deref() {
-        None | Some("OPAQUE") => 0,
-        Some("MASK") => MATERIAL_MASK,
-        Some("BLEND") => MATERIAL_BLEND,
-        Some(_) => {
+    let extensions = &json.more.extensions;
+    let mut flags = match json.alpha_mode {
+        Valid(AlphaMode::Opaque) => 0,
+        Valid(AlphaMode::Mask) => MATERIAL_MASK,
+        Valid(AlphaMode::Blend) => MATERIAL_BLEND,
+        Invalid => {
             warnings.add("its alpha mode is not one of glTF; opaque is used", place);
             0
         }
@@ -159,24 +164,24 @@ fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> 
     if json.double_sided {
         flags |= MATERIAL_DOUBLE_SIDED;
     }
-    if json.extensions.unlit.is_some() {
+    if extensions.unlit.is_some() {
         flags |= MATERIAL_UNLIT;
     }
-    let strength = json.extensions.emissive_strength.as_ref().and_then(|e| e.emissive_strength).unwrap_or(1.0);
+    let strength = extensions.emissive_strength.as_ref().and_then(|e| e.emissive_strength).unwrap_or(1.0);
     let mut material = Material {
-        base_color: pbr.base_color_factor.unwrap_or([1.0; 4]).map(unit),
-        emission: json.emissive_factor.map(|c| (c * strength).clamp(0.0, f32::MAX as f64) as f32),
-        metallic: unit(pbr.metallic_factor.unwrap_or(1.0)),
-        roughness: unit(pbr.roughness_factor.unwrap_or(1.0)),
-        alpha_cutoff: json.alpha_cutoff.unwrap_or(0.5).clamp(0.0, f32::MAX as f64) as f32,
+        base_color: pbr.base_color_factor.0.map(|c| unit(c.into())),
+        emission: json.more.emissive_factor.map(|c| (c * strength).clamp(0.0, f32::MAX as f64) as f32),
+        metallic: unit(pbr.metallic_factor.0.into()),
+        roughness: unit(pbr.roughness_factor.0.into()),
+        alpha_cutoff: json.alpha_cutoff.unwrap_or_default().0.clamp(0.0, f32::MAX),
         flags,
         ..default_material()
     };
-    if let Some(scale) = json.normal_texture.as_ref().and_then(|info| info.scale) {
-        material.normal_scale = scale.clamp(f32::MIN as f64, f32::MAX as f64) as f32;
+    if let Some(texture) = &json.normal_texture {
+        material.normal_scale = texture.scale.clamp(f32::MIN, f32::MAX);
     }
-    if let Some(strength) = json.occlusion_texture.as_ref().and_then(|info| info.strength) {
-        material.occlusion_strength = unit(strength);
+    if let Some(texture) = &json.occlusion_texture {
+        material.occlusion_strength = unit(texture.strength.0.into());
     }
     reflect(json, &mut material, warnings, place);
     coat(json, &mut material, warnings, place);
@@ -190,7 +195,7 @@ fn unit(x: f64) -> f32 {
 
 /// What the dielectric part reflects (KHR_materials_ior, _specular, _pbrSpecularGlossiness).
 fn reflect(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
-    let extensions = &json.extensions;
+    let extensions = &json.more.extensions;
     if let Some(extension) = &extensions.specular_glossiness {
         // Its specular colour stands for metals too.
         material.base_color = extension.diffuse_factor.unwrap_or([1.0; 4]).map(unit);
@@ -225,7 +230,7 @@ fn reflect(json: &Json, material: &mut Material, warnings: &mut Warnings, place:
 
 /// KHR_materials_clearcoat.
 fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
-    let Some(extension) = &json.extensions.clearcoat else { return };
+    let Some(extension) = &json.more.extensions.clearcoat else { return };
     material.clearcoat = unit(extension.clearcoat_factor.unwrap_or(0.0));
     material.clearcoat_roughness = unit(extension.clearcoat_roughness_factor.unwrap_or(0.0));
     let textures =
@@ -243,7 +248,7 @@ fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &d
 /// brighter so that along the normal it is as bright as it was: specular / a, and of the base colour the share that is not transmitted,
 /// (1 - t) / (1 - t c). Then surfaces reflect and transmit no more than they receive. What is lost is the tint of what is seen through.
 fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
-    let Some(extension) = &json.extensions.transmission else { return };
+    let Some(extension) = &json.more.extensions.transmission else { return };
     let transmission = unit(extension.transmission_factor.unwrap_or(0.0));
     if transmission == 0.0
         || material.metallic == 1.0 && json.pbr_metallic_roughness.metallic_roughness_texture.is_none()
@@ -282,7 +287,7 @@ fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place
 /// Images and wrap modes of a texture.
 fn texture(
     document: &Document,
-    index: Index,
+    index: Index<json::Texture>,
     warnings: &mut Warnings,
     place: &dyn Fn() -> String,
 ) -> Result<Texture, Problem> {
@@ -291,30 +296,32 @@ fn texture(
     let mut wrap = [WRAP_REPEAT; 2];
     if let Some(sampler) = texture.sampler {
         let sampler = item(&document.samplers, sampler, "sampler")?.0.as_ref().map_err(malformed)?;
-        for (wrap, code) in wrap.iter_mut().zip([sampler.wrap_s, sampler.wrap_t]) {
-            *wrap = match code.map(|code| code.0) {
-                None | Some(10497) => WRAP_REPEAT,
-                Some(33071) => WRAP_CLAMP,
-                Some(33648) => WRAP_MIRROR,
-                Some(_) => {
+        for (wrap, mode) in wrap.iter_mut().zip([sampler.wrap_s, sampler.wrap_t]) {
+            *wrap = match mode {
+                Valid(WrappingMode::Repeat) => WRAP_REPEAT,
+                Valid(WrappingMode::ClampToEdge) => WRAP_CLAMP,
+                Valid(WrappingMode::MirroredRepeat) => WRAP_MIRROR,
+                Invalid => {
                     warnings.add("the wrap mode of its texture is not one of glTF; it is repeated", place);
                     WRAP_REPEAT
                 }
             };
         }
-        if sampler.mag_filter.is_some_and(|code| code.0 == 9728) {
+        if sampler.mag_filter == Some(Valid(MagFilter::Nearest)) {
             warnings.add("its texture asks for the nearest texel; textures are always interpolated", place);
         }
     }
     // What extensions name comes first: the plain image is for readers that do not know them.
-    let extensions = [&texture.extensions.basisu, &texture.extensions.webp];
-    let sources = extensions.into_iter().flatten().map(|extension| extension.source).chain([texture.source]);
-    let sources: Vec<_> = sources.flatten().collect();
+    let extensions = &texture.more.extensions;
+    let extensions = [&extensions.basisu, &extensions.webp].into_iter().flatten();
+    // The crate takes the last index for an absent image.
+    let plain = Some(texture.source).filter(|source| source.value() != u32::MAX as usize);
+    let sources: Vec<_> = extensions.filter_map(|extension| extension.source).chain(plain).collect();
     if sources.is_empty() {
         return Err(Problem::new(format!("texture {index} names no image in a format that is read")));
     }
     let found: Vec<_> = sources.iter().map(|&image| item(&document.images, image, "image").map(|_| image)).collect();
-    let images: Vec<usize> = found.iter().flatten().map(|image| image.0 as usize).collect();
+    let images: Vec<usize> = found.iter().flatten().map(|image| image.value()).collect();
     match found.into_iter().find_map(Result::err) {
         Some(problem) if images.is_empty() => Err(problem),
         _ => Ok(Texture { images, wrap: wrap[0] | wrap[1] << 16 }),

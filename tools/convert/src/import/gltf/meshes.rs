@@ -1,6 +1,6 @@
 //! Meshes (glTF 2.0, section 3.7): primitives are checked first, which gives their triangle counts, then read in parts.
 
-use super::accessor::{Accessor, Component, Shape};
+use super::accessor::{Accessor, Shape};
 use super::document::{Document, Primitive as Json};
 use super::draco;
 use super::file::{File, Problem, item};
@@ -10,6 +10,9 @@ use crate::import::tangents;
 use crate::import::vertices::Vertices;
 use crate::import::warnings::Warnings;
 use crate::source::Primitive;
+use gltf::json::accessor::{ComponentType as Component, Type};
+use gltf::json::mesh::{Mode, Semantic};
+use gltf::json::validation::Checked::{Invalid, Valid};
 use std::io;
 
 /// How elements form triangles.
@@ -73,21 +76,21 @@ struct Geometry {
 
 const FLOAT_OR_QUANTIZED: &[Component] =
     &[Component::F32, Component::I8, Component::U8, Component::I16, Component::U16];
-const POSITION: Shape = Shape { kinds: &[("VEC3", 3)], components: FLOAT_OR_QUANTIZED, always_normalized: false };
+const POSITION: Shape = Shape { kinds: &[Type::Vec3], components: FLOAT_OR_QUANTIZED, always_normalized: false };
 const NORMAL: Shape = Shape {
-    kinds: &[("VEC3", 3)],
+    kinds: &[Type::Vec3],
     components: &[Component::F32, Component::I8, Component::I16],
     always_normalized: true,
 };
-const TANGENT: Shape = Shape { kinds: &[("VEC4", 4)], ..NORMAL };
-const TEXCOORD: Shape = Shape { kinds: &[("VEC2", 2)], components: FLOAT_OR_QUANTIZED, always_normalized: false };
+const TANGENT: Shape = Shape { kinds: &[Type::Vec4], ..NORMAL };
+const TEXCOORD: Shape = Shape { kinds: &[Type::Vec2], components: FLOAT_OR_QUANTIZED, always_normalized: false };
 const COLOR: Shape = Shape {
-    kinds: &[("VEC3", 3), ("VEC4", 4)],
+    kinds: &[Type::Vec3, Type::Vec4],
     components: &[Component::F32, Component::U8, Component::U16],
     always_normalized: true,
 };
 const INDICES: Shape = Shape {
-    kinds: &[("SCALAR", 1)],
+    kinds: &[Type::Scalar],
     components: &[Component::U8, Component::U16, Component::U32],
     always_normalized: false,
 };
@@ -121,7 +124,7 @@ pub(super) fn check(
 ) -> Result<Checked, Problem> {
     let material = json.material.and_then(|index| match item(&file.document.materials, index, "material") {
         // A malformed one is told where materials are read.
-        Ok(_) => Some(index.0 as usize),
+        Ok(_) => Some(index.value()),
         Err(problem) => {
             warnings.add("its material is not in the file; the default one is used", || {
                 format!("{} ({})", place(), problem.what)
@@ -129,24 +132,26 @@ pub(super) fn check(
             None
         }
     });
-    let topology = match json.mode.map_or(4, |mode| mode.0) {
-        0..=3 => {
+    let draco = json.more.extensions.draco.as_ref();
+    let topology = match json.mode {
+        Valid(Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) => {
             warnings.add("points and lines are left out", place);
             return Ok(Checked { material, geometry: None });
         }
-        4 => Topology::Triangles,
+        Valid(Mode::Triangles) => Topology::Triangles,
         // Draco decodes to a list of triangles whatever was compressed.
-        5 | 6 if json.extensions.draco.is_some() => Topology::Triangles,
-        5 => Topology::Strip,
-        6 => Topology::Fan,
-        mode => return Err(Problem::new(format!("mode {mode} is not one of glTF"))),
+        Valid(_) if draco.is_some() => Topology::Triangles,
+        Valid(Mode::TriangleStrip) => Topology::Strip,
+        Valid(Mode::TriangleFan) => Topology::Fan,
+        Invalid => return Err(Problem::new("its mode is not one of glTF")),
     };
-    let compressed = match &json.extensions.draco {
+    let compressed = match draco {
         Some(draco) => Some((draco, draco::find(&file.document, decoded, draco)?)),
         None => None,
     };
-    let attribute = |name: &str, shape: &Shape| {
-        let Some(&index) = json.attributes.get(name) else { return Ok(None) };
+    let attribute = |semantic: Semantic, shape: &Shape| {
+        let name = &semantic.to_string();
+        let Some(&index) = json.attributes.get(&Valid(semantic)) else { return Ok(None) };
         let plain = Accessor::resolve(file, index, shape)
             .map_err(|problem| Problem { what: format!("{name}: {}", problem.what), ..problem })?;
         let Some((draco, decoded)) = compressed else { return Ok(Some(plain)) };
@@ -160,16 +165,16 @@ pub(super) fn check(
             None => Ok(Some(plain)),
         }
     };
-    let Some(positions) = attribute("POSITION", &POSITION)? else {
+    let Some(positions) = attribute(Semantic::Positions, &POSITION)? else {
         warnings.add("without POSITION; left out", place);
         return Ok(Checked { material, geometry: None });
     };
-    let normals = attribute("NORMAL", &NORMAL)?;
-    let colors = attribute("COLOR_0", &COLOR)?;
+    let normals = attribute(Semantic::Normals, &NORMAL)?;
+    let colors = attribute(Semantic::Colors(0), &COLOR)?;
     let looks = material.and_then(|m| file.document.materials[m].0.as_ref().ok());
     let Coordinates { sets, normal } = looks.map(Coordinates::of).unwrap_or_default();
-    let uvs = attribute("TEXCOORD_0", &TEXCOORD)?;
-    let uvs1 = if sets[1] { attribute("TEXCOORD_1", &TEXCOORD)? } else { None };
+    let uvs = attribute(Semantic::TexCoords(0), &TEXCOORD)?;
+    let uvs1 = if sets[1] { attribute(Semantic::TexCoords(1), &TEXCOORD)? } else { None };
     let is_there = [uvs.is_some(), uvs1.is_some()];
     if (0..2).any(|set| sets[set] && !is_there[set]) {
         warnings.add("textured, but without texture coordinates", place);
@@ -177,14 +182,14 @@ pub(super) fn check(
     let normal_coordinates = normal.filter(|(set, _)| is_there[*set]);
     // Tangents without normals mean nothing (glTF 2.0, section 3.7.2.1).
     let has_frame = normal_coordinates.is_some() && normals.is_some();
-    let tangents = if has_frame { attribute("TANGENT", &TANGENT)? } else { None };
+    let tangents = if has_frame { attribute(Semantic::Tangents, &TANGENT)? } else { None };
     let others = [("NORMAL", &normals), ("COLOR_0", &colors), ("TEXCOORD_0", &uvs), ("TEXCOORD_1", &uvs1)];
     for (name, other) in others.into_iter().chain([("TANGENT", &tangents)]) {
         if let Some(other) = other.as_ref().filter(|other| other.count != positions.count) {
             return Err(Problem::new(format!("{name} has {} elements, POSITION {}", other.count, positions.count)));
         }
     }
-    if !json.targets.is_empty() {
+    if json.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
         warnings.add("has morph targets; its geometry is taken at rest", place);
     }
     let indices = match json.indices {

@@ -24,8 +24,8 @@ pub(super) fn decode_views(file: &mut File) -> Result<(), ImportError> {
     // Views of the same data are decoded once.
     let mut known = HashMap::new();
     for index in 0..file.document.buffer_views.len() {
-        let Some(json) = file.document.buffer_views[index].extensions.compression() else { continue };
-        let key = (json.buffer.0, json.byte_offset.0, json.byte_length.0, json.byte_stride.0, json.count.0);
+        let Some(json) = file.document.buffer_views[index].compression() else { continue };
+        let key = (json.buffer, json.byte_offset, json.byte_length, json.byte_stride, json.count);
         let key = (key, json.mode.clone(), json.filter.clone());
         let bytes = match known.get(&key) {
             Some(bytes) => Clone::clone(bytes),
@@ -48,8 +48,8 @@ pub(super) fn decode_views(file: &mut File) -> Result<(), ImportError> {
 
 /// Decodes one view; `total` counts the bytes of all.
 fn decode(file: &File, json: &Meshopt, total: &mut u64) -> Result<Vec<u8>, Problem> {
-    let encoded = file.piece(json.buffer, json.byte_offset.0, json.byte_length.0)?;
-    let (count, stride) = (json.count.0, json.byte_stride.0);
+    let encoded = file.piece(json.buffer, json.byte_offset, json.byte_length)?;
+    let (count, stride) = (json.count, json.byte_stride);
     let filter = json.filter.as_deref().unwrap_or("NONE");
     let is_sound = match json.mode.as_str() {
         "ATTRIBUTES" => {

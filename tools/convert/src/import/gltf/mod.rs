@@ -1,8 +1,17 @@
 //! glTF 2.0, as JSON or GLB.
 //!
 //! The node hierarchy of one scene becomes placements, in depth-first order; each mesh in use is stored once. Geometry is
-//! taken at rest. The `gltf` crate's validation is not used: its list of extensions is too short, and its readers trust
-//! what they are given. Instead everything that is followed is checked here, where it is followed.
+//! taken at rest.
+//!
+//! The `gltf` crate is the model of the document, without its validator. Own code does what the crate lacks:
+//!
+//! - Matrices and placements are f64 (`document`, `nodes`); the crate reads f32, too coarse far from the origin.
+//! - Extensions of geometry, materials and lights (`draco`, `meshopt`, `nodes`, `materials`, `lights`); the crate lacks
+//!   them, or reads them in f32.
+//! - Checks where something is followed (`file`, `accessor`, `nodes`). The crate's validator refuses extensions that are
+//!   read here, and its readers panic on what it would have refused.
+//! - Buffers larger than memory, read piece by piece, and decoded ones in the spool (`file`, `accessor`); the crate wants
+//!   each buffer in memory.
 //!
 //! Opening a file parses its JSON and checks the ranges of what is in use; geometry is read part by part when it is asked
 //! for, images are decoded one by one.
@@ -123,7 +132,7 @@ pub(super) fn open_within(
     }
     let image_name = |texture: &Texture| {
         let image = texture.images[0];
-        display_name(image, document.images[image].0.as_ref().ok().and_then(|image| image.name.as_deref()))
+        display_name(image, document.images[image].0.as_ref().ok().and_then(|image| image.more.name.as_deref()))
     };
     let textures: Vec<_> = textures.into_iter().map(|texture| (image_name(&texture), texture)).collect();
     let outline = Outline {

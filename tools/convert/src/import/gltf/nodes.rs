@@ -1,7 +1,7 @@
 //! The node hierarchy (glTF 2.0, section 3.5): checked to be a forest, then walked depth first.
 
-use super::accessor::{Accessor, Component, Shape};
-use super::document::{Document, Index, Uint};
+use super::accessor::{Accessor, Shape};
+use super::document::Document;
 use super::file::{File, Problem, item};
 use super::{display_name, label, lights};
 use crate::import::affine::{Affine, from_columns, from_parts, multiply};
@@ -9,6 +9,7 @@ use crate::import::error::{ImportError, one_line};
 use crate::import::warnings::Warnings;
 use crate::pattern::names;
 use bricks::PunctualLight;
+use gltf::json::accessor::{ComponentType as Component, Type};
 use std::io;
 use std::rc::Rc;
 
@@ -125,7 +126,7 @@ pub(super) fn uses(
             }
             let instances = instances(file, index).map_err(fault)?;
             // In range: `parents` checked it.
-            uses.push(Use { node: index, mesh: mesh.0 as usize, world, above: above.clone(), instances });
+            uses.push(Use { node: index, mesh: mesh.value(), world, above: above.clone(), instances });
         }
         if let Some(light) = &node.extensions.light {
             lights.extend(lights::place(document, light, &world, warnings, &|| node_place(document, index)));
@@ -140,7 +141,7 @@ pub(super) fn uses(
             }
         };
         // In range: `parents` checked them.
-        stack.extend(node.children.iter().rev().map(|&child| (child.0 as usize, world, above.clone())));
+        stack.extend(node.children.iter().rev().map(|&child| (child.value(), world, above.clone())));
     }
     let left_out = document.nodes.len() - visited;
     if left_out > 0 && document.nodes.iter().any(|node| node.mesh.is_some()) {
@@ -163,7 +164,7 @@ fn parents(file: &File) -> Result<Vec<Option<usize>>, ImportError> {
         }
         for &child in &node.children {
             item(&document.nodes, child, "node").map_err(fault)?;
-            let parent = &mut parents[child.0 as usize];
+            let parent = &mut parents[child.value()];
             if let Some(other) = *parent {
                 let what = format!("node {child} is its child, but is already a child of node {other}");
                 return Err(fault(Problem { what, remedy: "give every node one parent" }));
@@ -206,22 +207,21 @@ fn roots(file: &File, asked: Option<&str>, parents: &[Option<usize>]) -> Result<
             item(&document.nodes, node, "node").map_err(|problem| file.fault(place(index), problem))?;
         }
     }
-    let chosen: Index = match (asked, document.scene) {
+    let chosen = match (asked, &document.scene) {
         (Some(asked), _) => find_scene(document, asked).map_err(|problem| file.fault("scenes".into(), problem))?,
         (None, Some(scene)) => {
-            item(&document.scenes, scene, "scene").map_err(|problem| file.fault("default scene".into(), problem))?;
-            scene
+            item(&document.scenes, **scene, "scene").map_err(|problem| file.fault("default scene".into(), problem))?;
+            scene.value()
         }
         (None, None) if document.scenes.is_empty() => {
             return Ok((0..parents.len()).filter(|&node| parents[node].is_none()).collect());
         }
-        (None, None) => Uint(0),
+        (None, None) => 0,
     };
-    let chosen = chosen.0 as usize;
     let mut listed = vec![false; parents.len()];
     let mut roots = Vec::with_capacity(document.scenes[chosen].nodes.len());
     for &node in &document.scenes[chosen].nodes {
-        let node = node.0 as usize;
+        let node = node.value();
         let problem = match parents[node] {
             Some(parent) => format!("lists node {node}, which is a child of node {parent}"),
             None if listed[node] => format!("lists node {node} twice"),
@@ -238,10 +238,10 @@ fn roots(file: &File, asked: Option<&str>, parents: &[Option<usize>]) -> Result<
 }
 
 /// The scene named `asked`, else the one of that number.
-fn find_scene(document: &Document, asked: &str) -> Result<Index, Problem> {
+fn find_scene(document: &Document, asked: &str) -> Result<usize, Problem> {
     let named = document.scenes.iter().position(|scene| scene.name.as_deref() == Some(asked));
     let numbered = || asked.parse().ok().filter(|&number: &usize| number < document.scenes.len());
-    named.or_else(numbered).map(|scene| Uint(scene as u64)).ok_or_else(|| {
+    named.or_else(numbered).ok_or_else(|| {
         let scenes = document.scenes.iter().enumerate().take(16);
         let known: Vec<_> = scenes.map(|(i, scene)| label("scene", i, scene.name.as_deref())).collect();
         let known = if known.is_empty() { "none".into() } else { known.join(", ") };
@@ -252,9 +252,9 @@ fn find_scene(document: &Document, asked: &str) -> Result<Index, Problem> {
 
 /// The accessors of EXT_mesh_gpu_instancing, if the node has it.
 fn instances(file: &File, node: usize) -> Result<Option<Instances>, Problem> {
-    const VECTOR: Shape = Shape { kinds: &[("VEC3", 3)], components: &[Component::F32], always_normalized: false };
+    const VECTOR: Shape = Shape { kinds: &[Type::Vec3], components: &[Component::F32], always_normalized: false };
     const ROTATION: Shape = Shape {
-        kinds: &[("VEC4", 4)],
+        kinds: &[Type::Vec4],
         components: &[Component::F32, Component::I8, Component::I16],
         always_normalized: true,
     };

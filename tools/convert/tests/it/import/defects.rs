@@ -35,6 +35,8 @@ fn sound() -> Writer {
 
 #[test]
 fn every_reference_is_checked() {
+    // Those beyond 32 bits, which no list reaches, are not told apart.
+    let shown = |index: u64| if index < 1 << 32 { index.to_string() } else { "4294967294 or more".into() };
     // The place that the error must name, for each reference.
     let references = [
         ("/scene", "default scene"),
@@ -60,7 +62,7 @@ fn every_reference_is_checked() {
             *file.root.pointer_mut(pointer).unwrap() = json!(index);
             let scene = file.scene();
             assert!(scene.materials.iter().all(|material| material.base_color_texture == bricks::NONE));
-            let told = |line: &String| line.contains(place) && line.contains(&index.to_string());
+            let told = |line: &String| line.contains(place) && line.contains(&shown(index));
             assert!(scene.warnings.iter().any(told), "{pointer}: {:?}", scene.warnings);
         }
     }
@@ -68,7 +70,7 @@ fn every_reference_is_checked() {
         // The second would be index 0 in 32 bits.
         for index in [100u64, 1 << 32, u64::MAX] {
             let error = with(pointer, json!(index));
-            assert!(error.contains(place) && error.contains(&index.to_string()), "{pointer}: {error}");
+            assert!(error.contains(place) && error.contains(&shown(index)), "{pointer}: {error}");
         }
         for wrong in [json!(-1), json!(0.5), json!("0"), json!([]), json!(1e19), json!(1e300)] {
             let error = with(pointer, wrong);
