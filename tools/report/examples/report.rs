@@ -8,7 +8,7 @@ fn main() -> ExitCode {
         eprintln!("give the folder that a walk has written");
         return ExitCode::from(2);
     };
-    match brickwalk_report::write(Path::new(&dir)) {
+    match brickwalk_report::write(Path::new(&dir), &[]) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error}");
