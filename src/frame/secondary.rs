@@ -128,8 +128,7 @@ impl Methods {
 
     /// Gives the method of a kind away.
     pub fn remove<M: Secondary>(&mut self) -> Option<M> {
-        let is_own = |method: &Box<dyn Secondary>| (&**method as &dyn Any).is::<M>();
-        let index = self.0.iter().position(is_own)?;
+        let index = self.0.iter().position(|method| (&**method as &dyn Any).is::<M>())?;
         let method: Box<dyn Any> = self.0.swap_remove(index);
         method.downcast().ok().map(|method| *method)
     }

@@ -5,6 +5,7 @@ use crate::counters::{Counters, device_words};
 use crate::schedule::{BrickStates, Demand, ExecutorError, Report, Step};
 
 /// The words of the device that are counters, and which.
+#[allow(clippy::type_complexity)]
 const DEVICE_WORDS: &[(u32, fn(&mut Counters) -> &mut u64)] = device_words!();
 
 /// Where every brick lies and its part in the pass.

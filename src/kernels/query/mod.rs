@@ -2,6 +2,8 @@
 
 pub mod interval;
 pub mod pair_counts;
+// A twin's file has the name of its kernel.
+#[allow(clippy::module_inception)]
 pub mod query;
 pub mod query_all;
 pub mod query_pairs;

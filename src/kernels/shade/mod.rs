@@ -6,4 +6,6 @@ pub mod lamps;
 pub mod light;
 pub mod random;
 pub mod resolve;
+// A twin's file has the name of its kernel.
+#[allow(clippy::module_inception)]
 pub mod shade;
