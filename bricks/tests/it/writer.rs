@@ -129,7 +129,7 @@ fn an_aborted_process_leaves_the_old_file() {
     let old = fs::read(&path).unwrap();
     let test = std::env::current_exe().unwrap();
     let output = std::process::Command::new(test)
-        .args(["--exact", "--ignored", "aborts_while_writing"])
+        .args(["--exact", "--ignored", "writer::aborts_while_writing"])
         .env("BRICKS_TEST_PATH", &path)
         .output()
         .unwrap();
@@ -163,10 +163,12 @@ fn a_failing_disk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.bricks");
     let test = std::env::current_exe().unwrap();
-    let script = format!("trap '' XFSZ; ulimit -f 1; exec {} --exact --ignored writes_a_large_payload", test.display());
-    let status =
+    let options = "--exact --ignored writer::writes_a_large_payload";
+    let script = format!("trap '' XFSZ; ulimit -f 1; exec {} {options}", test.display());
+    let output =
         std::process::Command::new("sh").args(["-c", &script]).env("BRICKS_TEST_PATH", &path).output().unwrap();
-    assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stdout));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("1 passed"), "{said}");
     assert_eq!(names(folder.path()), [""; 0]);
 }
 
