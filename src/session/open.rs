@@ -68,7 +68,7 @@ impl Frame {
     /// # Errors
     /// The file cannot be written.
     pub fn write_png(&self, file: &Path) -> Result<()> {
-        Ok(png::write(file, self.size.0, self.size.1, &self.picture())?)
+        png::write(file, self.size.0, self.size.1, &self.picture())
     }
 
     /// Writes radiance, depth, normals, ids and albedo as an EXR; of a frame that was rendered with `aov`.
@@ -81,7 +81,7 @@ impl Frame {
             bail!("{}: the frame has no AOVs; render it with aov", file.display());
         }
         let (width, height) = self.size;
-        Ok(exr::write(file, &exr::Aovs { width, height, radiance, depth, normal, triangle: id, albedo })?)
+        exr::write(file, &exr::Aovs { width, height, radiance, depth, normal, triangle: id, albedo })
     }
 }
 

@@ -67,13 +67,12 @@ fn wrapped(text: &str) -> String {
             lines.push(" ".to_string());
             length = 1;
         }
-        let line = lines.last_mut().map(|line| {
+        if let Some(line) = lines.last_mut() {
             if !line.is_empty() {
                 line.push(' ');
             }
-            line
-        });
-        line.into_iter().for_each(|line| line.push_str(word));
+            line.push_str(word);
+        }
         length += more;
     }
     lines.join("\n")

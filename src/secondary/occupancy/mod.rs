@@ -110,6 +110,8 @@ crate::settings::names::names! {
     }
 }
 
+// The variants are declared by a macro, which leaves no place for `#[default]`.
+#[allow(clippy::derivable_impls)]
 impl Default for Source {
     fn default() -> Self {
         Self::Bricks
