@@ -103,9 +103,9 @@ pub fn listed(all: &[LeftOut], measured: &[Map<String, Value>]) -> Vec<Value> {
     all.iter().enumerate().map(one).collect()
 }
 
-/// What a frame of `camera`, of the scene in the file `path`, takes as it is rendered and with each of `all` kept, turn by turn: medians of the
-/// milliseconds of five frames each, after one that is not counted. Nothing is stated of what kernels decide as they
-/// run.
+/// What a frame of `camera`, of the scene in the file `path`, takes as it is rendered and with each of `all` kept, turn
+/// by turn: medians of the milliseconds of five frames each, after one that is not counted. Nothing is stated of what
+/// kernels decide as they run.
 ///
 /// # Errors
 /// The device's.

@@ -34,8 +34,8 @@ settings! {
         size: ImageSize = ImageSize { width: 1280, height: 720 }, "--size WxH", Rule::Any, "pixels", Camera, Common;
         /// Vertical field of view. [default: the path's]
         fov: Option<f64> = None, "--fov DEG", Rule::Real(MIN_FOV_Y_DEGREES, MAX_FOV_Y_DEGREES), "degrees", Camera, Usual;
-        /// Motion of instances (JSON); docs/using.md has the form. What moves is an instance: see `info --instances` and
-        /// `convert --movable`. [default: nothing moves]
+        /// Motion of instances (JSON); docs/using.md has the form. What moves is an instance: see `info --instances`
+        /// and `convert --movable`. [default: nothing moves]
         motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
 
         /// What is traced: primary, shadow, ao, diffuse, glossy, environment; with commas between them. All include
@@ -81,8 +81,9 @@ settings! {
         spp: u32 = 1, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
         /// Seed of random sampling.
         seed: u64 = 0, "--seed N", Rule::Any, "", Quality, Usual;
-        /// Exposure of PNGs and video in stops (EV), or auto. Radiance is multiplied by 2^EV before the tone map. `auto`
-        /// brings the log-average luminance of a frame to middle grey and adapts along the path. EXR keeps the radiance.
+        /// Exposure of PNGs and video in stops (EV), or auto. Radiance is multiplied by 2^EV before the tone map.
+        /// `auto` brings the log-average luminance of a frame to middle grey and adapts along the path. EXR keeps the
+        /// radiance.
         exposure: Exposure = Exposure::Fixed(0.0), "--exposure EV|auto", Rule::Real(-32.0, 32.0), "stops", Quality, Usual;
         /// How PNGs and video show what is brighter than a display: none, agx, aces, reinhard. `none` cuts off at 1;
         /// `agx` is AgX, base look; `aces` is Hill's fit of the ACES transforms; `reinhard` works on luminance, 4 is
@@ -142,9 +143,10 @@ settings! {
         without: Vec<Optimisation> = Vec::new(), "--without LIST", Rule::Any, "", Schedule, Expert;
 
         /// How secondary rays are answered: exact, roma, auto, df, dvf. `exact`: all are traced. `roma`: those of `ao`,
-        /// `shadow` and `diffuse` by occupancy maps, with a bias of a few cells and without a brick loaded. `auto`: those
-        /// of `ao` and `shadow` that the maps find free are not traced. `df`: those of `ao` and `shadow` by distance
-        /// fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first walk.
+        /// `shadow` and `diffuse` by occupancy maps, with a bias of a few cells and without a brick loaded. `auto`:
+        /// those of `ao` and `shadow` that the maps find free are not traced. `df`: those of `ao` and `shadow` by
+        /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
+        /// walk.
         secondary: Secondary = Secondary::Exact, "--secondary METHOD", Rule::Any, "", Methods, Common;
 
         /// Record which bricks every pass needed (`bricks_needed`). It takes a traversal more a pass.

@@ -119,9 +119,27 @@ impl Field {
         self.usage.split_once(' ').map(|(_, name)| name)
     }
 
+    /// What it does, and its default where that is said in words.
+    fn words(&self) -> (String, Option<String>) {
+        let text = self.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ");
+        match text.split_once(" [default: ") {
+            Some((help, default)) => (help.into(), Some(default.trim_end_matches(']').into())),
+            None => (text, None),
+        }
+    }
+
     /// What it does.
     pub fn help(&self) -> String {
-        self.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
+        self.words().0
+    }
+
+    /// What its values must be, with their unit; empty where anything will do.
+    pub fn range(&self) -> String {
+        let range = self.rule.text();
+        match self.rule {
+            Rule::Any | Rule::Bytes(_) => range,
+            _ => format!("{range} {}", self.unit).trim_end().into(),
+        }
     }
 
     /// What it does, in a sentence.
@@ -131,12 +149,12 @@ impl Field {
         end.map_or(help.clone(), |end| help[..end].into())
     }
 
-    /// Its default in words; empty where what it does says so, and of switches that are off.
+    /// Its default in words; empty of switches that are off.
     pub fn default_text(&self) -> String {
-        match (self.default)() {
-            Plain::Bool(false) if self.value_name().is_none() => String::new(),
-            _ if self.help().contains("[default:") => String::new(),
-            default => default.to_string(),
+        match (self.words().1, (self.default)()) {
+            (Some(default), _) => default,
+            (None, Plain::Bool(false)) if self.value_name().is_none() => String::new(),
+            (None, default) => default.to_string(),
         }
     }
 }

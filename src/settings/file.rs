@@ -115,7 +115,7 @@ pub fn to_toml<G: Group>(group: &G) -> String {
         }
         heading = Some(field.heading);
         let mut notes = vec![field.summary()];
-        notes.extend([field.unit.to_string(), field.rule.text()].into_iter().filter(|note| !note.is_empty()));
+        notes.extend(Some(field.range()).filter(|note| !note.is_empty()));
         if !field.names.is_empty() {
             notes.push(field.names.join(", "));
         }

@@ -9,11 +9,13 @@ const COLUMNS: usize = 120;
 const HEAD: &str = "\
 # Options
 
-Made from `src/settings/`; do not edit. `BRICKWALK_WRITE_OPTIONS=1 cargo test --lib options_page` writes it anew.
+Made from `src/settings/`; do not edit.
+`BRICKWALK_WRITE_OPTIONS=1 cargo test --release --lib options_page` writes it anew.
 
 Each option of `brickwalk walk` is a setting of `brickwalk::settings::Settings` and a key of a settings file
-(`--settings F.toml`; `--print-settings` prints one). The command line wins over the file. `-h` shows the options in bold,
-`--help` those without \"expert\", `--help-all` all. Sizes take K, M, G (powers of 1024), counts K, M (powers of 1000).
+(`--settings F.toml`; `--print-settings` prints one). The command line wins over the file. `-h` shows the options in
+bold, `--help` those without \"expert\", `--help-all` all. Sizes take K, M, G (powers of 1024), counts K, M (powers of
+1000).
 ";
 
 /// The page.
@@ -37,11 +39,7 @@ fn item(entry: &Entry) -> String {
     };
     let usage = if field.level == Level::Common { format!("**{usage}**") } else { usage };
     let mut notes = vec![format!("key `{}`", entry.key())];
-    let unit = if field.unit.is_empty() { String::new() } else { format!(" {}", field.unit) };
-    let range = field.rule.text();
-    if !range.is_empty() {
-        notes.push(format!("{range}{}", if range.starts_with("a size") { "" } else { &unit }));
-    }
+    notes.extend(Some(field.range()).filter(|range| !range.is_empty()));
     if !field.names.is_empty() && field.value_name().is_some() {
         notes.push(field.names.join(", "));
     }

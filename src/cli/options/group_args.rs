@@ -134,8 +134,8 @@ fn argument<V: View>(entry: &Entry) -> Arg {
         .long(field.flag())
         .aliases(field.aliases())
         .help_heading(field.heading.name())
-        .help(with_default(field.summary(), field.default_text()))
-        .long_help(with_default(field.help().trim_end_matches('.').into(), field.default_text()))
+        .help(with_notes(field.summary(), &[], field.default_text()))
+        .long_help(with_notes(field.help().trim_end_matches('.').into(), &[field.range()], field.default_text()))
         .allow_hyphen_values(field.is_signed || field.rule.is_signed())
         .hide_short_help(level != Some(Level::Common))
         .hide_long_help(level.is_none_or(|level| level == Level::Expert))
@@ -155,6 +155,9 @@ fn argument<V: View>(entry: &Entry) -> Arg {
     if entry.key() == "adapter" { argument.env("BRICKWALK_ADAPTER") } else { argument }
 }
 
-fn with_default(text: String, default: String) -> StyledStr {
-    if default.is_empty() { text.into() } else { format!("{text} [default: {default}]").into() }
+/// `text` with what is said in brackets after it.
+fn with_notes(text: String, notes: &[String], default: String) -> StyledStr {
+    let default = (!default.is_empty()).then(|| format!("default: {default}"));
+    let notes = notes.iter().filter(|note| !note.is_empty()).cloned().chain(default);
+    notes.fold(text, |text, note| format!("{text} [{note}]")).into()
 }

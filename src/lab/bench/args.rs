@@ -41,8 +41,8 @@ settings! {
         cache: CacheSize = CacheSize::Percent(100.0), "--cache SIZE|P%", Rule::Any, "", Cache, Common;
         /// The schedule, as `walk --schedule` has it.
         schedule: Schedule = Schedule::Chc, "--schedule NAME", Rule::Any, "", Schedule, Common;
-        /// A device to be measured, as `walk --adapter` has it. Given again: each of them, and the pictures of the others
-        /// are compared with those of the first. [default: cpu, then every graphics adapter]
+        /// A device to be measured, as `walk --adapter` has it. Given again: each of them, and the pictures of the
+        /// others are compared with those of the first. [default: cpu, then every graphics adapter]
         adapters: Lines<Adapter> = Lines::default(), "--adapter NAME", Rule::Any, "", Device, Common;
     }
 }
@@ -67,22 +67,22 @@ impl ExecutorsArgs {
 settings! {
     /// Options of `bench chc`.
     pub struct ChcArgs {
-        /// Folder for the results: chc.json, chc.md, report.html, a CSV a table, and cells.jsonl, which grows with every
-        /// walk. Started again with the same folder and settings, the bench goes on where it stopped.
+        /// Folder for the results: chc.json, chc.md, report.html, a CSV a table, and cells.jsonl, which grows with
+        /// every walk. Started again with the same folder and settings, the bench goes on where it stopped.
         output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
-        /// Small scenes, small pictures, few frames. It takes under 10 minutes on two cores without a GPU. The results say
-        /// which rules of measuring are not met.
+        /// Small scenes, small pictures, few frames. It takes under 10 minutes on two cores without a GPU. The results
+        /// say which rules of measuring are not met.
         quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
-        /// Triangles of the city, of the city out of core, and of the plant of pipes. Of the latter 16 copies are out of
-        /// core. [default: 12M,139M,13M; with --quick 100K,200K,100K]
+        /// Triangles of the city, of the city out of core, and of the plant of pipes. Of the latter 16 copies are out
+        /// of core. [default: 12M,139M,13M; with --quick 100K,200K,100K]
         triangles: Option<Counts> = None, "--triangles A,B,C", Rule::Any, "", Quality, Common;
         /// Folder of the generated scenes; what is missing is generated there. [default: DIR/scenes]
         scenes: Option<PathBuf> = None, "--scenes DIR", Rule::Any, "", Output, Common;
         /// A converted Sponza, measured beside the generated scenes. [default: none]
         sponza: Option<PathBuf> = None, "--sponza S.bricks", Rule::Any, "", Output, Common;
-        /// What to measure in this run, with commas between them. table2 (in core against both baselines), table3 (out of
-        /// core), table4 (aggressive culling), table5 (random turns), figure5 (tile sizes), targets (bytes moved against
-        /// needed), scale (the large city all resident). [default: all]
+        /// What to measure in this run, with commas between them. table2 (in core against both baselines), table3 (out
+        /// of core), table4 (aggressive culling), table5 (random turns), figure5 (tile sizes), targets (bytes moved
+        /// against needed), scale (the large city all resident). [default: all]
         stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
         /// Measure only cases whose names contain every word of TEXT. Given again: those of any TEXT. Names are such as
         /// "table2/city/100%/tile 64/near/primary,ao,diffuse/chc+fronts/threshold 0/turn 36"; cells.jsonl holds them.

@@ -14,8 +14,8 @@ settings! {
         /// Rays aimed at edges and vertices of closed meshes (case 20). Other cases take a share of them, at most 1/50.
         rays: u32 = 10_000_000, "--rays COUNT", Rule::Whole(1000, 1_000_000_000), "", Measurement, Common;
         /// Instead of the cases: measure the error against scale and against the distance from the origin. It measures
-        /// this program's arithmetic, plain f32 in world space and Möller-Trumbore, and writes tables and plots into this
-        /// folder, which is made if missing. [default: none]
+        /// this program's arithmetic, plain f32 in world space and Möller-Trumbore, and writes tables and plots into
+        /// this folder, which is made if missing. [default: none]
         errors: Option<PathBuf> = None, "--errors DIR", Rule::Any, "", Measurement, Common;
         /// Print JSON.
         json: bool = false, "--json", Rule::Any, "", Output, Common;

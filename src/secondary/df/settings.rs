@@ -15,11 +15,11 @@ settings! {
         /// With --secondary df: look-ups that a ray makes at most. One that has made them goes free, and `rays_capped`
         /// counts it. [default: 64 for `ao`, 16 for `shadow`]
         steps: Option<u32> = None, "--df-steps N", Rule::Whole(1, 1024), "", Methods, Expert;
-        /// With --secondary df: cells by which rays start off their surface. Less than 0.87 more than --df-hit, and some
-        /// surfaces shade themselves.
+        /// With --secondary df: cells by which rays start off their surface. Less than 0.87 more than --df-hit, and
+        /// some surfaces shade themselves.
         lift: f64 = 1.5, "--df-lift CELLS", Rule::Real(0.0, 8.0), "cells", Methods, Expert;
-        /// With --secondary df: distance to the middle of an occupied cell within which a ray hits. 0.5 is the face of a
-        /// cell in a layer of them; more is darker.
+        /// With --secondary df: distance to the middle of an occupied cell within which a ray hits. 0.5 is the face of
+        /// a cell in a layer of them; more is darker.
         hit: f64 = 0.5, "--df-hit CELLS", Rule::Real(0.01, 8.0), "cells", Methods, Expert;
     }
 }

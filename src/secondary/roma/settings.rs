@@ -35,18 +35,18 @@ settings! {
         shadow_k: u32 = 8, "--roma-shadow-k N", K, "", Methods, Expert;
         /// With --secondary roma: the same of `diffuse`.
         diffuse_k: u32 = 4, "--roma-diffuse-k N", K, "", Methods, Expert;
-        /// With --secondary roma: cells of a map on each axis. Of 128, 16 maps take 4 MiB for each of up to six sizes of
-        /// cells.
+        /// With --secondary roma: cells of a map on each axis. Of 128, 16 maps take 4 MiB for each of up to six sizes
+        /// of cells.
         size: u32 = 128, "--roma-size CELLS", Rule::OneOf(&[32, 64, 128, 256]), "cells", Methods, Expert;
         /// With --secondary roma: how often a cell of a map looks into the scene's cells along the ray. [default: 4,
         /// which passes over none; 2 for `ao`, where thin sheets leak a little]
         samples: Option<u32> = None, "--roma-samples N", Rule::OneOf(&[1, 2, 4]), "", Methods, Expert;
-        /// With --secondary roma or df: what maps are made of: bricks, raster. `bricks`: what every brick carries of its
-        /// cells, so that no geometry is read. `raster`: the paper's way: all triangles, 4M at most, rasterised in every
-        /// sample; thinner, with holes, and slow.
+        /// With --secondary roma or df: what maps are made of: bricks, raster. `bricks`: what every brick carries of
+        /// its cells, so that no geometry is read. `raster`: the paper's way: all triangles, 4M at most, rasterised in
+        /// every sample; thinner, with holes, and slow.
         bom: Source = Source::Bricks, "--bom SOURCE", Rule::Any, "", Methods, Expert;
-        /// With --secondary roma: which rays keep their direction rather than take that of a map, with commas between
-        /// them.
+        /// With --secondary roma: which rays keep their direction rather than take that of a map. Several have commas
+        /// between them.
         unsnapped: Vec<Unsnapped> = vec![Unsnapped::Shadow], "--roma-unsnapped LIST", Rule::Any, "", Methods, Expert;
         /// With --secondary roma: columns of cells that a ray with a direction of its own passes before it goes on in
         /// that of its map. `rays_capped` counts such rays.
@@ -55,9 +55,9 @@ settings! {
         /// The mean is that of exact rays; more take less time and are noisier. Blocks of 64 pixels go together, which
         /// shows in few rays without --rotation full, --denoise or --taa. `off`: --auto-error says which are traced.
         one_in: Option<u32> = None, "--auto-one-in N|off", Rule::Whole(2, MOST_ONE_IN as u64), "", Methods, Expert;
-        /// With --secondary auto: how many of a hundred rays of `ao` or `shadow` maps may answer wrongly; or off. Rays that
-        /// maps do not find free are traced as far as that takes, which one ray in 16 measures. `off`: they are traced to
-        /// their ends, and nothing is measured.
+        /// With --secondary auto: how many of a hundred rays of `ao` or `shadow` maps may answer wrongly; or off. Rays
+        /// that maps do not find free are traced as far as that takes, which one ray in 16 measures. `off`: they are
+        /// traced to their ends, and nothing is measured.
         error: Option<f64> = Some(2.0), "--auto-error PERCENT|off", Rule::Real(0.1, 50.0), "percent", Methods, Usual;
     }
 }

@@ -49,18 +49,19 @@ settings! {
         /// Folder for the results: dvf.json, dvf.md, report.html, a CSV a table, and rows.jsonl, which grows with every
         /// measurement. Started again with the same folder and settings, the bench goes on where it stopped.
         output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
-        /// Camera paths (JSON) of the scenes, in their order, with commas between them. [default: S.near.json beside each,
-        /// or one made from its bounds]
+        /// Camera paths (JSON) of the scenes, in their order, with commas between them. [default: S.near.json beside
+        /// each, or one made from its bounds]
         paths: Vec<PathBuf> = Vec::new(), "--paths P.json", Rule::Any, "", Camera, Common;
         /// The environment. [default: the sky over the ground]
         environment: Option<PathBuf> = None, "--environment FILE", Rule::Any, "", Light, Common;
-        /// What to measure in this run, with commas between them. points (figure 13 and table 2: points, rounding, hash and
-        /// Hammersley), grid (figure 14), rays (figure 15), lanes (figure 16), masks (their resolution, dilation, which
-        /// answers count), modes (same-sample and the paper's), flicker (of scenes in which something moves: what pictures
-        /// change from frame to frame that exact rays do not), memory (a cache of --cache, the field of what is seen).
-        /// [default: all]
+        /// What to measure in this run, with commas between them. points (figure 13 and table 2: points, rounding, hash
+        /// and Hammersley), grid (figure 14), rays (figure 15), lanes (figure 16), masks (their resolution, dilation,
+        /// which answers count), modes (same-sample and the paper's), flicker (of scenes in which something moves: what
+        /// pictures change from frame to frame that exact rays do not), memory (a cache of --cache, the field of what
+        /// is seen). [default: all]
         stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
-        /// Begin no measurement after so many minutes. The results hold what is measured until then. [default: no limit]
+        /// Begin no measurement after so many minutes. The results hold what is measured until then. [default: no
+        /// limit]
         minutes: Option<f64> = None, "--minutes N", bench::MINUTES, "", Measurement, Common;
         /// Width and height of the pictures.
         size: ImageSize = ImageSize { width: 320, height: 180 }, "--size WxH", Rule::Any, "pixels", Camera, Common;

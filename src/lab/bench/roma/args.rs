@@ -8,8 +8,8 @@ use std::path::PathBuf;
 settings! {
     /// Options of `bench roma`.
     pub struct RomaBenchArgs {
-        /// Folder for the results: roma.json, roma.md, report.html, a CSV a table, and rows.jsonl, which grows with every
-        /// job. Started again with the same folder and settings, the bench goes on where it stopped.
+        /// Folder for the results: roma.json, roma.md, report.html, a CSV a table, and rows.jsonl, which grows with
+        /// every job. Started again with the same folder and settings, the bench goes on where it stopped.
         output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
         /// Small scenes, small pictures, few samples. It takes minutes on two cores without a GPU.
         quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
@@ -20,11 +20,11 @@ settings! {
         /// A converted Sponza, measured beside the generated scenes. [default: none]
         sponza: Option<PathBuf> = None, "--sponza S.bricks", Rule::Any, "", Output, Common;
         /// What to measure in this run, with commas between them. speed (times over resolutions and numbers of
-        /// directions), ao (errors by scenes), resolution (errors by resolutions and numbers of directions), radius (errors
-        /// by the length of rays), shadows (snapped and unsnapped rays to an area light), diffuse (light of the sun by one
-        /// bounce, its errors without the sun's own), out-of-core (a cache of 15 %), handover (maps and bricks together,
-        /// out of core), seams (errors by the distance from where larger cells take over), leaks (columns that pass through
-        /// single sheets). [default: all]
+        /// directions), ao (errors by scenes), resolution (errors by resolutions and numbers of directions), radius
+        /// (errors by the length of rays), shadows (snapped and unsnapped rays to an area light), diffuse (light of the
+        /// sun by one bounce, its errors without the sun's own), out-of-core (a cache of 15 %), handover (maps and
+        /// bricks together, out of core), seams (errors by the distance from where larger cells take over), leaks
+        /// (columns that pass through single sheets). [default: all]
         stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
         /// Begin no job after so many minutes. The results hold what is measured until then. [default: no limit]
         minutes: Option<f64> = None, "--minutes N", bench::MINUTES, "", Measurement, Common;
