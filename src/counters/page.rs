@@ -6,8 +6,8 @@ use std::fmt::Write;
 const HEAD: &str = "\
 # Fields of `records.jsonl`
 
-Generated from [the table of counters](../src/counters/table.rs). `BRICKWALK_WRITE=1 cargo test --lib counters` writes this page
-anew.
+Generated from [the table of counters](../src/counters/table.rs). `BRICKWALK_WRITE=1 cargo test --lib counters` writes
+this page anew.
 
 A walk appends a line, a JSON object, for each frame and effect. `report.html` and the totals of `summary.json` are made of
 these lines.
