@@ -109,7 +109,7 @@ impl Ours {
     /// Traces a set; processor seconds. `from_root`: no lists.
     fn seconds(&mut self, set: usize, from_root: bool) -> f64 {
         let pass = if set == 1 { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
-        let Session { executor, cache, .. } = &mut self.session;
+        let Opened { executor, cache, .. } = &mut self.session;
         // As `chc` bounds its lists for camera rays, and for others.
         executor.tuning().list_most = if set == 0 { 128 } else { 12 };
         executor.set_rays(pass, &self.sets[set]);
