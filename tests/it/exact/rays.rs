@@ -1,17 +1,15 @@
 //! Records count every ray that is generated once: as traced or as answered, in every mode, on both executors.
 
-use crate::common::{city, folder, succeed};
-use brickwalk::cli::options::args::{Cli, Command};
+use crate::common::{city, folder, settings, succeed};
 use brickwalk::counters::Record;
 use brickwalk::frame::{Equirectangular, Renderer, environment};
-use brickwalk::kernels::{Extent, Lamps};
+use brickwalk::kernels::Lamps;
 use brickwalk::scene::Camera;
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::{Lamp, Pass};
 use brickwalk::secondary::dvf::answer::{Dvf, DvfTracing, Region};
 use brickwalk::secondary::dvf::{Cells, DvfSettings, DvfUse};
-use brickwalk::session::open::{Session, open_scene};
-use clap::Parser;
+use brickwalk::session::opened::{Opened, open_scene};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -36,12 +34,10 @@ const EFFECTS: [&str; 2] = ["shadow,ao,diffuse,glossy --ao-rays 4 --ao-length 64
 
 /// A renderer with a sun, and a sky or an environment.
 fn renderer(scene: &Path, adapter: &str, options: &str) -> Renderer {
-    let words = ["brickwalk", "walk", "-o", "o", "--size", "48x32", "--tile", "16", "--adapter", adapter];
-    let words = words.into_iter().chain(options.split_whitespace()).map(Into::into).chain([scene.into()]);
-    let Command::Walk(args) = Cli::parse_from::<_, std::ffi::OsString>(words).command else { panic!("it says walk") };
-    let extent = Extent { width: args.size.width, height: args.size.height, tile: args.stream.tile };
-    let session = Session::open(open_scene(scene).expect("a scene"), scene, &args.stream, extent).expect("a session");
-    let mut renderer = brickwalk::cli::walk::renderer(session, &args).expect("lamps");
+    let options = format!("--size 48x32 --tile 16 --adapter {adapter} {options}");
+    let settings = settings(&options);
+    let opened = Opened::open(open_scene(scene).expect("a scene"), scene, &settings).expect("a session");
+    let mut renderer = brickwalk::session::renderer::renderer(opened, scene, &settings).expect("lamps");
     if !options.contains("environment") {
         return renderer;
     }
