@@ -50,7 +50,7 @@ pub struct Report {
     pub most_selected: u32,
     /// What kernels of a method counted for it, from its first counter on.
     pub own: [u64; OWN_COUNTERS],
-    /// Rays that see each node, after [`Step::QueryPairs`].
+    /// Rays that see each node, after [`Step::QueryPairs`](super::Step::QueryPairs).
     pub pair_rays: Vec<u32>,
 }
 

@@ -1,6 +1,6 @@
 //! Settings: everything that can be chosen about what renders, once, as plain data.
 //!
-//! [`Settings`] is a structure with a default. The table that declares it ([`settings!`]) also says what each setting
+//! [`Settings`] is a structure with a default. The table that declares it (`settings!`) also says what each setting
 //! does, its unit, its range, its form on the command line and who needs it. The command line, settings files,
 //! `--print-settings`, `docs/options.md` and `summary.json` are views of that table. A new setting is one row there.
 //!
