@@ -4,6 +4,10 @@ use brickwalk::frame::{Equirectangular, Renderer, environment};
 use brickwalk::kernels::Lamps;
 use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::settings::{Adapter, Group, Settings};
+use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::SourceScene;
+use brickwalk_scenes::{Settings as SceneSettings, generate, write_paths};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -48,6 +52,25 @@ pub fn city(folder: &Path, triangles: &str, brick_triangles: &str) -> PathBuf {
     let scene = folder.join(format!("city-{triangles}-{brick_triangles}.bricks"));
     let words = ["scene", "city", "--triangles", triangles, "--brick-triangles", brick_triangles, "-o"];
     succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
+    scene
+}
+
+/// A source with every surface half of smooth metal, so that rays of `--effects glossy` leave all of them.
+pub fn polished(mut source: SourceScene) -> SourceScene {
+    for material in &mut source.materials {
+        (material.metallic, material.roughness) = (0.5, 0.1);
+    }
+    source
+}
+
+/// A generated city in `folder`, [`polished`].
+pub fn polished_city(folder: &Path, triangles: u64, brick_triangles: u32) -> PathBuf {
+    let scene = folder.join(format!("polished-{triangles}-{brick_triangles}.bricks"));
+    let settings = SceneSettings { triangles, ..SceneSettings::default() };
+    let city = generate(&settings, &Progress::hidden()).expect("a count in range");
+    let settings = BuildSettings { brick_triangles, ..BuildSettings::default() };
+    build(polished(city.whole()), &settings, &scene, &Progress::hidden()).expect("a scene");
+    write_paths(&city, &scene).expect("camera paths");
     scene
 }
 

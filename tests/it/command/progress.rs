@@ -1,7 +1,7 @@
 //! Caches much smaller than what a pass works on: every frame is finished, in as many fillings of the cache as it
 //! takes, and the records say how many.
 
-use crate::common::{city, folder, frames, walk};
+use crate::common::{folder, frames, polished_city, walk};
 use serde_json::Value;
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn records(output: &Path) -> Vec<Value> {
 #[test]
 fn every_frame_is_finished_by_a_cache_of_two_bricks() {
     let folder = folder();
-    let scene = city(folder.path(), "100K", "512");
+    let scene = polished_city(folder.path(), 100_000, 512);
     let bricks = bricks::SceneFile::open(&scene).expect("a scene");
     let sizes: Vec<(u64, u64)> =
         bricks.resident().bricks.iter().map(|b| (b.geometry.bytes, bricks::AttributeLayout::of(b).bytes)).collect();

@@ -1,7 +1,7 @@
 //! The invariant that everything hangs on: pixels, ids and depths do not depend on schedule, cache size, eviction,
 //! fronts, tile size, threads or run; ids and depths not on brick size.
 
-use crate::common::{self, city, folder, frames, walk};
+use crate::common::{self, city, folder, frames, polished_city, walk};
 use std::path::Path;
 
 const VIEW: &str = "--frames 3 --size 104x72 --aov";
@@ -60,7 +60,7 @@ fn frames_are_byte_identical_whatever_the_cache_and_schedule() {
 #[test]
 fn effects_do_not_depend_on_the_cache() {
     let folder = folder();
-    let scene = city(folder.path(), "60K", "1K");
+    let scene = polished_city(folder.path(), 60_000, 1000);
     let effects = "--effects shadow,ao,diffuse,glossy --ao-rays 2 --ao-length 4 --diffuse-rays 2 \
                    --rect-light -2,6,-2,4,0,0,0,0,4 --rotation full";
     let view = near(&scene).replace("--frames 3", "--frames 2");
@@ -91,7 +91,7 @@ fn effects_do_not_depend_on_the_cache() {
 #[test]
 fn light_of_the_sky_does_not_depend_on_the_cache() {
     let folder = folder();
-    let scene = city(folder.path(), "30K", "1K");
+    let scene = polished_city(folder.path(), 30_000, 1000);
     let options = "--effects shadow,diffuse,glossy,environment --environment sky --diffuse-rays 2 --rotation full";
     let view = near(&scene).replace("--frames 3", "--frames 2");
     let run = |name: &str, more: &str| {

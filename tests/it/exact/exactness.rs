@@ -268,7 +268,7 @@ fn what_is_cut_out_is_exact() {
 #[test]
 fn rotated_overlapping_instances_are_exact() {
     let folder = common::folder();
-    let scene = made(folder.path(), rotated_instances(5), 256);
+    let scene = made(folder.path(), common::polished(rotated_instances(5)), 256);
     assert!(open_scene(&scene).expect("the scene").resident().instances.len() > 8, "they stay instances");
     check("instances", &scene, "128x96", None, 8000);
     let file = open_scene(&scene).expect("the scene");
@@ -279,7 +279,7 @@ fn rotated_overlapping_instances_are_exact() {
 #[test]
 fn a_city_of_500k_triangles_is_exact() {
     let folder = common::folder();
-    let scene = common::city(folder.path(), "500K", "4K");
+    let scene = common::polished_city(folder.path(), 500_000, 4000);
     let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
     check_effects("city", &scene, "72x48", &path);
     check("city", &scene, "144x96", Some(path), 4000);

@@ -43,7 +43,7 @@ fn source(matrix: Option<[f64; 12]>, shines: bool) -> SourceScene {
         // The last material is the boxes'.
         source.materials[2].emission = [2.0, 1.0, 3.0];
     }
-    source
+    common::polished(source)
 }
 
 fn convert(folder: &Path, name: &str, source: SourceScene) -> PathBuf {

@@ -1,7 +1,7 @@
 //! What `--query-threshold` costs, as `--measure-error` records it: nothing at 0; else what a comparison of the
 //! pictures of two walks finds; and the walk itself is as without the measurement.
 
-use crate::common::{city, folder, frames, walk};
+use crate::common::{folder, frames, polished_city, walk};
 use serde_json::Value;
 use std::path::Path;
 
@@ -31,7 +31,7 @@ fn picture(output: &Path, frame: usize) -> (Vec<[f64; 3]>, Vec<u32>) {
 #[test]
 fn the_error_of_a_threshold_is_that_of_the_pictures() {
     let folder = folder();
-    let scene = city(folder.path(), "60K", "1K");
+    let scene = polished_city(folder.path(), 60_000, 1000);
     let path = scene.with_extension("near.json");
     let view = format!("--frames 3 --size 96x64 --cache 20% --tile 32 --schedule chc --aov --path {}", path.display());
     let run = |name: &str, options: &str| {

@@ -2,7 +2,7 @@
 //! few pixels, the same bricks loaded by the same queries; and it does so whatever the number of its threads, and where
 //! there is no driver.
 
-use crate::common::{brickwalk, city, folder, frames, shared_scenes, succeed, walk};
+use crate::common::{brickwalk, city, folder, frames, polished, polished_city, shared_scenes, succeed, walk};
 use exr::prelude::{FlatSamples, read_all_flat_layers_from_file};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -105,7 +105,7 @@ fn generated(folder: &Path, kind: &str) -> PathBuf {
 fn generated_scenes_look_the_same() {
     let Some(software) = software() else { return };
     let folder = folder();
-    let city = city(folder.path(), "40K", "1K");
+    let city = polished_city(folder.path(), 40_000, 1000);
     let near = format!("--path {}", city.with_extension("near.json").display());
     let lamp = "--rect-light -2,6,-2,4,0,0,0,0,4";
     let of_city = [
@@ -146,7 +146,7 @@ fn soups_and_instances_look_the_same() {
         let folder = folder();
         let scene = folder.path().join("scene.bricks");
         let settings = BuildSettings { brick_triangles: 256, ..BuildSettings::default() };
-        build(source, &settings, &scene, &Progress::hidden()).expect("a scene");
+        build(polished(source), &settings, &scene, &Progress::hidden()).expect("a scene");
         let options = format!("{EFFECTS} --schedule chc --cache 35% --tile 16");
         check(folder.path(), &software, name, &scene, &options);
     }

@@ -82,7 +82,7 @@ fn no_combination_changes_a_hit() {
     println!("seed {seed:#x}");
     let mut random = Random(seed);
     let folder = common::folder();
-    let scene = common::city(folder.path(), "40K", "1K");
+    let scene = common::polished_city(folder.path(), 40_000, 1000);
     let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
     let mut plain = open(&scene, &format!("{SIZE} --schedule plain --cache 100%"));
     let sets = effect_sets(plain.settings.effects);
@@ -222,7 +222,7 @@ fn cut(scene: &Path, options: &str) -> (Vec<FrameOutput>, Vec<FrameOutput>, Fram
 #[test]
 fn a_cut_is_a_cold_start() {
     let folder = common::folder();
-    let scene = common::city(folder.path(), "40K", "1K");
+    let scene = common::polished_city(folder.path(), 40_000, 1000);
     for (fronts, cache) in [("off", "20%"), ("on", "20%"), ("on", "100%")] {
         let options = format!("--size 72x48 --tile 16 --schedule chc --cache {cache} --fronts {fronts}");
         let (after, cold, before) = cut(&scene, &options);

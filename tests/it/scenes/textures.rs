@@ -56,7 +56,7 @@ fn total(records: &[Value], field: &str) -> u64 {
     records.iter().map(|record| record[field].as_u64().expect("a count")).sum()
 }
 
-const VIEW: &str = "--adapter cpu --frames 3 --size 320x240 --aov --effects shadow,diffuse,glossy --diffuse-rays 1";
+const VIEW: &str = "--adapter cpu --frames 3 --size 320x240 --aov --effects shadow,diffuse --diffuse-rays 1";
 
 #[test]
 fn pictures_do_not_depend_on_the_tiles_that_fit() {
@@ -133,7 +133,7 @@ fn a_bounded_frame_takes_coarser_levels_and_a_resting_camera_gets_the_exact_pict
     std::fs::write(&path, text).expect("a path");
     let frames_of_walk = 8;
     let view = format!(
-        "--adapter cpu --frames {frames_of_walk} --size 320x240 --aov --cache 100% --effects shadow,glossy --path {}",
+        "--adapter cpu --frames {frames_of_walk} --size 320x240 --aov --cache 100% --effects shadow --path {}",
         path.display()
     );
     let run = |name: &str, options: &str| {
