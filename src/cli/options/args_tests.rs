@@ -274,7 +274,8 @@ fn help_explains_units_and_defaults() {
             let optional = !argument.is_required_set() && argument.get_action().takes_values() && !is_switch;
             let has_default = !argument.get_default_values().is_empty()
                 || argument.get_help().is_some_and(|h| h.to_string().contains("[default:"));
-            let filter = ["path", "adapter", "id"].contains(&argument.get_id().as_str());
+            // Scene and output of `walk` are required unless settings are printed.
+            let filter = ["path", "adapter", "id", "scene", "output"].contains(&argument.get_id().as_str());
             assert!(!optional || has_default || filter, "{name}: {} states no default", argument.get_id());
         }
     }

@@ -448,8 +448,8 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::Seed, &plain, "hits"),
         (Defect::Light, &plain, "radiance"),
         (Defect::Lookups, &tiled, "tiles"),
-        (Defect::Maps, &plain, "columns of maps"),
-        (Defect::Fields, &plain, "distances of fields"),
+        (Defect::Maps, &plain, "columns"),
+        (Defect::Fields, &plain, "distances"),
         (Defect::LampMaps, &plain, "radiance"),
         (Defect::Points, &plain, "rays of points"),
     ];
@@ -466,7 +466,6 @@ fn a_twin_that_differs_is_noticed() {
     }
 }
 
-/// Two levels of base maps with every n-th cell or so occupied; of no n none.
 /// The distances of fields as the device keeps them.
 fn words_of(fields: &[DistanceField]) -> Vec<u32> {
     let levels = fields.iter().flat_map(|field| (0..LEVELS).map(|level| field.level(level)));
@@ -474,6 +473,7 @@ fn words_of(fields: &[DistanceField]) -> Vec<u32> {
     pairs.map(|[low, high]| u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16).collect()
 }
 
+/// Two levels of base maps with every n-th cell or so occupied; of no n none.
 fn base_maps(cells: u32, every: Option<u32>) -> Arc<Cascades> {
     let mut state = 0x2545_f491u32;
     let mut level = |cell_log2: i32, first: i64| {

@@ -48,8 +48,8 @@ settings! {
         /// With --secondary roma: which rays keep their direction rather than take that of a map. Several have commas
         /// between them.
         unsnapped: Vec<Unsnapped> = vec![Unsnapped::Shadow], "--roma-unsnapped LIST", Rule::Any, "", Methods, Expert;
-        /// With --secondary roma: columns of cells that a ray with a direction of its own passes before it goes on in
-        /// that of its map. `rays_capped` counts such rays.
+        /// With --secondary roma: columns that an unsnapped ray passes before it takes its map's direction.
+        /// `rays_capped` counts rays that did.
         steps: u32 = 8, "--roma-steps N", Rule::Whole(1, MOST_STEPS as u64), "columns", Methods, Expert;
         /// With --secondary auto: maps answer rays of `ao`, and one in N is traced, too, and corrects the mean; or off.
         /// The mean is that of exact rays; more take less time and are noisier. Blocks of 64 pixels go together, which
