@@ -10,6 +10,7 @@ use brickwalk::schedule::{Lamp, Pass};
 use brickwalk::secondary::dvf::answer::{Dvf, DvfTracing, Region};
 use brickwalk::secondary::dvf::{Cells, DvfSettings, DvfUse};
 use brickwalk::session::opened::{Opened, open_scene};
+use brickwalk::settings::Group;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -34,8 +35,8 @@ const EFFECTS: [&str; 2] = ["shadow,ao,diffuse,glossy --ao-rays 4 --ao-length 64
 
 /// A renderer with a sun, and a sky or an environment.
 fn renderer(scene: &Path, adapter: &str, options: &str) -> Renderer {
-    let options = format!("--size 48x32 --tile 16 --adapter {adapter} {options}");
-    let settings = settings(&options);
+    let mut settings = settings(&format!("--size 48x32 --tile 16 {options}"));
+    settings.set("adapter", adapter).expect("an adapter");
     let opened = Opened::open(open_scene(scene).expect("a scene"), scene, &settings).expect("a session");
     let mut renderer = brickwalk::session::renderer::renderer(opened, scene, &settings).expect("lamps");
     if !options.contains("environment") {

@@ -10,6 +10,7 @@ use crate::lab::bench::scenes::Place;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::scene::{Camera, CameraPath};
 use crate::schedule::cache::Cache;
+use crate::secondary::df::answer::Df;
 use crate::secondary::occupancy::BaseMaps;
 use crate::secondary::roma::answer::Roma;
 use crate::session::opened::{Opened, open_scene};
@@ -146,8 +147,10 @@ impl<'a> View<'a> {
             depth.is_finite().then(|| (self.camera.position + along * f64::from(depth)).to_array())
         };
         let points: Vec<Option<[f64; 3]>> = one.depth.iter().enumerate().map(point).collect();
-        if let Some(roma) = self.renderer.methods.get::<Roma>() {
-            seams.add(roma.base.levels(), &points, &one.image, &reference.image);
+        let methods = &self.renderer.methods;
+        let of_roma = methods.get::<Roma>().map(|roma| &roma.base);
+        if let Some(base) = of_roma.or(methods.get::<Df>().map(|df| &df.base)) {
+            seams.add(base.levels(), &points, &one.image, &reference.image);
         }
     }
 
