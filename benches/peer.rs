@@ -9,6 +9,7 @@
 mod common;
 
 use bricks::Payload;
+use brickwalk::Settings;
 use brickwalk::counters::Counters;
 use brickwalk::kernels::frame::{Frame, Placement};
 use brickwalk::kernels::layout::{Hit, NONE, Params, Ray, Surface, T_INFINITE};
@@ -18,7 +19,7 @@ use brickwalk::kernels::{Directions, Extent, View};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::{Lamp, Pass, Step, plain};
 use brickwalk::session::opened::{Opened, open_scene};
-use brickwalk::settings::{Adapter, CacheSize, ImageSize, Schedule, Settings};
+use brickwalk::settings::{Adapter, CacheSize, ImageSize, Schedule};
 use glam::DVec3;
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};

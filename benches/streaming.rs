@@ -4,10 +4,11 @@
 
 mod common;
 
+use brickwalk::Settings;
 use brickwalk::gpu::device::Gpu;
 use brickwalk::schedule::Load;
 use brickwalk::session::opened::{Opened, brick_bytes, open_scene};
-use brickwalk::settings::{CacheSize, ImageSize, Settings};
+use brickwalk::settings::{CacheSize, ImageSize};
 use brickwalk::stream::{Item, Slot};
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use std::path::PathBuf;

@@ -5,9 +5,10 @@
 //! ```
 
 use anyhow::{Context, Result};
+use brickwalk::Settings;
 use brickwalk::scene::Camera;
 use brickwalk::session::{Ray, Session};
-use brickwalk::settings::{CacheSize, Effect, EffectList, ImageSize, Settings};
+use brickwalk::settings::{CacheSize, Effect, EffectList, ImageSize};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::Primitive;

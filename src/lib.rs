@@ -6,13 +6,14 @@
 //!
 //! # A picture and a ray
 //!
-//! [`Session`](session::Session) opens a scene file. [`Settings`](settings::Settings) say what to render; each has a
+//! [`Session`](session::Session) opens a scene file. [`Settings`](session::Settings) say what to render; each has a
 //! default, its unit, range and meaning ([`settings`]), and a place in a settings file and on the command line.
 //!
 //! ```
 //! use brickwalk::scene::Camera;
-//! use brickwalk::session::{Ray, Session};
-//! use brickwalk::settings::{Adapter, CacheSize, ImageSize, Settings};
+//! use brickwalk::session::Ray;
+//! use brickwalk::settings::{Adapter, CacheSize, ImageSize};
+//! use brickwalk::{Session, Settings};
 //! use glam::DVec3;
 //! # use brickwalk_convert::{build::{BuildSettings, build}, progress::Progress, source::Primitive};
 //! # fn main() -> anyhow::Result<()> {
@@ -80,3 +81,5 @@ pub mod secondary;
 pub mod session;
 pub mod settings;
 pub mod stream;
+
+pub use session::{Session, Settings};

@@ -12,8 +12,8 @@ mod measures;
 mod references;
 mod report;
 
-use brickwalk::frame::Renderer;
-use brickwalk::picture::denoise::{Denoiser, Guides, Taa};
+use brickwalk::frame::{Guides, Renderer};
+use brickwalk::picture::denoise::{Denoiser, Taa};
 use brickwalk::picture::exposure::{Exposure, Meter};
 use brickwalk::picture::tone_map::ToneMap;
 use brickwalk::scene::Camera;
@@ -189,7 +189,7 @@ fn main() {
     if options.only_references {
         return;
     }
-    let tone_map = ToneMap::ALL.into_iter().find(|map| map.name() == options.tone_map).expect("a tone map");
+    let tone_map: ToneMap = options.tone_map.parse().expect("a tone map");
     let stops = Meter::new(Exposure::Auto).stops(&mean(&halves[&0][0], &halves[&0][1]), 0.0);
     let display = Display { stops, tone_map, size: options.size() };
 

@@ -1,12 +1,13 @@
 //! Pictures of many samples, kept on disk and not made twice.
 
 use super::Options;
+use brickwalk::Settings;
 use brickwalk::frame::Renderer;
 use brickwalk::output::atomic;
 use brickwalk::scene::Camera;
 use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::session::renderer;
-use brickwalk::settings::{Adapter, CacheSize, Group, ImageSize, Schedule, Settings};
+use brickwalk::settings::{Adapter, CacheSize, Group, ImageSize, Schedule};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

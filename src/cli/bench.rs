@@ -2,13 +2,15 @@
 
 use super::options::args::UNITS;
 use super::options::group_args::{GroupArgs, Of, View};
+use super::{Usage, interrupt, print};
 use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
 use crate::lab::bench::dvf::args::DvfBenchArgs;
 use crate::lab::bench::roma::args::RomaBenchArgs;
 use crate::lab::bench::{self, Experiment};
+use crate::lab::console::Console;
 use crate::lab::selftest;
 use crate::lab::selftest::args::SelftestArgs;
-use crate::settings::{Entry, Group, Lines};
+use crate::settings::{Entry, Group, Lines, SettingsError};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use std::marker::PhantomData;
@@ -81,7 +83,7 @@ struct MeasuredScenes {
 /// # Errors
 /// Those of the experiment.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    bench::run(&match &args.experiments {
+    let experiment = match &args.experiments {
         Experiments::Chc(own) => Experiment::Chc(ChcArgs { output: own.output.clone(), ..own.options.over(None)? }),
         Experiments::Executors(own) => {
             Experiment::Executors(ExecutorsArgs { output: own.output.clone(), ..own.options.over(None)? })
@@ -94,7 +96,21 @@ pub fn run(args: &BenchArgs) -> Result<()> {
             output: own.output.clone(),
             ..own.options.over(None)?
         }),
-    })
+    };
+    bench::run(&experiment, console()).map_err(in_words)
+}
+
+/// What the laboratory talks to: standard output, and Ctrl-C.
+fn console() -> Console<'static> {
+    Console { show: &print, stop: interrupt::flag(), job: &interrupt::job }
+}
+
+/// Options that do not go together are wrong usage.
+fn in_words(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast::<SettingsError>() {
+        Ok(error) => Usage(error.to_string()).into(),
+        Err(error) => error,
+    }
 }
 
 /// Options of `selftest`.
@@ -111,5 +127,5 @@ pub struct TestArgs {
 /// # Errors
 /// Those of the test.
 pub fn test(args: &TestArgs) -> Result<()> {
-    selftest::run(&args.options.over(None)?)
+    selftest::run(&args.options.over(None)?, console())
 }

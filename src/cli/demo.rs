@@ -3,7 +3,8 @@
 use super::options::args::{DemoArgs, SceneArgs, VerifyArgs};
 use super::{scene, verify, walk};
 use crate::output::atomic;
-use crate::settings::{Group, Settings};
+use crate::session::Settings;
+use crate::settings::Group;
 use anyhow::Result;
 
 /// Runs the command: what a user would type, each printed before it runs.

@@ -1,9 +1,10 @@
 //! The frame loop.
 
 use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, Methods, Moved, camera_view};
+use super::{GuideReader, Guides};
 use crate::counters::{Counters, Record};
 use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
-use crate::picture::denoise::{GuideReader, Guides, taa_jitter};
+use crate::math::sampling::pixel_jitter;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass, Shading, Step, attributes};
 use std::ops::{Deref, DerefMut};
@@ -121,7 +122,7 @@ impl Renderer {
                 camera_view(engine.scene.resident(), camera, &engine.light, &effects, engine.size, sample, seed);
             view.directions.scatter = engine.settings.guides;
             if engine.settings.taa {
-                let [x, y] = taa_jitter(frame, sample, engine.settings.samples);
+                let [x, y] = pixel_jitter(frame, sample, engine.settings.samples);
                 view.params.jitter = [x, y, 0.0, 0.0];
             }
             engine.executor.begin_frame(&view);

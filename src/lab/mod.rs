@@ -1,6 +1,7 @@
 //! The laboratory: benchmarks of the papers, the selftest, and the comparison of both executors.
 
 pub mod bench;
+pub mod console;
 #[cfg(test)]
 mod lockstep;
 pub mod selftest;

@@ -94,6 +94,16 @@ pub fn random4(pixel: u32, sample: u32, seed: u32) -> [u32; 4] {
     [a, b, c, pcg(c)]
 }
 
+/// Frames after which [`pixel_jitter`] repeats.
+const JITTER_PERIOD: u32 = 64;
+
+/// Where in its pixels sample `sample` of frame `frame` lies, of `samples` a frame: the Halton sequence in bases 2 and
+/// 3, without its first point.
+pub fn pixel_jitter(frame: u32, sample: u32, samples: u32) -> [f32; 2] {
+    let index = 1 + (frame % JITTER_PERIOD).wrapping_mul(samples).wrapping_add(sample);
+    [halton(index, 0), halton(index, 1)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,5 +193,15 @@ mod tests {
         assert_ne!(random2(7, 3, 1), random2(7, 3, 2));
         let words = random4(7, 3, 1);
         assert_eq!([words[0], words[1]].map(|w| (w >> 8) as f32 / 16_777_216.0), [x, y]);
+    }
+
+    #[test]
+    fn jitters_spread_over_the_pixel() {
+        let points: Vec<[f32; 2]> = (0..JITTER_PERIOD).map(|frame| pixel_jitter(frame, 0, 1)).collect();
+        for k in 0..2 {
+            let mean = points.iter().map(|p| p[k]).sum::<f32>() / JITTER_PERIOD as f32;
+            assert!((mean - 0.5).abs() < 0.03 && points.iter().all(|p| (0.0..1.0).contains(&p[k])), "{mean}");
+        }
+        assert_eq!(pixel_jitter(3, 1, 4), pixel_jitter(13, 0, 1));
     }
 }

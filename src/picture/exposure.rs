@@ -1,5 +1,8 @@
 //! Exposure: what radiance is multiplied by before the tone map.
 
+use super::color::luminance;
+use crate::settings::{Plain, Rule, Value};
+
 /// Middle grey, which an automatic exposure brings the log-average luminance of a frame to (Reinhard et al. 2002,
 /// equation 2).
 const MIDDLE_GREY: f64 = 0.18;
@@ -24,9 +27,22 @@ pub enum Exposure {
     Auto,
 }
 
-/// Luminance of a linear Rec. 709 colour.
-pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
+impl Value for Exposure {
+    const IS_SIGNED: bool = true;
+
+    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        f64::read(text, Rule::Real(-MOST_STOPS, MOST_STOPS), "stops, or auto").map(Self::Fixed)
+    }
+
+    fn plain(&self) -> Plain {
+        match self {
+            Self::Fixed(stops) => stops.plain(),
+            Self::Auto => Plain::Text("auto".into()),
+        }
+    }
 }
 
 /// The stops that bring the log-average luminance of `radiance` to middle grey, within [`MOST_STOPS`]; `None` of a
@@ -77,6 +93,16 @@ impl Meter {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stops_are_read_within_their_range() {
+        let read = |text: &str| Exposure::read(text, Rule::Any, "");
+        assert_eq!(read("auto"), Ok(Exposure::Auto));
+        assert_eq!(read("-2.5"), Ok(Exposure::Fixed(-2.5)));
+        for bad in ["", "bright", "nan", "33", "-33", "inf"] {
+            assert!(read(bad).is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn log_average_becomes_middle_grey() {

@@ -1,5 +1,6 @@
 //! From radiance to pictures: denoising and anti-aliasing over frames, exposure, tone maps.
 
+mod color;
 pub mod denoise;
 pub mod exposure;
 pub mod tone_map;

@@ -3,23 +3,24 @@
 //! All are functions of one pixel, from linear Rec. 709 to linear Rec. 709 of which a display shows 0 to 1; the sRGB
 //! encoding comes after them. Components below 0 and those that are no number count as 0.
 
-use super::exposure::luminance;
+use super::color::luminance;
+use crate::settings::names;
 
-/// A tone map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ToneMap {
-    /// The value itself; what is above 1 is cut off where it is encoded.
-    #[default]
-    None,
-    /// AgX, the base look: Sobotka, github.com/sobotka/AgX; matrices and the polynomial of its curve by Wrensch,
-    /// "Minimal AgX Implementation", 2023.
-    AgX,
-    /// Hill's fit of the ACES reference rendering and sRGB output transforms: Pettineo,
-    /// github.com/TheRealMJP/BakingLab, `ACES.hlsl`.
-    Aces,
-    /// Reinhard, Stark, Shirley and Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002,
-    /// equation 4, on luminance.
-    Reinhard,
+names! {
+    /// A tone map.
+    ToneMap {
+        /// The value itself; what is above 1 is cut off where it is encoded.
+        None = "none",
+        /// AgX, the base look: Sobotka, github.com/sobotka/AgX; matrices and the polynomial of its curve by Wrensch,
+        /// "Minimal AgX Implementation", 2023.
+        AgX = "agx",
+        /// Hill's fit of the ACES reference rendering and sRGB output transforms: Pettineo,
+        /// github.com/TheRealMJP/BakingLab, `ACES.hlsl`.
+        Aces = "aces",
+        /// Reinhard, Stark, Shirley and Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002,
+        /// equation 4, on luminance.
+        Reinhard = "reinhard",
+    }
 }
 
 /// Luminance that `Reinhard` shows as white: two stops above 1.
@@ -59,19 +60,6 @@ const ACES_OUTPUT: [[f32; 3]; 3] =
     [[1.604_75, -0.531_08, -0.073_67], [-0.102_08, 1.108_13, -0.006_05], [-0.003_27, -0.072_76, 1.076_02]];
 
 impl ToneMap {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::None, Self::AgX, Self::Aces, Self::Reinhard];
-
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::AgX => "agx",
-            Self::Aces => "aces",
-            Self::Reinhard => "reinhard",
-        }
-    }
-
     /// What a display shows of `color`; but for [`Self::None`], which leaves everything as it is, at least 0 and
     /// finite.
     pub fn apply(self, color: [f32; 3]) -> [f32; 3] {
@@ -120,7 +108,7 @@ mod tests {
 
     #[test]
     fn greys_stay_grey_and_in_order() {
-        for map in ToneMap::ALL {
+        for &map in ToneMap::ALL {
             let mut before = 0.0f32;
             for x in greys() {
                 let [r, g, b] = map.apply([x; 3]);
@@ -141,7 +129,7 @@ mod tests {
 
     #[test]
     fn black_stays_black() {
-        for map in ToneMap::ALL {
+        for &map in ToneMap::ALL {
             assert_eq!(map.apply([0.0; 3]), [0.0; 3], "{}", map.name());
             // The least of light is no step up.
             assert!(map.apply([f32::from_bits(1); 3])[1] < 1e-6, "{}", map.name());

@@ -3,6 +3,8 @@
 pub mod camera;
 pub mod motion;
 pub mod path;
+mod projection;
 
 pub use camera::{Camera, RayBasis};
 pub use path::{CameraPath, Keyframe, PathError, path_from_bounds};
+pub use projection::Projection;

@@ -3,6 +3,9 @@
 
 use super::{BrickStates, Executor, ExecutorError, Pass, Report, Step};
 use crate::counters::Counters;
+use crate::settings::removed::unknown;
+use crate::settings::value::value_of_name;
+use std::str::FromStr;
 
 /// What an optimisation is a part of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,6 +93,17 @@ impl Optimisation {
         Self::NAMES[self as usize]
     }
 }
+
+impl FromStr for Optimisation {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().copied().find(|which| which.name() == text);
+        found.ok_or_else(|| unknown(text, Self::NAMES, &[]))
+    }
+}
+
+value_of_name!(Optimisation);
 
 /// Most dispatches with one leaf a tile that go into a submission.
 const MOST_SINGLE_LEAVES: usize = 24;

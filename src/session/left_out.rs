@@ -6,7 +6,7 @@ use crate::frame::{Light, Renderer};
 use crate::kernels::{Keep, opacity, reflectance};
 use crate::scene::Camera;
 use crate::secondary::roma::answer::Roma;
-use crate::settings::Settings;
+use crate::session::Settings;
 use anyhow::Result;
 use bricks::SceneFile;
 use serde_json::{Map, Value, json};

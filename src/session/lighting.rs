@@ -6,7 +6,8 @@ use crate::frame::{
 };
 use crate::kernels::Lamps;
 use crate::kernels::lamps::{Emitter, Shape};
-use crate::settings::{self, Settings};
+use crate::session::Settings;
+use crate::settings;
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::{LIGHT_DISTANT, LIGHT_SPOT, PunctualLight, Resident, SceneFile};
 use exr::prelude::{MetaData, ReadChannels, ReadLayers};

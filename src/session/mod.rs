@@ -8,6 +8,7 @@ mod open;
 pub mod opened;
 mod pictures;
 pub mod renderer;
+mod settings;
 pub mod summary;
 pub mod trace;
 
@@ -15,3 +16,4 @@ pub use crate::output::npy::{Hit, Ray};
 pub use open::{Frame, Session, Watch, developed};
 pub use opened::{Opened, open_scene};
 pub use pictures::Pictures;
+pub use settings::{Settings, TRACE};

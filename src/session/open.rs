@@ -15,10 +15,11 @@ use crate::picture::exposure::Meter;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
-use crate::secondary::dvf::prepare::{Note, prepare};
+use crate::secondary::dvf::prepare::{Note, Walk, prepare};
 use crate::secondary::roma::LEAST_CELLS;
 use crate::secondary::roma::answer::Roma;
-use crate::settings::{Secondary, Settings};
+use crate::session::Settings;
+use crate::settings::Secondary;
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
 use serde_json::{Map, Value};
@@ -186,7 +187,9 @@ impl Session {
     pub fn prepare(&mut self, watch: &mut dyn Watch) -> Result<()> {
         if self.field.is_none() {
             let Self { file, settings, path, renderer, warnings, .. } = self;
-            let note = prepare(renderer, file, settings, path, warnings, &mut |rays, about| watch.field(rays, about))?;
+            let walk = Walk { path, frames: settings.frames, is_moving: settings.motion.is_some() };
+            let mut watch = |rays, about| watch.field(rays, about);
+            let note = prepare(renderer, file, &settings.dvf, &walk, warnings, &mut watch)?;
             self.field = Some(note);
         }
         Ok(())

@@ -3,8 +3,9 @@
 use super::device::Device;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::schedule::cache::{BrickBytes, Cache, SceneBytes};
+use crate::session::Settings;
 use crate::settings::sizes::option_bytes;
-use crate::settings::{CacheSize, Schedule, Settings};
+use crate::settings::{CacheSize, Schedule};
 use crate::stream::{HostCache, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;

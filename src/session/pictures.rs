@@ -5,7 +5,7 @@ use crate::output::png;
 use crate::output::video::{Video, ffmpeg_of_frames, ffmpeg_of_video};
 use crate::picture::exposure::{Exposure, Meter};
 use crate::picture::tone_map::ToneMap;
-use crate::settings::Settings;
+use crate::session::Settings;
 use anyhow::Result;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

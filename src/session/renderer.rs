@@ -8,7 +8,8 @@ use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
 use crate::secondary::df::answer::Df;
 use crate::secondary::roma::answer::Roma;
-use crate::settings::{Schedule, Secondary, Settings};
+use crate::session::Settings;
+use crate::settings::{Schedule, Secondary};
 use anyhow::Result;
 use std::path::Path;
 

@@ -9,7 +9,8 @@ use crate::secondary::df::answer::Df;
 use crate::secondary::roma::Role;
 use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::handover::{Handover, Trust};
-use crate::settings::{Schedule, Settings};
+use crate::session::Settings;
+use crate::settings::Schedule;
 use serde_json::{Map, Value, json};
 
 /// Raised when a field changes its meaning.
@@ -63,7 +64,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "secondary": s.secondary.name(),
             "roma": roma_settings(s, renderer),
             "df": field_settings(s, renderer),
-            "dvf": field.as_ref().and_then(Option::as_ref).map(|note| note.report(renderer, s, records)),
+            "dvf": field.as_ref().and_then(Option::as_ref).map(|note| note.report(renderer, &s.dvf, s.motion.is_some(), records)),
             "rsm": renderer.methods.get::<Roma>().and_then(|roma| roma.rsm.report()),
             "spp": s.spp,
             "seed": s.seed,

@@ -1,6 +1,6 @@
 //! Settings files: TOML in which every key is a setting. What is printed can be read again.
 
-use super::declare::{Entry, Group, SettingsError};
+use super::group::{Entry, Group, SettingsError};
 use super::value::Plain;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};

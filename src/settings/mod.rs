@@ -1,14 +1,14 @@
-//! Settings: everything that can be chosen about what renders, once, as plain data.
+//! What settings are: values with a default, a unit, a range and a meaning, in groups.
 //!
-//! [`Settings`] is a structure with a default. The table that declares it (`settings!`) also says what each setting
-//! does, its unit, its range, its form on the command line and who needs it. The command line, settings files,
-//! `--print-settings`, `docs/options.md` and `summary.json` are views of that table. A new setting is one row there.
+//! A group is declared once, as a table (`settings!`). The table says what each setting does, its unit, its range, its
+//! form on the command line and who needs it. The command line, settings files, `--print-settings`, `docs/options.md`
+//! and `summary.json` are views of that table. A new setting is one row there.
 //!
-//! A method of `secondary/` declares its options in its own folder; here it is one line.
+//! The table of what renders is `session/settings.rs`. A method of `secondary/` has one in its own folder.
 
-mod all;
 mod declare;
 pub mod file;
+mod group;
 pub mod names;
 pub mod page;
 pub mod removed;
@@ -16,13 +16,10 @@ pub mod sizes;
 mod types;
 pub mod value;
 
-#[cfg(test)]
-mod tests;
-
-pub use all::{Settings, TRACE};
-pub use declare::{Entry, Field, Group, Heading, Level, SettingsError};
+pub use group::{Entry, Field, Group, Heading, Level, SettingsError};
 pub use sizes::{CacheSize, ImageSize};
 pub use types::{Adapter, Direction, Effect, EffectList, Environment, Rectangle, Schedule, Secondary, Turn};
 pub use value::{Lines, Plain, Rule, Value};
 
 pub(crate) use declare::settings;
+pub(crate) use names::names;

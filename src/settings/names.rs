@@ -32,26 +32,12 @@ macro_rules! names {
             fn from_str(text: &str) -> Result<Self, String> {
                 let later: &[&[&str]] = &[$($later)?];
                 let found = Self::ALL.iter().copied().find(|value| value.name() == text);
-                found.ok_or_else(|| $crate::settings::names::unknown(text, Self::NAMES, &later.concat()))
+                found.ok_or_else(|| $crate::settings::removed::unknown(text, Self::NAMES, &later.concat()))
             }
         }
 
         $crate::settings::value::value_of_name!($name);
     };
-}
-
-/// Why a value is refused that is none of `known`; those of `later` are announced, of removed ones it says what stands
-/// in their place.
-pub fn unknown(text: &str, known: &[&str], later: &[&str]) -> String {
-    if let Some(message) = super::removed::removed(text) {
-        return message;
-    }
-    let known = known.join(", ");
-    if later.contains(&text) {
-        format!("{text} is not in this version; it has: {known}")
-    } else {
-        format!("there is no '{text}'; known: {known}")
-    }
 }
 
 pub(crate) use names;

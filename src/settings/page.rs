@@ -1,7 +1,6 @@
 //! `docs/options.md`: every setting, as the table of settings says it.
 
-use super::all::Settings;
-use super::declare::{Entry, Group, Heading, Level};
+use super::group::{Entry, Group, Heading, Level};
 
 /// Most characters of a line.
 const COLUMNS: usize = 120;
@@ -9,20 +8,20 @@ const COLUMNS: usize = 120;
 const HEAD: &str = "\
 # Options
 
-Made from `src/settings/`; do not edit.
+Made from `src/session/settings.rs` and the methods' settings; do not edit.
 `BRICKWALK_WRITE_OPTIONS=1 cargo test --release --lib options_page` writes it anew.
 
-Each option of `brickwalk walk` is a setting of `brickwalk::settings::Settings` and a key of a settings file
+Each option of `brickwalk walk` is a setting of `brickwalk::Settings` and a key of a settings file
 (`--settings F.toml`; `--print-settings` prints one). The command line wins over the file. `-h` shows the options in
 bold, `--help` those without \"expert\", `--help-all` all. Sizes take K, M, G (powers of 1024), counts K, M (powers of
 1000).
 ";
 
-/// The page.
-pub fn options_page() -> String {
+/// The page of a group.
+pub fn options_page<G: Group>() -> String {
     let mut text = String::from(HEAD);
     for heading in Heading::ALL {
-        let mut entries: Vec<Entry> = Settings::entries().into_iter().filter(|e| e.field.heading == heading).collect();
+        let mut entries: Vec<Entry> = G::entries().into_iter().filter(|e| e.field.heading == heading).collect();
         entries.sort_by_key(|entry| entry.table);
         text += &format!("\n## {}\n\n", heading.name());
         entries.iter().for_each(|entry| text += &item(entry));
@@ -74,21 +73,4 @@ fn wrapped(text: &str) -> String {
         length += more;
     }
     lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_options_page_is_that_of_the_settings() {
-        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/options.md");
-        let page = options_page();
-        assert!(page.lines().all(|line| line.chars().count() <= COLUMNS));
-        if std::env::var_os("BRICKWALK_WRITE_OPTIONS").is_some() {
-            std::fs::write(file, &page).unwrap();
-        }
-        let found = std::fs::read_to_string(file).unwrap_or_default();
-        assert!(found == page, "docs/options.md is out of date; BRICKWALK_WRITE_OPTIONS=1 writes it anew");
-    }
 }

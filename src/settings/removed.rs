@@ -17,3 +17,17 @@ pub fn removed(name: &str) -> Option<String> {
     let (_, instead) = REMOVED.iter().find(|(gone, _)| *gone == name)?;
     Some(format!("{name} was removed: {instead}"))
 }
+
+/// Why a value is refused that is none of `known`; those of `later` are announced, of removed ones it says what stands
+/// in their place.
+pub fn unknown(text: &str, known: &[&str], later: &[&str]) -> String {
+    if let Some(message) = removed(text) {
+        return message;
+    }
+    let known = known.join(", ");
+    if later.contains(&text) {
+        format!("{text} is not in this version; it has: {known}")
+    } else {
+        format!("there is no '{text}'; known: {known}")
+    }
+}

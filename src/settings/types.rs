@@ -1,11 +1,9 @@
 //! Types of settings that are no plain numbers.
 
-use super::names::{names, unknown};
+use super::names::names;
+use super::removed::unknown;
 use super::sizes::{CacheSize, ImageSize};
 use super::value::{Plain, Rule, Value, value_of_text};
-use crate::picture::exposure::{Exposure, MOST_STOPS};
-use crate::picture::tone_map::ToneMap;
-use crate::schedule::Optimisation;
 use crate::stream::Policy;
 use glam::DVec3;
 use std::convert::Infallible;
@@ -297,46 +295,17 @@ impl fmt::Display for Adapter {
 
 value_of_text!(CacheSize, ImageSize, Environment, Adapter; false);
 
-impl Value for Exposure {
-    const IS_SIGNED: bool = true;
+impl Value for Policy {
+    const NAMES: &'static [&'static str] = &["round-robin", "second-chance", "lru"];
 
     fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
-        if text == "auto" {
-            return Ok(Self::Auto);
-        }
-        f64::read(text, Rule::Real(-MOST_STOPS, MOST_STOPS), "stops, or auto").map(Self::Fixed)
+        let found = Self::ALL.iter().copied().find(|value| value.name() == text);
+        found.ok_or_else(|| unknown(text, <Self as Value>::NAMES, &[]))
     }
 
     fn plain(&self) -> Plain {
-        match self {
-            Self::Fixed(stops) => stops.plain(),
-            Self::Auto => Plain::Text("auto".into()),
-        }
+        Plain::Text(self.name().into())
     }
-}
-
-/// Enums of other modules that have `ALL` and `name`.
-macro_rules! value_of_known {
-    ($($name:ident: $names:expr;)*) => { $(
-        impl Value for $name {
-            const NAMES: &'static [&'static str] = $names;
-
-            fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
-                let found = $name::ALL.iter().copied().find(|value| value.name() == text);
-                found.ok_or_else(|| unknown(text, Self::NAMES, &[]))
-            }
-
-            fn plain(&self) -> Plain {
-                Plain::Text(self.name().into())
-            }
-        }
-    )* };
-}
-
-value_of_known! {
-    Policy: &["round-robin", "second-chance", "lru"];
-    ToneMap: &["none", "agx", "aces", "reinhard"];
-    Optimisation: Optimisation::NAMES;
 }
 
 #[cfg(test)]
@@ -348,11 +317,9 @@ mod tests {
     }
 
     #[test]
-    fn names_of_other_modules_are_all_there() {
+    fn names_of_policies_are_all_there() {
         assert_eq!(Policy::ALL.map(Policy::name), Policy::NAMES);
-        assert_eq!(ToneMap::ALL.map(ToneMap::name), <ToneMap as Value>::NAMES);
-        assert!(read::<ToneMap>("filmic").unwrap_err().contains("aces"));
-        assert_eq!(read("agx"), Ok(ToneMap::AgX));
+        assert!(read::<Policy>("mru").unwrap_err().contains("lru"));
     }
 
     #[test]
@@ -392,11 +359,6 @@ mod tests {
         assert_eq!(Turn::read("full", rule, ""), Ok(Turn::FULL));
         assert!(Turn::read("361", rule, "").unwrap_err().ends_with("or full"));
         assert!(Turn::read("nan", rule, "").is_err());
-        assert_eq!(read("auto"), Ok(Exposure::Auto));
-        assert_eq!(read("-2.5"), Ok(Exposure::Fixed(-2.5)));
-        for bad in ["", "bright", "nan", "33", "-33", "inf"] {
-            assert!(read::<Exposure>(bad).is_err(), "{bad}");
-        }
         for (text, adapter) in [("auto", Adapter::Auto), ("cpu", Adapter::Cpu), ("llvm", Adapter::Named("llvm".into()))]
         {
             assert_eq!(read(text), Ok(adapter.clone()));

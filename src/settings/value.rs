@@ -151,7 +151,7 @@ impl Value for bool {
         match text {
             "on" | "true" => Ok(true),
             "off" | "false" => Ok(false),
-            _ => Err(super::names::unknown(text, Self::NAMES, &[])),
+            _ => Err(super::removed::unknown(text, Self::NAMES, &[])),
         }
     }
 

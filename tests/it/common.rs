@@ -1,9 +1,10 @@
 //! What the integration tests share: the command as a user runs it, scenes made once, folders that vanish.
 
+use brickwalk::Settings;
 use brickwalk::frame::{Equirectangular, Renderer, environment};
 use brickwalk::kernels::Lamps;
 use brickwalk::session::opened::{Opened, open_scene};
-use brickwalk::settings::{Adapter, Group, Settings};
+use brickwalk::settings::{Adapter, Group};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;

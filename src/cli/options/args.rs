@@ -6,8 +6,9 @@ use super::inputs::{FromArgs, InputArgs};
 use super::scene_kind::{SceneKind, scene_help};
 #[cfg(feature = "lab")]
 use crate::cli::bench::{BenchArgs, TestArgs};
+use crate::session::Settings;
 use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
-use crate::settings::{Adapter, CacheSize, ImageSize, Settings, SettingsError};
+use crate::settings::{Adapter, CacheSize, ImageSize, SettingsError};
 use brickwalk_convert::build::TextureEncoding;
 use brickwalk_scenes::Stiff;
 use clap::{Args, Parser, Subcommand};

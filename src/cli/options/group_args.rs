@@ -1,8 +1,9 @@
 //! The command line as a view of settings: each is an option, with the text, the range and the default that the table
 //! of settings has for it.
 
+use crate::session::{Settings, TRACE};
 use crate::settings::value::LINE;
-use crate::settings::{Entry, Group, Level, Settings, TRACE, file};
+use crate::settings::{Entry, Group, Level, file};
 use clap::builder::StyledStr;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};

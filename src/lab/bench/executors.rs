@@ -6,21 +6,21 @@
 use super::args::{ExecutorsArgs, Settings};
 use super::plan::{SceneId, View};
 use super::scenes;
-use crate::cli::interrupt;
 use crate::frame::{Pixels, Renderer};
 use crate::gpu::device::candidates;
 use crate::kernels::DeviceInfo;
+use crate::lab::console::Console;
 use crate::output::atomic;
+use crate::session::Settings as WalkSettings;
 use crate::session::opened::{Opened, open_scene};
 use crate::session::renderer::renderer;
+use crate::settings::Adapter;
 use crate::settings::sizes::human_count;
-use crate::settings::{Adapter, Settings as WalkSettings};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 use brickwalk_report::{Table, Value};
 use serde_json::json;
 use std::path::Path;
-use std::sync::atomic::Ordering;
 
 /// Raised when a field of `executors.json` changes its meaning.
 const FORMAT: u32 = 2;
@@ -83,11 +83,11 @@ impl Side {
 /// # Errors
 /// The folder cannot be written; a scene that cannot be generated or read; a device that was asked for and cannot be
 /// had.
-pub fn run(args: &ExecutorsArgs) -> Result<()> {
+pub fn run(args: &ExecutorsArgs, console: Console) -> Result<()> {
     let settings = args.settings();
     atomic::create_folder(&args.output)?;
     let folder = args.scenes.clone().unwrap_or_else(|| args.output.join("scenes"));
-    let place = scenes::place(SceneId::City, &folder, &settings, None)?;
+    let place = scenes::place(SceneId::City, &folder, &settings, None, console)?;
     let mut notes = Vec::new();
     let mut sides = Vec::new();
     for adapter in wanted(args) {
@@ -105,7 +105,7 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
             let camera = path.frame(frame, settings.frames.max(30));
             let mut first: Option<Pixels> = None;
             for side in &mut sides {
-                if interrupt::flag().load(Ordering::Relaxed) {
+                if console.is_stopped() {
                     bail!("interrupted; nothing has been written to {}", args.output.display());
                 }
                 let output = side.renderer.frame(frame, &camera).with_context(|| side.info.name.clone())?;
@@ -129,7 +129,7 @@ pub fn run(args: &ExecutorsArgs) -> Result<()> {
     }
     progress.finish();
     let text = write(args, &settings, &sides, &notes)?;
-    crate::cli::print(&text)
+    console.show(&text)
 }
 
 /// The devices to be measured: those asked for, else the processor and every graphics adapter that has what is needed.

@@ -8,18 +8,19 @@ use super::scenes::Place;
 use crate::counters::Counters;
 use crate::counters::Record;
 use crate::frame::{Engine, Renderer};
+use crate::lab::console::Console;
 use crate::output::srgb;
 use crate::scene::path::CameraPath;
 use crate::schedule::ExecutorError;
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
+use crate::session::Settings as WalkSettings;
 use crate::session::opened::{Opened, open_scene, scaled_threshold};
 use crate::session::renderer::{render_settings, renderer};
-use crate::settings::{Adapter, CacheSize, Effect, EffectList, Settings as WalkSettings, Turn};
+use crate::settings::{Adapter, CacheSize, Effect, EffectList, Turn};
 use crate::stream::{Item, Residency};
 use anyhow::{Context, Result, bail};
-use std::sync::atomic::Ordering;
 
 /// Frames of the walk that a path is made for: the camera moves as fast in a shorter one, which ends earlier.
 const PATH_FRAMES: u32 = 30;
@@ -147,13 +148,12 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// A brick that cannot be read, the device's, pixels that are not finite.
-    pub fn walk(&mut self, case: &Case) -> Result<Option<Passes>> {
+    pub fn walk(&mut self, case: &Case, console: Console) -> Result<Option<Passes>> {
         self.prepare(case)?;
         let path = self.place.path(case.view)?;
-        let stop = crate::cli::interrupt::flag();
         let mut passes = Passes::new();
         for frame in 0..self.settings.frames {
-            if stop.load(Ordering::Relaxed) {
+            if console.is_stopped() {
                 return Ok(None);
             }
             for record in self.frame(&path, frame)?.records {
@@ -170,19 +170,18 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// As [`Self::walk`].
-    pub fn picture_error(&mut self, case: &Case) -> Result<Option<PictureError>> {
+    pub fn picture_error(&mut self, case: &Case, console: Console) -> Result<Option<PictureError>> {
         if case.variant.threshold == THRESHOLDS[0] {
             return Ok(None);
         }
         let path = self.place.path(case.view)?;
         let exact = Case { variant: Variant { threshold: THRESHOLDS[0], ..case.variant }, ..*case };
-        let stop = crate::cli::interrupt::flag();
         let last = self.settings.frames - 1;
         let mut frames: Vec<u32> = (0..5).map(|k| k * last / 4).collect();
         frames.dedup();
         let mut all = PictureError::default();
         for &frame in &frames {
-            if stop.load(Ordering::Relaxed) {
+            if console.is_stopped() {
                 return Ok(None);
             }
             let mut picture = |case: &Case| -> Result<Vec<[u8; 3]>> {

@@ -20,10 +20,11 @@ mod rows;
 mod scenes;
 mod tables;
 
-use crate::cli::interrupt;
 use crate::kernels::DeviceInfo;
+use crate::lab::console::Console;
 use crate::output::atomic;
 use crate::session::device::Device;
+use crate::settings::SettingsError;
 use crate::settings::sizes::human_count;
 use anyhow::{Result, bail};
 use args::{ChcArgs, ExecutorsArgs, Settings};
@@ -34,7 +35,6 @@ use measure::{Bench, DoesNotFit};
 use plan::{Case, Group, PLAIN_BVH2, Scope};
 use roma::args::RomaBenchArgs;
 use serde_json::json;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// What can be measured.
@@ -54,23 +54,22 @@ pub enum Experiment {
 ///
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
-pub fn run(experiment: &Experiment) -> Result<()> {
+pub fn run(experiment: &Experiment, console: Console) -> Result<()> {
     let args = match experiment {
         Experiment::Chc(args) => args,
-        Experiment::Executors(args) => return executors::run(args),
-        Experiment::Roma(args) => return roma::run(args),
-        Experiment::Dvf(args) => return dvf::run(args),
+        Experiment::Executors(args) => return executors::run(args, console),
+        Experiment::Roma(args) => return roma::run(args, console),
+        Experiment::Dvf(args) => return dvf::run(args, console),
     };
     let settings = args.settings();
     if settings.frames <= settings.skip {
-        return Err(
-            crate::cli::Usage(format!("--frames {}: it must be above {}", settings.frames, settings.skip)).into()
-        );
+        let text = format!("--frames {}: it must be above {}", settings.frames, settings.skip);
+        return Err(SettingsError::Conflict(text).into());
     }
-    chc(args, &settings)
+    chc(args, &settings, console)
 }
 
-fn chc(args: &ChcArgs, settings: &Settings) -> Result<()> {
+fn chc(args: &ChcArgs, settings: &Settings, console: Console) -> Result<()> {
     let start = Instant::now();
     let scope = |stages| Scope { stages, sponza: args.sponza.is_some(), tile: settings.tile, repeat: settings.repeat };
     let mut wanted = plan::groups(&scope(args.stages()));
@@ -79,26 +78,23 @@ fn chc(args: &ChcArgs, settings: &Settings) -> Result<()> {
     }
     wanted.retain(|group| !group.cases.is_empty());
     if wanted.is_empty() {
-        return Err(crate::cli::Usage(format!(
-            "--only {}: no case of these stages has such a name",
-            args.only.0.join(", ")
-        ))
-        .into());
+        let text = format!("--only {}: no case of these stages has such a name", args.only.0.join(", "));
+        return Err(SettingsError::Conflict(text).into());
     }
     atomic::create_folder(&args.output)?;
     let header = header(args, settings)?;
     let mut cells = Cells::open(&args.output, header, args.resume)?;
     let deadline = args.minutes.map(|minutes| start + Duration::from_secs_f64(60.0 * minutes));
-    let mut run = Run { args, settings, cells: &mut cells, notes: Vec::new(), deadline };
+    let mut run = Run { args, settings, console, cells: &mut cells, notes: Vec::new(), deadline };
     let ended = run.measure(&wanted)?;
     let notes = std::mem::take(&mut run.notes);
     // What earlier runs measured of other stages is shown, too.
     let all = plan::groups(&scope(plan::Stage::ALL.to_vec()));
     let text = output::write(&args.output, settings, &cells, &all, &notes)?;
-    crate::cli::print(&text)?;
+    console.show(&text)?;
     match ended {
         Ended::Finished => Ok(()),
-        Ended::OutOfTime => crate::cli::print("Out of time: the same command goes on where this one stopped.\n"),
+        Ended::OutOfTime => console.show("Out of time: the same command goes on where this one stopped.\n"),
         Ended::Interrupted => {
             bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display())
         }
@@ -140,6 +136,7 @@ enum Ended {
 struct Run<'a> {
     args: &'a ChcArgs,
     settings: &'a Settings,
+    console: Console<'a>,
     cells: &'a mut Cells,
     /// What was not measured, and why.
     notes: Vec<String>,
@@ -165,7 +162,7 @@ impl Run<'_> {
                 return Ok(ended);
             }
             let folder = self.args.scenes.clone().unwrap_or_else(|| self.args.output.join("scenes"));
-            let place = scenes::place(first.scene, &folder, self.settings, self.args.sponza.as_deref())?;
+            let place = scenes::place(first.scene, &folder, self.settings, self.args.sponza.as_deref(), self.console)?;
             let wants_binary = open.iter().any(|case| case.variant.schedule == PLAIN_BVH2.schedule);
             let mut bench = match Bench::open(first, &place, self.settings, &self.args.adapter, wants_binary) {
                 Ok(bench) => bench,
@@ -194,7 +191,7 @@ impl Run<'_> {
 
     /// Whether to begin no other walk.
     fn ended(&self) -> Option<Ended> {
-        if interrupt::flag().load(Ordering::Relaxed) {
+        if self.console.is_stopped() {
             return Some(Ended::Interrupted);
         }
         self.deadline.is_some_and(|deadline| Instant::now() >= deadline).then_some(Ended::OutOfTime)
@@ -211,9 +208,9 @@ impl Run<'_> {
                 if let Some(ended) = self.ended() {
                     return Ok(Some(ended));
                 }
-                let Some(passes) = bench.walk(case)? else { return Ok(Some(Ended::Interrupted)) };
+                let Some(passes) = bench.walk(case, self.console)? else { return Ok(Some(Ended::Interrupted)) };
                 // The pictures are the same in every walk.
-                let error = if repetition == 0 { bench.picture_error(case)? } else { None };
+                let error = if repetition == 0 { bench.picture_error(case, self.console)? } else { None };
                 if let Some(ended @ Ended::Interrupted) = self.ended() {
                     return Ok(Some(ended));
                 }

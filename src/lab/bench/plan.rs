@@ -48,7 +48,7 @@ impl Value for Stage {
     fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
         let names = Self::ALL.map(Self::name);
         let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
-        found.ok_or_else(|| crate::settings::names::unknown(text, &names, &[]))
+        found.ok_or_else(|| crate::settings::removed::unknown(text, &names, &[]))
     }
 
     fn plain(&self) -> Plain {

@@ -2,7 +2,7 @@
 
 use super::args::Settings;
 use super::plan::{SceneId, View};
-use crate::cli::interrupt;
+use crate::lab::console::Console;
 use crate::output::atomic;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use anyhow::{Context, Result};
@@ -42,7 +42,13 @@ impl Place {
 ///
 /// # Errors
 /// It cannot be generated, or is no scene.
-pub fn place(scene: SceneId, folder: &Path, settings: &Settings, sponza: Option<&Path>) -> Result<Place> {
+pub fn place(
+    scene: SceneId,
+    folder: &Path,
+    settings: &Settings,
+    sponza: Option<&Path>,
+    console: Console,
+) -> Result<Place> {
     let [city, large, pipes] = settings.triangles;
     let (kind, triangles, copies) = match scene {
         SceneId::Sponza => {
@@ -65,7 +71,7 @@ pub fn place(scene: SceneId, folder: &Path, settings: &Settings, sponza: Option<
         atomic::create_folder(folder)?;
         // Small scenes are cut finer, so that shares of the cache hold several bricks.
         let brick_triangles = (triangles / LEAST_BRICKS).clamp(1, 16_384) as u32;
-        make(&Generated { kind, triangles, copies, ..Generated::default() }, brick_triangles, &file)?;
+        make(&Generated { kind, triangles, copies, ..Generated::default() }, brick_triangles, &file, console)?;
     }
     Ok(Place { scene: file, otherwise: None })
 }
@@ -74,9 +80,9 @@ pub fn place(scene: SceneId, folder: &Path, settings: &Settings, sponza: Option<
 ///
 /// # Errors
 /// It cannot have so many triangles; the file cannot be written.
-pub fn make(settings: &Generated, brick_triangles: u32, file: &Path) -> Result<()> {
+pub fn make(settings: &Generated, brick_triangles: u32, file: &Path, console: Console) -> Result<()> {
     let name = || file.display().to_string();
-    let progress = interrupt::job();
+    let progress = (console.job)();
     let scene = generate(settings, &progress).with_context(name)?;
     let movable = settings.kind.movable().iter().map(|&name| name.to_owned()).collect();
     let build = BuildSettings { movable, brick_triangles, ..BuildSettings::default() };

@@ -19,7 +19,7 @@ use glam::DVec3;
 use std::any::Any;
 use std::sync::Arc;
 
-crate::settings::names::names! {
+crate::settings::names! {
     /// What is planted.
     Defect {
         /// Vertices and origins in f32 relative to the world's origin.

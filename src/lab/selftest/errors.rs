@@ -11,6 +11,7 @@
 //! and D has no part in it.
 
 use super::args::SelftestArgs;
+use crate::lab::console::Console;
 use crate::math::exact::{intersect_triangle, ray_frame};
 use crate::output::atomic;
 use crate::reference::{Truth, TruthInstance, TruthObject, TruthRay, TruthTriangle};
@@ -223,7 +224,7 @@ struct Sweep {
 ///
 /// # Errors
 /// The folder cannot be written.
-pub fn run(args: &SelftestArgs, folder: &std::path::Path) -> Result<()> {
+pub fn run(args: &SelftestArgs, folder: &std::path::Path, console: Console) -> Result<()> {
     atomic::create_folder(folder)?;
     let measured = |radius_log2: i32, distance: f64| -> Result<[Wrong; 4]> {
         Ok(measure(&Place::new(radius_log2, distance, args.seed)?, args.seed))
@@ -247,7 +248,7 @@ pub fn run(args: &SelftestArgs, folder: &std::path::Path) -> Result<()> {
     let sweeps = [far, scale];
     atomic::write(&folder.join("errors.md"), markdown(args, &sweeps).as_bytes())?;
     write_sheet(folder, &sheet(args, &sweeps))?;
-    crate::cli::print(&format!("{} and report.html beside it\n", folder.join("errors.md").display()))
+    console.show(&format!("{} and report.html beside it\n", folder.join("errors.md").display()))
 }
 
 const READING: &str = "A closed bumpy sphere of 320 triangles, radius 1 m or as said, on a lattice of 2^-14 of its radius, against exact \

@@ -32,6 +32,7 @@ use crate::cpu;
 use crate::gpu::probe;
 use crate::gpu::probe::ProbeReport;
 use crate::kernels::DeviceInfo;
+use crate::lab::console::Console;
 use crate::session::device::Device;
 use anyhow::{Result, bail};
 use args::SelftestArgs;
@@ -88,15 +89,15 @@ pub struct Report {
 ///
 /// # Errors
 /// A case fails; there is no device.
-pub fn run(args: &SelftestArgs) -> Result<()> {
+pub fn run(args: &SelftestArgs, console: Console) -> Result<()> {
     if let Some(folder) = &args.errors {
-        return errors::run(args, folder);
+        return errors::run(args, folder, console);
     }
     let report = test(args)?;
     if args.json {
-        crate::cli::print_json(&report)?;
+        console.show(&(serde_json::to_string_pretty(&report)? + "\n"))?;
     } else {
-        crate::cli::print(&as_text(&report))?;
+        console.show(&as_text(&report))?;
     }
     if report.failed > 0 {
         let failed = report.rows.iter().filter(|row| row.status == Status::Fail);

@@ -4,7 +4,8 @@
 //! so it does not confirm them.
 
 use super::grid::Grid;
-use super::{Seen, lerp, luminance};
+use crate::frame::Seen;
+use crate::picture::color::{lerp, luminance};
 
 /// Neighbourhood of the test for change, pixels to each side.
 const TEST_RADIUS: i32 = 5;

@@ -1,7 +1,8 @@
 //! The edge-avoiding à-trous wavelet: five levels of a 5x5 B-spline with holes, 1, 2, 4, 8 and 16 pixels apart.
 
 use super::grid::Grid;
-use super::{Seen, luminance};
+use crate::frame::Seen;
+use crate::picture::color::luminance;
 
 /// Levels; the pixels of level k are 2^k apart.
 pub const LEVELS: u32 = 5;

@@ -1,6 +1,7 @@
 //! Light without what it falls on, and back.
 
-use super::{Guides, is_finite};
+use crate::frame::Guides;
+use crate::picture::color::is_finite;
 use rayon::prelude::*;
 
 /// Channels of an albedo below this are not divided by: their light goes around the filter, so that black stays black

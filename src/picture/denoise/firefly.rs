@@ -1,7 +1,8 @@
 //! Fireflies: single pixels far brighter than their neighbours.
 
 use super::grid::Grid;
-use super::{Seen, luminance};
+use crate::frame::Seen;
+use crate::picture::color::luminance;
 
 /// Neighbours are looked for so far away, pixels: where one ray in thirty finds light, nine of ten that do have another
 /// among 80.

@@ -5,7 +5,9 @@ use super::atrous;
 use super::atrous::Lit;
 use super::grid::Grid;
 use super::reproject::Taps;
-use super::{Moments, Seen, firefly, is_finite, lerp, luminance};
+use super::{Moments, firefly};
+use crate::frame::Seen;
+use crate::picture::color::{is_finite, lerp, luminance};
 
 /// Frames that the long average weighs alike; after them a new one weighs 1/12.
 const LONG: f32 = 12.0;

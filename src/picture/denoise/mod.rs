@@ -26,22 +26,20 @@ mod atrous;
 mod demodulate;
 mod firefly;
 mod grid;
-mod guides;
 mod layer;
 mod moments;
-mod projection;
 mod reproject;
 mod resolve;
 mod taa;
 
 pub use demodulate::LEAST_ALBEDO;
-pub use guides::{GuideReader, Guides, Seen};
 pub use layer::{Kind, Layer, LayerReport};
 pub use moments::Moments;
-pub use projection::Projection;
 pub use resolve::Resolve;
-pub use taa::{Taa, taa_jitter};
+pub use taa::Taa;
 
+use super::color::luminance;
+use crate::frame::Guides;
 use demodulate::{demodulate, recompose};
 use grid::Grid;
 use reproject::reproject;
@@ -117,19 +115,4 @@ impl Denoiser {
         self.before = Some(guides);
         done.non_finite
     }
-}
-
-/// Luminance of linear Rec. 709.
-pub(crate) fn luminance(c: [f32; 3]) -> f32 {
-    0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
-}
-
-/// `a` on the way to `b` by the share `t`; exactly `b` at 1.
-fn lerp(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
-    if t >= 1.0 { b } else { [0, 1, 2].map(|k| a[k] + t * (b[k] - a[k])) }
-}
-
-/// Whether all of a colour is finite.
-fn is_finite(c: &[f32; 3]) -> bool {
-    c.iter().all(|x| x.is_finite())
 }

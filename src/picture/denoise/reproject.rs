@@ -1,7 +1,7 @@
 //! Where a pixel's surface was in the frame before.
 
 use super::grid::Grid;
-use super::{Guides, Seen};
+use crate::frame::{Guides, Seen};
 
 /// Pixels of the frame before that show a pixel's surface, with weights that sum to 1; of weight 0 are those that do
 /// not count.

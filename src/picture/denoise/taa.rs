@@ -7,22 +7,14 @@
 //! edges take theirs along.
 
 use super::grid::Grid;
-use super::{Guides, Projection, is_finite, lerp};
-use crate::math::sampling::halton;
+use crate::frame::Guides;
+use crate::picture::color::{is_finite, lerp};
+use crate::scene::Projection;
 
 /// What a new frame weighs.
 const NEW: f32 = 0.1;
 /// Standard deviations of the new frame's neighbours that the history may be off.
 const DEVIATIONS: f32 = 1.25;
-/// Frames after which the points in the pixels repeat.
-const PERIOD: u32 = 64;
-
-/// Where in its pixels sample `sample` of frame `frame` lies, of `samples` a frame: the Halton sequence in bases 2 and
-/// 3, without its first point.
-pub fn taa_jitter(frame: u32, sample: u32, samples: u32) -> [f32; 2] {
-    let index = 1 + (frame % PERIOD).wrapping_mul(samples).wrapping_add(sample);
-    [halton(index, 0), halton(index, 1)]
-}
 
 /// Averages frame after frame.
 #[derive(Clone, Debug, Default)]
@@ -144,15 +136,5 @@ mod tests {
         for t in [0.125f32, 0.5, 0.875] {
             assert!((catmull_rom(t).iter().sum::<f32>() - 1.0).abs() < 1e-6);
         }
-    }
-
-    #[test]
-    fn points_spread_over_the_pixel() {
-        let points: Vec<[f32; 2]> = (0..PERIOD).map(|frame| taa_jitter(frame, 0, 1)).collect();
-        for k in 0..2 {
-            let mean = points.iter().map(|p| p[k]).sum::<f32>() / PERIOD as f32;
-            assert!((mean - 0.5).abs() < 0.03 && points.iter().all(|p| (0.0..1.0).contains(&p[k])), "{mean}");
-        }
-        assert_eq!(taa_jitter(3, 1, 4), taa_jitter(13, 0, 1));
     }
 }

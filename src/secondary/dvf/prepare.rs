@@ -8,7 +8,6 @@ use crate::counters::Record;
 use crate::frame::{RenderError, Renderer};
 use crate::output::atomic;
 use crate::scene::path::CameraPath;
-use crate::settings::Settings;
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -32,7 +31,17 @@ pub struct Note {
 /// Who watches rays being traced: how many have been, about how many there are; says whether to go on.
 pub type Watch<'a> = dyn FnMut(u64, u64) -> bool + 'a;
 
-/// Gives `renderer`, of the scene in `file`, the field that its settings ask for. Nothing is done where no rays lead to
+/// What a field is made for.
+pub struct Walk<'a> {
+    /// Where the camera goes.
+    pub path: &'a CameraPath,
+    /// In how many frames.
+    pub frames: u32,
+    /// Instances move meanwhile.
+    pub is_moving: bool,
+}
+
+/// Gives `renderer`, of the scene in `file`, the field that `options` ask for, for a walk. Nothing is done where no rays lead to
 /// an environment.
 ///
 /// # Errors
@@ -40,8 +49,8 @@ pub type Watch<'a> = dyn FnMut(u64, u64) -> bool + 'a;
 pub fn prepare(
     renderer: &mut Renderer,
     file: &Path,
-    settings: &Settings,
-    path: &CameraPath,
+    options: &Options,
+    walk: &Walk,
     warnings: &mut Vec<String>,
     watch: &mut Watch,
 ) -> Result<Option<Note>> {
@@ -52,7 +61,6 @@ pub fn prepare(
         );
         return Ok(None);
     }
-    let options = &settings.dvf;
     if options.how().paper && renderer.settings.effects.diffuse.is_some() {
         bail!(
             "--dvf-mode paper goes without diffuse in --effects, which would bring the environment's light again; use --dvf-mode same-sample"
@@ -63,8 +71,8 @@ pub fn prepare(
     let region = match options.region {
         RegionKind::Scene => Region::scene(renderer.scene.resident()),
         RegionKind::View => {
-            let views = settings.frames.min(MOST_VIEWS);
-            let cameras: Vec<_> = (0..views).map(|view| path.frame(view, views)).collect();
+            let views = walk.frames.min(MOST_VIEWS);
+            let cameras: Vec<_> = (0..views).map(|view| walk.path.frame(view, views)).collect();
             renderer.visible_region(&cameras).with_context(|| name.clone())?
         }
     };
@@ -82,7 +90,7 @@ pub fn prepare(
         }
     };
     let mut dvf = Dvf::new(Arc::new(kept.finished(making.dilate)), options.how());
-    if settings.motion.is_some() && options.renew > 0 {
+    if walk.is_moving && options.renew > 0 {
         dvf = dvf.renewed_by(renewal(options, Arc::new(kept), region));
     }
     renderer.methods.set(dvf);
@@ -144,12 +152,11 @@ pub fn make(
 }
 
 impl Note {
-    /// As summaries have it.
-    pub fn report(&self, renderer: &Renderer, settings: &Settings, records: &[Record]) -> Value {
+    /// As summaries have it; `is_moving`: instances move, so that cells are made anew.
+    pub fn report(&self, renderer: &Renderer, options: &Options, is_moving: bool, records: &[Record]) -> Value {
         let Some(field) = renderer.methods.get::<Dvf>().and_then(Dvf::field) else { return Value::Null };
         let own = || records.iter().filter(|record| record.pass == DVF_EFFECT);
         let sum = |of: &dyn Fn(&Record) -> u64| own().map(of).sum::<u64>();
-        let options = &settings.dvf;
         json!({
             "file": self.file.file_name().map(|name| name.to_string_lossy()),
             "points_asked": options.points,
@@ -166,7 +173,7 @@ impl Note {
             "region": options.region.name(),
             "mode": options.mode.name(),
             "trust": options.trust.name(),
-            "renew": settings.motion.as_ref().map(|_| json!({
+            "renew": is_moving.then(|| json!({
                 "rays_a_frame": options.renew,
                 "rays": sum(&|record| record.rays()),
                 "cells": sum(&|record| record.cells_renewed),

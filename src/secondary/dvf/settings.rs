@@ -2,7 +2,7 @@
 
 use super::answer::DvfTracing;
 use super::{CELLS, Cells, DvfSettings, DvfUse, POINTS, RAYS};
-use crate::settings::names::names;
+use crate::settings::names;
 use crate::settings::{Plain, Rule, Value, settings};
 use std::path::PathBuf;
 

@@ -100,7 +100,7 @@ impl Bom {
     }
 }
 
-crate::settings::names::names! {
+crate::settings::names! {
     /// What base maps are made of.
     Source {
         /// The maps that bricks carry. No geometry is read, and no occupied cell is missed.

@@ -1,9 +1,9 @@
 //! Denoising and temporal anti-aliasing, frame after frame, against pictures of many samples.
 
 use crate::common;
-use brickwalk::frame::{FrameOutput, Light, Renderer};
+use brickwalk::frame::{FrameOutput, Guides, Light, Renderer};
 use brickwalk::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr};
-use brickwalk::picture::denoise::{Denoiser, Guides, Taa};
+use brickwalk::picture::denoise::{Denoiser, Taa};
 use brickwalk::scene::Camera;
 use glam::DVec3;
 use std::path::{Path, PathBuf};

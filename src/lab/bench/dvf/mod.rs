@@ -12,19 +12,20 @@ mod plots;
 use super::cells::Header;
 use super::rows::{Row, Rows};
 use super::scenes;
-use crate::cli::interrupt;
 use crate::frame::Renderer;
 use crate::kernels::DeviceInfo;
+use crate::lab::console::Console;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::output::atomic;
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::secondary::dvf::answer::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Region};
 use crate::secondary::dvf::{Options, RegionKind, prepare};
+use crate::session::Settings;
 use crate::session::device::Device;
 use crate::session::opened::{Opened, open_scene};
 use crate::session::renderer::renderer;
-use crate::settings::{CacheSize, Effect, EffectList, Environment, Settings};
+use crate::settings::{CacheSize, Effect, EffectList, Environment};
 use anyhow::{Context, Result, bail};
 use args::{DvfBenchArgs, Measurement, Stage};
 use brickwalk_convert::progress::Progress;
@@ -33,7 +34,6 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Raised when a value changes its meaning.
@@ -70,6 +70,7 @@ struct Picture {
 struct View<'a> {
     place: &'a Place,
     args: &'a DvfBenchArgs,
+    console: Console<'a>,
     renderer: Renderer,
     /// Without a field.
     exact: Picture,
@@ -81,9 +82,9 @@ struct View<'a> {
 ///
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be read; the device's.
-pub fn run(args: &DvfBenchArgs) -> Result<()> {
+pub fn run(args: &DvfBenchArgs, console: Console) -> Result<()> {
     atomic::create_folder(&args.output)?;
-    let places = places(args)?;
+    let places = places(args, console)?;
     let mut rows = Rows::open(&args.output, header(args, &places)?)?;
     let deadline = args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
     let stages: Vec<Stage> =
@@ -101,7 +102,7 @@ pub fn run(args: &DvfBenchArgs) -> Result<()> {
     for (place, stage, own) in &jobs {
         let key = key(&place.name, *stage, &own.to_string());
         if !rows.has(&key) {
-            if interrupt::flag().load(Ordering::Relaxed) {
+            if console.is_stopped() {
                 ended = "Interrupted: the same command goes on where this one stopped.\n";
                 break;
             }
@@ -110,12 +111,12 @@ pub fn run(args: &DvfBenchArgs) -> Result<()> {
                 break;
             }
             if *stage == Stage::Memory {
-                rows.push(Row { key, values: memory(place, args, &own.options)? })?;
+                rows.push(Row { key, values: memory(place, args, &own.options, console)? })?;
             } else {
                 let of_place = view.take().filter(|view| std::ptr::eq(view.place, *place));
                 let open = match of_place {
                     Some(view) => view,
-                    None => View::open(place, args, CacheSize::Percent(100.0))?,
+                    None => View::open(place, args, CacheSize::Percent(100.0), console)?,
                 };
                 let open = view.insert(open);
                 let values = match stage {
@@ -130,11 +131,11 @@ pub fn run(args: &DvfBenchArgs) -> Result<()> {
     progress.finish();
     let names: Vec<&str> = places.iter().map(|place| place.name.as_str()).collect();
     let text = output::write(args, &names, &rows, jobs.len())?;
-    crate::cli::print(&text)?;
+    console.show(&text)?;
     if ended.starts_with("Interrupted") {
         bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display());
     }
-    crate::cli::print(ended)
+    console.show(ended)
 }
 
 /// The name of a measurement.
@@ -161,7 +162,7 @@ fn header(args: &DvfBenchArgs, places: &[Place]) -> Result<Header> {
 }
 
 /// The scenes, and the box, which is built if it is not there.
-fn places(args: &DvfBenchArgs) -> Result<Vec<Place>> {
+fn places(args: &DvfBenchArgs, console: Console) -> Result<Vec<Place>> {
     let mut places = Vec::new();
     for (i, scene) in args.scenes.0.iter().enumerate() {
         let file = open_scene(scene)?;
@@ -180,7 +181,7 @@ fn places(args: &DvfBenchArgs) -> Result<Vec<Place>> {
     if !scene.with_extension("motion.json").exists() || open_scene(&scene).is_err() {
         let [triangles, brick_triangles] = BOX_SIZE;
         let cornell = Generated { kind: Kind::Cornell, triangles: triangles.into(), ..Generated::default() };
-        scenes::make(&cornell, brick_triangles, &scene)?;
+        scenes::make(&cornell, brick_triangles, &scene, console)?;
     }
     places.push(Place::of(BOX.into(), scene, CameraPath::read(&near)?.frame(0, 1)));
     Ok(places)
@@ -196,7 +197,7 @@ impl Place {
 type Values = BTreeMap<String, f64>;
 
 impl<'a> View<'a> {
-    fn open(place: &'a Place, args: &'a DvfBenchArgs, cache: CacheSize) -> Result<Self> {
+    fn open(place: &'a Place, args: &'a DvfBenchArgs, cache: CacheSize, console: Console<'a>) -> Result<Self> {
         let settings = Settings {
             size: args.size,
             tile: 16,
@@ -213,7 +214,7 @@ impl<'a> View<'a> {
         let renderer = renderer(opened, &place.scene, &settings)?;
         let image = Image { width: 0, height: 0, rgb: Vec::new() };
         let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, renewal: [0.0; 2], ms: 0.0 };
-        let mut view = Self { place, args, renderer, exact: nothing, truth: [None, None] };
+        let mut view = Self { place, args, console, renderer, exact: nothing, truth: [None, None] };
         view.exact = view.picture(0)?;
         Ok(view)
     }
@@ -243,6 +244,7 @@ impl<'a> View<'a> {
     /// Makes the field that `options` ask for.
     fn make(&mut self, options: &Options) -> Result<(DvfMade, f64)> {
         let region = self.region(options)?;
+        let console = self.console;
         let progress = Progress::new();
         let mut told = None;
         let mut watch = |rays: u64, about: u64| {
@@ -251,7 +253,7 @@ impl<'a> View<'a> {
             }
             progress.advance(rays - told.unwrap_or(0));
             told = Some(rays);
-            !interrupt::flag().load(Ordering::Relaxed)
+            !console.is_stopped()
         };
         let made = prepare::make(&mut self.renderer, &options.settings(), &region, options.tracing(), &mut watch);
         progress.finish();
@@ -331,9 +333,9 @@ fn differing(a: &Image, b: &Image) -> usize {
 }
 
 /// What is seen, with a small cache and with all resident: values of the first, and how many pixels of both differ.
-fn memory(place: &Place, args: &DvfBenchArgs, options: &Options) -> Result<Values> {
-    let (mut values, out_of_core) = View::open(place, args, args.cache)?.measure(Stage::Memory, options)?;
-    let mut resident = View::open(place, args, CacheSize::Percent(100.0))?;
+fn memory(place: &Place, args: &DvfBenchArgs, options: &Options, console: Console) -> Result<Values> {
+    let (mut values, out_of_core) = View::open(place, args, args.cache, console)?.measure(Stage::Memory, options)?;
+    let mut resident = View::open(place, args, CacheSize::Percent(100.0), console)?;
     resident.renderer.settings.tracing.measure_needed = true;
     let (of_resident, in_core) = resident.measure(Stage::Memory, options)?;
     // Which bricks rays need is known where all are resident.

@@ -14,8 +14,8 @@ mod view;
 use super::cells::Header;
 use super::rows::{Row, Rows};
 use super::scenes;
-use crate::cli::interrupt;
 use crate::kernels::DeviceInfo;
+use crate::lab::console::Console;
 use crate::output::atomic;
 use crate::session::device::Device;
 use anyhow::{Result, bail};
@@ -25,7 +25,6 @@ use plan::{Job, Stage, Way};
 use seams::Seams;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use view::{Picture, View};
 
@@ -36,7 +35,7 @@ const FORMAT: u32 = 2;
 ///
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
-pub fn run(args: &RomaBenchArgs) -> Result<()> {
+pub fn run(args: &RomaBenchArgs, console: Console) -> Result<()> {
     let settings = args.settings();
     let jobs: Vec<Job> = plan::jobs(&settings, args.sponza.is_some())
         .into_iter()
@@ -57,7 +56,7 @@ pub fn run(args: &RomaBenchArgs) -> Result<()> {
         if missing.is_empty() {
             continue;
         }
-        if interrupt::flag().load(Ordering::Relaxed) {
+        if console.is_stopped() {
             ended = "Interrupted: the same command goes on where this one stopped.\n";
             break;
         }
@@ -66,7 +65,7 @@ pub fn run(args: &RomaBenchArgs) -> Result<()> {
             break;
         }
         // Ways are compared with each other, so that all of a job are measured together.
-        for (way, values) in measure(job, args, &settings)? {
+        for (way, values) in measure(job, args, &settings, console)? {
             let key = job.key(&way);
             if !rows.has(&key) {
                 rows.push(Row { key, values })?;
@@ -83,11 +82,11 @@ pub fn run(args: &RomaBenchArgs) -> Result<()> {
     }
     progress.finish();
     let text = output::write(&args.output, &settings, &rows, planned)?;
-    crate::cli::print(&text)?;
+    console.show(&text)?;
     if ended.starts_with("Interrupted") {
         bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display());
     }
-    crate::cli::print(ended)
+    console.show(ended)
 }
 
 fn header(args: &RomaBenchArgs, settings: &Settings) -> Result<Header> {
@@ -130,9 +129,9 @@ fn leak_name(wide: usize, samples: u32) -> String {
 }
 
 /// Everything that is measured of the ways of a job.
-fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings) -> Result<Vec<(Way, Values)>> {
+fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings, console: Console) -> Result<Vec<(Way, Values)>> {
     let folder = args.scenes.clone().unwrap_or_else(|| args.output.join("scenes"));
-    let place = scenes::place(job.scene, &folder, &settings.of_scenes(), args.sponza.as_deref())?;
+    let place = scenes::place(job.scene, &folder, &settings.of_scenes(), args.sponza.as_deref(), console)?;
     let mut all: Vec<(Way, Values)> = job.ways.iter().map(|way| (*way, Values::new())).collect();
     let mut view = View::open(job, &place, settings, &args.adapter)?;
     if job.times {

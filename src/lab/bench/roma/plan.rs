@@ -3,7 +3,8 @@
 use super::args::Settings as Scale;
 use crate::lab::bench::plan::SceneId;
 use crate::secondary::roma::{self, Unsnapped};
-use crate::settings::{Effect, EffectList, Plain, Rule, Secondary, Settings, Turn, Value};
+use crate::session::Settings;
+use crate::settings::{Effect, EffectList, Plain, Rule, Secondary, Turn, Value};
 use std::fmt;
 
 /// A part of the measurements that can be asked for alone.
@@ -67,7 +68,7 @@ impl Value for Stage {
     fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
         let names = Self::ALL.map(Self::name);
         let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
-        found.ok_or_else(|| crate::settings::names::unknown(text, &names, &[]))
+        found.ok_or_else(|| crate::settings::removed::unknown(text, &names, &[]))
     }
 
     fn plain(&self) -> Plain {

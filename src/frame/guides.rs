@@ -1,11 +1,10 @@
-//! What a frame saw, to guide the filter.
+//! What a frame saw: what guides denoising and anti-aliasing.
 
-use super::Projection;
-use crate::frame::Moved;
+use super::Moved;
 use crate::kernels::layout::{BATCH_SAMPLES, GBuffer, Hit, NONE, Ray, Surface};
 use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::{FrameExecutor, View};
-use crate::scene::Camera;
+use crate::scene::{Camera, Projection};
 use crate::schedule::{ExecutorError, Pass};
 use bricks::Material;
 use glam::{DVec3, Vec3};

@@ -1,4 +1,6 @@
 use super::*;
+use crate::settings::page::options_page;
+use crate::settings::{Effect, Level, Plain, file};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -164,4 +166,16 @@ fn settings_that_do_not_go_together_are_refused() {
     }
     let on = Settings { without: vec![crate::schedule::Optimisation::Requery], ..Settings::default() }.optimisations();
     assert!(!on.requery && on.nearest_first);
+}
+
+#[test]
+fn the_options_page_is_that_of_the_settings() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/options.md");
+    let page = options_page::<Settings>();
+    assert!(page.lines().all(|line| line.chars().count() <= 120));
+    if std::env::var_os("BRICKWALK_WRITE_OPTIONS").is_some() {
+        std::fs::write(file, &page).unwrap();
+    }
+    let found = std::fs::read_to_string(file).unwrap_or_default();
+    assert!(found == page, "docs/options.md is out of date; BRICKWALK_WRITE_OPTIONS=1 writes it anew");
 }

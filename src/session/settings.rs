@@ -1,16 +1,20 @@
-//! The settings of what renders.
+//! Every setting of what renders. A method of `secondary/` declares its own in its folder; here each is a line.
 
-use super::declare::{Entry, Group, SettingsError, settings};
-use super::sizes::{CacheSize, ImageSize};
-use super::types::{Adapter, Direction, EffectList, Environment, Rectangle, Schedule, Secondary, Turn};
-use super::value::Rule;
 use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
 use crate::schedule::{Optimisation, Optimisations, PartOf};
 use crate::secondary::{df, dvf, roma, rsm};
+use crate::settings::file::{read_toml, to_toml};
+use crate::settings::{
+    Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Rectangle, Rule, Schedule,
+    Secondary, SettingsError, Turn, settings,
+};
 use crate::stream::Policy;
 use std::path::PathBuf;
+
+#[cfg(test)]
+mod tests;
 
 /// Without an upper bound.
 const ANY: f64 = f64::INFINITY;
@@ -21,7 +25,8 @@ settings! {
     /// Everything that can be chosen about what renders.
     ///
     /// ```
-    /// use brickwalk::settings::{CacheSize, Schedule, Settings};
+    /// use brickwalk::Settings;
+    /// use brickwalk::settings::{CacheSize, Schedule};
     /// let settings = Settings { schedule: Schedule::Chc, cache: CacheSize::Bytes(64 << 20), ..Settings::default() };
     /// assert_eq!(settings.spp, 1);
     /// ```
@@ -237,13 +242,13 @@ impl Settings {
     /// It is no TOML; an unknown key; a value that is none of the setting.
     pub fn from_toml(text: &str) -> Result<Self, SettingsError> {
         let mut settings = Self::default();
-        super::file::read_toml(&mut settings, text)?;
+        read_toml(&mut settings, text)?;
         Ok(settings)
     }
 
     /// The settings as a settings file, which [`Self::from_toml`] reads.
     pub fn to_toml(&self) -> String {
-        super::file::to_toml(self)
+        to_toml(self)
     }
 
     /// What does not count for `trace`, though it is not as it is by default.

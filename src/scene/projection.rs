@@ -1,7 +1,7 @@
 //! Where points of the world lie in a camera's picture.
 
-use crate::scene::Camera;
-use crate::scene::camera::RayBasis;
+use super::Camera;
+use super::camera::RayBasis;
 use glam::DVec3;
 
 /// A camera's picture.
