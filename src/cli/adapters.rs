@@ -1,6 +1,7 @@
 //! `brickwalk adapters`: the devices that there are, and which of them `--adapter auto` takes.
 
 use super::options::args::AdaptersArgs;
+use crate::cli::output::{print, print_json};
 use crate::cpu;
 use crate::gpu::device::{Candidate, candidates};
 use crate::kernels::DeviceInfo;
@@ -20,9 +21,9 @@ pub fn run(args: &AdaptersArgs) -> Result<()> {
     let candidates = candidates();
     let choice = automatic(&candidates);
     if args.json {
-        return super::print_json(&as_json(&candidates, choice));
+        return print_json(&as_json(&candidates, choice));
     }
-    super::print(&as_text(&candidates, choice))
+    print(&as_text(&candidates, choice))
 }
 
 fn as_json(candidates: &[Candidate], choice: Choice) -> Value {

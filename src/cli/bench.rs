@@ -1,8 +1,9 @@
 //! `brickwalk bench` and `brickwalk selftest`: what the laboratory does.
 
-use super::options::args::UNITS;
+use super::interrupt;
 use super::options::group_args::{GroupArgs, Of, View};
-use super::{Usage, interrupt, print};
+use super::options::units::UNITS;
+use crate::cli::output::{Usage, print};
 use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
 use crate::lab::bench::dvf::args::DvfBenchArgs;
 use crate::lab::bench::roma::args::RomaBenchArgs;

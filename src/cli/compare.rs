@@ -1,6 +1,7 @@
 //! `compare`: how far an image is from a reference.
 
 use super::options::args::CompareArgs;
+use crate::cli::output::{print, print_json};
 use crate::metrics::{Comparison, FlipKind, compare, load};
 use crate::settings::sizes::human_count;
 use anyhow::Result;
@@ -25,9 +26,9 @@ struct Document<'a> {
 pub fn run(args: &CompareArgs) -> Result<()> {
     let comparison = compare(&load(&args.image)?, &load(&args.reference)?)?;
     if args.json {
-        super::print_json(&Document { format: FORMAT, comparison: &comparison })
+        print_json(&Document { format: FORMAT, comparison: &comparison })
     } else {
-        super::print(&human(&comparison))
+        print(&human(&comparison))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::interrupt;
 use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
+use crate::cli::output::{Usage, print};
 use crate::settings::sizes::{human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
@@ -72,7 +73,7 @@ pub fn mesh_settings(args: &MeshArgs, settings: BuildSettings) -> BuildSettings 
 /// As of the builder.
 pub fn usage(built: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
     built.map_err(|error| match error {
-        BuildError::Setting { .. } => super::Usage(error.to_string()).into(),
+        BuildError::Setting { .. } => Usage(error.to_string()).into(),
         error => error.into(),
     })
 }
@@ -87,7 +88,7 @@ pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<
     for warning in &resident.manifest.warnings {
         let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(warning));
     }
-    super::print(&format!(
+    print(&format!(
         "{}: {} triangles ({} with instances) in {} bricks, {}, {:.1} s\n",
         path.display(),
         human_count(resident.manifest.triangles_stored),
@@ -97,7 +98,7 @@ pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<
         start.elapsed().as_secs_f64()
     ))?;
     let phases = summary.phases.iter().map(|(phase, time)| format!("{phase} {:.1} s", time.as_secs_f64()));
-    super::print(&format!("{}: {}\n", path.display(), phases.collect::<Vec<_>>().join(", ")))
+    print(&format!("{}: {}\n", path.display(), phases.collect::<Vec<_>>().join(", ")))
 }
 
 /// The files that the inputs name: a folder stands for its `tileset.json`, else for the scene files in it and below,

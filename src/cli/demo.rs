@@ -2,6 +2,7 @@
 
 use super::options::args::{DemoArgs, SceneArgs, VerifyArgs};
 use super::{scene, verify, walk};
+use crate::cli::output::print;
 use crate::output::atomic;
 use crate::session::Settings;
 use crate::settings::Group;
@@ -33,9 +34,9 @@ pub fn run(args: &DemoArgs) -> Result<()> {
     step("walk through it, out of core", &format!("walk {name} -o {output} {}", settings.options()))?;
     walk::walk(&file, &args.output, &settings, false)?;
     let report = args.output.join("report.html");
-    super::print(&format!("Done. Frames: {}\nReport: {}\n", args.output.join("frames").display(), report.display()))
+    print(&format!("Done. Frames: {}\nReport: {}\n", args.output.join("frames").display(), report.display()))
 }
 
 fn step(what: &str, command: &str) -> Result<()> {
-    super::print(&format!("\n# {what}\n$ brickwalk {command}\n"))
+    print(&format!("\n# {what}\n$ brickwalk {command}\n"))
 }

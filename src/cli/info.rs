@@ -3,6 +3,7 @@
 use super::instances;
 use super::options::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
+use crate::cli::output::{print, print_json};
 use crate::session::opened::scene_bytes;
 use crate::settings::sizes::{human_bytes, human_count};
 use crate::stream::Residency;
@@ -26,14 +27,14 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     let scene = SceneFile::open(&args.scene)?;
     if let Some(id) = args.id {
         let origin = origin(&scene, id)?;
-        return if args.json { super::print_json(&origin) } else { super::print(&origin.human()) };
+        return if args.json { print_json(&origin) } else { print(&origin.human()) };
     }
     if args.instances {
         let rows = instances::rows(scene.resident());
-        return if args.json { super::print_json(&rows) } else { super::print(&instances::human(&rows)) };
+        return if args.json { print_json(&rows) } else { print(&instances::human(&rows)) };
     }
     let info = Info::of(&scene, args.deep)?;
-    if args.json { super::print_json(&info) } else { super::print(&info.human()) }
+    if args.json { print_json(&info) } else { print(&info.human()) }
 }
 
 /// A statement about a scene for reports: what rendering leaves out, or what it cannot show, and why.

@@ -11,6 +11,7 @@ pub mod info;
 pub mod instances;
 pub mod interrupt;
 pub mod options;
+pub mod output;
 pub mod quality;
 pub mod repair;
 pub mod replay;
@@ -22,6 +23,7 @@ pub mod walk;
 use clap::{CommandFactory, Parser};
 use options::args::{Cli, Command};
 use options::removed;
+use output::{ClosedPipe, Usage, print};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -29,11 +31,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit status for bad input.
 const BAD_INPUT: u8 = 1;
-
-/// Wrong usage that only a command itself can see: exit status 2.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}; see brickwalk --help")]
-pub struct Usage(pub String);
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
@@ -129,34 +126,6 @@ fn one_line(text: &str) -> String {
 /// Whether the reader of standard output went away, as in `brickwalk info S.bricks | head -1`.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.downcast_ref::<ClosedPipe>().is_some()
-}
-
-/// The reader of standard output went away; the command ends quietly.
-#[derive(Debug, thiserror::Error)]
-#[error("standard output is closed")]
-struct ClosedPipe;
-
-/// Writes text to standard output; unlike `print!`, without a panic when the reader went away.
-///
-/// # Errors
-/// Standard output is closed or full.
-pub fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| {
-        if error.kind() == std::io::ErrorKind::BrokenPipe {
-            ClosedPipe.into()
-        } else {
-            anyhow::Error::new(error).context("cannot write to standard output")
-        }
-    })
-}
-
-/// Writes a value as indented JSON and a newline to standard output.
-///
-/// # Errors
-/// As [`print()`].
-pub fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
-    print(&(serde_json::to_string_pretty(value)? + "\n"))
 }
 
 /// Makes a panic, which is a defect of the program, one line on standard error; [`main`] turns it into exit status 1.

@@ -8,6 +8,7 @@
 use super::convert::{expand, mesh_settings, usage, work_settings};
 use super::options::args::RepairArgs;
 use super::{interrupt, verify};
+use crate::cli::output::{Usage, print};
 use crate::settings::sizes::human_bytes;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::layout::PAGE_BYTES;
@@ -35,7 +36,7 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     let progress = interrupt::job();
     let damaged = damaged_payloads(&verify::watched(&progress, |progress| scene.verify(progress))?)?;
     if damaged.is_empty() {
-        return super::print(&format!("{name}: whole; nothing to repair\n"));
+        return print(&format!("{name}: whole; nothing to repair\n"));
     }
     // Before the long work, so that a file that cannot be written is found at once.
     let mut file = OpenOptions::new()
@@ -57,7 +58,7 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     }
     file.sync_all().with_context(|| format!("{name}: cannot sync the file to the disk; repair it again"))?;
     let parts: Vec<String> = damaged.iter().map(Payload::to_string).collect();
-    super::print(&format!("{name}: {} rebuilt, {}\n", parts.join(", "), human_bytes(bytes)))
+    print(&format!("{name}: {} rebuilt, {}\n", parts.join(", "), human_bytes(bytes)))
 }
 
 /// Reserves the repair of the scene for this process, by a file beside it that goes with the last process.
@@ -140,7 +141,7 @@ fn source(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Progr
     }
     let settings = generated(&scene.resident().manifest).ok_or_else(|| {
         let name = scene.path().display();
-        super::Usage(format!("{name} is no generated scene: give what it was converted from with --from"))
+        Usage(format!("{name} is no generated scene: give what it was converted from with --from"))
     })?;
     Ok(Box::new(generate(&settings, progress)?))
 }

@@ -1,6 +1,7 @@
 //! `brickwalk replay`: a recorded trace of requests against other cache sizes and policies.
 
 use super::options::args::ReplayArgs;
+use crate::cli::output::{print, print_json};
 use crate::session::opened::cache_budget;
 use crate::settings::sizes::{CacheSize, human_bytes, human_count};
 use crate::stream::{Replay, ReplayResult, Residency, ResidencyError, Trace, TraceError, replay};
@@ -51,9 +52,9 @@ pub fn run(args: &ReplayArgs) -> Result<()> {
         brickwalk_report::write_replay(page, &short, &json)?;
     }
     if args.json {
-        return super::print_json(&json);
+        return print_json(&json);
     }
-    super::print(&format!("{name}: {}", as_text(&trace, &rungs, &skipped)))
+    print(&format!("{name}: {}", as_text(&trace, &rungs, &skipped)))
 }
 
 /// Bytes of all bricks and tiles; saturates.

@@ -1,10 +1,10 @@
 //! `scene`: generated scenes, and camera paths through them.
 
-use super::Usage;
 use super::convert::{build_settings, refuse_folder, summarise, usage};
 use super::interrupt;
 use super::options::args::{BuildArgs, SceneArgs};
 use super::options::scene_kind::SceneKind;
+use crate::cli::output::{Usage, print};
 use crate::settings::sizes::human_count;
 use anyhow::{Context, Result};
 use brickwalk_convert::build::{BuildSettings, BuildSummary, build_source};
@@ -35,7 +35,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     progress.finish();
     match summary {
         Written::Bricks(summary) => summarise(&args.output, &summary, start)?,
-        Written::Gltf { triangles } => super::print(&format!(
+        Written::Gltf { triangles } => print(&format!(
             "{}: {} triangles with instances, {:.1} s\n",
             args.output.display(),
             human_count(triangles),
@@ -44,7 +44,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     }
     for path in paths {
         let is_motion = path.to_string_lossy().ends_with(".motion.json");
-        super::print(&format!("{}: {}\n", path.display(), if is_motion { "a motion" } else { "a camera path" }))?;
+        print(&format!("{}: {}\n", path.display(), if is_motion { "a motion" } else { "a camera path" }))?;
     }
     Ok(())
 }

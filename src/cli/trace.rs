@@ -1,6 +1,7 @@
 //! `brickwalk trace`: closest hits, or occlusion, of given rays.
 
 use super::options::args::TraceArgs;
+use crate::cli::output::print_json;
 use crate::kernels::layout::NONE;
 use crate::output::npy;
 use crate::session::trace::{check, for_rays, trace};
@@ -37,7 +38,7 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     Opened::write_requests(&settings, &opened.cache)?;
     if args.json {
         let hit = hits.iter().filter(|h| h.triangle != NONE).count();
-        super::print_json(&serde_json::json!({
+        print_json(&serde_json::json!({
             "format": 1,
             "rays": rays.len(),
             "hits": hit,

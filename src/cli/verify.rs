@@ -1,6 +1,7 @@
 //! `verify`: every checksum and reference of a `.bricks` file.
 
 use super::options::args::VerifyArgs;
+use crate::cli::output::print;
 use crate::settings::sizes::{human_bytes, human_count};
 use anyhow::{Result, bail};
 use bricks::{Error, Part, Payload, Section, VerifyReport};
@@ -19,7 +20,7 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
     if let Some(message) = problems(&report) {
         bail!("{message}");
     }
-    super::print(&format!(
+    print(&format!(
         "{}: whole: {} in {} payloads, every byte as it was written\n",
         args.scene.display(),
         human_bytes(report.file_bytes),

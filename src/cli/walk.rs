@@ -1,6 +1,7 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::options::args::WalkArgs;
+use crate::cli::output::print;
 use crate::counters::{COLUMNS, Column, Kind, Record};
 use crate::frame::{Accumulation, BATCH_SAMPLES};
 use crate::output::atomic;
@@ -20,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub fn run(args: &WalkArgs) -> Result<()> {
     let settings = args.settings()?;
     if args.print_settings {
-        return super::print(&settings.to_toml());
+        return print(&settings.to_toml());
     }
     let (scene, output) = args.files()?;
     walk(scene, output, &settings, args.json)
@@ -63,7 +64,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
         for record in frame.records {
             let line = lines.push(&record)?;
             if json {
-                super::print(&line)?;
+                print(&line)?;
             }
             records.push(record);
         }
@@ -155,7 +156,7 @@ pub(super) fn warn(warnings: Vec<String>) {
 fn say(lines: &[String], json: bool) -> Result<()> {
     let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
     if !json {
-        return super::print(&text);
+        return print(&text);
     }
     // Whoever closed standard error does not want to know.
     let _ = std::io::stderr().write_all(text.as_bytes());

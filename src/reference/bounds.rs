@@ -67,84 +67,22 @@
 //! that; this point of the ray is in the box grown by as much. And a kernel's hit, clamped, is within the perturbed
 //! triangle's slabs grown by 36 u abs(a), and so in the grown box as well (φ abs(a) more for instances).
 
+use super::assessment::{Assessment, SLACK, distance_to_segment, orientation, perimeter};
 use super::bvh::Padding;
-use super::decode::TruthObject;
+use super::instance::{Extremes, frobenius, linear, translation};
 use super::predicate::crossing;
 use super::ray::TruthRay;
-use super::truth::{Truth, TruthInstance};
+use super::truth::Truth;
 use bricks::ORIGIN_STEPS;
 use glam::{DMat3, DVec3};
 
 /// u = 2⁻²⁴.
 const U: f64 = 1.0 / 16_777_216.0;
-/// Holds the terms of higher order.
-const SLACK: f64 = 1.0 + 1.0 / 65_536.0;
 /// f64's own rounding in transforming by an instance, relative to the sizes that take part: 2⁻⁴⁸ per unit of the ratio
 /// of scales.
 const NOISE: f64 = f64::EPSILON * 16.0;
 /// Norm of the map between the sheared planes of two axes along which the direction is equally long.
 const OTHER_AXIS: f64 = 1.618_033_988_749_895;
-
-/// What can be said of a triangle's hit by a kernel.
-#[derive(Clone, Copy, Debug)]
-pub struct Assessment {
-    /// Whether truth has the ray's line meet the closed triangle.
-    pub inside: bool,
-    /// Distance of the ray from the triangle's boundary, across the direction's dominant axis, in object units.
-    pub edge_distance: f64,
-    /// ε_edge, in the same units.
-    pub edge_epsilon: f64,
-    /// Least t that the kernel may report.
-    pub t_low: f64,
-    /// Greatest t that the kernel may report.
-    pub t_high: f64,
-    /// The vertices on the sheared plane.
-    pub(super) sheared: [[f64; 2]; 3],
-}
-
-impl Assessment {
-    /// Whether the ray is within ε_edge of an edge, so that the kernel may decide either way.
-    pub fn near_edge(&self) -> bool {
-        self.edge_distance <= self.edge_epsilon
-    }
-
-    /// Whether the kernel must find the triangle met, t aside.
-    pub fn certainly_met(&self) -> bool {
-        self.inside && !self.near_edge()
-    }
-
-    /// Whether the kernel may find the triangle met, t aside.
-    pub fn possibly_met(&self) -> bool {
-        self.inside || self.near_edge()
-    }
-
-    /// Twice the area on the sheared plane, with its sign.
-    pub(super) fn determinant(&self) -> f64 {
-        orientation(self.sheared[0], self.sheared[1], self.sheared[2])
-    }
-
-    /// Whether the winding on the sheared plane stays the same however the vertices move by up to `e`.
-    pub(super) fn winding_is_certain(&self, e: f64) -> bool {
-        self.determinant().abs() > (perimeter(&self.sheared) * e + 3.0 * e * e) * SLACK
-    }
-}
-
-/// Twice the signed area of a triangle on a plane.
-pub(super) fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-}
-
-/// Distance of the origin from a segment of the plane.
-pub(super) fn distance_to_segment(a: [f64; 2], b: [f64; 2]) -> f64 {
-    let e = [b[0] - a[0], b[1] - a[1]];
-    let squared = e[0] * e[0] + e[1] * e[1];
-    let s = if squared > 0.0 { (-(a[0] * e[0] + a[1] * e[1]) / squared).clamp(0.0, 1.0) } else { 0.0 };
-    (a[0] + s * e[0]).hypot(a[1] + s * e[1])
-}
-
-fn perimeter(p: &[[f64; 2]; 3]) -> f64 {
-    (0..3).map(|i| (p[i][0] - p[(i + 1) % 3][0]).hypot(p[i][1] - p[(i + 1) % 3][1])).sum()
-}
 
 /// A ray and a triangle in the triangle's object, with the bounds of step 1.
 struct Local {
@@ -205,20 +143,6 @@ impl Local {
             d_error: d_error.to_array(),
         }
     }
-}
-
-/// The linear part of a row-major 3x4 matrix.
-fn linear(m: &[f64; 12]) -> DMat3 {
-    DMat3::from_cols(DVec3::new(m[0], m[4], m[8]), DVec3::new(m[1], m[5], m[9]), DVec3::new(m[2], m[6], m[10]))
-}
-
-/// The last column of a row-major 3x4 matrix.
-fn translation(m: &[f64; 12]) -> DVec3 {
-    DVec3::new(m[3], m[7], m[11])
-}
-
-fn frobenius(m: &DMat3) -> f64 {
-    m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// The frame in which the kernel subtracts.
@@ -315,42 +239,6 @@ pub(super) fn assess_index(truth: &Truth, ray: &TruthRay, index: usize) -> Asses
 /// What a kernel can make of `ray` and triangle `id`; `None` if there is no such triangle.
 pub fn assess(truth: &Truth, ray: &TruthRay, id: u32) -> Option<Assessment> {
     truth.find(id).map(|index| assess_index(truth, ray, index))
-}
-
-/// Object lengths to world lengths, bounded from above; exactly 1 for the identity.
-pub(super) fn stretch(instance: &TruthInstance) -> f64 {
-    instance.world_from_object.as_ref().map_or(1.0, |m| frobenius(&linear(m)))
-}
-
-/// What [`padding`] must know of a scene's instances: the worst of each.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Extremes {
-    /// κ: greatest ratio of scales, bounded from above by Frobenius norms (then at least 3); 0 if all are the identity.
-    scale_ratio: f64,
-    /// Greatest size of a cell of reference points, world units.
-    cell: f64,
-    /// Greatest magnitude of what enters the f64 transform of an instance, but for the ray; world units.
-    reach: f64,
-}
-
-impl Extremes {
-    pub(super) fn of(objects: &[TruthObject], instances: &[TruthInstance]) -> Self {
-        let mut worst = Self::default();
-        for instance in instances {
-            let Some(m) = &instance.world_from_object else { continue };
-            let object = &objects[instance.object as usize];
-            let step = f64::from(object.step_log2).exp2();
-            let (size, cell) = (frobenius(&linear(m)), step * ORIGIN_STEPS as f64);
-            let corner = DVec3::from(std::array::from_fn(|k| {
-                object.bounds[0][k].unsigned_abs().max(object.bounds[1][k].unsigned_abs()) as f64 * step
-            }));
-            let reach = translation(m).length() + size * (corner.length() + 4.0 * cell);
-            worst.scale_ratio = worst.scale_ratio.max(size * frobenius(&linear(m).inverse()));
-            worst.cell = worst.cell.max(size * cell);
-            worst.reach = worst.reach.max(reach);
-        }
-        worst
-    }
 }
 
 /// By how much boxes must be grown so that the ray meets the box of every triangle that comes within four times its own

@@ -18,8 +18,10 @@
 //! The triangle that a ray excludes is as if it were not there: it may not be named, need not be found, and is no part
 //! of a patch, which then has a hole where its neighbours' edges lack a side.
 
-use super::bounds::{Assessment, assess_index, distance_to_segment, orientation, padding, stretch};
+use super::assessment::{Assessment, distance_to_segment, orientation};
+use super::bounds::{assess_index, padding};
 use super::bvh::Padding;
+use super::instance::stretch;
 use super::opacity::Passing;
 use super::ray::TruthRay;
 use super::truth::Truth;

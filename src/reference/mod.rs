@@ -9,10 +9,12 @@
 //! carry it out, could not have told: [`bounds`] derives how far off it can be. Nothing is excused that a watertight
 //! test must get right, so that a gap between two triangles that share an edge is a mismatch.
 
+mod assessment;
 pub mod bounds;
 mod bvh;
 mod decode;
 mod expansion;
+mod instance;
 mod judge;
 mod opacity;
 mod predicate;
@@ -25,6 +27,7 @@ mod file_tests;
 mod tests;
 
 pub use decode::{DecodeError, TruthObject, TruthTriangle};
+pub use instance::TruthInstance;
 pub use judge::{Excuse, Fault, Tally, Verdict, judge, judge_any};
 pub use ray::TruthRay;
-pub use truth::{Truth, TruthHit, TruthInstance};
+pub use truth::{Truth, TruthHit};

@@ -1,6 +1,6 @@
 //! Which rays pass through triangles, in f64.
 
-use super::bounds::Assessment;
+use super::assessment::Assessment;
 use super::decode::DecodeError;
 use bricks::{
     MATERIAL_BLEND, Material, OpacityMap, OpacityTriangle, Payload, SceneFile, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,

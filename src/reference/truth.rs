@@ -1,25 +1,15 @@
 //! The scene in f64 and its closest hits.
 
-use super::bounds::{Assessment, Extremes};
+use super::assessment::Assessment;
 use super::bvh::{Bounds, Bvh, Padding};
 use super::decode;
 use super::decode::{DecodeError, TruthObject, TruthTriangle};
+use super::instance::{Extremes, TruthInstance};
 use super::opacity::{Opacities, Passing};
 use super::predicate::{Crossing, crossing, order};
 use super::ray::TruthRay;
 use bricks::{INSTANCE_IDENTITY, SceneFile};
 use std::cmp::Ordering;
-
-/// An object placed in the world.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TruthInstance {
-    /// The object.
-    pub object: u32,
-    /// Global id of the object's triangle 0.
-    pub base: u32,
-    /// world_from_object, row-major 3x4; `None` for the identity, with which nothing is rounded.
-    pub world_from_object: Option<[f64; 12]>,
-}
 
 /// A triangle of an instance.
 #[derive(Clone, Copy, Debug)]

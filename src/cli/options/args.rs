@@ -4,8 +4,10 @@
 use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
 use super::scene_kind::{SceneKind, scene_help};
+use super::units::UNITS;
 #[cfg(feature = "lab")]
 use crate::cli::bench::{BenchArgs, TestArgs};
+use crate::cli::output::Usage;
 use crate::session::Settings;
 use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
 use crate::settings::{Adapter, CacheSize, ImageSize, SettingsError};
@@ -13,10 +15,6 @@ use brickwalk_convert::build::TextureEncoding;
 use brickwalk_scenes::Stiff;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
-
-/// Said at the end of every help text.
-pub(crate) const UNITS: &str = "Sizes are bytes and take K, M, G (powers of 1024); counts take K, M (powers of 1000).\n\
-     Exit status: 0 done, 1 the input is bad (one line says what and what to do), 2 wrong usage.";
 
 /// Walks by ray tracing through scenes that do not fit in GPU memory.
 ///
@@ -338,8 +336,8 @@ impl WalkArgs {
     ///
     /// # Errors
     /// There are none, which the parser sees to but for `--print-settings`.
-    pub fn files(&self) -> Result<(&Path, &Path), crate::cli::Usage> {
-        let missing = || crate::cli::Usage("walk needs a scene and --output".into());
+    pub fn files(&self) -> Result<(&Path, &Path), Usage> {
+        let missing = || Usage("walk needs a scene and --output".into());
         self.scene.as_deref().zip(self.output.as_deref()).ok_or_else(missing)
     }
 }
@@ -347,7 +345,7 @@ impl WalkArgs {
 /// Settings that do not go together are wrong usage.
 fn usage(error: SettingsError) -> anyhow::Error {
     match error {
-        SettingsError::Conflict(text) => crate::cli::Usage(text).into(),
+        SettingsError::Conflict(text) => Usage(text).into(),
         error => error.into(),
     }
 }
@@ -388,7 +386,7 @@ impl TraceArgs {
     pub fn settings(&self) -> anyhow::Result<Settings> {
         if let Some(entry) = self.given.over(None)?.for_frames_alone() {
             let flag = entry.field.flag();
-            return Err(crate::cli::Usage(format!("--{flag} is for walk; leave it out of trace")).into());
+            return Err(Usage(format!("--{flag} is for walk; leave it out of trace")).into());
         }
         self.given.over(self.file.as_deref())
     }

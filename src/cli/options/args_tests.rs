@@ -1,4 +1,5 @@
 use crate::cli::options::args::*;
+use crate::cli::output::Usage;
 use crate::schedule::Optimisation;
 use crate::settings::{Direction, EffectList, Level, Schedule};
 use crate::stream::Policy;
@@ -295,5 +296,5 @@ fn optimisations_are_switched_by_name() {
     let error = walk("--without haste").unwrap_err().to_string();
     assert!(error.contains("known: nearest-first, requery"), "{error}");
     let conflict = walk_args("--schedule plain --without requery").unwrap().settings().unwrap_err();
-    assert!(conflict.is::<crate::cli::Usage>() && conflict.to_string().contains("chc, demand or auto"));
+    assert!(conflict.is::<Usage>() && conflict.to_string().contains("chc, demand or auto"));
 }

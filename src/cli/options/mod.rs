@@ -5,3 +5,4 @@ pub mod group_args;
 pub mod inputs;
 pub mod removed;
 pub mod scene_kind;
+pub mod units;

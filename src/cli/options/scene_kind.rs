@@ -1,6 +1,6 @@
 //! What `scene` can generate.
 
-use super::args::UNITS;
+use super::units::UNITS;
 use brickwalk_scenes::{Error, Kind, Stiff};
 use std::fmt::Write;
 use std::str::FromStr;

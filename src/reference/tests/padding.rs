@@ -1,7 +1,8 @@
 //! Boxes are grown enough, and no more are visited than the ray comes near.
 
-use crate::reference::bounds::{padding, stretch};
+use crate::reference::bounds::padding;
 use crate::reference::bvh::{Bounds, Padding};
+use crate::reference::instance::stretch;
 use crate::reference::tests::*;
 
 /// `instanced`, every instance stretched by 60 along an axis of its own before it is turned.

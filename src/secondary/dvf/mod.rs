@@ -18,17 +18,19 @@
 //! *Practice.* [`mask`] has the masks, [`shape`] the grid, [`field`] a whole field and what is said of it, [`mod@file`]
 //! its file, [`Fresh`] what of it is made anew when something has moved. Kernels: `shaders/dvf_*.wgsl`.
 
-pub mod answer;
+mod answer;
 mod areas;
 pub mod field;
 pub mod file;
 mod fresh;
 pub mod kernels;
+mod make;
 pub mod maps;
 pub mod mask;
 mod movers;
+mod plan;
 pub mod prepare;
-pub mod renew;
+mod renew;
 mod settings;
 pub mod shape;
 pub mod source;
@@ -36,12 +38,16 @@ pub mod strew;
 pub mod twin;
 pub mod worth;
 
+pub use answer::Dvf;
 pub use areas::Areas;
 pub use field::{Answer, DvfField, DvfKept, Trial};
 pub use fresh::Fresh;
+pub use make::DvfMade;
 pub use movers::Concerned;
+pub use plan::{DvfTracing, EFFECT, Renewal};
 pub use settings::{Count, Mode, Options, RegionKind, Sequence, Sides, Trust};
 pub use shape::Shape;
+pub use source::Region;
 
 /// Which cells a field has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,12 +4,10 @@
 //! what has moved can only change the answers of rays that lead to where it was or is, and those are traced.
 
 use super::mask::UNKNOWN;
+use super::shape::MARGIN;
 use super::{DvfField, Shape};
 use glam::DVec3;
 use rayon::prelude::*;
-
-/// By how much of their sides cells are taken to be wider, on every side: what kernels round a point's cell by.
-pub const MARGIN: f64 = 1.0 / 64.0;
 
 /// Radians by which cones are taken to be wider: what kernels round a ray's texel by.
 const ROUNDING: f64 = 1e-3;

@@ -1,9 +1,9 @@
 //! The field of visibility of a walk: read from its file, or made and kept there.
 
-use super::answer::{Dvf, DvfMade, DvfTracing, EFFECT as DVF_EFFECT, Region};
+use super::Renewal;
 use super::file::{FileError, decode, encode};
-use super::renew::Renewal;
 use super::{Cells, DvfKept, DvfSettings, Options, RegionKind};
+use super::{Dvf, DvfMade, DvfTracing, EFFECT, Region};
 use crate::counters::Record;
 use crate::frame::{RenderError, Renderer};
 use crate::output::atomic;
@@ -155,7 +155,7 @@ impl Note {
     /// As summaries have it; `is_moving`: instances move, so that cells are made anew.
     pub fn report(&self, renderer: &Renderer, options: &Options, is_moving: bool, records: &[Record]) -> Value {
         let Some(field) = renderer.methods.get::<Dvf>().and_then(Dvf::field) else { return Value::Null };
-        let own = || records.iter().filter(|record| record.pass == DVF_EFFECT);
+        let own = || records.iter().filter(|record| record.pass == EFFECT);
         let sum = |of: &dyn Fn(&Record) -> u64| own().map(of).sum::<u64>();
         json!({
             "file": self.file.file_name().map(|name| name.to_string_lossy()),

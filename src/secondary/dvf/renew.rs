@@ -17,10 +17,9 @@
 //! accepted: the budget is never exceeded. Rays of points are made, wait for bricks and are entered as those of a whole
 //! field are ([`super::strew`]).
 
-use super::answer::Dvf;
-use super::answer::{DvfTracing, EFFECT, PASS, Plan, Region};
 use super::kernels;
 use super::maps::{DvfMaps, directions};
+use super::plan::{DvfTracing, EFFECT, PASS, Plan, Renewal};
 use super::source::{groups, groups_of_moved};
 use super::strew::Strewing;
 use super::worth::{Candidate, MADE, Worth};
@@ -38,23 +37,6 @@ use std::sync::Arc;
 /// Share of the rays that are saved in cells of which nothing was known: of half of all directions, which lead above
 /// surfaces, half are answered.
 const NEW: f64 = 0.25;
-
-/// How a field is kept up in a scene in which something moves.
-#[derive(Clone, Debug)]
-pub struct Renewal {
-    /// The field as it was made.
-    pub kept: Arc<DvfKept>,
-    /// How it was made.
-    pub settings: DvfSettings,
-    /// Of what.
-    pub region: Region,
-    /// How rays are traced.
-    pub tracing: DvfTracing,
-    /// Most rays a frame; 0: no cell is made anew.
-    pub rays: u64,
-    /// A cell is made anew if that saves what it takes within so many frames like this one, 1 or more.
-    pub frames: u32,
-}
 
 /// A field with what has moved since it was made.
 pub(crate) struct Marked {
@@ -86,35 +68,33 @@ impl Marked {
     }
 }
 
-impl Dvf {
-    /// Makes cells of the field anew, where something has moved and primary hits of the frame, which are traced, lie.
-    ///
-    /// # Errors
-    /// A brick that cannot be read, the device's.
-    pub(crate) fn renew(
-        &mut self,
-        engine: &mut Engine,
-        records: &mut FrameRecords,
-        view: &View,
-    ) -> Result<(), ExecutorError> {
-        let (Some(renewal), Some(marked)) = (&self.renewal, &mut self.marked) else { return Ok(()) };
-        if renewal.rays == 0 || !engine.draws_environment() {
-            return Ok(());
-        }
-        let frame = records.frame();
-        let answers = (self.field.as_ref(), self.how);
-        records.work(engine, EFFECT, |engine, stats| {
-            let done = renew(engine, frame, view, renewal, marked, answers, stats);
-            marked.frames = marked.frames.saturating_add(1);
-            done
-        })
+/// What the field answered before something moved, and how.
+pub(crate) type Answers<'a> = (Option<&'a Arc<DvfField>>, DvfUse);
+
+/// Makes cells of the field anew, where something has moved and primary hits of the frame, which are traced, lie.
+///
+/// # Errors
+/// A brick that cannot be read, the device's.
+pub(crate) fn renew(
+    engine: &mut Engine,
+    records: &mut FrameRecords,
+    view: &View,
+    renewal: &Renewal,
+    marked: &mut Marked,
+    answers: Answers,
+) -> Result<(), ExecutorError> {
+    if renewal.rays == 0 || !engine.draws_environment() {
+        return Ok(());
     }
+    let frame = records.frame();
+    records.work(engine, EFFECT, |engine, stats| {
+        let done = renew_cells(engine, frame, view, renewal, marked, answers, stats);
+        marked.frames = marked.frames.saturating_add(1);
+        done
+    })
 }
 
-/// What the field answered before something moved, and how.
-type Answers<'a> = (Option<&'a Arc<DvfField>>, DvfUse);
-
-fn renew(
+fn renew_cells(
     engine: &mut Engine,
     frame: u32,
     view: &View,

@@ -1,6 +1,6 @@
 //! Options of `--secondary dvf`.
 
-use super::answer::DvfTracing;
+use super::DvfTracing;
 use super::{CELLS, Cells, DvfSettings, DvfUse, POINTS, RAYS};
 use crate::settings::names;
 use crate::settings::{Plain, Rule, Value, settings};

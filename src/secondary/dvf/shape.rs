@@ -1,8 +1,10 @@
 //! The grid of a field.
 
 use super::mask;
-use super::movers::MARGIN;
 use glam::DVec3;
+
+/// By how much of their sides cells are taken to be wider, on every side: what kernels round a point's cell by.
+pub const MARGIN: f64 = 1.0 / 64.0;
 
 /// Where the cells of a field lie.
 #[derive(Clone, Copy, Debug, PartialEq)]

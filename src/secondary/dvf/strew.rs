@@ -5,8 +5,8 @@
 //! those that are answered. Of the groups of triangles in which rays wait the triangles are kept, so that no brick is
 //! read for them again.
 
-use super::answer::{EFFECT, PASS, Plan, unread};
 use super::kernels;
+use super::plan::{EFFECT, PASS, Plan, unread};
 use super::source::{Group, triangles};
 use super::{DvfSettings, Fresh, Shape};
 use crate::counters::Counters;

@@ -2,7 +2,7 @@
 //! read.
 
 use super::mask::UNKNOWN;
-use super::renew::Renewal;
+use super::plan::Renewal;
 use crate::kernels::layout::NONE;
 use glam::DVec3;
 
@@ -123,8 +123,7 @@ fn leaves_of(renewal: &Renewal, leaves: &[LeafBox], candidates: &[Candidate]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::secondary::dvf::answer::{DvfTracing, Region};
-    use crate::secondary::dvf::{Areas, DvfField, DvfKept, DvfSettings, Shape, mask};
+    use crate::secondary::dvf::{Areas, DvfField, DvfKept, DvfSettings, DvfTracing, Region, Shape, mask};
     use std::sync::Arc;
 
     const RAYS: u32 = 64;

@@ -10,7 +10,7 @@
 //! the sphere, one in each stratum, those that are travelled are drawn by the cosine. Two tries are made on the
 //! average, however many maps there are; of some 200 rays one is refused by all, and takes the nearest map.
 
-use super::twin::{Maps, RUN, Taken, normal_of};
+use super::twin::{GOLDEN, Maps, RUN, Taken, length_of, normal_of};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{COUNTER_RAYS_ANSWERED, COUNTER_RAYS_CAPPED, PARAM_ANY_HIT, Params, Ray, RomaMap};
 use crate::kernels::rays::RaySet;
@@ -22,9 +22,6 @@ use crate::schedule::ExecutorError;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
 
-/// The golden section of 2³².
-pub(crate) const GOLDEN: u32 = 0x9e37_79b9;
-
 const TRIES: usize = 8;
 
 /// The word by which a ray first tries a map: the directions of a pixel, those of all samples, go on by the golden
@@ -32,10 +29,6 @@ const TRIES: usize = 8;
 pub(crate) fn drawn_word(p: &Params, index: u32) -> u32 {
     let first = random4(index, !p.stream.wrapping_sub(p.sample), p.seed)[1];
     first.wrapping_add(p.direction.wrapping_mul(GOLDEN))
-}
-
-pub(crate) fn length_of(d: Vec3) -> f32 {
-    square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
 }
 
 fn product(d: Vec3, v: Vec3) -> f32 {

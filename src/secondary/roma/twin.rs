@@ -1,7 +1,6 @@
 //! Ray-aligned occupancy maps: twins of `shaders/roma/roma_rotate.wgsl` and `roma_trace.wgsl`.
 
 use super::bits::{cells_between, first_cell};
-use super::cosine::{GOLDEN, length_of};
 use super::directions::stratum_of;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
@@ -40,6 +39,9 @@ const UNBOUNDED: f32 = f32::from_bits((127 + 40) << 23);
 
 /// Slower than this, in cells a unit of t, a ray stays where it is.
 const LEAST_SPEED: f32 = f32::from_bits((127 - 60) << 23);
+
+/// The golden section of 2³².
+pub(crate) const GOLDEN: u32 = 0x9e37_79b9;
 
 /// Rays that a task traces in a row.
 pub(crate) const RUN: usize = 256;
@@ -285,6 +287,10 @@ fn start_level_of(own: &RomaOwn, levels: &[Level], origin: Vec3, normal: Vec3, m
         at.iter().all(|&x| x >= margin && x <= side - margin)
     };
     levels.iter().position(holds).unwrap_or(levels.len() - usize::from(own.is_part == 0))
+}
+
+pub(crate) fn length_of(d: Vec3) -> f32 {
+    square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
 }
 
 pub(crate) fn normal_of(seen: &RaySet, index: usize) -> Vec3 {

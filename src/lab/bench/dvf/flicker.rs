@@ -14,7 +14,7 @@ use super::{Picture, Values, View};
 use crate::kernels::layout::NONE;
 use crate::metrics::{Change, Image, PIXELS_PER_DEGREE, flicker, flip_ldr};
 use crate::scene::motion::{Motion, Movers};
-use crate::secondary::dvf::answer::Dvf;
+use crate::secondary::dvf::Dvf;
 use crate::secondary::dvf::prepare::renewal;
 use crate::secondary::dvf::{DvfField, DvfUse, Options, Shape, mask};
 use anyhow::{Context, Result};

@@ -19,7 +19,7 @@ use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::output::atomic;
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
-use crate::secondary::dvf::answer::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Region};
+use crate::secondary::dvf::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Region};
 use crate::secondary::dvf::{Options, RegionKind, prepare};
 use crate::session::Settings;
 use crate::session::device::Device;
