@@ -1,5 +1,5 @@
-//! Parses and validates every kernel, so that a typo is a build error, and writes the Rust mirrors of the structures and
-//! constants that WGSL files named `*types.wgsl` declare.
+//! Parses and validates every kernel, so that a typo is a build error, and writes the Rust mirrors of the structures
+//! and constants that WGSL files named `*types.wgsl` declare.
 
 #[path = "src/kernels/layout/mirror.rs"]
 mod mirror;

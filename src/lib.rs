@@ -52,8 +52,8 @@
 //! # Where things are
 //!
 //! Each module knows those above it: [`settings`] and [`scene`] are plain data; [`stream`] brings bricks to the device;
-//! [`schedule`] decides which bricks a pass needs; [`mod@kernels`] run on the executors [`gpu`] and [`cpu`]; [`frame`] makes
-//! a frame of passes; [`secondary`] has the approximations of secondary rays; [`session`] brings all together.
+//! [`schedule`] decides which bricks a pass needs; [`mod@kernels`] run on the executors [`gpu`] and [`cpu`]; [`frame`]
+//! makes a frame of passes; [`secondary`] has the approximations of secondary rays; [`session`] brings all together.
 //! `ARCHITECTURE.md` is the tour of the house.
 //!
 //! # Features

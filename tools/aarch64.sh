@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds for aarch64 and runs what NEON has tests of there, emulated by qemu: vectors, nodes, packets of rays. On Debian and its
-# relatives it installs the cross compiler and qemu. Options go to `cargo test`.
+# Builds for aarch64 and runs what NEON has tests of there, emulated by qemu: vectors, nodes, packets of rays. On Debian
+# and its relatives it installs the cross compiler and qemu. Options go to `cargo test`.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)

@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # Measures the conversion of generated cities from glTF: rates, phases, peak memory; prints a Markdown table. Scenes and
-# finished rows are kept in the folder, so that an interrupted measurement continues.
-#   tools/measure_conversion.sh FOLDER [TRIANGLES [LARGE]]        defaults: 12M, 20M
-# TRIANGLES as .glb is converted in memory, with --fast, and with --memory 15 bytes a triangle, a tenth of the peak in memory;
-# LARGE as .gltf with --memory 1G. Needs GNU time at /usr/bin/time.
+# finished rows are kept in the folder, so that an interrupted measurement continues. tools/measure_conversion.sh FOLDER
+# [TRIANGLES [LARGE]]        defaults: 12M, 20M TRIANGLES as .glb is converted in memory, with --fast, and with --memory
+# 15 bytes a triangle, a tenth of the peak in memory; LARGE as .gltf with --memory 1G. Needs GNU time at /usr/bin/time.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)

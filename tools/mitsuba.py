@@ -37,7 +37,7 @@ SIZE = (320, 180)
 # As long as the scene: occlusion is then what a sky of one brightness leaves.
 AO_LENGTH = 1000.0
 SUN = np.array([0.4, 0.8, 0.45])
-# What a white surface that faces the sun reflects of it at intensity 1 (src/render/light.rs).
+# What a white surface that faces the sun reflects of it at intensity 1 (src/frame/light.rs).
 SUN_COLOR = np.array([0.60, 0.56, 0.48])
 SUN_INTENSITY = 2.4
 # Samples a pixel that Mitsuba takes before its picture is kept.

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Measures the processor's kernels against Embree, the same rays through the same triangles, in turns, and prints a table. Words are
-# sizes of generated cities (default: 1M 5M). Embree 4 is the library that EMBREE names, else the system's, else that of the
-# Python package embreex, which is installed under target/peer. No other program should be busy meanwhile.
+# Measures the processor's kernels against Embree, the same rays through the same triangles, in turns, and prints a
+# table. Words are sizes of generated cities (default: 1M 5M). Embree 4 is the library that EMBREE names, else the
+# system's, else that of the Python package embreex, which is installed under target/peer. No other program should be
+# busy meanwhile.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)

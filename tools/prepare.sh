@@ -1,5 +1,5 @@
-# Sourced by the scripts beside it: makes sure that cargo, a C++ compiler and linker, and for tests a Vulkan driver are there. On
-# Debian and its relatives it installs what is missing with apt-get; elsewhere it says what to install.
+# Sourced by the scripts beside it: makes sure that cargo, a C++ compiler and linker, and for tests a Vulkan driver are
+# there. On Debian and its relatives it installs what is missing with apt-get; elsewhere it says what to install.
 # shellcheck shell=bash
 
 fail() {

@@ -1,4 +1,4 @@
-// Random words by hashing, as shared/random.wgsl has them, and numbers of them.
+// Random words by hashing, as common/random.wgsl has them, and numbers of them.
 #include "common/random.wgsl"
 
 // A word as a number in [0, 1).

@@ -6,9 +6,12 @@
 
 @group(1) @binding(6) var<uniform> own: DfOwn;
 @group(2) @binding(0) var<storage, read> field_levels: array<Level>;     // the base maps, the finest first
-@group(2) @binding(1) var<storage, read> boms: array<u32>;                  // of all levels: cell (x, y, z) is bit z % 32 of a word
-@group(2) @binding(2) var<storage, read_write> nearest: array<u32>;         // of one field, the nearest occupied cell to each, twice
-@group(2) @binding(3) var<storage, read_write> distances: array<u32>;       // of all fields, their levels one by one: two f16 a word, the first lowest
+// Of all levels: cell (x, y, z) is bit z % 32 of a word.
+@group(2) @binding(1) var<storage, read> boms: array<u32>;
+// Of one field, the nearest occupied cell to each, twice.
+@group(2) @binding(2) var<storage, read_write> nearest: array<u32>;
+// Of all fields, their levels one by one: two f16 a word, the first lowest.
+@group(2) @binding(3) var<storage, read_write> distances: array<u32>;
 
 // The nearest occupied cell where there is none.
 const NO_SEED: u32 = 0xffffffffu;

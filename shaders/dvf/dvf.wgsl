@@ -1,25 +1,28 @@
-// Discrete visibility fields (src/visibility/dvf): bindings of group 2, and where things lie in them. Twin:
-// src/cpu/dvf.rs.
+// Discrete visibility fields (src/secondary/dvf): bindings of group 2, and where things lie in them. Twin:
+// src/secondary/dvf/twin.rs.
 
 #include "dvf/types.wgsl"
 
 @group(1) @binding(6) var<uniform> own: DvfOwn;
 @group(2) @binding(0) var<storage, read> dvf: DvfGrid;
-@group(2) @binding(1) var<storage, read_write> dvf_masks: array<atomic<u32>>; // of each cell, texel by texel: where some ray missed, then where some
-                                                                              // ray hit
-@group(2) @binding(2) var<storage, read_write> dvf_labels: array<u32>;        // of each cell: DVF_VISIBLE, DVF_OCCLUDED or DVF_UNKNOWN
+// Of each cell, texel by texel: where some ray missed, then where some ray hit.
+@group(2) @binding(1) var<storage, read_write> dvf_masks: array<atomic<u32>>;
+// Of each cell: DVF_VISIBLE, DVF_OCCLUDED or DVF_UNKNOWN.
+@group(2) @binding(2) var<storage, read_write> dvf_labels: array<u32>;
 @group(2) @binding(3) var<storage, read> dvf_triangles: array<DvfTriangle>;   // of the group at hand
-@group(2) @binding(4) var<storage, read_write> dvf_sums: array<vec2<u32>>;    // sums of 64 bits, the low word first, level by level
-@group(2) @binding(5) var<storage, read> dvf_directions: array<vec4<f32>>;    // dvf.rays of rays about z, then points of the unit circle, then
-                                                                              // numbers of these for a tile of pixels,
-                                                                              // four to an element
-@group(2) @binding(6) var<storage, read_write> dvf_waiting: array<atomic<u32>>; // a bit for each ray of some blocks: whether it waits for bricks
-@group(2) @binding(7) var<storage, read> dvf_fresh: array<u32>;               // with DVF_RENEW: of each cell the number of its entry, NONE where it is
-                                                                              // not made anew; then of each entry the
-                                                                              // texels that are
-@group(2) @binding(8) var<storage, read_write> dvf_tally: array<atomic<u32>>; // dvf_seen: hits in each cell; dvf_points: entry and rays of each side of
-                                                                              // each point; dvf_rays: numbers of those
-                                                                              // whose rays are made
+// Sums of 64 bits, the low word first, level by level.
+@group(2) @binding(4) var<storage, read_write> dvf_sums: array<vec2<u32>>;
+// dvf.rays of rays about z, then points of the unit circle, then numbers of these for a tile of pixels, four to an
+// element.
+@group(2) @binding(5) var<storage, read> dvf_directions: array<vec4<f32>>;
+// A bit for each ray of some blocks: whether it waits for bricks.
+@group(2) @binding(6) var<storage, read_write> dvf_waiting: array<atomic<u32>>;
+// With DVF_RENEW: of each cell the number of its entry, NONE where it is not made anew; then of each entry the texels
+// that are.
+@group(2) @binding(7) var<storage, read> dvf_fresh: array<u32>;
+// dvf_seen: hits in each cell; dvf_points: entry and rays of each side of each point; dvf_rays: numbers of those whose
+// rays are made.
+@group(2) @binding(8) var<storage, read_write> dvf_tally: array<atomic<u32>>;
 
 const DVF_VISIBLE_LABEL: u32 = 0u;  // more directions miss than hit
 const DVF_OCCLUDED_LABEL: u32 = 1u;

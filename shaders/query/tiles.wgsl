@@ -7,7 +7,8 @@
 @group(3) @binding(3) var<storage, read_write> selection: array<u32>;           // positions in `list`, per tile
 @group(3) @binding(4) var<storage, read_write> pair_demand: array<PairDemand>;  // per position in `list`
 @group(3) @binding(5) var<storage, read> pairs: array<Pair>;                    // queries of pairs
-@group(3) @binding(6) var<storage, read_write> pair_rays: array<atomic<u32>>;   // rays that see each of their nodes, or each leaf from each tile
+// Rays that see each of their nodes, or each leaf from each tile.
+@group(3) @binding(6) var<storage, read_write> pair_rays: array<atomic<u32>>;
 @group(3) @binding(7) var<storage, read> pair_nodes: array<u32>;                // their nodes
 
 // Of a tile and a leaf, the place of their count in pair_rays.

@@ -1,15 +1,18 @@
 // Ray-aligned occupancy maps (Zeng et al., ROMA): bindings of group 2, cells of a column in words of 32 bits (depth t
-// at bit 31 - t % 32 of word t / 32), strata of directions. Twins: src/visibility/roma/bits.rs and directions.rs.
+// at bit 31 - t % 32 of word t / 32), strata of directions. Twins: src/secondary/roma/bits.rs and directions.rs.
 
 #include "occupancy/types.wgsl"
 #include "roma/types.wgsl"
 
 @group(1) @binding(6) var<uniform> own: RomaOwn;
 @group(2) @binding(0) var<storage, read> roma_levels: array<Level>;
-@group(2) @binding(1) var<storage, read> roma_maps: array<RomaMap>;  // of the finest level, by their strata, then of the next
-@group(2) @binding(2) var<storage, read> boms: array<u32>;           // of each level: cell (x, y, z) is bit z % 32 of a word; then what is empty, a
-                                                                     // byte a block (src/visibility/bom/clearance.rs)
-@group(2) @binding(3) var<storage, read_write> columns: array<u32>;  // of all maps, row by row, the words of a column together
+// Of the finest level, by their strata, then of the next.
+@group(2) @binding(1) var<storage, read> roma_maps: array<RomaMap>;
+// Of each level: cell (x, y, z) is bit z % 32 of a word; then what is empty, a byte a block
+// (src/secondary/occupancy/clearance.rs).
+@group(2) @binding(2) var<storage, read> boms: array<u32>;
+// Of all maps, row by row, the words of a column together.
+@group(2) @binding(3) var<storage, read_write> columns: array<u32>;
 
 const TAN_8: f32 = 0.41421356; // tan(pi / 8)
 

@@ -1,4 +1,4 @@
-// Maps that are drawn by the cosine to a normal. Twin: src/cpu/roma_cosine.rs.
+// Maps that are drawn by the cosine to a normal. Twin: src/secondary/roma/cosine.rs.
 
 const TRIES: u32 = 8u;
 

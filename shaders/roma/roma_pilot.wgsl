@@ -1,4 +1,4 @@
-// Which of the rays that maps answer are traced all the same. Twin: src/cpu/roma.rs.
+// Which of the rays that maps answer are traced all the same. Twin: src/secondary/roma/twin.rs.
 
 // What hits of rays have in place of a distance that are not traced: answered, and waiting for maps to answer them.
 const ANSWERED: f32 = -1.0;

@@ -1,4 +1,4 @@
-// Where a ray starts in base maps, which overlap. Twin: src/cpu/roma.rs.
+// Where a ray starts in base maps, which overlap. Twin: src/secondary/roma/twin.rs.
 
 // Cells before its sides at which a level ends for ray `index`.
 fn margin_of(index: u32) -> f32 {

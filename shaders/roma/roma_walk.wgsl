@@ -1,4 +1,4 @@
-// Rays through ray-aligned occupancy maps (Zeng et al., Algorithm 2). Twin: src/cpu/roma.rs.
+// Rays through ray-aligned occupancy maps (Zeng et al., Algorithm 2). Twin: src/secondary/roma/twin.rs.
 
 // Share of a level's lift by which rays start that are sifted.
 const SIFTED_LIFT: f32 = 0.4;

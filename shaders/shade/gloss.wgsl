@@ -1,7 +1,7 @@
 // How surfaces reflect otherwise than diffusely: microfacets with the distribution of Trowbridge and Reitz (GGX),
 // Smith's masking, Fresnel by Schlick, the light of further bounces between facets by Turquin (2019), and a clear coat
 // of the same kind on top. The diffuse part has what they leave of the light (the albedo scaling of
-// KHR_materials_specular), so that no energy is gained. Twin: src/cpu/gloss.rs.
+// KHR_materials_specular), so that no energy is gained. Twin: src/kernels/shade/gloss.rs.
 
 // Of a lobe's square root of roughness; smoother ones are as sharp as this.
 const LEAST_ALPHA: f32 = 0.001;

@@ -1,11 +1,12 @@
 // Bindings of group 2 of kernels that light: the environment and the emitters, and how a point of them is drawn.
 
-@group(2) @binding(0) var<storage, read> environment: array<vec4<f32>>;      // rows from +Y down: radiance, and in w the density by which
-                                                                             // directions are drawn, over both angles
-@group(2) @binding(1) var<storage, read> environment_table: array<vec2<u32>>; // threshold and other entry of each texel's
+// Rows from +Y down: radiance, and in w the density by which directions are drawn, over both angles.
+@group(2) @binding(0) var<storage, read> environment: array<vec4<f32>>;
+// Threshold and other entry of each texel's.
+@group(2) @binding(1) var<storage, read> environment_table: array<vec2<u32>>;
 @group(2) @binding(2) var<storage, read> emitters: array<Emitter>;
-@group(2) @binding(3) var<storage, read> reflectances: array<vec2<f32>>; // see shared/gloss.wgsl: rows by the root of alpha, in them by that
-                                                                         // of the cosine
+// See shade/gloss.wgsl: rows by the root of alpha, in them by that of the cosine.
+@group(2) @binding(3) var<storage, read> reflectances: array<vec2<f32>>;
 
 const TURN: f32 = 6.2831855;      // 2 pi
 const HALF_TURN: f32 = 3.1415927;

@@ -7,6 +7,7 @@
 @group(3) @binding(3) var<storage, read_write> seen_rays: array<Ray>;
 @group(3) @binding(4) var<storage, read_write> seen_hits: array<Hit>;
 @group(3) @binding(5) var<storage, read_write> seen_surfaces: array<Surface>;
-@group(3) @binding(6) var<storage, read_write> throughput: array<vec4<f32>>; // of the light that the rays of set 1 bring; w: number of their direction
-@group(3) @binding(7) var<storage, read_write> densities: array<f32>;      // by which the directions of the rays of set 1 were drawn; 0 where no lamp's
-                                                                           // rays bring the same light
+// Of the light that the rays of set 1 bring; w: number of their direction.
+@group(3) @binding(6) var<storage, read_write> throughput: array<vec4<f32>>;
+// By which the directions of the rays of set 1 were drawn; 0 where no lamp's rays bring the same light.
+@group(3) @binding(7) var<storage, read_write> densities: array<f32>;

@@ -4,7 +4,8 @@
 // order. Kernels of a scene without such triangles have a function in place of this file that says no.
 #include "common/random.wgsl"
 
-@group(0) @binding(7) var<storage, read> opacity: array<vec4<u32>>;  // Opacity of each material, then texels, 16 to a vector
+// Opacity of each material, then texels, 16 to a vector.
+@group(0) @binding(7) var<storage, read> opacity: array<vec4<u32>>;
 
 // Of alpha in units of 1 / 255^2: the least difference between two alphas as they are stored.
 const ALPHA_ONE: f32 = 65025.0;

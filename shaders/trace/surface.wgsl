@@ -10,7 +10,8 @@ struct SurfacePoint {
     p: vec3<f32>,       // on the triangle, inset from its edges by more than the offset's error
     delta: f32,         // distance along n that clears the surface
     n: vec3<f32>,       // unit geometric normal on the side that the ray came from
-    down: u32,          // bit k: component k of the origin moves down (n[k] < 0; if n[k] is 0, away from where d points)
+    // Bit k: component k of the origin moves down (n[k] < 0; if n[k] is 0, away from where d points).
+    down: u32,
     area: f32,          // twice the triangle's area
 }
 

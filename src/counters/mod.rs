@@ -125,8 +125,8 @@ impl Counters {
 pub struct Record {
     /// Frame, from 0.
     pub frame: u32,
-    /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `glossy`, and of the rays to lamps from the hits
-    /// of bounces `diffuse-shadow`, `diffuse-environment`, `glossy-shadow`, `glossy-environment`; `rsm`, where
+    /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `glossy`, and of the rays to lamps from the
+    /// hits of bounces `diffuse-shadow`, `diffuse-environment`, `glossy-shadow`, `glossy-environment`; `rsm`, where
     /// reflective shadow maps are made; `dvf`, where the cells of a field of visibility are made anew for what moves.
     pub pass: &'static str,
     counters: Counters,

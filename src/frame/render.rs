@@ -192,8 +192,8 @@ impl Renderer {
     }
 }
 
-/// Traces rays from primary hits whose own hits are shaded, and lights those: `names` are the effects that it counts for,
-/// as in [`light`].
+/// Traces rays from primary hits whose own hits are shaded, and lights those: `names` are the effects that it counts
+/// for, as in [`light`].
 fn bounce(
     engine: &mut Engine,
     methods: &mut Methods,

@@ -1,4 +1,4 @@
-//! Assembly of WGSL: `#include "shared/x.wgsl"` lines are replaced by the file, each file once; the accessors of paged
+//! Assembly of WGSL: `#include "family/x.wgsl"` lines are replaced by the file, each file once; the accessors of paged
 //! buffers are generated for the number of pages at hand, so that one page costs no branch, and so is what a scene does
 //! not need.
 //!
@@ -60,14 +60,14 @@ fn append(
     Some(())
 }
 
-/// What stands for `shared/opacity.wgsl` where no ray passes through a triangle.
+/// What stands for `trace/opacity.wgsl` where no ray passes through a triangle.
 const OPAQUE: &str = "\
 fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) -> bool {
     return false;
 }
 ";
 
-/// What stands for `shared/gloss.wgsl` where all surfaces are Lambertian.
+/// What stands for `shade/gloss.wgsl` where all surfaces are Lambertian.
 const MATT: &str = "\
 struct Gloss {
     diffuse: vec3<f32>,
@@ -118,7 +118,7 @@ fn texel_accessors(pages: usize) -> String {
     s
 }
 
-/// What kernels over binary trees include as `shared/binary.wgsl`: group 3, the root of each brick and, from binding 1,
+/// What kernels over binary trees include as `trace/binary.wgsl`: group 3, the root of each brick and, from binding 1,
 /// the nodes in so many pages; and how many entries a traversal's stack has.
 pub fn binary_accessors(pages: usize, stack: u32) -> String {
     let mut s = format!("const BINARY_STACK: u32 = {stack}u;\n");

@@ -83,8 +83,8 @@ pub fn words<const N: usize>(buffers: &mut [Vec<u32>]) -> Result<[&mut [u32]; N]
 
 /// Words that several threads write.
 pub fn atomic(words: &mut [u32]) -> &[AtomicU32] {
-    // SAFETY: an AtomicU32 has the size and alignment of a u32, every bit pattern of either is one of the other, and the
-    // exclusive borrow leaves no other way to the words while the result lives.
+    // SAFETY: an AtomicU32 has the size and alignment of a u32, every bit pattern of either is one of the other, and
+    // the exclusive borrow leaves no other way to the words while the result lives.
     unsafe { &*(std::ptr::from_mut(words) as *const [AtomicU32]) }
 }
 

@@ -33,9 +33,9 @@ pub fn hammersley(index: u32, count: u32) -> [f32; 2] {
 }
 
 /// Point `index` of the R2 sequence in the unit square, [0, 1): the centre moved by multiples of 1/p and 1/p², where
-/// p^3 = p + 1 is the plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018). In step with
-/// any dimensions of [`halton`] it is spread evenly over the product of both, because p is irrational, while two points
-/// of the same dimensions of [`halton`] depend on one another.
+/// p^3 = p + 1 is the plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018). In
+/// step with any dimensions of [`halton`] it is spread evenly over the product of both, because p is irrational, while
+/// two points of the same dimensions of [`halton`] depend on one another.
 pub fn r2(index: u32) -> [f32; 2] {
     const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     STEPS.map(|step| below_one((0.5 + f64::from(index) * step).fract()))

@@ -35,14 +35,15 @@ pub trait Executor {
     /// A payload that cannot be read or whose checksum fails, by its brick.
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError>;
 
-    /// Sets the tiles' lists of leaves, near first, in place of [`Step::Lists`](super::Step::Lists); one list a tile, row by row.
+    /// Sets the tiles' lists of leaves, near first, in place of [`Step::Lists`](super::Step::Lists); one list a tile,
+    /// row by row.
     ///
     /// # Errors
     /// Lists beyond what the device holds.
     fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError>;
 
-    /// Sets the queries of the next [`Step::QueryPairs`](super::Step::QueryPairs), and the nodes of all of them, one query's after the other's.
-    /// A query of several nodes asks for all at once, and where a ray sees any, for each.
+    /// Sets the queries of the next [`Step::QueryPairs`](super::Step::QueryPairs), and the nodes of all of them, one
+    /// query's after the other's. A query of several nodes asks for all at once, and where a ray sees any, for each.
     ///
     /// # Errors
     /// More than the device holds.

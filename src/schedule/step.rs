@@ -52,7 +52,8 @@ pub enum Step {
     },
     /// Ask ray by ray which bricks are still wanted: phase 2.
     Query(Query),
-    /// Ask how many rays see each node of the queries set by [`Executor::set_pairs`](super::Executor::set_pairs): phase 2 of the fronts.
+    /// Ask how many rays see each node of the queries set by [`Executor::set_pairs`](super::Executor::set_pairs): phase
+    /// 2 of the fronts.
     QueryPairs {
         /// By the boxes of the node's children instead of its own.
         tighter: bool,

@@ -144,8 +144,8 @@ impl<'a> FieldView<'a> {
         self.levels[0].first().is_some_and(|distance| distance.is_finite())
     }
 
-    /// The distance at a point, [`DistanceField::local`], of a level: of the eight cells whose middles are around it, by
-    /// their nearness; beyond the outermost middles as there. Cells of the finest level; infinite of a map without
+    /// The distance at a point, [`DistanceField::local`], of a level: of the eight cells whose middles are around it,
+    /// by their nearness; beyond the outermost middles as there. Cells of the finest level; infinite of a map without
     /// occupied cells.
     pub fn distance(&self, level: usize, point: [f32; 3]) -> f32 {
         if !self.has_seed() {

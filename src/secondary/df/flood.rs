@@ -17,8 +17,8 @@ pub(crate) fn squared([x, y, z]: [u32; 3], seed: u32) -> u32 {
     of(x, seed).wrapping_add(of(y, seed >> 10)).wrapping_add(of(z, seed >> 20))
 }
 
-/// Begins flooding a map of these words: the nearest occupied cell to one that is occupied is itself, to others none is known. Twin of
-/// `shaders/df/flood_seeds.wgsl`.
+/// Begins flooding a map of these words: the nearest occupied cell to one that is occupied is itself, to others none is
+/// known. Twin of `shaders/df/flood_seeds.wgsl`.
 pub fn seeds(cells: u32, words: &[u32], nearest: &mut [u32]) {
     nearest.par_chunks_mut(plane(cells)).zip(0..cells).for_each(|(out, x)| {
         for (cell, (y, z)) in out.iter_mut().zip((0..cells).flat_map(|y| (0..cells).map(move |z| (y, z)))) {

@@ -43,8 +43,8 @@ impl DfMaps {
         self.cascades.levels.first().map_or(0, Bom::cells)
     }
 
-    /// Gives an executor the base maps, unless it has them, and places the fields. Those that were made last stay as long
-    /// as their maps do.
+    /// Gives an executor the base maps, unless it has them, and places the fields. Those that were made last stay as
+    /// long as their maps do.
     ///
     /// # Errors
     /// More than the device holds in one buffer, with how much it does.

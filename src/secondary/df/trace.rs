@@ -71,7 +71,7 @@ pub struct LocalTraced {
 impl FieldView<'_> {
     /// Where a ray meets something, and whether it made as many look-ups as it may and was not at its end: `at` and
     /// `speed` in cells of the finest level, `range` of t within the field. Twin of `through` in
-    /// `shaders/df/field_trace.wgsl`.
+    /// `shaders/df/df_trace.wgsl`.
     pub fn through(
         &self,
         tracing: &Tracing,

@@ -252,9 +252,9 @@ pub fn rays(first: u32, turn: u32, waiting: Option<u32>) -> Step {
     Own::new(names::dvf_rays, &DvfOwn { first, turn, next: waiting.unwrap_or(NONE), ..DvfOwn::default() }).into()
 }
 
-/// Enters what they met into the masks of the cells that they start in. `waiting`: rays that asked for bricks wait; they
-/// are noted from this word on, a bit each, and ended; else all are answered. `enters`: whether what the others met is
-/// entered.
+/// Enters what they met into the masks of the cells that they start in. `waiting`: rays that asked for bricks wait;
+/// they are noted from this word on, a bit each, and ended; else all are answered. `enters`: whether what the others
+/// met is entered.
 pub fn write(waiting: Option<u32>, enters: bool) -> Step {
     let own = DvfOwn { next: waiting.unwrap_or(NONE), count: enters.into(), ..DvfOwn::default() };
     Own::new(names::dvf_write, &own).into()

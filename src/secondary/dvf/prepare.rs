@@ -41,8 +41,8 @@ pub struct Walk<'a> {
     pub is_moving: bool,
 }
 
-/// Gives `renderer`, of the scene in `file`, the field that `options` ask for, for a walk. Nothing is done where no rays lead to
-/// an environment.
+/// Gives `renderer`, of the scene in `file`, the field that `options` ask for, for a walk. Nothing is done where no
+/// rays lead to an environment.
 ///
 /// # Errors
 /// A brick that cannot be read; the device's; `watch` stopped it.

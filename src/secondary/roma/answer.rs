@@ -76,8 +76,9 @@ impl Roma {
         }
     }
 
-    /// Has the executor take the maps of `pass` for rays that are `length` world units long at most, unless it has them;
-    /// the step that then makes them. Levels are left out that such rays end in before they are off their surface.
+    /// Has the executor take the maps of `pass` for rays that are `length` world units long at most, unless it has
+    /// them; the step that then makes them. Levels are left out that such rays end in before they are off their
+    /// surface.
     fn prepare(&mut self, engine: &mut Engine, pass: RomaPass, length: f64) -> Result<Option<Step>, ExecutorError> {
         let Some(BaseView { frame, sample, seed, .. }) = self.base.view().copied() else { return Ok(None) };
         let RomaPass { grid, role, .. } = pass;

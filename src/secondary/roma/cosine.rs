@@ -16,7 +16,6 @@ use crate::kernels::layout::{COUNTER_RAYS_ANSWERED, COUNTER_RAYS_CAPPED, PARAM_A
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::vector::{Vec3, dot, each, most};
-use crate::math::exact::square_root;
 use crate::math::sampling::{pcg, random4};
 use crate::schedule::ExecutorError;
 use rayon::prelude::*;

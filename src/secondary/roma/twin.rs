@@ -65,8 +65,8 @@ fn bounded(cells: u32, range: [f32; 2], start: f32, step: f32) -> [f32; 2] {
     [most(range[0], least(a, b) - 1.0), least(range[1], most(a, b) + 1.0)]
 }
 
-/// Makes the ray-aligned maps of all levels from their base maps (Zeng et al., Algorithm 1): a cell is occupied where one
-/// of its look-ups, evenly spaced along the column, finds an occupied cell of the base map.
+/// Makes the ray-aligned maps of all levels from their base maps (Zeng et al., Algorithm 1): a cell is occupied where
+/// one of its look-ups, evenly spaced along the column, finds an occupied cell of the base map.
 pub fn roma_rotate(bound: &Bound, buffers: &mut [Vec<u32>]) -> Result<(), ExecutorError> {
     let own: &RomaOwn = bound.own();
     let [_, maps, boms, columns] = words(buffers)?;

@@ -38,8 +38,8 @@ pub static FAMILY: Family = Family {
 const STREAM: u32 = 10 << 24;
 
 impl RsmMaps {
-    /// Gives an executor the maps as they lie in the frame that has begun. Texels keep what was written as long as there
-    /// are as many.
+    /// Gives an executor the maps as they lie in the frame that has begun. Texels keep what was written as long as
+    /// there are as many.
     ///
     /// # Errors
     /// More than the device holds in one buffer, with how much it does; a device that binds too few buffers.
@@ -49,8 +49,8 @@ impl RsmMaps {
         Ok(())
     }
 
-    /// Writes a block of texels of a map from the hits of the set before, whose attributes are read. `corner`: the texel
-    /// that ray 0 is for.
+    /// Writes a block of texels of a map from the hits of the set before, whose attributes are read. `corner`: the
+    /// texel that ray 0 is for.
     pub fn write(&self, map: u32, [x, y]: [u32; 2]) -> Step {
         Own::new(names::rsm_write, &RsmOwn { maps: self.maps.len() as u32, map, x, y }).into()
     }
