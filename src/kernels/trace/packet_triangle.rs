@@ -4,8 +4,8 @@
 
 use super::leaf::BrickRay;
 use super::packet::{Packet, RAYS};
-use crate::kernels::simd::isa::Isa;
-use crate::kernels::simd::wide::{Wide, inside, three};
+use crate::kernels::simd::isa::{Isa, inside};
+use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, each};
 use crate::math::exact::{CLAMP_ULPS, TINY, TriangleHit, intersect_triangle};
 
