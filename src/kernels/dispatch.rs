@@ -93,7 +93,7 @@ pub struct Dispatch {
     /// Its parameters.
     pub params: Params,
     /// What a method's kernel is told beside these.
-    pub own: [u32; OWN_WORDS],
+    pub own: [u32; Own::WORDS],
     /// Its workgroups.
     pub groups: Workgroups,
     /// Phase of the schedule that its time counts for, from 0.
@@ -117,9 +117,6 @@ pub fn are_pairs_culled(step: Step, before: bool, threshold: u32) -> bool {
     }
 }
 
-/// Words of what a method's kernel is told beside the parameters of all.
-pub const OWN_WORDS: usize = crate::schedule::Own::WORDS;
-
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
 
@@ -136,7 +133,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
     let by_tile = across(params.tiles * (params.tile / 8) * (params.tile / 8));
-    let dispatch = |kernel, params, groups, phase| Dispatch { kernel, params, own: [0; OWN_WORDS], groups, phase };
+    let dispatch = |kernel, params, groups, phase| Dispatch { kernel, params, own: [0; Own::WORDS], groups, phase };
     let kernel = |kernel, params, groups, phase| dispatch(kernel, params, Workgroups::Fixed(groups), phase);
     let shading = |name, params| kernel(name, params, per_ray, None);
     let list = |params, phase| dispatch(kernels::intersect_list, params, Workgroups::Chosen, Some(phase));
