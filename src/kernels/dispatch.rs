@@ -1,28 +1,10 @@
 //! Which dispatches of which kernels a step consists of.
 
 use super::layout::{self, Params};
+use super::setup::Directions;
 use super::table::names as kernels;
 use crate::math::sampling::{cosine_hemisphere, halton};
 use crate::schedule::{Lamp, Over, Own, Pass, Query, Step};
-
-/// The directions of the passes that start at hits.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Directions {
-    /// Occlusion rays a pixel and sample.
-    pub occlusion: u32,
-    /// Their length, device units.
-    pub occlusion_length: f32,
-    /// Diffuse rays a pixel and sample.
-    pub diffuse: u32,
-    /// Greatest random turn about the normal, radians.
-    pub turn: f32,
-    /// Every pixel has directions of its own, all over the hemisphere: what filters over pixels and frames needs.
-    pub scatter: bool,
-    /// What surfaces reflect otherwise than diffusely comes by rays of its own, too.
-    pub glossy: bool,
-    /// Diffuse rays bring the environment's light as well as rays to it.
-    pub shares: bool,
-}
 
 /// Direction `index` about z of passes that start at hits, before it is turned or scattered.
 pub fn direction_around(index: u32) -> [f32; 3] {

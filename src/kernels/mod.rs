@@ -23,7 +23,6 @@ pub mod textures;
 pub mod trace;
 pub mod vector;
 
-pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
 pub use lamps::Lamps;
-pub use setup::{Extent, Keep, Setup, Tuning, View};
+pub use setup::{Directions, Extent, Keep, Setup, Tuning, View};
