@@ -4,9 +4,9 @@
 use super::frame::{Frame, Placement};
 use super::layout;
 use super::layout::Params;
+use super::payloads::BrickView;
 use super::shade::lamps::LampTables;
 use super::simd::isa::Best;
-use super::trace::brick::BrickView;
 use crate::schedule::Own;
 use bricks::{Node, Resident};
 use std::sync::atomic::{AtomicU32, Ordering};

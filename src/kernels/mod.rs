@@ -10,6 +10,7 @@ mod frame_executor;
 pub mod lamps;
 pub mod layout;
 pub mod opacity;
+pub mod payloads;
 pub mod query;
 pub mod rays;
 pub mod reflectance;

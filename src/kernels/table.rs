@@ -6,6 +6,7 @@
 //! file. The kernels of a secondary method have a table of their own in the method's folder ([`Family`]).
 
 use super::bound::Bound;
+use super::payloads::AttributeView;
 use super::query::query::query;
 use super::query::query_all::{count_pairs, query_all};
 use super::query::query_pairs::query_pairs;
@@ -16,7 +17,7 @@ use super::rays::{RaySet, Work};
 use super::shade::generate::{
     generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
-use super::shade::resolve::{AttributeView, resolve};
+use super::shade::resolve::resolve;
 use super::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
 use super::texture::sample::{Sampling, TileDemand, sample};
 use super::trace::intersect_all::intersect_all;

@@ -2,7 +2,6 @@
 
 pub mod binary_tree;
 pub mod brick;
-pub mod indices;
 pub mod intersect_all;
 pub mod intersect_binary;
 pub mod intersect_list;

@@ -1,9 +1,9 @@
-use super::brick::BrickView;
 use super::intersect_all::intersect_all;
 use crate::gpu::probe;
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{COUNTER_NODES, COUNTER_TRIANGLES, Hit, NONE, PARAM_ANY_HIT, Params, Ray, Slot, Surface};
+use crate::kernels::payloads::BrickView;
 use crate::kernels::query::pair_counts::PairCounts;
 use crate::kernels::rays::{RaySet, Work, start_hit};
 use crate::kernels::shade::lamps::LampTables;
