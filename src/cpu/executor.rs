@@ -4,11 +4,11 @@
 use super::cache::{BrickCache, Shared};
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
 use crate::kernels::dispatch::{Dispatch, are_pairs_culled, dispatches};
+use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{self, Params};
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::query::tile_lists::TileLists;
 use crate::kernels::rays::RaySet;
-use crate::kernels::shade::lamps::LampTables;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
 use crate::kernels::table::{self, Family, Target};

@@ -2,10 +2,10 @@
 //! parameters; and what all of them add to.
 
 use super::frame::{Frame, Placement};
+use super::lamps::LampTables;
 use super::layout;
 use super::layout::Params;
 use super::payloads::BrickView;
-use super::shade::lamps::LampTables;
 use super::simd::isa::Best;
 use crate::schedule::Own;
 use bricks::{Node, Resident};
