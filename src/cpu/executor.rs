@@ -12,7 +12,7 @@ use crate::kernels::rays::RaySet;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
 use crate::kernels::table::{self, Family, Target};
-use crate::kernels::texture::sample::{Sampling, Texels, TileDemand};
+use crate::kernels::texture::texels::{Sampling, Texels, TileDemand};
 use crate::kernels::trace::intersect_binary::BinaryTrees;
 use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,

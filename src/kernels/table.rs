@@ -19,7 +19,8 @@ use super::shade::generate::{
 };
 use super::shade::resolve::resolve;
 use super::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
-use super::texture::sample::{Sampling, TileDemand, sample};
+use super::texture::sample::sample;
+use super::texture::texels::{Sampling, TileDemand};
 use super::trace::intersect_all::intersect_all;
 use super::trace::intersect_binary::{BinaryTrees, intersect_binary};
 use super::trace::intersect_list::intersect_list;
