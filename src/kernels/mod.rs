@@ -21,6 +21,7 @@ pub mod simd;
 pub mod table;
 pub mod texture;
 pub mod textures;
+pub mod tiles;
 pub mod trace;
 pub mod vector;
 

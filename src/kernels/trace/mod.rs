@@ -13,6 +13,8 @@ pub mod packet_node;
 pub mod packet_surface;
 pub mod packet_triangle;
 pub mod packet_walk;
+pub mod run;
+pub mod scratch;
 pub mod walk_brick;
 
 #[cfg(test)]
