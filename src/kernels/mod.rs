@@ -1,7 +1,11 @@
 //! What both executors share: the structures that kernels read and write, which kernels a step consists of, the scene
 //! relative to a frame's reference point, and what their counters say.
 //!
-//! A kernel is a WGSL file in `shaders/` and a function of the same name in [`crate::cpu`], its twin.
+//! A kernel is a WGSL file in `shaders/` and a function of the same name in a family here, its twin.
+//!
+//! Modules know those before them: plain structures ([`vector`], [`layout`], [`frame`], [`lamps`], [`payloads`] …); what
+//! every twin is given ([`bound`], [`rays`], [`tiles`]); the families [`trace`], [`query`], [`texture`], [`shade`]; the
+//! [`table`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the families the node test alone ([`trace::node`]).
 
 pub mod bound;
 pub mod dispatch;
