@@ -13,7 +13,7 @@ use brickwalk::Settings;
 use brickwalk::counters::Counters;
 use brickwalk::kernels::frame::{Frame, Placement};
 use brickwalk::kernels::layout::{Hit, NONE, Params, Ray, Surface, T_INFINITE};
-use brickwalk::kernels::trace::brick::BrickView;
+use brickwalk::kernels::payloads::BrickView;
 use brickwalk::kernels::trace::leaf::rows_point;
 use brickwalk::kernels::{Directions, Extent, View};
 use brickwalk::scene::path::CameraPath;

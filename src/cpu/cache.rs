@@ -1,8 +1,7 @@
 //! The payloads that are resident: verified bytes in host memory, shared with the host cache, and the places that they
 //! take of the budget.
 
-use crate::kernels::shade::resolve::AttributeView;
-use crate::kernels::trace::brick::BrickView;
+use crate::kernels::payloads::{AttributeView, BrickView};
 use crate::schedule::{BrickStates, ExecutorError, Load};
 use crate::stream::{Destination, Item, Slot, Workers};
 use bricks::{Resident, SceneFile};

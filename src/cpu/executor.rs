@@ -4,15 +4,15 @@
 use super::cache::{BrickCache, Shared};
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
 use crate::kernels::dispatch::{Dispatch, are_pairs_culled, dispatches};
+use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{self, Params};
-use crate::kernels::query::tile_lists::TileLists;
+use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
-use crate::kernels::shade::lamps::LampTables;
-use crate::kernels::shade::resolve::AttributeView;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
 use crate::kernels::table::{self, Family, Target};
-use crate::kernels::texture::sample::{Sampling, Texels, TileDemand};
+use crate::kernels::texture::texels::{Sampling, Texels, TileDemand};
+use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::intersect_binary::BinaryTrees;
 use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,

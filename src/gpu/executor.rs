@@ -16,7 +16,7 @@ use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
-use crate::kernels::dispatch::{Dispatch, OWN_WORDS, Workgroups, are_pairs_culled, dispatches};
+use crate::kernels::dispatch::{Dispatch, Workgroups, are_pairs_culled, dispatches};
 use crate::kernels::layout;
 use crate::kernels::layout::Params;
 use crate::kernels::table::{self, Bindings, Family, names};
@@ -24,7 +24,7 @@ use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
     report, textures,
 };
-use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::schedule::{BrickStates, Executor, ExecutorError, Load, Own, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, WorkerPool, Workers};
 use bricks::SceneFile;
 use std::any::Any;
@@ -132,7 +132,7 @@ impl GpuExecutor {
                 mapped_at_creation: false,
             }),
             params: uniform(&gpu, "params", size_of::<Params>()),
-            blocks: uniform(&gpu, "blocks", 4 * OWN_WORDS),
+            blocks: uniform(&gpu, "blocks", 4 * Own::WORDS),
         };
         let read = [&buffers.counters, &buffers.demand, &buffers.texels.tile_demand];
         let readback = Readback::new(&gpu, read.iter().map(|buffer| buffer.size()).sum());
@@ -228,7 +228,7 @@ impl GpuExecutor {
         if dispatches.iter().any(|dispatch| dispatch.kernel == names::count_pairs) {
             self.make_room_for_counts()?;
         }
-        let strides = [size_of::<Params>(), 4 * OWN_WORDS].map(|bytes| stride(&self.gpu, bytes));
+        let strides = [size_of::<Params>(), 4 * Own::WORDS].map(|bytes| stride(&self.gpu, bytes));
         let mut told = strides.map(|stride| vec![0u8; stride as usize * dispatches.len()]);
         for (i, dispatch) in dispatches.iter().enumerate() {
             let bytes = [bytemuck::bytes_of(&dispatch.params), bytemuck::cast_slice(&dispatch.own)];

@@ -8,8 +8,8 @@ use super::rays::{PixelBuffers, RayBuffers, TileBuffers};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::wgsl::TEXEL_BINDING;
-use crate::kernels::dispatch::OWN_WORDS;
 use crate::kernels::layout::Params;
+use crate::schedule::Own;
 
 /// What kernels read and write.
 pub struct Buffers {
@@ -76,7 +76,7 @@ impl Groups {
             }),
         };
         let rays = |set: &RayBuffers| {
-            let mut entries = vec![of_dispatch(0, params, size_of::<Params>()), of_dispatch(6, blocks, 4 * OWN_WORDS)];
+            let mut entries = vec![of_dispatch(0, params, size_of::<Params>()), of_dispatch(6, blocks, 4 * Own::WORDS)];
             entries.extend(numbered([&set.rays, &set.hits, &set.surfaces, demand, counters], 1));
             group("rays", &kernels.rays, &entries)
         };

@@ -9,18 +9,24 @@
 use super::wgsl;
 use super::wgsl::Pages;
 use crate::math::exact;
-use bricks::SceneFile;
 use cases::{ArithmeticCase, TriangleCase};
+use check::{TWIN, no_results};
 use serde::Serialize;
 use std::sync::mpsc;
 use std::time::Instant;
 
 mod cases;
+mod check;
 mod rays;
+mod scene;
 mod traversal;
 mod twin;
 
+pub use check::{Check, failures};
 pub use traversal::compare_pipelines;
+
+#[cfg(test)]
+pub(crate) use scene::scene;
 
 /// What the probe found on a device.
 #[derive(Clone, Debug, Serialize)]
@@ -43,72 +49,14 @@ pub struct ProbeReport {
     pub ms: f64,
 }
 
-/// One function or property, over all cases that concern it.
-#[derive(Clone, Debug, Serialize)]
-pub struct Check {
-    /// Function of the exact arithmetic, the property, or the pipeline.
-    pub name: &'static str,
-    /// What it was compared with.
-    pub against: &'static str,
-    /// Cases compared.
-    pub cases: u32,
-    /// Cases with another result.
-    pub different: u32,
-    /// The first of these, in words.
-    pub first: Option<String>,
-}
-
-/// One line for everything that differs; empty if the device may render in exact mode.
-pub fn failures(checks: &[Check]) -> Vec<String> {
-    let line = |c: &Check| {
-        let first = c.first.as_deref().unwrap_or_default();
-        format!("{} differs from {} in {} of {} cases (first: {first})", c.name, c.against, c.different, c.cases)
-    };
-    checks.iter().filter(|c| c.different > 0).map(line).collect()
-}
-
-/// The scene that the traversal pipelines are compared with: several bricks, one of them wide; sheets in one plane,
-/// some twice; slivers; turned and mirrored instances. `scene_tests.rs` says how it is made.
-pub(crate) fn scene() -> Result<SceneFile, bricks::Error> {
-    SceneFile::from_bytes("the probe's scene", include_bytes!("probe/scene.bricks"))
-}
-
 /// The rays of the probe, at its scene in `frame`, for tests of others.
 #[cfg(test)]
 pub(crate) fn adverse_rays(
-    scene: &SceneFile,
+    scene: &bricks::SceneFile,
     frame: &crate::kernels::frame::Frame,
 ) -> Result<Vec<crate::kernels::layout::Ray>, bricks::Error> {
     Ok(rays::rays(&twin::Twin::new(scene, frame)?, frame.unit))
 }
-
-impl Check {
-    fn new(name: &'static str, against: &'static str) -> Self {
-        Self { name, against, cases: 0, different: 0, first: None }
-    }
-
-    /// Compares words of a result; +0 and -0 are one value.
-    fn compare(&mut self, found: &[u32], expected: &[u32], case: &dyn std::fmt::Debug) {
-        let value = |x: &u32| if *x == 1 << 31 { 0 } else { *x };
-        self.count(found.iter().map(value).eq(expected.iter().map(value)), found, expected, case);
-    }
-
-    /// Compares words of a result bit for bit.
-    fn compare_bits(&mut self, found: &[u32], expected: &[u32], case: &dyn std::fmt::Debug) {
-        self.count(found == expected, found, expected, case);
-    }
-
-    fn count(&mut self, same: bool, found: &[u32], expected: &[u32], case: &dyn std::fmt::Debug) {
-        self.cases += 1;
-        if !same {
-            self.different += 1;
-            self.first.get_or_insert_with(|| format!("{found:08x?} instead of {expected:08x?} for {case:?}"));
-        }
-    }
-}
-
-/// What results of exact arithmetic are compared with.
-const TWIN: &str = "its twin";
 
 /// Words of results per case of the kernel `arithmetic`.
 const ARITHMETIC_WORDS: usize = 12;
@@ -167,16 +115,6 @@ pub fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> P
     }
     report.ms = start.elapsed().as_secs_f64() * 1e3;
     report
-}
-
-fn no_results(name: &'static str, reason: String) -> Check {
-    Check {
-        name,
-        against: TWIN,
-        cases: 1,
-        different: 1,
-        first: Some(format!("the device returned no results: {reason}")),
-    }
 }
 
 /// Runs one entry point over all cases; `result_words` words a case come back.

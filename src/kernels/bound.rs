@@ -1,13 +1,13 @@
 //! What every kernel of a submission reads: the resident part of the scene in the frame, bricks where they lie,
 //! parameters; and what all of them add to.
 
-use super::dispatch::OWN_WORDS;
 use super::frame::{Frame, Placement};
+use super::lamps::LampTables;
 use super::layout;
 use super::layout::Params;
-use super::shade::lamps::LampTables;
+use super::payloads::BrickView;
 use super::simd::isa::Best;
-use super::trace::brick::BrickView;
+use crate::schedule::Own;
 use bricks::{Node, Resident};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -144,8 +144,8 @@ impl Tally {
 pub struct Bound<'a> {
     /// Parameters.
     pub params: &'a Params,
-    /// What a method's kernel is told beside these ([`crate::schedule::Own::block`]).
-    pub block: &'a [u32; OWN_WORDS],
+    /// What a method's kernel is told beside these ([`Own::block`]).
+    pub block: &'a [u32; Own::WORDS],
     /// The scene.
     pub scene: &'a Scene,
     /// Geometry of the bricks; empty of those that are not resident.

@@ -1,28 +1,10 @@
 //! Which dispatches of which kernels a step consists of.
 
 use super::layout::{self, Params};
+use super::setup::Directions;
 use super::table::names as kernels;
 use crate::math::sampling::{cosine_hemisphere, halton};
 use crate::schedule::{Lamp, Over, Own, Pass, Query, Step};
-
-/// The directions of the passes that start at hits.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Directions {
-    /// Occlusion rays a pixel and sample.
-    pub occlusion: u32,
-    /// Their length, device units.
-    pub occlusion_length: f32,
-    /// Diffuse rays a pixel and sample.
-    pub diffuse: u32,
-    /// Greatest random turn about the normal, radians.
-    pub turn: f32,
-    /// Every pixel has directions of its own, all over the hemisphere: what filters over pixels and frames needs.
-    pub scatter: bool,
-    /// What surfaces reflect otherwise than diffusely comes by rays of its own, too.
-    pub glossy: bool,
-    /// Diffuse rays bring the environment's light as well as rays to it.
-    pub shares: bool,
-}
 
 /// Direction `index` about z of passes that start at hits, before it is turned or scattered.
 pub fn direction_around(index: u32) -> [f32; 3] {
@@ -93,7 +75,7 @@ pub struct Dispatch {
     /// Its parameters.
     pub params: Params,
     /// What a method's kernel is told beside these.
-    pub own: [u32; OWN_WORDS],
+    pub own: [u32; Own::WORDS],
     /// Its workgroups.
     pub groups: Workgroups,
     /// Phase of the schedule that its time counts for, from 0.
@@ -117,9 +99,6 @@ pub fn are_pairs_culled(step: Step, before: bool, threshold: u32) -> bool {
     }
 }
 
-/// Words of what a method's kernel is told beside the parameters of all.
-pub const OWN_WORDS: usize = crate::schedule::Own::WORDS;
-
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
 
@@ -136,7 +115,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
     let per_ray = [params.width.div_ceil(8), params.height.div_ceil(8)];
     let per_tile = [params.tiles.div_ceil(64), 1];
     let by_tile = across(params.tiles * (params.tile / 8) * (params.tile / 8));
-    let dispatch = |kernel, params, groups, phase| Dispatch { kernel, params, own: [0; OWN_WORDS], groups, phase };
+    let dispatch = |kernel, params, groups, phase| Dispatch { kernel, params, own: [0; Own::WORDS], groups, phase };
     let kernel = |kernel, params, groups, phase| dispatch(kernel, params, Workgroups::Fixed(groups), phase);
     let shading = |name, params| kernel(name, params, per_ray, None);
     let list = |params, phase| dispatch(kernels::intersect_list, params, Workgroups::Chosen, Some(phase));

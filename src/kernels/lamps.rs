@@ -5,6 +5,7 @@ use super::layout;
 use crate::math::alias::AliasTable;
 use glam::DVec3;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// The background of all directions, and how they are drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -214,5 +215,45 @@ impl Lamps {
     /// The alias table over them.
     pub fn texel_table(&self) -> &[[u32; 2]] {
         self.environment.as_ref().map_or(&[], |environment| &environment.table)
+    }
+}
+
+/// What kernels that light read beside the scene: group 2 of those on the device.
+#[derive(Default)]
+pub struct LampTables {
+    lamps: Arc<Lamps>,
+    emitters: Vec<layout::Emitter>,
+    frame: Option<Frame>,
+}
+
+impl LampTables {
+    /// Takes `lamps`, unless they are those that it has.
+    pub fn set(&mut self, lamps: &Arc<Lamps>) {
+        if !Arc::ptr_eq(&self.lamps, lamps) {
+            (self.lamps, self.frame) = (lamps.clone(), None);
+        }
+    }
+
+    /// Those that it has taken.
+    pub fn lamps(&self) -> &Lamps {
+        &self.lamps
+    }
+
+    /// The emitters in the present frame.
+    pub fn emitters(&self) -> &[layout::Emitter] {
+        &self.emitters
+    }
+
+    /// One of them by its number.
+    pub fn emitter(&self, number: u32) -> &layout::Emitter {
+        &self.emitters[number as usize]
+    }
+
+    /// Moves the emitters to `frame`, if they are not there yet.
+    pub fn rebase(&mut self, frame: Frame) {
+        if self.frame != Some(frame) {
+            self.frame = Some(frame);
+            self.emitters = self.lamps.placed(&frame);
+        }
     }
 }

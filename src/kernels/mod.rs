@@ -1,7 +1,11 @@
 //! What both executors share: the structures that kernels read and write, which kernels a step consists of, the scene
 //! relative to a frame's reference point, and what their counters say.
 //!
-//! A kernel is a WGSL file in `shaders/` and a function of the same name in [`crate::cpu`], its twin.
+//! A kernel is a WGSL file in `shaders/` and a function of the same name in a family here, its twin.
+//!
+//! Modules know those before them: plain structures ([`vector`], [`layout`], [`frame`], [`lamps`], [`payloads`] …); what
+//! every twin is given ([`bound`], [`rays`], [`tiles`]); the families [`trace`], [`query`], [`texture`], [`shade`]; the
+//! [`table`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the families the node test alone ([`trace::node`]).
 
 pub mod bound;
 pub mod dispatch;
@@ -10,6 +14,7 @@ mod frame_executor;
 pub mod lamps;
 pub mod layout;
 pub mod opacity;
+pub mod payloads;
 pub mod query;
 pub mod rays;
 pub mod reflectance;
@@ -20,10 +25,10 @@ pub mod simd;
 pub mod table;
 pub mod texture;
 pub mod textures;
+pub mod tiles;
 pub mod trace;
 pub mod vector;
 
-pub use dispatch::Directions;
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
 pub use lamps::Lamps;
-pub use setup::{Extent, Keep, Setup, Tuning, View};
+pub use setup::{Directions, Extent, Keep, Setup, Tuning, View};

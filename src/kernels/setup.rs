@@ -1,6 +1,5 @@
 //! What an executor is set up for, and what it is told of every frame.
 
-use super::Directions;
 use super::frame::Frame;
 use super::layout::Params;
 
@@ -81,6 +80,25 @@ impl Tuning {
     pub fn new(setup: &Setup) -> Self {
         Self { threshold: setup.threshold, list_most: u32::MAX }
     }
+}
+
+/// The directions of the passes that start at hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Directions {
+    /// Occlusion rays a pixel and sample.
+    pub occlusion: u32,
+    /// Their length, device units.
+    pub occlusion_length: f32,
+    /// Diffuse rays a pixel and sample.
+    pub diffuse: u32,
+    /// Greatest random turn about the normal, radians.
+    pub turn: f32,
+    /// Every pixel has directions of its own, all over the hemisphere: what filters over pixels and frames needs.
+    pub scatter: bool,
+    /// What surfaces reflect otherwise than diffusely comes by rays of its own, too.
+    pub glossy: bool,
+    /// Diffuse rays bring the environment's light as well as rays to it.
+    pub shares: bool,
 }
 
 /// What a frame needs to know besides the scene.

@@ -6,22 +6,26 @@
 //! file. The kernels of a secondary method have a table of their own in the method's folder ([`Family`]).
 
 use super::bound::Bound;
+use super::payloads::AttributeView;
 use super::query::query::query;
 use super::query::query_all::{count_pairs, query_all};
 use super::query::query_pairs::query_pairs;
 use super::query::tile_bounds::tile_bounds;
-use super::query::tile_lists::{TileLists, query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
+use super::query::tile_lists::{query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::query::tile_walk::{tile_walk_count, tile_walk_write};
-use super::rays::{RaySet, Work};
+use super::rays::RaySet;
 use super::shade::generate::{
     generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
-use super::shade::resolve::{AttributeView, resolve};
+use super::shade::resolve::resolve;
 use super::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
-use super::texture::sample::{Sampling, TileDemand, sample};
+use super::texture::sample::sample;
+use super::texture::texels::{Sampling, TileDemand};
+use super::tiles::TileLists;
 use super::trace::intersect_all::intersect_all;
 use super::trace::intersect_binary::{BinaryTrees, intersect_binary};
 use super::trace::intersect_list::intersect_list;
+use super::trace::run::Work;
 use crate::schedule::ExecutorError;
 use bricks::Material;
 use std::sync::atomic::AtomicU32;
@@ -227,7 +231,7 @@ kernels! {
     query_reduce: "query/query_reduce" Tiles [] |b, t| query_reduce(b, t.tiles);
     query_all: "query/query_all" Tiles [] |b, t| query_all(b, t.own, Work::All, &t.tiles.pair_counts);
     query_from_root: "query/query_all" Tiles [OF_TILES = 1]
-        |b, t| query_all(b, t.own, Work::Rooted(t.tiles), &t.tiles.pair_counts);
+        |b, t| query_all(b, t.own, Work::Rooted(&t.tiles.lists), &t.tiles.pair_counts);
     count_pairs: "query/query_all" Tiles [PAIRS = 1] |b, t| {
         t.tiles.pair_counts.start(b.params.tiles, b.scene.leaves.len())?;
         count_pairs(b, t.own, &t.tiles.pair_counts);
@@ -241,9 +245,9 @@ kernels! {
     intersect_selected: "trace/intersect_all" CacheTiles [COUNT = 0, SELECT = 1]
         |b, t| intersect_all::<true>(b, t.own, Work::All, &t.tiles.pair_counts);
     intersect_from_root: "trace/intersect_all" CacheTiles [COUNT = 0, SELECT = 1, OF_TILES = 1]
-        |b, t| intersect_all::<true>(b, t.own, Work::Rooted(t.tiles), &t.tiles.pair_counts);
+        |b, t| intersect_all::<true>(b, t.own, Work::Rooted(&t.tiles.lists), &t.tiles.pair_counts);
     intersect_from_root_all: "trace/intersect_all" CacheTiles [COUNT = 0, SELECT = 0, OF_TILES = 1]
-        |b, t| intersect_all::<false>(b, t.own, Work::Rooted(t.tiles), &t.tiles.pair_counts);
+        |b, t| intersect_all::<false>(b, t.own, Work::Rooted(&t.tiles.lists), &t.tiles.pair_counts);
     intersect_binary: "trace/intersect_binary" Binary [] |b, t| match t.binary {
         Some(trees) => {
             intersect_binary(b, t.own, trees);

@@ -47,3 +47,8 @@ pub fn mix(a: f32, b: f32, t: f32) -> f32 {
 pub fn xyz(v: [f32; 4]) -> Vec3 {
     [v[0], v[1], v[2]]
 }
+
+/// WGSL's `unpack4x8unorm`.
+pub fn unpack4x8unorm(word: u32) -> [f32; 4] {
+    word.to_le_bytes().map(|b| f32::from(b) / 255.0)
+}

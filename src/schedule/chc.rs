@@ -1,9 +1,9 @@
 //! The schedule `chc`: lists per tile, resident bricks first, then missing ones nearest first with a query before each
 //! batch.
 
+use super::by_tile::run;
 use super::cache::{BATCH_BRICKS, Cache};
-use super::optimisations::{Optimisations, run};
-use super::{Demand, Executor, ExecutorError, Pass, Query, Report, Step, Tracing};
+use super::{Demand, Executor, ExecutorError, Optimisations, Pass, Query, Report, Step, Tracing};
 use crate::counters::Counters;
 use crate::stream::Item;
 use std::time::Instant;

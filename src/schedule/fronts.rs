@@ -5,10 +5,10 @@
 //! traversal are queried, loaded nearest first and intersected as without fronts. Invisible pairs are queried in every
 //! frame and a pair is only ever left out by a query against present hits, so the final hits are exact.
 
+use super::by_tile::run;
 use super::cache::Cache;
 use super::chc::{Batches, measure_needed};
 use super::multi_query::batches;
-use super::optimisations::run;
 use super::pair_tree::{Front, PairTree, Square};
 use super::{Executor, ExecutorError, PairQuery, Pass, Step, Tracing};
 use crate::counters::Counters;

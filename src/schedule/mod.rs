@@ -11,6 +11,7 @@
 
 pub mod attributes;
 pub mod auto;
+mod by_tile;
 pub mod cache;
 pub mod chc;
 pub mod demand;

@@ -4,9 +4,10 @@
 //! pipelines that a session goes on to use trace fixed rays through a small scene that is part of the program, for
 //! closest and for any hits; what they write is compared bit for bit, and with brute force on the host.
 
+use super::check::{Check, no_results};
 use super::rays::{RAYS, rays};
+use super::scene::scene;
 use super::twin::{Twin, closest};
-use super::{Check, no_results, scene};
 use crate::counters::Counters;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernels::frame::Frame;

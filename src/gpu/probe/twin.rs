@@ -3,7 +3,7 @@
 use crate::kernels::frame::{Frame, Placement};
 use crate::kernels::layout;
 use crate::kernels::layout::{INSTANCE_IDENTITY, NONE};
-use crate::kernels::trace::brick::BrickView;
+use crate::kernels::payloads::BrickView;
 use crate::kernels::trace::leaf::{BrickRay, rows_direction, rows_point};
 use crate::kernels::trace::node::framed_ray;
 use crate::math::exact::{divide, intersect_triangle, ray_frame};

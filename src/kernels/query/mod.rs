@@ -1,7 +1,6 @@
 //! Twins of the kernels that decide which bricks tiles and rays need.
 
 pub mod interval;
-pub mod pair_counts;
 // A twin's file has the name of its kernel.
 #[allow(clippy::module_inception)]
 pub mod query;

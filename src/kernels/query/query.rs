@@ -1,25 +1,27 @@
 //! Ray-by-ray queries of the selected (tile, leaf) pairs: twin of `shaders/query/query.wgsl`. How many rays of the tile
 //! enter a child box of the brick's root at or before their present hit, and where the nearest does.
 
-use super::tile_lists::TileLists;
 use crate::kernels::bound::{Bound, entry_bits};
 use crate::kernels::layout::{INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT};
-use crate::kernels::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, for_each_ray, run_for_each_packet};
+use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
+use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::node::{entered_children, framed_ray, node_hits};
 use crate::kernels::trace::packet::RAYS;
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::PacketScratch;
+use crate::kernels::trace::run::{PacketKernel, RayKernel, Work, for_each_ray, run_for_each_packet};
+use crate::kernels::trace::scratch::Scratch;
 use crate::kernels::vector::least;
 
 /// Of the rays of chosen tiles. With PARAM_NEEDED the hits are final and the rays of an any-hit pass that ended
 /// occluded ask only for the brick that holds their hit.
 pub fn query(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
     if bound.has(PARAM_NEEDED) {
-        for_each_ray(set, bound, Work::Chosen(lists), |_, slot| ask(bound, &slot, lists));
+        for_each_ray(set, bound, Work::Chosen(&lists.chosen), |_, slot| ask(bound, &slot, lists));
     } else {
-        run_for_each_packet(set, bound, Work::Chosen(lists), &Query { bound, lists });
+        run_for_each_packet(set, bound, Work::Chosen(&lists.chosen), &Query { bound, lists });
     }
 }
 

@@ -2,14 +2,16 @@
 //! asks for the bricks in the wanted state of whose root it enters a child box at or before its present hit, and notes
 //! whether it asked for any. Or it asks for nothing, and counted is how many rays of a tile see each leaf.
 
-use super::pair_counts::PairCounts;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     COUNTER_PAIRS_INVISIBLE, COUNTER_PAIRS_VISIBLE, COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT, PARAM_NEXT,
 };
-use crate::kernels::rays::{RaySet, Scratch, Slot, Work, for_each_ray};
+use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::tiles::PairCounts;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::node::{by_priority, entered_children, framed_ray, inner_before, node_hits};
+use crate::kernels::trace::run::{Work, for_each_ray};
+use crate::kernels::trace::scratch::Scratch;
 use crate::kernels::vector::least;
 
 /// MAX_TOP_HEIGHT levels of which each leaves at most 7 siblings, and the root.

@@ -3,10 +3,10 @@
 //! its brick's root's), which lie in its own. A query of several nodes asks first whether any ray enters any of them,
 //! and only then for each node alone.
 
-use super::tile_lists::TileLists;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{COUNTER_PAIRS_TESTED, COUNTER_TIGHTENED, NONE, PARAM_ANY_HIT, PARAM_TIGHTER, Pair};
 use crate::kernels::rays::{RaySet, is_traced};
+use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::node::{FramedRay, UNIT, framed_ray, node_hits, traversal_mask};
 use crate::kernels::vector::{each, least, most, most3};

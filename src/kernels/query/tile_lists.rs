@@ -3,88 +3,16 @@
 //! `query_reduce.wgsl`.
 
 use super::interval::tile_meets_box;
-use super::pair_counts::PairCounts;
-use crate::kernels::bound::{Bound, Demand, Tally};
+use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     COUNTER_FRONT_TO_BACK, COUNTER_LIST_ENTRIES, COUNTER_MOST_SELECTED, COUNTER_PAIRS_INTERSECTED,
     COUNTER_PAIRS_INVISIBLE, COUNTER_PAIRS_VISIBLE, COUNTER_TILE_BATCH_LEAVES, COUNTER_TILE_BATCHES,
-    COUNTER_TILES_FROM_ROOT, Entry, Pair, TileBounds, TileList, TopNode2,
+    COUNTER_TILES_FROM_ROOT, Entry, TileBounds, TileList, TopNode2,
 };
+use crate::kernels::tiles::TileLists;
 use crate::kernels::vector::{dot, each, least, most};
 use crate::schedule::ExecutorError;
 use rayon::prelude::*;
-
-/// Most entries of all lists together: 1.25 GiB.
-const MOST_ENTRIES: u64 = 1 << 26;
-
-/// Tiles, their lists, and queries of pairs: group 3 of the kernels that work on tiles.
-#[derive(Default)]
-pub struct TileLists {
-    /// Bounds of the tiles' rays.
-    pub bounds: Vec<TileBounds>,
-    /// Where the tiles' entries lie in `list`, one after the other. Which tiles have work `chosen` says, and
-    /// `from_root` of each.
-    pub lists: Vec<TileList>,
-    /// Whether each tile had a selection when tiles were last chosen.
-    pub chosen: Vec<bool>,
-    /// Leaves per tile, near first; tables of those whose rays walk from the root.
-    pub list: Vec<Entry>,
-    /// Positions in `list`, per tile.
-    pub selection: Vec<u32>,
-    /// The least distance of the entries that are selected, per tile.
-    pub nearest: Vec<f32>,
-    /// What is asked of every position of `list`.
-    pub pair_demand: Vec<Demand>,
-    /// Queries of pairs.
-    pub pairs: Vec<Pair>,
-    /// Their nodes.
-    pub pair_nodes: Vec<u32>,
-    /// Rays that see each of their nodes.
-    pub pair_rays: Vec<u32>,
-    /// Rays that see each leaf from each tile.
-    pub pair_counts: PairCounts,
-}
-
-impl TileLists {
-    /// For so many tiles.
-    pub fn new(tiles: usize) -> Self {
-        let (bounds, lists) = (vec![TileBounds::default(); tiles], vec![TileList::default(); tiles]);
-        Self { bounds, lists, chosen: vec![false; tiles], nearest: vec![0.0; tiles], ..Self::default() }
-    }
-
-    /// Makes room for so many entries.
-    ///
-    /// # Errors
-    /// They are too many.
-    pub fn make_room(&mut self, entries: u64) -> Result<(), ExecutorError> {
-        if entries > MOST_ENTRIES {
-            let text = format!("cannot hold tile lists of {entries} entries; use a larger --tile");
-            return Err(ExecutorError::Device(text));
-        }
-        let entries = entries as usize;
-        if entries > self.list.len() {
-            self.list.resize(entries, Entry::default());
-            self.selection.resize(entries, 0);
-            self.pair_demand.resize_with(entries, Demand::default);
-        }
-        Ok(())
-    }
-
-    /// Sets the lists of all tiles, for which there is room.
-    pub fn set(&mut self, lists: &[Vec<u32>]) {
-        let mut first = 0;
-        self.lists.clear();
-        for leaves in lists {
-            let count = leaves.len() as u32;
-            self.lists.push(TileList { first, count, ..TileList::default() });
-            first += count;
-        }
-        for (entry, &leaf) in self.list.iter_mut().zip(lists.iter().flatten()) {
-            *entry = Entry { leaf, near: 0.0 };
-        }
-        self.pair_demand.iter_mut().for_each(|demand| *demand = Demand::default());
-    }
-}
 
 /// The parts of `data` that belong to the tiles, in order. Lists follow each other, empty ones apart.
 pub fn of_tiles<'a, T>(lists: &[TileList], data: &'a mut [T]) -> Vec<&'a mut [T]> {

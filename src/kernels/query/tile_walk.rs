@@ -3,11 +3,12 @@
 //! them.
 
 use super::interval::tile_meets_box;
-use super::tile_lists::{TileLists, centre_along, of_tiles};
+use super::tile_lists::{centre_along, of_tiles};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     COUNTER_PAIRS_CULLED, COUNTER_PAIRS_TESTED, COUNTER_STACK_OVERFLOW, Entry, NONE, TileBounds, TileList, TopNode2,
 };
+use crate::kernels::tiles::TileLists;
 use rayon::prelude::*;
 
 const WALK_STACK: usize = 72;

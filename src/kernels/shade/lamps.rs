@@ -1,45 +1,12 @@
 //! The environment and the emitters, and how a point of them is drawn: twin of `shaders/shade/lamps.wgsl`.
 
-use crate::kernels::Lamps;
 use crate::kernels::bound::Bound;
-use crate::kernels::frame::Frame;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_KIND, EMITTER_SPOT, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter, PARAM_BOUNCE, Params,
 };
 use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, normalize};
 use crate::math::sampling::{pcg, random4};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
-use std::sync::Arc;
-
-/// What kernels that light read beside the scene: group 2 of those on the device.
-#[derive(Default)]
-pub struct LampTables {
-    lamps: Arc<Lamps>,
-    emitters: Vec<Emitter>,
-    frame: Option<Frame>,
-}
-
-impl LampTables {
-    /// Takes `lamps`, unless they are those that it has.
-    pub fn set(&mut self, lamps: &Arc<Lamps>) {
-        if !Arc::ptr_eq(&self.lamps, lamps) {
-            (self.lamps, self.frame) = (lamps.clone(), None);
-        }
-    }
-
-    /// One of the emitters by its number, in the present frame.
-    pub fn emitter(&self, number: u32) -> &Emitter {
-        &self.emitters[number as usize]
-    }
-
-    /// Moves the emitters to `frame`, if they are not there yet.
-    pub fn rebase(&mut self, frame: Frame) {
-        if self.frame != Some(frame) {
-            self.frame = Some(frame);
-            self.emitters = self.lamps.placed(&frame);
-        }
-    }
-}
 
 /// The high word of a product.
 fn multiply_high(a: u32, b: u32) -> u32 {
@@ -90,7 +57,7 @@ fn environment_texel(bound: &Bound, column: i32, row: i32) -> Vec3 {
     let Params { environment_width, environment_height, .. } = *bound.params;
     let x = column.rem_euclid(environment_width as i32);
     let y = row.clamp(0, environment_height as i32 - 1);
-    crate::kernels::vector::xyz(bound.lamps.lamps.texels()[(y * environment_width as i32 + x) as usize])
+    crate::kernels::vector::xyz(bound.lamps.lamps().texels()[(y * environment_width as i32 + x) as usize])
 }
 
 /// Radiance at a place in texels, between their centres bilinearly.
@@ -131,7 +98,7 @@ pub fn environment_density(bound: &Bound, d: Vec3) -> f32 {
     let (width, height) = (bound.params.environment_width, bound.params.environment_height);
     let [x, y] = environment_place(bound.params, d).map(|x| most(x, 0.0) as u32);
     let texel = y.min(height - 1) * width + x.min(width - 1);
-    bound.lamps.lamps.texels()[texel as usize][3] / most((d[0] * d[0] + d[2] * d[2]).sqrt(), 1.0e-7)
+    bound.lamps.lamps().texels()[texel as usize][3] / most((d[0] * d[0] + d[2] * d[2]).sqrt(), 1.0e-7)
 }
 
 /// By which the sun's disc draws d, with a part of 1 along the sun: evenly over a disc across it.
@@ -163,7 +130,7 @@ pub struct EnvironmentSample {
 pub fn environment_sample(bound: &Bound, words: [u32; 4]) -> EnvironmentSample {
     let p = bound.params;
     let mut texel = multiply_high(words[0], p.environment_width * p.environment_height);
-    let entry = bound.lamps.lamps.texel_table()[texel as usize];
+    let entry = bound.lamps.lamps().texel_table()[texel as usize];
     if words[1] >= entry[0] {
         texel = entry[1];
     }
@@ -183,7 +150,7 @@ pub fn environment_sample(bound: &Bound, words: [u32; 4]) -> EnvironmentSample {
 
 /// Radiance along a direction that was drawn over its density; zero where none is to be drawn.
 pub fn drawn_light(bound: &Bound, drawn: &EnvironmentSample) -> Vec3 {
-    let density = bound.lamps.lamps.texels()[drawn.texel as usize][3];
+    let density = bound.lamps.lamps().texels()[drawn.texel as usize][3];
     if density > 0.0 {
         let weight = most(drawn.level, 0.0) / density;
         return environment_lookup(bound, drawn.place).map(|c| c * weight);
@@ -193,13 +160,13 @@ pub fn drawn_light(bound: &Bound, drawn: &EnvironmentSample) -> Vec3 {
 
 /// The density by which a direction was drawn.
 pub fn drawn_density(bound: &Bound, drawn: &EnvironmentSample) -> f32 {
-    bound.lamps.lamps.texels()[drawn.texel as usize][3] / most(drawn.level, 1.0e-7)
+    bound.lamps.lamps().texels()[drawn.texel as usize][3] / most(drawn.level, 1.0e-7)
 }
 
 /// The emitter that the ray of a pixel leads to.
 pub fn emitter_of<'a>(bound: &Bound<'a>, index: usize, throughput: &[[f32; 4]]) -> &'a Emitter {
-    let emitters = &bound.lamps.emitters;
-    if let [alone] = &emitters[..] {
+    let emitters = bound.lamps.emitters();
+    if let [alone] = emitters {
         return alone;
     }
     // The first two draw the point.

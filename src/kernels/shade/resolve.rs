@@ -5,59 +5,16 @@ use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     GBUFFER_FIRST, GBUFFER_READ, GBuffer, INSTANCE_MIRRORED, NO_NORMAL, NONE, Params, Ray, STATE_ATTRIBUTES, Surface,
 };
+use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
 use crate::kernels::texture::sample::settle;
-use crate::kernels::trace::indices::Indices;
-use crate::kernels::vector::{Vec3, dot, each, most, normalize, xyz};
+use crate::kernels::vector::{Vec3, dot, each, most, normalize, unpack4x8unorm, xyz};
 use crate::math::exact::{divide, square_root};
-use bricks::{
-    AttributeDetail, AttributeLayout, AttributeVertex, Brick, Material, NORMAL, SURFACE_MATERIAL,
-    SURFACE_ROTATION_SHIFT,
-};
+use bricks::{Material, NORMAL, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use rayon::prelude::*;
 
 /// Of the angle between a ray and a normal; below it a footprint is that of this one.
 const LEAST_COSINE: f32 = 0.05;
-
-/// The arrays of a brick's attributes where they lie.
-#[derive(Clone, Copy, Default)]
-pub struct AttributeView<'a> {
-    vertices: &'a [AttributeVertex],
-    /// Material and rotation of each triangle.
-    surfaces: &'a [u32],
-    indices: Indices<'a>,
-    /// As many as vertices, or none.
-    details: &'a [AttributeDetail],
-}
-
-impl<'a> AttributeView<'a> {
-    /// The arrays in the verified attributes of `brick`, which are aligned for u32 and of the length that the record
-    /// implies.
-    pub fn new(brick: &Brick, bytes: &'a [u8]) -> Self {
-        let layout = AttributeLayout::of(brick);
-        let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
-        Self {
-            vertices: bytemuck::cast_slice(part(0, layout.surfaces)),
-            surfaces: bytemuck::cast_slice(part(layout.surfaces, layout.indices)),
-            indices: Indices::new(brick, part(layout.indices, layout.details)),
-            details: bytemuck::cast_slice(part(layout.details, layout.bytes)),
-        }
-    }
-
-    fn corners(&self, triangle: u32) -> [AttributeVertex; 3] {
-        self.indices.of(triangle).map(|index| self.vertices[index as usize])
-    }
-
-    /// What its corners have besides, where they have.
-    fn details(&self, triangle: u32) -> Option<[AttributeDetail; 3]> {
-        let corners = self.indices.of(triangle);
-        (!self.details.is_empty()).then(|| corners.map(|index| self.details[index as usize]))
-    }
-}
-
-pub(crate) fn unpack4x8unorm(word: u32) -> [f32; 4] {
-    word.to_le_bytes().map(|b| f32::from(b) / 255.0)
-}
 
 /// The normal of an attribute vertex; zero if it has none.
 fn octahedral(word: u32) -> Vec3 {

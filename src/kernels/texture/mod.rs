@@ -3,6 +3,7 @@
 pub mod bc5;
 pub mod bc7;
 pub mod sample;
+pub mod texels;
 // A twin's file has the name of its kernel.
 #[allow(clippy::module_inception)]
 pub mod texture;

@@ -2,85 +2,16 @@
 //! for, and the hit waits. With `PARAM_COARSER` none waits: the next coarser level that is resident stands for what is
 //! missing. Twin of `shaders/texture/sample.wgsl`.
 
+use super::texels::{Sampling, TileDemand};
 use super::texture::{Level, color_at, level_at, levels_of, tile_at};
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::layout;
 use crate::kernels::layout::{
     COUNTER_UNRESOLVED, GBUFFER_FIRST, GBUFFER_WAITS, GBuffer, MATERIAL_UNLIT, NONE, PARAM_COARSER,
 };
-use crate::kernels::textures::{UNASKED, record};
 use crate::kernels::vector::{Vec3, cross, dot, each, mix, most};
-use crate::schedule::ExecutorError;
-use bricks::{BASE_COLOR, METALLIC_ROUGHNESS, Material, NORMAL, OCCLUSION, Payload, SceneFile};
+use bricks::{BASE_COLOR, METALLIC_ROUGHNESS, NORMAL, OCCLUSION};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering};
-
-/// Materials, textures and their tails, resident throughout.
-pub struct Texels {
-    /// Materials.
-    pub materials: Vec<Material>,
-    /// Textures.
-    pub textures: Vec<layout::Texture>,
-    /// Words of the tails.
-    pub tails: Vec<Vec<u32>>,
-    /// Bytes of tails.
-    pub bytes: u64,
-}
-
-impl Texels {
-    /// Reads and verifies every tail.
-    ///
-    /// # Errors
-    /// A texture that cannot be read or verified.
-    pub fn new(scene: &SceneFile) -> Result<Self, ExecutorError> {
-        let resident = scene.resident();
-        let read = |(i, texture): (u32, &bricks::Texture)| {
-            let mut words = vec![0u32; texture.tail.bytes as usize / 4];
-            scene
-                .copy(Payload::Texture(i), bytemuck::cast_slice_mut(&mut words))
-                .map_err(|error| ExecutorError::Device(format!("failed: {error}")))?;
-            Ok(words)
-        };
-        Ok(Self {
-            materials: resident.materials.clone(),
-            // A tail is a page of its own.
-            textures: (0u32..).zip(&resident.textures).map(|(i, texture)| record(texture, i, 0)).collect(),
-            tails: (0u32..).zip(&resident.textures).map(read).collect::<Result<_, ExecutorError>>()?,
-            bytes: resident.textures.iter().map(|texture| texture.tail.bytes).sum(),
-        })
-    }
-}
-
-/// What lookups read: textures with their tails, and tiles where they lie; empty of those that are not resident.
-#[derive(Clone, Copy)]
-pub struct Sampling<'a> {
-    /// What is resident throughout.
-    pub texels: &'a Texels,
-    /// Words of the tiles.
-    pub tiles: &'a [&'a [u32]],
-}
-
-/// What is asked of a tile.
-pub struct TileDemand {
-    rays: AtomicU32,
-    first: AtomicU32,
-    used: AtomicU32,
-}
-
-impl Default for TileDemand {
-    fn default() -> Self {
-        let layout::TileDemand { rays, first, used } = UNASKED;
-        Self { rays: rays.into(), first: first.into(), used: used.into() }
-    }
-}
-
-impl TileDemand {
-    /// What was asked.
-    pub fn get(&self) -> layout::TileDemand {
-        let [rays, first, used] = [&self.rays, &self.first, &self.used].map(|x| x.load(Ordering::Relaxed));
-        layout::TileDemand { rays, first, used }
-    }
-}
+use std::sync::atomic::Ordering;
 
 /// Of all hits of the shaded set that wait for it.
 pub fn sample(bound: &Bound, gbuffer: &mut [GBuffer], from: Sampling, demand: &[TileDemand]) {

@@ -1,10 +1,9 @@
 //! Lookups in textures that are cut into tiles: twin of `shaders/texture/texture.wgsl`.
 
-use super::sample::Sampling;
+use super::texels::Sampling;
 use super::{bc5, bc7};
 use crate::kernels::layout::{NONE, TEXTURE_BC5, TEXTURE_RGBA8, TEXTURE_SRGB, TILE_TEXELS, Texture};
-use crate::kernels::shade::resolve::unpack4x8unorm;
-use crate::kernels::vector::mix;
+use crate::kernels::vector::{mix, unpack4x8unorm};
 use std::sync::LazyLock;
 
 /// One level of a texture around a lookup.

@@ -1,7 +1,8 @@
 //! Texture lookups against the decoder of another library, naive bilinear lookups in f64, and heavily supersampled
 //! pictures.
 
-use super::sample::{Sampling, Texels, TileDemand, look_up};
+use super::sample::look_up;
+use super::texels::{Sampling, Texels, TileDemand};
 use super::texture::{Levels, color_at, level_at, levels_of, tile_at};
 use super::{bc5, bc7};
 use crate::kernels::layout::{GBUFFER_FIRST, GBUFFER_READ, GBuffer, NONE, Params, Ray, Surface};

@@ -1,87 +1,14 @@
 //! What a ray meets inside one brick: twin of `shaders/trace/brick.wgsl`.
 
-use super::indices::Indices;
 use super::leaf::{BrickRay, row_direction, rows_point};
 use super::node::UNIT;
-use super::opacity::OpacityView;
 use crate::kernels::bound::Scene;
-use crate::kernels::layout::{BRICK_WIDE, Hit, INSTANCE_IDENTITY, NONE, Surface};
+use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, Surface};
 use crate::kernels::rays::Slot;
 use crate::kernels::vector::{Vec3, each, most3};
 use crate::math::exact::{
     SurfacePoint, TriangleHit, barrier, divide, intersect_triangle, length_of, offset_origin, surface_point,
 };
-use bricks::{Brick, GeometryLayout, Node};
-
-/// The arrays of a brick's geometry where they lie. What indices they hold has been checked when the payload was
-/// loaded; they are checked on every use all the same.
-#[derive(Clone, Copy, Default)]
-pub struct BrickView<'a> {
-    /// Nodes, the root first.
-    pub nodes: &'a [Node],
-    /// Three numbers a vertex, or six of a wide brick.
-    vertices: &'a [f32],
-    /// Mesh-local ids of the triangles.
-    ids: &'a [u32],
-    /// The triangles' vertices.
-    indices: Indices<'a>,
-    /// Whether vertices have two parts.
-    is_wide: bool,
-    /// Which rays pass through its triangles.
-    pub opacity: OpacityView<'a>,
-}
-
-impl<'a> BrickView<'a> {
-    /// The arrays in the verified geometry of `brick`, which is aligned for u32 and of the length that the record
-    /// implies; `table` is that of [`crate::kernels::opacity`].
-    pub fn new(brick: &Brick, bytes: &'a [u8], table: &'a [[u32; 4]]) -> Self {
-        let layout = GeometryLayout::of(brick);
-        let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
-        Self {
-            nodes: bytemuck::cast_slice(part(0, layout.vertices)),
-            vertices: bytemuck::cast_slice(part(layout.vertices, layout.ids)),
-            ids: bytemuck::cast_slice(part(layout.ids, layout.indices)),
-            indices: Indices::new(brick, part(layout.indices, layout.opacity_of)),
-            opacity: OpacityView {
-                of: bytemuck::cast_slice(part(layout.opacity_of, layout.opacities)),
-                triangles: bytemuck::cast_slice(part(layout.opacities, layout.bytes)),
-                table,
-            },
-            is_wide: brick.flags & BRICK_WIDE != 0,
-        }
-    }
-
-    /// A vertex in the object's frame, in which the brick's origin lies at the offset: the correctly rounded difference
-    /// of its lattice position and the reference point.
-    #[inline(always)]
-    fn vertex(&self, index: u32, offset_high: Vec3, offset_low: Vec3) -> Vec3 {
-        if !self.is_wide {
-            let at = 3 * index as usize;
-            let l = &self.vertices[at..at + 3];
-            return each(|k| barrier(l[k] + offset_high[k]));
-        }
-        let at = 6 * index as usize;
-        let l = &self.vertices[at..at + 6];
-        each(|k| barrier(barrier(l[k] + offset_high[k]) + barrier(l[3 + k] + offset_low[k])))
-    }
-
-    /// The vertices of a triangle in the object's frame.
-    #[inline(always)]
-    pub fn vertices(&self, triangle: u32, offset_high: Vec3, offset_low: Vec3) -> [Vec3; 3] {
-        let [a, b, c] = self.indices.of(triangle);
-        let vertex = |index| self.vertex(index, offset_high, offset_low);
-        [vertex(a), vertex(b), vertex(c)]
-    }
-}
-
-impl Best {
-    /// What is known of a ray before a dispatch.
-    #[inline(always)]
-    pub fn before(slot: &Slot) -> Self {
-        let (before, source) = (&slot.hit, slot.surface.source);
-        Self { t: before.t, id: before.id, leaf: NONE, triangle: 0, hit: TriangleHit::default(), source }
-    }
-}
 
 /// The nearest hit so far.
 #[derive(Clone, Copy, Debug)]
@@ -98,6 +25,15 @@ pub struct Best {
     pub hit: TriangleHit,
     /// Triangle that the ray starts from.
     pub source: u32,
+}
+
+impl Best {
+    /// What is known of a ray before a dispatch.
+    #[inline(always)]
+    pub fn before(slot: &Slot) -> Self {
+        let (before, source) = (&slot.hit, slot.surface.source);
+        Self { t: before.t, id: before.id, leaf: NONE, triangle: 0, hit: TriangleHit::default(), source }
+    }
 }
 
 impl BrickRay<'_> {

@@ -7,12 +7,14 @@ use super::leaf::BrickRay;
 use super::node::{FramedRay, framed_ray, inner_before};
 use super::packet_node::Place;
 use super::packet_walk::{PacketGroup, PacketScratch, put, take};
+use super::run::{PacketKernel, RayKernel, Work, run_for_each_packet};
+use super::scratch::Scratch;
 use super::walk_brick::{Group, Visits, finish_walk};
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{NONE, PARAM_ANY_HIT};
-use crate::kernels::query::pair_counts::PairCounts;
-use crate::kernels::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
+use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::{Isa, Lanes};
+use crate::kernels::tiles::PairCounts;
 
 /// A group of the top level: the node, and its entered children, inner ones and leaves alike, by priority in the high
 /// byte, so that bricks are met near to far.

@@ -5,16 +5,18 @@ use super::brick::Best;
 use super::leaf::BrickRay;
 use super::node::framed_ray;
 use super::packet_walk::PacketScratch;
+use super::run::{PacketKernel, RayKernel, Work, run_for_each_packet};
+use super::scratch::Scratch;
 use super::walk_brick::{Group, Visits, finish_walk};
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Entry, NONE, PARAM_ANY_HIT};
-use crate::kernels::query::tile_lists::TileLists;
-use crate::kernels::rays::{PacketKernel, RayKernel, RaySet, Scratch, Slot, Work, run_for_each_packet};
+use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
+use crate::kernels::tiles::TileLists;
 
 /// Of the rays of chosen tiles.
 pub fn intersect_list(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
-    run_for_each_packet(set, bound, Work::Chosen(lists), &IntersectList { bound, lists });
+    run_for_each_packet(set, bound, Work::Chosen(&lists.chosen), &IntersectList { bound, lists });
 }
 
 struct IntersectList<'a> {

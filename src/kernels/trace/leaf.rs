@@ -1,14 +1,22 @@
 //! A ray at a leaf of the top level, transformed into the frame of the leaf's instance: twin of
 //! `shaders/trace/leaf.wgsl`.
 
-use super::brick::BrickView;
 use super::node::{FramedRay, framed_ray};
-use super::opacity::Draw;
 use crate::kernels::bound::{Bound, Scene};
 use crate::kernels::layout::INSTANCE_IDENTITY;
+use crate::kernels::payloads::BrickView;
 use crate::kernels::simd::isa::Lanes;
 use crate::kernels::vector::Vec3;
 use crate::math::exact::barrier;
+
+/// What numbers are drawn from where rays pass through triangles at random, beside ray and triangle.
+#[derive(Clone, Copy, Default)]
+pub struct Draw {
+    /// `Params.seed`.
+    pub seed: u32,
+    /// `Params.stream`.
+    pub stream: u32,
+}
 
 /// A ray in a brick.
 #[derive(Clone, Copy)]

@@ -2,7 +2,6 @@
 
 pub mod binary_tree;
 pub mod brick;
-pub mod indices;
 pub mod intersect_all;
 pub mod intersect_binary;
 pub mod intersect_list;
@@ -14,6 +13,8 @@ pub mod packet_node;
 pub mod packet_surface;
 pub mod packet_triangle;
 pub mod packet_walk;
+pub mod run;
+pub mod scratch;
 pub mod walk_brick;
 
 #[cfg(test)]

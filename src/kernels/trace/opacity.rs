@@ -1,33 +1,14 @@
 //! Which rays pass through a triangle: twin of `shaders/trace/opacity.wgsl`.
 
-use super::leaf::BrickRay;
+use super::leaf::{BrickRay, Draw};
 use super::node::FramedRay;
 use crate::kernels::layout::{NONE, Opacity};
+use crate::kernels::payloads::OpacityView;
 use crate::math::exact::{TriangleHit, barrier, divide};
 use crate::math::sampling::pcg;
-use bricks::{OpacityTriangle, WRAP_CLAMP, WRAP_MIRROR};
+use bricks::{WRAP_CLAMP, WRAP_MIRROR};
 
 const ALPHA_ONE: f32 = 65_025.0;
-
-/// The opacity of a brick's triangles where it lies.
-#[derive(Clone, Copy, Default)]
-pub struct OpacityView<'a> {
-    /// The number of each triangle among `triangles`, or NONE; empty in a brick that no ray passes through.
-    pub of: &'a [u32],
-    /// What decides.
-    pub triangles: &'a [OpacityTriangle],
-    /// [`Opacity`] of each material in two vectors, then texels ([`crate::kernels::opacity`]).
-    pub table: &'a [[u32; 4]],
-}
-
-/// What the numbers are drawn from, beside ray and triangle.
-#[derive(Clone, Copy, Default)]
-pub struct Draw {
-    /// `Params.seed`.
-    pub seed: u32,
-    /// `Params.stream`.
-    pub stream: u32,
-}
 
 fn wrapped(x: i32, size: i32, mode: u32) -> i32 {
     match mode {

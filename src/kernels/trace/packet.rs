@@ -6,12 +6,10 @@
 
 use super::brick::Best;
 use super::node::{FramedRay, framed_ray};
-use super::packet_node::{Axes, axes};
-use super::packet_triangle::turned;
 use crate::kernels::layout::{Hit, NONE, Ray};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
-use crate::kernels::vector::{least, most};
+use crate::kernels::vector::{Vec3, least, most};
 use crate::math::exact::{GREATEST_INVERSE, LEAST_SHEAR, RayFrame, TriangleHit};
 
 /// Most rays of a packet: a bit each in a u64.
@@ -20,6 +18,15 @@ pub const RAYS: usize = 64;
 /// Components of directions are plain below this magnitude, and so is the largest above its inverse: quotients are what
 /// f32 division gives.
 const PLAIN: f32 = f32::from_bits((127 + 90) << 23);
+
+/// Three numbers by axis, and zeros.
+pub type Axes = [f32; 8];
+
+/// Numbers by axis as a vector takes them.
+#[inline(always)]
+pub fn axes(v: Vec3) -> Axes {
+    [v[0], v[1], v[2], 0.0, 0.0, 0.0, 0.0, 0.0]
+}
 
 /// A number a ray.
 #[derive(Clone, Copy)]
@@ -347,5 +354,20 @@ impl Packet {
     #[inline(always)]
     pub fn shorten<I: Isa>(&mut self, isa: I) {
         self.bounds.t = self.t.range(isa, self.vectors::<I>());
+    }
+}
+
+/// A vector's components in the order of [`RayFrame`]: kx, ky, kz.
+#[inline(always)]
+pub fn turned<I: Isa>(x: [I::Wide; 3], axis: u32, [along_x, along_y]: [u32; 2]) -> [I::Wide; 3] {
+    match axis {
+        0 => [x[1], x[2], x[0]],
+        1 => [x[2], x[0], x[1]],
+        2 => x,
+        _ => [
+            x[1].or_else(along_x, x[2].or_else(along_y, x[0])),
+            x[2].or_else(along_x, x[0].or_else(along_y, x[1])),
+            x[0].or_else(along_x, x[1].or_else(along_y, x[2])),
+        ],
     }
 }

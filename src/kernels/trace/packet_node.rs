@@ -2,20 +2,11 @@
 //! tell, ray by ray.
 
 use super::node::UNIT;
-use super::packet::{Packet, RAYS};
+use super::packet::{Axes, Packet, RAYS, axes};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, most};
 use bricks::Node;
-
-/// Three numbers by axis, and zeros.
-pub type Axes = [f32; 8];
-
-/// Numbers by axis as a vector takes them.
-#[inline(always)]
-pub fn axes(v: Vec3) -> Axes {
-    [v[0], v[1], v[2], 0.0, 0.0, 0.0, 0.0, 0.0]
-}
 
 /// Where and how nodes are seen: see [`super::node::NodeFrame::new`].
 #[derive(Clone, Copy)]

@@ -7,8 +7,8 @@ use super::packet::{Packet, RAYS};
 use super::walk_brick::write_found;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, Surface};
-use crate::kernels::simd::isa::Isa;
-use crate::kernels::simd::wide::{Wide, inside, three};
+use crate::kernels::simd::isa::{Isa, inside};
+use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::Vec3;
 use crate::math::exact::{LEAST_COORDINATE, LEAST_SHEAR, OFFSET_ULPS, THIRD};
 

@@ -1,13 +1,14 @@
-use super::brick::BrickView;
 use super::intersect_all::intersect_all;
+use super::run::Work;
 use crate::gpu::probe;
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
 use crate::kernels::frame::Frame;
+use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{COUNTER_NODES, COUNTER_TRIANGLES, Hit, NONE, PARAM_ANY_HIT, Params, Ray, Slot, Surface};
-use crate::kernels::query::pair_counts::PairCounts;
-use crate::kernels::rays::{RaySet, Work, start_hit};
-use crate::kernels::shade::lamps::LampTables;
+use crate::kernels::payloads::BrickView;
+use crate::kernels::rays::{RaySet, start_hit};
 use crate::kernels::simd::isa::{Best, Scalar};
+use crate::kernels::tiles::PairCounts;
 use bricks::{Payload, SceneFile};
 use std::sync::atomic::Ordering;
 

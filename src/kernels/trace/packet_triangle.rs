@@ -3,9 +3,9 @@
 //! are tested alone.
 
 use super::leaf::BrickRay;
-use super::packet::{Packet, RAYS};
-use crate::kernels::simd::isa::Isa;
-use crate::kernels::simd::wide::{Wide, inside, three};
+use super::packet::{Packet, RAYS, turned};
+use crate::kernels::simd::isa::{Isa, inside};
+use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, each};
 use crate::math::exact::{CLAMP_ULPS, TINY, TriangleHit, intersect_triangle};
 
@@ -161,19 +161,4 @@ fn relative<I: Isa>(isa: I, x: Vec3, origin: [I::Wide; 3]) -> [I::Wide; 3] {
 #[inline(always)]
 fn shear<W: Wide>(p: [W; 3], by: [W; 2]) -> [W; 3] {
     [p[0] - by[0] * p[2], p[1] - by[1] * p[2], p[2]]
-}
-
-/// A vector's components in the order of [`crate::math::exact::RayFrame`]: kx, ky, kz.
-#[inline(always)]
-pub fn turned<I: Isa>(x: [I::Wide; 3], axis: u32, [along_x, along_y]: [u32; 2]) -> [I::Wide; 3] {
-    match axis {
-        0 => [x[1], x[2], x[0]],
-        1 => [x[2], x[0], x[1]],
-        2 => x,
-        _ => [
-            x[1].or_else(along_x, x[2].or_else(along_y, x[0])),
-            x[2].or_else(along_x, x[0].or_else(along_y, x[1])),
-            x[0].or_else(along_x, x[1].or_else(along_y, x[2])),
-        ],
-    }
 }

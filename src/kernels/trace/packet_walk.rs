@@ -3,10 +3,10 @@
 use super::leaf::BrickRay;
 use super::packet::Packet;
 use super::packet_node::Place;
+use super::scratch::Scratch;
 use super::walk_brick::{Group, STACK_SIZE, Stack, Visits};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{COUNTER_STACK_OVERFLOW, INSTANCE_IDENTITY, NONE};
-use crate::kernels::rays::Scratch;
 use crate::kernels::simd::isa::{Isa, Lanes};
 
 /// Where fewer rays than this go, each goes by itself: testing eight children for one ray costs less than testing the

@@ -77,6 +77,15 @@ pub trait Isa: Copy + Send + Sync {
     fn open_top(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32;
 }
 
+/// Numbers for which [`crate::math::exact::is_inside`] holds lie in these bounds, the upper one excluded.
+const INSIDE: [f32; 2] = [f32::from_bits(2 << 23), f32::from_bits(254 << 23)];
+
+/// [`crate::math::exact::is_inside`].
+#[inline(always)]
+pub fn inside<I: Isa>(isa: I, x: I::Wide) -> u32 {
+    isa.splat(INSIDE[0]).less_equal(x.abs()) & x.abs().less(isa.splat(INSIDE[1]))
+}
+
 /// No more than every processor has.
 #[derive(Clone, Copy, Debug)]
 pub struct Scalar;

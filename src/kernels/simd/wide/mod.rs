@@ -1,7 +1,6 @@
 //! Numbers of several rays at once. Operations are those of f32, lane by lane, none of them fused; comparisons give a
 //! bit a lane.
 
-use super::isa::Isa;
 use crate::math::exact;
 use std::ops::{Add, BitAnd, BitXor, Div, Mul, Sub};
 
@@ -74,15 +73,6 @@ macro_rules! three {
     };
 }
 pub(crate) use three;
-
-/// Numbers for which [`exact::is_inside`] holds lie in these bounds, the upper one excluded.
-const INSIDE: [f32; 2] = [f32::from_bits(2 << 23), f32::from_bits(254 << 23)];
-
-/// [`exact::is_inside`].
-#[inline(always)]
-pub fn inside<I: Isa>(isa: I, x: I::Wide) -> u32 {
-    isa.splat(INSIDE[0]).less_equal(x.abs()) & x.abs().less(isa.splat(INSIDE[1]))
-}
 
 /// Eight numbers in the hands of the compiler.
 #[derive(Clone, Copy)]

@@ -1,4 +1,4 @@
-use crate::kernels::simd::isa::for_each_isa;
+use crate::kernels::simd::isa::{Isa, for_each_isa};
 use crate::kernels::simd::wide::*;
 
 /// Zeros, infinities, what is no number of either sign, the ends of the denormals and of the normals, and numbers

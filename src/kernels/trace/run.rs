@@ -1,0 +1,381 @@
+//! How kernels run over the rays of a set: bands of rows in parallel, in each blocks of neighbours, ray by ray or in
+//! packets.
+
+use super::node::octant;
+use super::packet::RAYS;
+use super::packet_walk::PacketScratch;
+use super::scratch::Scratch;
+use crate::kernels::bound::Bound;
+use crate::kernels::layout::{Hit, Ray, Surface, TileList};
+use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::simd::isa::{Best, Isa};
+use rayon::prelude::*;
+
+/// Edge of the blocks of rays that one thread traces in a row.
+const BLOCK: usize = 8;
+
+/// Whose rays a kernel runs over.
+#[derive(Clone, Copy)]
+pub enum Work<'a> {
+    /// All tiles'.
+    All,
+    /// Those of the tiles that have been chosen: whether each has.
+    Chosen(&'a [bool]),
+    /// Those of the tiles whose rays walk from the root, as their lists say.
+    Rooted(&'a [TileList]),
+}
+
+impl Work<'_> {
+    fn includes(self, tile: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Chosen(chosen) => chosen[tile],
+            Self::Rooted(lists) => lists[tile].from_root != 0,
+        }
+    }
+}
+
+/// What a task works with.
+#[derive(Default)]
+struct Task {
+    /// What kernels keep from ray to ray.
+    scratch: Scratch,
+    /// What packets work with, once there was one.
+    packets: Option<Box<PacketScratch>>,
+    /// How rays come together in packets, once there was one.
+    groups: Option<Box<Groups>>,
+}
+
+/// A rectangle of rays that lies in one tile and in one band.
+struct Block {
+    tile: usize,
+    /// First column.
+    first: usize,
+    columns: usize,
+    rows: usize,
+}
+
+impl Block {
+    /// Squares of 8 x 8 that it consists of.
+    #[inline(always)]
+    fn squares(&self) -> usize {
+        self.columns.div_ceil(BLOCK) * self.rows.div_ceil(BLOCK)
+    }
+
+    /// Calls `visit` with the numbers of the rays of a square within the band of rows of `width`: squares of 4 x 4 one
+    /// after the other, so that neighbours come together.
+    #[inline(always)]
+    fn for_each_place(&self, width: usize, square: usize, mut visit: impl FnMut(usize)) {
+        let across = self.columns.div_ceil(BLOCK);
+        let (first, row, end) =
+            (self.first + square % across * BLOCK, square / across * BLOCK, self.first + self.columns);
+        for quarter in 0..4 {
+            let (x, y) = (first + quarter % 2 * BLOCK / 2, row + quarter / 2 * BLOCK / 2);
+            for row in y..(y + BLOCK / 2).min(self.rows) {
+                for column in x..(x + BLOCK / 2).min(end) {
+                    visit(row * width + column);
+                }
+            }
+        }
+    }
+}
+
+/// The rays of a band with what is written of them.
+struct Band<'a> {
+    rays: &'a [Ray],
+    hits: &'a mut [Hit],
+    surfaces: &'a mut [Surface],
+}
+
+impl Band<'_> {
+    /// Brings what is known of a ray near, if there is one.
+    #[inline(always)]
+    fn prefetch<I: Isa>(&self, isa: I, at: usize) {
+        if let (Some(ray), Some(hit), Some(surface)) = (self.rays.get(at), self.hits.get(at), self.surfaces.get(at)) {
+            isa.prefetch(ray);
+            isa.prefetch(hit);
+            isa.prefetch(surface);
+        }
+    }
+
+    #[inline(always)]
+    fn slot(&mut self, tile: usize, at: usize) -> Slot<'_> {
+        Slot { tile, ray: &self.rays[at], hit: &mut self.hits[at], surface: &mut self.surfaces[at] }
+    }
+}
+
+/// Calls `visit` for the blocks of `work`, of at most so many rows and columns: bands of rows in parallel.
+fn for_each_block(
+    set: &mut RaySet,
+    bound: &Bound,
+    work: Work,
+    [rows, columns]: [usize; 2],
+    visit: impl Fn(&mut Task, &mut Band, Block) + Sync,
+) {
+    let [width, tile_edge, tiles_x] = [bound.params.width, bound.params.tile, bound.params.tiles_x].map(|x| x as usize);
+    // Tiles are powers of two of at least 8.
+    let (rows, columns) = (rows.min(tile_edge), columns.min(tile_edge));
+    let band = rows * width;
+    let RaySet { rays, hits, surfaces } = set;
+    let bands = rays.par_chunks(band).zip(hits.par_chunks_mut(band)).zip(surfaces.par_chunks_mut(band));
+    bands.enumerate().for_each(|(number, ((rays, hits), surfaces))| {
+        let mut task = Task::default();
+        let row = number * rows;
+        let rows = rays.len() / width;
+        let mut band = Band { rays, hits, surfaces };
+        for first in (0..width).step_by(columns) {
+            let tile = row / tile_edge * tiles_x + first / tile_edge;
+            if work.includes(tile) {
+                let columns = columns.min(width - first);
+                visit(&mut task, &mut band, Block { tile, first, columns, rows });
+            }
+        }
+        bound.counters.add(&task.scratch.tally);
+    });
+}
+
+/// Calls `kernel` for every ray of `work`: bands of rows in parallel, in each blocks of 8 x 8 rays, so that neighbours
+/// meet the same nodes.
+pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn(&mut Scratch, Slot) + Sync) {
+    let width = bound.params.width as usize;
+    for_each_block(set, bound, work, [BLOCK; 2], |task, band, block| {
+        for square in 0..block.squares() {
+            block.for_each_place(width, square, |at| kernel(&mut task.scratch, band.slot(block.tile, at)));
+        }
+    });
+}
+
+/// A kernel that is compiled for every instruction set. Implementations are always inlined, so that all of it is.
+pub trait RayKernel: Sync {
+    /// Runs it for one ray.
+    fn run<I: Isa>(&self, isa: I, scratch: &mut Scratch, slot: Slot);
+}
+
+/// A kernel that rays of one octant may run together.
+pub trait PacketKernel: RayKernel {
+    /// Whether it does anything for a ray.
+    fn takes(&self, slot: &Slot) -> bool;
+
+    /// Runs it for the rays of the packet, which are of the tile; what they find stays with them.
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize);
+}
+
+/// [`for_each_ray`] with the dispatch's instruction set.
+pub fn run_for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl RayKernel) {
+    match bound.isa {
+        Best::Scalar(isa) => for_each_ray(set, bound, work, |scratch, slot| kernel.run(isa, scratch, slot)),
+        #[cfg(target_arch = "x86_64")]
+        Best::Avx2(isa) => for_each_ray(set, bound, work, |scratch, slot| {
+            // SAFETY: a value of the type exists only where AVX2 has been detected.
+            unsafe { run_avx2(isa, kernel, scratch, slot) }
+        }),
+        #[cfg(target_arch = "x86_64")]
+        Best::Avx512(isa) => for_each_ray(set, bound, work, |scratch, slot| {
+            // SAFETY: a value of the type exists only where AVX2 has been detected.
+            unsafe { run_avx2(isa, kernel, scratch, slot) }
+        }),
+        #[cfg(target_arch = "aarch64")]
+        Best::Neon(isa) => for_each_ray(set, bound, work, |scratch, slot| kernel.run(isa, scratch, slot)),
+    }
+}
+
+/// What `kernel` is compiled for AVX2 in.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn run_avx2<I: Isa>(isa: I, kernel: &impl RayKernel, scratch: &mut Scratch, slot: Slot) {
+    kernel.run(isa, scratch, slot);
+}
+
+/// Edge of the blocks whose rays are made packets of, those of an octant together.
+const PACKET_BLOCK: usize = 32;
+/// Rays of such a block.
+const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
+/// Bands that a thread has at least, if they can be so low.
+const BANDS: usize = 8;
+/// So many rays of a square of 8 x 8 go together if they are of one octant; others wait for those of their octant in
+/// the block.
+const LEAST_SQUARE: usize = 16;
+/// Fewer rays of an octant go one by one.
+const LEAST_PACKET: usize = 4;
+
+/// [`run_for_each_ray`], rays of an octant together.
+pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
+    // Where there are many threads, each has its share of bands.
+    let height = bound.params.height as usize;
+    let rows = if height < PACKET_BLOCK * BANDS * rayon::current_num_threads() { BLOCK } else { PACKET_BLOCK };
+    for_each_block(set, bound, work, [rows, BLOCK_RAYS / rows], |task, band, block| match bound.isa {
+        Best::Scalar(isa) => run_block(isa, bound, kernel, task, band, block),
+        #[cfg(target_arch = "x86_64")]
+        Best::Avx2(isa) => {
+            // SAFETY: a value of the type exists only where AVX2 has been detected.
+            unsafe { run_block_avx2(isa, bound, kernel, task, band, block) }
+        }
+        #[cfg(target_arch = "x86_64")]
+        Best::Avx512(isa) => {
+            // SAFETY: a value of the type exists only where AVX-512 and AVX2 have been detected.
+            unsafe { run_block_avx512(isa, bound, kernel, task, band, block) }
+        }
+        #[cfg(target_arch = "aarch64")]
+        Best::Neon(isa) => run_block(isa, bound, kernel, task, band, block),
+    });
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn run_block_avx2(
+    isa: crate::kernels::simd::isa::Avx2,
+    bound: &Bound,
+    kernel: &impl PacketKernel,
+    task: &mut Task,
+    band: &mut Band,
+    block: Block,
+) {
+    run_block(isa, bound, kernel, task, band, block);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512dq")]
+fn run_block_avx512(
+    isa: crate::kernels::simd::isa::Avx512,
+    bound: &Bound,
+    kernel: &impl PacketKernel,
+    task: &mut Task,
+    band: &mut Band,
+    block: Block,
+) {
+    run_block(isa, bound, kernel, task, band, block);
+}
+
+/// Makes packets of a block's rays and runs them.
+#[inline(always)]
+fn run_block<I: Isa>(
+    isa: I,
+    bound: &Bound,
+    kernel: &impl PacketKernel,
+    task: &mut Task,
+    band: &mut Band,
+    block: Block,
+) {
+    let mut packets = task.packets.take().unwrap_or_default();
+    let mut groups = task.groups.take().unwrap_or_default();
+    groups.clear();
+    while groups.next(isa, bound, kernel, band, &block) {
+        let places = &groups.places[..groups.count];
+        if places.len() < LEAST_PACKET {
+            for &at in places {
+                kernel.run(isa, &mut task.scratch, band.slot(block.tile, at as usize));
+            }
+            continue;
+        }
+        packets.packet.clear(groups.octant as u32);
+        for &at in places {
+            let slot = band.slot(block.tile, at as usize);
+            packets.packet.add(slot.ray, slot.hit, slot.surface.source);
+        }
+        packets.packet.seal(isa);
+        kernel.run_packet(isa, &mut task.scratch, &mut packets, block.tile);
+        packets.count(bound, &mut task.scratch.tally);
+        packets.packet.write(isa, bound, band.hits, band.surfaces, places);
+    }
+    (task.packets, task.groups) = (Some(packets), Some(groups));
+}
+
+/// Takes the rays of a block by groups of an octant: those of a square of 8 x 8 where they are of one, then the others.
+struct Groups {
+    /// The square that is looked at next.
+    square: usize,
+    /// Rays that wait for others of their octant, and their octants.
+    waiting: [(u32, u8); BLOCK_RAYS],
+    /// The same by octants, once there are no more squares.
+    sorted: [u32; BLOCK_RAYS],
+    /// How many of them are of each octant.
+    counts: [usize; 8],
+    /// How many have been taken.
+    taken: usize,
+    /// The group: its octant and the places of its rays.
+    octant: usize,
+    count: usize,
+    places: [u32; RAYS],
+}
+
+impl Default for Groups {
+    fn default() -> Self {
+        let (waiting, sorted, places) = ([(0, 0); BLOCK_RAYS], [0; BLOCK_RAYS], [0; RAYS]);
+        Self { square: 0, waiting, sorted, counts: [0; 8], taken: 0, octant: 0, count: 0, places }
+    }
+}
+
+impl Groups {
+    /// Begins with a block.
+    fn clear(&mut self) {
+        (self.square, self.counts, self.taken) = (0, [0; 8], 0);
+    }
+
+    /// Takes the next group of rays for which `kernel` does anything. False: there is none.
+    #[inline(always)]
+    fn next<I: Isa>(
+        &mut self,
+        isa: I,
+        bound: &Bound,
+        kernel: &impl PacketKernel,
+        band: &mut Band,
+        block: &Block,
+    ) -> bool {
+        let width = bound.params.width as usize;
+        while self.square < block.squares() {
+            let (mut octants, mut octant_of) = (0u32, [0u8; RAYS]);
+            self.count = 0;
+            block.for_each_place(width, self.square, |at| {
+                band.prefetch(isa, at + BLOCK);
+                let slot = band.slot(block.tile, at);
+                if kernel.takes(&slot) {
+                    let octant = octant(slot.ray.direction) % 8;
+                    self.places[self.count % RAYS] = at as u32;
+                    octant_of[self.count % RAYS] = octant as u8;
+                    octants |= 1 << octant;
+                    self.count += 1;
+                }
+            });
+            self.square += 1;
+            if octants.is_power_of_two() && self.count >= LEAST_SQUARE {
+                self.octant = octants.trailing_zeros() as usize;
+                return true;
+            }
+            let waiting: usize = self.counts.iter().sum();
+            for i in 0..self.count {
+                let octant = octant_of[i % RAYS];
+                self.waiting[(waiting + i) % BLOCK_RAYS] = (self.places[i % RAYS], octant);
+                self.counts[octant as usize % 8] += 1;
+            }
+        }
+        if self.square == block.squares() {
+            self.sort();
+            self.square += 1;
+        }
+        let mut end = 0;
+        for octant in 0..8 {
+            end += self.counts[octant];
+            if self.taken < end {
+                (self.octant, self.count) = (octant, (end - self.taken).min(RAYS));
+                self.places[..self.count].copy_from_slice(&self.sorted[self.taken..self.taken + self.count]);
+                self.taken += self.count;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Sorts the rays that wait by octants.
+    fn sort(&mut self) {
+        let mut next = [0; 8];
+        for octant in 1..8 {
+            next[octant] = next[octant - 1] + self.counts[octant - 1];
+        }
+        let waiting: usize = self.counts.iter().sum();
+        for &(at, octant) in &self.waiting[..waiting] {
+            let to = &mut next[octant as usize % 8];
+            self.sorted[*to % BLOCK_RAYS] = at;
+            *to += 1;
+        }
+    }
+}
