@@ -92,9 +92,16 @@ impl Optimisation {
     }
 }
 
-use crate::settings::removed::unknown;
-use crate::settings::value::value_of_name;
-use std::str::FromStr;
+impl FromStr for Optimisation {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().copied().find(|which| which.name() == text);
+        found.ok_or_else(|| unknown(text, Self::NAMES, &[]))
+    }
+}
+
+value_of_name!(Optimisation);
 
 #[cfg(test)]
 mod tests {
