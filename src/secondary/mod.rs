@@ -7,6 +7,23 @@ pub mod roma;
 pub mod rsm;
 
 use crate::kernels::table::Family;
+use crate::settings::names;
+
+names! {
+    /// How secondary rays are answered.
+    Method {
+        /// By tracing them.
+        Exact = "exact",
+        /// By occupancy maps, those that these can answer.
+        Roma = "roma",
+        /// By occupancy maps where these find them free, else by tracing them.
+        Auto = "auto",
+        /// By distance fields, those that occupancy maps can answer.
+        Df = "df",
+        /// By fields of visibility, those to the environment.
+        Dvf = "dvf",
+    } later &["displacement"]
+}
 
 /// The kernels of all methods: what is compared on both executors.
 pub static FAMILIES: [&Family; 4] =

@@ -15,11 +15,11 @@ use crate::picture::exposure::Meter;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::Camera;
 use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::secondary::Method;
 use crate::secondary::dvf::prepare::{Note, Walk, prepare};
 use crate::secondary::roma::LEAST_CELLS;
 use crate::secondary::roma::answer::Roma;
 use crate::session::Settings;
-use crate::settings::Secondary;
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
 use serde_json::{Map, Value};
@@ -150,7 +150,7 @@ impl Session {
             renderer,
             lighting,
             resolve: Resolve::new(settings.denoise, settings.taa),
-            field: (settings.secondary != Secondary::Dvf).then_some(None),
+            field: (settings.secondary != Method::Dvf).then_some(None),
             stops: Vec::new(),
             meter: Meter::new(settings.exposure),
             motion,
@@ -311,7 +311,7 @@ impl Session {
 fn check_occupancy(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()> {
     let resident = scene.resident();
     let has_occupancy = resident.bricks.is_empty() || !resident.occupancy.is_empty();
-    if !matches!(settings.secondary, Secondary::Exact | Secondary::Dvf) && !has_occupancy {
+    if !matches!(settings.secondary, Method::Exact | Method::Dvf) && !has_occupancy {
         bail!(
             "{}: --secondary {} needs the occupancy of bricks; convert the scene again without --no-proxies",
             file.display(),
@@ -326,7 +326,7 @@ fn reference(scene: Arc<SceneFile>, file: &Path, settings: &Settings, light: Lig
     let settings = Settings {
         query_threshold: 0,
         requests_out: None,
-        secondary: Secondary::Exact,
+        secondary: Method::Exact,
         interactive: None,
         measure_needed: false,
         aov: false,

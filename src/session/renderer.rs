@@ -6,10 +6,11 @@ use crate::frame::{Effects, Engine, Light, Methods, Moved, Occlusion, RenderSett
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
+use crate::secondary::Method;
 use crate::secondary::df::answer::Df;
 use crate::secondary::roma::answer::Roma;
 use crate::session::Settings;
-use crate::settings::{Schedule, Secondary};
+use crate::settings::Schedule;
 use anyhow::Result;
 use std::path::Path;
 
@@ -50,12 +51,12 @@ pub fn methods(settings: &Settings) -> Methods {
     let mut methods = Methods::default();
     let (roma, df) = (&settings.roma, &settings.df);
     match settings.secondary {
-        Secondary::Roma | Secondary::Auto => {
-            let is_auto = settings.secondary == Secondary::Auto;
+        Method::Roma | Method::Auto => {
+            let is_auto = settings.secondary == Method::Auto;
             methods.set(Roma::new(roma.settings(settings.rsm.settings(), is_auto), roma.bom));
         }
-        Secondary::Df => methods.set(Df::new(df.settings(), roma.bom)),
-        Secondary::Exact | Secondary::Dvf => {}
+        Method::Df => methods.set(Df::new(df.settings(), roma.bom)),
+        Method::Exact | Method::Dvf => {}
     }
     methods
 }

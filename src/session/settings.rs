@@ -4,11 +4,11 @@ use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
 use crate::schedule::{Optimisation, Optimisations, PartOf};
-use crate::secondary::{df, dvf, roma, rsm};
+use crate::secondary::{Method, df, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
     Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Rectangle, Rule, Schedule,
-    Secondary, SettingsError, Turn, settings,
+    SettingsError, Turn, settings,
 };
 use crate::stream::Policy;
 use std::path::PathBuf;
@@ -152,7 +152,7 @@ settings! {
         /// those of `ao` and `shadow` that the maps find free are not traced. `df`: those of `ao` and `shadow` by
         /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
         /// walk.
-        secondary: Secondary = Secondary::Exact, "--secondary METHOD", Rule::Any, "", Methods, Common;
+        secondary: Method = Method::Exact, "--secondary METHOD", Rule::Any, "", Methods, Common;
 
         /// Record which bricks every pass needed (`bricks_needed`). It takes a traversal more a pass.
         measure_needed: bool = false, "--measure-needed", Rule::Any, "", Measurement, Expert;

@@ -28,22 +28,6 @@ names! {
 }
 
 names! {
-    /// How secondary rays are answered.
-    Secondary {
-        /// By tracing them.
-        Exact = "exact",
-        /// By occupancy maps, those that these can answer.
-        Roma = "roma",
-        /// By occupancy maps where these find them free, else by tracing them.
-        Auto = "auto",
-        /// By distance fields, those that occupancy maps can answer.
-        Df = "df",
-        /// By fields of visibility, those to the environment.
-        Dvf = "dvf",
-    } later &["displacement"]
-}
-
-names! {
     /// A pass.
     Effect {
         /// Rays of the camera.

@@ -27,6 +27,12 @@ mod exact {
     mod twins;
 }
 
+/// The sources themselves: arrows, circles, folders.
+mod house {
+    mod sources;
+    mod structure;
+}
+
 /// Files of the shared scenes and models of other projects: what converting does, what the picture shows.
 mod scenes {
     mod expected;

@@ -2,9 +2,10 @@
 
 use super::args::Settings as Scale;
 use crate::lab::bench::plan::SceneId;
+use crate::secondary::Method;
 use crate::secondary::roma::{self, Unsnapped};
 use crate::session::Settings;
-use crate::settings::{Effect, EffectList, Plain, Rule, Secondary, Turn, Value};
+use crate::settings::{Effect, EffectList, Plain, Rule, Turn, Value};
 use std::fmt;
 
 /// A part of the measurements that can be asked for alone.
@@ -129,10 +130,10 @@ impl Way {
     pub fn over(&self, settings: &Settings) -> Settings {
         let (roma, mut settings) = (&settings.roma, settings.clone());
         settings.secondary = match self {
-            Self::Exact => Secondary::Exact,
-            Self::Roma { .. } => Secondary::Roma,
-            Self::Sifted | Self::Corrected { .. } | Self::Bounded { .. } => Secondary::Auto,
-            Self::Field { .. } => Secondary::Df,
+            Self::Exact => Method::Exact,
+            Self::Roma { .. } => Method::Roma,
+            Self::Sifted | Self::Corrected { .. } | Self::Bounded { .. } => Method::Auto,
+            Self::Field { .. } => Method::Df,
         };
         match *self {
             Self::Exact => {}
