@@ -1,8 +1,8 @@
 //! What can be wrong with a scene file, said so that the reader knows which part it is and what to do.
 
 use crate::layout::{MAGIC, Section, VERSION};
+use crate::pack::UnpackError;
 use crate::payload::Payload;
-use crate::resident::Resident;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -54,6 +54,13 @@ pub struct Flaw {
     pub found: String,
     /// What the format asks for.
     pub expected: String,
+}
+
+impl Flaw {
+    /// Packed bytes, which are `part` or in it, that could not be unpacked.
+    pub fn packed(part: Part, error: UnpackError) -> Self {
+        Self { part, found: error.found, expected: error.expected }
+    }
 }
 
 /// Why a scene file could not be opened, read or written. Every message names the file, the part of it, what was found
@@ -211,9 +218,9 @@ impl Error {
         }
     }
 
-    /// The same error, said to be about the texture that `payload` is part of, if it is of one.
-    pub(crate) fn within(self, resident: &Resident, payload: Payload) -> Self {
-        match (resident.texture_of(payload), self) {
+    /// The same error, said to be about a part of a texture if `place` says which.
+    pub(crate) fn within(self, place: Option<String>) -> Self {
+        match (place, self) {
             (Some(place), error @ (Error::Io { .. } | Error::Corrupt { .. } | Error::Invalid { .. })) => {
                 Error::Texture { error: Box::new(error), place }
             }

@@ -10,8 +10,6 @@
 //! LZ4 turns long runs of repeated bytes into few and is decoded at several times the speed of a disk; what is packed
 //! should be arranged accordingly.
 
-use crate::error::{Flaw, Part};
-
 /// Length of the word before the block.
 const HEAD_BYTES: usize = 4;
 
@@ -26,13 +24,6 @@ pub struct UnpackError {
     pub found: String,
     /// What the format asks for.
     pub expected: String,
-}
-
-impl UnpackError {
-    /// As a flaw in `part`, where the packed bytes are.
-    pub fn in_part(self, part: Part) -> Flaw {
-        Flaw { part, found: self.found, expected: self.expected }
-    }
 }
 
 /// Packs at most [`MAX_PAYLOAD_BYTES`](crate::layout::MAX_PAYLOAD_BYTES) bytes. The same bytes give the same packed
