@@ -1,6 +1,6 @@
 //! Checks of occupancy: the resident records, the maps, and the vertices against the maps.
 
-use super::rule;
+use super::rule::rule;
 use crate::error::{Flaw, Part};
 use crate::layout::Section;
 use crate::occupancy::{OCCUPANCY_CELLS, OCCUPANCY_LIMIT, OccupancyGrid, OccupancyMap, RESIDENT_LEVEL};
