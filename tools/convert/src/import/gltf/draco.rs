@@ -4,7 +4,7 @@ use super::accessor::Accessor;
 use super::document::{Document, Draco};
 use super::file::{File, Problem, item};
 use crate::import::error::{EXPORT_AGAIN, one_line};
-use crate::import::quietly;
+use crate::import::panics::quietly;
 use crate::import::table::TableWriter;
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
 use gltf::json::{Index, buffer};

@@ -5,7 +5,7 @@
 
 use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform};
 use super::file::{File, Problem, item};
-use super::label;
+use super::names::label;
 use crate::import::warnings::Warnings;
 use bricks::{
     MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, Material, NORMAL,

@@ -25,21 +25,23 @@ mod lights;
 mod materials;
 mod meshes;
 mod meshopt;
+mod names;
 mod nodes;
 
 use super::affine::{Affine, multiply};
 use super::bytes::{Bytes, Spool};
-use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
+use super::error::{EXPORT_AGAIN, ImportError, show};
 use super::image::decode_texture;
+use super::opened::{Opened, Parts, TriangleBudget};
 use super::repairs::Repairs;
 use super::warnings::Warnings;
-use super::{Opened, Parts, TriangleBudget};
 use crate::source::{
     IDENTITY, MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, SourceError, SourceTexture,
 };
 use file::{File, Problem};
 use materials::Texture;
 use meshes::Checked;
+use names::{display_name, label};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -317,20 +319,4 @@ fn place(file: &File, uses: &[nodes::Use], numbers: &[Option<u32>]) -> Result<Ve
         }
     }
     Ok(placements)
-}
-
-/// "kind 3 \"name\"", on one line.
-fn label(kind: &str, index: usize, name: Option<&str>) -> String {
-    match name {
-        Some(name) if !name.is_empty() => format!("{kind} {index} \"{}\"", one_line(name)),
-        _ => format!("{kind} {index}"),
-    }
-}
-
-/// The name of an object, or its index.
-fn display_name(index: usize, name: Option<&str>) -> String {
-    match name {
-        Some(name) if !name.is_empty() => one_line(name),
-        _ => index.to_string(),
-    }
 }

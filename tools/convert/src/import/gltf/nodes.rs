@@ -3,7 +3,8 @@
 use super::accessor::{Accessor, Shape};
 use super::document::Document;
 use super::file::{File, Problem, item};
-use super::{display_name, label, lights};
+use super::lights;
+use super::names::{display_name, label};
 use crate::import::affine::{Affine, from_columns, from_parts, multiply};
 use crate::import::error::{ImportError, one_line};
 use crate::import::warnings::Warnings;
