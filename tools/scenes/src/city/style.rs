@@ -120,7 +120,7 @@ pub const FRAMES: [Tint; 6] = [
 const SHUTTERS: [Tint; 4] = [[0.16, 0.30, 0.22], [0.20, 0.28, 0.42], [0.42, 0.20, 0.14], [0.55, 0.53, 0.48]];
 
 impl Style {
-    /// A random style for a row of houses; `density` as in [`crate::layout::Cell`].
+    /// A random style for a row of houses; `density` as in [`super::layout::Cell`].
     pub fn row(rng: &mut Rng, density: f64) -> Self {
         match rng.unit() {
             x if x < 0.30 => Self::brick(rng),

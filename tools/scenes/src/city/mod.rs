@@ -3,20 +3,33 @@
 //! A block depends on the seed and its cell alone, so that the centre is the same in every size. The last block gets
 //! what is left of the budget, piece by piece; the rest of its ring stays meadow, and fields surround everything.
 
-use crate::block::block;
-use crate::layout::Layout;
+mod block;
+mod building;
+mod facade;
+mod furniture;
+mod layout;
+mod open;
+mod plan;
+mod roof;
+mod site;
+mod street;
+mod style;
+mod vehicle;
+mod window;
+
 use crate::material::city_materials;
 use crate::mesh::Builder;
 use crate::path::{self, CameraPath, Way};
 use crate::rings::{cell_of, empty_cells, grow, last_ring};
 use crate::rng::Rng;
-use crate::scene::{Draft, EMPTY, Recipe, rows, union};
-use crate::site::{Library, Site, Use};
-use crate::street;
-use crate::{Scene, Settings};
+use crate::scene::{Draft, EMPTY, Recipe, Scene, rows, union};
+use crate::settings::Settings;
+use block::block;
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Primitive};
 use glam::{DVec2, DVec3};
+use layout::Layout;
+use site::{Library, Site, Use};
 
 /// What a block takes on average, to guess how many are still needed.
 const USUAL: u64 = 30_000;

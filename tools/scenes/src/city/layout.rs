@@ -2,7 +2,7 @@
 
 use crate::rings::ring;
 use crate::rng::{Rng, noise};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 /// Lines of the grid on either side of the origin.
 const LINES: i64 = 120;
@@ -22,6 +22,11 @@ pub const EAST: usize = 1;
 pub const NORTH: usize = 2;
 /// See [`SOUTH`].
 pub const WEST: usize = 3;
+
+/// The point (x, z) on the ground behind the kerb.
+pub fn on_ground(p: DVec2) -> DVec3 {
+    DVec3::new(p.x, KERB, p.y)
+}
 
 /// A rectangle in (x, z).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,8 @@
 //! A mesh of the scene is a mesh there, a part a primitive, a placement a node; all keep their order, and so do
 //! triangles. Positions are f32 relative to an anchor of their mesh, by which its nodes are moved.
 
-use crate::{Error, output};
+use super::output;
+use crate::error::Error;
 use bricks::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{PART_TRIANGLES, PartOutline, Placement, Primitive, Source, SourceError};

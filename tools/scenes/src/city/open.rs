@@ -1,16 +1,15 @@
 //! Open blocks: parks and squares.
 
-use crate::block::on_ground;
-use crate::facade::Side;
-use crate::furniture as things;
-use crate::layout::{KERB, NORTH, Rect, SOUTH};
+use super::facade::Side;
+use super::furniture as things;
+use super::layout::{KERB, NORTH, Rect, SOUTH, on_ground};
+use super::roof;
+use super::site::Site;
+use super::street;
+use super::style::{FacadeKind, Style};
 use crate::material::{Mat, WHITE, shade};
 use crate::mesh::{Builder, Frame, face};
 use crate::rng::Rng;
-use crate::roof;
-use crate::site::Site;
-use crate::street;
-use crate::style::{FacadeKind, Style};
 use crate::vegetation::{self, Tree};
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
@@ -223,7 +222,7 @@ pub fn plaza(site: &mut Site, rng: &mut Rng) {
 fn hall(b: &mut Builder, rng: &mut Rng, rect: Rect, front: usize) {
     let style = Style {
         kind: FacadeKind::Punched,
-        ground: crate::style::Ground::Dwelling,
+        ground: super::style::Ground::Dwelling,
         floor: 4.6,
         ground_floor: 4.8,
         bay: 3.6,
@@ -255,7 +254,7 @@ fn hall(b: &mut Builder, rng: &mut Rng, rect: Rect, front: usize) {
     let height = style.ground_floor + style.floor;
     for k in 0..4 {
         let (frame, width) = Frame::wall(cella_corners[k], cella_corners[(k + 1) % 4], KERB + floor);
-        let wall = crate::facade::Wall {
+        let wall = super::facade::Wall {
             frame,
             width,
             side: sides[k],

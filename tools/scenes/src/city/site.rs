@@ -1,12 +1,12 @@
 //! A building site: a block under construction within a budget of triangles, and the library of trees and vehicles that
 //! blocks share.
 
-use crate::layout::Cell;
+use super::layout::Cell;
+use super::vehicle::{Vehicle, vehicle};
 use crate::mesh::{Builder, Frame};
 use crate::pieces::Pieces;
 use crate::rng::Rng;
 use crate::vegetation::{Tree, tree};
-use crate::vehicle::{Vehicle, vehicle};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// A mesh that many blocks use.

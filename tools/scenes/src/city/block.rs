@@ -1,18 +1,18 @@
 //! Blocks: what stands on the lots of a cell, on its pavements and on its half of the streets.
 
-use crate::building;
-use crate::facade::Side;
-use crate::furniture as things;
-use crate::layout::{CORNER, EAST, KERB, NORTH, PAVEMENT, Rect, SOUTH, WEST, Zone};
+use super::building;
+use super::facade::Side;
+use super::furniture as things;
+use super::layout::{CORNER, EAST, KERB, NORTH, PAVEMENT, Rect, SOUTH, WEST, Zone, on_ground};
+use super::open;
+use super::site::Site;
+use super::street;
+use super::style::Style;
+use super::vehicle::Vehicle;
 use crate::material::{Mat, WHITE, shade};
 use crate::mesh::Frame;
-use crate::open;
 use crate::rng::Rng;
-use crate::site::Site;
-use crate::street;
-use crate::style::Style;
 use crate::vegetation::{self, Tree};
-use crate::vehicle::Vehicle;
 use glam::{DVec2, DVec3};
 
 /// Builds the block of `site`.
@@ -31,11 +31,6 @@ pub fn block(site: &mut Site, seed: u64) {
     traffic_lights(site, &mut rng);
     pavement(site, &mut rng);
     traffic(site, &mut rng);
-}
-
-/// The point (x, z) on the ground behind the kerb.
-pub fn on_ground(p: DVec2) -> DVec3 {
-    DVec3::new(p.x, KERB, p.y)
 }
 
 /// Cuts `from..to` into pieces of about `size`.

@@ -1,7 +1,7 @@
 //! The ground of a cell: half of the four streets around it, markings, kerb, pavement; and the country outside the
 //! city.
 
-use crate::layout::{CORNER, Cell, KERB, Layout, PAVEMENT, Rect};
+use super::layout::{CORNER, Cell, KERB, Layout, PAVEMENT, Rect};
 use crate::material::{Mat, Tint, WHITE, shade};
 use crate::mesh::{Builder, Frame};
 use crate::rng::Rng;
@@ -46,7 +46,7 @@ struct Side {
 }
 
 impl Side {
-    /// Side `k` in the order of [`crate::layout::SOUTH`].
+    /// Side `k` in the order of [`super::layout::SOUTH`].
     fn new(cell: &Cell, k: usize) -> Self {
         let corners = cell.rect.polygon();
         // Traffic keeps right: it runs clockwise around a block, against the order of the walls.
@@ -243,7 +243,7 @@ fn markings(b: &mut Builder, rng: &mut Rng, side: &Side, k: usize) {
         });
     }
     // The centre line belongs to the cell at its greater side.
-    if k == crate::layout::NORTH || k == crate::layout::WEST {
+    if k == super::layout::NORTH || k == super::layout::WEST {
         let yellow = [1.0, 0.72, 0.18];
         if lanes.centers.len() > 1 {
             for w in [[-0.2, -0.08], [0.08, 0.2]] {

@@ -1,13 +1,13 @@
 //! Roofs: parapets, terraces, slopes with dormers, and what stands on them.
 
-use crate::building::Plan;
-use crate::facade::Side;
-use crate::layout::Rect;
+use super::facade::Side;
+use super::layout::Rect;
+use super::plan::Plan;
+use super::style::Style;
+use super::window::Window;
 use crate::material::{Mat, Tint, WHITE, shade};
 use crate::mesh::{Builder, Frame, face, inset, lift};
 use crate::rng::Rng;
-use crate::style::Style;
-use crate::window::Window;
 use glam::{DVec2, DVec3};
 
 /// A parapet of height `height` and thickness `t` on the walls of `plan`.

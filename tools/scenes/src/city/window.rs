@@ -1,9 +1,9 @@
 //! Windows and the openings they sit in.
 
+use super::style::Style;
 use crate::material::{Mat, Tint, shade};
 use crate::mesh::{Builder, Frame, face};
 use crate::rng::Rng;
-use crate::style::Style;
 
 /// The four sides of an opening, `depth` deep.
 pub fn reveal(b: &mut Builder, f: &Frame, m: Mat, tint: Tint, [u0, u1]: [f64; 2], [v0, v1]: [f64; 2], depth: f64) {

@@ -1,10 +1,10 @@
 //! Facades: walls divided into storeys and bays, with windows, doors, shops, ledges and balconies.
 
+use super::style::{FRAMES, FacadeKind, Ground, Style};
+use super::window::{Window, pane, reveal};
 use crate::material::{Mat, Tint, WHITE, shade};
 use crate::mesh::{Builder, Frame, face};
 use crate::rng::Rng;
-use crate::style::{FRAMES, FacadeKind, Ground, Style};
-use crate::window::{Window, pane, reveal};
 
 /// What a wall looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
