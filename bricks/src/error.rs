@@ -93,8 +93,8 @@ pub enum Error {
     },
     /// The file has a version of the format that this program does not read.
     #[error(
-        "{}: the header is of another format version: found version {found}, expected version {VERSION}; the file is {} \
-         than this program reads: convert again with this program",
+        "{}: the header is of another format version: found version {found}, expected version {VERSION}; \
+         the file is {} than this program reads: convert again with this program",
         path.display(), if *found < VERSION { "older" } else { "newer" }
     )]
     Version {
@@ -161,7 +161,10 @@ pub enum Error {
         flaw: Flaw,
     },
     /// A payload was asked for that the scene does not have, or with a buffer of the wrong length.
-    #[error("{}: {payload}: found a request for {found}, expected {expected}; this is an error of the caller", path.display())]
+    #[error(
+        "{}: {payload}: found a request for {found}, expected {expected}; this is an error of the caller",
+        path.display()
+    )]
     Request {
         /// The file.
         path: PathBuf,

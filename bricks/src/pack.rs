@@ -151,7 +151,9 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_unpacked_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300), length in 0usize..4000) {
+        fn any_bytes_are_unpacked_or_refused(
+            bytes in prop::collection::vec(any::<u8>(), 0..300), length in 0usize..4000
+        ) {
             let _ = unpacked(&bytes, length);
             // The same as a block with a right frame, so that it is decoded.
             let mut framed = (bytes.len() as u32).to_le_bytes().to_vec();

@@ -40,8 +40,11 @@ pub enum Error {
         source: std::io::Error,
     },
     /// More than the lengths in a GLB file can say.
-    #[error("{}: a GLB file has less than 4 GiB, and this scene needs more; name it {}, which keeps its buffer in a file \
-        of its own", path.display(), path.with_extension("gltf").display())]
+    #[error(
+        "{}: a GLB file has less than 4 GiB, and this scene needs more; name it {}, which keeps its buffer in a file \
+         of its own",
+        path.display(), path.with_extension("gltf").display()
+    )]
     GlbSize {
         /// The file.
         path: PathBuf,

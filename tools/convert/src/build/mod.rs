@@ -6,8 +6,8 @@
 //! encoded (`encode`). Trees take their topology from floating-point builders, but their boxes are exact integers
 //! (`tree`). Everything is the same for any number of threads.
 //!
-//! A scene that does not fit in memory goes through the same steps by way of the disk (`bounded`, `disk`): its items are
-//! split there until they fit, then its triangles are brought together by bricks. What depends on sets of triangles
+//! A scene that does not fit in memory goes through the same steps by way of the disk (`bounded`, `disk`): its items
+//! are split there until they fit, then its triangles are brought together by bricks. What depends on sets of triangles
 //! alone cannot differ, so neither does the file. Steps are recorded, so that an interrupted conversion can be
 //! continued.
 //!

@@ -4,10 +4,10 @@
 //!
 //! | phase | what it holds |
 //! | --- | --- |
-//! | collecting | per thread a part of the source and the items of a run of triangles; then the items of objects that fit |
+//! | collecting | per thread a part of the source and the items of a run of triangles; then items of objects that fit |
 //! | partition | the items of a node that fits with their order; or per thread a block of items and its two sides |
 //! | distribution | per thread a part of the source and triangles not yet appended; the bricks of a window of slots |
-//! | encoding | two chunks of triangles (one is read while the other is encoded), per thread a brick in work with its occupancy and two batches of payloads |
+//! | encoding | two chunks of triangles, one being read; per thread a brick, its occupancy, two batches of payloads |
 //!
 //! A source that lies in memory is not counted, nor is a single image while its texture is made.
 

@@ -139,8 +139,9 @@ struct Block {
 }
 
 /// An integer wide enough for the brick at hand.
-trait Whole:
-    Copy + Ord + From<i64> + Into<i128> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+trait Whole: Copy + Ord + From<i64> + Into<i128> + Neg<Output = Self>
+where
+    Self: Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>,
 {
     /// A value that is known to fit.
     fn narrow(value: i128) -> Self;

@@ -607,7 +607,8 @@ mod tests {
                 let [mean, most, psnr, milliseconds] = loss(&texture, variant);
                 let kind = if variant == CompressionVariant::BC5 { "bc5" } else { "bc7" };
                 println!(
-                    "{name}, {kind}: {mean:.2} degrees in the mean, {most:.1} at most, {psnr:.1} dB, {milliseconds:.0} ms"
+                    "{name}, {kind}: {mean:.2} degrees in the mean, {most:.1} at most, {psnr:.1} dB, \
+                     {milliseconds:.0} ms"
                 );
                 mean
             });

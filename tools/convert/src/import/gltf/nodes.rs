@@ -93,8 +93,8 @@ pub(super) struct Placed {
     pub lights: Vec<PunctualLight>,
 }
 
-/// Every use of a mesh and of a light in the scene that is asked for (else the default scene, else scene 0, else all root nodes), depth
-/// first; `placing` takes the scene to the world. Uses know which nodes above them `movable` names.
+/// Every use of a mesh and of a light in the scene that is asked for (else the default scene, else scene 0, else all
+/// root nodes), depth first; `placing` takes the scene to the world. Uses know which nodes above them `movable` names.
 pub(super) fn uses(
     file: &File,
     (asked, movable): (Option<&str>, &[String]),
