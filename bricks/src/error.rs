@@ -1,8 +1,8 @@
 //! What can be wrong with a scene file, said so that the reader knows which part it is and what to do.
 
 use crate::layout::{MAGIC, Section, VERSION};
+use crate::pack::UnpackError;
 use crate::payload::Payload;
-use crate::resident::Resident;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -56,6 +56,13 @@ pub struct Flaw {
     pub expected: String,
 }
 
+impl Flaw {
+    /// Packed bytes, which are `part` or in it, that could not be unpacked.
+    pub fn packed(part: Part, error: UnpackError) -> Self {
+        Self { part, found: error.found, expected: error.expected }
+    }
+}
+
 /// Why a scene file could not be opened, read or written. Every message names the file, the part of it, what was found
 /// and expected, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -86,8 +93,8 @@ pub enum Error {
     },
     /// The file has a version of the format that this program does not read.
     #[error(
-        "{}: the header is of another format version: found version {found}, expected version {VERSION}; the file is {} \
-         than this program reads: convert again with this program",
+        "{}: the header is of another format version: found version {found}, expected version {VERSION}; \
+         the file is {} than this program reads: convert again with this program",
         path.display(), if *found < VERSION { "older" } else { "newer" }
     )]
     Version {
@@ -154,7 +161,10 @@ pub enum Error {
         flaw: Flaw,
     },
     /// A payload was asked for that the scene does not have, or with a buffer of the wrong length.
-    #[error("{}: {payload}: found a request for {found}, expected {expected}; this is an error of the caller", path.display())]
+    #[error(
+        "{}: {payload}: found a request for {found}, expected {expected}; this is an error of the caller",
+        path.display()
+    )]
     Request {
         /// The file.
         path: PathBuf,
@@ -211,9 +221,9 @@ impl Error {
         }
     }
 
-    /// The same error, said to be about the texture that `payload` is part of, if it is of one.
-    pub(crate) fn within(self, resident: &Resident, payload: Payload) -> Self {
-        match (resident.texture_of(payload), self) {
+    /// The same error, said to be about a part of a texture if `place` says which.
+    pub(crate) fn within(self, place: Option<String>) -> Self {
+        match (place, self) {
             (Some(place), error @ (Error::Io { .. } | Error::Corrupt { .. } | Error::Invalid { .. })) => {
                 Error::Texture { error: Box::new(error), place }
             }

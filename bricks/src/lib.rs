@@ -25,6 +25,7 @@ mod occupancy;
 pub mod pack;
 mod payload;
 mod place;
+mod reader;
 pub mod records;
 mod resident;
 mod source;

@@ -10,8 +10,6 @@
 //! LZ4 turns long runs of repeated bytes into few and is decoded at several times the speed of a disk; what is packed
 //! should be arranged accordingly.
 
-use crate::error::{Flaw, Part};
-
 /// Length of the word before the block.
 const HEAD_BYTES: usize = 4;
 
@@ -26,13 +24,6 @@ pub struct UnpackError {
     pub found: String,
     /// What the format asks for.
     pub expected: String,
-}
-
-impl UnpackError {
-    /// As a flaw in `part`, where the packed bytes are.
-    pub fn in_part(self, part: Part) -> Flaw {
-        Flaw { part, found: self.found, expected: self.expected }
-    }
 }
 
 /// Packs at most [`MAX_PAYLOAD_BYTES`](crate::layout::MAX_PAYLOAD_BYTES) bytes. The same bytes give the same packed
@@ -160,7 +151,9 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_unpacked_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300), length in 0usize..4000) {
+        fn any_bytes_are_unpacked_or_refused(
+            bytes in prop::collection::vec(any::<u8>(), 0..300), length in 0usize..4000
+        ) {
             let _ = unpacked(&bytes, length);
             // The same as a block with a right frame, so that it is decoded.
             let mut framed = (bytes.len() as u32).to_le_bytes().to_vec();

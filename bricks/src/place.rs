@@ -44,7 +44,8 @@ pub enum PlaceError {
     },
     /// A place beyond the range of the arithmetic.
     #[error(
-        "instance {instance} would be {reach:e} away, from the origin or from other parts; {limit:e} can be held, keep it nearer to the scene"
+        "instance {instance} would be {reach:e} away, from the origin or from other parts; {limit:e} can be held, \
+         keep it nearer to the scene"
     )]
     Range {
         /// The instance.

@@ -1,11 +1,11 @@
 //! Reads a whole file and lists everything that is wrong with it.
 
 use crate::error::{Error, Flaw, Part};
-use crate::file::{Decoding, Directory, Reader, length_of, open_file};
 use crate::layout::{Header, MAX_PAYLOAD_BYTES, PAGE_BYTES, Section};
 use crate::manifest::Manifest;
 use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
+use crate::reader::{Decoding, Directory, Reader, length_of, open_file};
 use crate::records::{AttributeLayout, Brick, Span, Texture};
 use crate::resident::Resident;
 use crate::source::{ReadSource, Source};
@@ -192,7 +192,7 @@ impl Verifier<'_> {
             let reader = &self.reader;
             let check = |buffers: &mut (Vec<u8>, Decoding), &(payload, span): &(Payload, Span)| {
                 let checked = check_payload(reader, resident, (payload, span), valid, buffers);
-                checked.err().map(|error| error.within(resident, payload))
+                checked.err().map(|error| error.within(resident.texture_of(payload)))
             };
             // The collection keeps the order of the batch.
             let problems: Vec<Option<Error>> = batch.par_iter().map_init(Default::default, check).collect();

@@ -1,7 +1,8 @@
 //! Checks that take longer than copying and concern no index: what a converter must have got right.
 
 use super::node::NodeView;
-use super::{occupancy, rule};
+use super::occupancy;
+use super::rule::rule;
 use crate::error::{Flaw, Part};
 use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;

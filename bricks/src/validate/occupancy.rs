@@ -1,6 +1,6 @@
 //! Checks of occupancy: the resident records, the maps, and the vertices against the maps.
 
-use super::rule;
+use super::rule::rule;
 use crate::error::{Flaw, Part};
 use crate::layout::Section;
 use crate::occupancy::{OCCUPANCY_CELLS, OCCUPANCY_LIMIT, OccupancyGrid, OccupancyMap, RESIDENT_LEVEL};
@@ -58,7 +58,7 @@ fn proxies(index: u32) -> Part {
 /// bounds of the brick.
 pub(super) fn map(resident: &Resident, index: u32, bytes: &[u8]) -> Result<(), Flaw> {
     let part = proxies(index);
-    let map = OccupancyMap::unpack(bytes).map_err(|error| error.in_part(part))?;
+    let map = OccupancyMap::unpack(bytes).map_err(|error| Flaw::packed(part, error))?;
     let columns = map.finest();
     rule(map == OccupancyMap::of_finest(&columns), part, || {
         ("a level that does not follow from the finest", "each the OR of the one before")

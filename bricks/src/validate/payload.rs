@@ -4,7 +4,8 @@
 //! maximum per array of indices, which compilers vectorise.
 
 use super::node::NodeView;
-use super::{occupancy, rule};
+use super::occupancy;
+use super::rule::rule;
 use crate::error::{Flaw, Part};
 use crate::payload::Payload;
 use crate::records::{

@@ -1,6 +1,6 @@
 //! Checks of objects, instances, leaves, materials, textures, lights and the manifest.
 
-use super::{length, rule};
+use super::rule::{length, rule};
 use crate::error::{Flaw, Part};
 use crate::layout::Section;
 use crate::payload::Payload;

@@ -1,7 +1,7 @@
 //! Checks of the two top-level trees. Each is a tree over exactly the leaves, children after parents.
 
 use super::node::NodeView;
-use super::rule;
+use super::rule::rule;
 use crate::error::{Flaw, Part};
 use crate::layout::Section;
 use crate::records::{LATTICE_LIMIT, MAX_TOP_EXPONENT, MAX_TOP_HEIGHT, MAX_TOP2_HEIGHT, TOP_LEAF, TopNode2, TopNode8};

@@ -180,9 +180,10 @@ fn numbers_are_those_of_the_page() {
         format!("| `version` | 8 | 4 | {VERSION} |"),
         format!("| `page_bytes` | 12 | 4 | {PAGE_BYTES} |"),
         format!("| `directory_bytes` | 32 | 8 | {DIRECTORY_BYTES} |"),
-        format!("{PAGE_BYTES} bytes for\npayloads and the directory, {SECTION_ALIGN} for sections"),
+        format!("{PAGE_BYTES}\nbytes for payloads and the directory, {SECTION_ALIGN} for sections"),
         format!(
-            "{KIND_VISIBILITY_FIELDS} visibility fields, {KIND_DISPLACEMENT_FIELDS} displacement fields, {KIND_LEVELS_OF_DETAIL} levels of detail"
+            "{KIND_VISIBILITY_FIELDS} visibility fields, {KIND_DISPLACEMENT_FIELDS} displacement fields, \
+             {KIND_LEVELS_OF_DETAIL} levels of detail"
         ),
         format!("1 to {MAX_TEXTURE_SIZE} texels"),
         format!("at most {MAX_TOP_EXPONENT} |"),

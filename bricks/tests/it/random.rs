@@ -139,7 +139,9 @@ proptest! {
     fn any_change_with_right_checksums(
         words in prop::collection::vec((any::<prop::sample::Index>(), word()), 0..4),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
-        moved in prop::option::weighted(0.3, (any::<prop::sample::Index>(), any::<prop::sample::Index>(), 0usize..4096)),
+        moved in prop::option::weighted(
+            0.3, (any::<prop::sample::Index>(), any::<prop::sample::Index>(), 0usize..4096)
+        ),
     ) {
         let mut bytes = whole().to_vec();
         for (at, value) in words {

@@ -10,6 +10,7 @@
 
 mod chart;
 mod error;
+mod field;
 mod format;
 mod frames;
 mod page;
@@ -21,21 +22,11 @@ mod walk;
 
 pub use chart::Unit;
 pub use error::ReportError;
+pub use field::Field;
 pub use sheet::{Graph, GraphShape, Line, Section, Sheet, Table, Value, write_sheet};
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-
-/// What is known of a field of records; others are shown without.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Field {
-    /// Its name.
-    pub name: &'static str,
-    /// What it means, and its unit.
-    pub meaning: String,
-    /// Whether its sum over frames means anything; that of a state does not.
-    pub adds_up: bool,
-}
 
 /// Writes `dir/report.html` from `dir/records.jsonl`, `dir/summary.json` and `dir/frames/*.png`. `fields` says what
 /// fields of records mean.

@@ -291,8 +291,8 @@ fn all_tables(walk: &Walk, fields: &[Field]) -> Markup {
             section {
                 h2 { "Throughput, queries and bytes moved" }
                 p.reading {
-                    "The columns of Table 3 of CHC+RT, in MiB. Median and p95 are per frame; for Mray/s a high p95 is the "
-                    "fast end, and its total is all rays traced over all time."
+                    "The columns of Table 3 of CHC+RT, in MiB. Median and p95 are per frame; for Mray/s a high p95 is "
+                    "the fast end, and its total is all rays traced over all time."
                 }
                 (tables::out_of_core(walk))
             }
@@ -362,8 +362,8 @@ fn memory(walk: &Walk) -> Markup {
         @match walk.summary("memory").and_then(tables::pairs) {
             Some(table) => {
                 p.reading {
-                    "Peak of the process without mapped files; mapped pages are listed apart. On a software adapter the "
-                    "cache is part of it."
+                    "Peak of the process without mapped files; mapped pages are listed apart. On a software adapter "
+                    "the cache is part of it."
                 }
                 (table)
             }

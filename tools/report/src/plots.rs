@@ -124,8 +124,8 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: ERROR,
         of_needs: false,
-        reading: "Mean absolute difference of the effect's part of the picture from the exact one, linear radiance: over all \
-                  pixels, and over the tile where it is largest. Measured with --measure-error.",
+        reading: "Mean absolute difference of the effect's part of the picture from the exact one, linear radiance: \
+                  over all pixels, and over the tile where it is largest. Measured with --measure-error.",
         unit: Unit::Count,
         lines: &[line("all pixels", &["error_mean"], BLUE), line("worst tile", &["error_worst_tile"], RED)],
     },

@@ -29,7 +29,8 @@ const CURVES: [Curve; 3] = [
     ("Loads", "Payloads loaded: geometry or attributes of a brick.", Unit::Count, |row| row.loads),
     (
         "Hit rate",
-        "Higher is better: requests for what was resident. No policy can do better than the first request of each payload allows.",
+        "Higher is better: requests for what was resident. No policy can do better than the first \
+         request of each payload allows.",
         Unit::Percent,
         |row| 100.0 * row.hit_rate,
     ),
@@ -52,8 +53,14 @@ pub fn render(name: &str, replay: &Value) -> Result<String, ReportError> {
         dl.facts {
             @for (name, value) in [
                 ("Bricks", [number("/bricks").map(format::count), number("/brick_bytes").map(format::bytes)]),
-                ("Requests", [number("/requests").map(format::count), number("/passes").map(|n| format!("{} passes", format::count(n)))]),
-                ("Payloads asked for", [number("/distinct").map(format::count), number("/distinct_bytes").map(format::bytes)]),
+                ("Requests", [
+                    number("/requests").map(format::count),
+                    number("/passes").map(|n| format!("{} passes", format::count(n))),
+                ]),
+                ("Payloads asked for", [
+                    number("/distinct").map(format::count),
+                    number("/distinct_bytes").map(format::bytes),
+                ]),
                 ("Recorded with", [
                     replay.pointer("/recorded/policy").and_then(Value::as_str).map(str::to_owned),
                     number("/recorded/cache_bytes").map(format::bytes),

@@ -281,7 +281,8 @@ fn bar_figure(graph: &Graph, unit: Unit, parts: &[String], bars: &[(String, Vec<
                         (name) ": " (unit.show(lengths.iter().sum()))
                     }
                     @for (at, length, colour) in pieces(lengths) {
-                        rect x=(format!("{at:.2}")) y=(row * BAR + 17) width=(format!("{length:.2}")) height="12" fill=(colour) {}
+                        rect x=(format!("{at:.2}")) y=(row * BAR + 17) width=(format!("{length:.2}")) height="12"
+                            fill=(colour) {}
                     }
                 }
             }

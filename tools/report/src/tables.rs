@@ -70,7 +70,8 @@ fn total(pass: &Pass, field: &str, known: Option<&Field>, sum: f64) -> Option<f6
     if field == "mrays_per_s" { overall_throughput(pass) } else { known.is_none_or(|f| f.adds_up).then_some(sum) }
 }
 
-/// All rays traced in a pass over all of its time, millions per second; `None` where either is unknown or no time passed.
+/// All rays traced in a pass over all of its time, millions per second; `None` where either is unknown or no time
+/// passed.
 fn overall_throughput(pass: &Pass) -> Option<f64> {
     let (rays, ms) = (pass.statistics("rays_traced")?.total, pass.statistics("ms")?.total);
     (ms > 0.0).then(|| rays / ms * 1e-3)
@@ -149,7 +150,8 @@ pub fn per_frame(walk: &Walk) -> Markup {
         div.wide { table {
             thead { tr {
                 th { "Frame" } th.text { "Pass" } th { "Rays traced" } th { "answered" } th { "Mray/s" } th { "ms" }
-                th { "Queries" } th { "MiB moved" } th { "of it BVH" } th { "geometry" } th { "Loaded" } th { "Evicted" }
+                th { "Queries" } th { "MiB moved" } th { "of it BVH" } th { "geometry" }
+                th { "Loaded" } th { "Evicted" }
             } }
             tbody {
                 @for frame in &walk.frames {
@@ -163,7 +165,9 @@ pub fn per_frame(walk: &Walk) -> Markup {
                                 @for field in ["mrays_per_s", "ms"] { td { (cell(row.get(field), format::number)) } }
                                 td { (cell(row.get("queries"), value)) } td { (format::mebibytes(row.sum(&MOVED))) }
                                 @for field in MOVED_GEOMETRY { td { (cell(row.get(field), format::mebibytes)) } }
-                                @for field in ["bricks_loaded", "bricks_evicted"] { td { (cell(row.get(field), value)) } }
+                                @for field in ["bricks_loaded", "bricks_evicted"] {
+                                    td { (cell(row.get(field), value)) }
+                                }
                             }
                         }
                     }

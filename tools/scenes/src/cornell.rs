@@ -4,12 +4,12 @@
 //! The room is that of every such picture; its walls are flat. What triangles there are go into the boxes, whose sides
 //! have a relief, and most of them into the one that moves.
 
-use crate::Settings;
 use crate::material::{Tint, WHITE, material};
 use crate::motion::{Mover, Pose};
 use crate::path::{self, CameraPath, Keyframe};
 use crate::rng::Rng;
 use crate::scene::{Draft, Recipe, Scene, rows as matrix};
+use crate::settings::Settings;
 use bricks::{MATERIAL_DOUBLE_SIDED, Material};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Primitive};

@@ -1,8 +1,8 @@
 //! A generated scene as a source: counts, names and bounds are kept, geometry is made again whenever it is read.
 
-use crate::Settings;
 use crate::motion::Mover;
 use crate::path::CameraPath;
+use crate::settings::Settings;
 use brickwalk_convert::source::{
     Mesh, MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, Source, SourceError, SourceScene,
     SourceTexture,
@@ -146,6 +146,11 @@ fn cut(whole: &Primitive, indices: &[u32]) -> Primitive {
     }
 }
 
+/// The source entry of a generated scene: no bytes, and the xxh3-64 of none.
+pub fn source_of(name: String) -> bricks::Source {
+    bricks::Source { name, bytes: 0, hash: "2d06800538d394c2".into() }
+}
+
 /// An outline under construction.
 pub struct Draft {
     /// What there is so far.
@@ -159,7 +164,7 @@ impl Draft {
         if settings.copies > 1 {
             name += &format!(" copies={}", settings.copies);
         }
-        let sources = vec![crate::source_of(name)];
+        let sources = vec![source_of(name)];
         Self { outline: Outline { materials, sources, ..Outline::default() } }
     }
 

@@ -71,7 +71,7 @@ pub(crate) fn scene(name: String, meshes: Vec<Mesh>, placements: Vec<Placement>)
         meshes,
         placements,
         materials: vec![material([0.7, 0.6, 0.5], 0.8, 0), material([0.3, 0.45, 0.6], 0.8, 0)],
-        sources: vec![crate::source_of(name)],
+        sources: vec![crate::scene::source_of(name)],
         ..SourceScene::default()
     }
 }

@@ -1,13 +1,13 @@
 //! The resident part: what the bricks, objects and instances add up to.
 
-use super::binary::Box3;
-use super::cut::ObjectCut;
+use super::cut::cuts::ObjectCut;
 use super::error::BuildError;
-use super::lattice::{Lattice, pow2};
-use super::matrix::Affine;
-use super::objects::Plan;
+use super::input::matrix::Affine;
+use super::input::objects::Plan;
 use super::settings::{BuildSettings, BuildSummary};
-use super::top_level::{self, TopLevel, world_box};
+use super::tree::binary::Box3;
+use super::tree::top_level::{self, TopLevel, world_box};
+use super::triangles::lattice::{Lattice, pow2};
 use crate::source::Outline;
 use bricks::{
     BRICK_WIDE, Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Leaf, MATERIAL_BLEND, MATERIAL_MASK, Manifest,

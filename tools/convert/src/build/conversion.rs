@@ -1,21 +1,21 @@
 //! The steps of a conversion, in memory and by way of the disk.
 
 use super::assemble::{self, Dropped};
-use super::bounded::{Bounded, BoundedCuts};
-use super::brick::{self, BrickContext, EncodedBrick};
-use super::budget::Budget;
-use super::cut::{self, ObjectCut};
-use super::encode::{self, BrickWriter, Job};
+use super::bounded::budget::Budget;
+use super::bounded::cuts::{Bounded, BoundedCuts};
+use super::cut::cuts::{self, ObjectCut};
+use super::disk::journal::{self, Journal, Step};
+use super::disk::scratch::{self, Scratch};
+use super::encode::brick::{self, BrickContext, EncodedBrick};
+use super::encode::jobs::{self, BrickWriter, Job};
 use super::error::BuildError;
-use super::journal::{self, Journal, Step};
-use super::lattice::Lattice;
-use super::objects::{ObjectPlan, Placed, Plan};
-use super::opacity::Opacities;
-use super::parts::Reader;
-use super::scratch::{self, Scratch};
+use super::input::objects::{ObjectPlan, Placed, Plan};
+use super::input::parts::Reader;
 use super::settings::{BuildSettings, BuildSummary};
-use super::textures::{self, Textures};
-use super::triangle::{Detailed, Plain, Stored, Triangle};
+use super::texture::mips::{self, Textures};
+use super::texture::opacity::Opacities;
+use super::triangles::lattice::Lattice;
+use super::triangles::triangle::{Detailed, Plain, Stored, Triangle};
 use crate::progress::Progress;
 use crate::source::{Outline, Source};
 use bricks::{Brick, Manifest, Occupancy, Partial, Resident, Writer};
@@ -76,21 +76,21 @@ impl Conversion<'_> {
     fn write_in_memory(&self, writer: &mut Writer, clock: &mut Clock) -> Result<Written, BuildError> {
         let Self { outline, plan, settings, progress, .. } = self;
         let textures =
-            textures::write(self.source, self.settings.textures, rayon::current_num_threads(), writer, progress)?;
+            mips::write(self.source, self.settings.textures, rayon::current_num_threads(), writer, progress)?;
         let opacities = self.write_opacity(&textures, writer)?;
         let mut warnings = textures.warnings.clone();
         clock.end("textures");
         let reader = Reader::eager(self.source, plan, progress)?;
         clock.end("read");
         warnings.extend(self.source.repairs());
-        let (cuts, used_materials) = cut::in_memory(&reader, plan, settings, progress)?;
+        let (cuts, used_materials) = cuts::in_memory(&reader, plan, settings, progress)?;
         clock.end("partition");
-        let lattices = cut::choose(plan, &outline.meshes, &cuts, settings, &mut warnings)?;
+        let lattices = cuts::choose(plan, &outline.meshes, &cuts, settings, &mut warnings)?;
         let means = textures.material_means();
         let opacity = opacities.of_materials(&textures.materials);
         let details = textures.details();
-        let contexts = encode::contexts(&lattices, &means, &opacity, &details, settings);
-        let jobs = encode::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
+        let contexts = jobs::contexts(&lattices, &means, &opacity, &details, settings);
+        let jobs = jobs::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
         progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.len(), BATCH_TRIANGLES);
         let encode = |job: &Job| encode_loaded(&reader, &plan.objects[job.object as usize], &cuts, &contexts, job);
@@ -197,7 +197,7 @@ impl Conversion<'_> {
         let mut textures = Textures::default();
         let words = journal.step(Step::Textures, || {
             // One at a time, for images may be large.
-            textures = textures::write(self.source, settings.textures, 1, writer, progress)?;
+            textures = mips::write(self.source, settings.textures, 1, writer, progress)?;
             Ok(textures.to_words(writer.checkpoint()?))
         })?;
         let textures = Textures::from_words(&words, outline).ok_or_else(|| journal.damaged())?;
@@ -221,12 +221,12 @@ impl Conversion<'_> {
         })?;
         warnings.extend(journal::texts_of_words(&words).ok_or_else(|| journal.damaged())?);
         clock.end("partition");
-        let lattices = cut::choose(plan, &outline.meshes, &cuts.objects, settings, &mut warnings)?;
+        let lattices = cuts::choose(plan, &outline.meshes, &cuts.objects, settings, &mut warnings)?;
         let means = textures.material_means();
         let opacity = opacities.of_materials(&textures.materials);
         let details = textures.details();
-        let contexts = encode::contexts(&lattices, &means, &opacity, &details, settings);
-        let jobs = encode::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
+        let contexts = jobs::contexts(&lattices, &means, &opacity, &details, settings);
+        let jobs = jobs::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.objects.len(), budget.batch);
         let by_disk = (&cuts, jobs.as_slice(), contexts.as_slice());
         let rounded_away = if details.contains(&true) {

@@ -97,8 +97,8 @@ pub enum BuildError {
     },
     /// A placement that cannot be an instance.
     #[error(
-        "node \"{node}\": it cannot be movable, for its matrix has no inverse or scales one axis too much against another; correct the matrix, or \
-         leave the node out of --movable"
+        "node \"{node}\": it cannot be movable, for its matrix has no inverse or scales one axis too much \
+         against another; correct the matrix, or leave the node out of --movable"
     )]
     NotMovable {
         /// Name of the node.
@@ -106,8 +106,8 @@ pub enum BuildError {
     },
     /// The lattice that was asked for is too fine for the size or place of an object.
     #[error(
-        "--lattice {found}: steps of 2^{found} are too fine for {object}, which reaches {reach:e} and is {size:e} large; \
-         give --lattice {least} or more, or leave it out"
+        "--lattice {found}: steps of 2^{found} are too fine for {object}, which reaches {reach:e} and is {size:e} \
+         large; give --lattice {least} or more, or leave it out"
     )]
     LatticeTooFine {
         /// "the scene" or the name of the mesh.
@@ -139,7 +139,8 @@ pub enum BuildError {
     Source(#[from] crate::source::SourceError),
     /// A file of the scratch folder could not be made, read or written.
     #[error(
-        "{}: cannot {action} this scratch file or folder: {source}; free some space there or name another folder with --scratch",
+        "{}: cannot {action} this scratch file or folder: {source}; free some space there or name \
+         another folder with --scratch",
         path.display()
     )]
     Scratch {
@@ -158,7 +159,8 @@ pub enum BuildError {
     },
     /// There is a folder where the scratch folder would be.
     #[error(
-        "{}: this folder is not the scratch folder of an earlier conversion; remove it or name another folder with --scratch",
+        "{}: this folder is not the scratch folder of an earlier conversion; remove it or name another \
+         folder with --scratch",
         path.display()
     )]
     NotScratch {
@@ -167,8 +169,8 @@ pub enum BuildError {
     },
     /// A conversion that is to be continued is another one.
     #[error(
-        "{}: the interrupted conversion had other inputs or options; give those (--memory and --threads too) or leave out \
-         --resume",
+        "{}: the interrupted conversion had other inputs or options; give those (--memory and --threads too) or leave \
+         out --resume",
         path.display()
     )]
     OtherConversion {
@@ -179,7 +181,10 @@ pub enum BuildError {
     #[error(transparent)]
     Interrupted(#[from] crate::progress::Interrupted),
     /// Somebody asked to stop a conversion that can be continued.
-    #[error("interrupted; the same command with --resume continues, without it starts anew ({} is kept)", scratch.display())]
+    #[error(
+        "interrupted; the same command with --resume continues, without it starts anew ({} is kept)",
+        scratch.display()
+    )]
     Paused {
         /// The scratch folder.
         scratch: std::path::PathBuf,

@@ -1,57 +1,50 @@
 //! Cuts a scene into bricks and writes the scene file.
 //!
 //! The order of the work is what makes images independent of how a scene is cut (numerics.md, "Positions"): triangles
-//! are numbered in the order of the source (`objects`), a partition that ignores all settings gives the sizes from
-//! which each object's lattice follows (`partition`, `lattice`), every position is rounded to it once (`triangle`), and
-//! only then are bricks encoded (`brick`). Trees take their topology from floating-point builders (`binary`, `wide`),
-//! but their boxes are exact integers (`node`). Everything is the same for any number of threads.
+//! are numbered in the order of the source (`input`), a partition that ignores all settings gives the sizes from which
+//! each object's lattice follows (`cut`), every position is rounded to it once (`triangles`), and only then are bricks
+//! encoded (`encode`). Trees take their topology from floating-point builders, but their boxes are exact integers
+//! (`tree`). Everything is the same for any number of threads.
 //!
-//! A scene that does not fit in memory (`budget`) goes through the same steps by way of the disk (`scratch`, `spill`):
-//! its items are split there until they fit (`external`, `bounded`), then its triangles are brought together by bricks
-//! (`distribute`). What depends on sets of triangles alone cannot differ, so neither does the file. Steps are recorded
-//! (`journal`), so that an interrupted conversion can be continued.
+//! A scene that does not fit in memory goes through the same steps by way of the disk (`bounded`, `disk`): its items
+//! are split there until they fit, then its triangles are brought together by bricks. What depends on sets of triangles
+//! alone cannot differ, so neither does the file. Steps are recorded, so that an interrupted conversion can be
+//! continued.
+//!
+//! | folder or file | what is in it |
+//! | --- | --- |
+//! | `conversion` | the steps, in memory and by way of the disk |
+//! | `input` | objects, their placements, the parts of the source |
+//! | `cut` | which triangles make up a brick, and the lattices that follow |
+//! | `triangles` | positions on the lattice and attributes, as bricks store them |
+//! | `tree` | binary and eight-wide trees, in bricks and above them |
+//! | `texture` | levels, tiles and opacity maps of textures |
+//! | `encode` | bytes of bricks |
+//! | `assemble` | the resident part |
+//! | `bounded`, `disk` | the same for scenes that do not fit in memory |
 
 mod assemble;
-mod attributes;
-mod binary;
 mod bounded;
-mod brick;
-mod budget;
 mod conversion;
 mod cut;
-mod distribute;
+mod disk;
 mod encode;
 mod error;
-mod external;
-mod gather;
-mod intern;
-mod journal;
-mod lattice;
-mod matrix;
-mod node;
-mod objects;
-mod opacity;
-mod partition;
-mod parts;
-mod scratch;
+mod input;
 mod settings;
-mod spill;
-mod textures;
-mod top_level;
-mod triangle;
-mod voxelise;
-#[cfg(test)]
-mod voxelise_tests;
-mod wide;
+mod texture;
+mod tree;
+mod triangles;
 
 pub use error::BuildError;
 pub use settings::{BuildSettings, BuildSummary, TextureEncoding};
-pub use wide::ITEM_COST as TRIANGLE_COST;
+pub use tree::wide::ITEM_COST as TRIANGLE_COST;
 
 use crate::progress::Progress;
 use crate::source::{InMemory, Source, SourceScene};
-use budget::Budget;
+use bounded::budget::{self, Budget};
 use conversion::Conversion;
+use input::objects;
 use std::path::Path;
 
 /// Stack of a worker: the partition recurses, and a thread that waits takes up other work on the same stack.

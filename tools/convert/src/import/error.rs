@@ -60,7 +60,8 @@ pub enum ImportError {
     },
     /// The triangles of all placements do not fit global ids of 32 bits.
     #[error(
-        "{file}: the scene has {triangles} triangles up to here, more than the 4294967294 that ids can number; convert it in parts"
+        "{file}: the scene has {triangles} triangles up to here, more than the 4294967294 that ids can \
+         number; convert it in parts"
     )]
     TooManyTriangles {
         /// The input with which the limit is passed.

@@ -2,7 +2,7 @@
 
 use super::bytes::Bytes;
 use super::error::one_line;
-use super::quietly;
+use super::panics::quietly;
 use crate::source::SourceTexture;
 use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use image::ImageFormat;

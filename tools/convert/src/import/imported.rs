@@ -1,7 +1,7 @@
 //! Several opened files as one source.
 
 use super::affine::{Affine, direction, multiply, point};
-use super::{Opened, Parts};
+use super::opened::{Opened, Parts};
 use crate::source::{IDENTITY, Outline, Primitive, Source, SourceError, SourceTexture};
 use bricks::PunctualLight;
 use std::borrow::Cow;

@@ -13,6 +13,8 @@ mod image;
 mod imported;
 mod load;
 mod obj;
+mod opened;
+mod panics;
 mod plain;
 mod ply;
 mod repairs;
@@ -29,19 +31,16 @@ mod warnings;
 pub use error::ImportError;
 pub use imported::Imported;
 pub use load::load_all;
+pub use panics::catches_panics;
 pub use transform::parse_transform;
 
 use crate::progress::Progress;
-use crate::source::{IDENTITY, Outline, Primitive, SourceError, SourceTexture};
+use crate::source::IDENTITY;
 use bytes::Spool;
 use error::show;
-use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use opened::TriangleBudget;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Largest number of triangles over all placements: ids are u32 and 4294967295 means "none".
-const MAX_TRIANGLES: u64 = u32::MAX as u64 - 1;
 
 /// Extensions of the files that folders are searched for, lower case.
 pub const EXTENSIONS: [&str; 5] = ["gltf", "glb", "obj", "ply", "stl"];
@@ -134,7 +133,7 @@ fn open_all(inputs: &[Input], settings: &ImportSettings, progress: &Progress) ->
     // Formats are checked first, so that a wrong argument is told before hours of reading.
     let formats = inputs.iter().map(|input| format(&input.path)).collect::<Result<Vec<_>, _>>()?;
     let spool = Arc::new(Spool::new(settings.scratch.clone(), progress.clone()));
-    let mut budget = TriangleBudget { used: 0 };
+    let mut budget = TriangleBudget::new();
     let mut imported = Imported::default();
     progress.phase("inputs", inputs.len() as u64);
     for (input, format) in inputs.iter().zip(formats) {
@@ -209,65 +208,5 @@ fn format(path: &Path) -> Result<Format, ImportError> {
         Some("stl") => Ok(Format::Stl),
         Some("json") => Ok(Format::Tiles),
         _ => Err(ImportError::Format { file: show(path) }),
-    }
-}
-
-/// An opened file: a scene of its own.
-struct Opened {
-    outline: Outline,
-    parts: Box<dyn Parts>,
-}
-
-/// What an opened file holds; see [`Source`](crate::source::Source).
-trait Parts: Send + Sync {
-    /// The triangles of part `part` of mesh `mesh`.
-    fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError>;
-
-    /// The file as messages show it.
-    fn label(&self) -> &str;
-
-    /// The number in the file of vertex `vertex` of a part: in its primitive, from 0. `None`: the part cannot be read
-    /// again.
-    fn vertex(&self, mesh: usize, part: usize, vertex: u32) -> Option<u64>;
-
-    /// The texels of texture `index`.
-    fn texture(&self, index: usize) -> Result<SourceTexture, SourceError>;
-
-    /// What was repaired in the parts read so far.
-    fn repairs(&self) -> Vec<String>;
-}
-
-thread_local! {
-    static CATCHES: Cell<bool> = const { Cell::new(false) };
-}
-
-/// What `decode` returns, `None` if it panics: for decoders of others, which may not be proof against every input.
-fn quietly<T>(decode: impl FnOnce() -> T) -> Option<T> {
-    let before = CATCHES.replace(true);
-    // What is half done is dropped with the call.
-    let result = catch_unwind(AssertUnwindSafe(decode)).ok();
-    CATCHES.set(before);
-    result
-}
-
-/// Whether a panic of this thread is caught by an importer, which makes it an error of the input: a panic hook need not
-/// tell it.
-pub fn catches_panics() -> bool {
-    CATCHES.get()
-}
-
-/// Triangles of all placements so far.
-struct TriangleBudget {
-    used: u64,
-}
-
-impl TriangleBudget {
-    /// Adds `count` placements of `triangles` triangles each, from `file`.
-    fn add(&mut self, file: &str, count: u64, triangles: u64) -> Result<(), ImportError> {
-        self.used = self.used.saturating_add(count.saturating_mul(triangles));
-        if self.used > MAX_TRIANGLES {
-            return Err(ImportError::TooManyTriangles { file: file.to_owned(), triangles: self.used });
-        }
-        Ok(())
     }
 }

@@ -5,10 +5,10 @@
 
 use super::bytes::{Bytes, Spool, Stream};
 use super::error::ImportError;
+use super::opened::{Opened, Parts, TriangleBudget};
 use super::plain::{self, fault, no_room, unreadable};
 use super::table::{Table, TableWriter};
 use super::text::Tokens;
-use super::{Opened, Parts, TriangleBudget};
 use crate::source::{Primitive, SourceError, SourceTexture};
 use std::path::Path;
 use xxhash_rust::xxh3::Xxh3;

@@ -4,7 +4,7 @@
 //! They are made for each part of a source by itself, so that at the border of two parts of a large primitive they are
 //! those of one side. Where there are no normals those of the triangles are taken.
 
-use super::quietly;
+use super::panics::quietly;
 use crate::source::Primitive;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 

@@ -169,7 +169,10 @@ fn a_complete_walk_has_every_plot_field_and_frame() {
 fn the_statistics_are_those_of_the_records() {
     let with = |frame: u64, rays: u64, ms: f64| {
         let rate = rays as f64 / ms * 1e-3;
-        json!({ "frame": frame, "pass": "primary", "rays_traced": rays, "rays_answered": 7 * frame, "ms": ms, "mrays_per_s": rate, "cache_bytes": 7 })
+        json!({
+            "frame": frame, "pass": "primary", "rays_traced": rays, "rays_answered": 7 * frame,
+            "ms": ms, "mrays_per_s": rate, "cache_bytes": 7
+        })
     };
     // Median 3 ms, p95 linear between the fourth and fifth: 4 + 0.8·(14 − 4) = 12 ms; 24 ms and 60M rays in all.
     let rows: Vec<Value> =

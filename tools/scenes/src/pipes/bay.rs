@@ -1,10 +1,10 @@
 //! A bay of the plant: its frame and floors, the ways around it, its equipment, and the pipes in what room is left.
 
 use super::fitting::{Line, Look, flange, line};
+use super::plan::{AISLE, Bay, HEIGHT, PITCH, Use};
 use super::route::{CELL, FLOOR, Grid};
 use super::steel::{self, STEEL};
 use super::vessel;
-use super::{AISLE, Bay, HEIGHT, PITCH, Use};
 use crate::material::{Mat, WHITE, shade};
 use crate::mesh::{Builder, Frame, face};
 use crate::pieces::Pieces;

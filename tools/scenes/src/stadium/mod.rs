@@ -7,10 +7,10 @@ mod bowl;
 mod pitch;
 mod teapot;
 
-use crate::Settings;
 use crate::material::materials;
 use crate::path::{self, CameraPath, Keyframe};
 use crate::scene::{Draft, EMPTY, Recipe, Scene, union};
+use crate::settings::Settings;
 use bowl::{DETAILS, SECTORS};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Primitive};

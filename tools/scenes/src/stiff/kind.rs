@@ -1,8 +1,6 @@
 //! The kinds of stiff scenes: their names, sizes and what they need.
 
-use crate::Error;
 use std::fmt;
-use std::str::FromStr;
 
 /// Kinds of stiff scenes. `n` is the size that [`super::stiff`] is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,13 +146,5 @@ impl Stiff {
 impl fmt::Display for Stiff {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-impl FromStr for Stiff {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| Error::Case { name: name.into() })
     }
 }

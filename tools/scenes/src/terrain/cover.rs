@@ -1,7 +1,7 @@
 //! What grows and lies on the land: trees, bushes, stones, patches of grass, each stored once and placed many times.
 
 use super::height::{Land, WATER};
-use super::{CLEAR, way_distance};
+use super::way::{CLEAR, way_distance};
 use crate::material::{Mat, Tint, WHITE, shade};
 use crate::mesh::Builder;
 use crate::rng::Rng;

@@ -158,7 +158,7 @@ mod tests {
             let land = Land::new(seed);
             assert!(land.height(DVec2::ZERO) < WATER - 0.5);
             for k in 0..300 {
-                let p = super::super::way(f64::from(k) * 0.5);
+                let p = super::super::way::way(f64::from(k) * 0.5);
                 assert!(land.height(p) > WATER + 0.1, "seed {seed}: the way at {p} is under water");
             }
             let heights: Vec<f64> =

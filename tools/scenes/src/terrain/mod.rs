@@ -5,13 +5,14 @@
 
 mod cover;
 mod height;
+mod way;
 
-use crate::Settings;
 use crate::material::{Mat, materials};
 use crate::mesh::Builder;
 use crate::path::{self, CameraPath, Keyframe};
 use crate::rng::Rng;
 use crate::scene::{Draft, EMPTY, Recipe, Scene, rows, union};
+use crate::settings::Settings;
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Primitive};
 use cover::{CELL, Item, Use};
@@ -19,29 +20,16 @@ use glam::{DVec2, DVec3};
 use height::{Land, WATER};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use way::{CLEAR, way, way_distance};
 
 /// Edge of a quad, metres.
 const STEP: f64 = 0.5;
 /// Quads along the edge of a tile.
 const TILE: i64 = 128;
-/// Radius of the way around the pond, metres.
-const WAY: f64 = 24.0;
-/// Nothing but low grass is nearer to the way, metres.
-const CLEAR: f64 = 1.6;
 /// Segments and rings of the pond's surface.
 const POND: [u32; 2] = [48, 6];
 /// Radius of the pond's surface, metres; its rim is under the ground.
 const POND_RADIUS: f64 = 21.0;
-
-/// The way, `s` metres from its start.
-fn way(s: f64) -> DVec2 {
-    DVec2::from_angle(0.9 - s / WAY) * WAY
-}
-
-/// Distance from the way.
-fn way_distance(p: DVec2) -> f64 {
-    (p.length() - WAY).abs()
-}
 
 /// A tile: quads from `from` (inclusive) to `to` (exclusive), in quads from the origin.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,5 @@
-//! Accessors (glTF 2.0, sections 3.6.2 and 5.1): typed, strided, possibly sparse views of buffers. They are checked once;
-//! elements are read when they are wanted.
+//! Accessors (glTF 2.0, sections 3.6.2 and 5.1): typed, strided, possibly sparse views of buffers. They are checked
+//! once; elements are read when they are wanted.
 
 use super::file::{File, Problem, item};
 use crate::import::table::Table;
@@ -198,8 +198,8 @@ impl Accessor {
         self.base.is_none() && self.sparse.is_none()
     }
 
-    /// The elements `wanted`, which ascend without repetition; components beyond the width are zero. Fails when they are
-    /// not below the count, or when the file has changed.
+    /// The elements `wanted`, which ascend without repetition; components beyond the width are zero. Fails when they
+    /// are not below the count, or when the file has changed.
     pub fn gather<const N: usize>(&self, wanted: &[u64]) -> io::Result<Vec<[f64; N]>> {
         if wanted.last().is_some_and(|&last| last >= self.count) {
             return Err(io::ErrorKind::UnexpectedEof.into());

@@ -4,7 +4,7 @@ use super::accessor::Accessor;
 use super::document::{Document, Draco};
 use super::file::{File, Problem, item};
 use crate::import::error::{EXPORT_AGAIN, one_line};
-use crate::import::quietly;
+use crate::import::panics::quietly;
 use crate::import::table::TableWriter;
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
 use gltf::json::{Index, buffer};
@@ -18,8 +18,8 @@ const MAX_FACES_A_BYTE: u64 = 64;
 /// Primitives may have as many faces or points at any rate.
 const FREE_FACES: u64 = 1 << 20;
 
-/// Most bytes of attributes for a byte of a compressed primitive, beside those of the free faces. Constants take next to
-/// nothing, but positions are rarely constant.
+/// Most bytes of attributes for a byte of a compressed primitive, beside those of the free faces. Constants take next
+/// to nothing, but positions are rarely constant.
 const MAX_RATIO: u64 = 1024;
 
 /// Bytes of attributes that any primitive may have.

@@ -19,8 +19,8 @@ pub(super) struct Chunks {
 }
 
 /// Finds the chunks of a GLB file of `held` bytes, of which `read` fills its second argument with those from the first
-/// on; the error says what is wrong. Chunks behind the second are ignored, as are bytes behind the length that the header
-/// states.
+/// on; the error says what is wrong. Chunks behind the second are ignored, as are bytes behind the length that the
+/// header states.
 pub(super) fn chunks(held: u64, read: impl Fn(u64, &mut [u8]) -> io::Result<()>) -> Result<Chunks, String> {
     let word = |at: u64| {
         let mut bytes = [0; 4];

@@ -7,8 +7,8 @@ use crate::import::warnings::Warnings;
 use bricks::{LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, PunctualLight};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
-/// The light that a node places, by its matrix; `None`, with a warning: it has none that can be used. Lights shine along -Z of their
-/// nodes; scales do not change their range and strength.
+/// The light that a node places, by its matrix; `None`, with a warning: it has none that can be used. Lights shine
+/// along -Z of their nodes; scales do not change their range and strength.
 pub(super) fn place(
     document: &Document,
     Lenient(of_node): &Lenient<LightOfNode>,

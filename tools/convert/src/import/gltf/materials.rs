@@ -1,11 +1,11 @@
-//! Materials and their textures (glTF 2.0, sections 3.8 and 3.9, and the extensions KHR_materials_clearcoat, _emissive_strength, _ior,
-//! _pbrSpecularGlossiness, _specular, _transmission, _unlit and KHR_texture_transform).
+//! Materials and their textures (glTF 2.0, sections 3.8 and 3.9, and the extensions KHR_materials_clearcoat,
+//! _emissive_strength, _ior, _pbrSpecularGlossiness, _specular, _transmission, _unlit and KHR_texture_transform).
 //!
 //! Filters of samplers are not kept: textures are averaged over what a pixel covers, whatever the sampler asks for.
 
 use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform};
 use super::file::{File, Problem, item};
-use super::label;
+use super::names::label;
 use crate::import::warnings::Warnings;
 use bricks::{
     MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, Material, NORMAL,
@@ -74,8 +74,9 @@ fn set(info: &TextureInfo) -> Option<usize> {
     (set < SETS).then_some(set as usize)
 }
 
-/// The rows of [`Material::uv_from_set`] of a texture (KHR_texture_transform: translation * rotation * scale; a positive angle turns
-/// counter-clockwise in an image whose v points down). `None`: they are beyond the range of numbers.
+/// The rows of [`Material::uv_from_set`] of a texture (KHR_texture_transform: translation * rotation * scale; a
+/// positive angle turns counter-clockwise in an image whose v points down). `None`: they are beyond the range of
+/// numbers.
 fn rows(info: &TextureInfo) -> Option<[[f32; 4]; 2]> {
     let Some(TextureTransform { offset, rotation, scale, .. }) = &info.extensions.transform else { return Some(SAME) };
     let (sin, cos) = rotation.unwrap_or(0.0).sin_cos();
@@ -240,13 +241,14 @@ fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &d
     }
 }
 
-/// KHR_materials_transmission, of thin walls: rays pass straight through, whatever the roughness, and each is either let through or
-/// shaded.
+/// KHR_materials_transmission, of thin walls: rays pass straight through, whatever the roughness, and each is either
+/// let through or shaded.
 ///
-/// Let t be the share transmitted, c the greatest component of the base colour, F the greatest of what is reflected along the normal.
-/// A share 1 - a = t c (1 - F) of the rays passes: alpha is multiplied by a, and what is shaded, seen by the share a, is made
-/// brighter so that along the normal it is as bright as it was: specular / a, and of the base colour the share that is not transmitted,
-/// (1 - t) / (1 - t c). Then surfaces reflect and transmit no more than they receive. What is lost is the tint of what is seen through.
+/// Let t be the share transmitted, c the greatest component of the base colour, F the greatest of what is reflected
+/// along the normal. A share 1 - a = t c (1 - F) of the rays passes: alpha is multiplied by a, and what is shaded, seen
+/// by the share a, is made brighter so that along the normal it is as bright as it was: specular / a, and of the base
+/// colour the share that is not transmitted, (1 - t) / (1 - t c). Then surfaces reflect and transmit no more than they
+/// receive. What is lost is the tint of what is seen through.
 fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
     let Some(extension) = &json.more.extensions.transmission else { return };
     let transmission = unit(extension.transmission_factor.unwrap_or(0.0));

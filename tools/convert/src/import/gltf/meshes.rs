@@ -4,8 +4,8 @@ use super::accessor::{Accessor, Shape};
 use super::document::{Document, Primitive as Json};
 use super::draco;
 use super::file::{File, Problem, item};
-use super::label;
 use super::materials::Coordinates;
+use super::names::label;
 use crate::import::tangents;
 use crate::import::vertices::Vertices;
 use crate::import::warnings::Warnings;
@@ -32,7 +32,8 @@ impl Topology {
         }
     }
 
-    /// The elements of triangle `i`, in the order that the specification gives, so that all faces of a strip wind alike.
+    /// The elements of triangle `i`, in the order that the specification gives, so that all faces of a strip wind
+    /// alike.
     fn corners(self, i: u64) -> [u64; 3] {
         match self {
             Self::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],

@@ -1,20 +1,20 @@
 //! glTF 2.0, as JSON or GLB.
 //!
-//! The node hierarchy of one scene becomes placements, in depth-first order; each mesh in use is stored once. Geometry is
-//! taken at rest.
+//! The node hierarchy of one scene becomes placements, in depth-first order; each mesh in use is stored once. Geometry
+//! is taken at rest.
 //!
 //! The `gltf` crate is the model of the document, without its validator. Own code does what the crate lacks:
 //!
 //! - Matrices and placements are f64 (`document`, `nodes`); the crate reads f32, too coarse far from the origin.
 //! - Extensions of geometry, materials and lights (`draco`, `meshopt`, `nodes`, `materials`, `lights`); the crate lacks
 //!   them, or reads them in f32.
-//! - Checks where something is followed (`file`, `accessor`, `nodes`). The crate's validator refuses extensions that are
-//!   read here, and its readers panic on what it would have refused.
-//! - Buffers larger than memory, read piece by piece, and decoded ones in the spool (`file`, `accessor`); the crate wants
-//!   each buffer in memory.
+//! - Checks where something is followed (`file`, `accessor`, `nodes`). The crate's validator refuses extensions that
+//!   are read here, and its readers panic on what it would have refused.
+//! - Buffers larger than memory, read piece by piece, and decoded ones in the spool (`file`, `accessor`); the crate
+//!   wants each buffer in memory.
 //!
-//! Opening a file parses its JSON and checks the ranges of what is in use; geometry is read part by part when it is asked
-//! for, images are decoded one by one.
+//! Opening a file parses its JSON and checks the ranges of what is in use; geometry is read part by part when it is
+//! asked for, images are decoded one by one.
 
 mod accessor;
 mod document;
@@ -25,26 +25,28 @@ mod lights;
 mod materials;
 mod meshes;
 mod meshopt;
+mod names;
 mod nodes;
 
 use super::affine::{Affine, multiply};
 use super::bytes::{Bytes, Spool};
-use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
+use super::error::{EXPORT_AGAIN, ImportError, show};
 use super::image::decode_texture;
+use super::opened::{Opened, Parts, TriangleBudget};
 use super::repairs::Repairs;
 use super::warnings::Warnings;
-use super::{Opened, Parts, TriangleBudget};
 use crate::source::{
     IDENTITY, MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, SourceError, SourceTexture,
 };
 use file::{File, Problem};
 use materials::Texture;
 use meshes::Checked;
+use names::{display_name, label};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Most triangles stored for a byte of input. A triangle of its own takes several bytes; many meshes may share accessors
-/// (to differ in material, say), but without a bound a small file could demand any amount of work.
+/// Most triangles stored for a byte of input. A triangle of its own takes several bytes; many meshes may share
+/// accessors (to differ in material, say), but without a bound a small file could demand any amount of work.
 const MAX_SHARING: u64 = 64;
 
 /// Instances whose transformations are read at once.
@@ -73,7 +75,8 @@ struct Mesh {
     parts: Vec<(u32, u64)>,
 }
 
-/// Opens one .gltf or .glb file: of its scenes the one that is asked for, by name or number; placements tell which nodes above them `movable` names.
+/// Opens one .gltf or .glb file: of its scenes the one that is asked for, by name or number; placements tell which
+/// nodes above them `movable` names.
 pub(super) fn open(
     path: &Path,
     scene: Option<&str>,
@@ -317,20 +320,4 @@ fn place(file: &File, uses: &[nodes::Use], numbers: &[Option<u32>]) -> Result<Ve
         }
     }
     Ok(placements)
-}
-
-/// "kind 3 \"name\"", on one line.
-fn label(kind: &str, index: usize, name: Option<&str>) -> String {
-    match name {
-        Some(name) if !name.is_empty() => format!("{kind} {index} \"{}\"", one_line(name)),
-        _ => format!("{kind} {index}"),
-    }
-}
-
-/// The name of an object, or its index.
-fn display_name(index: usize, name: Option<&str>) -> String {
-    match name {
-        Some(name) if !name.is_empty() => one_line(name),
-        _ => index.to_string(),
-    }
 }

@@ -3,7 +3,8 @@
 use super::accessor::{Accessor, Shape};
 use super::document::Document;
 use super::file::{File, Problem, item};
-use super::{display_name, label, lights};
+use super::lights;
+use super::names::{display_name, label};
 use crate::import::affine::{Affine, from_columns, from_parts, multiply};
 use crate::import::error::{ImportError, one_line};
 use crate::import::warnings::Warnings;
@@ -92,8 +93,8 @@ pub(super) struct Placed {
     pub lights: Vec<PunctualLight>,
 }
 
-/// Every use of a mesh and of a light in the scene that is asked for (else the default scene, else scene 0, else all root nodes), depth
-/// first; `placing` takes the scene to the world. Uses know which nodes above them `movable` names.
+/// Every use of a mesh and of a light in the scene that is asked for (else the default scene, else scene 0, else all
+/// root nodes), depth first; `placing` takes the scene to the world. Uses know which nodes above them `movable` names.
 pub(super) fn uses(
     file: &File,
     (asked, movable): (Option<&str>, &[String]),

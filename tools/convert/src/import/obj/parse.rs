@@ -1,8 +1,8 @@
 //! The text of an OBJ file into tables.
 
-use crate::import::TriangleBudget;
 use crate::import::bytes::{Spool, Stream};
 use crate::import::error::{ImportError, one_line, show};
+use crate::import::opened::TriangleBudget;
 use crate::import::plain::{self, fault, no_room, unreadable};
 use crate::import::table::{Table, TableWriter};
 use crate::import::text::{Lines, number};

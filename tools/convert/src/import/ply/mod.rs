@@ -8,12 +8,12 @@ mod header;
 
 use super::bytes::{Spool, Stream};
 use super::error::ImportError;
+use super::opened::{Opened, Parts, TriangleBudget};
 use super::plain::{self, doubles, fault, floats, no_room, unreadable};
 use super::repairs::Repairs;
 use super::table::{Table, TableWriter};
 use super::vertices::Vertices;
 use super::warnings::Warnings;
-use super::{Opened, Parts, TriangleBudget};
 use crate::source::{Primitive, SourceError, SourceTexture};
 use body::{Body, Failure};
 use header::{Element, Header, Scalar};

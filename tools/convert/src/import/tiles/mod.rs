@@ -11,6 +11,7 @@ mod document;
 use super::affine::{Affine, from_columns, multiply};
 use super::bytes::{Bytes, Spool};
 use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
+use super::opened::{self, TriangleBudget};
 use super::{gltf, uri};
 use crate::source::IDENTITY;
 use document::{Content, Tile, Tileset};
@@ -287,8 +288,8 @@ pub(super) fn open_model(
     model: &Model,
     movable: &[String],
     spool: &Arc<Spool>,
-    budget: &mut super::TriangleBudget,
-) -> Result<super::Opened, ImportError> {
+    budget: &mut TriangleBudget,
+) -> Result<opened::Opened, ImportError> {
     gltf::open_within(&model.path, model.bytes.each_ref(), (None, movable), &model.tile_from_model, spool, budget)
 }
 

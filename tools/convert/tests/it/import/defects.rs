@@ -17,7 +17,9 @@ fn sound() -> Writer {
     let sparse_indices = file.view(&le16(&[0, 2]));
     let sparse_values = file.view(&le32(&[0.0; 6]));
     file.root["accessors"][0]["sparse"] = json!({
-        "count": 2, "indices": {"bufferView": sparse_indices, "componentType": U16}, "values": {"bufferView": sparse_values}
+        "count": 2,
+        "indices": {"bufferView": sparse_indices, "componentType": U16},
+        "values": {"bufferView": sparse_values}
     });
     file.push("accessors", json!({"componentType": F32, "type": "VEC3", "count": 3}));
     file.push("images", json!({"uri": "data:,"}));

@@ -294,7 +294,9 @@ fn material_factors() {
     file.push(
         "materials",
         json!({
-            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 0.75], "metallicFactor": 0.5, "roughnessFactor": 0.125},
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0.5, 0.25, 1, 0.75], "metallicFactor": 0.5, "roughnessFactor": 0.125
+            },
             "emissiveFactor": [1, 0.5, 0], "alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": true,
             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}
         }),

@@ -40,13 +40,14 @@ fn obj_polygons_become_fans() {
 #[test]
 fn obj_objects_materials_and_attributes() {
     let folder = tempfile::tempdir().unwrap();
-    let library = "newmtl red\nKd 1 0 0\nPr 0.25\nPm 0.5\nnewmtl glass\nKd 0.5\nd 0.25\nmap_Kd -clamp on tex\\a b.png\nmap_Bump b.png\n";
+    let library = "newmtl red\nKd 1 0 0\nPr 0.25\nPm 0.5\nnewmtl glass\nKd 0.5\nd 0.25\n\
+        map_Kd -clamp on tex\\a b.png\nmap_Bump b.png\n";
     write(folder.path(), "my materials.mtl", library.as_bytes());
     std::fs::create_dir(folder.path().join("tex")).unwrap();
     write(folder.path(), "tex/a b.png", &png(1, 1, &[1, 2, 3, 4]));
     let text = "mtllib my materials.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.25\nvt 1 0\nvn 0 0 1\n\
-        f 1 2 3\no first\nusemtl glass\nf 1/1/1 2/2/1 3/1/1\nusemtl red\nf 1//1 2//1 3//1\no empty\ng second\nf 1/1 2/2 3/2\n\
-        usemtl none\nf 3 2 1\n";
+        f 1 2 3\no first\nusemtl glass\nf 1/1/1 2/2/1 3/1/1\nusemtl red\nf 1//1 2//1 3//1\no empty\ng second\n\
+        f 1/1 2/2 3/2\nusemtl none\nf 3 2 1\n";
     let path = write(folder.path(), "test.obj", text.as_bytes());
     let scene = import_one(&path).unwrap();
     let names: Vec<_> = scene.meshes.iter().map(|mesh| (mesh.name.as_str(), mesh.primitives.len())).collect();
@@ -110,8 +111,9 @@ fn obj_defects() {
 pub fn ply(encoding: &str) -> Vec<u8> {
     let header = format!(
         "ply\nformat {encoding} 1.0\ncomment made by hand\nelement other 2\nproperty list uchar short what\n\
-         element vertex 4\nproperty double x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
-         property uchar blue\nproperty float nx\nproperty float ny\nproperty float nz\nelement nothing 4294967295\n\
+         element vertex 4\nproperty double x\nproperty float y\nproperty float z\nproperty uchar red\n\
+         property uchar green\nproperty uchar blue\nproperty float nx\nproperty float ny\n\
+         property float nz\nelement nothing 4294967295\n\
          element face 2\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
     );
     let mut bytes = header.into_bytes();
@@ -197,7 +199,8 @@ fn ply_defects() {
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty float x\nproperty float y\n\
         property float z\nelement face 4294967295\nproperty list uint int vertex_indices\nend_header\n";
     assert!(error("a.ply", header.as_bytes()).contains("vertex 0: the file ends here"));
-    let points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
+    let points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+        end_header\n1 2 3\n";
     assert!(error("a.ply", points.as_bytes()).contains("point clouds are not read"));
 }
 

@@ -130,7 +130,9 @@ proptest! {
     }
 
     #[test]
-    fn truncated_and_swollen_files_do_no_harm(at in any::<prop::sample::Index>(), inserted in prop::collection::vec(any::<u8>(), 0..40)) {
+    fn truncated_and_swollen_files_do_no_harm(
+        at in any::<prop::sample::Index>(), inserted in prop::collection::vec(any::<u8>(), 0..40)
+    ) {
         let bytes = rich().glb();
         let at = at.index(bytes.len());
         assert_harmless("test.glb", &bytes[..at]);
@@ -138,7 +140,9 @@ proptest! {
     }
 
     #[test]
-    fn replaced_numbers_do_no_harm(edits in prop::collection::vec((any::<prop::sample::Index>(), 0..TOKENS.len()), 1..4)) {
+    fn replaced_numbers_do_no_harm(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..TOKENS.len()), 1..4)
+    ) {
         let file = rich();
         let bin: String = file.bytes.iter().map(|b| format!("%{b:02x}")).collect();
         let mut root = file.root.clone();
@@ -155,8 +159,8 @@ proptest! {
 }
 
 /// An OBJ file with most of what importing follows.
-const OBJ: &str = "mtllib a.mtl\no one\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0.5\nvn 0 0 1\nusemtl red\n\
-    f 1/1/1 2/2/1 3/1/1 4/2/1\ng two\nf -4 -3 \\\n -2\nf 1//1 2//1 3//1\nl 1 2\n";
+const OBJ: &str = "mtllib a.mtl\no one\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0.5\nvn 0 0 1\n\
+    usemtl red\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng two\nf -4 -3 \\\n -2\nf 1//1 2//1 3//1\nl 1 2\n";
 
 /// Words that stand where others should.
 const WORDS: [&str; 14] = [
@@ -201,7 +205,8 @@ proptest! {
             ("a.ply", ply("binary_little_endian")),
             ("a.ply", ply("binary_big_endian")),
             ("a.stl", stl()),
-            ("a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n".to_vec()),
+            ("a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+                endloop\n".to_vec()),
         ];
         for (name, mut bytes) in files {
             assert_harmless(name, &bytes[..cut.index(bytes.len())]);

@@ -47,9 +47,11 @@ fn all_textures_with_their_sets_and_transformations() {
             "baseColorTexture": {"index": 0},
             "metallicRoughnessTexture": {"index": 1, "texCoord": 1}
         },
-        "normalTexture": {"index": 2, "scale": -0.5, "extensions": {"KHR_texture_transform": {"scale": [2, 4], "offset": [0.5, 0.25]}}},
+        "normalTexture": {"index": 2, "scale": -0.5, "extensions": {
+            "KHR_texture_transform": {"scale": [2, 4], "offset": [0.5, 0.25]}}},
         "occlusionTexture": {"index": 1, "strength": 0.25},
-        "emissiveTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1, "rotation": std::f64::consts::FRAC_PI_2}}},
+        "emissiveTexture": {"index": 0, "extensions": {
+            "KHR_texture_transform": {"texCoord": 1, "rotation": std::f64::consts::FRAC_PI_2}}},
         "emissiveFactor": [1, 0.5, 0],
         "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}
     }))
@@ -149,8 +151,8 @@ fn dielectrics_reflect_by_their_index_and_their_factors() {
     let coat = json!({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25, "clearcoatTexture": {"index": 0}});
     let (coated, warnings) = material(json!({"extensions": {"KHR_materials_clearcoat": coat}}));
     assert_eq!((coated.clearcoat, coated.clearcoat_roughness, warnings.len()), (0.5, 0.25, 1));
-    let gloss = json!({"diffuseFactor": [0.5, 0.25, 0, 1], "specularFactor": [0.75, 0.5, 0.25], "glossinessFactor": 0.75,
-        "diffuseTexture": {"index": 1}, "specularGlossinessTexture": {"index": 0}});
+    let gloss = json!({"diffuseFactor": [0.5, 0.25, 0, 1], "specularFactor": [0.75, 0.5, 0.25],
+        "glossinessFactor": 0.75, "diffuseTexture": {"index": 1}, "specularGlossinessTexture": {"index": 0}});
     let pbr = json!({"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}});
     let extensions = json!({"KHR_materials_pbrSpecularGlossiness": gloss});
     let (found, warnings) = material(json!({"pbrMetallicRoughness": pbr, "extensions": extensions}));
@@ -252,7 +254,8 @@ fn obj_maps_become_textures() {
     }
     write(folder.path(), "r.png", &png(2, 1, &[10, 0, 0, 255, 20, 0, 0, 255]));
     write(folder.path(), "m.png", &png(1, 2, &[30, 0, 0, 255, 40, 0, 0, 255]));
-    let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\n";
+    let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n\
+        usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\n";
     let scene = import_one(&write(folder.path(), "a.obj", text.as_bytes())).unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     let textures = |material: usize| scene.materials[material].textures();
