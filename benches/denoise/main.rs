@@ -4,9 +4,8 @@
 //! Everything is measured on what a display shows: radiance times 2^EV, the EV that brings the first reference to
 //! middle grey, through the tone map, cut off at 0 and 1, linear. *RMSE* is over pixels and channels, *FLIP* the mean,
 //! *temporal error* the root of the mean squared error over all frames of the steady state, *flicker* the mean over
-//! pixels, channels and these frames of
-//! |(A[k] - A[k-1]) - (R[k] - R[k-1])|: how far the change of the picture A is from the change of the reference R. The steady state
-//! is the last frames of the walk.
+//! pixels, channels and these frames of |(A[k] - A[k-1]) - (R[k] - R[k-1])|: how far the change of the picture A is
+//! from the change of the reference R. The steady state is the last frames of the walk.
 
 mod measures;
 mod references;

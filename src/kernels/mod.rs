@@ -3,9 +3,10 @@
 //!
 //! A kernel is a WGSL file in `shaders/` and a function of the same name in a family here, its twin.
 //!
-//! Modules know those before them: plain structures ([`vector`], [`layout`], [`frame`], [`lamps`], [`payloads`] …); what
-//! every twin is given ([`bound`], [`rays`], [`tiles`]); the families [`trace`], [`query`], [`texture`], [`shade`]; the
-//! [`table`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the families the node test alone ([`trace::node`]).
+//! Modules know those before them: plain structures ([`vector`], [`layout`], [`frame`], [`lamps`], [`payloads`] …);
+//! what every twin is given ([`bound`], [`rays`], [`tiles`]); the families [`trace`], [`query`], [`texture`],
+//! [`shade`]; the [`table`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the families the node test alone
+//! ([`trace::node`]).
 
 pub mod bound;
 pub mod dispatch;

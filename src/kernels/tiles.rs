@@ -1,4 +1,5 @@
-//! What kernels keep of tiles: the bounds of their rays, their lists of leaves, and how many of their rays see each leaf.
+//! What kernels keep of tiles: the bounds of their rays, their lists of leaves, and how many of their rays see each
+//! leaf.
 
 use super::bound::{Bound, Demand};
 use super::layout::{Entry, PARAM_CULLED, Pair, TileBounds, TileList};

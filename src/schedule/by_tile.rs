@@ -1,5 +1,5 @@
-//! Runs the steps of a schedule as [`Optimisations::by_tile`] says: all selected leaves of a tile in one dispatch, or one
-//! leaf a dispatch.
+//! Runs the steps of a schedule as [`Optimisations::by_tile`] says: all selected leaves of a tile in one dispatch, or
+//! one leaf a dispatch.
 
 use super::{BrickStates, Executor, ExecutorError, Optimisations, Pass, Report, Step};
 use crate::counters::Counters;

@@ -3,7 +3,7 @@
 //! The file's first line describes the cache, every other line one pass:
 //!
 //! ```text
-//! {"format":4,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"passes":1,"sizes":[[1024,512],[2048,512]],"tiles":[256]}
+//! {"format":4,"policy":"round-robin","budget_bytes":65536,"page_bytes":65536,"passes":1,"sizes":[[8,4]],"tiles":[]}
 //! {"frame":0,"pass":"primary","requests":["g0","g1","a1","t0"],"batches":[1,3]}
 //! ```
 //!

@@ -76,8 +76,11 @@ impl<'a> Visit<'a> for Named {
     }
 
     fn visit_item_use(&mut self, item: &'a syn::ItemUse) {
-        flatten(&item.tree, &[], matches!(item.vis, syn::Visibility::Public(_)), &mut self.paths);
+        flatten(&item.tree, &[], !matches!(item.vis, syn::Visibility::Inherited), &mut self.paths);
     }
+
+    /// `pub(super)` uses nothing.
+    fn visit_vis_restricted(&mut self, _: &'a syn::VisRestricted) {}
 
     fn visit_path(&mut self, path: &'a syn::Path) {
         let names: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
