@@ -220,8 +220,8 @@ impl Reader<'_> {
         self.corrupt(part, xxh3_64(out), span.checksum)
     }
 
-    /// Decodes the attributes of `brick` to `out`, [`AttributeLayout::bytes`] long, from a copy whose checksum was
-    /// compared.
+    /// Decodes the attributes of `brick` to `out`, [`crate::AttributeLayout::bytes`] long, from a copy whose checksum
+    /// was compared.
     pub(crate) fn attributes(
         &self,
         payload: Payload,

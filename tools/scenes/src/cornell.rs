@@ -194,7 +194,7 @@ impl Recipe for Cornell {
     }
 }
 
-/// See [`crate::generate`].
+/// See [`crate::generate()`].
 pub fn generate(settings: &Settings, progress: &Progress) -> Scene {
     let Settings { triangles, seed, .. } = *settings;
     // Squares along an edge, `sides` of which take about so many triangles.

@@ -3,8 +3,8 @@
 //! A scene depends on its settings alone: not on the number of threads, nor on the machine's clock. The detail of a
 //! place is fixed; asking for more triangles adds more of it around the same centre.
 //!
-//! [`generate`] chooses one of `city`, `pipes`, `terrain`, `stadium` and `cornell`, which draw with `mesh`, `solid` and
-//! `material` and give a [`Scene`]; `write` makes files of it. `stiff` and `soup` are scenes for tests.
+//! [`generate()`] chooses one of `city`, `pipes`, `terrain`, `stadium` and `cornell`, which draw with `mesh`, `solid`
+//! and `material` and give a [`Scene`]; `write` makes files of it. `stiff` and `soup` are scenes for tests.
 
 mod city;
 mod copies;

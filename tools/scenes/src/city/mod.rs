@@ -138,7 +138,7 @@ fn surrounding_triangles(blocks: usize) -> u64 {
     18 * meadows + 2 * (all * all - cells * cells)
 }
 
-/// See [`crate::generate`]. Builds every block once, to count.
+/// See [`crate::generate()`]. Builds every block once, to count.
 pub fn generate(settings: &Settings, progress: &Progress) -> Scene {
     let Settings { triangles, seed, instanced, .. } = *settings;
     let (layout, library) = (Layout::new(seed), Library::new(seed));

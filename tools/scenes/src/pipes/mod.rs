@@ -93,7 +93,7 @@ impl Recipe for Plant {
     }
 }
 
-/// See [`crate::generate`]. Builds every bay once, to count.
+/// See [`crate::generate()`]. Builds every bay once, to count.
 pub fn generate(settings: &Settings, progress: &Progress) -> Scene {
     let plant = Plant { seed: settings.seed, budgets: Vec::new(), bounds: Vec::new() };
     let around = |count: usize| AROUND + 2 * (4 * (last_ring(count) as u64 + 1).pow(2) - count as u64);

@@ -63,7 +63,7 @@ impl Recipe for Stadium {
     }
 }
 
-/// See [`crate::generate`]. Builds the bowl once, to count.
+/// See [`crate::generate()`]. Builds the bowl once, to count.
 pub fn generate(settings: &Settings, progress: &Progress) -> Scene {
     let Settings { triangles, seed, .. } = *settings;
     // The bowl's triangles are about those of as many times an ordinary sector.

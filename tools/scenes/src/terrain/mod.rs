@@ -128,7 +128,7 @@ fn reach(one: &Use) -> i64 {
     (t.x.abs().max(t.z.abs()) / STEP).ceil() as i64
 }
 
-/// See [`crate::generate`].
+/// See [`crate::generate()`].
 pub fn generate(settings: &Settings, progress: &Progress) -> Scene {
     let Settings { triangles: wanted, seed, .. } = *settings;
     let (land, items) = (Land::new(seed), cover::items(seed));
