@@ -10,6 +10,7 @@ use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Pass, Report, Step};
 use bricks::SceneFile;
 use glam::DVec3;
+use serde_json::Value;
 use std::any::Any;
 use std::sync::Arc;
 
@@ -98,6 +99,16 @@ pub trait Secondary: Any {
 
     /// Notes that instances have moved.
     fn scene_has_moved(&mut self, _displaced: &Displaced) {}
+
+    /// Side of the finest cells that it knows, world units: shorter rays it tells nothing of.
+    fn finest_cell(&self) -> Option<f64> {
+        None
+    }
+
+    /// What summaries tell of it, by name.
+    fn report(&self) -> Vec<(&'static str, Value)> {
+        Vec::new()
+    }
 }
 
 /// The methods of a renderer, at most one of each kind; each answers other rays.
@@ -105,6 +116,11 @@ pub trait Secondary: Any {
 pub struct Methods(Vec<Box<dyn Secondary>>);
 
 impl Methods {
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &dyn Secondary> {
+        self.0.iter().map(|method| &**method)
+    }
+
     /// All of them.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Box<dyn Secondary>> {
         self.0.iter_mut()

@@ -63,8 +63,7 @@ pub fn methods(settings: &Settings) -> Methods {
 
 /// Side of the finest base map of a method that has some, world units.
 pub fn finest_cell(methods: &Methods) -> Option<f64> {
-    let roma = methods.get::<Roma>().and_then(|roma| roma.base.finest_cell());
-    roma.or_else(|| methods.get::<Df>().and_then(|df| df.base.finest_cell()))
+    methods.iter().find_map(|method| method.finest_cell())
 }
 
 /// How frames are rendered, with this schedule in force.

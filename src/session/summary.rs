@@ -1,14 +1,9 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
 use super::open::Session;
-use super::renderer::finest_cell;
 use crate::counters::Record;
 use crate::frame::Renderer;
 use crate::picture::exposure::Exposure;
-use crate::secondary::df::answer::Df;
-use crate::secondary::roma::Role;
-use crate::secondary::roma::answer::Roma;
-use crate::secondary::roma::handover::{Handover, Trust};
 use crate::session::Settings;
 use crate::settings::Schedule;
 use serde_json::{Map, Value, json};
@@ -26,6 +21,8 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
     let (streamed_bytes, tile_bytes) =
         (renderer.cache.bytes.sizes().sum(), renderer.cache.bytes.tiles.iter().sum::<u64>());
     let brick_bytes = streamed_bytes - tile_bytes;
+    let mut reports: Map<String, Value> =
+        renderer.methods.iter().flat_map(|method| method.report()).map(|(name, value)| (name.into(), value)).collect();
     json!({
         "format": FORMAT,
         "version": env!("CARGO_PKG_VERSION"),
@@ -62,10 +59,10 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "host_cache_bytes": s.host_cache,
             "interactive_bytes": s.interactive,
             "secondary": s.secondary.name(),
-            "roma": roma_settings(s, renderer),
-            "df": field_settings(s, renderer),
+            "roma": reports.remove("roma"),
+            "df": reports.remove("df"),
             "dvf": field.as_ref().and_then(Option::as_ref).map(|note| note.report(renderer, &s.dvf, s.motion.is_some(), records)),
-            "rsm": renderer.methods.get::<Roma>().and_then(|roma| roma.rsm.report()),
+            "rsm": reports.remove("rsm"),
             "spp": s.spp,
             "seed": s.seed,
             "sun": s.sun.unit().to_array(),
@@ -201,57 +198,6 @@ fn memory() -> Value {
         }),
         _ => Value::Null,
     }
-}
-
-/// What was measured of rays that maps sift: shares of all, 0 to 1, that would be answered otherwise than exact ones,
-/// by how far rays in doubt are traced.
-fn handover(role: Role, measured: &Handover) -> Option<Value> {
-    let Role::Sift { most_wrong: Some(most_wrong) } = role else { return None };
-    let ways = Trust::all().map(|trust| json!({ "trust": trust.to_string(), "wrong": measured.share_wrong(trust) }));
-    Some(json!({
-        "pilots": measured.pilots(),
-        "trust": measured.trust(most_wrong).to_string(),
-        "measured": ways.collect::<Vec<_>>(),
-    }))
-}
-
-/// What answers rays by maps; `None` where none does.
-fn roma_settings(settings: &Settings, renderer: &Renderer) -> Option<Value> {
-    let answers = renderer.methods.get::<Roma>()?;
-    answers.settings.map(|roma| {
-        json!({
-            "bom": settings.roma.bom.name(),
-            "k": roma.occlusion.grid.k,
-            "shadow_k": roma.shadow.grid.k,
-            "size": roma.occlusion.grid.size,
-            "samples": roma.occlusion.grid.samples,
-            "steps": roma.occlusion.steps,
-            "shadow_steps": roma.shadow.steps,
-            "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
-            "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
-            "one_in": if let Role::Correct(one_in) = roma.occlusion.role { one_in } else { 1 },
-            "most_wrong": if let Role::Sift { most_wrong: Some(n) } = roma.occlusion.role { 1e-6 * f64::from(n) } else { 0.0 },
-            "ao_handover": handover(roma.occlusion.role, &answers.handovers()[0]),
-            "shadow_handover": handover(roma.shadow.role, &answers.handovers()[1]),
-            "finest_cell": finest_cell(&renderer.methods),
-        })
-    })
-}
-
-/// What answers rays by distance fields.
-fn field_settings(settings: &Settings, renderer: &Renderer) -> Option<Value> {
-    renderer.methods.get::<Df>().map(|df| {
-        let field = df.settings();
-        json!({
-            "bom": settings.roma.bom.name(),
-            "size": field.size,
-            "steps": field.occlusion_steps,
-            "shadow_steps": field.shadow_steps,
-            "lift": field.lift,
-            "hit": field.hit,
-            "finest_cell": finest_cell(&renderer.methods),
-        })
-    })
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use super::{Defect, Findings, Lockstep};
 use crate::cpu::CpuExecutor;
 use crate::frame::{
-    Effects, Engine, Equirectangular, Light, Methods, Moved, Occlusion, RenderSettings, Renderer, Schedule,
+    Effects, Engine, Equirectangular, Light, Moved, Occlusion, RenderSettings, Renderer, Schedule,
     emissive_triangles, environment,
 };
 use crate::gpu::device::Gpu;
@@ -22,7 +22,6 @@ use crate::schedule::auto::Auto;
 use crate::schedule::cache::{Cache, SceneBytes};
 use crate::schedule::fronts::Fronts;
 use crate::schedule::{Executor, Lamp, Optimisation, Pass, Step, Tracing};
-use crate::secondary::FAMILIES;
 use crate::secondary::df::answer::Df;
 use crate::secondary::df::kernels as df;
 use crate::secondary::df::maps::DfMaps;
@@ -34,6 +33,9 @@ use crate::secondary::occupancy::{Bom, Cascades, Source};
 use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::{Grid, Role, RomaPass, RomaSettings};
 use crate::secondary::rsm::RsmSettings;
+use crate::secondary::{FAMILIES, Method};
+use crate::session::Settings;
+use crate::session::renderer::methods;
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
@@ -183,6 +185,8 @@ struct Variant {
     tile_bytes: Option<u64>,
     /// Look-ups of rays answered by distance fields, if they are.
     field: Option<u32>,
+    /// A method as a session makes it.
+    method: Method,
     /// How a field of visibility is made that answers rays to the environment, if one does.
     dvf: Option<DvfSettings>,
 }
@@ -197,6 +201,7 @@ const VARIANT: Variant = Variant {
     roma: None,
     tile_bytes: None,
     field: None,
+    method: Method::Exact,
     dvf: None,
 };
 
@@ -325,7 +330,9 @@ fn render(
         captures: None,
         moved: Moved::default(),
     };
-    let mut renderer = Renderer { engine, methods: Methods::default() };
+    let mut usual = Settings { secondary: variant.method, ..Settings::default() };
+    (usual.roma.size, usual.df.size) = (32, 32);
+    let mut renderer = Renderer { engine, methods: methods(&usual) };
     if let Some(settings) = variant.roma.map(roma) {
         renderer.methods.set(Roma::new(settings, Source::default()));
     }
@@ -412,15 +419,20 @@ fn twins_agree_with_their_kernels() {
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
     ];
+    // Whatever methods there are, with few cells.
+    let usual = Method::ALL.iter().map(|&method| Variant { method, ..VARIANT }).filter(|v| v.method != Method::Exact);
+    let variants: Vec<Variant> = variants.into_iter().chain(usual).collect();
     let findings = Arc::new(Mutex::new(Findings::default()));
     for (scene, variants) in [
         (Arc::new(probe::scene().unwrap()), &variants[..]),
-        (textured(false), &variants),
+        (textured(false), &variants[..]),
         (textured(true), &variants[2..10]),
     ] {
         let has_occupancy = !scene.resident().occupancy.is_empty();
-        for (i, variant) in
-            variants.iter().enumerate().filter(|(_, v)| has_occupancy || (v.roma.is_none() && v.field.is_none()))
+        for (i, variant) in variants
+            .iter()
+            .enumerate()
+            .filter(|(_, v)| has_occupancy || (v.roma.is_none() && v.field.is_none() && v.method == Method::Exact))
         {
             render(&device, &scene, variant, None, &findings);
             let found = findings.lock().unwrap();

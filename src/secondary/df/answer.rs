@@ -7,6 +7,7 @@ use crate::kernels::View;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass};
 use crate::secondary::occupancy::{BaseMaps, Cascades, Source};
+use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// Rays answered by distance fields.
@@ -64,5 +65,23 @@ impl Secondary for Df {
 
     fn scene_has_moved(&mut self, _displaced: &Displaced) {
         self.base.scene_has_moved();
+    }
+
+    fn finest_cell(&self) -> Option<f64> {
+        self.base.finest_cell()
+    }
+
+    fn report(&self) -> Vec<(&'static str, Value)> {
+        let DfSettings { size, occlusion_steps, shadow_steps, lift, hit } = self.settings;
+        let report = json!({
+            "bom": self.base.source().name(),
+            "size": size,
+            "steps": occlusion_steps,
+            "shadow_steps": shadow_steps,
+            "lift": lift,
+            "hit": hit,
+            "finest_cell": self.finest_cell(),
+        });
+        vec![("df", report)]
     }
 }

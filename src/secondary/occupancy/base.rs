@@ -66,6 +66,11 @@ fn usual_cell_log2(resident: &Resident) -> Option<i32> {
 }
 
 impl BaseMaps {
+    /// What they are made of.
+    pub fn source(&self) -> Source {
+        self.source
+    }
+
     /// Of `source`.
     pub fn new(source: Source) -> Self {
         Self { source, ..Self::default() }

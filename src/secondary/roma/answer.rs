@@ -10,6 +10,7 @@ use crate::schedule::{ExecutorError, Lamp, Pass, Report, Step};
 use crate::secondary::occupancy::{BaseMaps, BaseView, Bom, Source};
 use crate::secondary::rsm::answer::Rsm;
 use bricks::SceneFile;
+use serde_json::{Value, json};
 
 /// Rays answered by ray-aligned occupancy maps.
 #[derive(Default)]
@@ -186,5 +187,33 @@ impl Secondary for Roma {
     fn scene_has_moved(&mut self, displaced: &Displaced) {
         self.base.scene_has_moved();
         self.rsm.scene_has_moved(displaced.touched);
+    }
+
+    fn finest_cell(&self) -> Option<f64> {
+        self.base.finest_cell()
+    }
+
+    fn report(&self) -> Vec<(&'static str, Value)> {
+        let of = |roma: &RomaSettings| {
+            let RomaPass { grid, role, steps, .. } = roma.occlusion;
+            json!({
+                "bom": self.base.source().name(),
+                "k": grid.k,
+                "shadow_k": roma.shadow.grid.k,
+                "size": grid.size,
+                "samples": grid.samples,
+                "steps": steps,
+                "shadow_steps": roma.shadow.steps,
+                "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
+                "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
+                "one_in": if let Role::Correct(one_in) = role { one_in } else { 1 },
+                "most_wrong": if let Role::Sift { most_wrong: Some(n) } = role { 1e-6 * f64::from(n) } else { 0.0 },
+                "ao_handover": self.handovers[0].report(role),
+                "shadow_handover": self.handovers[1].report(roma.shadow.role),
+                "finest_cell": self.finest_cell(),
+            })
+        };
+        let rsm = self.rsm.report().map(|report| ("rsm", report));
+        self.settings.as_ref().map(|roma| ("roma", of(roma))).into_iter().chain(rsm).collect()
     }
 }

@@ -1,7 +1,8 @@
 //! Up to where rays that occupancy maps do not find free are traced: as far as measured errors ask for.
 
-use super::Pilots;
+use super::{Pilots, Role};
 use crate::kernels::layout::HANDOVERS;
+use serde_json::{Value, json};
 use std::fmt::{Display, Formatter};
 
 /// One ray in so many is traced to its end, to measure by.
@@ -45,6 +46,18 @@ pub struct Handover {
 }
 
 impl Handover {
+    /// What was measured of rays of a role that maps sift: shares of all, 0 to 1, that would be answered otherwise than
+    /// exact ones, by how far rays in doubt are traced.
+    pub fn report(&self, role: Role) -> Option<Value> {
+        let Role::Sift { most_wrong: Some(most_wrong) } = role else { return None };
+        let ways = Trust::all().map(|trust| json!({ "trust": trust.to_string(), "wrong": self.share_wrong(trust) }));
+        Some(json!({
+            "pilots": self.pilots(),
+            "trust": self.trust(most_wrong).to_string(),
+            "measured": ways.collect::<Vec<_>>(),
+        }))
+    }
+
     /// Adds what the pilots of a pass showed.
     pub fn note(&mut self, pilots: Pilots) {
         self.seen.add(pilots);
