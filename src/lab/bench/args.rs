@@ -1,6 +1,6 @@
 //! Options of `bench`.
 
-use super::plan::Stage;
+use super::chc::plan::Stage;
 use crate::settings::sizes::positive_count;
 use crate::settings::{
     Adapter, CacheSize, Effect, EffectList, ImageSize, Lines, Plain, Rule, Schedule, Value, settings,
@@ -15,6 +15,11 @@ const FRAMES: Rule = Rule::Whole(1, 300);
 pub const REPETITIONS: Rule = Rule::Whole(1, 1000);
 /// Minutes.
 pub const MINUTES: Rule = Rule::Real(0.0, 100_000.0);
+
+/// Those of `all` stages that are `given`, else all.
+pub fn wanted<T: Copy + PartialEq>(all: &[T], given: &[T]) -> Vec<T> {
+    all.iter().filter(|stage| given.is_empty() || given.contains(stage)).copied().collect()
+}
 
 settings! {
     /// Options of `bench executors`.
@@ -161,12 +166,6 @@ impl ChcArgs {
             repeat: self.repeat.unwrap_or(if quick { 2 } else { 5 }),
             rays: self.rays.unwrap_or(if quick { 2 } else { 20 }),
         }
-    }
-
-    /// The stages wanted.
-    pub fn stages(&self) -> Vec<Stage> {
-        let wanted = |stage: &Stage| self.stages.is_empty() || self.stages.contains(stage);
-        Stage::ALL.into_iter().filter(wanted).collect()
     }
 
     /// Whether a case of this name is wanted.

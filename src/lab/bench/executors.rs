@@ -4,8 +4,9 @@
 //! are those of the others.
 
 use super::args::{ExecutorsArgs, Settings};
-use super::plan::{SceneId, View};
-use super::scenes;
+use super::results::{Column, table, write_json};
+use super::scenes::{SceneId, Scenes, View};
+use super::store;
 use crate::frame::{Pixels, Renderer};
 use crate::gpu::device::candidates;
 use crate::kernels::DeviceInfo;
@@ -86,8 +87,8 @@ impl Side {
 pub fn run(args: &ExecutorsArgs, console: Console) -> Result<()> {
     let settings = args.settings();
     atomic::create_folder(&args.output)?;
-    let folder = args.scenes.clone().unwrap_or_else(|| args.output.join("scenes"));
-    let place = scenes::place(SceneId::City, &folder, &settings, None, console)?;
+    let place =
+        Scenes::new(args.scenes.as_deref(), &args.output, settings.triangles, None, console).place(SceneId::City)?;
     let mut notes = Vec::new();
     let mut sides = Vec::new();
     for adapter in wanted(args) {
@@ -173,26 +174,35 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
+/// A pass on a device.
+struct Pass<'a> {
+    device: &'a str,
+    name: &'static str,
+    /// Median rays of a frame, and milliseconds.
+    own: Option<(f64, f64)>,
+    /// Of the first device.
+    first: Option<(f64, f64)>,
+}
+
 /// The table of all devices and passes.
-fn table(sides: &[Side]) -> Table {
-    let columns = ["device", "pass", "rays a frame", "ms", "Mray/s", "over the first"];
+fn passes(sides: &[Side]) -> Table {
     let mut rows = Vec::new();
     for side in sides {
-        for (pass, _) in &side.passes {
-            let own = side.medians(pass);
-            let first = sides.first().and_then(|first| first.medians(pass));
-            rows.push(vec![
-                Value::Text(side.info.name.clone()),
-                Value::Text((*pass).into()),
-                Value::number(own.map(|(rays, _)| rays)),
-                Value::number(own.map(|(_, ms)| ms)),
-                Value::number(own.map(|(rays, ms)| rays * 1e-3 / ms)),
-                Value::ratio(own.zip(first).map(|((_, own), (_, first))| first / own)),
-            ]);
+        for &(name, _) in &side.passes {
+            let first = sides[0].medians(name);
+            rows.push(Pass { device: &side.info.name, name, own: side.medians(name), first });
         }
     }
+    let columns: [Column<Pass>; 6] = [
+        ("device", |pass| pass.device.into()),
+        ("pass", |pass| pass.name.into()),
+        ("rays a frame", |pass| Value::number(pass.own.map(|(rays, _)| rays))),
+        ("ms", |pass| Value::number(pass.own.map(|(_, ms)| ms))),
+        ("Mray/s", |pass| Value::number(pass.own.map(|(rays, ms)| rays * 1e-3 / ms))),
+        ("over the first", |pass| Value::ratio(pass.own.zip(pass.first).map(|((_, own), (_, first))| first / own))),
+    ];
     let caption = "Medians over frames and repetitions of the wall time of a pass.";
-    Table { name: "executors".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows }
+    table("executors", caption, rows, &columns)
 }
 
 /// How the pictures of each device but the first differ from those of the first, a line each.
@@ -216,29 +226,21 @@ fn differences(sides: &[Side]) -> String {
 
 /// Writes the results; returns what to print.
 fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[String]) -> Result<String> {
-    let table = table(sides);
-    let devices: Vec<serde_json::Value> = sides
-        .iter()
-        .map(|side| {
-            let DeviceInfo { name, driver, driver_info, backend, .. } = &side.info;
-            let d = &side.differences;
-            json!({
-                "name": name,
-                "driver": driver,
-                "driver_info": driver_info,
-                "backend": backend,
-                "pixels_compared": d.pixels,
-                "other_ids": d.ids,
-                "depth_ulps": d.depth_ulps,
-                "radiance_rmse": d.radiance_rmse(),
-            })
-        })
-        .collect();
+    let table = passes(sides);
+    let device = |side: &Side| {
+        let d = &side.differences;
+        let mut json = store::device(&side.info);
+        json["pixels_compared"] = d.pixels.into();
+        json["other_ids"] = d.ids.into();
+        json["depth_ulps"] = d.depth_ulps.into();
+        json["radiance_rmse"] = d.radiance_rmse().into();
+        json
+    };
     let json = json!({
         "format": FORMAT,
         "version": env!("CARGO_PKG_VERSION"),
         "commit": env!("BRICKWALK_COMMIT"),
-        "devices": devices,
+        "devices": sides.iter().map(device).collect::<Vec<_>>(),
         "settings": {
             "triangles": settings.triangles[0],
             "size": settings.size.to_string(),
@@ -253,7 +255,7 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
         "left_out": notes,
         "table": table,
     });
-    atomic::write(&args.output.join("executors.json"), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
+    write_json(&args.output, "executors", &json)?;
     let mut text = format!(
         "# The same frames on every device\n\nCity of {} triangles, {}, cache {}, schedule {}, {} frames, {} repetitions.\n\n",
         human_count(settings.triangles[0]),

@@ -10,8 +10,9 @@
 //! mode draws rays otherwise than exact ones are, so it has a brute force of its own.
 
 use super::args::{Measurement, Way};
-use super::{Picture, Values, View};
+use super::{Picture, View};
 use crate::kernels::layout::NONE;
+use crate::lab::bench::store::Values;
 use crate::metrics::{Change, Image, PIXELS_PER_DEGREE, flicker, flip_ldr};
 use crate::scene::motion::{Motion, Movers};
 use crate::secondary::dvf::Dvf;

@@ -1,79 +1,36 @@
 //! What is measured.
 
 use super::args::Settings as Scale;
-use crate::lab::bench::plan::SceneId;
+use crate::lab::bench::scenes::SceneId;
 use crate::secondary::Method;
 use crate::secondary::roma::{self, Unsnapped};
 use crate::session::Settings;
-use crate::settings::{Effect, EffectList, Plain, Rule, Turn, Value};
+use crate::settings::{Effect, EffectList, Turn, names};
 use std::fmt;
 
-/// A part of the measurements that can be asked for alone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Times over resolutions and numbers of directions (the paper's table 2).
-    Speed,
-    /// Errors by scenes (its figure 5).
-    Ao,
-    /// Errors by resolutions and numbers of directions (its figure 9).
-    Resolution,
-    /// Errors by the length of rays: where the method fails.
-    Radius,
-    /// Snapped and unsnapped shadow rays (its figures 7 and 8).
-    Shadows,
-    /// One-bounce diffuse light of the sun by reflective shadow maps (its figure 6).
-    Diffuse,
-    /// A cache that holds 15 % of the scene.
-    OutOfCore,
-    /// Rays that maps and bricks answer together, out of core.
-    Handover,
-    /// Errors by the distance from where maps with larger cells take over.
-    Seams,
-    /// How often columns pass through single sheets, by how base maps are made and looked up (spec §2).
-    Leaks,
-}
-
-impl Stage {
-    /// All of them, in their order.
-    pub const ALL: [Self; 10] = [
-        Self::Speed,
-        Self::Ao,
-        Self::Resolution,
-        Self::Radius,
-        Self::Shadows,
-        Self::Diffuse,
-        Self::OutOfCore,
-        Self::Handover,
-        Self::Seams,
-        Self::Leaks,
-    ];
-
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Speed => "speed",
-            Self::Ao => "ao",
-            Self::Resolution => "resolution",
-            Self::Radius => "radius",
-            Self::Shadows => "shadows",
-            Self::Diffuse => "diffuse",
-            Self::OutOfCore => "out-of-core",
-            Self::Handover => "handover",
-            Self::Seams => "seams",
-            Self::Leaks => "leaks",
-        }
-    }
-}
-
-impl Value for Stage {
-    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
-        let names = Self::ALL.map(Self::name);
-        let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
-        found.ok_or_else(|| crate::settings::removed::unknown(text, &names, &[]))
-    }
-
-    fn plain(&self) -> Plain {
-        Plain::Text(self.name().into())
+names! {
+    /// A part of the measurements that can be asked for alone.
+    Stage {
+        /// Times over resolutions and numbers of directions (the paper's table 2).
+        Speed = "speed",
+        /// Errors by scenes (its figure 5).
+        Ao = "ao",
+        /// Errors by resolutions and numbers of directions (its figure 9).
+        Resolution = "resolution",
+        /// Errors by the length of rays: where the method fails.
+        Radius = "radius",
+        /// Snapped and unsnapped shadow rays (its figures 7 and 8).
+        Shadows = "shadows",
+        /// One-bounce diffuse light of the sun by reflective shadow maps (its figure 6).
+        Diffuse = "diffuse",
+        /// A cache that holds 15 % of the scene.
+        OutOfCore = "out-of-core",
+        /// Rays that maps and bricks answer together, out of core.
+        Handover = "handover",
+        /// Errors by the distance from where maps with larger cells take over.
+        Seams = "seams",
+        /// How often columns pass through single sheets, by how base maps are made and looked up (spec §2).
+        Leaks = "leaks",
     }
 }
 

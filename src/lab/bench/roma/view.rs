@@ -5,8 +5,8 @@ use super::plan::{Job, Way};
 use super::seams::Seams;
 use crate::counters::Record;
 use crate::frame::Renderer;
-use crate::lab::bench::plan::View as Path;
-use crate::lab::bench::scenes::Place;
+use crate::lab::bench::scenes::{Place, View as Path};
+use crate::lab::bench::store::Values;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::scene::{Camera, CameraPath};
 use crate::schedule::cache::Cache;
@@ -19,7 +19,6 @@ use crate::session::renderer::{methods, render_settings, renderer};
 use crate::settings::{Adapter, CacheSize, Schedule};
 use crate::stream::Residency;
 use anyhow::{Context, Result, bail};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A scene, a light, a cache and a camera.
@@ -39,7 +38,7 @@ pub struct Picture {
     /// Distances along the rays through the middles of pixels, world units; of jobs that ask for them.
     depth: Vec<f32>,
     /// Of the pass, by name.
-    pub values: BTreeMap<String, f64>,
+    pub values: Values,
 }
 
 impl<'a> View<'a> {

@@ -1,13 +1,13 @@
 //! Walks of the bench: one renderer a scene, cache and tile, in which the cases take turns.
 
-use super::args::Settings;
 use super::cells::{Passes, PictureError};
 use super::paper::THRESHOLDS;
-use super::plan::{self, Case, PLAIN, PLAIN_BVH2, Variant};
-use super::scenes::Place;
+use super::plan::{Case, PLAIN, PLAIN_BVH2, Variant};
 use crate::counters::Counters;
 use crate::counters::Record;
 use crate::frame::{Engine, Renderer};
+use crate::lab::bench::args::Settings;
+use crate::lab::bench::scenes::Place;
 use crate::lab::console::Console;
 use crate::output::srgb;
 use crate::scene::path::CameraPath;
@@ -18,7 +18,7 @@ use crate::schedule::fronts::Fronts;
 use crate::session::Settings as WalkSettings;
 use crate::session::opened::{Opened, open_scene, scaled_threshold};
 use crate::session::renderer::{render_settings, renderer};
-use crate::settings::{Adapter, CacheSize, Effect, EffectList, Turn};
+use crate::settings::{Adapter, CacheSize, EffectList, Turn};
 use crate::stream::{Item, Residency};
 use anyhow::{Context, Result, bail};
 
@@ -53,7 +53,7 @@ const FIELDS: [&str; 17] = [
 pub struct Bench<'a> {
     renderer: Renderer,
     settings: &'a Settings,
-    place: &'a Place,
+    place: Place,
     adapter: &'a Adapter,
     /// Whether the binary trees could be made; else why not.
     binary: Result<(), String>,
@@ -71,7 +71,7 @@ impl<'a> Bench<'a> {
     /// [`DoesNotFit`]: the device does not hold the cache. Else the scene's, and the device's.
     pub fn open(
         case: &Case,
-        place: &'a Place,
+        place: Place,
         settings: &'a Settings,
         adapter: &'a Adapter,
         wants_binary: bool,
@@ -157,7 +157,7 @@ impl<'a> Bench<'a> {
                 return Ok(None);
             }
             for record in self.frame(&path, frame)?.records {
-                if case.passes().iter().any(|effect| effect.name() == record.pass) {
+                if case.effects.iter().any(|effect| effect.name() == record.pass) {
                     note(&mut passes, &record)?;
                 }
             }
@@ -236,11 +236,8 @@ fn of_device(error: &anyhow::Error) -> bool {
 /// The settings of a walk.
 fn of_case(case: &Case, settings: &Settings, adapter: &Adapter) -> WalkSettings {
     let Variant { schedule, threshold, rotation, without, needed, fronts } = case.variant;
-    let has = |effect: plan::Effect| case.effects.contains(&effect);
-    let effects = [(plan::Effect::Ao, Effect::Ao), (plan::Effect::Diffuse, Effect::Diffuse)];
-    let effects: Vec<Effect> = effects.into_iter().filter(|(own, _)| has(*own)).map(|(_, effect)| effect).collect();
     WalkSettings {
-        effects: EffectList::of(&effects),
+        effects: EffectList::of(case.effects),
         schedule,
         cache: CacheSize::Percent(case.cache.into()),
         tile: case.tile,

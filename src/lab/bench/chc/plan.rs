@@ -1,0 +1,264 @@
+//! The experiments of Mattausch et al. 2015, §7, as cases to be measured.
+
+use super::paper;
+use crate::lab::bench::scenes::{SceneId, View};
+use crate::schedule::Optimisation;
+use crate::settings::{Effect, Schedule, names};
+use std::fmt;
+
+names! {
+    /// A part of the measurements that can be asked for alone.
+    Stage {
+        /// Times in core, against both baselines.
+        Table2 = "table2",
+        /// Times and traffic out of core.
+        Table3 = "table3",
+        /// Aggressive culling.
+        Table4 = "table4",
+        /// Random turns.
+        Table5 = "table5",
+        /// Tile sizes.
+        Figure5 = "figure5",
+        /// Bytes moved against bytes needed.
+        Targets = "targets",
+        /// The large city, all of it resident.
+        Scale = "scale",
+    }
+}
+
+/// How rays are traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// The schedule.
+    pub schedule: Schedule,
+    /// Temporal fronts: Algorithm 1 of the paper.
+    pub fronts: bool,
+    /// The query threshold, pixels.
+    pub threshold: u32,
+    /// Greatest turn of directions, degrees.
+    pub rotation: u32,
+    /// Optimisations that are left out.
+    pub without: &'static [Optimisation],
+    /// Whether needs are measured, which costs time.
+    pub needed: bool,
+}
+
+impl Variant {
+    const fn of(schedule: Schedule) -> Self {
+        Self { schedule, fronts: false, threshold: 0, rotation: 36, without: &[], needed: false }
+    }
+}
+
+/// Every ray from the root, over wide trees.
+pub const PLAIN: Variant = Variant::of(Schedule::Plain);
+/// Every ray from the root, over binary trees: the paper's kind of baseline.
+pub const PLAIN_BVH2: Variant = Variant::of(Schedule::PlainBinary);
+/// Lists and queries of every frame anew.
+pub const CHC: Variant = Variant::of(Schedule::Chc);
+/// Algorithm 1 of the paper.
+pub const FRONTS: Variant = Variant { fronts: true, ..CHC };
+/// Ray by ray over what is resident.
+pub const DEMAND: Variant = Variant::of(Schedule::Demand);
+/// The cheapest by measurement.
+pub const AUTO: Variant = Variant::of(Schedule::Auto);
+/// What is compared in core.
+pub const IN_CORE: [Variant; 6] = [PLAIN, PLAIN_BVH2, CHC, FRONTS, DEMAND, AUTO];
+/// What is compared out of core.
+pub const OUT_OF_CORE: [Variant; 4] = [CHC, FRONTS, DEMAND, AUTO];
+/// Optimisations of loading that are left out, each and both.
+pub const WITHOUT: [&[Optimisation]; 3] =
+    [&[Optimisation::Requery], &[Optimisation::NearestFirst], &[Optimisation::Requery, Optimisation::NearestFirst]];
+
+impl fmt::Display for Variant {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.schedule.name())?;
+        if self.fronts {
+            f.write_str("+fronts")?;
+        }
+        if !self.without.is_empty() {
+            let names: Vec<&str> = self.without.iter().map(|which| which.name()).collect();
+            write!(f, " without {}", names.join(","))?;
+        }
+        Ok(())
+    }
+}
+
+/// What a walk is of, but for its repetition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// The stage.
+    pub stage: Stage,
+    /// The scene.
+    pub scene: SceneId,
+    /// Cache in percent of the scene's bricks.
+    pub cache: u32,
+    /// Edge of a tile in pixels.
+    pub tile: u32,
+    /// The path.
+    pub view: View,
+    /// What is traced beside camera rays; these passes are measured.
+    pub effects: &'static [Effect],
+    /// How.
+    pub variant: Variant,
+}
+
+/// What one renderer serves: a scene, a cache and a size of tiles.
+pub type Session = (SceneId, u32, u32);
+
+impl Case {
+    /// The session that it belongs to.
+    pub fn session(&self) -> Session {
+        (self.scene, self.cache, self.tile)
+    }
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { stage, scene, cache, tile, view, effects, variant } = self;
+        let effects: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+        let Variant { threshold, rotation, .. } = variant;
+        write!(f, "{stage}/{scene}/{cache}%/tile {tile}/{view}/{}/{variant}", effects.join(","))?;
+        write!(f, "/threshold {threshold}/turn {rotation}")
+    }
+}
+
+/// A walk.
+#[derive(Clone, Copy, Debug)]
+pub struct Walk {
+    /// What it is of.
+    pub case: Case,
+    /// Which of the case, from 0.
+    pub repetition: u32,
+}
+
+impl Walk {
+    /// What it is told from others by.
+    pub fn key(&self) -> String {
+        key(&self.case.to_string(), self.repetition)
+    }
+}
+
+/// What a walk of `case` is told from others by.
+pub fn key(case: &str, repetition: u32) -> String {
+    format!("{case}/{repetition}")
+}
+
+/// What the plan depends on.
+#[derive(Clone, Debug)]
+pub struct Scope {
+    /// Whether there is a Sponza.
+    pub sponza: bool,
+    /// Edge of a tile in pixels.
+    pub tile: u32,
+    /// Repetitions of what is timed.
+    pub repeat: u32,
+}
+
+/// The share of bricks that the paper's cache holds of a scene, percent (table 1).
+pub fn paper_cache(scene: SceneId) -> u32 {
+    match scene {
+        SceneId::CityLarge => 47,
+        SceneId::Pipes16 => 32,
+        SceneId::City | SceneId::Pipes | SceneId::Sponza => 100,
+    }
+}
+
+/// Sizes of tiles of figure 5, pixels.
+const TILES: [u32; 5] = [16, 32, 64, 128, 256];
+
+/// Share of the bricks that the cache holds where bytes moved are measured against bytes needed, percent.
+pub fn target_cache(scene: SceneId) -> u32 {
+    if scene == SceneId::CityLarge { 25 } else { 20 }
+}
+
+/// What is traced in core, all in one walk.
+pub const EFFECTS: &[Effect] = &[Effect::Primary, Effect::Ao, Effect::Diffuse];
+const PRIMARY: &[Effect] = &[Effect::Primary];
+const DIFFUSE: &[Effect] = &[Effect::Diffuse];
+/// What is traced of random turns.
+pub const SECONDARY: &[Effect] = &[Effect::Ao, Effect::Diffuse];
+const IN: [SceneId; 2] = [SceneId::City, SceneId::Pipes];
+const OUT: [SceneId; 2] = [SceneId::CityLarge, SceneId::Pipes16];
+
+/// [`EFFECTS`], each in a walk of its own: rays of one would load, or evict, what those of another need.
+pub fn apart() -> impl Iterator<Item = &'static [Effect]> {
+    EFFECTS.chunks(1)
+}
+
+/// All walks of these stages, those of one session after each other.
+pub fn walks(stages: &[Stage], scope: &Scope) -> Vec<Walk> {
+    let mut all = Vec::new();
+    for &stage in stages {
+        // Counts are the same in every walk.
+        let repetitions = if stage == Stage::Targets { 1 } else { scope.repeat };
+        for group in groups(stage, scope) {
+            let turn = |repetition| group.iter().map(move |&case| Walk { case, repetition });
+            all.extend((0..repetitions).flat_map(turn));
+        }
+    }
+    let mut order: Vec<Session> = Vec::new();
+    for walk in &all {
+        if !order.contains(&walk.case.session()) {
+            order.push(walk.case.session());
+        }
+    }
+    all.sort_by_key(|walk| order.iter().position(|session| *session == walk.case.session()));
+    all
+}
+
+/// Cases of one session that are compared with each other: their walks are interleaved.
+type Group = Vec<Case>;
+
+fn groups(stage: Stage, scope: &Scope) -> Vec<Group> {
+    let of_view = |scene, cache, view, effects, variants: &[Variant]| -> Group {
+        let case = |&variant: &Variant| Case { stage, scene, cache, tile: scope.tile, view, effects, variant };
+        variants.iter().map(case).collect()
+    };
+    let of_views = |scene, cache, effects, variants: &[Variant]| -> Vec<Group> {
+        // Sponza has no far path.
+        let views = if scene == SceneId::Sponza { &View::ALL[..1] } else { View::ALL };
+        views.iter().map(|&view| of_view(scene, cache, view, effects, variants)).collect()
+    };
+    let rotations = paper::ROTATIONS.map(|rotation| Variant { rotation, ..CHC });
+    let needed = Variant { needed: true, ..CHC };
+    match stage {
+        Stage::Table2 => {
+            let scenes = IN.into_iter().chain(scope.sponza.then_some(SceneId::Sponza));
+            scenes.flat_map(|scene| of_views(scene, 100, EFFECTS, &IN_CORE)).collect()
+        }
+        Stage::Table3 => OUT
+            .iter()
+            .flat_map(|&scene| View::ALL.iter().map(move |&view| (scene, view)))
+            .flat_map(|(scene, view)| apart().map(move |effects| (scene, view, effects)))
+            .map(|(scene, view, effects)| of_view(scene, paper_cache(scene), view, effects, &OUT_OF_CORE))
+            .collect(),
+        Stage::Table4 => {
+            let variants = paper::THRESHOLDS.map(|threshold| Variant { threshold, ..CHC });
+            OUT.iter().flat_map(|&scene| of_views(scene, paper_cache(scene), DIFFUSE, &variants)).collect()
+        }
+        Stage::Table5 => {
+            let all = [rotations, rotations.map(|variant| Variant { fronts: true, ..variant })].concat();
+            IN.map(|scene| of_view(scene, 100, View::Near, SECONDARY, &all)).to_vec()
+        }
+        Stage::Figure5 => {
+            let of_tile = |tile| {
+                of_views(SceneId::City, 100, PRIMARY, &[CHC])
+                    .concat()
+                    .into_iter()
+                    .map(move |case| vec![Case { tile, ..case }])
+            };
+            TILES.into_iter().flat_map(of_tile).collect()
+        }
+        Stage::Targets => {
+            let without = WITHOUT.map(|without| Variant { without, ..needed });
+            let of = |scene, effects, variants: &[Variant]| {
+                of_view(scene, target_cache(scene), View::Near, effects, variants)
+            };
+            let all = [&[needed], &without[..]].concat();
+            let of_effects = |(scene, effects)| of(scene, effects, if effects == PRIMARY { &all } else { &all[..1] });
+            let each = IN.into_iter().flat_map(|scene| apart().map(move |effects| (scene, effects)));
+            each.map(of_effects).chain([of(SceneId::CityLarge, PRIMARY, &[needed])]).collect()
+        }
+        Stage::Scale => vec![of_view(SceneId::CityLarge, 100, View::Near, EFFECTS, &[PLAIN, CHC, FRONTS])],
+    }
+}
