@@ -5,16 +5,14 @@
 
 use super::args::{ExecutorsArgs, Settings};
 use super::results::{Column, table, write_json};
-use super::scenes::{SceneId, Scenes, View};
-use super::store;
+use super::scenes::{self, SceneId, Scenes, View};
+use super::store::device;
 use crate::frame::{Pixels, Renderer};
 use crate::gpu::device::candidates;
 use crate::kernels::DeviceInfo;
 use crate::lab::console::Console;
 use crate::output::atomic;
 use crate::session::Settings as WalkSettings;
-use crate::session::opened::{Opened, open_scene};
-use crate::session::renderer::renderer;
 use crate::settings::Adapter;
 use crate::settings::sizes::human_count;
 use anyhow::{Context, Result, bail};
@@ -162,8 +160,7 @@ fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapt
         adapter: adapter.clone(),
         ..WalkSettings::default()
     };
-    let opened = Opened::open(open_scene(scene)?, scene, &own)?;
-    let renderer = renderer(opened, scene, &own)?;
+    let renderer = scenes::open(scene, &own)?;
     let info = renderer.executor.device();
     Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
 }
@@ -174,35 +171,23 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// A pass on a device.
-struct Pass<'a> {
-    device: &'a str,
-    name: &'static str,
-    /// Median rays of a frame, and milliseconds.
-    own: Option<(f64, f64)>,
-    /// Of the first device.
-    first: Option<(f64, f64)>,
-}
-
 /// The table of all devices and passes.
-fn passes(sides: &[Side]) -> Table {
-    let mut rows = Vec::new();
-    for side in sides {
-        for &(name, _) in &side.passes {
-            let first = sides[0].medians(name);
-            rows.push(Pass { device: &side.info.name, name, own: side.medians(name), first });
-        }
-    }
+fn passes<'s>(sides: &'s [Side]) -> Table {
+    /// A device, the first one, and the name of a pass.
+    type Pass<'a> = (&'a Side, &'a Side, &'static str);
     let columns: [Column<Pass>; 6] = [
-        ("device", |pass| pass.device.into()),
-        ("pass", |pass| pass.name.into()),
-        ("rays a frame", |pass| Value::number(pass.own.map(|(rays, _)| rays))),
-        ("ms", |pass| Value::number(pass.own.map(|(_, ms)| ms))),
-        ("Mray/s", |pass| Value::number(pass.own.map(|(rays, ms)| rays * 1e-3 / ms))),
-        ("over the first", |pass| Value::ratio(pass.own.zip(pass.first).map(|((_, own), (_, first))| first / own))),
+        ("device", |(side, ..)| side.info.name.clone().into()),
+        ("pass", |(.., name)| (*name).into()),
+        ("rays a frame", |(side, _, name)| Value::number(side.medians(name).map(|(rays, _)| rays))),
+        ("ms", |(side, _, name)| Value::number(side.medians(name).map(|(_, ms)| ms))),
+        ("Mray/s", |(side, _, name)| Value::number(side.medians(name).map(|(rays, ms)| rays * 1e-3 / ms))),
+        ("over the first", |(side, first, name)| {
+            Value::ratio(side.medians(name).zip(first.medians(name)).map(|((_, own), (_, first))| first / own))
+        }),
     ];
+    let of_side = |side: &'s Side| side.passes.iter().map(move |(name, _)| (side, &sides[0], *name));
     let caption = "Medians over frames and repetitions of the wall time of a pass.";
-    table("executors", caption, rows, &columns)
+    table("executors", caption, sides.iter().flat_map(of_side), &columns)
 }
 
 /// How the pictures of each device but the first differ from those of the first, a line each.
@@ -227,9 +212,9 @@ fn differences(sides: &[Side]) -> String {
 /// Writes the results; returns what to print.
 fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[String]) -> Result<String> {
     let table = passes(sides);
-    let device = |side: &Side| {
+    let of_side = |side: &Side| {
         let d = &side.differences;
-        let mut json = store::device(&side.info);
+        let mut json = device(&side.info);
         json["pixels_compared"] = d.pixels.into();
         json["other_ids"] = d.ids.into();
         json["depth_ulps"] = d.depth_ulps.into();
@@ -240,7 +225,7 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
         "format": FORMAT,
         "version": env!("CARGO_PKG_VERSION"),
         "commit": env!("BRICKWALK_COMMIT"),
-        "devices": sides.iter().map(device).collect::<Vec<_>>(),
+        "devices": sides.iter().map(of_side).collect::<Vec<_>>(),
         "settings": {
             "triangles": settings.triangles[0],
             "size": settings.size.to_string(),

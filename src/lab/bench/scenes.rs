@@ -1,10 +1,15 @@
 //! The scenes of the benches: generated where they are missing.
 
+use crate::frame::Renderer;
 use crate::lab::console::Console;
 use crate::output::atomic;
 use crate::scene::path::{CameraPath, path_from_bounds};
-use crate::session::opened::open_scene;
+use crate::schedule::cache::Cache;
+use crate::session::Settings;
+use crate::session::opened::{Opened, open_scene};
+use crate::session::renderer::renderer;
 use crate::settings::names;
+use crate::stream::Residency;
 use anyhow::{Context, Result};
 use brickwalk_convert::build::{BuildSettings, build_source};
 use brickwalk_scenes::{Kind, Settings as Generated, generate, write_motion, write_paths};
@@ -119,6 +124,26 @@ impl<'a> Scenes<'a> {
         }
         Ok(Place { scene: file, otherwise: None })
     }
+}
+
+/// Opens a scene file to be rendered.
+///
+/// # Errors
+/// The scene's, the device's.
+pub fn open(scene: &Path, settings: &Settings) -> Result<Renderer> {
+    renderer(Opened::open(open_scene(scene)?, scene, settings)?, scene, settings)
+}
+
+/// Empties the cache of a renderer.
+///
+/// # Errors
+/// None that the first one did not have.
+pub fn empty_cache(renderer: &mut Renderer) -> Result<()> {
+    let page_bytes = renderer.executor.page_bytes();
+    let Cache { bytes, residency: old, .. } = &renderer.cache;
+    let residency = Residency::new(&bytes.sizes(), old.budget_bytes(), page_bytes, old.policy())?;
+    renderer.cache = Cache::new(residency, bytes.clone(), None);
+    Ok(())
 }
 
 /// Generates a scene with bricks of at most so many triangles, its paths and its motion beside it.

@@ -7,19 +7,18 @@ use crate::counters::Counters;
 use crate::counters::Record;
 use crate::frame::{Engine, Renderer};
 use crate::lab::bench::args::Settings;
-use crate::lab::bench::scenes::Place;
+use crate::lab::bench::scenes::{self, Place, empty_cache};
 use crate::lab::console::Console;
 use crate::output::srgb;
 use crate::scene::path::CameraPath;
 use crate::schedule::ExecutorError;
 use crate::schedule::auto::Auto;
-use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
 use crate::session::Settings as WalkSettings;
-use crate::session::opened::{Opened, open_scene, scaled_threshold};
-use crate::session::renderer::{render_settings, renderer};
+use crate::session::opened::scaled_threshold;
+use crate::session::renderer::render_settings;
 use crate::settings::{Adapter, CacheSize, EffectList, Turn};
-use crate::stream::{Item, Residency};
+use crate::stream::Item;
 use anyhow::{Context, Result, bail};
 
 /// Frames of the walk that a path is made for: the camera moves as fast in a shorter one, which ends earlier.
@@ -77,9 +76,7 @@ impl<'a> Bench<'a> {
         wants_binary: bool,
     ) -> Result<Self> {
         let open = |variant: Variant| -> Result<Renderer> {
-            let own = of_case(&Case { variant, ..*case }, settings, adapter);
-            let opened = Opened::open(open_scene(&place.scene)?, &place.scene, &own)?;
-            let mut renderer = renderer(opened, &place.scene, &own)?;
+            let mut renderer = scenes::open(&place.scene, &of_case(&Case { variant, ..*case }, settings, adapter))?;
             renderer.executor.allow_bounces();
             Ok(renderer)
         };
@@ -130,11 +127,7 @@ impl<'a> Bench<'a> {
         renderer.auto = Auto::default();
         renderer.executor.tuning().threshold = scaled_threshold(case.variant.threshold, case.tile);
         if case.cache < 100 {
-            let old = &renderer.cache;
-            let sizes = old.bytes.sizes();
-            let page_bytes = renderer.executor.page_bytes();
-            let residency = Residency::new(&sizes, old.residency.budget_bytes(), page_bytes, old.residency.policy())?;
-            renderer.cache = Cache::new(residency, old.bytes.clone(), None);
+            empty_cache(renderer)?;
         }
         Ok(())
     }

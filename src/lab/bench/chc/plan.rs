@@ -177,8 +177,6 @@ const PRIMARY: &[Effect] = &[Effect::Primary];
 const DIFFUSE: &[Effect] = &[Effect::Diffuse];
 /// What is traced of random turns.
 pub const SECONDARY: &[Effect] = &[Effect::Ao, Effect::Diffuse];
-const IN: [SceneId; 2] = [SceneId::City, SceneId::Pipes];
-const OUT: [SceneId; 2] = [SceneId::CityLarge, SceneId::Pipes16];
 
 /// [`EFFECTS`], each in a walk of its own: rays of one would load, or evict, what those of another need.
 pub fn apart() -> impl Iterator<Item = &'static [Effect]> {
@@ -210,55 +208,54 @@ pub fn walks(stages: &[Stage], scope: &Scope) -> Vec<Walk> {
 type Group = Vec<Case>;
 
 fn groups(stage: Stage, scope: &Scope) -> Vec<Group> {
-    let of_view = |scene, cache, view, effects, variants: &[Variant]| -> Group {
-        let case = |&variant: &Variant| Case { stage, scene, cache, tile: scope.tile, view, effects, variant };
+    let tile = scope.tile;
+    let group = |scene, cache, view, effects, variants: &[Variant]| -> Group {
+        let case = |&variant: &Variant| Case { stage, scene, cache, tile, view, effects, variant };
         variants.iter().map(case).collect()
     };
-    let of_views = |scene, cache, effects, variants: &[Variant]| -> Vec<Group> {
-        // Sponza has no far path.
-        let views = if scene == SceneId::Sponza { &View::ALL[..1] } else { View::ALL };
-        views.iter().map(|&view| of_view(scene, cache, view, effects, variants)).collect()
-    };
-    let rotations = paper::ROTATIONS.map(|rotation| Variant { rotation, ..CHC });
+    let (city, plant, large) = (SceneId::City, SceneId::Pipes, SceneId::CityLarge);
     let needed = Variant { needed: true, ..CHC };
+    let mut all = Vec::new();
     match stage {
         Stage::Table2 => {
-            let scenes = IN.into_iter().chain(scope.sponza.then_some(SceneId::Sponza));
-            scenes.flat_map(|scene| of_views(scene, 100, EFFECTS, &IN_CORE)).collect()
+            for scene in [city, plant] {
+                all.extend(View::ALL.iter().map(|&view| group(scene, 100, view, EFFECTS, &IN_CORE)));
+            }
+            all.extend(scope.sponza.then(|| group(SceneId::Sponza, 100, View::Near, EFFECTS, &IN_CORE)));
         }
-        Stage::Table3 => OUT
-            .iter()
-            .flat_map(|&scene| View::ALL.iter().map(move |&view| (scene, view)))
-            .flat_map(|(scene, view)| apart().map(move |effects| (scene, view, effects)))
-            .map(|(scene, view, effects)| of_view(scene, paper_cache(scene), view, effects, &OUT_OF_CORE))
-            .collect(),
-        Stage::Table4 => {
+        Stage::Table3 | Stage::Table4 => {
             let variants = paper::THRESHOLDS.map(|threshold| Variant { threshold, ..CHC });
-            OUT.iter().flat_map(|&scene| of_views(scene, paper_cache(scene), DIFFUSE, &variants)).collect()
+            for scene in [large, SceneId::Pipes16] {
+                let cache = paper_cache(scene);
+                for &view in View::ALL {
+                    if stage == Stage::Table3 {
+                        all.extend(apart().map(|effects| group(scene, cache, view, effects, &OUT_OF_CORE)));
+                    } else {
+                        all.push(group(scene, cache, view, DIFFUSE, &variants));
+                    }
+                }
+            }
         }
         Stage::Table5 => {
-            let all = [rotations, rotations.map(|variant| Variant { fronts: true, ..variant })].concat();
-            IN.map(|scene| of_view(scene, 100, View::Near, SECONDARY, &all)).to_vec()
+            let variants = paper::ROTATIONS.map(|rotation| Variant { rotation, ..CHC });
+            let variants = [variants, variants.map(|variant| Variant { fronts: true, ..variant })].concat();
+            all.extend([city, plant].map(|scene| group(scene, 100, View::Near, SECONDARY, &variants)));
         }
         Stage::Figure5 => {
-            let of_tile = |tile| {
-                of_views(SceneId::City, 100, PRIMARY, &[CHC])
-                    .concat()
-                    .into_iter()
-                    .map(move |case| vec![Case { tile, ..case }])
-            };
-            TILES.into_iter().flat_map(of_tile).collect()
+            for tile in TILES {
+                let case = |&view| Case { tile, ..group(city, 100, view, PRIMARY, &[CHC])[0] };
+                all.extend(View::ALL.iter().map(|view| vec![case(view)]));
+            }
         }
         Stage::Targets => {
-            let without = WITHOUT.map(|without| Variant { without, ..needed });
-            let of = |scene, effects, variants: &[Variant]| {
-                of_view(scene, target_cache(scene), View::Near, effects, variants)
-            };
-            let all = [&[needed], &without[..]].concat();
-            let of_effects = |(scene, effects)| of(scene, effects, if effects == PRIMARY { &all } else { &all[..1] });
-            let each = IN.into_iter().flat_map(|scene| apart().map(move |effects| (scene, effects)));
-            each.map(of_effects).chain([of(SceneId::CityLarge, PRIMARY, &[needed])]).collect()
+            let variants = [&[needed][..], &WITHOUT.map(|without| Variant { without, ..needed })].concat();
+            for scene in [city, plant] {
+                let of = |effects| if effects == PRIMARY { &variants[..] } else { &variants[..1] };
+                all.extend(apart().map(|own| group(scene, target_cache(scene), View::Near, own, of(own))));
+            }
+            all.push(group(large, target_cache(large), View::Near, PRIMARY, &[needed]));
         }
-        Stage::Scale => vec![of_view(SceneId::CityLarge, 100, View::Near, EFFECTS, &[PLAIN, CHC, FRONTS])],
+        Stage::Scale => all.push(group(large, 100, View::Near, EFFECTS, &[PLAIN, CHC, FRONTS])),
     }
+    all
 }

@@ -22,8 +22,7 @@ use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::secondary::dvf::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Region};
 use crate::secondary::dvf::{Options, RegionKind, prepare};
 use crate::session::Settings;
-use crate::session::opened::{Opened, open_scene};
-use crate::session::renderer::renderer;
+use crate::session::opened::open_scene;
 use crate::settings::{CacheSize, Effect, EffectList, Environment};
 use anyhow::{Context, Result};
 use args::{DvfBenchArgs, Measurement, Stage};
@@ -182,8 +181,7 @@ impl<'a> View<'a> {
             adapter: args.adapter.clone(),
             ..Settings::default()
         };
-        let opened = Opened::open(open_scene(&place.scene)?, &place.scene, &settings)?;
-        let renderer = renderer(opened, &place.scene, &settings)?;
+        let renderer = scenes::open(&place.scene, &settings)?;
         let image = Image { width: 0, height: 0, rgb: Vec::new() };
         let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, renewal: [0.0; 2], ms: 0.0 };
         let mut view = Self { place, args, console, renderer, exact: nothing, truth: [None, None] };

@@ -58,9 +58,9 @@ const PAPER_MAKING: [PaperMaking; 3] = [
 /// The folder cannot be written.
 pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) -> Result<String> {
     let lines = |stage: Stage| {
-        let of_scene = move |scene| args.names(stage).into_iter().map(move |options| (scene, options));
-        let all = scenes.iter().flat_map(move |&scene| of_scene(scene));
-        all.map(move |(scene, options)| Line::new(rows, scene, stage, options)).filter(|line| rows.has(&line.key))
+        let line = move |scene, options: String| Line { scene, stage, key: key(scene, stage, &options), options, rows };
+        let of_scene = move |&scene| args.names(stage).into_iter().map(move |options| line(scene, options));
+        scenes.iter().flat_map(of_scene).filter(|line| rows.has(&line.key))
     };
     let mut sections = Vec::new();
     for &stage in Stage::ALL {
@@ -98,11 +98,7 @@ struct Line<'a> {
     rows: &'a Rows,
 }
 
-impl<'a> Line<'a> {
-    fn new(rows: &'a Rows, scene: &'a str, stage: Stage, options: String) -> Self {
-        Self { scene, stage, key: key(scene, stage, &options), options, rows }
-    }
-
+impl Line<'_> {
     fn value(&self, name: &str) -> Option<f64> {
         self.rows.value(&self.key, name)
     }

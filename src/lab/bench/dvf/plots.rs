@@ -22,58 +22,47 @@ struct Plot {
     unit: Unit,
 }
 
-/// How to read errors.
-const HUNDREDTHS: &str = "Hundredths of FLIP.";
+/// A plot of errors.
+const fn errors(
+    stage: Stage,
+    title: &'static str,
+    across: (&'static str, &'static str),
+    reading: &'static str,
+) -> Plot {
+    Plot { stage, title, reading, across, value: ("flip", 100.0), unit: Unit::Percent }
+}
+
+const CELLS: (&str, &str) = ("--dvf-cells", "cells");
 
 /// Plots whose horizontal axis is an option.
 const PLOTS: [Plot; 6] = [
+    errors(
+        Stage::Points,
+        "Error over points",
+        ("--dvf-points", "points"),
+        "Hundredths of FLIP. Points are those asked for.",
+    ),
+    errors(Stage::Grid, "Error over cells along the longest side", CELLS, "Hundredths of FLIP."),
     Plot {
-        stage: Stage::Points,
-        title: "Error over points",
-        reading: "Hundredths of FLIP. Points are those asked for.",
-        across: ("--dvf-points", "points"),
-        value: ("flip", 100.0),
-        unit: Unit::Percent,
-    },
-    Plot {
-        stage: Stage::Grid,
-        title: "Error over cells along the longest side",
-        reading: HUNDREDTHS,
-        across: ("--dvf-cells", "cells"),
-        value: ("flip", 100.0),
-        unit: Unit::Percent,
-    },
-    Plot {
-        stage: Stage::Grid,
-        title: "Fewer rays over cells along the longest side",
-        reading: "Rays without a field over rays traced with it, and the ratio of their times, in the next plot.",
-        across: ("--dvf-cells", "cells"),
         value: ("fewer", 1.0),
         unit: Unit::Count,
+        ..errors(
+            Stage::Grid,
+            "Fewer rays over cells along the longest side",
+            CELLS,
+            "Rays without a field over rays traced with it, and the ratio of their times, in the next plot.",
+        )
     },
     Plot {
-        stage: Stage::Grid,
-        title: "Faster over cells along the longest side",
-        reading: "",
-        across: ("--dvf-cells", "cells"),
         value: ("faster", 1.0),
         unit: Unit::Count,
+        ..errors(Stage::Grid, "Faster over cells along the longest side", CELLS, "")
     },
+    errors(Stage::Rays, "Error over rays of a point", ("--dvf-rays", "rays"), "Hundredths of FLIP."),
     Plot {
-        stage: Stage::Rays,
-        title: "Error over rays of a point",
-        reading: HUNDREDTHS,
-        across: ("--dvf-rays", "rays"),
-        value: ("flip", 100.0),
-        unit: Unit::Percent,
-    },
-    Plot {
-        stage: Stage::Lanes,
-        title: "Time of making a field over lanes",
-        reading: "",
-        across: ("--dvf-lanes", "lanes"),
         value: ("seconds", 1e3),
         unit: Unit::Milliseconds,
+        ..errors(Stage::Lanes, "Time of making a field over lanes", ("--dvf-lanes", "lanes"), "")
     },
 ];
 

@@ -129,24 +129,16 @@ impl Measurement<'_> {
     }
 }
 
-/// A part of the time of answering rays.
-#[derive(Clone, Copy)]
-enum Part {
-    Generation,
-    Tracing,
-    Both,
-}
+/// A part of the times of generation and tracing.
+type Part = fn([f64; 2]) -> f64;
+
+const GENERATION: Part = |[generation, _]| generation;
+const TRACING: Part = |[_, tracing]| tracing;
+const BOTH: Part = |[generation, tracing]| generation + tracing;
 
 /// How much longer than `way` the distance field of as many cells takes; `times` are those of generation and tracing.
 fn field_over(way: Way, part: Part, times: impl Fn(Way) -> Option<[f64; 2]>) -> Value {
-    let time = |way: Way| {
-        times(way).map(|[generation, tracing]| match part {
-            Part::Generation => generation,
-            Part::Tracing => tracing,
-            Part::Both => generation + tracing,
-        })
-    };
-    Value::ratio(way.field().and_then(|field| ratio(time(field), time(way))))
+    Value::ratio(way.field().and_then(|field| ratio(times(field).map(part), times(way).map(part))))
 }
 
 /// What the paper's table 2 has of a way, ms: generation and tracing.
@@ -171,14 +163,14 @@ fn speed<'a>() -> [Column<Measurement<'a>>; 14] {
         ("tracing, ms", |line| Value::number(line.value("ms_trace"))),
         ("ns a ray", |line| Value::number(line.per_ray())),
         ("exact ÷ tracing", |line| Value::ratio(line.exact_over())),
-        ("df ÷ generation", |line| line.field_over(Part::Generation)),
-        ("df ÷ tracing", |line| line.field_over(Part::Tracing)),
-        ("df ÷ both", |line| line.field_over(Part::Both)),
+        ("df ÷ generation", |line| line.field_over(GENERATION)),
+        ("df ÷ tracing", |line| line.field_over(TRACING)),
+        ("df ÷ both", |line| line.field_over(BOTH)),
         ("generation, paper", |line| Value::number(paper(line.way).map(|ms| ms[0]))),
         ("tracing, paper", |line| Value::number(paper(line.way).map(|ms| ms[1]))),
-        ("df ÷ generation, paper", |line| field_over(line.way, Part::Generation, paper)),
-        ("df ÷ tracing, paper", |line| field_over(line.way, Part::Tracing, paper)),
-        ("df ÷ both, paper", |line| field_over(line.way, Part::Both, paper)),
+        ("df ÷ generation, paper", |line| field_over(line.way, GENERATION, paper)),
+        ("df ÷ tracing, paper", |line| field_over(line.way, TRACING, paper)),
+        ("df ÷ both, paper", |line| field_over(line.way, BOTH, paper)),
     ]
 }
 
@@ -224,8 +216,8 @@ fn errors<'a>(stage: Stage) -> Vec<Column<Measurement<'a>>> {
         ],
         Stage::Shadows => &[
             ("generation, ms", |line| line.own("ms_generation")),
-            ("df ÷ generation", |line| line.field_over(Part::Generation)),
-            ("df ÷ tracing", |line| line.field_over(Part::Tracing)),
+            ("df ÷ generation", |line| line.field_over(GENERATION)),
+            ("df ÷ tracing", |line| line.field_over(TRACING)),
             ("df ÷ generation, paper", |line| of_paper(line, 0)),
             ("df ÷ tracing, paper", |line| of_paper(line, 1)),
         ],
@@ -273,24 +265,20 @@ fn leaks_table(rows: &Rows) -> Table {
         [[Some(0.0), None, None], [Some(8.4), Some(1.1), None], [None; 3]],
     ];
     const WIDTHS: [&str; 3] = ["the base map", "its diagonal", "the diagonal of twice as many cells"];
-    struct Leak {
-        /// Which of [`LEAKS`], of [`WIDTHS`], and of [`leaks::SAMPLES`].
-        at: [usize; 3],
-        share: f64,
-    }
+    /// Which of [`LEAKS`], of [`WIDTHS`], and of [`leaks::SAMPLES`], and the share.
+    type Leak = ([usize; 3], f64);
     let each = |[a, b, c]: [usize; 3]| {
         let share = rows.value(&leak_key(LEAKS[a].0), &leak_name(b, leaks::SAMPLES[c]));
-        share.map(|share| Leak { at: [a, b, c], share })
+        share.map(|share| ([a, b, c], share))
     };
-    let all = (0..18).map(|i| [i / 9, i / 3 % 3, i % 3]).filter_map(each);
     let columns: [Column<Leak>; 5] = [
-        ("base map", |leak| LEAKS[leak.at[0]].0.into()),
-        ("turned map as wide as", |leak| WIDTHS[leak.at[1]].into()),
-        ("look-ups a texel", |leak| Value::Number(leaks::SAMPLES[leak.at[2]].into())),
-        ("leaks, %", |leak| Value::Number(leak.share)),
-        ("leaks before, %", |Leak { at: [a, b, c], .. }| Value::number(BEFORE[*a][*b][*c])),
+        ("base map", |([a, ..], _)| LEAKS[*a].0.into()),
+        ("turned map as wide as", |([_, b, _], _)| WIDTHS[*b].into()),
+        ("look-ups a texel", |([.., c], _)| Value::Number(leaks::SAMPLES[*c].into())),
+        ("leaks, %", |(_, share)| Value::Number(*share)),
+        ("leaks before, %", |([a, b, c], _)| Value::number(BEFORE[*a][*b][*c])),
     ];
-    table("leaks", LEAKING, all, &columns)
+    table("leaks", LEAKING, (0..18).map(|i| [i / 9, i / 3 % 3, i % 3]).filter_map(each), &columns)
 }
 
 fn plots(stage: Stage, jobs: &[&Job], rows: &Rows) -> Vec<Graph> {
