@@ -22,7 +22,7 @@ use crate::settings::SettingsError;
 use anyhow::Result;
 use cells::Cell;
 use measure::{Bench, DoesNotFit};
-use plan::{PLAIN_BVH2, Scope, Session, Stage, Walk};
+use plan::{PLAIN_BVH2, Session, Stage, Walk, key};
 use serde_json::json;
 
 /// Raised when a field changes its meaning.
@@ -39,9 +39,9 @@ pub fn run(args: &ChcArgs, console: Console) -> Result<()> {
         return Err(SettingsError::Conflict(text).into());
     }
     let mut runner = Runner::new(args.minutes, console);
-    let scope = Scope { sponza: args.sponza.is_some(), tile: settings.tile, repeat: settings.repeat };
-    let mut walks = plan::walks(&wanted(Stage::ALL, &args.stages), &scope);
-    walks.retain(|walk| args.wants(&walk.case.to_string()));
+    let plan = |stages: &[Stage]| plan::walks(stages, &settings, args.sponza.is_some());
+    let mut walks = plan(&wanted(Stage::ALL, &args.stages));
+    walks.retain(|(case, _)| args.wants(&case.to_string()));
     if walks.is_empty() {
         let text = format!("--only {}: no case of these stages has such a name", args.only.0.join(", "));
         return Err(SettingsError::Conflict(text).into());
@@ -61,12 +61,13 @@ pub fn run(args: &ChcArgs, console: Console) -> Result<()> {
     let header = Header::new(FORMAT, &args.adapter, own)?;
     let mut store = Store::<Cell>::open(args.output.join("cells.jsonl"), header, args.resume)?;
     let run = store.all().iter().map(|cell| cell.run + 1).max().unwrap_or(0);
-    let is_binary = |walk: &&Walk| walk.case.variant.schedule == PLAIN_BVH2.schedule && !store.has(&walk.key());
-    let binary: Vec<Session> = walks.iter().filter(is_binary).map(|walk| walk.case.session()).collect();
+    let key = |(case, repetition): &Walk| key(&case.to_string(), *repetition);
+    let is_binary = |walk: &&Walk| walk.0.variant.schedule == PLAIN_BVH2.schedule && !store.has(&key(walk));
+    let binary: Vec<Session> = walks.iter().filter(is_binary).map(|(case, _)| case.session()).collect();
     // What was not measured, and why.
     let mut notes = Vec::new();
     let (mut session, mut opened) = (None, None);
-    let measure = |Walk { case, repetition }: &Walk| {
+    let measure = |(case, repetition): &Walk| {
         if session.replace(case.session()) != Some(case.session()) {
             // Its memory is for the next one.
             opened = None;
@@ -93,9 +94,8 @@ pub fn run(args: &ChcArgs, console: Console) -> Result<()> {
         }
         Ok(vec![Cell { case: case.to_string(), repetition: *repetition, run, passes, error }])
     };
-    runner.measure(&mut store, &walks, |walk| vec![walk.key()], measure)?;
+    runner.measure(&mut store, &walks, |walk| vec![key(walk)], measure)?;
     // What earlier runs measured of other stages is shown, too.
-    let all = plan::walks(Stage::ALL, &scope);
-    let text = output::write(&args.output, &settings, &store, &all, &notes)?;
+    let text = output::write(&args.output, &settings, &store, &plan(Stage::ALL), &notes)?;
     runner.end(&args.output, &text)
 }

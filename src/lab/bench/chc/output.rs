@@ -31,7 +31,7 @@ pub fn write(
     walks: &[Walk],
     notes: &[String],
 ) -> Result<String> {
-    let cases: Vec<Case> = walks.iter().filter(|walk| walk.repetition == 0).map(|walk| walk.case).collect();
+    let cases: Vec<Case> = walks.iter().filter(|walk| walk.1 == 0).map(|walk| walk.0).collect();
     let measured = Measured { cases, cells: store.all(), skip: settings.skip as usize };
     let mut sections = tables::all(&measured);
     let (done, planned) = (store.all().len(), walks.len());

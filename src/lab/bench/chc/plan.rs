@@ -1,6 +1,7 @@
 //! The experiments of Mattausch et al. 2015, §7, as cases to be measured.
 
 use super::paper;
+use crate::lab::bench::args::Settings;
 use crate::lab::bench::scenes::{SceneId, View};
 use crate::schedule::Optimisation;
 use crate::settings::{Effect, Schedule, names};
@@ -122,36 +123,12 @@ impl fmt::Display for Case {
     }
 }
 
-/// A walk.
-#[derive(Clone, Copy, Debug)]
-pub struct Walk {
-    /// What it is of.
-    pub case: Case,
-    /// Which of the case, from 0.
-    pub repetition: u32,
-}
+/// A walk: what it is of, and which of the case, from 0.
+pub type Walk = (Case, u32);
 
-impl Walk {
-    /// What it is told from others by.
-    pub fn key(&self) -> String {
-        key(&self.case.to_string(), self.repetition)
-    }
-}
-
-/// What a walk of `case` is told from others by.
+/// What a walk is told from others by.
 pub fn key(case: &str, repetition: u32) -> String {
     format!("{case}/{repetition}")
-}
-
-/// What the plan depends on.
-#[derive(Clone, Debug)]
-pub struct Scope {
-    /// Whether there is a Sponza.
-    pub sponza: bool,
-    /// Edge of a tile in pixels.
-    pub tile: u32,
-    /// Repetitions of what is timed.
-    pub repeat: u32,
 }
 
 /// The share of bricks that the paper's cache holds of a scene, percent (table 1).
@@ -184,31 +161,31 @@ pub fn apart() -> impl Iterator<Item = &'static [Effect]> {
 }
 
 /// All walks of these stages, those of one session after each other.
-pub fn walks(stages: &[Stage], scope: &Scope) -> Vec<Walk> {
+pub fn walks(stages: &[Stage], settings: &Settings, has_sponza: bool) -> Vec<Walk> {
     let mut all = Vec::new();
     for &stage in stages {
-        // Counts are the same in every walk.
-        let repetitions = if stage == Stage::Targets { 1 } else { scope.repeat };
-        for group in groups(stage, scope) {
-            let turn = |repetition| group.iter().map(move |&case| Walk { case, repetition });
+        for group in groups(stage, settings.tile, has_sponza) {
+            // Counts are the same in every walk; of the large city times are looked at, too.
+            let counts = stage == Stage::Targets && group[0].scene != SceneId::CityLarge;
+            let repetitions = if counts { 1 } else { settings.repeat };
+            let turn = |repetition| group.iter().map(move |&case| (case, repetition));
             all.extend((0..repetitions).flat_map(turn));
         }
     }
     let mut order: Vec<Session> = Vec::new();
-    for walk in &all {
-        if !order.contains(&walk.case.session()) {
-            order.push(walk.case.session());
+    for (case, _) in &all {
+        if !order.contains(&case.session()) {
+            order.push(case.session());
         }
     }
-    all.sort_by_key(|walk| order.iter().position(|session| *session == walk.case.session()));
+    all.sort_by_key(|(case, _): &Walk| order.iter().position(|session| *session == case.session()));
     all
 }
 
 /// Cases of one session that are compared with each other: their walks are interleaved.
 type Group = Vec<Case>;
 
-fn groups(stage: Stage, scope: &Scope) -> Vec<Group> {
-    let tile = scope.tile;
+fn groups(stage: Stage, tile: u32, has_sponza: bool) -> Vec<Group> {
     let group = |scene, cache, view, effects, variants: &[Variant]| -> Group {
         let case = |&variant: &Variant| Case { stage, scene, cache, tile, view, effects, variant };
         variants.iter().map(case).collect()
@@ -221,7 +198,7 @@ fn groups(stage: Stage, scope: &Scope) -> Vec<Group> {
             for scene in [city, plant] {
                 all.extend(View::ALL.iter().map(|&view| group(scene, 100, view, EFFECTS, &IN_CORE)));
             }
-            all.extend(scope.sponza.then(|| group(SceneId::Sponza, 100, View::Near, EFFECTS, &IN_CORE)));
+            all.extend(has_sponza.then(|| group(SceneId::Sponza, 100, View::Near, EFFECTS, &IN_CORE)));
         }
         Stage::Table3 | Stage::Table4 => {
             let variants = paper::THRESHOLDS.map(|threshold| Variant { threshold, ..CHC });
