@@ -39,7 +39,7 @@ pub fn run(args: &ChcArgs, console: Console) -> Result<()> {
         return Err(SettingsError::Conflict(text).into());
     }
     let mut runner = Runner::new(args.minutes, console);
-    let plan = |stages: &[Stage]| plan::walks(stages, &settings, args.sponza.is_some());
+    let plan = |stages: &[Stage]| plan::walks(stages, settings.tile, settings.repeat, args.sponza.is_some());
     let mut walks = plan(&wanted(Stage::ALL, &args.stages));
     walks.retain(|(case, _)| args.wants(&case.to_string()));
     if walks.is_empty() {

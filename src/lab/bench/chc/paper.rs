@@ -2,11 +2,13 @@
 //! NVIDIA Titan, 1920 x 1080, 20 secondary rays a pixel; milliseconds a frame. Their scenes stand beside ours that are
 //! like them.
 
-use super::plan::EFFECTS;
 use crate::lab::bench::scenes::{SceneId, View};
 use crate::settings::Effect;
 
-/// Numbers near, then far; each of primary, AO and diffuse rays.
+/// What was traced.
+pub const EFFECTS: &[Effect] = &[Effect::Primary, Effect::Ao, Effect::Diffuse];
+
+/// Numbers near, then far; each of [`EFFECTS`].
 pub type NearFar = [[f64; 3]; 2];
 
 /// The number of a view and of rays.

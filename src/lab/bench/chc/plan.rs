@@ -1,7 +1,6 @@
 //! The experiments of Mattausch et al. 2015, §7, as cases to be measured.
 
-use super::paper;
-use crate::lab::bench::args::Settings;
+use super::paper::{self, EFFECTS};
 use crate::lab::bench::scenes::{SceneId, View};
 use crate::schedule::Optimisation;
 use crate::settings::{Effect, Schedule, names};
@@ -148,8 +147,6 @@ pub fn target_cache(scene: SceneId) -> u32 {
     if scene == SceneId::CityLarge { 25 } else { 20 }
 }
 
-/// What is traced in core, all in one walk.
-pub const EFFECTS: &[Effect] = &[Effect::Primary, Effect::Ao, Effect::Diffuse];
 const PRIMARY: &[Effect] = &[Effect::Primary];
 const DIFFUSE: &[Effect] = &[Effect::Diffuse];
 /// What is traced of random turns.
@@ -160,14 +157,15 @@ pub fn apart() -> impl Iterator<Item = &'static [Effect]> {
     EFFECTS.chunks(1)
 }
 
-/// All walks of these stages, those of one session after each other.
-pub fn walks(stages: &[Stage], settings: &Settings, has_sponza: bool) -> Vec<Walk> {
+/// All walks of these stages with tiles of so many pixels, `repeat` of what is timed, those of one session after each
+/// other.
+pub fn walks(stages: &[Stage], tile: u32, repeat: u32, has_sponza: bool) -> Vec<Walk> {
     let mut all = Vec::new();
     for &stage in stages {
-        for group in groups(stage, settings.tile, has_sponza) {
+        for group in groups(stage, tile, has_sponza) {
             // Counts are the same in every walk; of the large city times are looked at, too.
             let counts = stage == Stage::Targets && group[0].scene != SceneId::CityLarge;
-            let repetitions = if counts { 1 } else { settings.repeat };
+            let repetitions = if counts { 1 } else { repeat };
             let turn = |repetition| group.iter().map(move |&case| (case, repetition));
             all.extend((0..repetitions).flat_map(turn));
         }

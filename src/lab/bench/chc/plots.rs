@@ -1,7 +1,8 @@
 //! The paper's figures 5, 7 and 8 from the cells.
 
 use super::cells::{Measured, Metric, Pass, WALL};
-use super::plan::{CHC, EFFECTS, FRONTS, IN_CORE, Stage, Variant};
+use super::paper::EFFECTS;
+use super::plan::{CHC, FRONTS, IN_CORE, Stage, Variant};
 use crate::lab::bench::results::plot;
 use crate::lab::bench::scenes::{SceneId, View};
 use crate::settings::Effect;

@@ -1,6 +1,7 @@
 //! The tables of the bench.
 
 use super::args::{DvfBenchArgs, Stage};
+use super::plots::short;
 use super::{key, plots};
 use crate::lab::bench::results::{Column, Results, percent, table};
 use crate::lab::bench::store::Rows;
@@ -136,11 +137,6 @@ impl Line<'_> {
         let found = PAPER.iter().find(|(words, ..)| self.scene.contains("sponza") && has(words));
         found.map(|paper| (paper.1, paper.2))
     }
-}
-
-/// What a measurement is called in its row: its options without those that all have.
-pub fn short(options: &str) -> String {
-    options.replace("--dvf-", "")
 }
 
 /// The columns that all tables begin with.

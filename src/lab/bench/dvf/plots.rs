@@ -3,7 +3,6 @@
 use super::args::{DvfBenchArgs, Stage, Way};
 use super::flicker::FRAMES;
 use super::key;
-use super::output::short;
 use crate::lab::bench::results::plot;
 use crate::lab::bench::store::Rows;
 use brickwalk_report::{Graph, Line, Unit};
@@ -65,6 +64,11 @@ const PLOTS: [Plot; 6] = [
         ..errors(Stage::Lanes, "Time of making a field over lanes", ("--dvf-lanes", "lanes"), "")
     },
 ];
+
+/// What a measurement is called in its row: its options without those that all have.
+pub fn short(options: &str) -> String {
+    options.replace("--dvf-", "")
+}
 
 /// The value of an option, and the options without it.
 fn split(options: &str, option: &str) -> Option<(f64, String)> {
