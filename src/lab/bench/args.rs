@@ -1,7 +1,7 @@
 //! Options of `bench`.
 
-use super::plan::Stage;
-use crate::settings::sizes::positive_count;
+use super::chc::plan::Stage;
+use crate::settings::sizes::{human_count, positive_count};
 use crate::settings::{
     Adapter, CacheSize, Effect, EffectList, ImageSize, Lines, Plain, Rule, Schedule, Value, settings,
 };
@@ -15,6 +15,11 @@ const FRAMES: Rule = Rule::Whole(1, 300);
 pub const REPETITIONS: Rule = Rule::Whole(1, 1000);
 /// Minutes.
 pub const MINUTES: Rule = Rule::Real(0.0, 100_000.0);
+
+/// Those of `all` stages that are `given`, else all.
+pub fn wanted<T: Copy + PartialEq>(all: &[T], given: &[T]) -> Vec<T> {
+    all.iter().filter(|stage| given.is_empty() || given.contains(stage)).copied().collect()
+}
 
 settings! {
     /// Options of `bench executors`.
@@ -147,26 +152,18 @@ pub struct Settings {
 impl ChcArgs {
     /// Options with their defaults.
     pub fn settings(&self) -> Settings {
-        let quick = self.quick;
-        let or = |full, small| if quick { small } else { full };
-        let size = if quick { (96, 54) } else { (1920, 1080) };
+        let or = |full, small| if self.quick { small } else { full };
+        let (width, height) = if self.quick { (96, 54) } else { (1920, 1080) };
+        let triangles = if self.quick { [100_000, 200_000, 100_000] } else { [12_000_000, 139_000_000, 13_000_000] };
         Settings {
-            triangles: self
-                .triangles
-                .map_or(or([12_000_000, 139_000_000, 13_000_000], [100_000, 200_000, 100_000]), |t| t.0),
-            size: self.size.unwrap_or(ImageSize { width: size.0, height: size.1 }),
-            frames: self.frames.unwrap_or(if quick { 4 } else { 30 }),
-            tile: self.tile.unwrap_or(if quick { 16 } else { 64 }),
-            skip: self.skip.unwrap_or(if quick { 1 } else { 5 }),
-            repeat: self.repeat.unwrap_or(if quick { 2 } else { 5 }),
-            rays: self.rays.unwrap_or(if quick { 2 } else { 20 }),
+            triangles: self.triangles.map_or(triangles, |own| own.0),
+            size: self.size.unwrap_or(ImageSize { width, height }),
+            frames: self.frames.unwrap_or(or(30, 4)),
+            tile: self.tile.unwrap_or(or(64, 16)),
+            skip: self.skip.unwrap_or(or(5, 1)),
+            repeat: self.repeat.unwrap_or(or(5, 2)),
+            rays: self.rays.unwrap_or(or(20, 2)),
         }
-    }
-
-    /// The stages wanted.
-    pub fn stages(&self) -> Vec<Stage> {
-        let wanted = |stage: &Stage| self.stages.is_empty() || self.stages.contains(stage);
-        Stage::ALL.into_iter().filter(wanted).collect()
     }
 
     /// Whether a case of this name is wanted.
@@ -178,21 +175,16 @@ impl ChcArgs {
 impl Settings {
     /// Rules of measuring (and conditions of the paper) that these settings do not meet.
     pub fn unmet(&self) -> Vec<String> {
-        let mut unmet = Vec::new();
-        let mut unless = |met: bool, text: String| {
-            if !met {
-                unmet.push(text);
-            }
-        };
-        unless(self.repeat >= 5, format!("{} walks of each case, not 5", self.repeat));
-        unless(self.skip >= 5, format!("the first {} frames left out, not 5", self.skip));
-        unless(self.frames > self.skip, "no frame is left to measure but the last".into());
-        let ImageSize { width, height } = self.size;
-        unless((width, height) == (1920, 1080), format!("{width}x{height} pixels, not the paper's 1920x1080"));
-        unless(self.rays == 20, format!("{} secondary rays a pixel, not the paper's 20", self.rays));
-        let counts = self.triangles.map(crate::settings::sizes::human_count).join(", ");
-        let alike = [11_000_000, 130_000_000, 12_000_000].iter().zip(self.triangles).all(|(&least, own)| own >= least);
-        unless(alike, format!("scenes of {counts} triangles, smaller than the paper's"));
-        unmet
+        let Self { triangles, size: ImageSize { width, height }, repeat, skip, rays, .. } = *self;
+        let counts = triangles.map(human_count).join(", ");
+        let is_large = [11_000_000, 130_000_000, 12_000_000].iter().zip(triangles).all(|(&least, own)| own >= least);
+        let rules = [
+            (repeat >= 5, format!("{repeat} walks of each case, not 5")),
+            (skip >= 5, format!("the first {skip} frames left out, not 5")),
+            ((width, height) == (1920, 1080), format!("{width}x{height} pixels, not the paper's 1920x1080")),
+            (rays == 20, format!("{rays} secondary rays a pixel, not the paper's 20")),
+            (is_large, format!("scenes of {counts} triangles, smaller than the paper's")),
+        ];
+        rules.into_iter().filter(|(is_met, _)| !is_met).map(|(_, text)| text).collect()
     }
 }

@@ -4,16 +4,15 @@
 //! are those of the others.
 
 use super::args::{ExecutorsArgs, Settings};
-use super::plan::{SceneId, View};
-use super::scenes;
+use super::results::{Column, table, write_json};
+use super::scenes::{self, SceneId, Scenes, View};
+use super::store::device;
 use crate::frame::{Pixels, Renderer};
 use crate::gpu::device::candidates;
 use crate::kernels::DeviceInfo;
 use crate::lab::console::Console;
 use crate::output::atomic;
 use crate::session::Settings as WalkSettings;
-use crate::session::opened::{Opened, open_scene};
-use crate::session::renderer::renderer;
 use crate::settings::Adapter;
 use crate::settings::sizes::human_count;
 use anyhow::{Context, Result, bail};
@@ -86,8 +85,8 @@ impl Side {
 pub fn run(args: &ExecutorsArgs, console: Console) -> Result<()> {
     let settings = args.settings();
     atomic::create_folder(&args.output)?;
-    let folder = args.scenes.clone().unwrap_or_else(|| args.output.join("scenes"));
-    let place = scenes::place(SceneId::City, &folder, &settings, None, console)?;
+    let place =
+        Scenes::new(args.scenes.as_deref(), &args.output, settings.triangles, None, console).place(SceneId::City)?;
     let mut notes = Vec::new();
     let mut sides = Vec::new();
     for adapter in wanted(args) {
@@ -161,8 +160,7 @@ fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapt
         adapter: adapter.clone(),
         ..WalkSettings::default()
     };
-    let opened = Opened::open(open_scene(scene)?, scene, &own)?;
-    let renderer = renderer(opened, scene, &own)?;
+    let renderer = scenes::open(scene, &own)?;
     let info = renderer.executor.device();
     Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
 }
@@ -174,25 +172,22 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// The table of all devices and passes.
-fn table(sides: &[Side]) -> Table {
-    let columns = ["device", "pass", "rays a frame", "ms", "Mray/s", "over the first"];
-    let mut rows = Vec::new();
-    for side in sides {
-        for (pass, _) in &side.passes {
-            let own = side.medians(pass);
-            let first = sides.first().and_then(|first| first.medians(pass));
-            rows.push(vec![
-                Value::Text(side.info.name.clone()),
-                Value::Text((*pass).into()),
-                Value::number(own.map(|(rays, _)| rays)),
-                Value::number(own.map(|(_, ms)| ms)),
-                Value::number(own.map(|(rays, ms)| rays * 1e-3 / ms)),
-                Value::ratio(own.zip(first).map(|((_, own), (_, first))| first / own)),
-            ]);
-        }
-    }
+fn passes<'s>(sides: &'s [Side]) -> Table {
+    /// A device, the first one, and the name of a pass.
+    type Pass<'a> = (&'a Side, &'a Side, &'static str);
+    let columns: [Column<Pass>; 6] = [
+        ("device", |(side, ..)| side.info.name.clone().into()),
+        ("pass", |(.., name)| (*name).into()),
+        ("rays a frame", |(side, _, name)| Value::number(side.medians(name).map(|(rays, _)| rays))),
+        ("ms", |(side, _, name)| Value::number(side.medians(name).map(|(_, ms)| ms))),
+        ("Mray/s", |(side, _, name)| Value::number(side.medians(name).map(|(rays, ms)| rays * 1e-3 / ms))),
+        ("over the first", |(side, first, name)| {
+            Value::ratio(side.medians(name).zip(first.medians(name)).map(|((_, own), (_, first))| first / own))
+        }),
+    ];
+    let of_side = |side: &'s Side| side.passes.iter().map(move |(name, _)| (side, &sides[0], *name));
     let caption = "Medians over frames and repetitions of the wall time of a pass.";
-    Table { name: "executors".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows }
+    table("executors", caption, sides.iter().flat_map(of_side), &columns)
 }
 
 /// How the pictures of each device but the first differ from those of the first, a line each.
@@ -216,29 +211,21 @@ fn differences(sides: &[Side]) -> String {
 
 /// Writes the results; returns what to print.
 fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[String]) -> Result<String> {
-    let table = table(sides);
-    let devices: Vec<serde_json::Value> = sides
-        .iter()
-        .map(|side| {
-            let DeviceInfo { name, driver, driver_info, backend, .. } = &side.info;
-            let d = &side.differences;
-            json!({
-                "name": name,
-                "driver": driver,
-                "driver_info": driver_info,
-                "backend": backend,
-                "pixels_compared": d.pixels,
-                "other_ids": d.ids,
-                "depth_ulps": d.depth_ulps,
-                "radiance_rmse": d.radiance_rmse(),
-            })
-        })
-        .collect();
+    let table = passes(sides);
+    let of_side = |side: &Side| {
+        let d = &side.differences;
+        let mut json = device(&side.info);
+        json["pixels_compared"] = d.pixels.into();
+        json["other_ids"] = d.ids.into();
+        json["depth_ulps"] = d.depth_ulps.into();
+        json["radiance_rmse"] = d.radiance_rmse().into();
+        json
+    };
     let json = json!({
         "format": FORMAT,
         "version": env!("CARGO_PKG_VERSION"),
         "commit": env!("BRICKWALK_COMMIT"),
-        "devices": devices,
+        "devices": sides.iter().map(of_side).collect::<Vec<_>>(),
         "settings": {
             "triangles": settings.triangles[0],
             "size": settings.size.to_string(),
@@ -253,7 +240,7 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
         "left_out": notes,
         "table": table,
     });
-    atomic::write(&args.output.join("executors.json"), (serde_json::to_string_pretty(&json)? + "\n").as_bytes())?;
+    write_json(&args.output, "executors", &json)?;
     let mut text = format!(
         "# The same frames on every device\n\nCity of {} triangles, {}, cache {}, schedule {}, {} frames, {} repetitions.\n\n",
         human_count(settings.triangles[0]),

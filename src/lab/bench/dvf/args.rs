@@ -128,57 +128,47 @@ impl DvfBenchArgs {
             keys: [&["points", "rays"], keys].concat(),
         };
         let cells = |cells| Options { cells: Cells::Longest(cells), ..base.clone() };
+        let usual = || cells(40);
+        let part = |part: u32| (self.points / part).max(100);
+        let modes = [Mode::SameSample, Mode::Paper];
         match stage {
-            Stage::Points => [25, 5, 1]
-                .into_iter()
-                .flat_map(|part| {
-                    let sets = [
-                        (Count::Rounding, Sequence::Hash),
-                        (Count::Ceiling, Sequence::Hash),
-                        (Count::Ceiling, Sequence::Hammersley),
-                    ];
-                    let points = (self.points / part).max(100);
-                    sets.map(|(count, sequence)| {
-                        with(&["cells", "count", "sequence"], Options { points, count, sequence, ..cells(40) })
-                    })
-                })
-                .collect(),
-            Stage::Grid => [155, 77, 40, 21, 12]
-                .map(cells)
-                .into_iter()
-                .chain([base.clone()])
-                .map(|options| with(&["cells"], options))
-                .collect(),
-            Stage::Rays => [8, 32, 64, 128, 256].map(|rays| with(&["cells"], Options { rays, ..cells(40) })).to_vec(),
+            Stage::Points => {
+                let sets = [
+                    (Count::Rounding, Sequence::Hash),
+                    (Count::Ceiling, Sequence::Hash),
+                    (Count::Ceiling, Sequence::Hammersley),
+                ];
+                let of = |points| sets.map(|(count, sequence)| Options { points, count, sequence, ..usual() });
+                let all = [25, 5, 1].into_iter().flat_map(|n| of(part(n)));
+                all.map(|options| with(&["cells", "count", "sequence"], options)).collect()
+            }
+            Stage::Grid => {
+                let all = [155, 77, 40, 21, 12].map(cells).into_iter().chain([base.clone()]);
+                all.map(|options| with(&["cells"], options)).collect()
+            }
+            Stage::Rays => [8, 32, 64, 128, 256].map(|rays| with(&["cells"], Options { rays, ..usual() })).to_vec(),
             Stage::Lanes => {
-                [1, 8, 32, 128].map(|lanes| with(&["cells", "lanes"], Options { lanes, ..cells(40) })).to_vec()
+                [1, 8, 32, 128].map(|lanes| with(&["cells", "lanes"], Options { lanes, ..usual() })).to_vec()
             }
             Stage::Masks => {
-                let sizes = [8, 16, 32];
-                let of = |octahedral| Options { octahedral, ..cells(40) };
-                let dilated = sizes.map(|size| with(&["cells", "octahedral"], of(size)));
-                let others =
-                    sizes.map(|size| with(&["cells", "octahedral", "dilate"], Options { dilate: false, ..of(size) }));
-                let masks = with(&["cells", "trust"], Options { trust: Trust::Masks, ..cells(40) });
-                let both = with(&["cells", "sides"], Options { sides: Sides::Both, ..cells(40) });
-                dilated.into_iter().chain(others).chain([masks, both]).collect()
+                let of = |octahedral| Options { octahedral, ..usual() };
+                let narrow = |size| with(&["cells", "octahedral", "dilate"], Options { dilate: false, ..of(size) });
+                let mut all = [8, 16, 32].map(|size| with(&["cells", "octahedral"], of(size))).to_vec();
+                all.extend([8, 16, 32].map(narrow));
+                all.push(with(&["cells", "trust"], Options { trust: Trust::Masks, ..usual() }));
+                all.push(with(&["cells", "sides"], Options { sides: Sides::Both, ..usual() }));
+                all
             }
-            Stage::Modes => [Mode::SameSample, Mode::Paper]
-                .map(|mode| with(&["cells", "mode"], Options { mode, ..cells(40) }))
-                .to_vec(),
+            Stage::Modes => modes.map(|mode| with(&["cells", "mode"], Options { mode, ..usual() })).to_vec(),
             // The paper's cells of the Cornell box, and masks so coarse that what labels do is to be seen.
-            Stage::Flicker => Way::ALL
-                .iter()
-                .flat_map(|&way| [Mode::SameSample, Mode::Paper].map(|mode| (way, mode)))
-                .map(|(way, mode)| {
-                    let points = (self.points / 25).max(100);
-                    let options = Options { points, octahedral: 16, mode, ..cells(16) };
-                    Measurement { way, ..with(&["cells", "octahedral", "mode"], options) }
-                })
-                .collect(),
-            Stage::Memory => {
-                vec![with(&["region", "cells"], Options { region: RegionKind::View, ..cells(40) })]
+            Stage::Flicker => {
+                let options = |mode| Options { points: part(25), octahedral: 16, mode, ..cells(16) };
+                let of = |way| {
+                    modes.map(|mode| Measurement { way, ..with(&["cells", "octahedral", "mode"], options(mode)) })
+                };
+                Way::ALL.iter().flat_map(|&way| of(way)).collect()
             }
+            Stage::Memory => vec![with(&["region", "cells"], Options { region: RegionKind::View, ..usual() })],
         }
     }
 

@@ -10,8 +10,9 @@
 //! mode draws rays otherwise than exact ones are, so it has a brute force of its own.
 
 use super::args::{Measurement, Way};
-use super::{Picture, Values, View};
+use super::{Picture, View};
 use crate::kernels::layout::NONE;
+use crate::lab::bench::store::Values;
 use crate::metrics::{Change, Image, PIXELS_PER_DEGREE, flicker, flip_ldr};
 use crate::scene::motion::{Motion, Movers};
 use crate::secondary::dvf::Dvf;
@@ -130,24 +131,22 @@ fn of_truth(view: &mut View, options: &Options, way: Way, truth: &Truth) -> Resu
     let how = options.how();
     let noise = truth.noise.p99;
     let mut values = Values::from([("noise_p99".into(), noise), ("noise_mean".into(), truth.noise.mean)]);
-    let (mut rays, mut traced, mut points, mut longest) = (0.0, 0.0, 0, 0);
-    let (mut of_fields, mut cells, mut flip) = (0.0, 0.0, 0.0);
+    // Of all frames together.
+    let (mut rays, mut traced, mut of_fields, mut cells, mut flip) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut jumps, mut greatest, mut mean) = (0.0f64, 0.0f64, 0.0);
-    let mut before: Option<Picture> = None;
+    let mut before: Option<(Picture, &Brute)> = None;
     for (frame, brute) in (0..FRAMES).zip(&truth.frames) {
         view.renderer.place(&truth.still, &truth.movers.at(time(frame)))?;
         if way == Way::Anew || frame == 0 {
             view.renderer.methods.remove::<Dvf>();
             let region = view.region(options)?;
             let (made, _) = view.make(options)?;
-            (points, longest) = (made.points, made.field.shape.size.into_iter().max().unwrap_or(0));
+            let longest = made.field.shape.size.into_iter().max().unwrap_or(0);
+            values.extend([("points".into(), made.points as f64), ("longest".into(), f64::from(longest))]);
             let mut dvf = Dvf::new(Arc::new(made.field), how);
             match way {
                 Way::Anew => of_fields += made.record.rays() as f64,
-                Way::Renewed => {
-                    let renewal = renewal(options, Arc::new(made.kept), region);
-                    dvf = dvf.renewed_by(renewal);
-                }
+                Way::Renewed => dvf = dvf.renewed_by(renewal(options, Arc::new(made.kept), region)),
                 Way::Told => {}
             }
             view.renderer.methods.set(dvf);
@@ -156,26 +155,22 @@ fn of_truth(view: &mut View, options: &Options, way: Way, truth: &Truth) -> Resu
         (rays, traced) = (rays + brute.picture.traced, traced + picture.traced);
         (of_fields, cells) = (of_fields + picture.renewal[0], cells + picture.renewal[1]);
         flip += flip_ldr(&picture.image, &brute.picture.image, PIXELS_PER_DEGREE)?.mean();
-        if let Some(before) = &before {
-            let brute_before = &truth.frames[frame as usize - 1].picture.image;
-            let pictures = [[&before.image, brute_before], [&picture.image, &brute.picture.image]];
+        if let Some((before, brute_before)) = &before {
+            let pictures = [[&before.image, &brute_before.picture.image], [&picture.image, &brute.picture.image]];
             let change = flicker(pictures[0], pictures[1], &brute.unchanged, noise)?;
             (jumps, greatest, mean) = (jumps.max(change.above), greatest.max(change.greatest), mean + change.mean);
-            for (name, value) in [
+            let own = [
                 ("pixels", change.pixels as f64),
                 ("change_mean", change.mean),
                 ("change_p99", change.p99),
                 ("change_greatest", change.greatest),
                 ("jumps", change.above),
-            ] {
-                values.insert(format!("{name} at {frame}"), value);
-            }
+            ];
+            values.extend(own.map(|(name, value)| (format!("{name} at {frame}"), value)));
         }
-        before = Some(picture);
+        before = Some((picture, brute));
     }
     values.extend([
-        ("points".into(), points as f64),
-        ("longest".into(), f64::from(longest)),
         ("rays".into(), rays),
         ("traced".into(), traced),
         ("fewer".into(), rays / traced.max(1.0)),

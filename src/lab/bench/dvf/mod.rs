@@ -9,11 +9,11 @@ mod flicker;
 mod output;
 mod plots;
 
-use super::cells::Header;
-use super::rows::{Row, Rows};
+use super::args::wanted;
+use super::runner::Runner;
 use super::scenes;
+use super::store::{Header, Row, Rows, Values, median};
 use crate::frame::Renderer;
-use crate::kernels::DeviceInfo;
 use crate::lab::console::Console;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::output::atomic;
@@ -22,19 +22,15 @@ use crate::scene::path::{CameraPath, path_from_bounds};
 use crate::secondary::dvf::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Region};
 use crate::secondary::dvf::{Options, RegionKind, prepare};
 use crate::session::Settings;
-use crate::session::device::Device;
-use crate::session::opened::{Opened, open_scene};
-use crate::session::renderer::renderer;
+use crate::session::opened::open_scene;
 use crate::settings::{CacheSize, Effect, EffectList, Environment};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use args::{DvfBenchArgs, Measurement, Stage};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Kind, Settings as Generated};
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 /// Raised when a value changes its meaning.
 const FORMAT: u32 = 3;
@@ -85,33 +81,35 @@ struct View<'a> {
 pub fn run(args: &DvfBenchArgs, console: Console) -> Result<()> {
     atomic::create_folder(&args.output)?;
     let places = places(args, console)?;
-    let mut rows = Rows::open(&args.output, header(args, &places)?)?;
-    let deadline = args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
-    let stages: Vec<Stage> =
-        Stage::ALL.iter().copied().filter(|stage| args.stages.is_empty() || args.stages.contains(stage)).collect();
+    let names: Vec<&str> = places.iter().map(|place| place.name.as_str()).collect();
+    let own = json!({
+        "scenes": names,
+        "size": args.size.to_string(),
+        "samples": args.samples,
+        "points": args.points,
+        "rays": args.rays,
+        "repeat": args.repeat,
+        "environment": args.environment.as_ref().map(|file| file.display().to_string()),
+    });
+    let mut rows = Rows::open(args.output.join("rows.jsonl"), Header::new(FORMAT, &args.adapter, own)?, false)?;
+    let mut runner = Runner::new(args.minutes, console);
+    let stages = wanted(Stage::ALL, &args.stages);
     let jobs: Vec<(&Place, Stage, Measurement)> = places
         .iter()
         .flat_map(|place| stages.iter().map(move |&stage| (place, stage)))
         .filter(|(place, stage)| *stage != Stage::Flicker || place.motion.is_some())
         .flat_map(|(place, stage)| args.measurements(stage).into_iter().map(move |own| (place, stage, own)))
         .collect();
-    let progress = Progress::new();
-    progress.phase("measurements", jobs.len() as u64);
+    let name = |(place, stage, own): &(&Place, Stage, Measurement)| key(&place.name, *stage, &own.to_string());
     let mut view: Option<View> = None;
-    let mut ended = "";
-    for (place, stage, own) in &jobs {
-        let key = key(&place.name, *stage, &own.to_string());
-        if !rows.has(&key) {
-            if console.is_stopped() {
-                ended = "Interrupted: the same command goes on where this one stopped.\n";
-                break;
-            }
-            if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-                ended = "Out of time: the same command goes on where this one stopped.\n";
-                break;
-            }
-            if *stage == Stage::Memory {
-                rows.push(Row { key, values: memory(place, args, &own.options, console)? })?;
+    runner.measure(
+        &mut rows,
+        &jobs,
+        |job| vec![name(job)],
+        |job| {
+            let (place, stage, own) = job;
+            let values = if *stage == Stage::Memory {
+                memory(place, args, &own.options, console)?
             } else {
                 let of_place = view.take().filter(|view| std::ptr::eq(view.place, *place));
                 let open = match of_place {
@@ -119,46 +117,21 @@ pub fn run(args: &DvfBenchArgs, console: Console) -> Result<()> {
                     None => View::open(place, args, CacheSize::Percent(100.0), console)?,
                 };
                 let open = view.insert(open);
-                let values = match stage {
+                match stage {
                     Stage::Flicker => flicker::measure(open, own)?,
                     _ => open.measure(*stage, &own.options)?.0,
-                };
-                rows.push(Row { key, values })?;
-            }
-        }
-        progress.advance(1);
-    }
-    progress.finish();
-    let names: Vec<&str> = places.iter().map(|place| place.name.as_str()).collect();
+                }
+            };
+            Ok(vec![Row { key: name(job), values }])
+        },
+    )?;
     let text = output::write(args, &names, &rows, jobs.len())?;
-    console.show(&text)?;
-    if ended.starts_with("Interrupted") {
-        bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display());
-    }
-    console.show(ended)
+    runner.end(&args.output, &text)
 }
 
 /// The name of a measurement.
 fn key(scene: &str, stage: Stage, options: &str) -> String {
     format!("{scene}, {}: {options}", stage.name())
-}
-
-fn header(args: &DvfBenchArgs, places: &[Place]) -> Result<Header> {
-    let DeviceInfo { name, driver, driver_info, backend, .. } = Device::open(&args.adapter)?.info();
-    Ok(Header {
-        format: FORMAT,
-        settings: json!({
-            "scenes": places.iter().map(|place| place.name.as_str()).collect::<Vec<_>>(),
-            "size": args.size.to_string(),
-            "samples": args.samples,
-            "points": args.points,
-            "rays": args.rays,
-            "repeat": args.repeat,
-            "environment": args.environment.as_ref().map(|file| file.display().to_string()),
-        }),
-        adapter: json!({ "name": name, "driver": driver, "driver_info": driver_info, "backend": backend }),
-        commit: env!("BRICKWALK_COMMIT").into(),
-    })
 }
 
 /// The scenes, and the box, which is built if it is not there.
@@ -194,8 +167,6 @@ impl Place {
     }
 }
 
-type Values = BTreeMap<String, f64>;
-
 impl<'a> View<'a> {
     fn open(place: &'a Place, args: &'a DvfBenchArgs, cache: CacheSize, console: Console<'a>) -> Result<Self> {
         let settings = Settings {
@@ -210,8 +181,7 @@ impl<'a> View<'a> {
             adapter: args.adapter.clone(),
             ..Settings::default()
         };
-        let opened = Opened::open(open_scene(&place.scene)?, &place.scene, &settings)?;
-        let renderer = renderer(opened, &place.scene, &settings)?;
+        let renderer = scenes::open(&place.scene, &settings)?;
         let image = Image { width: 0, height: 0, rgb: Vec::new() };
         let nothing = Picture { image, ids: Vec::new(), traced: 0.0, answered: 0.0, renewal: [0.0; 2], ms: 0.0 };
         let mut view = Self { place, args, console, renderer, exact: nothing, truth: [None, None] };
@@ -277,7 +247,7 @@ impl<'a> View<'a> {
             times[1].push(self.picture(0)?.ms);
         }
         self.renderer.methods.remove::<Dvf>();
-        let [exact_ms, ms] = times.map(median);
+        let [exact_ms, ms] = times.map(|times| median(times).unwrap_or_default());
         let exact = &self.exact;
         let errors = pixel_errors(&picture.image, &exact.image)?;
         let flip = flip_ldr(&picture.image, &exact.image, PIXELS_PER_DEGREE)?;
@@ -318,13 +288,6 @@ impl<'a> View<'a> {
         }
         Ok((values, picture.image))
     }
-}
-
-/// The middle one of values, of an even number the mean of two.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
 /// Pixels whose bits are not the same.

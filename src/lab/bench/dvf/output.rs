@@ -1,12 +1,13 @@
 //! The tables of the bench.
 
 use super::args::{DvfBenchArgs, Stage};
+use super::plots::short;
 use super::{key, plots};
-use crate::lab::bench::results::Results;
-use crate::lab::bench::rows::Rows;
+use crate::lab::bench::results::{Column, Results, percent, table};
+use crate::lab::bench::store::Rows;
 use crate::settings::sizes::human_count;
 use anyhow::Result;
-use brickwalk_report::{Section, Table, Value};
+use brickwalk_report::{Graph, Section, Table, Value};
 
 const TITLE: &str = "The experiments of discrete visibility fields";
 const READING: &str = "Fewer rays: rays to the environment without a field over those that are traced with it; all of them are the same rays, so \
@@ -40,7 +41,7 @@ const PAPER: [(&str, f64, f64); 11] = [
 
 const MAKING_TITLE: &str = "Making fields, tables 2 to 4";
 
-/// A scene, its points, the columns of [`making`].
+/// A scene, its points, the columns of [`making`] that it is beside.
 type PaperMaking = (&'static str, Option<u32>, [Option<f64>; 5]);
 
 /// What the paper's tables 2 to 4 have of a scene: making over a picture by brute force (9 and 44 a second), a picture
@@ -52,207 +53,165 @@ const PAPER_MAKING: [PaperMaking; 3] = [
     ("cornell", None, [Some(0.041), None, Some(0.017), Some(0.977), Some(0.006)]),
 ];
 
-/// What the paper has of a measurement of Sponza: RMSE and FLIP.
-fn paper(stage: Stage, scene: &str, options: &str) -> [Option<f64>; 2] {
-    let first = match stage {
-        Stage::Points => "--dvf-points",
-        Stage::Grid => "--dvf-cells",
-        _ => return [None; 2],
-    };
-    let options: Vec<&str> = options.split_whitespace().collect();
-    let has = |words: &str| words.starts_with(first) && words.split_whitespace().all(|word| options.contains(&word));
-    let found = PAPER.iter().find(|(words, ..)| scene.contains("sponza") && has(words));
-    [found.map(|paper| paper.1), found.map(|paper| paper.2)]
-}
-
 /// Writes the results; returns what to print.
 ///
 /// # Errors
 /// The folder cannot be written.
 pub fn write(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows, planned: usize) -> Result<String> {
-    let section = |stage: Stage| {
-        let table = match stage {
-            Stage::Flicker => flickering(args, scenes, rows),
-            _ => table(args, scenes, stage, rows),
-        };
-        let plots = plots::of(stage, args, scenes, rows);
-        let own = Section { title: stage.title().into(), tables: vec![table], plots, ..Section::default() };
-        let tables = (stage == Stage::Points).then(|| vec![making(args, scenes, rows)]);
-        let making = tables.map(|tables| Section { title: MAKING_TITLE.into(), tables, ..Section::default() });
-        [Some(own), making].into_iter().flatten()
+    let lines = |stage: Stage| {
+        let line = move |scene, options: String| Line { scene, stage, key: key(scene, stage, &options), options, rows };
+        let of_scene = move |&scene| args.names(stage).into_iter().map(move |options| line(scene, options));
+        scenes.iter().flat_map(of_scene).filter(|line| rows.has(&line.key))
     };
-    let sections: Vec<Section> = Stage::ALL.iter().copied().flat_map(section).collect();
-    let sections = sections.into_iter().filter(|section| !section.tables[0].rows.is_empty()).collect();
+    let mut sections = Vec::new();
+    for &stage in Stage::ALL {
+        let columns = if stage == Stage::Flicker { flicker() } else { columns(stage) };
+        let caption = if stage == Stage::Flicker { FLICKERING } else { READING };
+        let own = table(stage.name(), caption, lines(stage), &columns);
+        sections.push((stage.title(), own, plots::of(stage, args, scenes, rows)));
+        if stage == Stage::Points {
+            sections.push((MAKING_TITLE, table("making", MAKING, lines(stage), &making()), Vec::new()));
+        }
+    }
+    sections.retain(|(_, table, _)| !table.rows.is_empty());
+    let section = |(title, table, plots): (&str, Table, Vec<Graph>)| Section {
+        title: title.into(),
+        tables: vec![table],
+        plots,
+        ..Section::default()
+    };
     let facts = vec![
         ("Resolution", args.size.to_string()),
         ("Rays a pixel", args.samples.to_string()),
         ("Most points", human_count(args.points.into())),
         ("Turns", args.repeat.to_string()),
     ];
-    Results { name: "dvf", title: TITLE, reading: READING, facts, sections, rows, planned }.write(&args.output)
+    let sections = sections.into_iter().map(section).collect();
+    Results::of_rows(("dvf", TITLE, READING), rows, planned, facts, sections).write(&args.output)
 }
 
-/// What a measurement is called in its row: its options without those that all have.
-pub fn short(options: &str) -> String {
-    options.replace("--dvf-", "")
+/// What was measured of a scene with some options.
+struct Line<'a> {
+    scene: &'a str,
+    stage: Stage,
+    options: String,
+    key: String,
+    rows: &'a Rows,
 }
 
-fn table(args: &DvfBenchArgs, scenes: &[&str], stage: Stage, rows: &Rows) -> Table {
-    let mut columns = vec![
-        "scene",
-        "options",
-        "points",
-        "cells",
-        "fewer rays",
-        "faster",
-        "FLIP",
-        "RMSE",
-        "bias",
-        "pixels that differ, %",
-        "field, s",
+impl Line<'_> {
+    fn value(&self, name: &str) -> Option<f64> {
+        self.rows.value(&self.key, name)
+    }
+
+    fn number(&self, name: &str) -> Value {
+        Value::number(self.value(name))
+    }
+
+    /// What making the field takes over the time of rays without one; with the time of rays with it if `and_picture`.
+    fn making(&self, and_picture: bool) -> Value {
+        let value = |name: &str| self.value(name).unwrap_or(0.0);
+        let own = value("seconds") + if and_picture { 1e-3 * value("ms") } else { 0.0 };
+        Value::Of(own / (1e-3 * value("exact_ms")).max(f64::MIN_POSITIVE), '×')
+    }
+
+    /// A share of the time of making, per cent.
+    fn share(&self, name: &str) -> Value {
+        let [own, making] = [name, "seconds"].map(|name| self.value(name).unwrap_or(0.0));
+        Value::Number(100.0 * own / making.max(f64::MIN_POSITIVE))
+    }
+
+    /// What the paper has of making: its columns in [`PAPER_MAKING`].
+    fn paper_making(&self, column: usize) -> Option<f64> {
+        let is_of = |points: &Option<u32>| points.is_none_or(|n| self.options.contains(&format!("--dvf-points {n} ")));
+        let found = PAPER_MAKING.iter().find(|(name, points, _)| self.scene.contains(name) && is_of(points));
+        found.and_then(|(.., values)| values[column])
+    }
+
+    /// What the paper has of a measurement of Sponza: RMSE and FLIP.
+    fn paper(&self) -> Option<(f64, f64)> {
+        let first = if self.stage == Stage::Points { "--dvf-points" } else { "--dvf-cells" };
+        let options: Vec<&str> = self.options.split_whitespace().collect();
+        let has =
+            |words: &str| words.starts_with(first) && words.split_whitespace().all(|word| options.contains(&word));
+        let found = PAPER.iter().find(|(words, ..)| self.scene.contains("sponza") && has(words));
+        found.map(|paper| (paper.1, paper.2))
+    }
+}
+
+/// The columns that all tables begin with.
+fn first<'a>() -> Vec<Column<Line<'a>>> {
+    vec![
+        ("scene", |line| line.scene.into()),
+        ("options", |line| short(&line.options).into()),
+        ("points", |line| line.number("points")),
+    ]
+}
+
+fn columns<'a>(stage: Stage) -> Vec<Column<Line<'a>>> {
+    let all: [Column<Line>; 8] = [
+        ("cells", |line| line.number("longest")),
+        ("fewer rays", |line| Value::ratio(line.value("fewer"))),
+        ("faster", |line| Value::ratio(line.value("faster"))),
+        ("FLIP", |line| line.number("flip")),
+        ("RMSE", |line| line.number("rmse")),
+        ("bias", |line| line.number("bias")),
+        ("pixels that differ, %", |line| percent(line.value("pixels_that_differ"))),
+        ("field, s", |line| line.number("seconds")),
     ];
-    match stage {
-        Stage::Points | Stage::Grid => columns.extend(["RMSE, paper", "FLIP, paper"]),
-        Stage::Modes => columns.extend(["FLIP of other rays alone", "RMSE of other rays alone"]),
-        Stage::Memory => {
-            columns.extend(["bricks loaded", "needed", "loaded ÷ needed", "read", "pixels other than in core"])
-        }
-        _ => {}
-    }
-    let mut lines = Vec::new();
-    for scene in scenes {
-        for options in args.names(stage) {
-            let key = key(scene, stage, &options);
-            if !rows.has(&key) {
-                continue;
-            }
-            let value = |name: &str| rows.value(&key, name);
-            let mut line = vec![
-                Value::Text(scene.to_string()),
-                Value::Text(short(&options)),
-                Value::number(value("points")),
-                Value::number(value("longest")),
-                Value::ratio(value("fewer")),
-                Value::ratio(value("faster")),
-                Value::number(value("flip")),
-                Value::number(value("rmse")),
-                Value::number(value("bias")),
-                Value::number(value("pixels_that_differ").map(|share| 100.0 * share)),
-                Value::number(value("seconds")),
-            ];
-            match stage {
-                Stage::Points | Stage::Grid => line.extend(paper(stage, scene, &options).map(Value::number)),
-                Stage::Modes => line.extend(["noise_flip", "noise_rmse"].map(|name| Value::number(value(name)))),
-                Stage::Memory => line.extend([
-                    Value::number(value("bricks_loaded")),
-                    Value::number(value("bricks_needed")),
-                    Value::ratio(value("bricks_loaded").zip(value("bricks_needed")).map(|(a, b)| a / b.max(1.0))),
-                    Value::number(value("bricks_read")),
-                    Value::number(value("differ_from_in_core")),
-                ]),
-                _ => {}
-            }
-            lines.push(line);
-        }
-    }
-    let columns = columns.into_iter().map(String::from).collect();
-    Table { name: stage.name().into(), caption: READING.into(), columns, rows: lines }
+    let own: &[Column<Line>] = match stage {
+        Stage::Points | Stage::Grid => &[
+            ("RMSE, paper", |line| Value::number(line.paper().map(|paper| paper.0))),
+            ("FLIP, paper", |line| Value::number(line.paper().map(|paper| paper.1))),
+        ],
+        Stage::Modes => &[
+            ("FLIP of other rays alone", |line| line.number("noise_flip")),
+            ("RMSE of other rays alone", |line| line.number("noise_rmse")),
+        ],
+        Stage::Memory => &[
+            ("bricks loaded", |line| line.number("bricks_loaded")),
+            ("needed", |line| line.number("bricks_needed")),
+            ("loaded ÷ needed", |line| {
+                let bricks = line.value("bricks_loaded").zip(line.value("bricks_needed"));
+                Value::ratio(bricks.map(|(loaded, needed)| loaded / needed.max(1.0)))
+            }),
+            ("read", |line| line.number("bricks_read")),
+            ("pixels other than in core", |line| line.number("differ_from_in_core")),
+        ],
+        _ => &[],
+    };
+    [&first(), &all[..], own].concat()
 }
 
 /// What making the fields of the points takes.
-fn making(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Table {
-    let columns = [
-        "scene",
-        "options",
-        "points",
-        "making ÷ exact",
-        "making and picture ÷ exact",
-        "areas and sums, %",
-        "points and rays, %",
-        "labels, %",
-        "making ÷ exact, paper",
-        "making and picture ÷ exact, paper",
-        "areas and sums, %, paper",
-        "points and rays, %, paper",
-        "labels, %, paper",
+fn making<'a>() -> Vec<Column<Line<'a>>> {
+    let all: [Column<Line>; 10] = [
+        ("making ÷ exact", |line| line.making(false)),
+        ("making and picture ÷ exact", |line| line.making(true)),
+        ("areas and sums, %", |line| line.share("seconds_areas")),
+        ("points and rays, %", |line| line.share("seconds_rays")),
+        ("labels, %", |line| line.share("seconds_labels")),
+        ("making ÷ exact, paper", |line| Value::ratio(line.paper_making(0))),
+        ("making and picture ÷ exact, paper", |line| Value::ratio(line.paper_making(1))),
+        ("areas and sums, %, paper", |line| percent(line.paper_making(2))),
+        ("points and rays, %, paper", |line| percent(line.paper_making(3))),
+        ("labels, %, paper", |line| percent(line.paper_making(4))),
     ];
-    let mut lines = Vec::new();
-    for scene in scenes {
-        for options in args.names(Stage::Points) {
-            let key = key(scene, Stage::Points, &options);
-            if !rows.has(&key) {
-                continue;
-            }
-            let value = |name: &str| rows.value(&key, name).unwrap_or(0.0);
-            let (making, exact) = (value("seconds"), (1e-3 * value("exact_ms")).max(f64::MIN_POSITIVE));
-            let share = |name: &str| 100.0 * value(name) / making.max(f64::MIN_POSITIVE);
-            let own = [
-                making / exact,
-                (making + 1e-3 * value("ms")) / exact,
-                share("seconds_areas"),
-                share("seconds_rays"),
-                share("seconds_labels"),
-            ];
-            let is_of = |points: &Option<u32>| points.is_none_or(|n| options.contains(&format!("--dvf-points {n} ")));
-            let found = PAPER_MAKING.iter().find(|(name, points, _)| scene.contains(name) && is_of(points));
-            let [making, both, shares @ ..] = found.map_or([None; 5], |(.., values)| *values);
-            let hundredths = shares.map(|share| share.map(|share| 100.0 * share));
-            let mut line = vec![
-                Value::Text(scene.to_string()),
-                Value::Text(short(&options)),
-                Value::number(rows.value(&key, "points")),
-            ];
-            line.extend([Value::ratio(Some(own[0])), Value::ratio(Some(own[1]))]);
-            line.extend(own[2..].iter().map(|&share| Value::number(Some(share))));
-            line.extend([Value::ratio(making), Value::ratio(both)]);
-            line.extend(hundredths.map(Value::number));
-            lines.push(line);
-        }
-    }
-    let columns = columns.map(String::from).to_vec();
-    Table { name: "making".into(), caption: MAKING.into(), columns, rows: lines }
+    [&first(), &all[..]].concat()
 }
 
 /// How pictures of what moves flicker.
-fn flickering(args: &DvfBenchArgs, scenes: &[&str], rows: &Rows) -> Table {
-    let columns = [
-        "scene",
-        "options",
-        "points",
-        "cells",
-        "fewer rays",
-        "rays traced",
-        "rays of fields",
-        "fewer with these",
-        "FLIP",
-        "mean change ÷ mean noise",
-        "greatest change ÷ noise",
-        "pixels that jump in the worst frame, %",
+fn flicker<'a>() -> Vec<Column<Line<'a>>> {
+    let all: [Column<Line>; 9] = [
+        ("cells", |line| line.number("longest")),
+        ("fewer rays", |line| Value::ratio(line.value("fewer"))),
+        ("rays traced", |line| line.number("traced")),
+        ("rays of fields", |line| line.number("of_fields")),
+        ("fewer with these", |line| Value::ratio(line.value("fewer_with_fields"))),
+        ("FLIP", |line| line.number("flip")),
+        ("mean change ÷ mean noise", |line| line.number("mean_to_noise")),
+        ("greatest change ÷ noise", |line| line.number("greatest_to_noise")),
+        ("pixels that jump in the worst frame, %", |line| percent(line.value("jumps"))),
     ];
-    let mut lines = Vec::new();
-    for scene in scenes {
-        for options in args.names(Stage::Flicker) {
-            let key = key(scene, Stage::Flicker, &options);
-            if !rows.has(&key) {
-                continue;
-            }
-            let value = |name: &str| rows.value(&key, name);
-            lines.push(vec![
-                Value::Text(scene.to_string()),
-                Value::Text(short(&options)),
-                Value::number(value("points")),
-                Value::number(value("longest")),
-                Value::ratio(value("fewer")),
-                Value::number(value("traced")),
-                Value::number(value("of_fields")),
-                Value::ratio(value("fewer_with_fields")),
-                Value::number(value("flip")),
-                Value::number(value("mean_to_noise")),
-                Value::number(value("greatest_to_noise")),
-                Value::number(value("jumps").map(|share| 100.0 * share)),
-            ]);
-        }
-    }
-    let columns = columns.map(String::from).to_vec();
-    Table { name: Stage::Flicker.name().into(), caption: FLICKERING.into(), columns, rows: lines }
+    [&first(), &all[..]].concat()
 }

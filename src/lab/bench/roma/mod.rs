@@ -11,22 +11,19 @@ mod plan;
 mod seams;
 mod view;
 
-use super::cells::Header;
-use super::rows::{Row, Rows};
-use super::scenes;
-use crate::kernels::DeviceInfo;
+use super::args::wanted;
+use super::runner::Runner;
+use super::scenes::Scenes;
+use super::store::{Header, Row, Rows, Values, median};
 use crate::lab::console::Console;
 use crate::output::atomic;
-use crate::session::device::Device;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use args::{RomaBenchArgs, Settings};
-use brickwalk_convert::progress::Progress;
 use plan::{Job, Stage, Way};
 use seams::Seams;
 use serde_json::json;
-use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
-use view::{Picture, View};
+use std::collections::{BTreeMap, BTreeSet};
+use view::View;
 
 /// Raised when a value changes its meaning.
 const FORMAT: u32 = 2;
@@ -37,76 +34,36 @@ const FORMAT: u32 = 2;
 /// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
 pub fn run(args: &RomaBenchArgs, console: Console) -> Result<()> {
     let settings = args.settings();
-    let jobs: Vec<Job> = plan::jobs(&settings, args.sponza.is_some())
-        .into_iter()
-        .filter(|job| args.stages.is_empty() || args.stages.contains(&job.stage))
-        .collect();
+    let stages = wanted(Stage::ALL, &args.stages);
+    let mut jobs = plan::jobs(&settings, args.sponza.is_some());
+    jobs.retain(|job| stages.contains(&job.stage));
+    let leaks = if stages.contains(&Stage::Leaks) { &LEAKS[..] } else { &[] };
     atomic::create_folder(&args.output)?;
-    let mut rows = Rows::open(&args.output, header(args, &settings)?)?;
-    let deadline = args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
-    let progress = Progress::new();
-    let has_leaks = args.stages.is_empty() || args.stages.contains(&Stage::Leaks);
-    let leaks = if has_leaks { &LEAKS[..] } else { &[] };
+    let triangles = [settings.triangles; 3];
+    let scenes = Scenes::new(args.scenes.as_deref(), &args.output, triangles, args.sponza.as_deref(), console);
+    let own = json!({
+        "triangles": settings.triangles,
+        "size": settings.size.to_string(),
+        "repetitions": settings.repeat,
+        "samples": settings.samples,
+        "ao_length": settings.ao_length,
+        "sponza": scenes.sponza_name(),
+    });
+    let mut rows = Rows::open(args.output.join("rows.jsonl"), Header::new(FORMAT, &args.adapter, own)?, false)?;
+    let mut runner = Runner::new(args.minutes, console);
+    // Ways are compared with each other, so that all of a job are measured together.
+    let keys = |job: &Job| job.ways.iter().map(|way| job.key(way)).collect();
+    runner.measure(&mut rows, &jobs, keys, |job| measure(job, args, &settings, &scenes))?;
+    runner.measure(
+        &mut rows,
+        leaks,
+        |(name, _)| vec![leak_key(name)],
+        |(name, is_raster)| Ok(vec![Row { key: leak_key(name), values: leak_values(*is_raster) }]),
+    )?;
     let planned = jobs.iter().map(|job| job.ways.len()).sum::<usize>() + leaks.len();
-    progress.phase("measurements", planned as u64);
-    let mut ended = "";
-    for job in &jobs {
-        let missing: Vec<&Way> = job.ways.iter().filter(|way| !rows.has(&job.key(way))).collect();
-        progress.advance((job.ways.len() - missing.len()) as u64);
-        if missing.is_empty() {
-            continue;
-        }
-        if console.is_stopped() {
-            ended = "Interrupted: the same command goes on where this one stopped.\n";
-            break;
-        }
-        if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-            ended = "Out of time: the same command goes on where this one stopped.\n";
-            break;
-        }
-        // Ways are compared with each other, so that all of a job are measured together.
-        for (way, values) in measure(job, args, &settings, console)? {
-            let key = job.key(&way);
-            if !rows.has(&key) {
-                rows.push(Row { key, values })?;
-                progress.advance(1);
-            }
-        }
-    }
-    for (name, is_raster) in leaks {
-        let key = leak_key(name);
-        if ended.is_empty() && !rows.has(&key) {
-            rows.push(Row { key, values: leak_values(*is_raster) })?;
-        }
-        progress.advance(1);
-    }
-    progress.finish();
     let text = output::write(&args.output, &settings, &rows, planned)?;
-    console.show(&text)?;
-    if ended.starts_with("Interrupted") {
-        bail!("interrupted; {} holds what is measured, and the same command goes on", args.output.display());
-    }
-    console.show(ended)
+    runner.end(&args.output, &text)
 }
-
-fn header(args: &RomaBenchArgs, settings: &Settings) -> Result<Header> {
-    let DeviceInfo { name, driver, driver_info, backend, .. } = Device::open(&args.adapter)?.info();
-    Ok(Header {
-        format: FORMAT,
-        settings: json!({
-            "triangles": settings.triangles,
-            "size": settings.size.to_string(),
-            "repetitions": settings.repeat,
-            "samples": settings.samples,
-            "ao_length": settings.ao_length,
-            "sponza": args.sponza.as_ref().map(|file| file.file_name().map(|name| name.to_string_lossy().into_owned())),
-        }),
-        adapter: json!({ "name": name, "driver": driver, "driver_info": driver_info, "backend": backend }),
-        commit: env!("BRICKWALK_COMMIT").into(),
-    })
-}
-
-type Values = BTreeMap<String, f64>;
 
 /// How base maps are made whose leaks are measured, and whether that is by rasterising.
 const LEAKS: [(&str, bool); 2] = [("raster", true), ("conservative", false)];
@@ -129,9 +86,8 @@ fn leak_name(wide: usize, samples: u32) -> String {
 }
 
 /// Everything that is measured of the ways of a job.
-fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings, console: Console) -> Result<Vec<(Way, Values)>> {
-    let folder = args.scenes.clone().unwrap_or_else(|| args.output.join("scenes"));
-    let place = scenes::place(job.scene, &folder, &settings.of_scenes(), args.sponza.as_deref(), console)?;
+fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings, scenes: &Scenes) -> Result<Vec<Row>> {
+    let place = scenes.place(job.scene)?;
     let mut all: Vec<(Way, Values)> = job.ways.iter().map(|way| (*way, Values::new())).collect();
     let mut view = View::open(job, &place, settings, &args.adapter)?;
     if job.times {
@@ -146,7 +102,7 @@ fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings, console: Consol
             }
         }
         for ((_, values), turns) in all.iter_mut().zip(turns) {
-            values.extend(medians(&turns));
+            values.extend(by_name(&turns, median));
         }
     }
     if job.stage == Stage::Seams {
@@ -154,7 +110,7 @@ fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings, console: Consol
     } else if job.errors {
         measure_errors(&mut view, &mut all, job, settings)?;
     }
-    Ok(all)
+    Ok(all.into_iter().map(|(way, values)| Row { key: job.key(&way), values }).collect())
 }
 
 /// Errors, means over the frames.
@@ -166,7 +122,7 @@ fn measure_errors(view: &mut View, all: &mut [(Way, Values)], job: &Job, setting
         for ((way, _), found) in all.iter().zip(&mut found) {
             // What the reference's own noise is: another one, of other samples.
             let seed = u32::from(*way == Way::Exact);
-            let converged: Picture = view.picture(way, settings.samples, seed)?;
+            let converged = view.picture(way, settings.samples, seed)?;
             let mut errors: Values = view.errors("converged", &converged, &exact)?.into_iter().collect();
             errors.extend(view.cells());
             if *way != Way::Exact {
@@ -204,14 +160,9 @@ fn measure_seams(view: &mut View, all: &mut [(Way, Values)], job: &Job, settings
 
 /// What `of` makes of the values of each name.
 fn by_name(all: &[Values], of: impl Fn(Vec<f64>) -> Option<f64>) -> Values {
-    let names: std::collections::BTreeSet<&String> = all.iter().flat_map(BTreeMap::keys).collect();
+    let names: BTreeSet<&String> = all.iter().flat_map(BTreeMap::keys).collect();
     let named = |name: &String| of(all.iter().filter_map(|values| values.get(name).copied()).collect());
     names.into_iter().filter_map(|name| Some((name.clone(), named(name)?))).collect()
-}
-
-/// The median of every value over the turns.
-fn medians(turns: &[Values]) -> Values {
-    by_name(turns, super::cells::median)
 }
 
 #[cfg(test)]
@@ -225,9 +176,9 @@ mod tests {
             values.extend(b.map(|b| ("b".to_string(), b)));
             values
         };
-        let all = medians(&[turn(3.0, None), turn(1.0, Some(7.0)), turn(2.0, None)]);
+        let all = by_name(&[turn(3.0, None), turn(1.0, Some(7.0)), turn(2.0, None)], median);
         assert_eq!(all, turn(2.0, Some(7.0)));
-        assert!(medians(&[]).is_empty());
+        assert!(by_name(&[], median).is_empty());
         let sums = by_name(&[turn(3.0, None), turn(1.0, Some(7.0))], |values| Some(values.iter().sum()));
         assert_eq!(sums, turn(4.0, Some(7.0)));
     }

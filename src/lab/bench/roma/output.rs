@@ -3,11 +3,11 @@
 use super::args::Settings;
 use super::plan::{FIELD, Job, Stage, USUAL, Way, jobs};
 use super::{LEAKS, leak_key, leak_name, leaks, seams};
-use crate::lab::bench::results::Results;
-use crate::lab::bench::rows::Rows;
+use crate::lab::bench::results::{Column, Results, percent, plot, ratio, table};
+use crate::lab::bench::store::Rows;
 use crate::settings::sizes::human_count;
 use anyhow::Result;
-use brickwalk_report::{Graph, GraphShape, Section, Table, Unit, Value};
+use brickwalk_report::{Graph, Section, Table, Unit, Value};
 use std::path::Path;
 
 const TITLE: &str = "The experiments of ROMA";
@@ -38,18 +38,20 @@ const PAPER_SHADOWS: [f64; 2] = [3.6, 1.7];
 /// The folder cannot be written.
 pub fn write(folder: &Path, settings: &Settings, rows: &Rows, planned: usize) -> Result<String> {
     let all = jobs(settings, true);
-    let section = |stage| {
-        let of_stage: Vec<&Job> = all.iter().filter(|job| job.stage == stage).collect();
+    let section = |&stage: &Stage| {
+        let jobs: Vec<&Job> = all.iter().filter(|job| job.stage == stage).collect();
+        let lines = || jobs.iter().flat_map(|job| job.ways.iter().map(|way| Measurement { job, way: *way, rows }));
+        let lines = || lines().filter(|line| rows.has(&line.job.key(&line.way)));
         let table = match stage {
-            Stage::Speed => speed(&of_stage, rows),
-            Stage::Seams => seams_table(&of_stage, rows),
+            Stage::Speed => table(stage.name(), SPEED, lines(), &speed()),
+            Stage::Seams => seams_table(lines().filter(|line| line.way != Way::Exact)),
             Stage::Leaks => leaks_table(rows),
-            _ => errors(stage, &of_stage, rows),
+            _ => table(stage.name(), ERRORS, lines(), &errors(stage)),
         };
         (!table.rows.is_empty()).then(|| Section {
             title: title(stage).into(),
             tables: vec![table],
-            plots: plots(stage, &all, rows),
+            plots: plots(stage, &jobs, rows),
             ..Section::default()
         })
     };
@@ -60,8 +62,8 @@ pub fn write(folder: &Path, settings: &Settings, rows: &Rows, planned: usize) ->
         ("Turns", settings.repeat.to_string()),
         ("Samples of converged pictures", settings.samples.to_string()),
     ];
-    let sections = Stage::ALL.into_iter().filter_map(section).collect();
-    Results { name: "roma", title: TITLE, reading: READING, facts, sections, rows, planned }.write(folder)
+    let sections = Stage::ALL.iter().filter_map(section).collect();
+    Results::of_rows(("roma", TITLE, READING), rows, planned, facts, sections).write(folder)
 }
 
 fn title(stage: Stage) -> &'static str {
@@ -79,246 +81,181 @@ fn title(stage: Stage) -> &'static str {
     }
 }
 
-/// `a` over `b`, where both are above zero.
-fn ratio(a: Option<f64>, b: Option<f64>) -> Option<f64> {
-    a.zip(b).filter(|(a, b)| *a > 0.0 && *b > 0.0).map(|(a, b)| a / b)
+/// What was measured of a way of a job.
+#[derive(Clone, Copy)]
+struct Measurement<'a> {
+    job: &'a Job,
+    way: Way,
+    rows: &'a Rows,
 }
 
-/// How much longer than `way` the distance field of as many cells takes: generation, tracing, both.
-fn over_field(way: &Way, value: &dyn Fn(&Way, &str) -> Option<f64>) -> [Option<f64>; 3] {
-    let Some(field) = way.field() else { return [None; 3] };
-    let of = |way: &Way| [value(way, "ms_generation"), value(way, "ms_trace")];
-    let [field, own] = [of(&field), of(way)];
-    let total = |of: [Option<f64>; 2]| of[0].zip(of[1]).map(|(a, b)| a + b);
-    [ratio(field[0], own[0]), ratio(field[1], own[1]), ratio(total(field), total(own))]
+impl Measurement<'_> {
+    /// Of another way.
+    fn of(&self, way: Way) -> Self {
+        Self { way, ..*self }
+    }
+
+    fn value(&self, name: &str) -> Option<f64> {
+        self.rows.value(&self.job.key(&self.way), name)
+    }
+
+    /// A value that exact rays have none of.
+    fn own(&self, name: &str) -> Value {
+        Value::number(self.value(name).filter(|_| self.way != Way::Exact))
+    }
+
+    /// Nanoseconds of a ray. Of rays that maps and bricks are asked about both count.
+    fn per_ray(&self) -> Option<f64> {
+        let rays = self.of(if self.way.is_traced() { Way::Exact } else { self.way }).value("rays");
+        ratio(self.value("ms_trace").map(|ms| 1e6 * ms), rays)
+    }
+
+    fn exact_over(&self) -> Option<f64> {
+        ratio(self.of(Way::Exact).per_ray(), self.per_ray())
+    }
+
+    /// A value over that of the distance field that is beside it.
+    fn over_field(&self, name: &str) -> Value {
+        let field = self.way.field().map(|field| if self.job.stage == Stage::Ao { FIELD } else { field });
+        Value::ratio(field.and_then(|field| ratio(self.value(name), self.of(field).value(name))))
+    }
+
+    /// How much longer than it the distance field of as many cells takes.
+    fn field_over(&self, part: Part) -> Value {
+        field_over(self.way, part, |way| {
+            let own = self.of(way);
+            Some([own.value("ms_generation")?, own.value("ms_trace")?])
+        })
+    }
+}
+
+/// A part of the times of generation and tracing.
+type Part = fn([f64; 2]) -> f64;
+
+const GENERATION: Part = |[generation, _]| generation;
+const TRACING: Part = |[_, tracing]| tracing;
+const BOTH: Part = |[generation, tracing]| generation + tracing;
+
+/// How much longer than `way` the distance field of as many cells takes; `times` are those of generation and tracing.
+fn field_over(way: Way, part: Part, times: impl Fn(Way) -> Option<[f64; 2]>) -> Value {
+    Value::ratio(way.field().and_then(|field| ratio(times(field).map(part), times(way).map(part))))
 }
 
 /// What the paper's table 2 has of a way, ms: generation and tracing.
-fn paper_of(way: &Way) -> Option<(f64, f64)> {
+fn paper(way: Way) -> Option<[f64; 2]> {
     match way {
         Way::Roma { k, size, is_unsnapped: false } => {
-            PAPER.iter().find(|paper| (paper.0, paper.1) == (*size, *k)).map(|paper| (paper.2, paper.3))
+            PAPER.iter().find(|paper| (paper.0, paper.1) == (size, k)).map(|paper| [paper.2, paper.3])
         }
-        Way::Field { size } => PAPER_FIELD.iter().find(|paper| paper.0 == *size).map(|paper| (paper.1, paper.2)),
+        Way::Field { size } => PAPER_FIELD.iter().find(|paper| paper.0 == size).map(|paper| [paper.1, paper.2]),
         _ => None,
     }
 }
 
-fn speed(jobs: &[&Job], rows: &Rows) -> Table {
-    let columns = [
-        "scene",
-        "way",
-        "generation, ms",
-        "tracing, ms",
-        "ns a ray",
-        "exact ÷ tracing",
-        "df ÷ generation",
-        "df ÷ tracing",
-        "df ÷ both",
-        "generation, paper",
-        "tracing, paper",
-        "df ÷ generation, paper",
-        "df ÷ tracing, paper",
-        "df ÷ both, paper",
-    ];
-    let of_paper = |way: &Way, name: &str| {
-        let (generation, tracing) = paper_of(way)?;
-        Some(if name == "ms_generation" { generation } else { tracing })
-    };
-    let mut lines = Vec::new();
-    for job in jobs {
-        let value = |way: &Way, name: &str| rows.value(&job.key(way), name);
-        for way in job.ways.iter().filter(|way| rows.has(&job.key(way))) {
-            let per_ray = |way: &Way| ratio(value(way, "ms_trace").map(|ms| 1e6 * ms), value(way, "rays"));
-            let mut line = vec![
-                Value::Text(job.scene.name().into()),
-                Value::Text(way.to_string()),
-                Value::number(value(way, "ms_generation").filter(|_| *way != Way::Exact)),
-                Value::number(value(way, "ms_trace")),
-                Value::number(per_ray(way)),
-                Value::ratio(ratio(per_ray(&Way::Exact), per_ray(way))),
-            ];
-            line.extend(over_field(way, &value).map(Value::ratio));
-            line.extend(["ms_generation", "ms_trace"].map(|name| Value::number(of_paper(way, name))));
-            line.extend(over_field(way, &of_paper).map(Value::ratio));
-            lines.push(line);
-        }
-    }
-    let caption = "Making the maps or the distance field of a frame (generation) and answering its rays (tracing), device time; of exact rays \
-                   the wall time of the pass. df ÷: how much longer the distance field of as many cells takes.";
-    Table { name: "speed".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: lines }
+const SPEED: &str = "Making the maps or the distance field of a frame (generation) and answering its rays (tracing), device time; of exact rays \
+                     the wall time of the pass. df ÷: how much longer the distance field of as many cells takes.";
+
+fn speed<'a>() -> [Column<Measurement<'a>>; 14] {
+    [
+        ("scene", |line| line.job.scene.name().into()),
+        ("way", |line| line.way.to_string().into()),
+        ("generation, ms", |line| line.own("ms_generation")),
+        ("tracing, ms", |line| Value::number(line.value("ms_trace"))),
+        ("ns a ray", |line| Value::number(line.per_ray())),
+        ("exact ÷ tracing", |line| Value::ratio(line.exact_over())),
+        ("df ÷ generation", |line| line.field_over(GENERATION)),
+        ("df ÷ tracing", |line| line.field_over(TRACING)),
+        ("df ÷ both", |line| line.field_over(BOTH)),
+        ("generation, paper", |line| Value::number(paper(line.way).map(|ms| ms[0]))),
+        ("tracing, paper", |line| Value::number(paper(line.way).map(|ms| ms[1]))),
+        ("df ÷ generation, paper", |line| field_over(line.way, GENERATION, paper)),
+        ("df ÷ tracing, paper", |line| field_over(line.way, TRACING, paper)),
+        ("df ÷ both, paper", |line| field_over(line.way, BOTH, paper)),
+    ]
 }
 
-fn errors(stage: Stage, jobs: &[&Job], rows: &Rows) -> Table {
-    let mut columns = vec![
-        "scene",
-        "view",
-        "way",
-        "FLIP",
-        "bias, %",
-        "RMSE, %",
-        "FLIP, one sample",
-        "FLIP ÷ df",
-        "FLIP ÷ df, one sample",
-        "ns a ray",
-        "exact ÷ this",
-        "bricks loaded",
-        "capped, %",
-        "lamps' maps, ms",
-    ];
-    let has_times = stage == Stage::Shadows;
-    let has_lamps = stage == Stage::Diffuse;
+const ERRORS: &str = "How far pictures are from exact ones: converged, and with one sample a pixel. Times are those of tracing, without the \
+                      making of maps; bricks are those that the pass loaded. FLIP ÷ df: over that of the distance field of as many cells, which \
+                      takes as much memory with K = 4; in the paper it is below 1 in every scene of ambient occlusion. Of figure 5 errors are \
+                      means over six frames along the path, and the field has 128 cells beside all maps. Cells: length of rays, in cells that bricks have; of fewer than three maps \
+                      know nothing, and `--secondary auto` traces them. Whole: all of the effect, the making of maps as well.";
+
+fn errors<'a>(stage: Stage) -> Vec<Column<Measurement<'a>>> {
+    /// What the paper has of soft shadows.
+    fn of_paper(line: &Measurement, which: usize) -> Value {
+        let is_paper = matches!(line.way, Way::Roma { k: 8, is_unsnapped: true, .. });
+        Value::ratio(is_paper.then(|| PAPER_SHADOWS[which]))
+    }
     let has_lengths = [Stage::Ao, Stage::Radius].contains(&stage);
+    let mut columns: Vec<Column<Measurement>> =
+        vec![("scene", |line| line.job.scene.name().into()), ("view", |line| line.job.variant.clone().into())];
     if has_lengths {
-        columns.insert(2, "cells");
-        columns.insert(4, "MiB a level");
+        columns.push(("cells", |line| Value::number(line.value("cells"))));
     }
-    columns.truncate(columns.len() - usize::from(!has_lamps));
-    let is_whole = stage == Stage::Handover;
-    if is_whole {
-        columns.extend(["whole, ms", "whole ÷ exact"]);
+    columns.push(("way", |line| exact_as(line.way, "exact (noise)").into()));
+    if has_lengths {
+        columns.push(("MiB a level", |line| Value::number(line.way.mib())));
     }
-    if has_times {
-        columns.extend([
-            "generation, ms",
-            "df ÷ generation",
-            "df ÷ tracing",
-            "df ÷ generation, paper",
-            "df ÷ tracing, paper",
-        ]);
-    }
-    let mut lines = Vec::new();
-    for job in jobs {
-        let value = |way: &Way, name: &str| rows.value(&job.key(way), name);
-        let field = |way: &Way| way.field().map(|field| if stage == Stage::Ao { FIELD } else { field });
-        // Of rays that maps and bricks are asked about both count.
-        let rays = |way: &Way| value(if way.is_traced() { &Way::Exact } else { way }, "rays");
-        let per_ray = |way: &Way| ratio(value(way, "ms_trace").map(|ms| 1e6 * ms), rays(way));
-        for way in job.ways.iter().filter(|way| rows.has(&job.key(way))) {
-            let percent = |name: &str| Value::number(value(way, name).map(|x| 100.0 * x));
-            let beside =
-                |name: &str| Value::ratio(field(way).and_then(|field| ratio(value(way, name), value(&field, name))));
-            let mut line = vec![
-                Value::Text(job.scene.name().into()),
-                Value::Text(job.variant.clone()),
-                Value::Text(if *way == Way::Exact { "exact (noise)".into() } else { way.to_string() }),
-                Value::number(value(way, "flip_converged")),
-                percent("bias_converged"),
-                percent("rmse_converged"),
-                Value::number(value(way, "flip_single")),
-                beside("flip_converged"),
-                beside("flip_single"),
-                Value::number(per_ray(way)),
-                Value::ratio(ratio(per_ray(&Way::Exact), per_ray(way)).filter(|_| *way != Way::Exact)),
-                Value::number(value(way, "bricks_loaded")),
-                Value::number(ratio(value(way, "rays_capped"), value(way, "rays")).map(|x| 100.0 * x)),
-            ];
-            if has_lengths {
-                line.insert(2, Value::number(value(way, "cells")));
-                line.insert(4, Value::number(way.mib()));
-            }
-            if has_lamps {
-                line.push(Value::number(value(way, "ms_lamps").filter(|_| *way != Way::Exact)));
-            }
-            if is_whole {
-                line.push(Value::number(value(way, "ms")));
-                line.push(Value::ratio(ratio(value(way, "ms"), value(&Way::Exact, "ms"))));
-            }
-            if has_times {
-                let [generation, tracing, _] = over_field(way, &value);
-                line.push(Value::number(value(way, "ms_generation").filter(|_| *way != Way::Exact)));
-                line.extend([generation, tracing].map(Value::ratio));
-                let is_paper = matches!(way, Way::Roma { k: 8, is_unsnapped: true, .. });
-                line.extend(PAPER_SHADOWS.map(|ratio| Value::ratio(Some(ratio).filter(|_| is_paper))));
-            }
-            lines.push(line);
-        }
-    }
-    let caption = "How far pictures are from exact ones: converged, and with one sample a pixel. Times are those of tracing, without the \
-                   making of maps; bricks are those that the pass loaded. FLIP ÷ df: over that of the distance field of as many cells, which \
-                   takes as much memory with K = 4; in the paper it is below 1 in every scene of ambient occlusion. Of figure 5 errors are \
-                   means over six frames along the path, and the field has 128 cells beside all maps. Cells: length of rays, in cells that bricks have; of fewer than three maps \
-                   know nothing, and `--secondary auto` traces them. Whole: all of the effect, the making of maps as well.";
-    Table {
-        name: stage.name().into(),
-        caption: caption.into(),
-        columns: columns.into_iter().map(String::from).collect(),
-        rows: lines,
-    }
+    columns.extend::<[Column<Measurement>; 10]>([
+        ("FLIP", |line| Value::number(line.value("flip_converged"))),
+        ("bias, %", |line| percent(line.value("bias_converged"))),
+        ("RMSE, %", |line| percent(line.value("rmse_converged"))),
+        ("FLIP, one sample", |line| Value::number(line.value("flip_single"))),
+        ("FLIP ÷ df", |line| line.over_field("flip_converged")),
+        ("FLIP ÷ df, one sample", |line| line.over_field("flip_single")),
+        ("ns a ray", |line| Value::number(line.per_ray())),
+        ("exact ÷ this", |line| Value::ratio(line.exact_over().filter(|_| line.way != Way::Exact))),
+        ("bricks loaded", |line| Value::number(line.value("bricks_loaded"))),
+        ("capped, %", |line| percent(ratio(line.value("rays_capped"), line.value("rays")))),
+    ]);
+    let more: &[Column<Measurement>] = match stage {
+        Stage::Diffuse => &[("lamps' maps, ms", |line| line.own("ms_lamps"))],
+        Stage::Handover => &[
+            ("whole, ms", |line| Value::number(line.value("ms"))),
+            ("whole ÷ exact", |line| Value::ratio(ratio(line.value("ms"), line.of(Way::Exact).value("ms")))),
+        ],
+        Stage::Shadows => &[
+            ("generation, ms", |line| line.own("ms_generation")),
+            ("df ÷ generation", |line| line.field_over(GENERATION)),
+            ("df ÷ tracing", |line| line.field_over(TRACING)),
+            ("df ÷ generation, paper", |line| of_paper(line, 0)),
+            ("df ÷ tracing, paper", |line| of_paper(line, 1)),
+        ],
+        _ => &[],
+    };
+    columns.extend(more);
+    columns
 }
 
-fn plots(stage: Stage, all: &[Job], rows: &Rows) -> Vec<Graph> {
-    if stage == Stage::Handover {
-        return all.iter().filter(|job| job.stage == stage).filter_map(|job| error_over_time(job, rows)).collect();
-    }
-    if stage == Stage::Seams {
-        return all.iter().filter(|job| job.stage == stage).filter_map(|job| error_over_distance(job, rows)).collect();
-    }
-    if stage != Stage::Radius {
-        return Vec::new();
-    }
-    let line = |way: &Way| {
-        let mut points: Vec<(f64, f64)> = all
-            .iter()
-            .filter(|job| job.stage == stage)
-            .filter_map(|job| Some((job.length, rows.value(&job.key(way), "flip_converged")?)))
-            .map(|(length, flip)| (length, 100.0 * flip))
-            .collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        (if *way == Way::Exact { "noise of the exact picture".into() } else { way.to_string() }, points)
-    };
-    vec![Graph {
-        title: "FLIP over the length of occlusion rays, world units".into(),
-        reading: "Hundredths of FLIP. Rays shorter than a few cells are not answered by cells.".into(),
-        shape: GraphShape::Lines {
-            across: "length",
-            unit: Unit::Percent,
-            lines: vec![line(&USUAL), line(&FIELD), line(&Way::Exact)],
-        },
-    }]
+/// The name of a way; of exact rays `name`.
+fn exact_as(way: Way, name: &str) -> String {
+    if way == Way::Exact { name.into() } else { way.to_string() }
 }
+
+const SEAMS: &str = "Occlusion of what is near a side of the cube of a map, beyond which cells are twice as large; cells are 128ths of that cube's side, \
+                     distances the middles of bins two cells wide. Differences from the exact picture and their magnitudes, relative to its mean there, of six frames \
+                     along the path together.";
 
 /// Errors by the distance from a seam.
-fn seams_table(jobs: &[&Job], rows: &Rows) -> Table {
-    let columns = ["scene", "way", "cells from the seam, outward", "pixels", "bias, %", "error, %"];
-    let mut lines = Vec::new();
-    for job in jobs {
-        for way in job.ways.iter().filter(|way| **way != Way::Exact && rows.has(&job.key(way))) {
-            for bin in seams::bins() {
-                let value = |name: &str| rows.value(&job.key(way), &format!("{name} at {bin}"));
-                lines.push(vec![
-                    Value::Text(job.scene.name().into()),
-                    Value::Text(way.to_string()),
-                    Value::number(Some(bin.into())),
-                    Value::number(value("pixels")),
-                    Value::number(value("bias").map(|x| 100.0 * x)),
-                    Value::number(value("error").map(|x| 100.0 * x)),
-                ]);
-            }
-        }
+fn seams_table<'a>(lines: impl Iterator<Item = Measurement<'a>>) -> Table {
+    type InBin<'a> = (Measurement<'a>, i32);
+    fn value((line, bin): &InBin, name: &str) -> Option<f64> {
+        line.value(&format!("{name} at {bin}"))
     }
-    let caption = "Occlusion of what is near a side of the cube of a map, beyond which cells are twice as large; cells are 128ths of that cube's side, \
-                   distances the middles of bins two cells wide. Differences from the exact picture and their magnitudes, relative to its mean there, of six frames \
-                   along the path together.";
-    Table { name: "seams".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: lines }
+    let columns: [Column<InBin>; 6] = [
+        ("scene", |(line, _)| line.job.scene.name().into()),
+        ("way", |(line, _)| line.way.to_string().into()),
+        ("cells from the seam, outward", |(_, bin)| Value::Number((*bin).into())),
+        ("pixels", |at| Value::number(value(at, "pixels"))),
+        ("bias, %", |at| percent(value(at, "bias"))),
+        ("error, %", |at| percent(value(at, "error"))),
+    ];
+    let bins = lines.flat_map(|line| seams::bins().map(move |bin| (line, bin)));
+    table("seams", SEAMS, bins, &columns)
 }
 
-/// The magnitude of errors over the distance from a seam; `None` where nothing is measured.
-fn error_over_distance(job: &Job, rows: &Rows) -> Option<Graph> {
-    let line = |way: &Way| {
-        let point = |bin: i32| {
-            let error = rows.value(&job.key(way), &format!("error at {bin}"))?;
-            Some((f64::from(bin + seams::REACH), 100.0 * error))
-        };
-        (way.to_string(), seams::bins().filter_map(point).collect::<Vec<_>>())
-    };
-    let lines: Vec<_> = job.ways.iter().filter(|way| **way != Way::Exact).map(line).collect();
-    lines.iter().any(|(_, points)| !points.is_empty()).then(|| Graph {
-        title: format!("Error over the distance from a seam, {}", job.scene.name()),
-        reading: format!("Mean magnitude of differences from the exact picture, per cent, over cells from {} inside of a map to as many outside; its side is at {}.", seams::REACH, seams::REACH),
-        shape: GraphShape::Lines { across: "cells", unit: Unit::Percent, lines },
-    })
-}
+const LEAKING: &str = "Columns of turned maps that cross a random plane without a set bit: of the paper's base maps, rasterised from three sides, and of conservative \
+                       ones. Rays of ao have the last width with two look-ups, all others with four.";
 
 /// Shares of columns that pass through a plane, beside those measured before (spec §2).
 fn leaks_table(rows: &Rows) -> Table {
@@ -327,50 +264,77 @@ fn leaks_table(rows: &Rows) -> Table {
         [[Some(11.5), None, Some(2.7)], [Some(35.0), None, Some(6.3)], [None; 3]],
         [[Some(0.0), None, None], [Some(8.4), Some(1.1), None], [None; 3]],
     ];
-    let widths = ["the base map", "its diagonal", "the diagonal of twice as many cells"];
-    let columns = ["base map", "turned map as wide as", "look-ups a texel", "leaks, %", "leaks before, %"];
-    let mut lines = Vec::new();
-    for ((name, _), before) in LEAKS.iter().zip(BEFORE) {
-        for (wide, width) in widths.iter().enumerate() {
-            for (k, samples) in leaks::SAMPLES.into_iter().enumerate() {
-                if let Some(value) = rows.value(&leak_key(name), &leak_name(wide, samples)) {
-                    lines.push(vec![
-                        Value::Text((*name).into()),
-                        Value::Text((*width).into()),
-                        Value::number(Some(samples.into())),
-                        Value::number(Some(value)),
-                        Value::number(before[wide][k]),
-                    ]);
-                }
-            }
-        }
-    }
-    let caption = "Columns of turned maps that cross a random plane without a set bit: of the paper's base maps, rasterised from three sides, and of conservative \
-                   ones. Rays of ao have the last width with two look-ups, all others with four.";
-    Table { name: "leaks".into(), caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: lines }
+    const WIDTHS: [&str; 3] = ["the base map", "its diagonal", "the diagonal of twice as many cells"];
+    /// Which of [`LEAKS`], of [`WIDTHS`], and of [`leaks::SAMPLES`], and the share.
+    type Leak = ([usize; 3], f64);
+    let each = |[a, b, c]: [usize; 3]| {
+        let share = rows.value(&leak_key(LEAKS[a].0), &leak_name(b, leaks::SAMPLES[c]));
+        share.map(|share| ([a, b, c], share))
+    };
+    let columns: [Column<Leak>; 5] = [
+        ("base map", |([a, ..], _)| LEAKS[*a].0.into()),
+        ("turned map as wide as", |([_, b, _], _)| WIDTHS[*b].into()),
+        ("look-ups a texel", |([.., c], _)| Value::Number(leaks::SAMPLES[*c].into())),
+        ("leaks, %", |(_, share)| Value::Number(*share)),
+        ("leaks before, %", |([a, b, c], _)| Value::number(BEFORE[*a][*b][*c])),
+    ];
+    table("leaks", LEAKING, (0..18).map(|i| [i / 9, i / 3 % 3, i % 3]).filter_map(each), &columns)
 }
 
-/// FLIP of converged pictures over the time of the effect, by the ways of a job; `None` where nothing is measured.
-fn error_over_time(job: &Job, rows: &Rows) -> Option<Graph> {
+fn plots(stage: Stage, jobs: &[&Job], rows: &Rows) -> Vec<Graph> {
+    match stage {
+        Stage::Handover => jobs.iter().map(|job| error_over_time(job, rows)).collect(),
+        Stage::Seams => jobs.iter().map(|job| error_over_distance(job, rows)).collect(),
+        Stage::Radius => {
+            let line = |way: Way| {
+                let point = |job: &&Job| Some((job.length, 100.0 * rows.value(&job.key(&way), "flip_converged")?));
+                (exact_as(way, "noise of the exact picture"), jobs.iter().filter_map(point).collect())
+            };
+            let title = "FLIP over the length of occlusion rays, world units".into();
+            let reading = "Hundredths of FLIP. Rays shorter than a few cells are not answered by cells.";
+            vec![plot(title, reading, "length", Unit::Percent, [USUAL, FIELD, Way::Exact].map(line).to_vec())]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The magnitude of errors over the distance from a seam.
+fn error_over_distance(job: &Job, rows: &Rows) -> Graph {
+    let line = |way: &Way| {
+        let point = |bin: i32| {
+            let error = rows.value(&job.key(way), &format!("error at {bin}"))?;
+            Some((f64::from(bin + seams::REACH), 100.0 * error))
+        };
+        (way.to_string(), seams::bins().filter_map(point).collect())
+    };
+    let reach = seams::REACH;
+    plot(
+        format!("Error over the distance from a seam, {}", job.scene),
+        &format!(
+            "Mean magnitude of differences from the exact picture, per cent, over cells from {reach} inside of a map to as many \
+             outside; its side is at {reach}."
+        ),
+        "cells",
+        Unit::Percent,
+        job.ways.iter().filter(|way| **way != Way::Exact).map(line).collect(),
+    )
+}
+
+/// FLIP of converged pictures over the time of the effect, by the ways of a job.
+fn error_over_time(job: &Job, rows: &Rows) -> Graph {
     let point = |way: &Way| {
         let value = |name: &str| rows.value(&job.key(way), name);
         Some((value("ms")?, 100.0 * value("flip_converged")?))
     };
-    let line = |name: &str, of: fn(&Way) -> bool| {
-        let mut points: Vec<(f64, f64)> = job.ways.iter().filter(|way| of(way)).filter_map(point).collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        (name.to_string(), points)
-    };
-    let lines = vec![
-        line("maps alone", |way| matches!(way, Way::Roma { .. })),
-        line("auto: maps corrected by one ray in 2 to 8", |way| matches!(way, Way::Corrected { .. })),
-        line("auto: those in doubt traced", |way| *way == Way::Sifted),
-        line("auto: 2 to 10 % wrong", |way| matches!(way, Way::Bounded { .. })),
-        line("exact (noise)", |way| *way == Way::Exact),
+    let lines: [(&str, fn(&Way) -> bool); 5] = [
+        ("maps alone", |way| matches!(way, Way::Roma { .. })),
+        ("auto: maps corrected by one ray in 2 to 8", |way| matches!(way, Way::Corrected { .. })),
+        ("auto: those in doubt traced", |way| *way == Way::Sifted),
+        ("auto: 2 to 10 % wrong", |way| matches!(way, Way::Bounded { .. })),
+        ("exact (noise)", |way| *way == Way::Exact),
     ];
-    lines.iter().any(|(_, points)| !points.is_empty()).then(|| Graph {
-        title: format!("Error over time, {}", job.variant),
-        reading: "Hundredths of FLIP against milliseconds of ao in a frame, the making of maps as well.".into(),
-        shape: GraphShape::Lines { across: "ms", unit: Unit::Percent, lines },
-    })
+    let lines =
+        lines.map(|(name, of)| (name.to_string(), job.ways.iter().filter(|way| of(way)).filter_map(point).collect()));
+    let reading = "Hundredths of FLIP against milliseconds of ao in a frame, the making of maps as well.";
+    plot(format!("Error over time, {}", job.variant), reading, "ms", Unit::Percent, lines.to_vec())
 }

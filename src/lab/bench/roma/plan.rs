@@ -1,79 +1,36 @@
 //! What is measured.
 
 use super::args::Settings as Scale;
-use crate::lab::bench::plan::SceneId;
+use crate::lab::bench::scenes::SceneId;
 use crate::secondary::Method;
 use crate::secondary::roma::{self, Unsnapped};
 use crate::session::Settings;
-use crate::settings::{Effect, EffectList, Plain, Rule, Turn, Value};
+use crate::settings::{Effect, EffectList, Turn, names};
 use std::fmt;
 
-/// A part of the measurements that can be asked for alone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Times over resolutions and numbers of directions (the paper's table 2).
-    Speed,
-    /// Errors by scenes (its figure 5).
-    Ao,
-    /// Errors by resolutions and numbers of directions (its figure 9).
-    Resolution,
-    /// Errors by the length of rays: where the method fails.
-    Radius,
-    /// Snapped and unsnapped shadow rays (its figures 7 and 8).
-    Shadows,
-    /// One-bounce diffuse light of the sun by reflective shadow maps (its figure 6).
-    Diffuse,
-    /// A cache that holds 15 % of the scene.
-    OutOfCore,
-    /// Rays that maps and bricks answer together, out of core.
-    Handover,
-    /// Errors by the distance from where maps with larger cells take over.
-    Seams,
-    /// How often columns pass through single sheets, by how base maps are made and looked up (spec §2).
-    Leaks,
-}
-
-impl Stage {
-    /// All of them, in their order.
-    pub const ALL: [Self; 10] = [
-        Self::Speed,
-        Self::Ao,
-        Self::Resolution,
-        Self::Radius,
-        Self::Shadows,
-        Self::Diffuse,
-        Self::OutOfCore,
-        Self::Handover,
-        Self::Seams,
-        Self::Leaks,
-    ];
-
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Speed => "speed",
-            Self::Ao => "ao",
-            Self::Resolution => "resolution",
-            Self::Radius => "radius",
-            Self::Shadows => "shadows",
-            Self::Diffuse => "diffuse",
-            Self::OutOfCore => "out-of-core",
-            Self::Handover => "handover",
-            Self::Seams => "seams",
-            Self::Leaks => "leaks",
-        }
-    }
-}
-
-impl Value for Stage {
-    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
-        let names = Self::ALL.map(Self::name);
-        let found = Self::ALL.into_iter().find(|stage| stage.name() == text);
-        found.ok_or_else(|| crate::settings::removed::unknown(text, &names, &[]))
-    }
-
-    fn plain(&self) -> Plain {
-        Plain::Text(self.name().into())
+names! {
+    /// A part of the measurements that can be asked for alone.
+    Stage {
+        /// Times over resolutions and numbers of directions (the paper's table 2).
+        Speed = "speed",
+        /// Errors by scenes (its figure 5).
+        Ao = "ao",
+        /// Errors by resolutions and numbers of directions (its figure 9).
+        Resolution = "resolution",
+        /// Errors by the length of rays: where the method fails.
+        Radius = "radius",
+        /// Snapped and unsnapped shadow rays (its figures 7 and 8).
+        Shadows = "shadows",
+        /// One-bounce diffuse light of the sun by reflective shadow maps (its figure 6).
+        Diffuse = "diffuse",
+        /// A cache that holds 15 % of the scene.
+        OutOfCore = "out-of-core",
+        /// Rays that maps and bricks answer together, out of core.
+        Handover = "handover",
+        /// Errors by the distance from where maps with larger cells take over.
+        Seams = "seams",
+        /// How often columns pass through single sheets, by how base maps are made and looked up (spec §2).
+        Leaks = "leaks",
     }
 }
 
@@ -251,14 +208,12 @@ fn bounce(effects: &[Effect]) -> Settings {
 
 /// All jobs, in their order.
 pub fn jobs(settings: &Scale, has_sponza: bool) -> Vec<Job> {
-    let sizes = [32, 64, 128];
-    let all: Vec<Way> =
-        sizes.iter().flat_map(|&size| [snapped(size, 4), snapped(size, 8), Way::Field { size }]).collect();
-    let with_exact = |ways: &[Way]| [&[Way::Exact], ways].concat();
-    let job = |stage, scene, variant: String, length, ways: Vec<Way>| Job {
+    let of = |k, size, is_unsnapped| Way::Roma { k, size, is_unsnapped };
+    let all = [32, 64, 128].map(|size| [snapped(size, 4), snapped(size, 8), Way::Field { size }]).concat();
+    let of_length = |stage, scene, length: f64, ways: &[Way]| Job {
         stage,
         scene,
-        variant,
+        variant: format!("rays of {length}"),
         effect: "ao",
         settings: occlusion(length),
         without: None,
@@ -268,68 +223,60 @@ pub fn jobs(settings: &Scale, has_sponza: bool) -> Vec<Job> {
         times: false,
         is_cold: false,
         errors: true,
-        ways,
+        ways: [&[Way::Exact], ways].concat(),
     };
     let length = settings.ao_length;
-    let mut scenes = vec![SceneId::City, SceneId::Pipes];
+    let job = |stage, scene, variant: &str, ways: &[Way]| Job {
+        variant: variant.into(),
+        times: true,
+        ..of_length(stage, scene, length, ways)
+    };
+    let (city, pipes) = (SceneId::City, SceneId::Pipes);
+    let mut scenes = vec![city, pipes];
     scenes.extend(has_sponza.then_some(SceneId::Sponza));
     let mut jobs = Vec::new();
     for &scene in &scenes {
-        let own = job(Stage::Speed, scene, "all resident".into(), length, with_exact(&all));
-        jobs.push(Job { times: true, errors: false, ..own });
+        jobs.push(Job { errors: false, ..job(Stage::Speed, scene, "all resident", &all) });
     }
     for &scene in &scenes {
-        let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
         // None takes more memory than the field.
-        let ways = with_exact(&[USUAL, snapped(64, 8), unsnapped, FIELD]);
+        let ways = [USUAL, snapped(64, 8), of(4, 128, true), FIELD];
         // Rays that end in a room, too.
-        for length in [length, length / 4.0] {
-            let own = job(Stage::Ao, scene, format!("rays of {length}"), length, ways.clone());
-            jobs.push(Job { frames: WALK, ..own });
-        }
+        jobs.extend(
+            [length, length / 4.0].map(|length| Job { frames: WALK, ..of_length(Stage::Ao, scene, length, &ways) }),
+        );
     }
-    jobs.push(job(Stage::Resolution, SceneId::City, format!("rays of {length}"), length, with_exact(&all)));
-    for halvings in 0..6 {
-        let length = length / f64::from(1 << halvings);
-        jobs.push(job(Stage::Radius, SceneId::City, format!("rays of {length}"), length, with_exact(&[USUAL, FIELD])));
-    }
-    let shadows: Vec<Way> = [false, true]
-        .iter()
-        .flat_map(|&is_unsnapped| [4, 8].map(|k| Way::Roma { k, size: 128, is_unsnapped }))
-        .chain([FIELD])
-        .collect();
+    jobs.push(of_length(Stage::Resolution, city, length, &all));
+    let halved = (0..6).map(|halvings| length / f64::from(1 << halvings));
+    jobs.extend(halved.map(|length| of_length(Stage::Radius, city, length, &[USUAL, FIELD])));
+    let shadows = [of(4, 128, false), of(8, 128, false), of(4, 128, true), of(8, 128, true), FIELD];
     for (light, sun_angle) in [("sun of 0.5 degrees", 0.53), ("sun of 10 degrees", 10.0)] {
-        let own = job(Stage::Shadows, SceneId::City, light.into(), length, with_exact(&shadows));
         let settings = Settings { effects: EffectList::SHADOW, sky_intensity: 0.0, sun_angle, ..Settings::default() };
-        jobs.push(Job { effect: "shadow", settings, times: true, ..own });
+        jobs.push(Job { effect: "shadow", settings, ..job(Stage::Shadows, city, light, &shadows) });
     }
+    let (empty, filled) = ("cache 15 %, empty", "cache 15 %, filled");
+    let cold = |stage| Job { cache: 15, is_cold: true, ..job(stage, city, empty, &[USUAL]) };
     let lit = [Effect::Shadow, Effect::Diffuse];
-    let unsnapped = Way::Roma { k: 4, size: 128, is_unsnapped: true };
+    let diffuse = |job| Job { effect: "diffuse", settings: bounce(&lit), ..job };
     for &scene in &scenes {
-        let ways = with_exact(&[USUAL, snapped(128, 8), unsnapped]);
-        let own =
-            Job { effect: "diffuse", times: true, ..job(Stage::Diffuse, scene, "all resident".into(), length, ways) };
-        jobs.push(Job { settings: bounce(&lit), without: Some(bounce(&lit[..1])), ..own });
+        let own = job(Stage::Diffuse, scene, "all resident", &[USUAL, snapped(128, 8), of(4, 128, true)]);
+        jobs.push(Job { without: Some(bounce(&lit[..1])), ..diffuse(own) });
     }
-    let own = job(Stage::Diffuse, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
-    let own = Job { effect: "diffuse", settings: bounce(&lit), cache: 15, times: true, errors: false, ..own };
-    jobs.push(Job { is_cold: true, ..own });
-    let own = job(Stage::OutOfCore, SceneId::City, "cache 15 %, empty".into(), length, with_exact(&[USUAL]));
-    jobs.push(Job { cache: 15, times: true, is_cold: true, ..own.clone() });
-    jobs.push(Job { cache: 15, times: true, errors: false, variant: "cache 15 %, filled".into(), ..own });
+    jobs.push(Job { errors: false, ..diffuse(cold(Stage::Diffuse)) });
+    jobs.push(cold(Stage::OutOfCore));
+    jobs.push(Job { errors: false, cache: 15, ..job(Stage::OutOfCore, city, filled, &[USUAL]) });
     let corrected = [2, 4, 6, 8].map(|one_in| Way::Corrected { one_in });
     let bounded = [2, 5, 10].map(|percent| Way::Bounded { percent });
+    let ways = [&[USUAL][..], &corrected, &[Way::Sifted], &bounded].concat();
     for length in [length, 4.0 * length] {
-        let ways = with_exact(&[&[USUAL][..], &corrected, &[Way::Sifted], &bounded].concat());
-        let own = job(Stage::Handover, SceneId::City, format!("rays of {length}, cache 15 %"), length, ways);
         // As many rays a sample as make the maps a small part, and as are chosen among.
-        let settings = Settings { ao_rays: 16, ..own.settings.clone() };
-        jobs.push(Job { cache: 15, times: true, settings, ..own });
+        let (settings, variant) =
+            (Settings { ao_rays: 16, ..occlusion(length) }, format!("rays of {length}, cache 15 %"));
+        jobs.push(Job { cache: 15, times: true, settings, variant, ..of_length(Stage::Handover, city, length, &ways) });
     }
-    for scene in [SceneId::City, SceneId::Pipes] {
-        let own = job(Stage::Seams, scene, format!("rays of {length}"), length, with_exact(&[USUAL, FIELD]));
-        let settings = Settings { aov: true, ..own.settings.clone() };
-        jobs.push(Job { settings, frames: WALK, ..own });
+    for scene in [city, pipes] {
+        let settings = Settings { aov: true, ..occlusion(length) };
+        jobs.push(Job { settings, frames: WALK, ..of_length(Stage::Seams, scene, length, &[USUAL, FIELD]) });
     }
     jobs
 }

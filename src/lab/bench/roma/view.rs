@@ -5,21 +5,17 @@ use super::plan::{Job, Way};
 use super::seams::Seams;
 use crate::counters::Record;
 use crate::frame::Renderer;
-use crate::lab::bench::plan::View as Path;
-use crate::lab::bench::scenes::Place;
+use crate::lab::bench::scenes::{Place, View as Path, empty_cache, open};
+use crate::lab::bench::store::Values;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::scene::{Camera, CameraPath};
-use crate::schedule::cache::Cache;
 use crate::secondary::df::answer::Df;
 use crate::secondary::occupancy::BaseMaps;
 use crate::secondary::roma::answer::Roma;
 use crate::session::Settings;
-use crate::session::opened::{Opened, open_scene};
-use crate::session::renderer::{methods, render_settings, renderer};
+use crate::session::renderer::{methods, render_settings};
 use crate::settings::{Adapter, CacheSize, Schedule};
-use crate::stream::Residency;
 use anyhow::{Context, Result, bail};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A scene, a light, a cache and a camera.
@@ -39,7 +35,7 @@ pub struct Picture {
     /// Distances along the rays through the middles of pixels, world units; of jobs that ask for them.
     depth: Vec<f32>,
     /// Of the pass, by name.
-    pub values: BTreeMap<String, f64>,
+    pub values: Values,
 }
 
 impl<'a> View<'a> {
@@ -50,8 +46,7 @@ impl<'a> View<'a> {
     pub fn open(job: &'a Job, place: &Place, settings: &'a Scale, adapter: &'a Adapter) -> Result<Self> {
         let scene = place.scene.clone();
         let own = of_job(job, &job.settings, &Way::Exact, settings, adapter);
-        let opened = Opened::open(open_scene(&scene)?, &scene, &own)?;
-        let renderer = renderer(opened, &scene, &own)?;
+        let renderer = open(&scene, &own)?;
         let path = place.path(Path::Near)?;
         let camera = path.frame(job.frames[0], 30);
         Ok(Self { job, scene, renderer, path, camera, settings, adapter })
@@ -90,11 +85,7 @@ impl<'a> View<'a> {
             roma.keep(warm, self.job.is_cold);
         }
         if self.job.is_cold {
-            let old = &renderer.cache;
-            let sizes = old.bytes.sizes();
-            let page_bytes = renderer.executor.page_bytes();
-            let residency = Residency::new(&sizes, old.residency.budget_bytes(), page_bytes, old.residency.policy())?;
-            renderer.cache = Cache::new(residency, old.bytes.clone(), None);
+            empty_cache(renderer)?;
         }
         let output = renderer.frame(0, &self.camera).with_context(|| self.scene.display().to_string())?;
         let effect = self.job.effect;

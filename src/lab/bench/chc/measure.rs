@@ -1,25 +1,24 @@
 //! Walks of the bench: one renderer a scene, cache and tile, in which the cases take turns.
 
-use super::args::Settings;
 use super::cells::{Passes, PictureError};
 use super::paper::THRESHOLDS;
-use super::plan::{self, Case, PLAIN, PLAIN_BVH2, Variant};
-use super::scenes::Place;
+use super::plan::{Case, PLAIN, PLAIN_BVH2, Variant};
 use crate::counters::Counters;
 use crate::counters::Record;
 use crate::frame::{Engine, Renderer};
+use crate::lab::bench::args::Settings;
+use crate::lab::bench::scenes::{self, Place, empty_cache};
 use crate::lab::console::Console;
 use crate::output::srgb;
 use crate::scene::path::CameraPath;
 use crate::schedule::ExecutorError;
 use crate::schedule::auto::Auto;
-use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
 use crate::session::Settings as WalkSettings;
-use crate::session::opened::{Opened, open_scene, scaled_threshold};
-use crate::session::renderer::{render_settings, renderer};
-use crate::settings::{Adapter, CacheSize, Effect, EffectList, Turn};
-use crate::stream::{Item, Residency};
+use crate::session::opened::scaled_threshold;
+use crate::session::renderer::render_settings;
+use crate::settings::{Adapter, CacheSize, EffectList, Turn};
+use crate::stream::Item;
 use anyhow::{Context, Result, bail};
 
 /// Frames of the walk that a path is made for: the camera moves as fast in a shorter one, which ends earlier.
@@ -53,7 +52,7 @@ const FIELDS: [&str; 17] = [
 pub struct Bench<'a> {
     renderer: Renderer,
     settings: &'a Settings,
-    place: &'a Place,
+    place: Place,
     adapter: &'a Adapter,
     /// Whether the binary trees could be made; else why not.
     binary: Result<(), String>,
@@ -71,15 +70,13 @@ impl<'a> Bench<'a> {
     /// [`DoesNotFit`]: the device does not hold the cache. Else the scene's, and the device's.
     pub fn open(
         case: &Case,
-        place: &'a Place,
+        place: Place,
         settings: &'a Settings,
         adapter: &'a Adapter,
         wants_binary: bool,
     ) -> Result<Self> {
         let open = |variant: Variant| -> Result<Renderer> {
-            let own = of_case(&Case { variant, ..*case }, settings, adapter);
-            let opened = Opened::open(open_scene(&place.scene)?, &place.scene, &own)?;
-            let mut renderer = renderer(opened, &place.scene, &own)?;
+            let mut renderer = scenes::open(&place.scene, &of_case(&Case { variant, ..*case }, settings, adapter))?;
             renderer.executor.allow_bounces();
             Ok(renderer)
         };
@@ -130,11 +127,7 @@ impl<'a> Bench<'a> {
         renderer.auto = Auto::default();
         renderer.executor.tuning().threshold = scaled_threshold(case.variant.threshold, case.tile);
         if case.cache < 100 {
-            let old = &renderer.cache;
-            let sizes = old.bytes.sizes();
-            let page_bytes = renderer.executor.page_bytes();
-            let residency = Residency::new(&sizes, old.residency.budget_bytes(), page_bytes, old.residency.policy())?;
-            renderer.cache = Cache::new(residency, old.bytes.clone(), None);
+            empty_cache(renderer)?;
         }
         Ok(())
     }
@@ -157,7 +150,7 @@ impl<'a> Bench<'a> {
                 return Ok(None);
             }
             for record in self.frame(&path, frame)?.records {
-                if case.passes().iter().any(|effect| effect.name() == record.pass) {
+                if case.effects.iter().any(|effect| effect.name() == record.pass) {
                     note(&mut passes, &record)?;
                 }
             }
@@ -236,11 +229,8 @@ fn of_device(error: &anyhow::Error) -> bool {
 /// The settings of a walk.
 fn of_case(case: &Case, settings: &Settings, adapter: &Adapter) -> WalkSettings {
     let Variant { schedule, threshold, rotation, without, needed, fronts } = case.variant;
-    let has = |effect: plan::Effect| case.effects.contains(&effect);
-    let effects = [(plan::Effect::Ao, Effect::Ao), (plan::Effect::Diffuse, Effect::Diffuse)];
-    let effects: Vec<Effect> = effects.into_iter().filter(|(own, _)| has(*own)).map(|(_, effect)| effect).collect();
     WalkSettings {
-        effects: EffectList::of(&effects),
+        effects: EffectList::of(case.effects),
         schedule,
         cache: CacheSize::Percent(case.cache.into()),
         tile: case.tile,
