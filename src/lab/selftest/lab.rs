@@ -37,8 +37,6 @@ use std::sync::Arc;
 pub struct Lab {
     /// The device.
     pub device: Device,
-    /// The adapter that it was chosen by.
-    pub adapter: Adapter,
     /// Seed of scenes and rays.
     pub seed: u64,
     /// Rays of the largest case.
@@ -95,8 +93,7 @@ impl Lab {
             bail!("--plant {}: it is planted in kernels; name a graphics adapter with --adapter", defect.name());
         }
         let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
-        let adapter = adapter.clone();
-        Ok(Self { device, adapter, seed, rays, defect, fails_at: None, folder, kernels: Vec::new(), scenes: 0 })
+        Ok(Self { device, seed, rays, defect, fails_at: None, folder, kernels: Vec::new(), scenes: 0 })
     }
 
     /// A stream of random numbers for the part `key` of a case.

@@ -5,7 +5,6 @@ use super::lab::{Built, GOOD, Lab, Stage, cached, different, misses, scheduled, 
 use super::rays::{Aim, lattice_point, ray};
 use crate::kernels::layout::{NONE, Ray};
 use crate::scene::path::path_from_bounds;
-use crate::secondary::occupancy::Bom;
 use crate::secondary::occupancy::{Settings, assemble};
 use crate::settings::{Group, Schedule};
 use anyhow::{Context, Result};
@@ -197,13 +196,10 @@ pub fn flat_scene(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let settings = Settings { cells: 32, ..Settings::default() };
     let levels = assemble(&stage.file, &settings, DVec3::new(1.0, 2.0, -1.0))?.0.levels;
     let points = (-16..=16).flat_map(|x| (-16..=16).map(move |z| DVec3::new(f64::from(x), 0.0, f64::from(z)) / 4.0));
-    let cell_of = |bom: &Bom, p: DVec3| -> [i64; 3] {
-        let cell = (p / f64::from(bom.cell_log2).exp2()).floor();
-        std::array::from_fn(|k| cell[k] as i64 - bom.first[k])
-    };
     let coarsest = levels.last().context("the scene has occupancy")?;
-    let (empty, of) =
-        points.fold((0, 0), |(empty, of), p| (empty + u64::from(!coarsest.is_occupied(cell_of(coarsest, p))), of + 1));
+    let (empty, of) = points.fold((0, 0), |(empty, of), p| {
+        (empty + u64::from(!coarsest.is_occupied(coarsest.cell_at(p.to_array()))), of + 1)
+    });
     checks.none("points of it in empty cells of the occupancy around it", empty, of);
     Ok(())
 }
