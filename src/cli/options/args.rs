@@ -13,7 +13,7 @@ use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes
 use crate::settings::{Adapter, CacheSize, ImageSize, SettingsError};
 use brickwalk_convert::build::TextureEncoding;
 use brickwalk_scenes::Stiff;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -128,7 +128,9 @@ pub struct ConvertArgs {
 
 /// Reads how textures are stored.
 fn textures() -> impl TypedValueParser<Value = TextureEncoding> {
-    PossibleValuesParser::new(["bc7", "raw"]).map(|name| match &*name {
+    let [blocks, texels] =
+        [("bc7", "Blocks"), ("raw", "Texels")].map(|(name, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new([blocks, texels]).map(|name| match &*name {
         "raw" => TextureEncoding::Raw,
         _ => TextureEncoding::Bc7,
     })

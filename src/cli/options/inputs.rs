@@ -43,7 +43,8 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
                  count through them in this order. --transform, --scene, --up and --unit belong to the input before them, or \
                  to all inputs if they come before the first",
             ),
-            true => inputs.long("from").action(ArgAction::Append).help(
+            // It is listed last.
+            true => inputs.long("from").action(ArgAction::Append).display_order(999).help(
                 "The inputs of the conversion in their order, with their --transform, --scene, --up and --unit; give its \
                  other options too [default: what a generated scene is made from]",
             ),

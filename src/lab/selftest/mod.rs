@@ -30,7 +30,7 @@ mod visibility;
 
 use crate::cpu;
 use crate::gpu::probe;
-use crate::gpu::probe::ProbeReport;
+use crate::gpu::probe::{ProbeReport, Traits};
 use crate::kernels::DeviceInfo;
 use crate::lab::console::Console;
 use crate::session::device::Device;
@@ -46,21 +46,6 @@ use std::time::Instant;
 
 /// Raised when a field changes its meaning.
 const FORMAT: u32 = 1;
-
-/// What a device does where WGSL leaves it open.
-#[derive(Clone, Debug, Serialize)]
-pub struct Traits {
-    /// Whether `a * b - c * d` is fused where no barrier stands between.
-    pub contracts: bool,
-    /// Whether products in the range of denormals become 0.
-    pub flushes_denormals: bool,
-    /// Whether the bits of a NaN survive.
-    pub keeps_nan_bits: bool,
-    /// What max and min give of a NaN and a number.
-    pub nan_in_max_min: &'static str,
-    /// Least and greatest number of lanes that run together, where the device tells.
-    pub subgroup_size: Option<(u32, u32)>,
-}
 
 /// What a test found.
 #[derive(Clone, Debug, Serialize)]
@@ -190,14 +175,7 @@ fn device_traits(device: &Device, defect: Option<Defect>) -> (Traits, Option<Pro
         Device::Gpu(gpu) => {
             let text = defect.map_or_else(probe::source, |defect| defect.plant(probe::source()));
             let report = probe::run_source(&gpu.device, &gpu.queue, &text);
-            let traits = Traits {
-                contracts: report.contracts,
-                flushes_denormals: report.flushes_denormals,
-                keeps_nan_bits: report.keeps_nan_bits,
-                nan_in_max_min: report.nan_in_max_min,
-                subgroup_size: report.subgroup_size,
-            };
-            (traits, Some(report))
+            (report.traits.clone(), Some(report))
         }
     }
 }
