@@ -28,11 +28,8 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let scratch = args.build.work.scratch.clone().or_else(beside);
     let movable = args.movable.clone();
     let source = import(&inputs, &ImportSettings { threads, scratch, movable: movable.clone() }, &progress)?;
-    let settings = BuildSettings {
-        textures: args.textures.into(),
-        movable,
-        ..mesh_settings(&args.mesh, build_settings(&args.build))
-    };
+    let settings =
+        BuildSettings { textures: args.textures, movable, ..mesh_settings(&args.mesh, build_settings(&args.build)) };
     let summary = usage(build_source(&source, &settings, &args.output, &progress))?;
     progress.finish();
     summarise(&args.output, &summary, start)

@@ -2,17 +2,15 @@
 
 use super::instances;
 use super::options::args::InfoArgs;
-use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram};
+use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
 use crate::cli::output::{print, print_json};
 use crate::session::opened::scene_bytes;
 use crate::settings::sizes::{human_bytes, human_count};
 use crate::stream::Residency;
 use anyhow::{Context, Result};
-use bricks::{
-    AttributeLayout, BRICK_WIDE, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, Payload, PunctualLight, SceneFile,
-    Texture,
-};
+use bricks::{BRICK_WIDE, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, PunctualLight, SceneFile, Texture};
 use serde::Serialize;
+use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -63,71 +61,14 @@ pub fn left_out(manifest: &Manifest) -> Vec<LeftOut> {
     facts.map(|(_, what, why)| LeftOut { what: what.into(), why: why.into() }).collect()
 }
 
-/// What `info --json` prints.
+/// What `info` prints.
 #[derive(Debug, Serialize)]
 struct Info<'a> {
-    format: u32,
-    file: String,
-    file_bytes: u64,
-    resident_bytes: u64,
-    generator: &'a str,
-    sources: &'a [bricks::Source],
-    triangles_stored: u64,
-    triangles_instanced: u64,
-    triangle_ids: u64,
-    dropped_zero_area: u64,
-    dropped_non_finite: u64,
-    bounds_min: [f64; 3],
-    bounds_max: [f64; 3],
-    objects: usize,
-    instances: usize,
-    instance_scale_ratio: f64,
-    bricks: usize,
-    wide_bricks: usize,
-    brick_triangles: u32,
-    largest_brick_triangles: u32,
-    tallest_brick_levels: u32,
-    geometry_bytes: u64,
-    /// As they lie in the file.
-    attribute_bytes: u64,
-    /// As they are loaded.
-    loaded_attribute_bytes: u64,
-    /// Occupancy maps that are read on demand.
-    proxy_bytes: u64,
-    /// Tiles and tails of textures.
-    texture_bytes: u64,
-    /// Of these, tails: the coarse levels, which stay resident.
-    texture_tail_bytes: u64,
-    /// Geometry and attributes of the two largest bricks, as loaded.
-    two_largest_bricks_bytes: u64,
-    /// What a cache must hold at least: the two largest bricks, or the tiles of a texture lookup.
-    least_cache_bytes: u64,
-    /// Step of the world's lattice, world units.
-    lattice_step: f64,
-    /// World units of one unit of length on the device.
-    device_unit: f64,
-    top_level_leaves: usize,
-    top_level_nodes_binary: usize,
-    top_level_nodes_wide: usize,
-    materials: usize,
-    textures: usize,
-    /// Tiles of their levels that are streamed.
-    texture_tiles: usize,
-    /// How textures are stored, each encoding once: bc5, bc7, raw.
-    texture_encodings: Vec<&'static str>,
-    has_textures: bool,
-    has_normal_maps: bool,
-    is_glossy: bool,
-    has_alpha_mask: bool,
-    has_alpha_blend: bool,
-    has_emission: bool,
-    has_instances: bool,
-    has_animation: bool,
-    has_wide_bricks: bool,
-    has_proxies: bool,
-    provenance_ranges: usize,
-    /// Names of nodes whose meshes were kept as instances, as the conversion was asked.
-    movable: &'a [String],
+    #[serde(skip)]
+    scene: &'a SceneFile,
+    /// Names and numbers.
+    #[serde(flatten)]
+    facts: Map<String, Value>,
     /// Lights without extent.
     lights: Vec<Light>,
     left_out: Vec<LeftOut>,
@@ -144,69 +85,77 @@ impl<'a> Info<'a> {
     fn of(scene: &'a SceneFile, deep: bool) -> Result<Self> {
         let r = scene.resident();
         let m = &r.manifest;
-        let bytes = |wanted: fn(&Payload) -> bool| -> u64 {
-            r.payloads().filter(|(payload, _)| wanted(payload)).map(|(_, span)| span.bytes).sum()
-        };
+        let sections = Sections::of(scene);
         // The world object always exists.
         let world = r.objects.first();
-        let sections = Sections::of(scene);
+        let sizes = scene_bytes(scene);
+        let facts: [(&str, Value); 50] = [
+            ("format", FORMAT.into()),
+            ("file", scene.path().display().to_string().into()),
+            ("file_bytes", scene.file_bytes().into()),
+            ("resident_bytes", scene.resident_bytes().into()),
+            ("generator", json!(m.generator)),
+            ("sources", json!(m.sources)),
+            ("triangles_stored", m.triangles_stored.into()),
+            ("triangles_instanced", m.triangles_instanced.into()),
+            ("triangle_ids", m.triangle_ids.into()),
+            ("dropped_zero_area", m.dropped_zero_area.into()),
+            ("dropped_non_finite", m.dropped_non_finite.into()),
+            ("bounds_min", json!(m.min)),
+            ("bounds_max", json!(m.max)),
+            ("objects", r.objects.len().into()),
+            ("instances", r.instances.len().into()),
+            ("instance_scale_ratio", m.instance_scale_ratio.into()),
+            ("bricks", r.bricks.len().into()),
+            ("wide_bricks", r.bricks.iter().filter(|b| b.flags & BRICK_WIDE != 0).count().into()),
+            ("brick_triangles", m.brick_triangles.into()),
+            ("largest_brick_triangles", r.bricks.iter().map(|b| b.triangle_count).max().unwrap_or(0).into()),
+            ("tallest_brick_levels", r.bricks.iter().map(|b| b.height).max().unwrap_or(0).into()),
+            ("geometry_bytes", sections.geometry().into()),
+            // As they lie in the file.
+            ("attribute_bytes", sections.attributes.into()),
+            // As they are loaded.
+            ("loaded_attribute_bytes", loaded_attribute_bytes(r).into()),
+            // Occupancy maps that are read on demand.
+            ("proxy_bytes", sections.proxies.into()),
+            // Tiles and tails of textures.
+            ("texture_bytes", sections.textures.into()),
+            // Of these, tails: the coarse levels, which stay resident.
+            ("texture_tail_bytes", r.textures.iter().map(|texture| texture.tail.bytes).sum::<u64>().into()),
+            // Geometry and attributes of the two largest bricks, as loaded.
+            ("two_largest_bricks_bytes", sizes.sizes().two_largest_bricks().into()),
+            // What a cache must hold at least: the two largest bricks, or the tiles of a texture lookup.
+            ("least_cache_bytes", Residency::least_budget(sizes.sizes()).into()),
+            // Step of the world's lattice, world units.
+            ("lattice_step", world.map_or(0.0, |o| 2f64.powi(o.step_log2)).into()),
+            // World units of one unit of length on the device.
+            ("device_unit", world.map_or(0.0, |o| 2f64.powi(o.unit_log2)).into()),
+            ("top_level_leaves", r.leaves.len().into()),
+            ("top_level_nodes_binary", r.top2.len().into()),
+            ("top_level_nodes_wide", r.top8.len().into()),
+            ("materials", r.materials.len().into()),
+            ("textures", r.textures.len().into()),
+            // Tiles of their levels that are streamed.
+            ("texture_tiles", r.tiles.len().into()),
+            // How textures are stored, each encoding once: bc5, bc7, raw.
+            ("texture_encodings", json!(encodings(scene))),
+            ("has_textures", m.has_textures.into()),
+            ("has_normal_maps", m.has_normal_maps.into()),
+            ("is_glossy", m.is_glossy.into()),
+            ("has_alpha_mask", m.has_alpha_mask.into()),
+            ("has_alpha_blend", m.has_alpha_blend.into()),
+            ("has_emission", m.has_emission.into()),
+            ("has_instances", m.has_instances.into()),
+            ("has_animation", m.has_animation.into()),
+            ("has_wide_bricks", m.has_wide_bricks.into()),
+            ("has_proxies", m.has_proxies.into()),
+            ("provenance_ranges", m.provenance.len().into()),
+            // Names of nodes whose meshes were kept as instances, as the conversion was asked.
+            ("movable", json!(m.movable)),
+        ];
         Ok(Self {
-            format: FORMAT,
-            file: scene.path().display().to_string(),
-            file_bytes: scene.file_bytes(),
-            resident_bytes: scene.resident_bytes(),
-            generator: &m.generator,
-            sources: &m.sources,
-            triangles_stored: m.triangles_stored,
-            triangles_instanced: m.triangles_instanced,
-            triangle_ids: m.triangle_ids,
-            dropped_zero_area: m.dropped_zero_area,
-            dropped_non_finite: m.dropped_non_finite,
-            bounds_min: m.min,
-            bounds_max: m.max,
-            objects: r.objects.len(),
-            instances: r.instances.len(),
-            instance_scale_ratio: m.instance_scale_ratio,
-            bricks: r.bricks.len(),
-            wide_bricks: r.bricks.iter().filter(|b| b.flags & BRICK_WIDE != 0).count(),
-            brick_triangles: m.brick_triangles,
-            largest_brick_triangles: r.bricks.iter().map(|b| b.triangle_count).max().unwrap_or(0),
-            tallest_brick_levels: r.bricks.iter().map(|b| b.height).max().unwrap_or(0),
-            geometry_bytes: bytes(|p| matches!(p, Payload::Geometry(_))),
-            attribute_bytes: bytes(|p| matches!(p, Payload::Attributes(_))),
-            loaded_attribute_bytes: r.bricks.iter().map(|b| AttributeLayout::of(b).bytes).sum(),
-            proxy_bytes: bytes(|p| matches!(p, Payload::Proxies(_))),
-            texture_bytes: bytes(|p| matches!(p, Payload::Texture(_) | Payload::Tile(_) | Payload::Opacity(_))),
-            texture_tail_bytes: bytes(|p| matches!(p, Payload::Texture(_))),
-            two_largest_bricks_bytes: scene_bytes(scene).sizes().two_largest_bricks(),
-            least_cache_bytes: Residency::least_budget(scene_bytes(scene).sizes()),
-            lattice_step: world.map_or(0.0, |o| 2f64.powi(o.step_log2)),
-            device_unit: world.map_or(0.0, |o| 2f64.powi(o.unit_log2)),
-            top_level_leaves: r.leaves.len(),
-            top_level_nodes_binary: r.top2.len(),
-            top_level_nodes_wide: r.top8.len(),
-            materials: r.materials.len(),
-            textures: r.textures.len(),
-            texture_tiles: r.tiles.len(),
-            texture_encodings: r
-                .textures
-                .iter()
-                .map(Texture::encoding_name)
-                .collect::<BTreeSet<_>>()
-                .into_iter()
-                .collect(),
-            has_textures: m.has_textures,
-            has_normal_maps: m.has_normal_maps,
-            is_glossy: m.is_glossy,
-            has_alpha_mask: m.has_alpha_mask,
-            has_alpha_blend: m.has_alpha_blend,
-            has_emission: m.has_emission,
-            has_instances: m.has_instances,
-            has_animation: m.has_animation,
-            has_wide_bricks: m.has_wide_bricks,
-            has_proxies: m.has_proxies,
-            provenance_ranges: m.provenance.len(),
-            movable: &m.movable,
+            scene,
+            facts: facts.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
             lights: r.lights.iter().map(Light::of).collect(),
             left_out: left_out(m),
             warnings: &m.warnings,
@@ -218,95 +167,75 @@ impl<'a> Info<'a> {
     }
 
     fn human(&self) -> String {
-        let mut text = format!("{}\n", self.file);
+        let m = &self.scene.resident().manifest;
+        let number = |name: &str| self.facts[name].as_u64().unwrap_or(0);
+        let count = |name: &str| human_count(number(name));
+        let bytes = |name: &str| human_bytes(number(name));
+        let real = |name: &str| self.facts[name].as_f64().unwrap_or(0.0);
+        let mut text = format!("{}\n", self.scene.path().display());
         let mut row = |name: &str, value: String| {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "  {name:<18} {value}");
         };
-        row("written by", self.generator.to_string());
-        row("file", format!("{}, {} always resident", human_bytes(self.file_bytes), human_bytes(self.resident_bytes)));
-        for source in self.sources {
+        row("written by", m.generator.clone());
+        row("file", format!("{}, {} always resident", bytes("file_bytes"), bytes("resident_bytes")));
+        for source in &m.sources {
             row("source", format!("{} ({}, xxh3 {})", source.name, human_bytes(source.bytes), source.hash));
         }
-        row(
-            "triangles",
-            format!(
-                "{} stored, {} with every instance, {} ids",
-                human_count(self.triangles_stored),
-                human_count(self.triangles_instanced),
-                human_count(self.triangle_ids)
-            ),
-        );
-        if self.dropped_zero_area + self.dropped_non_finite > 0 {
-            let (zero, bad) = (human_count(self.dropped_zero_area), human_count(self.dropped_non_finite));
+        let [stored, instanced, ids] = ["triangles_stored", "triangles_instanced", "triangle_ids"].map(count);
+        row("triangles", format!("{stored} stored, {instanced} with every instance, {ids} ids"));
+        if m.dropped_zero_area + m.dropped_non_finite > 0 {
+            let [zero, bad] = ["dropped_zero_area", "dropped_non_finite"].map(count);
             row("dropped", format!("{zero} of zero area, {bad} with a non-finite vertex"));
         }
-        if self.bricks > 0 {
-            let [x0, y0, z0] = self.bounds_min;
-            let [x1, y1, z1] = self.bounds_max;
+        if number("bricks") > 0 {
+            let ([x0, y0, z0], [x1, y1, z1]) = (m.min, m.max);
             row("bounds", format!("[{x0}, {y0}, {z0}] to [{x1}, {y1}, {z1}]"));
         } else {
             row("bounds", "the scene is empty".into());
         }
-        row(
-            "objects",
-            format!("{}, placed {} times, scale ratio {}", self.objects, self.instances, self.instance_scale_ratio),
-        );
+        let [objects, instances] = ["objects", "instances"].map(number);
+        row("objects", format!("{objects}, placed {instances} times, scale ratio {}", m.instance_scale_ratio));
+        let (all, most) = (count("bricks"), m.brick_triangles);
+        let [wide, largest, tallest] = ["wide_bricks", "largest_brick_triangles", "tallest_brick_levels"].map(number);
         row(
             "bricks",
-            format!(
-                "{} ({} wide) of at most {} triangles; largest {}, up to {} levels",
-                human_count(self.bricks as u64),
-                self.wide_bricks,
-                self.brick_triangles,
-                self.largest_brick_triangles,
-                self.tallest_brick_levels
-            ),
+            format!("{all} ({wide} wide) of at most {most} triangles; largest {largest}, up to {tallest} levels"),
         );
         for line in human_histogram(&self.brick_histogram) {
             row("", line);
         }
-        let payloads = [
-            ("geometry", human_bytes(self.geometry_bytes)),
-            (
-                "attributes",
-                format!("{} ({} loaded)", human_bytes(self.attribute_bytes), human_bytes(self.loaded_attribute_bytes)),
+        let [geometry, attributes, loaded, proxies, textures] =
+            ["geometry_bytes", "attribute_bytes", "loaded_attribute_bytes", "proxy_bytes", "texture_bytes"].map(bytes);
+        row(
+            "payloads",
+            format!(
+                "geometry {geometry}, attributes {attributes} ({loaded} loaded), proxies {proxies}, textures {textures}"
             ),
-            ("proxies", human_bytes(self.proxy_bytes)),
-            ("textures", human_bytes(self.texture_bytes)),
-        ];
-        row("payloads", payloads.map(|(name, bytes)| format!("{name} {bytes}")).join(", "));
+        );
         for line in self.sections.human() {
             row("sections", line);
         }
         row("a triangle", self.per_triangle.human());
-        let what = if self.least_cache_bytes == self.two_largest_bricks_bytes {
-            "two largest bricks"
-        } else {
-            "tiles of a lookup"
-        };
-        row("least cache", format!("{} (the {what})", human_bytes(self.least_cache_bytes)));
-        row("lattice", format!("step {:e}, device unit {}, world units", self.lattice_step, self.device_unit));
-        row(
-            "top level",
-            format!(
-                "{} leaves, {} binary nodes, {} wide nodes",
-                self.top_level_leaves, self.top_level_nodes_binary, self.top_level_nodes_wide
-            ),
-        );
+        let is_of_bricks = number("least_cache_bytes") == number("two_largest_bricks_bytes");
+        let what = if is_of_bricks { "two largest bricks" } else { "tiles of a lookup" };
+        row("least cache", format!("{} (the {what})", bytes("least_cache_bytes")));
+        let (step, unit) = (real("lattice_step"), real("device_unit"));
+        row("lattice", format!("step {step:e}, device unit {unit}, world units"));
+        let [leaves, binary, wide] = ["top_level_leaves", "top_level_nodes_binary", "top_level_nodes_wide"].map(number);
+        row("top level", format!("{leaves} leaves, {binary} binary nodes, {wide} wide nodes"));
         for (name, value) in self.trees.human() {
             row(name, value);
         }
-        let textures = match self.textures {
+        let (tiles, coarse) = (count("texture_tiles"), bytes("texture_tail_bytes"));
+        let textures = match number("textures") {
             0 => "0 textures".into(),
-            count => format!(
-                "{count} textures ({}): {} tiles, {} of coarse levels always resident",
-                self.texture_encodings.join(", "),
-                human_count(self.texture_tiles as u64),
-                human_bytes(self.texture_tail_bytes)
-            ),
+            textures => {
+                let encodings = encodings(self.scene).join(", ");
+                format!("{textures} textures ({encodings}): {tiles} tiles, {coarse} of coarse levels always resident")
+            }
         };
-        row("materials", format!("{}, {textures}", self.materials));
+        row("materials", format!("{}, {textures}", number("materials")));
         for light in self.lights.iter().take(MOST_LIGHTS) {
             row("light", light.human());
         }
@@ -321,6 +250,12 @@ impl<'a> Info<'a> {
         }
         text
     }
+}
+
+/// How textures are stored, each encoding once.
+fn encodings(scene: &SceneFile) -> Vec<&'static str> {
+    let all: BTreeSet<_> = scene.resident().textures.iter().map(Texture::encoding_name).collect();
+    all.into_iter().collect()
 }
 
 /// Lights that are listed for people.
@@ -404,8 +339,7 @@ fn origin(scene: &SceneFile, id: u32) -> Result<Origin> {
 }
 
 fn find(manifest: &Manifest, id: u32) -> Option<Origin> {
-    let after = manifest.provenance.partition_point(|p| p.first_id <= id);
-    let p = &manifest.provenance[after.checked_sub(1)?];
+    let p = instances::origin(manifest, id)?;
     let triangle = id - p.first_id;
     let source = manifest.sources.get(p.source as usize);
     (triangle < p.count).then(|| Origin {

@@ -45,8 +45,8 @@ pub fn rows(resident: &Resident) -> Vec<Row<'_>> {
     (0u32..).zip(&resident.instances).skip(1).map(row).collect()
 }
 
-/// Where a triangle comes from.
-fn origin(manifest: &Manifest, id: u32) -> Option<&Provenance> {
+/// Where a triangle comes from, if there is one of this id.
+pub fn origin(manifest: &Manifest, id: u32) -> Option<&Provenance> {
     let after = manifest.provenance.partition_point(|one| one.first_id <= id);
     manifest.provenance[..after].last()
 }

@@ -95,6 +95,11 @@ impl Sections {
     }
 }
 
+/// Bytes of what shading reads, textures apart, as it is loaded.
+pub fn loaded_attribute_bytes(resident: &Resident) -> u64 {
+    resident.bricks.iter().map(|brick| AttributeLayout::of(brick).bytes).sum()
+}
+
 /// Bytes a stored triangle; 0 of none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PerTriangle {
@@ -138,7 +143,7 @@ impl PerTriangle {
             ids: share(sizes.ids),
             vertices: share(sizes.vertices),
             attributes: share(sizes.attributes),
-            loaded_attributes: share(resident.bricks.iter().map(|brick| AttributeLayout::of(brick).bytes).sum()),
+            loaded_attributes: share(loaded_attribute_bytes(resident)),
             proxies: share(sizes.proxies + size_of_val(resident.occupancy.as_slice()) as u64),
             file_without_textures: share(file_bytes - sizes.textures),
             file: share(file_bytes),

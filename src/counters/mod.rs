@@ -3,10 +3,10 @@
 //! `docs/records.md` follow from it.
 
 mod declare;
+#[cfg(test)]
 mod page;
 mod table;
 
-pub use page::page;
 pub(crate) use table::device_words;
 pub use table::{COLUMNS, Counters};
 
@@ -32,6 +32,14 @@ pub struct Column {
     pub meaning: &'static str,
     /// Whether records have it.
     pub is_written: bool,
+}
+
+impl Column {
+    /// Its meaning, and in which records it is not zero.
+    pub fn description(&self) -> String {
+        let only = if self.only.is_empty() { String::new() } else { format!(" Only {}; else 0.", self.only) };
+        self.meaning.trim().to_string() + &only
+    }
 }
 
 /// How values of several round trips or passes become one.

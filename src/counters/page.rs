@@ -52,14 +52,6 @@ pub fn page() -> String {
     text
 }
 
-impl Column {
-    /// Its meaning, and in which records it is not zero.
-    pub fn description(&self) -> String {
-        let only = if self.only.is_empty() { String::new() } else { format!(" Only {}; else 0.", self.only) };
-        self.meaning.trim().to_string() + &only
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -28,8 +28,6 @@ pub struct BinaryTrees {
     pub group: wgpu::BindGroup,
     /// The kernel.
     pub pipeline: wgpu::ComputePipeline,
-    /// Bytes of nodes.
-    pub bytes: u64,
 }
 
 impl BinaryTrees {
@@ -55,13 +53,13 @@ impl BinaryTrees {
                 roots.push(pages.push(&tree.nodes)?);
             }
         }
-        let (pages, bytes) = pages.finish()?;
+        let pages = pages.finish()?;
         let root_buffer = storage(gpu, "binary roots", count, size_of::<[u32; 2]>());
         gpu.queue.write_buffer(&root_buffer, 0, bytemuck::cast_slice(&roots));
         let (layout, pipeline) = pipeline(gpu, kernels, pages.len(), height + top_height(scene.resident()))?;
         let entries = numbered(std::iter::once(&root_buffer).chain(&pages), 0);
         let descriptor = wgpu::BindGroupDescriptor { label: Some("binary"), layout: &layout, entries: &entries };
-        Ok(Self { group: gpu.device.create_bind_group(&descriptor), pipeline, bytes })
+        Ok(Self { group: gpu.device.create_bind_group(&descriptor), pipeline })
     }
 }
 
@@ -124,7 +122,7 @@ impl Pages<'_> {
     }
 
     /// Finishes the last page.
-    fn finish(mut self) -> Result<(Vec<wgpu::Buffer>, u64), ExecutorError> {
+    fn finish(mut self) -> Result<Vec<wgpu::Buffer>, ExecutorError> {
         // A scene of nothing has a page, too, so that there is something to bind.
         if !self.filling.is_empty() || self.count == 0 {
             self.finish_page()?;
@@ -139,7 +137,7 @@ impl Pages<'_> {
                 self.count
             )));
         }
-        Ok((self.buffers, self.bytes))
+        Ok(self.buffers)
     }
 }
 

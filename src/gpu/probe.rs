@@ -28,13 +28,9 @@ pub use traversal::compare_pipelines;
 #[cfg(test)]
 pub(crate) use scene::scene;
 
-/// What the probe found on a device.
+/// What a device does where WGSL leaves it open.
 #[derive(Clone, Debug, Serialize)]
-pub struct ProbeReport {
-    /// Adapter name.
-    pub adapter: String,
-    /// What was compared.
-    pub checks: Vec<Check>,
+pub struct Traits {
     /// Whether the compiler fuses `a * b - c * d` where no barrier stands between. Harmless behind barriers.
     pub contracts: bool,
     /// Whether products in the denormal range become 0. Harmless in the ranges that exact.wgsl states.
@@ -45,6 +41,15 @@ pub struct ProbeReport {
     pub nan_in_max_min: &'static str,
     /// Least and greatest subgroup size, where the driver tells.
     pub subgroup_size: Option<(u32, u32)>,
+}
+
+/// What the probe found on a device.
+#[derive(Clone, Debug)]
+pub struct ProbeReport {
+    /// What was compared.
+    pub checks: Vec<Check>,
+    /// What the device does.
+    pub traits: Traits,
     /// Wall time of the probe, milliseconds, compilation included.
     pub ms: f64,
 }
@@ -95,13 +100,14 @@ pub fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> P
     let arithmetic = cases::arithmetic();
     let triangles = cases::triangles();
     let mut report = ProbeReport {
-        adapter: info.name,
         checks: Vec::new(),
-        contracts: false,
-        flushes_denormals: false,
-        keeps_nan_bits: true,
-        nan_in_max_min: "the number",
-        subgroup_size: (info.subgroup_max_size > 0).then_some((info.subgroup_min_size, info.subgroup_max_size)),
+        traits: Traits {
+            contracts: false,
+            flushes_denormals: false,
+            keeps_nan_bits: true,
+            nan_in_max_min: "the number",
+            subgroup_size: (info.subgroup_max_size > 0).then_some((info.subgroup_min_size, info.subgroup_max_size)),
+        },
         ms: 0.0,
     };
     let words = |c: &ArithmeticCase| c.words;
@@ -191,7 +197,7 @@ fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results:
     for (case, found) in cases.iter().zip(results.chunks_exact(ARITHMETIC_WORDS)) {
         let [a, b, c, d] = case.words.map(f32::from_bits);
         if !case.words.iter().all(|&x| ordinary(f32::from_bits(x))) {
-            report.keeps_nan_bits &= !a.is_nan() || found[8] == case.words[0];
+            report.traits.keeps_nan_bits &= !a.is_nan() || found[8] == case.words[0];
             if a.is_nan() {
                 nans.extend([found[9], found[10]].map(|x| f32::from_bits(x).is_nan()));
             }
@@ -199,7 +205,7 @@ fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results:
         }
         let product = a * b;
         if !ordinary(product) && product.is_finite() && product != 0.0 {
-            report.flushes_denormals |= f32::from_bits(found[2]) == 0.0;
+            report.traits.flushes_denormals |= f32::from_bits(found[2]) == 0.0;
         }
         let apart = product - c * d;
         let expected = [
@@ -217,10 +223,10 @@ fn check_arithmetic(report: &mut ProbeReport, cases: &[ArithmeticCase], results:
             }
         }
         if case.cancels {
-            report.contracts |= f32::from_bits(found[4]) != 0.0;
+            report.traits.contracts |= f32::from_bits(found[4]) != 0.0;
         }
     }
-    report.nan_in_max_min = match (nans.contains(&true), nans.contains(&false)) {
+    report.traits.nan_in_max_min = match (nans.contains(&true), nans.contains(&false)) {
         (true, true) => "either",
         (true, false) => "the NaN",
         _ => "the number",

@@ -36,12 +36,6 @@ pub fn barrier(x: f32) -> f32 {
     x
 }
 
-/// [`barrier`] of each component.
-#[inline(always)]
-pub fn barrier3(x: [f32; 3]) -> [f32; 3] {
-    x
-}
-
 /// The greater one, as one machine instruction; of numbers, never of NaN.
 #[inline(always)]
 pub fn most(a: f32, b: f32) -> f32 {

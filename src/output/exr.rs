@@ -9,9 +9,6 @@ use exr::prelude::{
 use std::io::{Cursor, Write};
 use std::path::Path;
 
-/// Triangle id of a pixel whose ray hit nothing.
-pub const MISS: u32 = u32::MAX;
-
 /// What a frame knows of every pixel, row by row from the top; each array has `width` x `height` entries.
 #[derive(Clone, Copy, Debug)]
 pub struct Aovs<'a> {
@@ -25,7 +22,7 @@ pub struct Aovs<'a> {
     pub depth: &'a [f32],
     /// Geometric normal in world space, unit, towards the camera: `normal.X normal.Y normal.Z`.
     pub normal: &'a [[f32; 3]],
-    /// Global triangle id, [`MISS`] on a miss: `triangle.id` (u32).
+    /// Global triangle id, [`u32::MAX`] on a miss: `triangle.id` (u32).
     pub triangle: &'a [u32],
     /// Linear base colour: `albedo.R albedo.G albedo.B`.
     pub albedo: &'a [[f32; 3]],
@@ -91,7 +88,7 @@ mod tests {
         let mut depth: Vec<f32> = (0..n).map(|i| i as f32 * 0.1).collect();
         depth[3] = f32::INFINITY;
         let mut triangle: Vec<u32> = (0..n as u32).map(|i| i.wrapping_mul(2654435761)).collect();
-        triangle[3] = MISS;
+        triangle[3] = u32::MAX;
         let aovs = Aovs {
             width,
             height,

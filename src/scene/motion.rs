@@ -376,11 +376,6 @@ impl Movers {
         };
         self.0.iter().flat_map(of_mover).collect()
     }
-
-    /// How many instances move.
-    pub fn count(&self) -> usize {
-        self.0.iter().map(|bound| bound.instances.len()).sum()
-    }
 }
 
 #[cfg(test)]

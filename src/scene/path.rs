@@ -175,14 +175,6 @@ impl CameraPath {
         Ok(self)
     }
 
-    /// The path as the text of a path file.
-    pub fn to_json(&self) -> String {
-        // Serialising numbers, arrays and structs into a string has no failing case.
-        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
-        text.push('\n');
-        text
-    }
-
     /// The camera of frame `k` of `frames`: time k/(frames − 1) of the range, the first keyframe when `frames` is 1;
     /// frames at and beyond the last stand at the last keyframe.
     pub fn frame(&self, k: u32, frames: u32) -> Camera {

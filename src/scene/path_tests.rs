@@ -84,7 +84,7 @@ fn parses_the_documented_form() {
     let c = p.frame(0, 1);
     assert_eq!(c.fov_y, 45f64.to_radians());
     assert_eq!((c.up, c.position, c.target), (DVec3::Z, DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)));
-    assert_eq!(CameraPath::parse(&p.to_json(), Path::new("q.json")).unwrap(), p);
+    assert_eq!(CameraPath::parse(&serde_json::to_string_pretty(&p).unwrap(), Path::new("q.json")).unwrap(), p);
 }
 
 #[test]

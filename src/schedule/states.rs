@@ -1,6 +1,6 @@
 //! The state of every brick as a schedule sees it, mirrored to the executor at each step.
 
-use crate::stream::{Item, Kind, Placed, Residency, Slot};
+use crate::stream::{Item, Kind, Placed, Slot};
 
 /// Where bricks and tiles of textures lie, and what part bricks play in the pass.
 #[derive(Clone, Debug)]
@@ -104,16 +104,6 @@ impl BrickStates {
     /// Whether rays ask for missing bricks even where none is missing.
     pub fn keep_asking(&mut self, asks: bool) {
         self.keeps_asking = asks;
-    }
-
-    /// Whether the slots are those of `residency`, for checks.
-    pub fn agrees_with(&self, residency: &Residency) -> bool {
-        let tiles = (0u32..).zip(&self.tiles);
-        tiles.into_iter().all(|(tile, slot)| *slot == residency.slot(Item::tile(tile)))
-            && (0..self.len()).all(|brick| {
-                self.geometry[brick] == residency.slot(Item::geometry(brick as u32))
-                    && self.attributes[brick] == residency.slot(Item::attributes(brick as u32))
-            })
     }
 
     fn slot(&mut self, item: Item) -> &mut Option<Slot> {

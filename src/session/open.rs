@@ -204,18 +204,10 @@ impl Session {
         self.render(number, camera, &mut ())?.ok_or_else(|| anyhow!("interrupted"))
     }
 
-    /// Renders frame `number` of the camera path, with what moves where it is then.
+    /// Renders frame `number` of the camera path, with what moves where it is then; `None`: `watch` stopped it.
     ///
     /// # Errors
     /// As [`Session::frame`]; a place that is too far out.
-    pub fn frame_at(&mut self, number: u32) -> Result<Frame> {
-        self.frame_watched(number, &mut ())?.ok_or_else(|| anyhow!("interrupted"))
-    }
-
-    /// [`Session::frame_at`], watched; `None`: it was stopped.
-    ///
-    /// # Errors
-    /// As [`Session::frame_at`].
     pub fn frame_watched(&mut self, number: u32, watch: &mut dyn Watch) -> Result<Option<Frame>> {
         let frames = self.settings.frames;
         if let Some(motion) = &self.motion {

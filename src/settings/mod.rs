@@ -12,6 +12,7 @@ mod declare;
 pub mod file;
 mod group;
 pub mod names;
+#[cfg(test)]
 pub mod page;
 pub mod removed;
 pub mod sizes;

@@ -66,11 +66,6 @@ impl HostCache {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The budget in bytes.
-    pub fn budget_bytes(&self) -> u64 {
-        self.budget_bytes
-    }
-
     /// What happened so far.
     pub fn stats(&self) -> HostCacheStats {
         self.lock().stats

@@ -297,12 +297,7 @@ impl Residency {
         }
     }
 
-    /// Numbers of bricks and of tiles are below this.
-    pub fn number_count(&self) -> u32 {
-        (self.bytes.len() / Kind::ALL.len()) as u32
-    }
-
-    /// Bytes of `item`. Its number must be below [`Self::number_count`], here and in every other method.
+    /// Bytes of `item`. There must be a brick or tile of its number, here and in every other method.
     pub fn bytes(&self, item: Item) -> u64 {
         self.bytes[item.index()]
     }

@@ -41,18 +41,11 @@ pub trait Destination: Send + 'static {
 pub trait WorkerPool {
     /// As [`Workers::host_cache`].
     fn host_cache(&self) -> &Arc<HostCache>;
-
-    /// As [`Workers::stats`].
-    fn stats(&self) -> WorkersStats;
 }
 
 impl<D: Destination> WorkerPool for Workers<D> {
     fn host_cache(&self) -> &Arc<HostCache> {
         Self::host_cache(self)
-    }
-
-    fn stats(&self) -> WorkersStats {
-        Self::stats(self)
     }
 }
 

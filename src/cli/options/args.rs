@@ -13,6 +13,7 @@ use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes
 use crate::settings::{Adapter, CacheSize, ImageSize, SettingsError};
 use brickwalk_convert::build::TextureEncoding;
 use brickwalk_scenes::Stiff;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -81,7 +82,7 @@ pub struct DemoArgs {
     #[arg(long, value_name = "COUNT", default_value = "2M", value_parser = positive_count)]
     pub triangles: u64,
     /// Frames of the walk
-    #[arg(long, value_name = "N", default_value = "12", value_parser = frames)]
+    #[arg(long, value_name = "N", default_value = "12", value_parser = ranged::<1, 1_000_000>)]
     pub frames: u32,
     /// Width and height of the frames in pixels, each 1 to 16384
     #[arg(long, value_name = "WxH", default_value = "640x360")]
@@ -113,8 +114,8 @@ pub struct ConvertArgs {
     pub build: BuildArgs,
     /// How textures are stored: bc7 (blocks, a byte a texel, of BC5 for normals, the loss measured in
     /// docs/results/textures.md) or raw (RGBA8, four bytes)
-    #[arg(long, value_name = "ENCODING", value_enum, default_value = "bc7")]
-    pub textures: Textures,
+    #[arg(long, value_name = "ENCODING", value_parser = textures(), default_value = "bc7")]
+    pub textures: TextureEncoding,
     /// Keep the meshes of the nodes called NAME, and of those below them, as instances of their own, so that walk
     /// --motion can move them; * stands for any characters, ? for one. Give it once for each name [default: none;
     /// meshes that are used once are baked into the world]
@@ -125,22 +126,14 @@ pub struct ConvertArgs {
     pub mesh: MeshArgs,
 }
 
-/// How textures are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Textures {
-    /// Blocks.
-    Bc7,
-    /// Texels.
-    Raw,
-}
-
-impl From<Textures> for TextureEncoding {
-    fn from(textures: Textures) -> Self {
-        match textures {
-            Textures::Bc7 => Self::Bc7,
-            Textures::Raw => Self::Raw,
-        }
-    }
+/// Reads how textures are stored.
+fn textures() -> impl TypedValueParser<Value = TextureEncoding> {
+    let [blocks, texels] =
+        [("bc7", "Blocks"), ("raw", "Texels")].map(|(name, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new([blocks, texels]).map(|name| match &*name {
+        "raw" => TextureEncoding::Raw,
+        _ => TextureEncoding::Bc7,
+    })
 }
 
 /// Options of what becomes of the triangles and meshes of inputs.
@@ -164,7 +157,7 @@ pub struct MeshArgs {
 pub struct BuildArgs {
     /// Most triangles of a brick, 1 to 1048576; larger is faster in core, smaller reads less out of core [default:
     /// 16384]
-    #[arg(long, value_name = "COUNT", value_parser = brick_triangles)]
+    #[arg(long, value_name = "COUNT", value_parser = ranged::<1, { 1 << 20 }>)]
     pub brick_triangles: Option<u32>,
     /// Leave out the occupancy maps of bricks, which approximate secondary rays where no brick is loaded
     #[arg(long)]
@@ -181,7 +174,7 @@ pub struct BuildArgs {
 #[derive(Clone, Debug, Args)]
 pub struct WorkArgs {
     /// Threads that convert [default: one per core]
-    #[arg(long, value_name = "N", value_parser = threads)]
+    #[arg(long, value_name = "N", value_parser = ranged::<1, 1024>)]
     pub threads: Option<u32>,
     /// log2 of the step that positions are rounded to, in world units [default: from the sizes of the bricks]
     #[arg(long, value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-126..=96))]
@@ -228,7 +221,7 @@ pub struct SceneArgs {
     #[arg(long)]
     pub instanced: bool,
     /// Place the whole scene so many times, in a square; meshes of 1000 triangles and more are stored once
-    #[arg(long, value_name = "N", default_value = "1", value_parser = copies, conflicts_with = "instanced")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = ranged::<1, 1024>, conflicts_with = "instanced")]
     pub copies: u32,
     /// How to cut and round.
     #[command(flatten)]
@@ -432,29 +425,10 @@ pub struct CompareArgs {
     pub json: bool,
 }
 
-/// Parses a whole number or count and checks its range.
-pub(crate) fn ranged(text: &str, least: u64, most: u64) -> Result<u32, String> {
-    let n = count(text)?;
-    match u32::try_from(n) {
-        Ok(n32) if (least..=most).contains(&n) => Ok(n32),
-        _ => Err(format!("it must be from {least} to {most}")),
-    }
-}
-
-fn frames(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 1_000_000)
-}
-
-fn copies(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 1024)
-}
-
-fn threads(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 1024)
-}
-
-fn brick_triangles(text: &str) -> Result<u32, String> {
-    ranged(text, 1, 1 << 20)
+/// Parses a whole number or count from `LEAST` to `MOST`.
+pub(crate) fn ranged<const LEAST: u32, const MOST: u32>(text: &str) -> Result<u32, String> {
+    let found = u32::try_from(count(text)?).ok().filter(|n| (LEAST..=MOST).contains(n));
+    found.ok_or_else(|| format!("it must be from {LEAST} to {MOST}"))
 }
 
 #[cfg(test)]

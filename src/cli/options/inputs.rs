@@ -12,13 +12,20 @@ const UNITS: [(&str, f64); 5] = [("mm", 0.001), ("cm", 0.01), ("m", 1.0), ("in",
 /// Files and folders with their options, in the order of the command line.
 ///
 /// An option belongs to the input before it; before the first input it belongs to all that have none of their own.
+/// `AFTER_FROM`: they are the inputs of a conversion that is repeated, which come after `--from`, and there may be none.
 #[derive(Clone, Debug)]
-pub struct InputArgs {
+pub struct Inputs<const AFTER_FROM: bool> {
     /// The inputs; a path may be that of a folder.
     pub inputs: Vec<Input>,
 }
 
-impl Args for InputArgs {
+/// What is converted.
+pub type InputArgs = Inputs<false>;
+
+/// What a scene was converted from.
+pub type FromArgs = Inputs<true>;
+
+impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
     fn augment_args(command: Command) -> Command {
         let option = |id: &'static str, value: &'static str, parser: ValueParser, help: &'static str| {
             Arg::new(id)
@@ -29,22 +36,25 @@ impl Args for InputArgs {
                 .allow_hyphen_values(id == "transform")
                 .help(help)
         };
-        let inputs = Arg::new("inputs")
-            .value_name("INPUT")
-            .required(true)
-            .num_args(1..)
-            .value_parser(value_parser!(PathBuf))
-            .help(
-                "Scene files (.gltf, .glb, .obj, .ply, .stl, the tileset.json of 3D Tiles) or folders of them; triangle ids count through them in this \
-                 order. --transform, --scene, --up and --unit belong to the input before them, or to all inputs if they \
-                 come before the first",
-            );
+        let inputs = Arg::new("inputs").value_name("INPUT").num_args(1..).value_parser(value_parser!(PathBuf));
+        let inputs = match AFTER_FROM {
+            false => inputs.required(true).help(
+                "Scene files (.gltf, .glb, .obj, .ply, .stl, the tileset.json of 3D Tiles) or folders of them; triangle ids \
+                 count through them in this order. --transform, --scene, --up and --unit belong to the input before them, or \
+                 to all inputs if they come before the first",
+            ),
+            // It is listed last.
+            true => inputs.long("from").action(ArgAction::Append).display_order(999).help(
+                "The inputs of the conversion in their order, with their --transform, --scene, --up and --unit; give its \
+                 other options too [default: what a generated scene is made from]",
+            ),
+        };
         command
             .arg(inputs)
             .arg(option(
                 "transform",
                 "STEPS|MATRIX",
-                ValueParser::new(transform),
+                ValueParser::new(parse_transform),
                 "Placement of the input: steps in the order in which they happen (translate X Y Z, scale S or scale X Y \
                  Z, rotate x|y|z DEGREES; metres, Y up), as in \"scale 0.5 rotate y 90 translate 10 0 -5\"; or the 12 or \
                  16 numbers of a matrix, row by row [default: where it is]",
@@ -74,7 +84,7 @@ impl Args for InputArgs {
     }
 }
 
-impl FromArgMatches for InputArgs {
+impl<const AFTER_FROM: bool> FromArgMatches for Inputs<AFTER_FROM> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let paths = indexed::<PathBuf>(matches, "inputs");
         let starts: Vec<usize> = paths.iter().map(|(at, _)| *at).collect();
@@ -103,39 +113,6 @@ impl FromArgMatches for InputArgs {
             inputs.push(input);
         }
         Ok(Self { inputs })
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Self::from_arg_matches(matches)?;
-        Ok(())
-    }
-}
-
-/// The inputs of a conversion that is repeated: as [`InputArgs`], but after `--from`, and there may be none.
-#[derive(Clone, Debug)]
-pub struct FromArgs {
-    /// The inputs; a path may be that of a folder.
-    pub inputs: Vec<Input>,
-}
-
-impl Args for FromArgs {
-    fn augment_args(command: Command) -> Command {
-        InputArgs::augment_args(command).mut_arg("inputs", |inputs| {
-            inputs.long("from").required(false).action(ArgAction::Append).help(
-                "The inputs of the conversion in their order, with their --transform, --scene, --up and --unit; give its \
-                 other options too [default: what a generated scene is made from]",
-            )
-        })
-    }
-
-    fn augment_args_for_update(command: Command) -> Command {
-        Self::augment_args(command)
-    }
-}
-
-impl FromArgMatches for FromArgs {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        Ok(Self { inputs: InputArgs::from_arg_matches(matches)?.inputs })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -200,10 +177,6 @@ fn assign<T: Clone>(starts: &[usize], given: Vec<(usize, T)>, option: &str) -> R
 
 fn usage(message: String) -> clap::Error {
     clap::Error::raw(ErrorKind::ValueValidation, message + "\n")
-}
-
-fn transform(text: &str) -> Result<[f64; 12], String> {
-    parse_transform(text)
 }
 
 fn up(text: &str) -> Result<Up, String> {

@@ -194,7 +194,7 @@ fn planted_defects_are_named() {
         ("offset_origin", "select(bits - 1u, bits + 1u, away)", "select(bits - 2u, bits + 2u, away)"),
     ];
     let fused = source().replace("x.x * x.y - x.z * x.w);", "diffprod(x.x, x.y, x.z, x.w));");
-    assert!(run_source(&device, &queue, &fused).contracts);
+    assert!(run_source(&device, &queue, &fused).traits.contracts);
     for (name, sound, broken) in defects {
         let text = source();
         assert!(text.contains(sound), "{sound}");

@@ -160,32 +160,6 @@ pub trait PacketKernel: RayKernel {
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize);
 }
 
-/// [`for_each_ray`] with the dispatch's instruction set.
-pub fn run_for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl RayKernel) {
-    match bound.isa {
-        Best::Scalar(isa) => for_each_ray(set, bound, work, |scratch, slot| kernel.run(isa, scratch, slot)),
-        #[cfg(target_arch = "x86_64")]
-        Best::Avx2(isa) => for_each_ray(set, bound, work, |scratch, slot| {
-            // SAFETY: a value of the type exists only where AVX2 has been detected.
-            unsafe { run_avx2(isa, kernel, scratch, slot) }
-        }),
-        #[cfg(target_arch = "x86_64")]
-        Best::Avx512(isa) => for_each_ray(set, bound, work, |scratch, slot| {
-            // SAFETY: a value of the type exists only where AVX2 has been detected.
-            unsafe { run_avx2(isa, kernel, scratch, slot) }
-        }),
-        #[cfg(target_arch = "aarch64")]
-        Best::Neon(isa) => for_each_ray(set, bound, work, |scratch, slot| kernel.run(isa, scratch, slot)),
-    }
-}
-
-/// What `kernel` is compiled for AVX2 in.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2<I: Isa>(isa: I, kernel: &impl RayKernel, scratch: &mut Scratch, slot: Slot) {
-    kernel.run(isa, scratch, slot);
-}
-
 /// Edge of the blocks whose rays are made packets of, those of an octant together.
 const PACKET_BLOCK: usize = 32;
 /// Rays of such a block.
@@ -198,7 +172,7 @@ const LEAST_SQUARE: usize = 16;
 /// Fewer rays of an octant go one by one.
 const LEAST_PACKET: usize = 4;
 
-/// [`run_for_each_ray`], rays of an octant together.
+/// [`for_each_ray`] with the dispatch's instruction set, rays of an octant together.
 pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
     // Where there are many threads, each has its share of bands.
     let height = bound.params.height as usize;

@@ -12,8 +12,7 @@
 
 use super::case::Checks;
 use super::lab::{Lab, cached, settings};
-use super::meshes::note;
-use super::rays::{Aim, Targets, ray};
+use super::rays::{Aim, ray};
 use crate::gpu::kernels;
 use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
@@ -23,19 +22,18 @@ use crate::session::device::Device;
 use anyhow::{Result, anyhow};
 use bricks::Node;
 use brickwalk_scenes::{Rng, Stiff, stiff};
-use glam::DVec3;
 
 /// Multiples of this are the integers.
 const GRID: f64 = 1.0 / 4096.0;
 
 /// What a case's rays and boxes have in common.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    /// A zero component of the direction, of either sign.
+pub enum Kind {
+    /// A zero component of the direction, of either sign: outside of the slab a miss, inside no bound.
     Zero,
-    /// An origin on a face's plane, and a direction along it.
+    /// An origin on a face's plane, and a direction along it: met.
     OnFace,
-    /// A component so small that its reciprocal is huge.
+    /// A component so small that its reciprocal is beyond what f32 holds.
     Tiny,
     /// A box that is flat on an axis.
     Flat,
@@ -217,8 +215,9 @@ fn entered(lab: &Lab, cases: &[BoxCase]) -> Result<Vec<(u32, [f32; 8])>> {
     Ok(words.chunks_exact(9).map(one).collect())
 }
 
-/// Compares what the device enters with truth.
-fn nodes(lab: &mut Lab, checks: &mut Checks, kind: Kind) -> Result<()> {
+/// Cases 15 to 19: compares what the device enters with truth; where boxes of scenes can be of the kind, also whole
+/// trees.
+pub fn nodes(lab: &mut Lab, checks: &mut Checks, kind: Kind) -> Result<()> {
     let count = lab.share(100_000);
     let mut rng = lab.random(&[15, kind as i64]);
     let cases: Vec<BoxCase> = (0..count).map(|number| case(&mut rng, kind, number)).collect();
@@ -245,20 +244,18 @@ fn nodes(lab: &mut Lab, checks: &mut Checks, kind: Kind) -> Result<()> {
     checks.none("boxes met and not entered", lost, met);
     checks.none("boxes entered that are not met even when grown by twice the padding", vain, passed);
     checks.equal("distances that are not finite", unordered, 0);
-    Ok(())
+    if matches!(kind, Kind::Zero | Kind::Flat) { scene(lab, checks, kind) } else { Ok(()) }
 }
 
 /// Judges rays through whole trees over axis-aligned boxes, most of them flat.
 fn scene(lab: &mut Lab, checks: &mut Checks, kind: Kind) -> Result<()> {
     let count = lab.share(12_000);
-    let mut stage = lab.stage(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(32, -10), &cached(50))?;
-    let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
-    let targets = Targets::of(&truth, &frame);
+    let mut stage = lab.judged(stiff(Stiff::FlatBoxes, 200, lab.seed), &settings(32, -10), &cached(50))?;
     let mut rng = lab.random(&[16, kind as i64]);
     let rays: Vec<Ray> = (0..count)
         .map(|number| {
-            let aim = targets.point(&mut rng, Aim::ALL[number % 3]);
-            let mut origin = aim + rng.range(0.1, 6.0) / frame.unit * rng.direction();
+            let aim = stage.targets.point(&mut rng, Aim::ALL[number % 3]);
+            let mut origin = aim + rng.range(0.1, 6.0) / stage.frame.unit * rng.direction();
             // In the planes of a face, or along a line of its edges.
             let axes = if number % 4 == 0 { 2 } else { 1 };
             let first = rng.int(0, 2) as usize;
@@ -270,44 +267,6 @@ fn scene(lab: &mut Lab, checks: &mut Checks, kind: Kind) -> Result<()> {
             one
         })
         .collect();
-    let (tally, _) = stage.judge(&truth, &frame, &rays)?;
-    note(checks, "scene of flat boxes", &tally);
+    stage.note(checks, "scene of flat boxes", &rays)?;
     Ok(())
-}
-
-/// Case 15: a zero component of the direction: outside of the slab a miss, inside no bound.
-pub fn zero_components(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    nodes(lab, &mut checks, Kind::Zero)?;
-    scene(lab, &mut checks, Kind::Zero)?;
-    Ok(checks)
-}
-
-/// Case 16: an origin on a face and a direction along it: met.
-pub fn on_faces(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    nodes(lab, &mut checks, Kind::OnFace)?;
-    Ok(checks)
-}
-
-/// Case 17: reciprocals beyond what f32 holds.
-pub fn huge_reciprocals(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    nodes(lab, &mut checks, Kind::Tiny)?;
-    Ok(checks)
-}
-
-/// Case 18: flat boxes.
-pub fn flat(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    nodes(lab, &mut checks, Kind::Flat)?;
-    scene(lab, &mut checks, Kind::Flat)?;
-    Ok(checks)
-}
-
-/// Case 19: rounding of slabs, near and far.
-pub fn rounding(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    nodes(lab, &mut checks, Kind::Any)?;
-    Ok(checks)
 }

@@ -1,6 +1,7 @@
 //! What a case is, and what it finds.
 
 use super::lab::Lab;
+use crate::reference::Tally;
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt::Display;
@@ -31,7 +32,7 @@ pub struct Case {
     /// Where truth comes from.
     pub truth: Source,
     /// Measures it; `None`: the part of the program that it is about is not built yet.
-    pub run: Option<fn(&mut Lab) -> Result<Checks>>,
+    pub run: Option<fn(&mut Lab, &mut Checks) -> Result<()>>,
 }
 
 /// One comparison of a case.
@@ -77,6 +78,15 @@ impl Checks {
     /// What is said is so.
     pub fn holds(&mut self, what: &str, is_so: bool) {
         self.push(format!("{what}: {}", if is_so { "yes" } else { "no" }), "yes".into(), is_so);
+    }
+
+    /// The judge of hits excuses every difference from truth.
+    pub fn judged(&mut self, what: &str, tally: &Tally) {
+        let text = format!("{what}: unexcused differences from truth ({} excused)", tally.excused());
+        self.none(&text, tally.mismatches, tally.total());
+        if let Some((index, fault)) = &tally.first {
+            self.equal(&format!("{what}: ray {index}"), format!("{fault:?}"), "no fault".into());
+        }
     }
 
     /// An error was given whose text has all `words`.

@@ -51,23 +51,6 @@ crate::settings::names! {
     }
 }
 
-/// Every defect.
-pub const ALL: [Defect; 13] = [
-    Defect::WorldF32,
-    Defect::AbsoluteEpsilon,
-    Defect::MollerTrumbore,
-    Defect::RelativePadding,
-    Defect::RawT,
-    Defect::NonStrictPrune,
-    Defect::NoBarriers,
-    Defect::SwappedTie,
-    Defect::NanSlab,
-    Defect::EarlyEviction,
-    Defect::LostQuery,
-    Defect::TileRemainder,
-    Defect::NoInset,
-];
-
 /// Möller and Trumbore 1997, in the axes of the frame; the sound function goes by another name.
 const MOLLER_TRUMBORE: &str =
     "fn intersect_triangle(f: RayFrame, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, t_min: f32) -> TriangleHit {

@@ -161,20 +161,17 @@ fn measure(place: &Place, seed: u64) -> [Wrong; 4] {
     let mut rng = Rng::new(seed, &[70]);
     let inside = |rng: &mut Rng| place.middle + 0.6 * place.radius * rng.unit() * rng.direction();
     let through = |origin: DVec3, to: DVec3| Given { origin, direction: (to - origin).normalize() };
+    let mut aimed = |kind: fn(usize) -> usize| -> Vec<Given> {
+        let one = |i| {
+            let (from, to) = (inside(&mut rng), place.point(&mut rng, kind(i)));
+            through(from, to)
+        };
+        (0..RAYS).map(one).collect()
+    };
     // At edges and vertices, from inside: every ray meets the closed mesh.
-    let at_edges: Vec<Given> = (0..RAYS)
-        .map(|i| {
-            let (from, to) = (inside(&mut rng), place.point(&mut rng, i % 2));
-            through(from, to)
-        })
-        .collect();
+    let at_edges = aimed(|i| i % 2);
     // At insides of triangles.
-    let at_insides: Vec<Given> = (0..RAYS)
-        .map(|_| {
-            let (from, to) = (inside(&mut rng), place.point(&mut rng, 2));
-            through(from, to)
-        })
-        .collect();
+    let at_insides = aimed(|_| 2);
     // Past the mesh's farthest vertex in some direction, by 10⁻⁶ to 10⁻² of the radius, across that direction.
     let past: Vec<Given> = (0..RAYS)
         .map(|_| {

@@ -1,12 +1,14 @@
 //! The cases by their numbers.
 
+use super::boxes::Kind;
 use super::case::Source::{Analytic, Exact, Paths, Reference, Unit};
 use super::case::{Case, Checks, Source};
 use super::lab::Lab;
 use super::{boxes, histories, lights, maps, meshes, roma, samples, shapes, streaming, surfaces, views, visibility};
 use anyhow::Result;
+use brickwalk_scenes::Stiff;
 
-const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab) -> Result<Checks>) -> Case {
+const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab, &mut Checks) -> Result<()>) -> Case {
     Case { number, title, truth, run: Some(run) }
 }
 
@@ -26,15 +28,21 @@ pub const CASES: &[Case] = &[
     case(8, "denormals", Paths, meshes::denormals),
     case(9, "overflow near 10^38", Unit, shapes::overflow),
     case(10, "coincident triangles", Paths, shapes::coincident),
-    case(11, "all centroids equal", Unit, shapes::equal_centroids),
+    case(11, "all centroids equal", Unit, |lab, checks| {
+        shapes::build_and_judge(lab, checks, Stiff::EqualCentroids, 300, 40, 2000.0)
+    }),
     case(12, "a million duplicates", Unit, shapes::duplicates),
-    case(13, "triangles that span every brick", Reference, shapes::spanning),
-    case(14, "a geometric series, very deep trees", Reference, shapes::series),
-    case(15, "zero component of the direction", Exact, boxes::zero_components),
-    case(16, "origin on a face, parallel to it", Exact, boxes::on_faces),
-    case(17, "huge reciprocals", Exact, boxes::huge_reciprocals),
-    case(18, "flat boxes", Exact, boxes::flat),
-    case(19, "rounding of slabs", Exact, boxes::rounding),
+    case(13, "triangles that span every brick", Reference, |lab, checks| {
+        shapes::build_and_judge(lab, checks, Stiff::Spanning, 4000, 128, 30.0)
+    }),
+    case(14, "a geometric series, very deep trees", Reference, |lab, checks| {
+        shapes::build_and_judge(lab, checks, Stiff::Series, 1000, 1000, 500.0)
+    }),
+    case(15, "zero component of the direction", Exact, |lab, checks| boxes::nodes(lab, checks, Kind::Zero)),
+    case(16, "origin on a face, parallel to it", Exact, |lab, checks| boxes::nodes(lab, checks, Kind::OnFace)),
+    case(17, "huge reciprocals", Exact, |lab, checks| boxes::nodes(lab, checks, Kind::Tiny)),
+    case(18, "flat boxes", Exact, |lab, checks| boxes::nodes(lab, checks, Kind::Flat)),
+    case(19, "rounding of slabs", Exact, |lab, checks| boxes::nodes(lab, checks, Kind::Any)),
     case(20, "edges and vertices of closed meshes", Exact, meshes::edges),
     case(21, "origins on surfaces", Analytic, surfaces::leaving_rays),
     case(22, "offset of origins", Exact, surfaces::offsets),
@@ -44,8 +52,12 @@ pub const CASES: &[Case] = &[
     case(26, "camera inside of geometry and boxes", Reference, surfaces::inside),
     case(27, "up along the view", Unit, views::up_along_view),
     case(28, "fields of view of 10^-6 and 179.99 degrees", Unit, views::fields_of_view),
-    case(29, "pictures of 1 x 1 and 1 x N", Paths, views::least_pictures),
-    case(30, "tiles that do not divide the picture", Paths, views::tile_remainder),
+    case(29, "pictures of 1 x 1 and 1 x N", Paths, |lab, checks| {
+        views::odd_sizes(lab, checks, &[(1, 1), (1, 37), (37, 1)], &[8, 64])
+    }),
+    case(30, "tiles that do not divide the picture", Paths, |lab, checks| {
+        views::odd_sizes(lab, checks, &[(33, 17), (65, 40)], &[8, 16, 32])
+    }),
     case(31, "fronts partition pixels and bricks", Paths, streaming::fronts),
     case(32, "a cut of the camera", Paths, streaming::cut),
     case(33, "late and lost results of queries", Paths, streaming::late_queries),
@@ -79,10 +91,9 @@ pub const CASES: &[Case] = &[
 ];
 
 /// Case 1: rays, then pictures.
-fn far_origin(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = meshes::far_origin(lab)?;
-    views::far_city(lab, &mut checks)?;
-    Ok(checks)
+fn far_origin(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    meshes::far_origin(lab, checks)?;
+    views::far_city(lab, checks)
 }
 
 #[cfg(test)]

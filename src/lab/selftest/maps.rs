@@ -2,7 +2,7 @@
 //! 57).
 
 use super::case::Checks;
-use super::lab::{Lab, settings};
+use super::lab::{Lab, mesh, settings};
 use crate::math::octahedral::{octahedral_decode, octahedral_encode};
 use crate::math::sampling::{concentric_disc, cosine_hemisphere, hammersley};
 use crate::reference::Truth;
@@ -10,13 +10,12 @@ use crate::secondary::df::{DistanceField, LEVELS, Tracing, distance_f16};
 use crate::secondary::occupancy::Bom;
 use anyhow::Result;
 use bricks::OCCUPANCY_LEVELS;
-use brickwalk_convert::source::Primitive;
-use brickwalk_scenes::one_mesh;
+use brickwalk_convert::source::SourceScene;
 use glam::DVec3;
 use half::f16;
 
 /// A sheet of 12 x 12 squares of side 1/8: its corner, and what one square more in either direction adds.
-fn sheet(corner: DVec3, [u, v]: [DVec3; 2]) -> Primitive {
+fn sheet(corner: DVec3, [u, v]: [DVec3; 2]) -> SourceScene {
     let n = 12u32;
     let at = |i: u32, j: u32| (corner + f64::from(i) * u + f64::from(j) * v).to_array();
     let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| at(i, j))).collect();
@@ -24,75 +23,69 @@ fn sheet(corner: DVec3, [u, v]: [DVec3; 2]) -> Primitive {
         .flat_map(|i| (0..n).map(move |j| i * (n + 1) + j))
         .flat_map(|p| [p, p + 1, p + n + 2, p, p + n + 2, p + n + 1])
         .collect();
-    Primitive { positions, indices, ..Primitive::default() }
+    mesh("sheet", positions, indices)
 }
 
-/// Points of the sheet that lie in an empty cell of every brick's map, of so many. The points have weights of eighths,
+/// No points of sheets lie in cells that are empty in every brick's map. The points have weights of eighths,
 /// the lattice is 2⁻²⁰ and cells are powers of two, so that everything is exact in f64.
-fn holes(lab: &mut Lab, primitive: Primitive) -> Result<(u64, u64)> {
-    let (file, _, _) = lab.build(one_mesh("sheet", primitive), &settings(40, -20))?;
-    let truth = Truth::load(&file)?;
-    let resident = file.resident();
-    let maps: Vec<_> =
-        (0..resident.bricks.len() as u32).map(|brick| file.occupancy(brick)).collect::<Result<_, _>>()?;
-    let is_occupied = |p: DVec3| {
-        resident.occupancy.iter().zip(&maps).any(|(record, map)| {
-            let side = f64::from(record.cell_log2).exp2();
-            let cell: [i64; 3] = std::array::from_fn(|k| (p[k] / side).floor() as i64 - record.origin[k]);
-            let holds = cell.iter().all(|x| (0..64).contains(x));
-            holds && (0..OCCUPANCY_LEVELS).all(|level| map.is_occupied(level, cell.map(|x| x as u32 >> level)))
-        })
-    };
+fn no_holes(lab: &mut Lab, checks: &mut Checks, what: &str, sheets: Vec<SourceScene>) -> Result<()> {
     let (mut empty, mut of) = (0, 0);
-    for [a, b, c] in truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(DVec3::from)) {
-        for (i, j) in (0..=8).flat_map(|i| (0..=8 - i).map(move |j| (f64::from(i), f64::from(j)))) {
-            of += 1;
-            empty += u64::from(!is_occupied((i * a + j * b + (8.0 - i - j) * c) / 8.0));
+    for sheet in sheets {
+        let file = lab.build(sheet, &settings(40, -20))?.file;
+        let truth = Truth::load(&file)?;
+        let resident = file.resident();
+        let maps: Vec<_> =
+            (0..resident.bricks.len() as u32).map(|brick| file.occupancy(brick)).collect::<Result<_, _>>()?;
+        let is_occupied = |p: DVec3| {
+            resident.occupancy.iter().zip(&maps).any(|(record, map)| {
+                let side = f64::from(record.cell_log2).exp2();
+                let cell: [i64; 3] = std::array::from_fn(|k| (p[k] / side).floor() as i64 - record.origin[k]);
+                let holds = cell.iter().all(|x| (0..64).contains(x));
+                holds && (0..OCCUPANCY_LEVELS).all(|level| map.is_occupied(level, cell.map(|x| x as u32 >> level)))
+            })
+        };
+        for [a, b, c] in truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(DVec3::from)) {
+            for (i, j) in (0..=8).flat_map(|i| (0..=8 - i).map(move |j| (f64::from(i), f64::from(j)))) {
+                of += 1;
+                empty += u64::from(!is_occupied((i * a + j * b + (8.0 - i - j) * c) / 8.0));
+            }
         }
     }
-    Ok((empty, of))
+    checks.none(what, empty, of);
+    Ok(())
 }
 
 /// Case 39: planes on the borders of cells, and one step of the lattice beside them.
-pub fn on_borders(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn on_borders(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let step = 1.0 / 1_048_576.0;
     let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-    let (mut empty, mut of) = (0, 0);
+    let mut sheets = Vec::new();
     for k in 0..3 {
         for aside in [-1.0, 0.0, 1.0] {
             let corner = axes[k] * (0.5 + aside * step);
-            let (e, n) = holes(lab, sheet(corner, [axes[(k + 1) % 3] / 8.0, axes[(k + 2) % 3] / 8.0]))?;
-            (empty, of) = (empty + e, of + n);
+            sheets.push(sheet(corner, [axes[(k + 1) % 3] / 8.0, axes[(k + 2) % 3] / 8.0]));
         }
     }
-    checks.none("points of planes at x, y, z = 1/2, and a step of 2^-20 beside, in empty cells", empty, of);
-    Ok(checks)
+    no_holes(lab, checks, "points of planes at x, y, z = 1/2, and a step of 2^-20 beside, in empty cells", sheets)
 }
 
 /// Case 40: planes along one axis of the raster, and along none.
-pub fn along_axes(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn along_axes(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let step = 1.0 / 1_048_576.0;
-    let (mut empty, mut of) = (0, 0);
+    let mut sheets = Vec::new();
     for slope in [0.0, step, 1.0 / 64.0, 0.125] {
         for k in 0..3 {
-            let mut u = DVec3::ZERO;
+            let (mut u, mut v) = (DVec3::ZERO, DVec3::ZERO);
             (u[k], u[(k + 1) % 3]) = (0.125, slope);
-            let mut v = DVec3::ZERO;
-            v[(k + 2) % 3] = 0.125;
-            v[(k + 1) % 3] = slope / 2.0;
-            let (e, n) = holes(lab, sheet(DVec3::splat(0.25), [u, v]))?;
-            (empty, of) = (empty + e, of + n);
+            (v[(k + 2) % 3], v[(k + 1) % 3]) = (0.125, slope / 2.0);
+            sheets.push(sheet(DVec3::splat(0.25), [u, v]));
         }
     }
-    checks.none("points of planes along axes and nearly so in empty cells", empty, of);
-    Ok(checks)
+    no_holes(lab, checks, "points of planes along axes and nearly so in empty cells", sheets)
 }
 
 /// Case 44: the concentric map at its centre, on diagonals, on the border.
-pub fn concentric(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn concentric(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut rng = lab.random(&[44]);
     checks.holds("the centre goes to the centre", concentric_disc([0.5, 0.5]) == [0.0, 0.0]);
     let (mut radius, mut diagonal, mut border) = (0.0f64, 0.0f64, 0.0f64);
@@ -116,12 +109,11 @@ pub fn concentric(lab: &mut Lab) -> Result<Checks> {
     checks.at_most("radius against the square's ring", radius, bound);
     checks.at_most("border against the unit circle", border, bound);
     checks.at_most("diagonals against |x| = |y|", diagonal, 2.0 * bound);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 45: octahedral directions at seams and zeros.
-pub fn octahedral(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn octahedral(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut rng = lab.random(&[45]);
     let mut worst = 0.0f64;
     let mut count = 0u64;
@@ -156,12 +148,11 @@ pub fn octahedral(lab: &mut Lab) -> Result<Checks> {
     checks.at_least("directions", count, 50_000);
     let zero = octahedral_decode(octahedral_encode([0.0; 3]));
     checks.holds("no direction gives one", zero.iter().all(|x| x.is_finite()));
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 46: the ends of the unit interval.
-pub fn hammersley_ends(_: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn hammersley_ends(_: &mut Lab, checks: &mut Checks) -> Result<()> {
     let (mut outside, mut below, mut points) = (0, 0, 0);
     for count in [1u32, 2, 3, 1000, 1 << 24, u32::MAX] {
         for index in [0, 1, count / 2, count - 1] {
@@ -180,12 +171,11 @@ pub fn hammersley_ends(_: &mut Lab) -> Result<Checks> {
     }
     checks.none("points outside of [0, 1)", outside, points);
     checks.none("heights that are negative or no number", below, points);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 56: distances between the middles of cells, as f16.
-pub fn distances(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn distances(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     // All that there are in the largest map.
     let (mut above, mut loose, mut of) = (0, 0, 0);
     for squared in 0..=3 * 255u32.pow(2) {
@@ -213,12 +203,11 @@ pub fn distances(lab: &mut Lab) -> Result<Checks> {
     checks.none("flooded distances that are too short", short, 32u64.pow(3));
     // No bound is known; the largest of many maps was 1.3.
     checks.at_most("flooded distance beyond the exact one, cells", longest, 2.0);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 57: the field of a map without occupied cells, and of one with a single one.
-pub fn no_seed(_: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn no_seed(_: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut map = Bom::new(64, -2, [0; 3]);
     let middle = 7.625;
     let traced = |field: &DistanceField| {
@@ -235,5 +224,5 @@ pub fn no_seed(_: &mut Lab) -> Result<Checks> {
     let t = traced(&DistanceField::new(&map)).t.unwrap_or(f64::NAN);
     // From the least distance that hits to the middle of the cell, which is at 10.125.
     checks.at_most("hit of a single cell, cells from its middle", (t - 11.125).abs() * 4.0, 1.0);
-    Ok(checks)
+    Ok(())
 }

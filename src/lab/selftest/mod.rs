@@ -30,14 +30,14 @@ mod visibility;
 
 use crate::cpu;
 use crate::gpu::probe;
-use crate::gpu::probe::ProbeReport;
+use crate::gpu::probe::{ProbeReport, Traits};
 use crate::kernels::DeviceInfo;
 use crate::lab::console::Console;
 use crate::session::device::Device;
 use anyhow::{Result, bail};
 use args::SelftestArgs;
 use brickwalk_convert::progress::Progress;
-use case::{Case, Check, Row, Source, Status};
+use case::{Case, Check, Checks, Row, Source, Status};
 use defects::Defect;
 use lab::Lab;
 use serde::Serialize;
@@ -46,21 +46,6 @@ use std::time::Instant;
 
 /// Raised when a field changes its meaning.
 const FORMAT: u32 = 1;
-
-/// What a device does where WGSL leaves it open.
-#[derive(Clone, Debug, Serialize)]
-pub struct Traits {
-    /// Whether `a * b - c * d` is fused where no barrier stands between.
-    pub contracts: bool,
-    /// Whether products in the range of denormals become 0.
-    pub flushes_denormals: bool,
-    /// Whether the bits of a NaN survive.
-    pub keeps_nan_bits: bool,
-    /// What max and min give of a NaN and a number.
-    pub nan_in_max_min: &'static str,
-    /// Least and greatest number of lanes that run together, where the device tells.
-    pub subgroup_size: Option<(u32, u32)>,
-}
 
 /// What a test found.
 #[derive(Clone, Debug, Serialize)]
@@ -120,12 +105,16 @@ pub fn test(args: &SelftestArgs) -> Result<Report> {
         list::CASES.iter().filter(|case| args.case.is_empty() || args.case.contains(&case.number)).collect();
     let mut rows = Vec::new();
     if let Some(probe) = probe.filter(|_| args.case.is_empty()) {
-        rows.push(probe_row(&probe, args));
+        let (title, truth) = ("the device's arithmetic", Source::Exact);
+        rows.push(row(&Case { number: 0, title, truth, run: None }, Some(Ok(probe_checks(&probe))), probe.ms, args));
     }
     let progress = Progress::new();
     progress.phase("cases", wanted.len() as u64);
     for case in wanted {
-        rows.push(run_case(case, &mut lab, args));
+        let start = Instant::now();
+        let mut checks = Checks::default();
+        let found = case.run.map(|run| run(&mut lab, &mut checks).map(|()| checks));
+        rows.push(row(case, found, start.elapsed().as_secs_f64() * 1e3, args));
         progress.advance(1);
     }
     progress.finish();
@@ -143,38 +132,25 @@ pub fn test(args: &SelftestArgs) -> Result<Report> {
     })
 }
 
-fn run_case(case: &Case, lab: &mut Lab, args: &SelftestArgs) -> Row {
-    let Case { number, title, truth, run } = *case;
-    let start = Instant::now();
-    let mut row = Row {
-        case: number,
-        title,
-        truth,
-        status: Status::NotBuilt,
-        checks: vec![],
-        error: None,
-        ms: 0.0,
-        replay: None,
+/// The line of a case; `None`: it was not run.
+fn row(case: &Case, found: Option<Result<Checks>>, ms: f64, args: &SelftestArgs) -> Row {
+    let Case { number, title, truth, .. } = *case;
+    let (status, checks, error) = match found {
+        None => (Status::NotBuilt, Vec::new(), None),
+        Some(Ok(checks)) => (if checks.passed() { Status::Pass } else { Status::Fail }, checks.0, None),
+        Some(Err(error)) => (Status::Fail, Vec::new(), Some(format!("{error:#}"))),
     };
-    if let Some(run) = run {
-        let (passed, checks, error) = match run(lab) {
-            Ok(checks) => (checks.passed(), checks.0, None),
-            Err(error) => (false, Vec::new(), Some(format!("{error:#}"))),
-        };
-        row = Row { status: if passed { Status::Pass } else { Status::Fail }, checks, error, ..row };
-        row.replay = (!passed).then(|| replay(Some(number), args));
-    }
-    row.ms = start.elapsed().as_secs_f64() * 1e3;
-    row
+    let replay = (status == Status::Fail).then(|| replay(number, args));
+    Row { case: number, title, truth, status, checks, error, ms, replay }
 }
 
 /// The command that repeats a case; the probe, which goes before the cases, with all of them.
-fn replay(number: Option<u32>, args: &SelftestArgs) -> String {
-    let case = number.map_or(String::new(), |number| format!(" --case {number}"));
+fn replay(number: u32, args: &SelftestArgs) -> String {
+    let case = if number == 0 { String::new() } else { format!(" --case {number}") };
     let mut text = format!("brickwalk selftest{case} --seed {}", args.seed);
     let _ = write!(text, " --rays {} --adapter {:?}", args.rays, args.adapter.to_string());
     if let Some(defect) = args.plant {
-        let _ = write!(text, " --plant {}", defect.name());
+        let _ = write!(text, " --plant {defect}");
     }
     text
 }
@@ -199,37 +175,19 @@ fn device_traits(device: &Device, defect: Option<Defect>) -> (Traits, Option<Pro
         Device::Gpu(gpu) => {
             let text = defect.map_or_else(probe::source, |defect| defect.plant(probe::source()));
             let report = probe::run_source(&gpu.device, &gpu.queue, &text);
-            let traits = Traits {
-                contracts: report.contracts,
-                flushes_denormals: report.flushes_denormals,
-                keeps_nan_bits: report.keeps_nan_bits,
-                nan_in_max_min: report.nan_in_max_min,
-                subgroup_size: report.subgroup_size,
-            };
-            (traits, Some(report))
+            (report.traits.clone(), Some(report))
         }
     }
 }
 
-/// The probe as a line before the cases.
-fn probe_row(report: &ProbeReport, args: &SelftestArgs) -> Row {
+/// What the probe found.
+fn probe_checks(report: &ProbeReport) -> Checks {
     let check = |check: &probe::Check| Check {
         measured: format!("{}: {} of {} unlike {}", check.name, check.different, check.cases, check.against),
         bound: "0".into(),
         passed: check.different == 0,
     };
-    let checks: Vec<Check> = report.checks.iter().map(check).collect();
-    let passed = checks.iter().all(|check| check.passed);
-    Row {
-        case: 0,
-        title: "the device's arithmetic",
-        truth: Source::Exact,
-        status: if passed { Status::Pass } else { Status::Fail },
-        checks,
-        error: None,
-        ms: report.ms,
-        replay: (!passed).then(|| replay(None, args)),
-    }
+    Checks(report.checks.iter().map(check).collect())
 }
 
 fn as_text(report: &Report) -> String {

@@ -63,6 +63,17 @@ impl Targets {
     pub fn ray(&self, rng: &mut Rng, origin: DVec3, aim: Aim) -> Ray {
         ray(origin, self.point(rng, aim))
     }
+
+    /// `count` rays at random targets from the cube of half side `half` around `middle`: half of the origins on
+    /// multiples of `step`, the others anywhere.
+    pub fn aimed(&self, rng: &mut Rng, (middle, half): (DVec3, f64), step: f64, count: usize) -> Vec<Ray> {
+        let aimed = |i: usize| {
+            let fine = if i.is_multiple_of(2) { step } else { step / 1024.0 };
+            let origin = lattice_point(rng, middle, half, fine);
+            self.ray(rng, origin, Aim::ALL[i / 2 % 3])
+        };
+        (0..count).map(aimed).collect()
+    }
 }
 
 /// The ray from a point through another, in device units; it begins at the point rounded to f32.

@@ -1,13 +1,13 @@
 //! Sums of many samples (case 54).
 
 use super::case::Checks;
-use super::lab::{Lab, picture, settings};
+use super::lab::{Lab, camera, primary, settings};
 use crate::frame::Engine;
 use crate::frame::{Accumulation, BATCH_SAMPLES, Renderer, camera_view};
 use crate::scene::Camera;
 use crate::schedule::{Lamp, Pass, Shading, Step};
 use crate::session::Settings;
-use crate::settings::{EffectList, Schedule};
+use crate::settings::Schedule;
 use anyhow::Result;
 use brickwalk_scenes::{Stiff, stiff};
 use glam::DVec3;
@@ -48,27 +48,25 @@ fn add_samples(renderer: &mut Renderer, camera: &Camera, first: u32, count: u32)
 }
 
 /// Case 54: in a closed room of black walls that glow every sample is the glow; so is the mean of any number of them.
-pub fn accumulation(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn accumulation(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut source = stiff(Stiff::Cube, 1, lab.seed);
     for material in &mut source.materials {
         material.base_color = [0.0, 0.0, 0.0, 1.0];
         material.emission = GLOW;
     }
-    let (file, path, _) = lab.build(source, &settings(64, 0))?;
-    let camera = Camera { position: DVec3::new(0.1, 0.2, -0.3), target: DVec3::X, up: DVec3::Y, fov_y: 1.0 };
-    let (schedule, effects) = (Schedule::Plain, EffectList::PRIMARY);
-    let options = |spp| Settings { tile: 8, schedule, effects, spp, ..picture(8, 8, 100) };
+    let scene = lab.build(source, &settings(64, 0))?;
+    let camera = camera([0.1, 0.2, -0.3], DVec3::X, 1.0);
+    let options = |spp| Settings { tile: 8, spp, ..primary(8, 8, 100, Schedule::Plain) };
 
     // Rendered, sample by sample; not a whole number of batches.
     let samples = lab.share(10_000) as u32 / BATCH_SAMPLES * BATCH_SAMPLES + 1;
-    let mut renderer = lab.renderer(&file, &path, &options(samples))?;
+    let mut renderer = lab.renderer(&scene, &options(samples))?;
     let mean = renderer.frame(0, &camera)?.pixels.radiance;
     checks.at_most(&format!("{samples} samples of a frame: relative drift"), drift(&mean), BOUND);
 
     // Shaded again and again: batches of the same frame.
     let frames = (lab.rays as u32).min(1_000_000) / BATCH_SAMPLES * BATCH_SAMPLES;
-    let mut renderer = lab.renderer(&file, &path, &options(1))?;
+    let mut renderer = lab.renderer(&scene, &options(1))?;
     renderer.frame(0, &camera)?;
     let mut accumulation = Accumulation::default();
     for first in (0..frames).step_by(BATCH_SAMPLES as usize) {
@@ -83,5 +81,5 @@ pub fn accumulation(lab: &mut Lab) -> Result<Checks> {
     let mut one = Accumulation::default();
     one.add(&renderer.executor.read_radiance()?);
     checks.at_least(&format!("{few} frames in one sum of f32: relative drift"), drift(&one.mean()), 2.0 * BOUND);
-    Ok(checks)
+    Ok(())
 }

@@ -1,24 +1,23 @@
 //! Queries, lists, caches and damaged files (cases 31 to 37).
 
 use super::case::Checks;
-use super::lab::{Lab, lit, misses, scheduled, settings};
-use super::rays::{Aim, Targets};
+use super::lab::{Built, Lab, lit, misses, scheduled, settings};
+use super::rays::{Aim, Targets, ray};
 use super::views::{city, in_city, pixels_unlike};
 use crate::frame::{Pixels, Renderer};
 use crate::kernels::layout::Ray;
+use crate::reference::Truth;
 use crate::schedule::Optimisation;
 use crate::session::Settings;
 use crate::session::opened::open_scene;
 use crate::settings::{CacheSize, Schedule};
 use crate::stream::{Item, PayloadSource, Policy, Residency};
 use anyhow::{Context, Result, anyhow};
-use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Payload, SceneFile};
+use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Payload};
 use brickwalk_convert::source::Primitive;
 use brickwalk_scenes::{Stiff, one_mesh, stiff};
 use bytemuck::Zeroable;
 use glam::DVec3;
-use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Settings of pictures with several effects.
 fn options(percent: u32) -> Settings {
@@ -27,16 +26,15 @@ fn options(percent: u32) -> Settings {
 
 /// A city of many bricks, and what it looks like from three places with everything resident.
 struct Place {
-    file: Arc<SceneFile>,
-    path: PathBuf,
+    scene: Built,
     expected: Vec<Pixels>,
 }
 
 fn place(lab: &mut Lab, bricks: u32) -> Result<Place> {
-    let (file, path, _) = lab.build(city(lab.seed, [0.0; 3])?, &settings(bricks, -14))?;
-    let mut plain = lab.renderer(&file, &path, &Settings { schedule: Schedule::Plain, tile: 64, ..options(100) })?;
+    let scene = lab.build(city(lab.seed, [0.0; 3])?, &settings(bricks, -14))?;
+    let mut plain = lab.renderer(&scene, &Settings { schedule: Schedule::Plain, tile: 64, ..options(100) })?;
     let expected = (0..3).map(|k| Ok(plain.frame(k, &in_city(k, [0.0; 3]))?.pixels)).collect::<Result<_>>()?;
-    Ok(Place { file, path, expected })
+    Ok(Place { scene, expected })
 }
 
 /// Frame `k`, which looks at the k-th view, and how many of its pixels differ from the expected ones.
@@ -46,11 +44,10 @@ fn unlike(renderer: &mut Renderer, place: &Place, k: u32) -> Result<u64> {
 }
 
 /// Case 31: every pair of a pixel and a brick lies in exactly one leaf pair of the fronts.
-pub fn fronts(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn fronts(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let place = place(lab, 128)?;
     let options = Settings { tile: 8, schedule: Schedule::Chc, fronts: true, ..options(25) };
-    let mut renderer = lab.renderer(&place.file, &place.path, &options)?;
+    let mut renderer = lab.renderer(&place.scene, &options)?;
     let (mut defects, mut pixels, mut states) = (0, 0, 0);
     // Still, then from place to place.
     for k in [0, 0, 0, 1, 1, 2, 0] {
@@ -61,35 +58,33 @@ pub fn fronts(lab: &mut Lab) -> Result<Checks> {
     }
     checks.none("visibility states that do not partition rays and bricks", defects, states);
     checks.none("pixels unlike those without fronts", pixels, 7 * 72 * 48);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 32: a cut of the camera is a cold start.
-pub fn cut(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn cut(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let place = place(lab, 256)?;
     for (fronts, name) in [(false, "off"), (true, "on")] {
         let options = Settings { schedule: Schedule::Chc, fronts, ..options(25) };
-        let mut walking = lab.renderer(&place.file, &place.path, &options)?;
+        let mut walking = lab.renderer(&place.scene, &options)?;
         for k in [0, 0, 1] {
             unlike(&mut walking, &place, k)?;
         }
         let after = walking.frame(2, &in_city(2, [0.0; 3]))?.pixels;
-        let cold = lab.renderer(&place.file, &place.path, &options)?.frame(2, &in_city(2, [0.0; 3]))?.pixels;
+        let cold = lab.renderer(&place.scene, &options)?.frame(2, &in_city(2, [0.0; 3]))?.pixels;
         checks.none(&format!("fronts {name}: pixels unlike a cold start's"), pixels_unlike(&cold, &after), 72 * 48);
     }
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 33: what a query says late changes nothing; what it never says is an error.
 ///
 /// Fronts ask for visible pairs in every third frame: in between their answer is the one from before. A query whose
 /// answer does not come back ends the frame with an error, so no picture can lack a brick silently.
-pub fn late_queries(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn late_queries(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let place = place(lab, 256)?;
     let options = Settings { schedule: Schedule::Chc, ..options(25) };
-    let mut late = lab.renderer(&place.file, &place.path, &Settings { fronts: true, ..options.clone() })?;
+    let mut late = lab.renderer(&place.scene, &Settings { fronts: true, ..options.clone() })?;
     let (mut differ, mut deferred) = (0, 0);
     for k in [0, 0, 0, 0, 1, 1, 1, 0] {
         let output = late.frame(k, &in_city(k, [0.0; 3]))?;
@@ -101,40 +96,38 @@ pub fn late_queries(lab: &mut Lab) -> Result<Checks> {
     for submission in [1, 3, 6] {
         lab.fails_at = Some(submission);
         let frame = lab
-            .renderer(&place.file, &place.path, &options)
+            .renderer(&place.scene, &options)
             .and_then(|mut renderer| renderer.frame(0, &in_city(0, [0.0; 3])).map_err(anyhow::Error::from));
         lab.fails_at = None;
         checks.refuses(&format!("lost answer of submission {submission}"), frame.map(|_| ()), &["lost"]);
     }
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 34: lists longer than there is room for at first are made again, and nothing is left out.
-pub fn overflow(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn overflow(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let place = place(lab, 32)?;
     // One tile, whose list starts with room for 64 leaves.
     let without = vec![Optimisation::RootWalk];
     let options = Settings { tile: 128, schedule: Schedule::Chc, without, ..options(25) };
-    let mut renderer = lab.renderer(&place.file, &place.path, &options)?;
-    checks.at_least("leaves", place.file.resident().leaves.len(), 256);
+    let mut renderer = lab.renderer(&place.scene, &options)?;
+    checks.at_least("leaves", place.scene.file.resident().leaves.len(), 256);
     let differ = unlike(&mut renderer, &place, 2)? + unlike(&mut renderer, &place, 0)?;
     checks.none("pixels unlike those without lists", differ, 2 * 72 * 48);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 35: a cache below two bricks is refused, of two bricks it works, and what is pinned is not overwritten.
-pub fn least_cache(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn least_cache(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let place = place(lab, 256)?;
-    let sizes = place.file.sizes();
+    let sizes = place.scene.file.sizes();
     let least = Residency::least_budget(&sizes);
     let of_bytes = |bytes| Settings { cache: CacheSize::Bytes(bytes), ..options(100) };
-    let small = lab.renderer(&place.file, &place.path, &of_bytes(least - 16));
+    let small = lab.renderer(&place.scene, &of_bytes(least - 16));
     checks.refuses("one unit less than two bricks", small.map(|_| ()), &["too small", "two largest bricks"]);
     for evict in Policy::ALL {
         let options = Settings { schedule: Schedule::Chc, evict, ..of_bytes(least) };
-        let mut renderer = lab.renderer(&place.file, &place.path, &options)?;
+        let mut renderer = lab.renderer(&place.scene, &options)?;
         let differ = unlike(&mut renderer, &place, 0)? + unlike(&mut renderer, &place, 2)?;
         checks.none(&format!("two bricks, {evict}: pixels unlike those with all"), differ, 2 * 72 * 48);
     }
@@ -162,12 +155,11 @@ pub fn least_cache(lab: &mut Lab) -> Result<Checks> {
         }
     }
     checks.none("pinned payloads that were overwritten in a batch", lost, of);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 36: a damaged brick is named, and what does not need it is still rendered.
-pub fn damage(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn damage(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let cube = stiff(Stiff::Cube, 6, lab.seed).meshes.remove(0).primitives.remove(0);
     let mut both = Primitive::default();
     for x in [-10.0, 10.0] {
@@ -175,12 +167,12 @@ pub fn damage(lab: &mut Lab) -> Result<Checks> {
         both.positions.extend(cube.positions.iter().map(|p| [p[0] + x, p[1], p[2]]));
         both.indices.extend(cube.indices.iter().map(|i| first + i));
     }
-    let (file, path, _) = lab.build(one_mesh("two cubes", both), &settings(64, -20))?;
-    let resident = file.resident();
+    let Built { file: sound, path, .. } = lab.build(one_mesh("two cubes", both), &settings(64, -20))?;
+    let resident = sound.resident();
     let is_right = |brick: &Brick| brick.origin[0] > 0;
     let bad = resident.bricks.iter().position(|brick| !is_right(brick)).context("a brick of the left cube")? as u32;
     let mut bytes = std::fs::read(&path)?;
-    let middle = file.span(Payload::Geometry(bad));
+    let middle = sound.span(Payload::Geometry(bad));
     bytes[(middle.offset + middle.bytes / 2) as usize] ^= 4;
     let damaged = lab.scene_path();
     std::fs::write(&damaged, &bytes)?;
@@ -188,37 +180,34 @@ pub fn damage(lab: &mut Lab) -> Result<Checks> {
     let report = file.verify(&mut |_, _| ())?;
     checks.equal("parts that verify finds damaged", report.problems.len(), 1);
 
-    let mut stage = lab.open_stage(file.clone(), &damaged, &scheduled(60, Schedule::Demand))?;
-    let truth = SceneFile::open(&path)?;
-    let truth = crate::reference::Truth::load(&truth)?;
-    let frame = stage.frame(DVec3::ZERO);
-    let targets = Targets::of(&truth, &frame);
+    let mut stage = lab.open_stage(file, &damaged, &scheduled(60, Schedule::Demand))?;
+    let unit = stage.frame.unit;
+    let targets = Targets::of(&Truth::load(&sound)?, &stage.frame);
     let mut rng = lab.random(&[36]);
-    let mut toward = |side: f64, stage: &mut super::lab::Stage| -> Result<u64> {
+    let mut toward = |side: f64| -> Result<u64> {
         let rays: Vec<Ray> = (0..400)
             .map(|i| {
                 let own = |p: DVec3| p.x * side > 0.0;
                 let aim = std::iter::repeat_with(|| targets.point(&mut rng, Aim::ALL[i % 3])).find(|&p| own(p));
                 // From inside, so that every brick of the cube is seen.
-                super::rays::ray(DVec3::new(10.0 * side, 0.1, 0.2) / frame.unit, aim.unwrap_or_default())
+                ray(DVec3::new(10.0 * side, 0.1, 0.2) / unit, aim.unwrap_or_default())
             })
             .collect();
-        Ok(misses(&stage.trace(&frame, &rays, false)?))
+        Ok(misses(&stage.trace(&rays, false)?))
     };
-    checks.equal("rays at the sound cube that miss", toward(1.0, &mut stage)?, 0);
+    checks.equal("rays at the sound cube that miss", toward(1.0)?, 0);
     let name = format!("brick {bad}");
-    checks.refuses("rays at the damaged cube", toward(-1.0, &mut stage).map(|_| ()), &[name.as_str()]);
-    checks.equal("rays at the sound cube that miss afterwards", toward(1.0, &mut stage)?, 0);
+    checks.refuses("rays at the damaged cube", toward(-1.0).map(|_| ()), &[name.as_str()]);
+    checks.equal("rays at the sound cube that miss afterwards", toward(1.0)?, 0);
 
     let cut = lab.scene_path();
     std::fs::write(&cut, &bytes[..bytes.len() * 2 / 3])?;
     checks.refuses("a file that was cut off", open_scene(&cut).map(|_| ()), &[&cut.display().to_string()]);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 37: more than 2³¹ indices or bytes.
-pub fn large_counts(_: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn large_counts(_: &mut Lab, checks: &mut Checks) -> Result<()> {
     let most = u32::MAX;
     let brick = Brick {
         node_count: most,
@@ -240,5 +229,5 @@ pub fn large_counts(_: &mut Lab) -> Result<Checks> {
     }
     checks.equal("bytes in use after nine loads of 3 GiB", residency.used_bytes() % (3 << 30), 0);
     checks.at_least("bytes in use", residency.used_bytes(), 9 << 30);
-    Ok(checks)
+    Ok(())
 }

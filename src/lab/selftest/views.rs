@@ -1,25 +1,23 @@
 //! Rays as they are given, cameras, pictures (cases 24, 25, 27 to 30, 60, and the pictures of case 1).
 
 use super::case::Checks;
-use super::lab::{Lab, cached, lit, picture, scheduled, settings, truth_ray};
-use super::meshes::{OTHER_SHIFTS, SHIFTS, aimed, note, step_of};
-use super::rays::Targets;
-use crate::frame::Pixels;
+use super::lab::{Lab, cached, camera, lit, misses, primary, scheduled, settings, tally};
+use super::meshes::{OTHER_SHIFTS, SHIFTS};
+use crate::frame::{Pixels, Renderer};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{NONE, Ray};
 use crate::output::npy;
-use crate::reference::{Tally, Truth, judge};
+use crate::reference::{Tally, Truth};
 use crate::scene::Camera;
 use crate::schedule::Pass;
 use crate::session::Settings;
 use crate::session::trace::{check, device_ray, trace};
-use crate::settings::{EffectList, Schedule};
+use crate::settings::Schedule;
 use anyhow::Result;
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
 use brickwalk_scenes::{Kind, Settings as Generated, Stiff, generate, moved, stiff};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// The smallest city, on a lattice of 2⁻¹⁴ m, moved.
 ///
@@ -35,8 +33,8 @@ pub fn in_city(k: u32, shift: [f64; 3]) -> Camera {
     let eyes =
         [([2.0, 1.75, 1.0], [30.0, 3.0, 8.0]), ([-3.5, 1.75, 12.0], [0.0, 2.5, -40.0]), ([40.0, 30.0, 40.0], [0.0; 3])];
     let (position, target) = eyes[k as usize % 3];
-    let shift = DVec3::from(shift);
-    Camera { position: DVec3::from(position) + shift, target: DVec3::from(target) + shift, up: DVec3::Y, fov_y: 1.0 }
+    let moved = |p: [f64; 3]| DVec3::from(p) + DVec3::from(shift);
+    camera(moved(position).to_array(), moved(target), 1.0)
 }
 
 /// How many pixels differ in any bit.
@@ -59,8 +57,8 @@ pub fn far_city(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let options = Settings { schedule: Schedule::Chc, ..lit(96, 64, 30, 1) };
     let mut expected: Vec<Pixels> = Vec::new();
     for shift in [[0.0; 3], SHIFTS[0], SHIFTS[1]] {
-        let (file, path, _) = lab.build(city(lab.seed, shift)?, &settings(1024, -14))?;
-        let mut renderer = lab.renderer(&file, &path, &options)?;
+        let scene = lab.build(city(lab.seed, shift)?, &settings(1024, -14))?;
+        let mut renderer = lab.renderer(&scene, &options)?;
         let (mut unlike, mut of, mut met) = (0, 0, 0);
         for k in 0..3 {
             let pixels = renderer.frame(k, &in_city(k, shift))?.pixels;
@@ -77,25 +75,20 @@ pub fn far_city(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     }
     // Elsewhere: the rule of exactness.
     for shift in OTHER_SHIFTS {
-        let (file, path, _) = lab.build(city(lab.seed, shift)?, &settings(1024, -14))?;
-        let truth = Truth::load(&file)?;
-        let (schedule, effects) = (Schedule::Chc, EffectList::PRIMARY);
-        let options = Settings { schedule, effects, ..picture(96, 64, 30) };
-        let mut renderer = lab.renderer(&file, &path, &options)?;
+        let scene = lab.build(city(lab.seed, shift)?, &settings(1024, -14))?;
+        let mut renderer = lab.renderer(&scene, &primary(96, 64, 30, Schedule::Chc))?;
         let camera = in_city(0, shift);
         renderer.frame(0, &camera)?;
-        let frame = Frame::near(file.resident(), camera.position);
-        let (tally, missed) = judge_picture(&mut *renderer.executor, &truth, &frame)?;
+        let (tally, missed) = judge_picture(&mut renderer, &Truth::load(&scene.file)?, &camera)?;
         let place = format!("city {:.0} m away, beside the lattice", DVec3::from(shift).length());
-        note(checks, &place, &tally);
+        checks.judged(&place, &tally);
         checks.at_least(&format!("{place}: pixels that show something"), tally.total() - missed, 1000);
     }
     Ok(())
 }
 
 /// Case 24: directions of all lengths; none at all.
-pub fn directions(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn directions(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut stage = lab.stage(stiff(Stiff::Shell, 2, lab.seed), &settings(64, 0), &cached(100))?;
     let mut rng = lab.random(&[24]);
     let count = lab.share(4000);
@@ -123,22 +116,19 @@ pub fn directions(lab: &mut Lab) -> Result<Checks> {
     checks.refuses("direction of no length", check(&zero), &["no length"]);
     let nan = npy::Ray { direction: [f64::NAN, 1.0, 0.0], ..base[0] };
     checks.refuses("direction that is not a number", check(&nan), &["finite"]);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 25: intervals: empty, a single point, endless.
-pub fn intervals(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    let mut stage = lab.stage(stiff(Stiff::Shell, 3, lab.seed), &settings(64, -20), &scheduled(40, Schedule::Chc))?;
-    let (truth, frame) = (stage.truth()?, stage.frame(DVec3::ZERO));
-    let targets = Targets::of(&truth, &frame);
+pub fn intervals(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    let mut stage = lab.judged(stiff(Stiff::Shell, 3, lab.seed), &settings(64, -20), &scheduled(40, Schedule::Chc))?;
     let count = lab.share(20_000);
-    let rays = aimed(&mut lab.random(&[25]), &targets, DVec3::ZERO, 0.3 / frame.unit, step_of(&stage), count);
-    let hits = stage.trace(&frame, &rays, false)?;
+    let rays = stage.aimed(&mut lab.random(&[25]), 0.3, count);
+    let hits = stage.trace(&rays, false)?;
     let of = count as u64;
     let mut run = |change: &dyn Fn(&Ray, f32) -> Ray, any: bool| -> Result<Vec<u32>> {
         let changed: Vec<Ray> = rays.iter().zip(&hits).map(|(ray, hit)| change(ray, hit.t)).collect();
-        Ok(stage.trace(&frame, &changed, any)?.iter().map(|hit| hit.id).collect())
+        Ok(stage.trace(&changed, any)?.iter().map(|hit| hit.id).collect())
     };
     let unlike = |ids: &[u32]| ids.iter().zip(&hits).filter(|(id, hit)| **id != hit.id).count() as u64;
     let found = |ids: &[u32]| ids.iter().filter(|&&id| id != NONE).count() as u64;
@@ -153,16 +143,15 @@ pub fn intervals(lab: &mut Lab) -> Result<Checks> {
     checks.none("t_max just below t of the hit: occluded", found(&short), of);
     let empty = run(&|ray, t| Ray { t_min: t.next_up(), t_max: t.next_down(), ..*ray }, false)?;
     checks.none("t_min above t_max: hits", found(&empty), of);
-    let frame = Frame::near(stage.file.resident(), DVec3::ZERO);
     let given = |t_min: f64, t_max: f64| npy::Ray { origin: [0.0; 3], direction: [1.0, 2.0, 3.0], t_min, t_max };
     let is_empty = |given: &npy::Ray| {
-        let ray = device_ray(given, &frame).ray;
+        let ray = device_ray(given, &stage.frame).ray;
         ray.t_min > ray.t_max
     };
     checks.holds("given: t_min above t_max is an empty interval", is_empty(&given(2.0, 1.0)));
     checks.holds("given: t_max = inf is not", !is_empty(&given(0.0, f64::INFINITY)));
     checks.refuses("given: t_max = NaN", check(&given(0.0, f64::NAN)), &["numbers"]);
-    Ok(checks)
+    Ok(())
 }
 
 /// How far a camera's axes are from right-handed and orthonormal.
@@ -175,8 +164,7 @@ fn deviation(camera: &Camera) -> f64 {
 }
 
 /// Case 27: an up vector along the view.
-pub fn up_along_view(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn up_along_view(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut rng = lab.random(&[27]);
     let mut worst = 0.0f64;
     for i in 0..3000 {
@@ -189,30 +177,22 @@ pub fn up_along_view(lab: &mut Lab) -> Result<Checks> {
     }
     // Each axis is a cross product of unit vectors and normalised: a handful of roundings of 2^-53, twice.
     checks.at_most("deviation from orthonormal axes", worst, 32.0 * 2f64.powi(-53));
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 28: fields of view from 10⁻⁶ to 179.99 degrees.
-pub fn fields_of_view(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    let (file, path, _) = lab.build(stiff(Stiff::Shell, 3, lab.seed), &settings(64, 0))?;
-    let truth = Truth::load(&file)?;
+pub fn fields_of_view(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    let scene = lab.build(stiff(Stiff::Shell, 3, lab.seed), &settings(64, 0))?;
+    let truth = Truth::load(&scene.file)?;
     for degrees in [1e-6, 1e-3, 1.0, 90.0, 179.0, 179.99] {
-        let camera = Camera {
-            position: DVec3::new(0.1, 0.0, 0.2),
-            target: DVec3::X,
-            up: DVec3::Y,
-            fov_y: f64::to_radians(degrees),
-        };
+        let camera = camera([0.1, 0.0, 0.2], DVec3::X, f64::to_radians(degrees));
         let basis = camera.ray_basis(64, 48);
         let vectors = [basis.b, basis.dx, basis.dy].into_iter().all(|v| v.is_finite() && v != DVec3::ZERO);
         checks.holds(&format!("{degrees} degrees: rays are finite"), vectors);
-        let (schedule, effects) = (Schedule::Chc, EffectList::PRIMARY);
-        let options = Settings { schedule, effects, aov: true, ..picture(64, 48, 40) };
-        let mut renderer = lab.renderer(&file, &path, &options)?;
+        let options = Settings { aov: true, ..primary(64, 48, 40, Schedule::Chc) };
+        let mut renderer = lab.renderer(&scene, &options)?;
         let pixels = renderer.frame(0, &camera)?.pixels;
-        let (tally, missed) =
-            judge_picture(&mut *renderer.executor, &truth, &Frame::near(file.resident(), camera.position))?;
+        let (tally, missed) = judge_picture(&mut renderer, &truth, &camera)?;
         checks.none(&format!("{degrees} degrees: unexcused differences from truth"), tally.mismatches, tally.total());
         checks.none(&format!("{degrees} degrees: pixels that miss a closed mesh"), missed, 64 * 48);
         checks.holds(
@@ -220,36 +200,29 @@ pub fn fields_of_view(lab: &mut Lab) -> Result<Checks> {
             pixels.radiance.iter().flatten().all(|x| x.is_finite()),
         );
     }
-    Ok(checks)
+    Ok(())
 }
 
 /// Judges the primary hits of the frame just rendered; also how many are misses.
-fn judge_picture(
-    executor: &mut dyn crate::kernels::FrameExecutor,
-    truth: &Truth,
-    frame: &Frame,
-) -> Result<(Tally, u64)> {
-    let (rays, hits) = (executor.read_rays(Pass::Primary)?, executor.read_hits(Pass::Primary)?);
-    let verdict = |(ray, hit)| judge(truth, &truth_ray(frame, ray), super::lab::found(hit));
-    let missed = hits.iter().filter(|hit| hit.id == NONE).count() as u64;
-    Ok((rays.par_iter().zip(&hits).map(verdict).collect::<Vec<_>>().into_iter().collect(), missed))
+fn judge_picture(renderer: &mut Renderer, truth: &Truth, camera: &Camera) -> Result<(Tally, u64)> {
+    let frame = Frame::near(renderer.scene.resident(), camera.position);
+    let (rays, hits) = (renderer.executor.read_rays(Pass::Primary)?, renderer.executor.read_hits(Pass::Primary)?);
+    Ok((tally(truth, &frame, &rays, &hits), misses(&hits)))
 }
 
-/// Renders pictures of odd sizes from inside of a closed mesh with each schedule.
-fn odd_sizes(lab: &mut Lab, checks: &mut Checks, sizes: &[(u32, u32)], tiles: &[u32]) -> Result<()> {
-    let (file, path, _) = lab.build(stiff(Stiff::Shell, 3, lab.seed), &settings(32, 0))?;
-    let truth = Truth::load(&file)?;
-    let camera = Camera { position: DVec3::new(0.1, 0.0, 0.2), target: DVec3::X, up: DVec3::Y, fov_y: 1.4 };
+/// Cases 29 and 30: renders pictures of odd sizes from inside of a closed mesh with each schedule.
+pub fn odd_sizes(lab: &mut Lab, checks: &mut Checks, sizes: &[(u32, u32)], tiles: &[u32]) -> Result<()> {
+    let scene = lab.build(stiff(Stiff::Shell, 3, lab.seed), &settings(32, 0))?;
+    let truth = Truth::load(&scene.file)?;
+    let camera = camera([0.1, 0.0, 0.2], DVec3::X, 1.4);
     for &(w, h) in sizes {
         let (mut wrong, mut missed, mut rays, mut pixels) = (0, 0, 0, 0);
         for &tile in tiles {
             for schedule in [Schedule::Chc, Schedule::Demand, Schedule::Plain] {
-                let effects = EffectList::PRIMARY;
-                let options = Settings { tile, schedule, effects, aov: true, ..picture(w, h, 100) };
-                let mut renderer = lab.renderer(&file, &path, &options)?;
+                let options = Settings { tile, aov: true, ..primary(w, h, 100, schedule) };
+                let mut renderer = lab.renderer(&scene, &options)?;
                 let output = renderer.frame(0, &camera)?;
-                let frame = Frame::near(file.resident(), camera.position);
-                let (tally, out) = judge_picture(&mut *renderer.executor, &truth, &frame)?;
+                let (tally, out) = judge_picture(&mut renderer, &truth, &camera)?;
                 wrong += tally.mismatches;
                 missed += out;
                 rays += output.records.iter().map(|record| record.rays_traced).sum::<u64>();
@@ -263,32 +236,17 @@ fn odd_sizes(lab: &mut Lab, checks: &mut Checks, sizes: &[(u32, u32)], tiles: &[
     Ok(())
 }
 
-/// Case 29: pictures of one pixel, one row, one column.
-pub fn least_pictures(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    odd_sizes(lab, &mut checks, &[(1, 1), (1, 37), (37, 1)], &[8, 64])?;
-    Ok(checks)
-}
-
-/// Case 30: tiles that do not divide the picture.
-pub fn tile_remainder(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    odd_sizes(lab, &mut checks, &[(33, 17), (65, 40)], &[8, 16, 32])?;
-    Ok(checks)
-}
-
 /// Case 60: ten runs are one.
-pub fn ten_runs(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    let (file, path, _) = lab.build(city(lab.seed, [0.0; 3])?, &settings(512, -14))?;
+pub fn ten_runs(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    let scene = lab.build(city(lab.seed, [0.0; 3])?, &settings(512, -14))?;
     let options = Settings { schedule: Schedule::Chc, ..lit(80, 56, 25, 1) };
     let mut expected: Option<Pixels> = None;
     let (mut unlike, mut of) = (0, 0);
     for _ in 0..10 {
-        let pixels = lab.renderer(&file, &path, &options)?.frame(0, &in_city(0, [0.0; 3]))?.pixels;
+        let pixels = lab.renderer(&scene, &options)?.frame(0, &in_city(0, [0.0; 3]))?.pixels;
         of += pixels.radiance.len() as u64;
         unlike += pixels_unlike(expected.get_or_insert_with(|| pixels.clone()), &pixels);
     }
     checks.none("ten runs: pixels unlike those of the first", unlike, of);
-    Ok(checks)
+    Ok(())
 }

@@ -1,11 +1,10 @@
 //! Fields of visibility (cases 47, 48, 49 and 51).
 
 use super::case::Checks;
-use super::lab::{Lab, Stage, cached, picture, settings};
+use super::lab::{Lab, camera, picture, settings};
 use crate::frame::{Equirectangular, environment};
-use crate::kernels::layout::{DvfTriangle, MET, NONE, Params, Ray};
-use crate::kernels::{Directions, Lamps, View};
-use crate::scene::Camera;
+use crate::kernels::Lamps;
+use crate::kernels::layout::{DvfTriangle, MET, NONE, Ray};
 use crate::schedule::{Lamp, Pass, Step};
 use crate::secondary::dvf::kernels;
 use crate::secondary::dvf::maps::{DvfMaps, directions, sum};
@@ -14,28 +13,20 @@ use crate::secondary::dvf::{Dvf, DvfTracing, Region};
 use crate::session::Settings;
 use crate::settings::{Effect, EffectList};
 use anyhow::Result;
-use brickwalk_convert::source::Primitive;
-use brickwalk_scenes::{Stiff, one_mesh, stiff};
+use brickwalk_scenes::{Stiff, stiff};
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 const PASS: Pass = Pass::Shadow(Lamp::Environment);
 
-/// A stage whose scene no ray of these cases meets.
-fn stage(lab: &mut Lab) -> Result<Stage> {
-    let positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    let triangle = Primitive { positions, indices: vec![0, 1, 2], ..Primitive::default() };
-    lab.stage(one_mesh("triangle", triangle), &settings(4, 0), &cached(100))
-}
-
 /// Case 47: of two cells one knows a way out upward and nothing else: rays upward from it are answered, also from its
 /// lower faces; those from its upper ones, which belong to the next cell, in other directions, from the other cell and
 /// from outside are traced.
-pub fn unknown(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    let mut stage = stage(lab)?;
-    let frame = stage.frame(DVec3::ZERO);
+pub fn unknown(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    let mut stage = lab.bare_stage()?;
+    stage.begin_frame();
+    let frame = stage.frame;
     // Cells on whole numbers of device units, so that points on faces are exact.
     let corner = frame.origin;
     let shape = Shape { corner, side: frame.unit, size: [2, 1, 1], octahedral: 8 };
@@ -45,7 +36,6 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
     field.finish(false);
     checks.equal("cells of which something is known", field.known_cells(), 1);
     let executor = &mut *stage.opened.executor;
-    executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let ray = |origin: [f32; 3], direction: [f32; 3]| Ray { origin, t_min: 0.0, direction, t_max: f32::MAX };
     let (upward, aside) = ([1e-3, 1.0, 1e-3], [1.0, 0.1, 0.1]);
     let cases = [
@@ -73,7 +63,7 @@ pub fn unknown(lab: &mut Lab) -> Result<Checks> {
     }
     let expected = cases.iter().filter(|case| case.2).count() as u64;
     checks.equal("rays answered", report.counters.rays_answered, expected);
-    Ok(checks)
+    Ok(())
 }
 
 /// Triangles of a group of case 48: a binding holds some 2.8 million.
@@ -81,9 +71,8 @@ const GROUP: usize = 1 << 20;
 
 /// Case 48: areas from 10^-12 to 10^6, summed and shared out by the device: sums against f64, prefix sums of points
 /// that never fall, at least one point a triangle, their numbers against f64.
-pub fn prefix_sums(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    let mut stage = stage(lab)?;
+pub fn prefix_sums(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    let mut stage = lab.bare_stage()?;
     let count = if lab.rays >= 1_000_000 { 3_000_000 } else { 3 * lab.share(1_000_000) };
     let mut random = lab.random(&[48]);
     let triangles: Vec<DvfTriangle> = (0..count as u32)
@@ -96,10 +85,10 @@ pub fn prefix_sums(lab: &mut Lab) -> Result<Checks> {
         .collect();
     let area = |t: &DvfTriangle| f64::from(t.b[0]) * f64::from(t.c[1]);
     let truth: f64 = triangles.iter().map(area).sum();
-    let frame = stage.frame(DVec3::ZERO);
+    stage.begin_frame();
+    let frame = stage.frame;
     let executor = &mut *stage.opened.executor;
     let states = &stage.opened.cache.states;
-    executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let shape = Shape::new(DVec3::ZERO, DVec3::ONE, 1, 8);
     let plan = DvfSettings { points: 10_000_000, rays: 1, ..DvfSettings::default() };
     let table = Arc::new(directions(1));
@@ -140,13 +129,12 @@ pub fn prefix_sums(lab: &mut Lab) -> Result<Checks> {
     checks.none("triangles without a point", empty, count as u64);
     checks.none("numbers of points that are not the share", wrong, count as u64);
     checks.at_least("points", points, 10_000_000);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 49: what a white surface reflects of a light from one direction by spherical harmonics of order 2, over the
 /// light: 1.0625 toward it, least at a cosine of -8/15, with -0.03958.
-pub fn delta_light(_: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
+pub fn delta_light(_: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut image = Equirectangular { width: 512, height: 256, texels: vec![[0.0; 3]; 512 * 256] };
     let (column, row) = (300, 90);
     image.texels[row * 512 + column] = [1.0; 3];
@@ -175,25 +163,25 @@ pub fn delta_light(_: &mut Lab) -> Result<Checks> {
     checks.at_most("error of the least", (least - truth).abs(), bound);
     // About its least the sum is flat: an error of 1e-5 moves it by (1e-5 / 0.47)^0.5.
     checks.at_most("distance of its place from -8/15", (place + 8.0 / 15.0).abs(), 0.005);
-    Ok(checks)
+    Ok(())
 }
 
 /// Case 51: in a closed box nothing of a bright environment is seen, whether rays are traced or answered: all light
 /// that was counted is taken off again.
-pub fn closed_box(lab: &mut Lab) -> Result<Checks> {
-    let mut checks = Checks::default();
-    let (file, path, _) = lab.build(stiff(Stiff::Cube, 4, lab.seed), &settings(64, 0))?;
-    let camera = Camera { position: DVec3::new(0.1, 0.2, -0.3), target: DVec3::X, up: DVec3::Y, fov_y: 1.5 };
+pub fn closed_box(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
+    let scene = lab.build(stiff(Stiff::Cube, 4, lab.seed), &settings(64, 0))?;
+    let camera = camera([0.1, 0.2, -0.3], DVec3::X, 1.5);
     let effects = EffectList::of(&[Effect::Environment]);
     let options = Settings { spp: 4, sun_intensity: Some(0.0), effects, ..picture(64, 64, 100) };
-    let mut renderer = lab.renderer(&file, &path, &options)?;
+    let mut renderer = lab.renderer(&scene, &options)?;
     let image = Equirectangular::of(32, 16, |[x, y, z]| [1e4 * (1.1 + x), 1e4 * (1.1 + y), 1e4 * (1.1 + z)]);
     renderer.light.lamps = Arc::new(Lamps::new(Some(environment(image, 1.0, 0.0).0), Vec::new(), 1.0));
     // The front of the cube is outside.
     // So coarse that as few rays reach every texel.
     let plan = DvfSettings { octahedral: 16, points: 4000, rays: 64, both: true, ..DvfSettings::default() };
     let plan = DvfSettings { cells: Cells::Longest(4), ..plan };
-    let made = renderer.make_dvf(&plan, &Region::scene(file.resident()), DvfTracing::over(64), &mut |_, _| true)?;
+    let made =
+        renderer.make_dvf(&plan, &Region::scene(scene.file.resident()), DvfTracing::over(64), &mut |_, _| true)?;
     checks.at_least("points", made.points, 4000);
     for doubt in [false, true] {
         renderer.methods.set(Dvf::new(Arc::new(made.field.clone()), DvfUse { doubt, ..DvfUse::default() }));
@@ -210,5 +198,5 @@ pub fn closed_box(lab: &mut Lab) -> Result<Checks> {
             checks.at_least("rays answered", answered, (traced + answered) / 4);
         }
     }
-    Ok(checks)
+    Ok(())
 }

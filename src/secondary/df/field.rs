@@ -31,7 +31,6 @@ pub struct DistanceField {
     /// From the middle of a cell to that of the nearest occupied one, in cells of the finest level; infinite where none
     /// is. Cell (x, y, z) of a level of n on each axis is element (x n + y) n + z.
     levels: [Vec<f16>; LEVELS],
-    has_seed: bool,
 }
 
 /// Distances of cells from the nearest occupied ones, as of [`jump_flood`]. Twin of `shaders/df/flood_distances.wgsl`.
@@ -71,7 +70,7 @@ impl DistanceField {
     pub fn unfilled(map: &Bom) -> Self {
         let cells = map.cells();
         let levels = std::array::from_fn(|level| vec![f16::INFINITY; (cells >> level).pow(3) as usize]);
-        Self { cells, side: map.side(), first: map.first, levels, has_seed: map.occupied() > 0 }
+        Self { cells, side: map.side(), first: map.first, levels }
     }
 
     /// Makes the finest level from the nearest occupied cells of its own, as of [`jump_flood`].
@@ -98,11 +97,6 @@ impl DistanceField {
     /// Distances of a level, cells of the finest: cell (x, y, z) of n on each axis is element (x n + y) n + z.
     pub fn level(&self, level: usize) -> &[f16] {
         &self.levels[level]
-    }
-
-    /// Whether any cell is occupied.
-    pub fn has_seed(&self) -> bool {
-        self.has_seed
     }
 
     /// A point of the world in cells of the finest level, from the first: the map's are from 0 to its number of cells.

@@ -136,9 +136,4 @@ impl DistanceField {
         let (t, is_capped) = found.unwrap_or_default();
         LocalTraced { t, iterations: way.look_ups, is_capped }
     }
-
-    /// Whether anything is hit; as [`Self::trace`].
-    pub fn any(&self, tracing: &Tracing, origin: [f64; 3], direction: [f64; 3], t_min: f64, t_max: f64) -> bool {
-        self.trace(tracing, origin, direction, t_min, t_max).t.is_some()
-    }
 }

@@ -67,11 +67,6 @@ impl Fresh {
         self.view().texels(entry)
     }
 
-    /// Whether an entry is made anew in a texel.
-    pub fn has(&self, entry: usize, texel: u32) -> bool {
-        self.view().has(entry, texel)
-    }
-
     /// Enters what an entry's rays met into its cell of `field`; other bits are those of `kept`.
     pub fn enter(&self, entry: usize, met: &[u32], kept: &DvfKept, dilate: bool, field: &mut DvfField) {
         let (cell, words, side) = (self.cells[entry] as usize, 2 * self.stride, field.shape.octahedral);
@@ -136,7 +131,8 @@ mod tests {
         let before = field.clone();
         let fresh = Fresh::new(&shape, [(5, &[0xffff_0000, u32::MAX][..]), (2, &[u32::MAX; 2])]);
         assert_eq!((fresh.entry(5), fresh.entry(2), fresh.entry(3)), (Some(0), Some(1), None));
-        assert!(fresh.has(0, 16) && !fresh.has(0, 15) && fresh.has(1, 15));
+        let view = fresh.view();
+        assert!(view.has(0, 16) && !view.has(0, 15) && view.has(1, 15));
         fresh.enter(0, &[0, 0, 0xffff_0000, u32::MAX], &kept, false, &mut field);
         fresh.enter(1, &[0, 0, 1, 0], &kept, false, &mut field);
         assert_eq!(field.masks[20..24], [0xffff, 0, 0xffff_0000, u32::MAX]);

@@ -25,8 +25,6 @@ pub const LEVELS: usize = 0;
 pub const MAPS: usize = 1;
 /// Of the bits of base maps, of each behind them what is empty.
 pub const BOMS: usize = 2;
-/// Of the words of all columns.
-pub const COLUMNS: usize = 3;
 
 /// The kernels and their buffers.
 pub static FAMILY: Family = Family {

@@ -66,11 +66,6 @@ impl Grid {
         let is_near = |samples: &u32| cells * f64::from(*samples) * stride >= 1.0;
         Self { samples: [1, 2].into_iter().find(is_near).unwrap_or(4), ..self }
     }
-
-    /// Words of the maps of `levels` base maps.
-    pub fn words(&self, levels: usize) -> u64 {
-        levels as u64 * u64::from(self.k * self.k) * u64::from(self.size * self.size) * u64::from(self.size / 32)
-    }
 }
 
 /// Cells of a base map between two look-ups of a column at most, of rays that must not pass through anything: those
@@ -169,7 +164,5 @@ mod tests {
             }
             assert_eq!(grid.base_per_cell(), if size == 256 { 1 } else { 2 });
         }
-        assert_eq!(Grid { k: 4, size: 128, samples: 1 }.words(1), 1 << 20);
-        assert_eq!(Grid { k: 8, size: 128, samples: 1 }.words(2) * 4, 32 << 20);
     }
 }

@@ -18,8 +18,6 @@ kernels! {
 
 /// Number of the buffer of maps in the frame.
 pub const MAPS: usize = 0;
-/// Of their texels.
-pub const TEXELS: usize = 1;
 
 /// The kernels and their buffers.
 pub static FAMILY: Family = Family {

@@ -4,7 +4,7 @@ use crate::common;
 use brickwalk::gpu::device::candidates;
 use brickwalk::lab::selftest::args::SelftestArgs;
 use brickwalk::lab::selftest::case::Status;
-use brickwalk::lab::selftest::defects::{ALL, Defect};
+use brickwalk::lab::selftest::defects::Defect;
 use brickwalk::lab::selftest::{Report, test};
 use brickwalk::session::device::Device;
 use brickwalk::settings::Group;
@@ -49,11 +49,11 @@ fn every_planted_defect_is_noticed() {
         return;
     };
     let name = adapter.info.name.split_whitespace().next().unwrap_or_default().to_string();
-    let cases: std::collections::BTreeSet<u32> = ALL.into_iter().map(case_of).collect();
+    let cases: std::collections::BTreeSet<u32> = Defect::ALL.iter().copied().map(case_of).collect();
     let numbers = cases.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
     let sound = test(&args(&format!("--adapter {name} --case {numbers}"))).expect("a device");
     assert!(failed(&sound).is_empty(), "without a defect: {:#?}", sound.rows);
-    for defect in ALL {
+    for &defect in Defect::ALL {
         let case = case_of(defect);
         let words = format!("--adapter {name} --case {case} --plant {}", defect.name());
         let report = test(&args(&words)).expect("a device");
@@ -66,7 +66,7 @@ fn every_planted_defect_is_noticed() {
 
 #[test]
 fn defects_of_streaming_are_noticed_on_the_processor() {
-    for defect in ALL.into_iter().filter(|defect| !defect.is_of_kernels()) {
+    for &defect in Defect::ALL.iter().filter(|defect| !defect.is_of_kernels()) {
         let words = format!("--adapter cpu --case {} --plant {}", case_of(defect), defect.name());
         let report = test(&args(&words)).expect("the processor");
         assert_eq!(failed(&report), [case_of(defect)], "{}", defect.name());
