@@ -113,9 +113,10 @@ settings! {
         /// samples and so on, and removed at the end.
         progressive: bool = false, "--progressive", Rule::Any, "", Output, Usual;
 
-        /// Device memory for bricks and tiles of textures: a size, or a share P% of all of them. It must hold the two
-        /// largest bricks.
-        cache: CacheSize = CacheSize::Percent(25.0), "--cache SIZE|P%", Rule::Any, "", Cache, Common;
+        /// Device memory for bricks and tiles of textures: a size, a share P% of all of them, or auto. A size must hold
+        /// the two largest bricks. `auto`: all of them, if three quarters of the device's memory hold them, or half of
+        /// what is available on the processor.
+        cache: CacheSize = CacheSize::Auto, "--cache SIZE|P%|auto", Rule::Any, "", Cache, Common;
         /// Host memory for verified bricks; 0 keeps none.
         host_cache: u64 = 1 << 30, "--host-cache SIZE", Rule::Bytes(0), "bytes", Cache, Usual;
         /// Bytes of texture tiles that a frame loads at most. Tiles that most hits ask for come first; a coarser level

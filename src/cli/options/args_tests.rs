@@ -107,7 +107,7 @@ fn help_has_three_lengths() {
     assert!(text.lines().count() <= 45 && text.contains("--cache") && !text.contains("--dvf-points"), "{text}");
     let text = parse("walk --help").unwrap_err().to_string();
     for part in
-        ["1280x720", "[default: 25%]", "[default: 30]", "degrees", "[default: 0.4,0.8,0.45]", "Camera:", "Light:"]
+        ["1280x720", "[default: auto]", "[default: 30]", "degrees", "[default: 0.4,0.8,0.45]", "Camera:", "Light:"]
     {
         assert!(text.contains(part), "walk --help lacks {part}: {text}");
     }

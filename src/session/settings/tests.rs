@@ -10,7 +10,7 @@ fn defaults_are_the_documented_ones() {
     assert_eq!((s.frames, s.size), (30, ImageSize { width: 1280, height: 720 }));
     assert_eq!(s.effects.to_string(), "primary,shadow");
     assert_eq!((s.spp, s.seed, s.tile), (1, 0, 64));
-    assert_eq!((s.cache, s.host_cache), (CacheSize::Percent(25.0), 1 << 30));
+    assert_eq!((s.cache, s.host_cache), (CacheSize::Auto, 1 << 30));
     assert_eq!((s.secondary, s.schedule, s.fronts), (Method::Exact, Schedule::Auto, false));
     assert_eq!((s.query_threshold, s.evict), (0, crate::stream::Policy::RoundRobin));
     assert_eq!((s.sun, s.sun_angle, s.sun_intensity()), (Direction([0.4, 0.8, 0.45]), 0.53, 2.4));
