@@ -1,4 +1,4 @@
-//! brickwalk walks by ray tracing through scenes that do not fit in GPU memory.
+//! brickwalk ray traces scenes that do not fit in GPU memory, and walks a camera through them.
 //!
 //! A scene is converted once into *bricks*: subtrees of a BVH with their triangles, in one memory-mapped file. A
 //! renderer streams the bricks that rays need through a small cache on the device, a GPU or the processor. Whatever the

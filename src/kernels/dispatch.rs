@@ -83,8 +83,8 @@ pub struct Dispatch {
 }
 
 /// Leaves of the longest list that a tile's rays are intersected with; longer ones cost more than the walk of the top
-/// level that they save (ARCHITECTURE.md, "What a list costs"). Camera rays of a tile agree on what is near and stop
-/// there, others do not.
+/// level that they save (docs/methods/chc.md, "What a list costs"). Camera rays of a tile agree on what is near and
+/// stop there, others do not.
 fn list_most(pass: Pass) -> u32 {
     if pass == Pass::Primary { 128 } else { 12 }
 }

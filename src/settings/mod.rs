@@ -2,9 +2,11 @@
 //!
 //! A group is declared once, as a table (`settings!`). The table says what each setting does, its unit, its range, its
 //! form on the command line and who needs it. The command line, settings files, `--print-settings`, `docs/options.md`
-//! and `summary.json` are views of that table. A new setting is one row there.
+//! and `options` in `summary.json` are views of that table. A new setting is one row there, and what reads it.
 //!
-//! The table of what renders is `session/settings.rs`. A method of `secondary/` has one in its own folder.
+//! The table of what renders is `session/settings.rs`. A method of `secondary/` has one in its own folder. Beside
+//! `options`, `summary.json` has some settings as `settings`: `session/summary.rs` lists these by hand, as they are in
+//! force, for reports and for older scripts.
 
 mod declare;
 pub mod file;

@@ -16,7 +16,7 @@ use brickwalk_scenes::Stiff;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 
-/// Walks by ray tracing through scenes that do not fit in GPU memory.
+/// Ray traces scenes that do not fit in GPU memory, and walks a camera through them.
 ///
 /// A scene is converted once into bricks, in one file; rendering streams the bricks that rays need through a small
 /// cache.

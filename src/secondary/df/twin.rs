@@ -1,5 +1,5 @@
 //! Distance fields: twins of `shaders/df/flood_seeds.wgsl`, `jump_flood.wgsl`, `flood_distances.wgsl`,
-//! `halve_distances.wgsl` and `field_trace.wgsl`.
+//! `halve_distances.wgsl` and `df_trace.wgsl`.
 
 use super::field::{FieldView, distances, halve};
 use super::{LEAST_STEP, LEVELS, Tracing, Way, flood, seeds};
