@@ -139,7 +139,8 @@ impl Session {
         let motion = settings.motion.as_ref().map(|file| SceneMotion::open(file, &scene, &lighting.sources));
         let motion = motion.transpose()?;
         let opened = Opened::open(scene.clone(), file, settings)?;
-        let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned().collect();
+        let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned();
+        let warnings = settings.without_effect().into_iter().chain(warnings).collect();
         let reference = settings.measure_error.then(|| reference(scene, file, settings, lighting.light.clone()));
         let mut renderer = lit_renderer(opened, settings, lighting.light.clone());
         renderer.captures = settings.measure_error.then(Captures::default);

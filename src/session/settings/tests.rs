@@ -179,3 +179,23 @@ fn the_options_page_is_that_of_the_settings() {
     let found = std::fs::read_to_string(file).unwrap_or_default();
     assert!(found == page, "docs/options.md is out of date; BRICKWALK_WRITE_OPTIONS=1 writes it anew");
 }
+
+#[test]
+fn settings_without_effect_are_named() {
+    let named = |options: &str| Settings::from_options(options).unwrap().without_effect();
+    assert_eq!(named("--ao-length 2"), ["--ao-length does nothing here; it belongs to --effects ao"]);
+    assert_eq!(named("--roma-k 8 --dvf-rays 64").len(), 2);
+    assert!(named("--effects ao --ao-length 2 --secondary roma --roma-k 8").is_empty());
+    // `--bom` is of two methods.
+    assert!(named("--secondary df --bom raster").is_empty() && named("--bom raster").len() == 1);
+    assert!(named("").is_empty());
+}
+
+#[test]
+fn videos_are_named_as_what_they_are() {
+    let checked = |options: &str| Settings::from_options(options).unwrap().check();
+    assert!(checked("--video a.y4m").is_ok());
+    for bad in ["--video a.mp4", "--video a"] {
+        assert!(checked(bad).unwrap_err().to_string().contains("a.y4m"), "{bad}");
+    }
+}
