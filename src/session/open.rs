@@ -367,13 +367,14 @@ fn dark_lamps(renderer: &Renderer) -> Vec<String> {
     let [others, areas] = roma.rsm.left_out();
     let others = (others > 0).then(|| {
         format!(
-            "what {others} weaker points, spots and distant lights light does not light diffuse rays; raise --rsm-lamps"
+            "{others} weaker point, spot and distant lights have no map: what they light does not light other surfaces; \
+             raise --rsm-lamps"
         )
     });
     let areas = (areas > 0).then(|| {
         format!(
-            "what {areas} areas and surfaces that shine light does not light diffuse rays by --secondary roma; use \
-             --secondary exact for it"
+            "{areas} area lights and surfaces that shine have no map: with --secondary roma what they light does not \
+             light other surfaces; use --secondary exact"
         )
     });
     others.into_iter().chain(areas).collect()
