@@ -331,7 +331,7 @@ fn render(
         moved: Moved::default(),
     };
     let mut usual = Settings { secondary: variant.method, ..Settings::default() };
-    (usual.roma.size, usual.df.size) = (32, 32);
+    (usual.roma.size, usual.rsm.size, usual.df.size) = (32, 64, 32);
     let mut renderer = Renderer { engine, methods: methods(&usual) };
     if let Some(settings) = variant.roma.map(roma) {
         renderer.methods.set(Roma::new(settings, Source::default()));
