@@ -26,7 +26,7 @@ fn scaled(text: &str, units: &[(&str, u64)], what: &str) -> Result<u64, String> 
     let are_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     let is_cut = factor == 1 && digits.contains('.');
     if is_cut || !are_digits(whole) || !are_digits(part) || part.len() > MOST_DECIMALS {
-        return Err(format!("'{text}' is no {what} such as 64, 16M or 1.5M"));
+        return Err(format!("'{text}' is no {what}: give a whole number, or one with a unit such as 16M or 1.5M"));
     }
     let beyond = || format!("the {what} does not fit in 64 bits");
     let whole: u128 = whole.parse().map_err(|_| beyond())?;

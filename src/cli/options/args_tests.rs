@@ -129,7 +129,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--cache 0", "at least 1"),
         ("--cache 101%", "100 %"),
         ("--cache 99999999999G", "64 bits"),
-        ("--host-cache 1.5G", "whole number"),
+        ("--host-cache 1.5", "whole number"),
         ("--schedule fastest", "known: chc, demand, plain, plain-bvh2, auto"),
         ("--effects glitter", "no 'glitter'"),
         ("--effects=", "known: primary, shadow"),
