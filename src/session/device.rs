@@ -80,8 +80,8 @@ impl Device {
         }
     }
 
-    /// Bytes of a cache that there is room for: three quarters of the device's own memory where the driver states it; of
-    /// the processor half of the memory that is available.
+    /// Bytes of a cache that there is room for: three quarters of the device's own memory where the driver states it;
+    /// of the processor half of the memory that is available.
     pub fn room(&self) -> u64 {
         match self {
             Self::Cpu => cpu::available_memory().map_or(USUAL_ROOM, |bytes| bytes / 2),

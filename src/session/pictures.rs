@@ -42,8 +42,8 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Starts the pictures of a walk in `output`, where the folder `frames` exists. Frames of earlier walks go; files of
-    /// other names stay.
+    /// Starts the pictures of a walk in `output`, where the folder `frames` exists. Frames of earlier walks go; files
+    /// of other names stay.
     ///
     /// # Errors
     /// An old frame cannot be removed; the video cannot be written.
