@@ -67,7 +67,8 @@ fn all_bytes(trace: &Trace) -> u64 {
 fn climb(trace: &Trace, asked: &[CacheSize]) -> Result<(Vec<Rung>, Vec<u64>), TraceError> {
     // As the cache rounds it.
     let recorded = trace.budget_bytes - trace.budget_bytes % 16;
-    let given = asked.iter().map(|&size| cache_budget(size, &trace.sizes, trace.page_bytes) / 16 * 16);
+    let given =
+        asked.iter().map(|&size| cache_budget(size, &trace.sizes, trace.page_bytes, trace.budget_bytes) / 16 * 16);
     let mut budgets: Vec<u64> = given.chain([recorded]).collect();
     budgets.sort_unstable();
     budgets.dedup();

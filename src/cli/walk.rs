@@ -36,6 +36,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     let mut session = Session::open(scene, settings)?;
     warn(session.take_warnings());
     atomic::create_folder(&output.join("frames"))?;
+    let _owned = atomic::Owned::take(output)?;
     for stale in ["summary.json", "report.html"] {
         // What is left of an earlier walk must not be taken for a part of this one.
         let _ = std::fs::remove_file(output.join(stale));

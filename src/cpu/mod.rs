@@ -38,3 +38,13 @@ pub fn device_info() -> DeviceInfo {
         timestamps: true,
     }
 }
+
+/// Bytes of memory that can be had without swapping, also of the control group that the process runs in; `None` where
+/// the system does not tell.
+pub fn available_memory() -> Option<u64> {
+    let mut system = sysinfo::System::new();
+    system.refresh_memory();
+    let group = system.cgroup_limits().map(|limits| limits.free_memory);
+    let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0);
+    machine.into_iter().chain(group).min()
+}

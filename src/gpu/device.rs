@@ -71,6 +71,8 @@ pub struct Gpu {
     pub timestamps: bool,
     /// How payloads reach the cache.
     pub upload: UploadPath,
+    /// Bytes of the device's own memory, where the driver states them.
+    pub local_memory: Option<u64>,
 }
 
 /// Adapters of the given backends.
@@ -185,6 +187,18 @@ fn check_limits(info: &wgpu::AdapterInfo, limits: &wgpu::Limits) -> Result<(), D
     Ok(())
 }
 
+/// Bytes of the largest heap of an adapter's own memory; `None` where its backend does not tell.
+fn local_memory(adapter: &wgpu::Adapter) -> Option<u64> {
+    const DEVICE_LOCAL: u32 = 1;
+    // SAFETY: nothing is done with the adapter but ask it; it is not destroyed.
+    let adapter = unsafe { adapter.as_hal::<wgpu::hal::api::Vulkan>() }?;
+    let instance = adapter.shared_instance().raw_instance();
+    // SAFETY: the physical device is one of this instance.
+    let memory = unsafe { instance.get_physical_device_memory_properties(adapter.raw_physical_device()) };
+    let heaps = memory.memory_heaps.iter().take(memory.memory_heap_count as usize);
+    heaps.filter(|heap| heap.flags.as_raw() & DEVICE_LOCAL != 0).map(|heap| heap.size).max()
+}
+
 /// Largest number of bytes of one page of the cache or of the texels.
 fn page_bytes(limits: &wgpu::Limits) -> u64 {
     let binding = limits.max_storage_buffer_binding_size;
@@ -233,7 +247,7 @@ impl Gpu {
         let mapped = host_memory && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) && !forced;
         let upload = if mapped { UploadPath::Mapped } else { UploadPath::Staged };
         let timestamps = features.contains(wgpu::Features::TIMESTAMP_QUERY);
-        Ok(Self { device, queue, info, limits, timestamps, upload })
+        Ok(Self { device, queue, info, limits, timestamps, upload, local_memory: local_memory(adapter) })
     }
 
     /// What summaries say of it.

@@ -15,6 +15,41 @@ pub fn create_folder(folder: &Path) -> Result<()> {
         .with_context(|| format!("{}: cannot create this folder; choose another with -o", folder.display()))
 }
 
+/// A folder that nobody else of this program writes to meanwhile.
+#[derive(Debug)]
+pub struct Owned {
+    file: File,
+    path: PathBuf,
+}
+
+impl Owned {
+    /// Takes a folder, which exists.
+    ///
+    /// # Errors
+    /// Another process has it; it cannot be written to.
+    pub fn take(folder: &Path) -> Result<Self> {
+        let path = folder.join(".brickwalk-lock");
+        let file = File::options().create(true).truncate(false).write(true).open(&path);
+        let file = file.with_context(|| cannot_write(&path))?;
+        match file.try_lock() {
+            Err(std::fs::TryLockError::WouldBlock) => anyhow::bail!(
+                "{}: another brickwalk writes to this folder; wait for it, or choose another with -o",
+                folder.display()
+            ),
+            // Some file systems have no locks: then nobody is kept out.
+            Ok(()) | Err(std::fs::TryLockError::Error(_)) => Ok(Self { file, path }),
+        }
+    }
+}
+
+impl Drop for Owned {
+    fn drop(&mut self) {
+        // Removed while it is held: whoever opens it next makes a new one.
+        let _ = std::fs::remove_file(&self.path);
+        let _ = self.file.unlock();
+    }
+}
+
 /// The folder that a file is in.
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {

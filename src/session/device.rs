@@ -33,7 +33,11 @@ pub fn automatic(candidates: &[Candidate]) -> Choice {
     }
 }
 
-/// A device that has been chosen.
+/// Room for a cache where a driver does not state the memory of its device.
+const USUAL_ROOM: u64 = 1 << 30;
+
+/// A device that has been chosen. Clones share it.
+#[derive(Clone)]
 pub enum Device {
     /// The processor.
     Cpu,
@@ -73,6 +77,15 @@ impl Device {
         match self {
             Self::Cpu => CpuExecutor::PAGE_BYTES,
             Self::Gpu(gpu) => gpu.page_bytes(),
+        }
+    }
+
+    /// Bytes of a cache that there is room for: three quarters of the device's own memory where the driver states it;
+    /// of the processor half of the memory that is available.
+    pub fn room(&self) -> u64 {
+        match self {
+            Self::Cpu => cpu::available_memory().map_or(USUAL_ROOM, |bytes| bytes / 2),
+            Self::Gpu(gpu) => gpu.local_memory.map_or(USUAL_ROOM, |bytes| bytes / 4 * 3),
         }
     }
 

@@ -139,7 +139,8 @@ impl Session {
         let motion = settings.motion.as_ref().map(|file| SceneMotion::open(file, &scene, &lighting.sources));
         let motion = motion.transpose()?;
         let opened = Opened::open(scene.clone(), file, settings)?;
-        let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned().collect();
+        let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned();
+        let warnings = settings.without_effect().into_iter().chain(warnings).collect();
         let reference = settings.measure_error.then(|| reference(scene, file, settings, lighting.light.clone()));
         let mut renderer = lit_renderer(opened, settings, lighting.light.clone());
         renderer.captures = settings.measure_error.then(Captures::default);
@@ -358,13 +359,14 @@ fn dark_lamps(renderer: &Renderer) -> Vec<String> {
     let [others, areas] = roma.rsm.left_out();
     let others = (others > 0).then(|| {
         format!(
-            "what {others} weaker points, spots and distant lights light does not light diffuse rays; raise --rsm-lamps"
+            "{others} weaker point, spot and distant lights have no map: what they light does not light other surfaces; \
+             raise --rsm-lamps"
         )
     });
     let areas = (areas > 0).then(|| {
         format!(
-            "what {areas} areas and surfaces that shine light does not light diffuse rays by --secondary roma; use \
-             --secondary exact for it"
+            "{areas} area lights and surfaces that shine have no map: with --secondary roma what they light does not \
+             light other surfaces; use --secondary exact"
         )
     });
     others.into_iter().chain(areas).collect()

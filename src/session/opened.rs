@@ -2,9 +2,10 @@
 
 use super::device::Device;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
+use crate::schedule::ExecutorError;
 use crate::schedule::cache::{BrickBytes, Cache, SceneBytes};
 use crate::session::Settings;
-use crate::settings::sizes::option_bytes;
+use crate::settings::sizes::{human_bytes, option_bytes};
 use crate::settings::{CacheSize, Schedule};
 use crate::stream::{HostCache, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
@@ -66,13 +67,35 @@ pub fn scene_bytes(scene: &SceneFile) -> SceneBytes {
     SceneBytes { bricks: brick_bytes(scene), tiles }
 }
 
-/// Bytes of the cache that `--cache` asks for, of a scene with bricks and tiles of `sizes`. Pages end before what does
+/// Room for which an allocation that fails is not tried with half of it.
+const LEAST_ROOM: u64 = 16 << 20;
+
+/// What a device has room for.
+#[derive(Clone, Copy, Debug)]
+pub struct Room {
+    /// Most bytes of a page of the cache.
+    pub page_bytes: u64,
+    /// Bytes of a cache that is made without being asked how large.
+    pub bytes: u64,
+}
+
+/// Whether the device is what an error is about.
+fn is_of_device(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| matches!(cause.downcast_ref(), Some(ExecutorError::Device(_))))
+}
+
+/// Bytes of the cache that `--cache` asks for, of a scene with bricks and tiles of `sizes`, on a device that has `room`
+/// for so many: a share never less than the least that works. Pages end before what does
 /// not fit into them: a cache that is to hold everything gets that room, too, and no more.
-pub fn cache_budget(cache: CacheSize, sizes: &Sizes, page_bytes: u64) -> u64 {
+pub fn cache_budget(cache: CacheSize, sizes: &Sizes, page_bytes: u64, room: u64) -> u64 {
     let all = sizes.sum();
     let for_all = Residency::budget_for_all(sizes, page_bytes);
-    let asked = cache.bytes(all);
-    if asked >= all { asked.max(for_all).min(for_all.max(16)) } else { asked }
+    let asked = cache.bytes(all, room);
+    match cache {
+        _ if asked >= all => for_all.max(16),
+        CacheSize::Bytes(_) => asked,
+        CacheSize::Auto | CacheSize::Percent(_) => asked.max(Residency::least_budget(sizes)),
+    }
 }
 
 /// The rays of a tile with edges of `tile` rays that `--query-threshold` comes to: it counts those of a tile of 200 x
@@ -103,15 +126,25 @@ impl Opened {
             }
         }
         let device = Device::open(&settings.adapter)?;
-        let page_bytes = device.page_bytes();
-        let mut opened = Self::open_on(scene, path, settings, page_bytes, |needs| {
-            device.executor(needs.scene, needs.host, needs.threads, needs.page_sizes, Setup { keep, ..needs.setup })
-        })?;
+        let mut room = Room { page_bytes: device.page_bytes(), bytes: device.room() };
+        let mut opened = loop {
+            let made = Self::open_on(scene.clone(), path, settings, room, |needs| {
+                let setup = Setup { keep, ..needs.setup };
+                device.clone().executor(needs.scene, needs.host, needs.threads, needs.page_sizes, setup)
+            });
+            match made {
+                // What a driver says is free is not trusted.
+                Err(error) if settings.cache == CacheSize::Auto && room.bytes > LEAST_ROOM && is_of_device(&error) => {
+                    room.bytes /= 2;
+                }
+                made => break made?,
+            }
+        };
         opened.cache.states.keep_asking(keep.queries);
         Ok(opened)
     }
 
-    /// As [`Opened::open`], on the executor that `make` makes, of a device with pages of at most `page_bytes`.
+    /// As [`Opened::open`], on the executor that `make` makes, of a device with so much room.
     ///
     /// # Errors
     /// As [`Opened::open`].
@@ -119,7 +152,7 @@ impl Opened {
         scene: Arc<SceneFile>,
         path: &Path,
         settings: &Settings,
-        page_bytes: u64,
+        Room { page_bytes, bytes: room }: Room,
         make: impl FnOnce(Needs) -> Result<Box<dyn FrameExecutor>>,
     ) -> Result<Self> {
         let name = path.display();
@@ -127,7 +160,7 @@ impl Opened {
         let bytes = scene_bytes(&scene);
         let sizes = bytes.sizes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
-        let budget = cache_budget(settings.cache, &sizes, page_bytes);
+        let budget = cache_budget(settings.cache, &sizes, page_bytes, room);
         let schedule = match settings.schedule {
             Schedule::Plain | Schedule::PlainBinary if budget < for_all => bail!(
                 "{name}: --schedule {} keeps everything resident: give --cache 100% ({for_all} bytes) rather than \
@@ -147,9 +180,17 @@ impl Opened {
             ),
             other => anyhow!(other).context(format!("{name}: --cache")),
         })?;
-        let trace = settings.requests_out.is_some().then(|| Trace::new(sizes, budget, page_bytes, policy));
+        let trace = settings.requests_out.is_some().then(|| Trace::new(sizes.clone(), budget, page_bytes, policy));
         let threshold = scaled_threshold(settings.query_threshold, extent.tile);
         let mut warnings = Vec::new();
+        let asked = settings.cache.bytes(sizes.sum(), room);
+        if matches!(settings.cache, CacheSize::Percent(_)) && asked < budget && budget < for_all {
+            let [asked, budget] = [asked, budget].map(human_bytes);
+            warnings.push(format!(
+                "--cache {} is {asked}, less than the two largest bricks need; the cache has {budget}",
+                settings.cache
+            ));
+        }
         if settings.query_threshold > threshold && threshold == 0 {
             warnings.push(format!(
                 "--query-threshold {} is less than one ray of a tile of {}: nothing is left out; use a larger --tile",

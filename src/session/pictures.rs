@@ -6,9 +6,24 @@ use crate::output::video::{Video, ffmpeg_of_frames, ffmpeg_of_video};
 use crate::picture::exposure::{Exposure, Meter};
 use crate::picture::tone_map::ToneMap;
 use crate::session::Settings;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+
+/// The frames in a folder, by their names: a number of four digits or more, and the ending of a picture.
+fn frames_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let is_frame = |path: &Path| {
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        stem.len() >= 4 && stem.bytes().all(|b| b.is_ascii_digit()) && matches!(ending, Some("png" | "exr"))
+    };
+    let context = || format!("{}: cannot read this folder", folder.display());
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(context)? {
+        found.extend(Some(entry.with_context(context)?.path()).filter(|path| is_frame(path)));
+    }
+    Ok(found)
+}
 
 /// Writes the pictures of a walk, frame by frame.
 pub struct Pictures {
@@ -27,13 +42,17 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Starts the pictures of a walk in `output`, where the folder `frames` exists.
+    /// Starts the pictures of a walk in `output`, where the folder `frames` exists. Frames of earlier walks go; files
+    /// of other names stay.
     ///
     /// # Errors
-    /// The video cannot be written.
+    /// An old frame cannot be removed; the video cannot be written.
     pub fn create(output: &Path, settings: &Settings) -> Result<Self> {
         let (size, fps) = ((settings.size.width, settings.size.height), settings.video_fps);
         let folder = output.join("frames");
+        for old in frames_in(&folder)? {
+            std::fs::remove_file(&old).with_context(|| format!("{}: cannot remove this old frame", old.display()))?;
+        }
         let mut commands = Vec::new();
         let mut video = None;
         if let Some(file) = &settings.video {

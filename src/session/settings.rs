@@ -1,5 +1,6 @@
 //! Every setting of what renders. A method of `secondary/` declares its own in its folder; here each is a line.
 
+use crate::frame::BATCH_SAMPLES;
 use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
@@ -113,9 +114,10 @@ settings! {
         /// samples and so on, and removed at the end.
         progressive: bool = false, "--progressive", Rule::Any, "", Output, Usual;
 
-        /// Device memory for bricks and tiles of textures: a size, or a share P% of all of them. It must hold the two
-        /// largest bricks.
-        cache: CacheSize = CacheSize::Percent(25.0), "--cache SIZE|P%", Rule::Any, "", Cache, Common;
+        /// Device memory for bricks and tiles of textures: a size, a share P% of all of them, or auto. A size must hold
+        /// the two largest bricks. `auto`: all of them, if three quarters of the device's memory hold them, or half of
+        /// what is available on the processor.
+        cache: CacheSize = CacheSize::Auto, "--cache SIZE|P%|auto", Rule::Any, "", Cache, Common;
         /// Host memory for verified bricks; 0 keeps none.
         host_cache: u64 = 1 << 30, "--host-cache SIZE", Rule::Bytes(0), "bytes", Cache, Usual;
         /// Bytes of texture tiles that a frame loads at most. Tiles that most hits ask for come first; a coarser level
@@ -191,6 +193,14 @@ impl Settings {
             let text = "--aov: depth, normals, ids and albedo are taken through the centres of pixels, which --taa moves; leave one out";
             return Err(SettingsError::Conflict(text.into()));
         }
+        if let Some(file) = self.video.as_ref().filter(|file| file.extension().is_none_or(|ending| ending != "y4m")) {
+            let (name, right) = (file.display(), file.with_extension("y4m"));
+            return Err(SettingsError::Conflict(format!(
+                "--video {name}: a video is written as YUV4MPEG2; name it {}; the command that makes an mp4 of it is \
+                 printed at the end",
+                right.display()
+            )));
+        }
         let is_chc = matches!(self.schedule, Schedule::Chc | Schedule::Auto);
         let is_plain = matches!(self.schedule, Schedule::Plain | Schedule::PlainBinary);
         for which in &self.without {
@@ -205,6 +215,41 @@ impl Settings {
             }
         }
         Ok(())
+    }
+
+    /// Settings that were chosen and have no effect, a line each: what they belong to is not on.
+    pub fn without_effect(&self) -> Vec<String> {
+        let effects = self.effects;
+        let maps = matches!(self.secondary, Method::Roma | Method::Auto);
+        let fields = self.secondary == Method::Df;
+        let lit = self.environment.is_some();
+        let needs: [(&str, bool, &str); 16] = [
+            ("ao_rays", effects.ao, "--effects ao"),
+            ("ao_length", effects.ao, "--effects ao"),
+            ("diffuse_rays", effects.diffuse, "--effects diffuse"),
+            ("rotation", effects.ao || effects.diffuse, "--effects ao or diffuse"),
+            ("environment_rotation", lit, "--environment"),
+            ("environment_intensity", lit, "--environment"),
+            ("rect_light_intensity", self.rect_light.is_some(), "--rect-light"),
+            ("video_fps", self.video.is_some(), "--video"),
+            ("progressive", self.spp > BATCH_SAMPLES, "--spp above 64"),
+            ("roma.bom", maps || fields, "--secondary roma, auto or df"),
+            ("roma.", maps, "--secondary roma or auto"),
+            ("rsm.", self.secondary == Method::Roma, "--secondary roma"),
+            ("df.", fields, "--secondary df"),
+            ("dvf.renew", self.secondary == Method::Dvf && self.motion.is_some(), "--secondary dvf and --motion"),
+            ("dvf.", self.secondary == Method::Dvf, "--secondary dvf"),
+            ("fronts", matches!(self.schedule, Schedule::Chc | Schedule::Auto), "--schedule chc"),
+        ];
+        let idle = |entry: &Entry| {
+            let key = entry.key();
+            let is_of = |name: &str| key == name || (name.ends_with('.') && key.starts_with(name));
+            let &(_, has_effect, belongs) = needs.iter().find(|(name, ..)| is_of(name))?;
+            let is_default = self.get(&key) == Some((entry.field.default)());
+            let flag = entry.field.flag();
+            (!has_effect && !is_default).then(|| format!("--{flag} does nothing here; it belongs to {belongs}"))
+        };
+        Self::entries().iter().filter_map(idle).collect()
     }
 
     /// Which optimisations are on.

@@ -7,41 +7,69 @@ use std::str::FromStr;
 /// Largest width or height of an image, pixels.
 pub const MAX_IMAGE_PX: u32 = 16384;
 
-/// Splits a whole number from its unit and multiplies, with every overflow refused.
-fn scaled(text: &str, units: &[(char, u64)], what: &str) -> Result<u64, String> {
-    let (digits, factor) = match text.chars().last() {
-        Some(last) if !last.is_ascii_digit() => {
-            let unit = units.iter().find(|(name, _)| *name == last.to_ascii_uppercase());
-            let names = units.iter().map(|(name, _)| name.to_string()).collect::<Vec<_>>().join(", ");
-            let &(_, factor) = unit.ok_or(format!("a {what} is a whole number, with {names} or nothing behind it"))?;
-            (&text[..text.len() - last.len_utf8()], factor)
+/// Most digits behind a point.
+const MOST_DECIMALS: usize = 9;
+
+/// Splits a number from its unit and multiplies, with every overflow refused. What is left of a unit is cut off.
+fn scaled(text: &str, units: &[(&str, u64)], what: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_alphabetic());
+    let unit = &text[digits.len()..];
+    let factor = match units.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)) {
+        Some(&(_, factor)) => factor,
+        None if unit.is_empty() => 1,
+        None => {
+            let names = units.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+            return Err(format!("a {what} is a number, with {names} or nothing behind it"));
         }
-        _ => (text, 1),
     };
-    if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
-        return Err(format!("'{digits}' is not a whole number; write 1536M rather than 1.5G"));
+    let (whole, part) = digits.split_once('.').unwrap_or((digits, "0"));
+    let are_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let is_cut = factor == 1 && digits.contains('.');
+    if is_cut || !are_digits(whole) || !are_digits(part) || part.len() > MOST_DECIMALS {
+        return Err(format!("'{text}' is no {what}: give a whole number, or one with a unit such as 16M or 1.5M"));
     }
-    let number: Option<u64> = digits.parse().ok();
-    number.and_then(|n| n.checked_mul(factor)).ok_or(format!("the {what} does not fit in 64 bits"))
+    let beyond = || format!("the {what} does not fit in 64 bits");
+    let whole: u128 = whole.parse().map_err(|_| beyond())?;
+    let part = part.parse::<u128>().map_err(|_| beyond())? * u128::from(factor) / 10u128.pow(part.len() as u32);
+    let sum = whole.checked_mul(factor.into()).and_then(|product| product.checked_add(part));
+    sum.and_then(|sum| u64::try_from(sum).ok()).ok_or_else(beyond)
 }
 
-/// A size in bytes: a whole number with `K`, `M` or `G` (powers of 1024) or nothing behind it; 0 is refused.
+/// Units of sizes: the short ones and those with an `i` are powers of 1024, those that end in `B` alone powers of 1000.
+const SIZES: [(&str, u64); 13] = [
+    ("K", 1 << 10),
+    ("M", 1 << 20),
+    ("G", 1 << 30),
+    ("T", 1 << 40),
+    ("KiB", 1 << 10),
+    ("MiB", 1 << 20),
+    ("GiB", 1 << 30),
+    ("TiB", 1 << 40),
+    ("kB", 1_000),
+    ("MB", 1_000_000),
+    ("GB", 1_000_000_000),
+    ("TB", 1_000_000_000_000),
+    ("B", 1),
+];
+
+/// A size in bytes: a number with `K`, `M`, `G`, `T` (powers of 1024; `KiB` is the same, `kB` a power of 1000) or
+/// nothing behind it; 0 is refused.
 ///
 /// # Errors
 /// A sentence for the user.
 pub fn size_bytes(text: &str) -> Result<u64, String> {
-    match scaled(text, &[('K', 1 << 10), ('M', 1 << 20), ('G', 1 << 30)], "size")? {
+    match scaled(text, &SIZES, "size")? {
         0 => Err("a size of 0 bytes holds nothing; give at least 1".into()),
         bytes => Ok(bytes),
     }
 }
 
-/// A count: a whole number with `K` or `M` (powers of 1000) or nothing behind it.
+/// A count: a number with `K`, `M` or `G` (powers of 1000) or nothing behind it.
 ///
 /// # Errors
 /// A sentence for the user.
 pub fn count(text: &str) -> Result<u64, String> {
-    scaled(text, &[('K', 1_000), ('M', 1_000_000)], "count")
+    scaled(text, &[("K", 1_000), ("M", 1_000_000), ("G", 1_000_000_000)], "count")
 }
 
 /// A count that is not 0.
@@ -104,6 +132,8 @@ pub fn human_count(count: u64) -> String {
 /// The device memory for bricks and tiles of textures: bytes, or a share of the sum over all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CacheSize {
+    /// All of them where the device has room, else as much as it has room for.
+    Auto,
     /// Bytes, at least 1.
     Bytes(u64),
     /// Percent of the bytes of all bricks and tiles, above 0, at most 100.
@@ -111,9 +141,11 @@ pub enum CacheSize {
 }
 
 impl CacheSize {
-    /// Bytes of the cache for a scene whose bricks and tiles take `all` bytes together; a share is rounded up.
-    pub fn bytes(self, all: u64) -> u64 {
+    /// Bytes of the cache for a scene whose bricks and tiles take `all` bytes together, on a device that has `room` for
+    /// so many; a share is rounded up.
+    pub fn bytes(self, all: u64, room: u64) -> u64 {
         match self {
+            Self::Auto => all.min(room),
             Self::Bytes(bytes) => bytes,
             Self::Percent(percent) if percent >= 100.0 => all,
             Self::Percent(percent) => (all as f64 * (percent / 100.0)).ceil() as u64,
@@ -125,10 +157,14 @@ impl FromStr for CacheSize {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let Some(share) = text.strip_suffix('%') else {
-            return size_bytes(text).map(Self::Bytes);
+        let percent = match text.strip_suffix('%') {
+            _ if text == "auto" => return Ok(Self::Auto),
+            Some(share) => share.parse::<f64>(),
+            // A share as a number: 0.25 is 25 %.
+            None if text.starts_with("0.") => text.parse::<f64>().map(|share| 100.0 * share),
+            None => return size_bytes(text).map(Self::Bytes),
         };
-        match share.parse::<f64>() {
+        match percent {
             Ok(percent) if percent > 0.0 && percent <= 100.0 => Ok(Self::Percent(percent)),
             _ => Err("a share is a number above 0 % and at most 100 %, as in 25%".into()),
         }
@@ -138,6 +174,7 @@ impl FromStr for CacheSize {
 impl fmt::Display for CacheSize {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Auto => f.write_str("auto"),
             Self::Bytes(bytes) => write!(f, "{bytes}"),
             Self::Percent(percent) => write!(f, "{percent}%"),
         }
@@ -186,7 +223,12 @@ mod tests {
         assert_eq!(size_bytes("2G"), Ok(2 << 30));
         assert_eq!(size_bytes("18446744073709551615"), Ok(u64::MAX));
         assert_eq!(size_bytes("17179869183G"), Ok(17179869183 << 30));
-        for bad in ["", "0", "0G", "G", "-1", "+1", "1.5G", "1 G", "1T", "1KB", "1GiB", "0x10", "é", "5é", "nan"] {
+        assert_eq!(size_bytes("1.5G"), Ok(3 << 29));
+        assert_eq!((size_bytes("10GiB"), size_bytes("10GB")), (Ok(10 << 30), Ok(10_000_000_000)));
+        assert_eq!((size_bytes("7B"), size_bytes("2kb"), size_bytes("1T")), (Ok(7), Ok(2000), Ok(1 << 40)));
+        let bad =
+            ["", "0", "0G", "G", "-1", "+1", ".5G", "1.G", "1..5G", "1 G", "1P", "1KiBs", "0x10", "é", "5é", "nan"];
+        for bad in bad {
             assert!(size_bytes(bad).is_err(), "{bad}");
         }
         // One beyond 64 bits, in the number and in the product.
@@ -200,7 +242,8 @@ mod tests {
         assert_eq!(count("0"), Ok(0));
         assert_eq!(count("16K"), Ok(16_000));
         assert_eq!(count("2M"), Ok(2_000_000));
-        assert!(count("2G").is_err());
+        assert_eq!((count("2G"), count("1.5M")), (Ok(2_000_000_000), Ok(1_500_000)));
+        assert!(["2GB", "2T", "1.5", "1.5."].iter().all(|bad| count(bad).is_err()));
         assert!(positive_count("0K").is_err());
         assert_eq!(positive_count32("4294967295"), Ok(u32::MAX));
         assert!(positive_count32("4294967296").is_err());
@@ -213,10 +256,12 @@ mod tests {
         for bad in ["0%", "-1%", "100.1%", "nan%", "inf%", "%", "25 %", "0"] {
             assert!(bad.parse::<CacheSize>().is_err(), "{bad}");
         }
-        assert_eq!(CacheSize::Percent(25.0).bytes(1001), 251);
-        assert_eq!(CacheSize::Percent(100.0).bytes(u64::MAX), u64::MAX);
-        assert_eq!(CacheSize::Bytes(7).bytes(1), 7);
-        for text in ["25%", "1024"] {
+        assert_eq!(("0.25".parse(), "auto".parse()), (Ok(CacheSize::Percent(25.0)), Ok(CacheSize::Auto)));
+        assert_eq!(CacheSize::Percent(25.0).bytes(1001, 0), 251);
+        assert_eq!(CacheSize::Percent(100.0).bytes(u64::MAX, 0), u64::MAX);
+        assert_eq!(CacheSize::Bytes(7).bytes(1, 0), 7);
+        assert_eq!([10, 100].map(|room| CacheSize::Auto.bytes(50, room)), [10, 50]);
+        for text in ["25%", "1024", "auto"] {
             assert_eq!(text.parse::<CacheSize>().unwrap().to_string(), text);
         }
     }

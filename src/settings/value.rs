@@ -166,7 +166,7 @@ impl Value for u64 {
             Rule::Bytes(0) if text == "0" => Ok(0),
             Rule::Bytes(_) => size_bytes(text),
             Rule::Whole(least, most) => {
-                let number = count(text)?;
+                let number = count(text).map_err(|why| format!("{why}; it must be from {least} to {most}"))?;
                 let is_right = (least..=most).contains(&number);
                 if is_right { Ok(number) } else { Err(format!("it must be from {least} to {most}")) }
             }

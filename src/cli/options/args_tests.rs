@@ -107,7 +107,7 @@ fn help_has_three_lengths() {
     assert!(text.lines().count() <= 45 && text.contains("--cache") && !text.contains("--dvf-points"), "{text}");
     let text = parse("walk --help").unwrap_err().to_string();
     for part in
-        ["1280x720", "[default: 25%]", "[default: 30]", "degrees", "[default: 0.4,0.8,0.45]", "Camera:", "Light:"]
+        ["1280x720", "[default: auto]", "[default: 30]", "degrees", "[default: 0.4,0.8,0.45]", "Camera:", "Light:"]
     {
         assert!(text.contains(part), "walk --help lacks {part}: {text}");
     }
@@ -129,7 +129,7 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--cache 0", "at least 1"),
         ("--cache 101%", "100 %"),
         ("--cache 99999999999G", "64 bits"),
-        ("--host-cache 1.5G", "whole number"),
+        ("--host-cache 1.5", "whole number"),
         ("--schedule fastest", "known: chc, demand, plain, plain-bvh2, auto"),
         ("--effects glitter", "no 'glitter'"),
         ("--effects=", "known: primary, shadow"),

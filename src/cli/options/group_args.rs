@@ -138,6 +138,8 @@ fn argument<V: View>(entry: &Entry) -> Arg {
         .help(with_notes(field.summary(), &[], field.default_text()))
         .long_help(with_notes(field.help().trim_end_matches('.').into(), &[field.range()], field.default_text()))
         .allow_hyphen_values(field.is_signed || field.rule.is_signed())
+        // So that the range is what is said of `--spp -1`, and not that there is no option -1.
+        .allow_negative_numbers(true)
         .hide_short_help(level != Some(Level::Common))
         .hide_long_help(level.is_none_or(|level| level == Level::Expert))
         .hide(level.is_none())

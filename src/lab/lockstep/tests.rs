@@ -4,8 +4,8 @@
 use super::{Defect, Findings, Lockstep};
 use crate::cpu::CpuExecutor;
 use crate::frame::{
-    Effects, Engine, Equirectangular, Light, Moved, Occlusion, RenderSettings, Renderer, Schedule,
-    emissive_triangles, environment,
+    Effects, Engine, Equirectangular, Light, Moved, Occlusion, RenderSettings, Renderer, Schedule, emissive_triangles,
+    environment,
 };
 use crate::gpu::device::Gpu;
 use crate::gpu::executor::GpuExecutor;

@@ -16,7 +16,7 @@ use crate::reference::{Tally, Truth, TruthRay, judge, judge_any};
 use crate::scene::Camera;
 use crate::session::Settings;
 use crate::session::device::Device;
-use crate::session::opened::{Needs, Opened, open_scene};
+use crate::session::opened::{Needs, Opened, Room, open_scene};
 use crate::session::renderer::renderer;
 use crate::session::trace::{EXTENT, for_rays, trace_device};
 use crate::settings::{Adapter, CacheSize, Effect, EffectList, ImageSize, Schedule};
@@ -167,8 +167,8 @@ impl Lab {
     }
 
     fn opened(&mut self, file: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Opened> {
-        let page_bytes = self.device.page_bytes();
-        Opened::open_on(file, path, settings, page_bytes, |needs| self.executor(needs))
+        let room = Room { page_bytes: self.device.page_bytes(), bytes: self.device.room() };
+        Opened::open_on(file, path, settings, room, |needs| self.executor(needs))
     }
 
     fn executor(&mut self, needs: Needs) -> Result<Box<dyn FrameExecutor>> {

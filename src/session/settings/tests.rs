@@ -10,7 +10,7 @@ fn defaults_are_the_documented_ones() {
     assert_eq!((s.frames, s.size), (30, ImageSize { width: 1280, height: 720 }));
     assert_eq!(s.effects.to_string(), "primary,shadow");
     assert_eq!((s.spp, s.seed, s.tile), (1, 0, 64));
-    assert_eq!((s.cache, s.host_cache), (CacheSize::Percent(25.0), 1 << 30));
+    assert_eq!((s.cache, s.host_cache), (CacheSize::Auto, 1 << 30));
     assert_eq!((s.secondary, s.schedule, s.fronts), (Method::Exact, Schedule::Auto, false));
     assert_eq!((s.query_threshold, s.evict), (0, crate::stream::Policy::RoundRobin));
     assert_eq!((s.sun, s.sun_angle, s.sun_intensity()), (Direction([0.4, 0.8, 0.45]), 0.53, 2.4));
@@ -178,4 +178,24 @@ fn the_options_page_is_that_of_the_settings() {
     }
     let found = std::fs::read_to_string(file).unwrap_or_default();
     assert!(found == page, "docs/options.md is out of date; BRICKWALK_WRITE_OPTIONS=1 writes it anew");
+}
+
+#[test]
+fn settings_without_effect_are_named() {
+    let named = |options: &str| Settings::from_options(options).unwrap().without_effect();
+    assert_eq!(named("--ao-length 2"), ["--ao-length does nothing here; it belongs to --effects ao"]);
+    assert_eq!(named("--roma-k 8 --dvf-rays 64").len(), 2);
+    assert!(named("--effects ao --ao-length 2 --secondary roma --roma-k 8").is_empty());
+    // `--bom` is of two methods.
+    assert!(named("--secondary df --bom raster").is_empty() && named("--bom raster").len() == 1);
+    assert!(named("").is_empty());
+}
+
+#[test]
+fn videos_are_named_as_what_they_are() {
+    let checked = |options: &str| Settings::from_options(options).unwrap().check();
+    assert!(checked("--video a.y4m").is_ok());
+    for bad in ["--video a.mp4", "--video a"] {
+        assert!(checked(bad).unwrap_err().to_string().contains("a.y4m"), "{bad}");
+    }
 }

@@ -78,14 +78,10 @@ fn a_video_holds_the_frames() {
     let left = std::fs::read_dir(folder.path()).expect("a folder").flatten();
     assert!(left.into_iter().all(|entry| !entry.file_name().to_string_lossy().ends_with(".tmp")));
     // A video that cannot be written is told before anything is rendered.
-    let words = [
-        "walk".as_ref(),
-        scene.as_os_str(),
-        "-o".as_ref(),
-        out.as_os_str(),
-        "--video".as_ref(),
-        folder.path().as_os_str(),
-    ];
+    let taken = folder.path().join("taken.y4m");
+    std::fs::create_dir(&taken).expect("a folder");
+    let words =
+        ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), out.as_os_str(), "--video".as_ref(), taken.as_os_str()];
     let refused = brickwalk(words);
     let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!((refused.status.code(), message.lines().count()), (Some(1), 1), "{message}");

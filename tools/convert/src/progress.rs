@@ -1,6 +1,7 @@
 //! Progress of long work: a bar on a terminal, silence in a pipe.
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::fmt::Write;
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,9 +33,15 @@ impl Progress {
 
     /// Starts the phase `name` of `total` steps (0: unknown).
     pub fn phase(&self, name: &'static str, total: u64) {
-        // The template is a constant that indicatif accepts; falling back to the default style loses only looks.
-        let template = "{msg:>12} [{bar:32}] {human_pos}/{human_len} {per_sec} {eta}";
+        // The templates are constants that indicatif accepts; falling back to the default style loses only looks.
+        let template = match total {
+            0 => "{msg:>12} {spinner} {human_pos}  {rate}  {elapsed}",
+            _ => "{msg:>12} [{bar:32}] {human_pos}/{human_len}  {rate}  {eta} left",
+        };
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = style.with_key("rate", |state: &ProgressState, out: &mut dyn Write| {
+            let _ = out.write_str(&rate(state.per_sec()));
+        });
         self.bar.reset();
         self.bar.set_style(style);
         self.bar.set_length(total);
@@ -65,8 +72,34 @@ impl Progress {
     }
 }
 
+/// Steps a second as people read them: three digits, with a unit of 1000.
+fn rate(per_second: f64) -> String {
+    let unit = [(1e9, "G"), (1e6, "M"), (1e3, "K"), (1.0, "")].into_iter().find(|(unit, _)| per_second >= *unit);
+    let (unit, name) = unit.unwrap_or((1.0, ""));
+    let value = per_second / unit;
+    let decimals = if value >= 100.0 {
+        0
+    } else if value >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{value:.decimals$}{name}/s")
+}
+
 impl Default for Progress {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rate;
+
+    #[test]
+    fn rates_have_three_digits() {
+        let texts = [346_391.6274, 0.25, 12.345, 1e6, 999.6, 0.0].map(rate);
+        assert_eq!(texts, ["346K/s", "0.25/s", "12.3/s", "1.00M/s", "1000/s", "0.00/s"]);
     }
 }
