@@ -141,7 +141,7 @@ pub fn open(scene: &Path, settings: &Settings) -> Result<Renderer> {
 pub fn empty_cache(renderer: &mut Renderer) -> Result<()> {
     let page_bytes = renderer.executor.page_bytes();
     let Cache { bytes, residency: old, .. } = &renderer.cache;
-    let residency = Residency::new(&bytes.sizes(), old.budget_bytes(), page_bytes, old.policy())?;
+    let residency = Residency::new(bytes.sizes(), old.budget_bytes(), page_bytes, old.policy())?;
     renderer.cache = Cache::new(residency, bytes.clone(), None);
     Ok(())
 }

@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn rates_have_three_digits() {
-        let texts = [346_391.6274, 0.25, 12.345, 1e6, 999.6, 0.0].map(rate);
+        let texts = [346_391.5, 0.25, 12.345, 1e6, 999.6, 0.0].map(rate);
         assert_eq!(texts, ["346K/s", "0.25/s", "12.3/s", "1.00M/s", "1000/s", "0.00/s"]);
     }
 }

@@ -326,7 +326,8 @@ fn error_over_time(job: &Job, rows: &Rows) -> Graph {
         let value = |name: &str| rows.value(&job.key(way), name);
         Some((value("ms")?, 100.0 * value("flip_converged")?))
     };
-    let lines: [(&str, fn(&Way) -> bool); 5] = [
+    type Line = (&'static str, fn(&Way) -> bool);
+    let lines: [Line; 5] = [
         ("maps alone", |way| matches!(way, Way::Roma { .. })),
         ("auto: maps corrected by one ray in 2 to 8", |way| matches!(way, Way::Corrected { .. })),
         ("auto: those in doubt traced", |way| *way == Way::Sifted),
