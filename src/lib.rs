@@ -6,8 +6,8 @@
 //!
 //! # A picture and a ray
 //!
-//! [`Session`](session::Session) opens a scene file. [`Settings`](session::Settings) say what to render; each has a
-//! default, its unit, range and meaning ([`settings`]), and a place in a settings file and on the command line.
+//! [`Session`] opens a scene file. [`Settings`] say what to render; each has a default, its unit, range and meaning
+//! ([`settings`]), and a place in a settings file and on the command line.
 //!
 //! ```
 //! use brickwalk::scene::Camera;
