@@ -2,8 +2,8 @@
 //! experiments of papers on our scenes, each number beside the paper's; and `brickwalk bench executors`
 //! (`executors.rs`).
 //!
-//! Everything runs in this process. [`runner`] goes through what is to be measured, each finished measurement is a line
-//! of a file ([`store`]), and tables, plots and pages are made from these lines alone ([`results`]).
+//! Everything runs in this process. `runner.rs` goes through what is to be measured, each finished measurement is a
+//! line of a file (`store.rs`), and tables, plots and pages are made from these lines alone (`results.rs`).
 
 pub mod args;
 mod chc;
