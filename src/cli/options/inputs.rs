@@ -12,7 +12,8 @@ const UNITS: [(&str, f64); 5] = [("mm", 0.001), ("cm", 0.01), ("m", 1.0), ("in",
 /// Files and folders with their options, in the order of the command line.
 ///
 /// An option belongs to the input before it; before the first input it belongs to all that have none of their own.
-/// `AFTER_FROM`: they are the inputs of a conversion that is repeated, which come after `--from`, and there may be none.
+/// `AFTER_FROM`: they are the inputs of a conversion that is repeated, which come after `--from`, and there may be
+/// none.
 #[derive(Clone, Debug)]
 pub struct Inputs<const AFTER_FROM: bool> {
     /// The inputs; a path may be that of a folder.
