@@ -17,6 +17,7 @@ compile_error!("the records of a scene file are used as they lie on disk, which 
 compile_error!("scene files are mapped whole, which takes a 64-bit address space");
 
 pub mod attributes;
+mod corners;
 mod error;
 mod file;
 pub mod layout;
@@ -34,6 +35,7 @@ pub mod validate;
 mod verify;
 mod writer;
 
+pub use corners::Corners;
 pub use error::{Error, Flaw, Part};
 pub use file::{Access, SceneFile};
 pub use layout::Section;

@@ -8,6 +8,7 @@ mod common;
 /// Commands on good and bad input: outputs, progress, interruption, repair.
 mod command {
     mod command_line;
+    mod crafted;
     mod defaults;
     mod outputs;
     mod progress;

@@ -65,6 +65,17 @@ impl NodeView {
         }
     }
 
+    /// Whether the quantisation grid in the bytes of a [`Node`] is finite: its origin, and its exponents, which are
+    /// those of normal numbers.
+    #[inline]
+    pub(super) fn has_finite_boxes(node: &[u8; size_of::<Node>()]) -> bool {
+        let origin = &node[offset_of!(Node, origin)..][..12];
+        let exponents = &node[offset_of!(Node, exponent)..][..3];
+        // An exponent field of ones is that of an infinity or of what is no number.
+        origin.as_chunks::<4>().0.iter().all(|x| u32::from_le_bytes(*x) >> 23 & 255 != 255)
+            && exponents.iter().all(|exponent| (1..255).contains(exponent))
+    }
+
     /// Number of inner children.
     #[inline]
     pub(super) fn inner_count(&self) -> u32 {

@@ -1,7 +1,7 @@
 //! Checks of a payload that has just been copied: every index in it, on the way from the disk to a cache.
 //!
 //! This lies on the path of every brick that is streamed, so it is one pass of a few instructions per node and a
-//! maximum per array of indices, which compilers vectorise.
+//! maximum per array of indices or coordinates, which compilers vectorise.
 
 use super::node::NodeView;
 use super::occupancy;
@@ -11,13 +11,18 @@ use crate::payload::Payload;
 use crate::records::{
     AttributeDetail, AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout,
 };
-use crate::records::{NO_NORMAL, Node, OpacityTriangle, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
+use crate::records::{
+    NEAR_STEPS, NO_NORMAL, Node, Object, OpacityTriangle, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT, WIDE_STEPS,
+};
 use crate::resident::Resident;
+
+/// Bits of an f32 but for its sign.
+const MAGNITUDE: u32 = 0x7fff_ffff;
 
 /// Checks the bytes of a payload, as it is loaded, against the resident part, which satisfies [`super::resident`]:
 /// every index that traversal or shading follows lies in its array, nodes form a tree no higher than the brick says
-/// with children after their parents, node 0 is the brick's root, padding is zero; of an occupancy map that all levels
-/// agree. `bytes` needs no alignment.
+/// with children after their parents, node 0 is the brick's root, padding is zero; boxes and vertices are finite, and
+/// vertices within reach of the brick's origin; of an occupancy map that all levels agree. `bytes` needs no alignment.
 pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(), Flaw> {
     let part = Part::Payload(payload);
     let length = resident.loaded_bytes(payload);
@@ -27,7 +32,7 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
     match payload {
         Payload::Geometry(index) => {
             let brick = &resident.bricks[index as usize];
-            geometry(part, brick, resident.objects[brick.object as usize].triangle_ids, bytes)?;
+            geometry(part, brick, &resident.objects[brick.object as usize], bytes)?;
             opacity(part, brick, resident.materials.len() as u32, bytes)
         }
         Payload::Attributes(index) => {
@@ -42,12 +47,19 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
     }
 }
 
-fn geometry(part: Part, brick: &Brick, triangle_ids: u32, bytes: &[u8]) -> Result<(), Flaw> {
+fn geometry(part: Part, brick: &Brick, object: &Object, bytes: &[u8]) -> Result<(), Flaw> {
     let layout = GeometryLayout::of(brick);
-    let vertex_bytes = if brick.flags & BRICK_WIDE != 0 { 24 } else { 12 };
+    let (vertex_bytes, steps) = if brick.flags & BRICK_WIDE != 0 { (24, WIDE_STEPS) } else { (12, NEAR_STEPS) };
+    let vertices_end = layout.vertices + u64::from(brick.vertex_count) * vertex_bytes;
     let ids_end = layout.ids + u64::from(brick.triangle_count) * 4;
+    let triangle_ids = object.triangle_ids;
     nodes(part, brick, &bytes[..layout.vertices as usize])?;
-    padding(part, bytes, layout.vertices + u64::from(brick.vertex_count) * vertex_bytes, layout.ids)?;
+    // Magnitudes are in the order of their bits, an infinity and what is no number above all. The reach is a power of
+    // two in the range of f32, as `validate::resident` has found.
+    let most = f32::from_bits(max_u32_by(&bytes[layout.vertices as usize..vertices_end as usize], |x| x & MAGNITUDE));
+    let reach = steps as f32 * 2f32.powi(object.step_log2 - object.unit_log2);
+    rule(most <= reach, part, || (format!("a vertex at {most}"), format!("at most {reach} units from the origin")))?;
+    padding(part, bytes, vertices_end, layout.ids)?;
     let id = max_u32(&bytes[layout.ids as usize..ids_end as usize]);
     rule(id < triangle_ids, part, || {
         (format!("triangle id {id}"), format!("less than {triangle_ids}, as its object says"))
@@ -125,6 +137,9 @@ fn nodes(part: Part, brick: &Brick, bytes: &[u8]) -> Result<(), Flaw> {
         let node = NodeView::of_bytes(bytes);
         node.check(index as u32, brick.node_count, brick.triangle_count, "triangles")
             .map_err(|flaw| flaw.of_node(part, format_args!("node {index}")))?;
+        rule(NodeView::has_finite_boxes(bytes), part, || {
+            (format!("node {index} with a box that is not finite"), "finite origins and exponents from 1 to 254")
+        })?;
         let level = levels[index];
         rule(level != 0, part, || (format!("node {index} without a parent"), "a tree"))?;
         if node.inner_mask == 0 {

@@ -89,6 +89,9 @@ pub(super) fn instances(resident: &Resident) -> Result<(), Flaw> {
         rule(finite && determinant.is_finite() && determinant != 0.0, part, || {
             (format!("matrix {:?}", instance.world_from_object), "finite numbers and an inverse")
         })?;
+        rule(in_units(resident, instance).iter().all(|value| (*value as f32).is_finite()), part, || {
+            (format!("matrix {:?}", instance.world_from_object), "one that f32 holds in device units, and its inverse")
+        })?;
         rule((determinant < 0.0) == (instance.flags & INSTANCE_MIRRORED != 0), part, || {
             (
                 format!("determinant {determinant}, flags {:#x}", instance.flags),
@@ -97,6 +100,25 @@ pub(super) fn instances(resident: &Resident) -> Result<(), Flaw> {
         })?;
     }
     Ok(())
+}
+
+/// The numbers of an instance's matrix and of the linear part of its inverse, between device units of its object and of
+/// the world. The object exists, and there is an inverse.
+fn in_units(resident: &Resident, instance: &Instance) -> [f64; 21] {
+    let exp2 = |log2: i32| f64::from(log2).exp2();
+    let world = resident.objects[0].unit_log2;
+    let scale = exp2(resident.objects[instance.object as usize].unit_log2 - world);
+    let (m, determinant) = (&instance.world_from_object, instance.determinant());
+    // Cofactor by cofactor, in rows of four; transposed, which does not matter here.
+    let cofactor = |i: usize| {
+        let at = |row: usize, column: usize| m[4 * ((i / 3 + row) % 3) + (i + column) % 3];
+        at(1, 1) * at(2, 2) - at(1, 2) * at(2, 1)
+    };
+    std::array::from_fn(|i| match i {
+        3 | 7 | 11 => m[i] / exp2(world),
+        0..12 => m[i] * scale,
+        _ => cofactor(i - 12) / determinant / scale,
+    })
 }
 
 /// There is one leaf for every brick of every instance.

@@ -71,6 +71,12 @@ fn instances() {
     }
     refused(record(Instances, 1), "matrix", |r| r.instances[1].world_from_object[7] = f64::NEG_INFINITY);
     refused(record(Instances, 1), "matrix", |r| r.instances[1].world_from_object[10] = 0.0);
+    for scale in [1e-90, 1e60] {
+        // It has an inverse in f64.
+        let scaled = Instance::IDENTITY.map(|x| x * scale);
+        refused(record(Instances, 1), "matrix", |r| r.instances[1].world_from_object = scaled);
+    }
+    refused(record(Instances, 1), "matrix", |r| r.instances[1].world_from_object[3] = 1e300);
     refused(record(Instances, 2), "determinant -1", |r| r.instances[2].flags = 0);
     refused(record(Instances, 1), "determinant 8", |r| r.instances[1].flags = INSTANCE_MIRRORED);
 }
@@ -519,6 +525,40 @@ fn geometry() {
     }
 }
 
+/// Boxes and vertices are finite before anything is made of them, whatever made the checksums right.
+#[test]
+fn what_is_not_finite() {
+    let scene = scene();
+    let [near, wide] = [0, 1].map(|brick| GeometryLayout::of(&scene.resident.bricks[brick]));
+    for value in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -f32::MAX] {
+        for (brick, at) in [
+            (0, near.vertices),
+            (0, near.vertices + 12 * u64::from(scene.resident.bricks[0].vertex_count) - 4),
+            (1, wide.vertices + 24),
+            (1, wide.vertices + 36),
+        ] {
+            payload_refused(Payload::Geometry(brick), "a vertex at", |b| put(b, at, value.to_le_bytes()));
+        }
+    }
+    let reach = |steps: i64| {
+        steps as f32 * 2f32.powi(scene.resident.objects[0].step_log2 - scene.resident.objects[0].unit_log2)
+    };
+    for (brick, at, steps) in [(0, near.vertices, NEAR_STEPS), (1, wide.vertices, WIDE_STEPS)] {
+        let beyond = reach(steps).next_up().to_le_bytes();
+        payload_refused(Payload::Geometry(brick), "a vertex at", |b| put(b, at, beyond));
+    }
+    for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for axis in 0..3 {
+            let finite = "node 1 with a box that is not finite";
+            payload_refused(Payload::Geometry(0), finite, |b| put(b, 80 + 4 * axis, value.to_le_bytes()));
+        }
+    }
+    for exponent in [0, 255] {
+        let at = 80 + offset_of!(Node, exponent) as u64 + 2;
+        payload_refused(Payload::Geometry(0), "exponents from 1 to 254", |b| put(b, at, [exponent]));
+    }
+}
+
 #[test]
 fn a_root_that_differs() {
     let (_folder, path, _) = written();
@@ -607,13 +647,12 @@ fn contents() {
     contents_refused(Payload::Geometry(0), "triangle 0 in no leaf", |b| {
         put(b, 80 + offset_of!(Node, meta) as u64, [0x61])
     });
-    contents_refused(Payload::Geometry(0), "origin [inf", |b| put(b, 80, f32::INFINITY.to_le_bytes()));
-    contents_refused(Payload::Geometry(0), "exponents [0,", |b| put(b, 80 + offset_of!(Node, exponent) as u64, [0]));
     contents_refused(Payload::Geometry(0), "bounds of child 0", |b| {
         put(b, 80 + offset_of!(Node, lo) as u64, [255]);
         put(b, 80 + offset_of!(Node, hi) as u64, [254]);
     });
-    for value in [f32::NAN, f32::INFINITY, -f32::MAX, 0.001, 1e6] {
+    let step = scene.resident.objects[0].step_log2 - scene.resident.objects[0].unit_log2;
+    for value in [2f32.powi(step) * 0.5, 2f32.powi(step) * 1e6] {
         contents_refused(Payload::Geometry(0), "vertex 1 at", |b| put(b, near.vertices + 12, value.to_le_bytes()));
         contents_refused(Payload::Geometry(1), "vertex 1 at", |b| put(b, wide.vertices + 24, value.to_le_bytes()));
         contents_refused(Payload::Geometry(1), "vertex 1 at", |b| put(b, wide.vertices + 36, value.to_le_bytes()));

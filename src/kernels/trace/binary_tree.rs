@@ -7,7 +7,7 @@
 use crate::kernels::layout::{BINARY_LEAF, BinaryNode};
 use crate::schedule::ExecutorError;
 use crate::stream::{Item, StreamError};
-use bricks::{BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, NODE_WIDTH, Node, Payload, Resident, SceneFile};
+use bricks::{Brick, Corners, NODE_WIDTH, Node, Payload, Resident, SceneFile};
 
 /// Bits below the number of a leaf's triangles.
 const COUNT_SHIFT: u32 = 29;
@@ -140,6 +140,7 @@ fn splits(children: &[Child]) -> Vec<usize> {
             continue;
         }
         // The lowest child lies in one part: the other is a subset of the rest.
+        splits[set] = rest;
         let (mut best, mut part) = (f64::INFINITY, rest);
         while part != 0 {
             let cost = costs[part] + costs[set ^ part];
@@ -153,10 +154,10 @@ fn splits(children: &[Child]) -> Vec<usize> {
     splits
 }
 
-/// The children of a wide node, `of` the boxes of wide nodes and of triangles.
+/// The children of a wide node below which there are triangles, `of` the boxes of wide nodes and of triangles.
 fn children(node: &Node, of: &AllBounds) -> impl Iterator<Item = Child> {
     let mut inner = node.child_base;
-    (0..NODE_WIDTH).filter_map(move |slot| {
+    let children = (0..NODE_WIDTH).filter_map(move |slot| {
         let meta = node.meta[slot];
         if meta == 0 {
             return None;
@@ -169,7 +170,8 @@ fn children(node: &Node, of: &AllBounds) -> impl Iterator<Item = Child> {
         let triangles = &of.triangles[first as usize..(first + count) as usize];
         let bounds = triangles.iter().fold(Bounds::NONE, |all, &one| all.union(one));
         Some(Child { bounds, what: Kind::Leaf(first, count) })
-    })
+    });
+    children.filter(|child| child.bounds != Bounds::NONE)
 }
 
 /// Exact boxes.
@@ -179,28 +181,12 @@ struct AllBounds {
 }
 
 fn bounds(brick: &Brick, geometry: &[u32], wide: &[Node]) -> AllBounds {
-    let layout = GeometryLayout::of(brick);
-    let vertices = &geometry[layout.vertices as usize / 4..];
-    let indices = &geometry[layout.indices as usize / 4..];
-    let vertex = |i: u32| -> [f64; 3] {
-        let value = |word: usize| f64::from(f32::from_bits(vertices[word]));
-        let wide = brick.flags & BRICK_WIDE != 0;
-        // High and low part have 24 bits each and a common step: the sum is exact.
-        let at = |k: usize| {
-            if wide { value(6 * i as usize + k) + value(6 * i as usize + 3 + k) } else { value(3 * i as usize + k) }
-        };
-        std::array::from_fn(at)
-    };
-    let index = |at: usize| match brick.flags & BRICK_INDEX32 {
-        // Two to a word, the first in the low half.
-        0 => indices[at / 2] >> (16 * (at % 2)) & 0xffff,
-        _ => indices[at],
-    };
-    let triangle = |i: usize| {
-        let points = [0, 1, 2].map(|k| vertex(index(3 * i + k)));
+    let corners = Corners::new(brick, bytemuck::cast_slice(geometry));
+    let triangle = |i: u32| {
+        let points = corners.of(i);
         points.iter().fold(Bounds::NONE, |all, &p| all.union(Bounds { min: p, max: p }))
     };
-    let triangles = (0..brick.triangle_count as usize).map(triangle).collect();
+    let triangles = (0..brick.triangle_count).map(triangle).collect();
     let mut all = AllBounds { nodes: vec![Bounds::NONE; wide.len()], triangles };
     // Children follow their parent.
     for (i, node) in wide.iter().enumerate().rev() {

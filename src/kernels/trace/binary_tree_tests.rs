@@ -103,6 +103,31 @@ proptest! {
     }
 }
 
+/// Valid files may have nodes without triangles; they are left out, however many there are.
+#[test]
+fn nodes_without_triangles_are_left_out() {
+    let scene = probe::scene().unwrap();
+    let brick = &scene.resident().bricks[0];
+    let payload = Payload::Geometry(0);
+    let mut words = vec![0u32; scene.loaded_bytes(payload) as usize / 4];
+    scene.copy(payload, bytemuck::cast_slice_mut(&mut words)).unwrap();
+    let root: Node = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&words[..20]));
+    let empty = Node { meta: [0; 8], inner_mask: 0, ..root };
+    // The root's parent, with seven nodes of nothing beside it.
+    let parent = Node { meta: std::array::from_fn(|slot| 0x38 | slot as u8), inner_mask: 255, child_base: 1, ..root };
+    let mut nodes = vec![parent; 1];
+    nodes.extend([empty; 7]);
+    let old = brick.node_count as usize * 20;
+    let mut below: Vec<Node> = bytemuck::cast_slice(&words[..old]).to_vec();
+    below.iter_mut().for_each(|node| node.child_base += 8);
+    nodes.extend(below);
+    words.splice(..old, bytemuck::cast_slice(&nodes).iter().copied());
+    let spoiled = Brick { node_count: nodes.len() as u32, height: brick.height + 1, ..*brick };
+    let (tree, before) = (binary_tree(&spoiled, &words), trees().swap_remove(0).0);
+    assert_eq!(tree.nodes.len(), before.nodes.len());
+    assert_eq!(tree.nodes[0].max, before.nodes[0].max);
+}
+
 /// Control of the test of splits: taking the children as they come is worse.
 #[test]
 fn splits_matter() {
