@@ -3,7 +3,7 @@
 use super::options::args::TraceArgs;
 use crate::cli::output::print_json;
 use crate::kernels::layout::NONE;
-use crate::output::npy;
+use crate::output::npy::{self, Rays};
 use crate::session::trace::{check, for_rays, trace};
 use crate::session::{Opened, open_scene};
 use anyhow::{Context, Result, bail};
@@ -15,7 +15,7 @@ use brickwalk_convert::progress::Progress;
 /// Bad rays, by their row; a bad scene, cache or output; a damaged brick; the device's.
 pub fn run(args: &TraceArgs) -> Result<()> {
     let settings = for_rays(&args.settings()?);
-    let rays = npy::read_rays(&args.rays)?;
+    let Rays { rays, shape } = npy::read_rays(&args.rays)?;
     for (row, ray) in rays.iter().enumerate() {
         check(ray).with_context(|| format!("{}: row {row}", args.rays.display()))?;
     }
@@ -31,9 +31,9 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     }
     if args.any {
         let any: Vec<bool> = hits.iter().map(|h| h.triangle != NONE).collect();
-        npy::write_any(&args.output, &any)?;
+        npy::write_any(&args.output, &any, &shape)?;
     } else {
-        npy::write_hits(&args.output, &hits)?;
+        npy::write_hits(&args.output, &hits, &shape, args.normals)?;
     }
     Opened::write_requests(&settings, &opened.cache)?;
     if args.json {

@@ -63,7 +63,7 @@ pub struct CpuExecutor {
     cache: BrickCache,
     scene: Scene,
     texels: Texels,
-    /// [`crate::kernels::opacity::table`].
+    /// [`crate::kernels::opacity::table`]; empty where every triangle is opaque.
     opacity: Vec<[u32; 4]>,
     lamps: LampTables,
     buffers: Buffers,
@@ -88,16 +88,17 @@ impl CpuExecutor {
     /// # Errors
     /// Textures that cannot be read.
     pub fn new(file: Arc<SceneFile>, workers: Workers<Shared>, setup: Setup) -> Result<Self, ExecutorError> {
-        let Setup { extent, count, keep, .. } = setup;
+        let Setup { extent, count, opaque, keep, .. } = setup;
         let rays = extent.rays();
         let sets = [RaySet::new(rays), RaySet::new(rays), RaySet::new(0)];
         let tiles = TileLists::new(extent.tiles() as usize);
+        let opacity = opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?;
         Ok(Self {
             cache: BrickCache::new(file.sizes().rows()),
             scene: Scene::new(file.resident()),
             samples: keep.textures || !file.resident().textures.is_empty(),
             texels: Texels::new(&file)?,
-            opacity: opacity::table(&file).map_err(|error| ExecutorError::Device(format!("failed: {error}")))?,
+            opacity: if opaque { Vec::new() } else { opacity },
             lamps: LampTables::default(),
             buffers: Buffers { sets, pixels: Pixels::new(rays), tiles, families: Vec::new() },
             binary: None,

@@ -79,7 +79,7 @@ impl GpuExecutor {
         let pages = Pages {
             cache: page_sizes.len().max(1),
             texels: texels.max(usize::from(keep.textures)),
-            opacity: keep.opacity || opacity::is_needed(resident),
+            opacity: keep.opacity || (opacity::is_needed(resident) && !setup.opaque),
             gloss: keep.gloss || reflectance::is_needed(resident),
         };
         let most_pages = gpu.max_cache_pages(pages);

@@ -27,17 +27,18 @@ pub struct BrickView<'a> {
 
 impl<'a> BrickView<'a> {
     /// The arrays in the verified geometry of `brick`, which is aligned for u32 and of the length that the record
-    /// implies; `table` is that of [`crate::kernels::opacity`].
+    /// implies; `table` is that of [`crate::kernels::opacity`], or empty where every triangle is to be opaque.
     pub fn new(brick: &Brick, bytes: &'a [u8], table: &'a [[u32; 4]]) -> Self {
         let layout = GeometryLayout::of(brick);
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
+        let of = if table.is_empty() { &[] } else { part(layout.opacity_of, layout.opacities) };
         Self {
             nodes: bytemuck::cast_slice(part(0, layout.vertices)),
             vertices: bytemuck::cast_slice(part(layout.vertices, layout.ids)),
             ids: bytemuck::cast_slice(part(layout.ids, layout.indices)),
             indices: Indices::new(brick, part(layout.indices, layout.opacity_of)),
             opacity: OpacityView {
-                of: bytemuck::cast_slice(part(layout.opacity_of, layout.opacities)),
+                of: bytemuck::cast_slice(of),
                 triangles: bytemuck::cast_slice(part(layout.opacities, layout.bytes)),
                 table,
             },

@@ -40,6 +40,8 @@ pub struct Setup {
     pub threshold: u32,
     /// Count nodes and triangles visited (slower).
     pub count: bool,
+    /// Every triangle stops every ray, whatever its alpha.
+    pub opaque: bool,
     /// What is kept though the scene does not need it.
     pub keep: Keep,
 }

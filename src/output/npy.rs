@@ -28,7 +28,8 @@ pub struct Ray {
     pub t_max: f64,
 }
 
-/// A row of the output: numpy dtype `[('t', '<f8'), ('triangle', '<u4'), ('u', '<f4'), ('v', '<f4')]`, packed.
+/// What a ray hits. Without its normal an element of the output, packed: numpy dtype `[('t', '<f8'), ('triangle',
+/// '<u4'), ('u', '<f4'), ('v', '<f4')]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance in lengths of the given direction, +inf on a miss.
@@ -39,15 +40,28 @@ pub struct Hit {
     pub u: f32,
     /// Weight of vertex 2 of the source's order.
     pub v: f32,
+    /// Geometric unit normal in world space, right-handed about the source's order of vertices as they lie in the
+    /// world; zero on a miss.
+    pub normal: [f32; 3],
 }
 
-/// Reads float64 (N, 8) in C order, of either byte order. Values are as in the file: what makes a ray valid is for the
+/// Rays as an array holds them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rays {
+    /// The rays, row by row.
+    pub rays: Vec<Ray>,
+    /// Shape of the array without its last axis: that of the hits.
+    pub shape: Vec<u64>,
+}
+
+/// Reads float64 or float32 of shape (..., 8) or (..., 6), in C order, of either byte order. Six numbers are origin and
+/// direction; the interval is then from 0 to infinity. Values are as in the file: what makes a ray valid is for the
 /// caller to say.
 ///
 /// # Errors
 /// The file cannot be read, is no `.npy` file, has another type, shape or order, or is shorter or longer than its
 /// header says.
-pub fn read_rays(path: &Path) -> Result<Vec<Ray>> {
+pub fn read_rays(path: &Path) -> Result<Rays> {
     let name = path.display();
     let mut file = File::open(path).with_context(|| format!("{name}: cannot open the rays"))?;
     let length = file.metadata().with_context(|| format!("{name}: cannot read the rays"))?.len();
@@ -55,31 +69,57 @@ pub fn read_rays(path: &Path) -> Result<Vec<Ray>> {
         .with_context(|| format!("{name}: not a NumPy file; write it with numpy.save(path, rays)"))?;
     let header = NpyFile::new(Cursor::new(header))
         .with_context(|| format!("{name}: its NumPy header is damaged; write it with numpy.save(path, rays)"))?;
-    let remedy = "rays are float64 of shape (N, 8); use numpy.ascontiguousarray(rays, dtype=numpy.float64)";
-    let double = |order: &str| order.parse::<TypeStr>().is_ok_and(|t| header.dtype() == DType::new_scalar(t));
-    if !double("<f8") && !double(">f8") {
+    let remedy = "rays are float64 or float32 of shape (..., 8) or (..., 6); use numpy.ascontiguousarray(rays, \
+                  dtype=numpy.float64)";
+    let is = |kind: &str| kind.parse::<TypeStr>().is_ok_and(|t| header.dtype() == DType::new_scalar(t));
+    let Some((_, number_bytes, read)) = NUMBERS.iter().find(|(kind, ..)| is(kind)) else {
         bail!("{name}: its type is {}; {remedy}", header.dtype().descr());
-    }
-    let &[rows, 8] = header.shape() else {
-        bail!("{name}: its shape is {:?}; {remedy}", header.shape());
     };
+    let (shape, columns) = match header.shape() {
+        [shape @ .., columns @ (6 | 8)] => (shape.to_vec(), *columns),
+        other => bail!("{name}: its shape is {other:?}; {remedy}"),
+    };
+    let rows = shape.iter().try_fold(1u64, |rows, &n| rows.checked_mul(n));
     // One row or none is the same in both orders.
-    if header.order() != Order::C && rows > 1 {
+    if header.order() != Order::C && rows != Some(0) && rows != Some(1) {
         bail!("{name}: its rows are in Fortran order; {remedy}");
     }
-    let expected = rows.checked_mul(64).and_then(|bytes| bytes.checked_add(header_bytes));
+    let row_bytes = columns * number_bytes;
+    let data = rows.and_then(|rows| rows.checked_mul(row_bytes));
     ensure!(
-        expected == Some(length),
-        "{name}: it has {length} bytes where its header promises {rows} rays of 64; write it again"
+        data.and_then(|bytes| bytes.checked_add(header_bytes)) == Some(length),
+        "{name}: it has {length} bytes where its header promises rays of {row_bytes} in shape {shape:?}; write it again"
     );
-    let mut rays = vec![Ray::zeroed(); usize::try_from(rows).context("too many rays for this machine")?];
+    // As many as the file has bytes for.
+    let mut rays = Vec::with_capacity(usize::try_from(rows.unwrap_or(0)).context("too many rays for this machine")?);
     // The header's reader may have read ahead; the file itself stands behind the header.
-    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut rays);
-    BufReader::new(file).read_exact(bytes).with_context(|| format!("{name}: cannot read the rays"))?;
-    if double(">f8") != cfg!(target_endian = "big") {
-        bytes.as_chunks_mut::<8>().0.iter_mut().for_each(|number| number.reverse());
+    let mut file = BufReader::new(file);
+    let mut row = vec![0; row_bytes as usize];
+    for _ in 0..rows.unwrap_or(0) {
+        file.read_exact(&mut row).with_context(|| format!("{name}: cannot read the rays"))?;
+        let mut numbers = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f64::INFINITY];
+        for (number, bytes) in numbers.iter_mut().zip(row.chunks_exact(*number_bytes as usize)) {
+            *number = read(bytes);
+        }
+        rays.push(bytemuck::cast(numbers));
     }
-    Ok(rays)
+    Ok(Rays { rays, shape })
+}
+
+/// Reads a number from as many bytes as it has.
+type ReadNumber = fn(&[u8]) -> f64;
+
+/// Types of numbers, their bytes, and how one is read.
+const NUMBERS: [(&str, u64, ReadNumber); 4] = [
+    ("<f8", 8, |bytes| f64::from_le_bytes(sized(bytes))),
+    (">f8", 8, |bytes| f64::from_be_bytes(sized(bytes))),
+    ("<f4", 4, |bytes| f32::from_le_bytes(sized(bytes)).into()),
+    (">f4", 4, |bytes| f32::from_be_bytes(sized(bytes)).into()),
+];
+
+/// The first bytes; zeros where there are too few.
+fn sized<const N: usize>(bytes: &[u8]) -> [u8; N] {
+    std::array::from_fn(|i| bytes.get(i).copied().unwrap_or(0))
 }
 
 /// The header of an `.npy` file, magic included, and its length in bytes; the file then stands at its data. Lengths and
@@ -111,13 +151,13 @@ fn read_header(file: &mut File) -> Result<(Vec<u8>, u64)> {
     Ok((header, bytes))
 }
 
-/// Writes a one-dimensional array; `rows` yields the bytes of its data.
-fn write(path: &Path, dtype: DType, count: usize, data: &[u8]) -> Result<()> {
+/// Writes an array of `shape`, whose bytes are `data`.
+fn write(path: &Path, dtype: DType, shape: &[u64], data: &[u8]) -> Result<()> {
     let context = || format!("{}: cannot write this file", path.display());
     atomic::write_with(path, |out| {
         WriteOptions::new_header_only()
             .dtype(dtype)
-            .shape(&[count as u64])
+            .shape(shape)
             .writer(&mut *out)
             .write_header_only()
             .with_context(context)?;
@@ -129,31 +169,37 @@ fn scalar(text: &'static str) -> Result<DType> {
     Ok(DType::new_scalar(text.parse().with_context(|| format!("the NumPy type {text}"))?))
 }
 
-/// Writes hits as a structured array, a row a ray.
+/// Writes hits as a structured array of `shape`, an element a ray; with `normals` each has its normal, too: field
+/// `normal`, three `<f4`.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_hits(path: &Path, hits: &[Hit]) -> Result<()> {
+pub fn write_hits(path: &Path, hits: &[Hit], shape: &[u64], normals: bool) -> Result<()> {
     let field = |name: &str, text| Ok::<_, anyhow::Error>(Field { name: name.into(), dtype: scalar(text)? });
-    let dtype =
-        DType::Record(vec![field("t", "<f8")?, field("triangle", "<u4")?, field("u", "<f4")?, field("v", "<f4")?]);
-    let mut data = Vec::with_capacity(hits.len() * 20);
+    let mut fields = vec![field("t", "<f8")?, field("triangle", "<u4")?, field("u", "<f4")?, field("v", "<f4")?];
+    if normals {
+        fields.push(Field { name: "normal".into(), dtype: DType::Array(3, Box::new(scalar("<f4")?)) });
+    }
+    let mut data = Vec::with_capacity(hits.len() * if normals { 32 } else { 20 });
     for hit in hits {
         data.extend_from_slice(&hit.t.to_le_bytes());
         data.extend_from_slice(&hit.triangle.to_le_bytes());
         data.extend_from_slice(&hit.u.to_le_bytes());
         data.extend_from_slice(&hit.v.to_le_bytes());
+        if normals {
+            data.extend(hit.normal.iter().flat_map(|x| x.to_le_bytes()));
+        }
     }
-    write(path, dtype, hits.len(), &data)
+    write(path, DType::Record(fields), shape, &data)
 }
 
-/// Writes, a row a ray, whether something was hit.
+/// Writes an array of `shape`: whether something was hit, an element a ray.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_any(path: &Path, hit: &[bool]) -> Result<()> {
+pub fn write_any(path: &Path, hit: &[bool], shape: &[u64]) -> Result<()> {
     let data: Vec<u8> = hit.iter().map(|&b| u8::from(b)).collect();
-    write(path, scalar("|b1")?, hit.len(), &data)
+    write(path, scalar("|b1")?, shape, &data)
 }
 
 #[cfg(test)]
@@ -184,17 +230,39 @@ mod tests {
     #[test]
     fn reads_rays_of_either_byte_order() {
         let folder = tempfile::tempdir().unwrap();
-        let little = read_rays(&file(folder.path(), "<f8", "False", "(3, 8)", &numbers(24))).unwrap();
+        let read = |path: PathBuf| read_rays(&path).unwrap().rays;
+        let little = read(file(folder.path(), "<f8", "False", "(3, 8)", &numbers(24)));
         assert_eq!(little.len(), 3);
         assert_eq!(little[0].origin, [-3.0, -2.5, -2.0]);
         assert_eq!(little[2].direction, [6.5, 7.0, 7.5]);
         assert_eq!((little[1].t_min, little[1].t_max), (4.0, 4.5));
         let swapped: Vec<u8> =
             numbers(24).chunks(8).flat_map(|c| c.iter().rev().copied().collect::<Vec<_>>()).collect();
-        assert_eq!(read_rays(&file(folder.path(), ">f8", "False", "(3, 8)", &swapped)).unwrap(), little);
-        assert_eq!(read_rays(&file(folder.path(), "<f8", "False", "(0, 8)", &[])).unwrap(), []);
+        assert_eq!(read(file(folder.path(), ">f8", "False", "(3, 8)", &swapped)), little);
+        assert_eq!(read(file(folder.path(), "<f8", "False", "(0, 8)", &[])), []);
         // numpy.save marks (1, 8) and (0, 8) as C order, other writers may not.
-        assert_eq!(read_rays(&file(folder.path(), "<f8", "True", "(1, 8)", &numbers(8))).unwrap().len(), 1);
+        assert_eq!(read(file(folder.path(), "<f8", "True", "(1, 8)", &numbers(8))).len(), 1);
+        // What f32 holds is the same in f32.
+        let single: Vec<u8> = (0..24).flat_map(|i| (i as f32 * 0.5 - 3.0).to_le_bytes()).collect();
+        assert_eq!(read(file(folder.path(), "<f4", "False", "(3, 8)", &single)), little);
+        let swapped: Vec<u8> = single.chunks(4).flat_map(|c| c.iter().rev().copied().collect::<Vec<_>>()).collect();
+        assert_eq!(read(file(folder.path(), ">f4", "False", "(3, 8)", &swapped)), little);
+    }
+
+    #[test]
+    fn reads_rays_of_any_shape_with_and_without_intervals() {
+        let folder = tempfile::tempdir().unwrap();
+        let read =
+            |shape: &str, count| read_rays(&file(folder.path(), "<f8", "False", shape, &numbers(count))).unwrap();
+        let long = read("(4, 8)", 32);
+        for (shape, expected) in [("(2, 2, 8)", vec![2, 2]), ("(1, 4, 1, 8)", vec![1, 4, 1])] {
+            assert_eq!(read(shape, 32), Rays { rays: long.rays.clone(), shape: expected });
+        }
+        assert_eq!(read("(8,)", 8), Rays { rays: long.rays[..1].to_vec(), shape: vec![] });
+        let short = read("(2, 6)", 12);
+        assert_eq!(short.shape, [2]);
+        assert_eq!((short.rays[1].origin, short.rays[1].direction), ([0.0, 0.5, 1.0], [1.5, 2.0, 2.5]));
+        assert!(short.rays.iter().all(|ray| ray.t_min == 0.0 && ray.t_max == f64::INFINITY));
     }
 
     #[test]
@@ -205,9 +273,12 @@ mod tests {
             let message = format!("{:#}", read_rays(&path).unwrap_err());
             assert!(message.contains("r.npy") && message.contains(part), "{message:?} lacks {part:?}");
         };
-        refused(file(folder, "<f4", "False", "(3, 8)", &numbers(12)), "<f4");
+        refused(file(folder, "<f2", "False", "(3, 8)", &numbers(6)), "<f2");
+        refused(file(folder, "<f4", "False", "(3, 8)", &numbers(24)), "promises");
         refused(file(folder, "|O", "False", "(3, 8)", &numbers(24)), "float64");
-        refused(file(folder, "<f8", "False", "(4, 6)", &numbers(24)), "[4, 6]");
+        refused(file(folder, "<f8", "False", "(4, 7)", &numbers(28)), "[4, 7]");
+        refused(file(folder, "<f8", "False", "(8, 3)", &numbers(24)), "[8, 3]");
+        refused(file(folder, "<f8", "True", "(2, 2, 6)", &numbers(24)), "Fortran");
         refused(file(folder, "<f8", "False", "(24,)", &numbers(24)), "[24]");
         refused(file(folder, "<f8", "False", "()", &numbers(1)), "[]");
         refused(file(folder, "<f8", "True", "(3, 8)", &numbers(24)), "Fortran");
@@ -251,10 +322,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("h.npy");
         let hits = [
-            Hit { t: 1.5, triangle: 7, u: 0.25, v: 0.5 },
-            Hit { t: f64::INFINITY, triangle: u32::MAX, u: 0.0, v: 0.0 },
+            Hit { t: 1.5, triangle: 7, u: 0.25, v: 0.5, normal: [0.0, -1.0, 0.0] },
+            Hit { t: f64::INFINITY, triangle: u32::MAX, u: 0.0, v: 0.0, normal: [0.0; 3] },
         ];
-        write_hits(&path, &hits).unwrap();
+        write_hits(&path, &hits, &[2], false).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let header = NpyFile::new(&bytes[..]).unwrap();
         assert_eq!(header.shape(), [2]);
@@ -271,17 +342,25 @@ mod tests {
         assert_eq!(data[16..20], 0.5f32.to_le_bytes());
         assert_eq!(data[28..32], u32::MAX.to_le_bytes());
         assert_eq!((bytes.len() - 40) % 64, 0, "numpy aligns the data to 64 bytes");
+        write_hits(&path, &hits, &[2, 1], true).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let header = NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(header.shape(), [2, 1]);
+        assert!(header.dtype().descr().contains("('normal', '<f4', (3,))"), "{}", header.dtype().descr());
+        assert_eq!(bytes[bytes.len() - 64..][24..28], (-1.0f32).to_le_bytes());
+        write_hits(&path, &hits[..1], &[], false).unwrap();
+        assert!(NpyFile::new(File::open(&path).unwrap()).unwrap().shape().is_empty());
     }
 
     #[test]
     fn occlusion_is_an_array_of_bool() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("h.npy");
-        write_any(&path, &[true, false, true]).unwrap();
+        write_any(&path, &[true, false, true], &[3]).unwrap();
         let file = NpyFile::new(File::open(&path).unwrap()).unwrap();
         assert_eq!(file.dtype().descr(), "'|b1'");
         assert_eq!(file.into_vec::<bool>().unwrap(), [true, false, true]);
-        write_any(&path, &[]).unwrap();
+        write_any(&path, &[], &[0]).unwrap();
         assert_eq!(NpyFile::new(File::open(&path).unwrap()).unwrap().shape(), [0]);
     }
 }

@@ -265,7 +265,7 @@ impl Session {
         // What frames may leave out given rays must find.
         let threshold = std::mem::take(&mut executor.tuning().threshold);
         let mut traced = Traced {
-            resident: scene.resident(),
+            scene,
             executor: &mut **executor,
             cache,
             schedule: settings.schedule,

@@ -197,7 +197,7 @@ impl Opened {
                 settings.query_threshold, extent.tile
             ));
         }
-        let setup = Setup { extent, threshold, count: settings.count, keep: Keep::default() };
+        let setup = Setup { extent, threshold, count: settings.count, opaque: settings.opaque, keep: Keep::default() };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         let host = HostCache::new(settings.host_cache);
         let threads = settings.worker_count();

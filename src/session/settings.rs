@@ -55,6 +55,8 @@ settings! {
         ao_length: f64 = 0.5, "--ao-length LENGTH", Rule::Real(1e-6, 1e9), "", Effects, Usual;
         /// Rays of `diffuse` per pixel and sample; they are as long as the scene.
         diffuse_rays: u32 = 20, "--diffuse-rays N", RAYS, "", Effects, Usual;
+        /// Every triangle stops every ray, whatever its alpha.
+        opaque: bool = false, "--opaque", Rule::Any, "", Effects, Expert;
         /// Greatest random turn of the directions of `ao` and `diffuse` about the normal, or full. A small one keeps
         /// rays of neighbouring pixels alike. --denoise and --taa give every pixel directions of its own instead.
         rotation: Turn = Turn(36.0), "--rotation DEG|full", Rule::Real(0.0, 360.0), "degrees", Effects, Expert;
@@ -304,5 +306,5 @@ impl Settings {
 }
 
 /// The settings that count where rays are given.
-pub const TRACE: [&str; 9] =
-    ["cache", "host_cache", "schedule", "tile", "workers", "evict", "requests_out", "count", "adapter"];
+pub const TRACE: [&str; 10] =
+    ["cache", "host_cache", "schedule", "tile", "workers", "evict", "requests_out", "count", "adapter", "opaque"];

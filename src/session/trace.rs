@@ -1,18 +1,23 @@
 //! Rays that are given: closest hits, or occlusion.
 
+mod given;
+mod refine;
+
+pub use given::{Approach, DeviceRay, approach, check, device_ray};
+
 use super::opened::Opened;
 use crate::counters::Counters;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout;
-use crate::kernels::layout::{NONE, Params, T_INFINITE};
+use crate::kernels::layout::{NONE, Params};
 use crate::kernels::{Directions, Extent, FrameExecutor, View};
 use crate::output::npy::{Hit, Ray};
 use crate::schedule::cache::Cache;
 use crate::schedule::{Lamp, Pass, Step, Tracing, attributes, chc, demand, plain};
 use crate::session::Settings;
 use crate::settings::{ImageSize, Schedule};
-use anyhow::{Result, bail};
-use bricks::Resident;
+use anyhow::Result;
+use bricks::SceneFile;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -27,8 +32,8 @@ pub fn for_rays(settings: &Settings) -> Settings {
 
 /// What rays are traced in.
 pub struct Traced<'a> {
-    /// The scene's resident part.
-    pub resident: &'a Resident,
+    /// The scene.
+    pub scene: &'a SceneFile,
     /// The executor.
     pub executor: &'a mut dyn FrameExecutor,
     /// The cache.
@@ -43,7 +48,7 @@ impl Opened {
     /// For tracing.
     pub fn traced(&mut self) -> Traced<'_> {
         Traced {
-            resident: self.scene.resident(),
+            scene: &self.scene,
             executor: &mut *self.executor,
             cache: &mut self.cache,
             schedule: self.schedule,
@@ -52,103 +57,109 @@ impl Opened {
     }
 }
 
-/// Refuses a ray that has no direction or that is not all numbers.
-///
-/// # Errors
-/// What is wrong with it.
-pub fn check(ray: &Ray) -> Result<()> {
-    if !ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite()) {
-        bail!("origin and direction must be finite");
-    }
-    if ray.direction == [0.0; 3] {
-        bail!("the direction has no length");
-    }
-    if ray.t_min.is_nan() || ray.t_max.is_nan() {
-        bail!("t_min and t_max must be numbers");
-    }
-    Ok(())
-}
-
-/// A given ray as the device gets it.
-pub struct DeviceRay {
-    /// In the frame's device units; the direction's largest component is in 1..2.
-    pub ray: layout::Ray,
-    /// Length of the device's direction in the given one, both in device units: given t = device t * `t_scale`.
-    pub t_scale: f64,
-}
-
-/// Rounds a ray to f32 once, in `frame`. Distances are scaled by powers of two alone.
-pub fn device_ray(ray: &Ray, frame: &Frame) -> DeviceRay {
-    let largest = ray.direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
-    // The exponent field, also of a subnormal: scaled into 1..2 by exact powers of two.
-    let exponent = largest.log2().floor().clamp(-1074.0, 1023.0) as i32;
-    let half = |e: i32| f64::from(e / 2).exp2() * f64::from(e - e / 2).exp2();
-    let direction = ray
-        .direction
-        .map(|d| (d * f64::from(-(exponent / 2)).exp2() * f64::from(exponent / 2 - exponent).exp2()) as f32);
-    let t_scale = frame.unit / half(exponent);
-    let bound = |t: f64| {
-        let t = t / t_scale;
-        if t >= f64::from(T_INFINITE) { T_INFINITE } else { t as f32 }
-    };
-    let (t_min, t_max) = (bound(ray.t_min.max(0.0)), bound(ray.t_max));
-    let origin = frame.point(DVec3::from_array(ray.origin));
-    // The device's range is closed and starts at 0; an empty one is t_min above t_max.
-    let empty = ray.t_min > ray.t_max || t_max < 0.0;
-    let (t_min, t_max) = if empty { (1.0, 0.0) } else { (t_min, t_max) };
-    DeviceRay { ray: layout::Ray { origin, t_min, direction, t_max }, t_scale }
+/// What the device found for a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// The ray, of those given.
+    pub ray: usize,
+    /// Distance in lengths of the given direction, of f32 accuracy, from the origin that [`approach`] gives.
+    pub t: f64,
+    /// Global triangle id.
+    pub id: u32,
+    /// Leaf of the top level; [`NONE`] of any hit.
+    pub leaf: u32,
+    /// Triangle within the leaf's brick.
+    pub triangle: u32,
+    /// Weights of vertices 1 and 2 of the source's order.
+    pub weights: [f32; 2],
 }
 
 /// Traces all rays; hits in their order. With `any` a hit says only that there is one. `watch` is told how many rays
 /// have been traced since it was told last.
 ///
+/// Rays are rounded to f32 relative to a point near their origin, or near the scene if that is far away, and what they
+/// hit is decided so. `t` and the normal are then those of the given ray and the triangle in f64.
+///
 /// # Errors
 /// A damaged brick, or the device's.
 pub fn trace(traced: &mut Traced, rays: &[Ray], any: bool, watch: &mut dyn FnMut(u64)) -> Result<(Vec<Hit>, Counters)> {
     let start = std::time::Instant::now();
-    let miss = Hit { t: f64::INFINITY, triangle: NONE, u: 0.0, v: 0.0 };
+    let (found, mut stats) = find(traced, rays, any, watch)?;
+    let miss = Hit { t: f64::INFINITY, triangle: NONE, u: 0.0, v: 0.0, normal: [0.0; 3] };
     let mut hits = vec![miss; rays.len()];
-    let mut stats = Counters::default();
-    // One reference point a cell: the rounding of an origin depends on the ray alone, not on its neighbours in the
-    // file.
-    let mut groups: BTreeMap<[i64; 3], (Frame, Vec<usize>)> = BTreeMap::new();
-    for (i, ray) in rays.iter().enumerate() {
-        let frame = Frame::near(traced.resident, DVec3::from_array(ray.origin));
-        groups.entry(frame.reference).or_insert_with(|| (frame, Vec::new())).1.push(i);
+    for found in &found {
+        let [u, v] = found.weights;
+        hits[found.ray] = Hit { t: found.t, triangle: found.id, u, v, normal: [0.0; 3] };
     }
-    for (frame, members) in groups.values() {
-        for chunk in members.chunks(traced.most) {
-            let given: Vec<DeviceRay> = chunk.iter().map(|&i| device_ray(&rays[i], frame)).collect();
-            let found = trace_chunk(traced, frame, &given, any, &mut stats)?;
-            for ((&i, given), (hit, weights)) in chunk.iter().zip(&given).zip(found) {
-                if hit.id != NONE {
-                    let t = f64::from(hit.t) * given.t_scale;
-                    hits[i] = Hit { t, triangle: hit.id, u: weights[0], v: weights[1] };
-                }
-            }
-            watch(chunk.len() as u64);
-        }
+    if !any {
+        refine::refine(traced, rays, found, &mut hits)?;
     }
     stats.ms = start.elapsed().as_secs_f64() * 1e3;
     Ok((hits, stats))
 }
 
+/// What rays hit, as the device finds it, in no order; rays that hit nothing are left out.
+///
+/// # Errors
+/// A damaged brick, or the device's.
+pub fn find(
+    traced: &mut Traced,
+    rays: &[Ray],
+    any: bool,
+    watch: &mut dyn FnMut(u64),
+) -> Result<(Vec<Found>, Counters)> {
+    let mut all = Vec::new();
+    let mut stats = Counters::default();
+    // One reference point a cell: the rounding of an origin depends on the ray alone, not on its neighbours in the
+    // file.
+    let mut groups: BTreeMap<[i64; 3], (Frame, Vec<usize>)> = BTreeMap::new();
+    for (i, ray) in rays.iter().enumerate() {
+        let Some(Approach { ray, .. }) = approach(traced.scene.resident(), ray) else {
+            watch(1);
+            continue;
+        };
+        let frame = Frame::near(traced.scene.resident(), DVec3::from_array(ray.origin));
+        groups.entry(frame.reference).or_insert_with(|| (frame, Vec::new())).1.push(i);
+    }
+    for (frame, members) in groups.values() {
+        for chunk in members.chunks(traced.most) {
+            let resident = traced.scene.resident();
+            let near = |&i: &usize| approach(resident, &rays[i]).map(|near| (i, device_ray(&near.ray, frame)));
+            let (numbers, given): (Vec<usize>, Vec<DeviceRay>) = chunk.iter().filter_map(near).unzip();
+            let found = trace_chunk(traced, frame, &given, any, &mut stats)?;
+            for ((ray, given), found) in numbers.into_iter().zip(&given).zip(found) {
+                if found.id != NONE {
+                    all.push(Found { ray, t: found.t * given.t_scale, ..found });
+                }
+            }
+            watch(chunk.len() as u64);
+        }
+    }
+    Ok((all, stats))
+}
+
+/// What rays in `frame` hit, in their order, with `t` in lengths of the device's direction.
 fn trace_chunk(
     traced: &mut Traced,
     frame: &Frame,
     rays: &[DeviceRay],
     any: bool,
     stats: &mut Counters,
-) -> Result<Vec<(layout::Hit, [f32; 2])>> {
+) -> Result<Vec<Found>> {
     let device: Vec<layout::Ray> = rays.iter().map(|r| r.ray).collect();
     let hits = trace_device(traced, frame, &device, any, stats)?;
+    let found = |hit: &layout::Hit, leaf, triangle, weights| {
+        let t = f64::from(hit.t);
+        Found { ray: 0, t, id: hit.id, leaf, triangle, weights }
+    };
     if any {
-        return Ok(hits.into_iter().map(|h| (h, [0.0; 2])).collect());
+        return Ok(hits.iter().map(|hit| found(hit, NONE, 0, [0.0; 2])).collect());
     }
     let (executor, cache) = (&mut *traced.executor, &mut *traced.cache);
     attributes::resolve(executor, cache, Pass::Primary, stats)?;
-    let gbuffer = executor.read_gbuffer()?;
-    Ok(hits.into_iter().zip(gbuffer).map(|(h, g)| (h, g.weights)).collect())
+    let (gbuffer, surfaces) = (executor.read_gbuffer()?, executor.read_surfaces(Pass::Primary)?);
+    let all = hits.iter().zip(&surfaces).zip(&gbuffer);
+    Ok(all.map(|((hit, surface), g)| found(hit, surface.leaf, surface.triangle, g.weights)).collect())
 }
 
 /// Traces rays that are in `frame`, at most [`Traced::most`]; their hits in the same order.

@@ -10,6 +10,7 @@ use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
 use brickwalk_scenes::{Settings as SceneSettings, generate, write_paths};
 use glam::DVec3;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Arc;
@@ -46,6 +47,18 @@ pub fn shared_scenes() -> Option<PathBuf> {
             None
         }
     }
+}
+
+/// The processor, and software Vulkan where there is some.
+pub fn adapters() -> Vec<String> {
+    let listed: Value = serde_json::from_str(&succeed(["adapters", "--json"])).expect("JSON");
+    let all = listed["adapters"].as_array().expect("a list");
+    let software = all.iter().find(|a| a["kind"] == "software" && a["lacks"].is_null());
+    let name = software.map(|a| a["name"].as_str().expect("a name").to_string());
+    if name.is_none() {
+        println!("skipped in part: no software Vulkan");
+    }
+    ["cpu".to_string()].into_iter().chain(name).collect()
 }
 
 /// A generated city in `folder`.

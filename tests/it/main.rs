@@ -16,12 +16,14 @@ mod command {
     mod replay;
     mod resume;
     mod scene_commands;
+    mod trace;
 }
 
 /// Hits and records against truth; equal bits whatever the cache, the schedule, the executor and the motion.
 mod exact {
     mod cache_independence;
     mod exactness;
+    mod given_rays;
     mod motion;
     mod rays;
     mod records;

@@ -350,16 +350,26 @@ pub struct TraceArgs {
     /// The scene
     #[arg(value_name = "S.bricks")]
     pub scene: PathBuf,
-    /// Rays: a NumPy array, float64, shape (N, 8): origin xyz, direction xyz, t_min, t_max; world space
+    /// Rays: a NumPy array, float64 or float32, shape (N, 8) or (N, 6): origin xyz, direction xyz, t_min, t_max; world
+    /// space
+    ///
+    /// Without t_min and t_max they are 0 and infinity. N may be any number of axes.
     #[arg(long, value_name = "R.npy")]
     pub rays: PathBuf,
-    /// Hits: a NumPy structured array, one row a ray: t (f8, +inf on a miss, in lengths of the direction), triangle
-    /// (u4), u (f4), v (f4)
+    /// Hits: a NumPy structured array, one element a ray, shaped as the rays: t (f8), triangle (u4), u (f4), v (f4)
+    ///
+    /// t counts in lengths of the direction, +inf on a miss, where triangle is 4294967295. u weights vertex 1 and v
+    /// vertex 2 of the triangle in the order of the source file; 1 - u - v weights vertex 0.
     #[arg(short, long, value_name = "H.npy")]
     pub output: PathBuf,
     /// Ask only whether anything is hit; the output is an array of bool
     #[arg(long)]
     pub any: bool,
+    /// Add a field to the hits: normal (three f4), the triangle's unit normal in world space
+    ///
+    /// Seen from its tip, vertices 0, 1, 2 of the source file run counter-clockwise. It is zero on a miss.
+    #[arg(long, conflicts_with = "any")]
+    pub normals: bool,
     /// Print what was loaded as a JSON object on standard output
     #[arg(long)]
     pub json: bool,

@@ -42,7 +42,7 @@ fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<Gpu
     let scene = Arc::new(scene().unwrap());
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1).unwrap();
     let extent = Extent { width: 8, height: 8, tile: 8 };
-    let setup = Setup { extent, threshold: 0, count: false, keep: Keep::default() };
+    let setup = Setup { extent, threshold: 0, count: false, opaque: false, keep: Keep::default() };
     Some(GpuExecutor::with_kernels(gpu, kernels, scene, workers, &[], setup).unwrap())
 }
 

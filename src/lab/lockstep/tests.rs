@@ -260,7 +260,7 @@ fn lockstep(
     threshold: u32,
     findings: &Arc<Mutex<Findings>>,
 ) -> Lockstep {
-    let setup = Setup { extent: EXTENT, threshold, count: true, keep: Keep::default() };
+    let setup = Setup { extent: EXTENT, threshold, count: true, opaque: false, keep: Keep::default() };
     let host = || HostCache::new(1 << 20);
     let on_gpu = GpuExecutor::with_kernels(
         gpu.clone(),

@@ -1,6 +1,6 @@
 //! Records count every ray that is generated once: as traced or as answered, in every mode, on both executors.
 
-use crate::common::{city, folder, settings, succeed};
+use crate::common::{adapters, city, folder, settings};
 use brickwalk::counters::Record;
 use brickwalk::frame::{Equirectangular, Renderer, environment};
 use brickwalk::kernels::Lamps;
@@ -11,22 +11,9 @@ use brickwalk::secondary::dvf::{Cells, DvfSettings, DvfUse};
 use brickwalk::secondary::dvf::{Dvf, DvfTracing, Region};
 use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::settings::Group;
-use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
-
-/// The processor, and software Vulkan where there is some.
-fn adapters() -> Vec<String> {
-    let listed: Value = serde_json::from_str(&succeed(["adapters", "--json"])).expect("JSON");
-    let all = listed["adapters"].as_array().expect("a list");
-    let software = all.iter().find(|a| a["kind"] == "software" && a["lacks"].is_null());
-    let name = software.map(|a| a["name"].as_str().expect("a name").to_string());
-    if name.is_none() {
-        println!("skipped in part: no software Vulkan");
-    }
-    ["cpu".to_string()].into_iter().chain(name).collect()
-}
 
 const ROMA: &str = "--secondary roma --roma-size 64 --roma-k 4 --cache 20%";
 

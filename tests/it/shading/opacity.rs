@@ -119,6 +119,35 @@ fn blending_is_a_share_of_the_rays() {
     assert_eq!(hits, again);
 }
 
+/// `--opaque`: alpha counts for nothing, on either executor.
+#[test]
+fn opaque_rays_stop_at_every_triangle() {
+    let folder = common::folder();
+    let (blend, mask) = (bricks::MATERIAL_BLEND, bricks::MATERIAL_MASK);
+    let scene = sheets(
+        folder.path(),
+        &[(blend, 0.0, 0.0, PLAIN), (mask, 1.0, 0.5, FADE), (blend, 0.3, 0.0, FADE), (blend, 1.0, 0.0, PLAIN)],
+    );
+    let rays = rays(40);
+    for adapter in common::adapters() {
+        let traced = |options: &str, any: bool| {
+            let mut settings = for_rays(&common::settings(&format!("--cache 100% {options}")));
+            brickwalk::settings::Group::set(&mut settings, "adapter", &adapter).expect("an adapter");
+            let mut opened =
+                Opened::open(open_scene(&scene).expect("the scene"), &scene, &settings).expect("a session");
+            trace(&mut opened.traced(), &rays, any, &mut |_| ()).expect("hits").0
+        };
+        for schedule in ["chc", "demand", "plain", "plain-bvh2"] {
+            let hits = traced(&format!("--opaque --schedule {schedule}"), false);
+            assert!(hits.iter().all(|hit| hit.triangle < 2 && hit.t == 1.0), "{adapter}, {schedule}");
+        }
+        let up_to = traced("--opaque", true);
+        assert!(up_to.iter().all(|hit| hit.triangle != bricks::NONE), "{adapter}");
+        let through = traced("", false);
+        assert!(through.iter().all(|hit| hit.triangle >= 2), "{adapter}: control: all pass the first");
+    }
+}
+
 #[test]
 fn a_mask_cuts_where_alpha_crosses_the_cutoff() {
     let folder = common::folder();
