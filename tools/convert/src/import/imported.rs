@@ -69,6 +69,11 @@ impl Imported {
         self.outline.sources.push(source);
     }
 
+    /// Notes what was ignored in the inputs as a whole.
+    pub(super) fn warn(&mut self, line: String) {
+        self.outline.warnings.push(line);
+    }
+
     /// The input for which `first` is at most `index`, the last such.
     fn input(&self, index: usize, first: impl Fn(&Input) -> usize) -> &Input {
         // The first input begins at 0, so at least one begins at or before any index.

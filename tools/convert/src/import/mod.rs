@@ -166,6 +166,12 @@ fn append_tiles(
 ) -> Result<(), ImportError> {
     let tileset = tiles::open(&input.path, spool)?;
     tileset.sources.into_iter().for_each(|source| imported.add_source(source));
+    if tileset.copies > 0 {
+        let (file, copies) = (show(&input.path), tileset.copies);
+        imported.warn(format!(
+            "{file}: {copies} times tiles show a model where it is shown already; each place is taken once"
+        ));
+    }
     let world_from_tileset = affine::multiply(&input.transform, &input.axes(Up::Z));
     progress.phase("tiles", tileset.models.len() as u64);
     for model in &tileset.models {

@@ -2,11 +2,15 @@
 
 use crate::import::error::{ImportError, one_line};
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 
 /// Extensions that are applied, or leave geometry alone.
-const KNOWN: [&str; 4] =
-    ["3DTILES_content_gltf", "3DTILES_multiple_contents", "3DTILES_metadata", "3DTILES_draco_point_compression"];
+const KNOWN: [&str; 5] = [
+    "3DTILES_content_gltf",
+    "3DTILES_multiple_contents",
+    "3DTILES_implicit_tiling",
+    "3DTILES_metadata",
+    "3DTILES_draco_point_compression",
+];
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -37,7 +41,7 @@ pub(super) struct Tile {
     contents: Vec<Content>,
     #[serde(default)]
     pub children: Vec<Tile>,
-    implicit_tiling: Option<IgnoredAny>,
+    implicit_tiling: Option<Box<Implicit>>,
     #[serde(default)]
     extensions: TileExtensions,
 }
@@ -45,9 +49,28 @@ pub(super) struct Tile {
 #[derive(Debug, Default, Deserialize)]
 struct TileExtensions {
     #[serde(rename = "3DTILES_implicit_tiling")]
-    implicit: Option<IgnoredAny>,
+    implicit: Option<Box<Implicit>>,
     #[serde(rename = "3DTILES_multiple_contents")]
     multiple: Option<Multiple>,
+}
+
+/// How the tiles below one are given by templates (section 7.6).
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Implicit {
+    pub subdivision_scheme: String,
+    pub subtree_levels: u32,
+    available_levels: Option<u32>,
+    /// In drafts of 3DTILES_implicit_tiling: the last level rather than their number.
+    maximum_level: Option<u32>,
+    pub subtrees: Content,
+}
+
+impl Implicit {
+    /// Levels of tiles, the first counted.
+    pub fn levels(&self) -> Option<u32> {
+        self.available_levels.or_else(|| self.maximum_level?.checked_add(1))
+    }
 }
 
 /// 3DTILES_multiple_contents, whose list had another name in drafts.
@@ -78,9 +101,9 @@ impl Tile {
         self.content.iter().chain(&self.contents).chain(multiple)
     }
 
-    /// Whether its descendants are not listed, but given by a template.
-    pub fn is_implicit(&self) -> bool {
-        self.implicit_tiling.is_some() || self.extensions.implicit.is_some()
+    /// What gives its descendants, if they are not listed.
+    pub fn implicit(&self) -> Option<&Implicit> {
+        self.implicit_tiling.as_deref().or(self.extensions.implicit.as_deref())
     }
 }
 

@@ -6,7 +6,11 @@
 //! keep their detail.
 
 mod b3dm;
+mod batched;
 mod document;
+mod i3dm;
+mod implicit;
+mod subtree;
 
 use super::affine::{Affine, from_columns, multiply};
 use super::bytes::{Bytes, Spool};
@@ -14,19 +18,19 @@ use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
 use super::opened::{self, TriangleBudget};
 use super::{gltf, uri};
 use crate::source::IDENTITY;
-use document::{Content, Tile, Tileset};
-use std::collections::BTreeMap;
+use document::{Tile, Tileset};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use xxhash_rust::xxh3::Xxh3;
+use subtree::Subtree;
 
-/// Most tiles that are walked, external tilesets multiplied out.
+/// Most tiles that are walked and instances that they place, external tilesets multiplied out.
 const MAX_TILES: u64 = 1 << 22;
 
 /// Deepest nesting of external tilesets.
 const MAX_DEPTH: usize = 32;
 
-/// Largest tileset file.
+/// Largest file of tiles: a tileset, a subtree or a buffer of one.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// A model and where it stands.
@@ -45,11 +49,13 @@ pub(super) struct Model {
 pub(super) struct Opened {
     /// Models in the order in which they are first met, depth first.
     pub models: Vec<Model>,
-    /// The tilesets that were read.
+    /// The tilesets and subtrees that were read.
     pub sources: Vec<bricks::Source>,
+    /// How often tiles show a model at the very place where it is shown already. Such copies are left out.
+    pub copies: u64,
 }
 
-/// A model by its file and how its glTF file is turned.
+/// A file of a model, and how its glTF file is turned.
 type Key = (PathBuf, Axis);
 
 /// The axis that points up in glTF files of a tileset.
@@ -94,10 +100,14 @@ struct Walk<'a> {
     folder: PathBuf,
     spool: &'a Arc<Spool>,
     tilesets: BTreeMap<PathBuf, Arc<Parsed>>,
+    subtrees: BTreeMap<PathBuf, Arc<Subtree>>,
+    /// What was read of files of tiles.
+    files: BTreeMap<PathBuf, Bytes>,
     /// Tilesets that are being walked, outermost first.
     open: Vec<PathBuf>,
     tiles: u64,
-    numbers: BTreeMap<Key, usize>,
+    /// The number of each model, or that within an instanced one, and its places there.
+    numbers: BTreeMap<Key, (usize, Arc<[Affine]>)>,
     models: Vec<Model>,
     sources: Vec<bricks::Source>,
 }
@@ -113,6 +123,8 @@ pub(super) fn open(path: &Path, spool: &Arc<Spool>) -> Result<Opened, ImportErro
         folder,
         spool,
         tilesets: BTreeMap::new(),
+        subtrees: BTreeMap::new(),
+        files: BTreeMap::new(),
         open: Vec::new(),
         tiles: 0,
         numbers: BTreeMap::new(),
@@ -128,7 +140,14 @@ pub(super) fn open(path: &Path, spool: &Arc<Spool>) -> Result<Opened, ImportErro
     }
     // A coarse model that finer ones replace was opened, but is not shown.
     walk.models.retain(|model| !model.placements.is_empty());
-    Ok(Opened { models: walk.models, sources: walk.sources })
+    let mut copies = 0;
+    for model in &mut walk.models {
+        let (mut places, before) = (BTreeSet::new(), model.placements.len());
+        // Adding 0 takes the sign off a zero.
+        model.placements.retain(|place| places.insert(place.map(|c| (c + 0.0).to_bits())));
+        copies += (before - model.placements.len()) as u64;
+    }
+    Ok(Opened { models: walk.models, sources: walk.sources, copies })
 }
 
 impl Walk<'_> {
@@ -137,16 +156,9 @@ impl Walk<'_> {
         if let Some(parsed) = self.tilesets.get(below) {
             return Ok(parsed.clone());
         }
-        let path = self.folder.join(below);
-        let label = show(&path);
-        let unreadable = |reason: String| ImportError::Read { file: label.clone(), reason };
-        let bytes = Bytes::of_file(&path).map_err(unreadable)?;
-        if bytes.len() > MAX_BYTES {
-            return Err(unreadable(format!("a tileset of {} bytes is too large", bytes.len())));
-        }
-        let mut hash = Xxh3::new();
-        bytes.hash(self.spool, &mut hash).map_err(|e| unreadable(e.to_string()))?;
-        let text = bytes.read().map_err(unreadable)?;
+        let label = show(&self.folder.join(below));
+        let text = self.source(below)?.read();
+        let text = text.map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
         let tileset = document::parse(&label, &text)?;
         let axis = match tileset.asset.gltf_up_axis.as_deref().map(str::to_ascii_uppercase).as_deref() {
             None => None,
@@ -158,8 +170,6 @@ impl Walk<'_> {
                 return Err(fault(&label, "asset".into(), what));
             }
         };
-        let name = below.to_string_lossy().into_owned();
-        self.sources.push(bricks::Source { name, bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) });
         let parsed = Arc::new(Parsed { label, tileset, axis });
         self.tilesets.insert(below.to_owned(), parsed.clone());
         Ok(parsed)
@@ -185,13 +195,7 @@ impl Walk<'_> {
         let label = &place.parsed.label;
         let number = self.tiles;
         let here = || format!("tile {number}");
-        self.tiles += 1;
-        if self.tiles > MAX_TILES {
-            return Err(fault(label, here(), format!("there are more than {MAX_TILES} tiles; convert it in parts")));
-        }
-        if tile.is_implicit() {
-            return Err(fault(label, here(), "implicit tiling is not read".into()));
-        }
+        self.count(1, label)?;
         let own = tile.transform.as_ref().map_or(Ok(IDENTITY), |transform| from_columns(transform));
         let own = own.map_err(|what| fault(label, here(), what.replace("its matrix", "its transform")))?;
         let world_from_tile = multiply(&place.world_from_parent, &own);
@@ -204,28 +208,48 @@ impl Walk<'_> {
             }
         };
         let place = Place { replaces, world_from_parent: world_from_tile, ..place.clone() };
+        if let Some(implicit) = tile.implicit() {
+            return self.implicit(tile, implicit, &place);
+        }
         let (mut shown, mut below) = (Vec::new(), Vec::new());
         for content in tile.contents() {
-            match self.content(content, &place)? {
-                Shows::Model(model) => shown.push((model, world_from_tile)),
+            match self.content(content.uri(), &place)? {
+                Shows::Model(model, places) => self.show(model, &places, &place, &mut shown)?,
                 Shows::Tiles(tiles) => below.extend(tiles),
             }
         }
         for child in &tile.children {
             below.extend(self.tile(child, &place)?);
         }
-        // What replaces nothing leaves the coarse model in view.
-        if !replaces || below.is_empty() {
-            shown.append(&mut below);
-            return Ok(shown);
+        Ok(shows(shown, below, replaces))
+    }
+
+    /// Counts tiles and instances of the tileset `label`.
+    fn count(&mut self, more: u64, label: &str) -> Result<(), ImportError> {
+        self.tiles += more;
+        if self.tiles > MAX_TILES {
+            let what = format!("there are more than {MAX_TILES} tiles and instances; convert it in parts");
+            return Err(fault(label, "tileset".into(), what));
         }
-        Ok(below)
+        Ok(())
+    }
+
+    /// Adds a model in the tile at `place`, at `places` of the tile, to what is shown.
+    fn show(
+        &mut self,
+        model: usize,
+        places: &[Affine],
+        place: &Place,
+        shown: &mut Vec<Shown>,
+    ) -> Result<(), ImportError> {
+        self.count(places.len() as u64 - places.len().min(1) as u64, &place.parsed.label)?;
+        shown.extend(places.iter().map(|in_tile| (model, multiply(&place.world_from_parent, in_tile))));
+        Ok(())
     }
 
     /// What a content is: a model, or the tiles of an external tileset.
-    fn content(&mut self, content: &Content, place: &Place) -> Result<Shows, ImportError> {
+    fn content(&mut self, text: &str, place: &Place) -> Result<Shows, ImportError> {
         let label = &place.parsed.label;
-        let text = content.uri();
         let refuse = |what: &str| fault(label, format!("content \"{}\"", one_line(text)), what.to_owned());
         let from = place.below.parent().unwrap_or(Path::new(""));
         let below = match uri::resolve_from(from, text).map_err(refuse)? {
@@ -233,8 +257,8 @@ impl Walk<'_> {
             uri::Target::Data(_) => return Err(refuse("data URIs are not read here")),
         };
         let key = (below, place.axis);
-        if let Some(&model) = self.numbers.get(&key) {
-            return Ok(Shows::Model(model));
+        if let Some((model, places)) = self.numbers.get(&key) {
+            return Ok(Shows::Model(*model, places.clone()));
         }
         let (below, axis) = key;
         let path = self.folder.join(&below);
@@ -245,12 +269,22 @@ impl Walk<'_> {
         let read = reader.read_at(0, &mut magic[..bytes.len().min(4) as usize]);
         read.map_err(|e| unreadable(e.to_string()))?;
         let is_gltf = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf"));
+        let of_file = |what: String| fault(&show(&path), String::from_utf8_lossy(&magic).into_owned(), what);
         let (gltf, center) = match &magic {
-            b"b3dm" => b3dm::open(&bytes, &reader).map_err(|what| fault(&show(&path), "b3dm".into(), what))?,
-            b"i3dm" => return Err(refuse("instanced models (i3dm) are not read")),
+            b"b3dm" => b3dm::open(&bytes, &reader).map_err(of_file)?,
+            b"i3dm" => {
+                let (model, places) = i3dm::open(&bytes, &reader, MAX_TILES).map_err(of_file)?;
+                let number = match model {
+                    i3dm::Model::Within(gltf) => self.model(path, [bytes, gltf], axis.z_from_up()),
+                    i3dm::Model::At(uri) => self.gltf_at(&uri, &below, axis).map_err(of_file)?,
+                };
+                let places: Arc<[Affine]> = places.into();
+                self.numbers.insert((below, axis), (number, places.clone()));
+                return Ok(Shows::Model(number, places));
+            }
             b"pnts" => return Err(refuse("point clouds (pnts) are not read")),
             b"cmpt" => return Err(refuse("composite tiles (cmpt) are not read")),
-            b"subt" => return Err(refuse("subtrees of implicit tiling are not read")),
+            b"subt" => return Err(refuse("it is a subtree, which implicitTiling must name")),
             b"vctr" | b"geom" => return Err(refuse("vector tiles are not read")),
             b"glTF" => (bytes.clone(), [0.0; 3]),
             _ if is_gltf => (bytes.clone(), [0.0; 3]),
@@ -259,22 +293,57 @@ impl Walk<'_> {
                 let place = Place { below, axis: parsed.axis.unwrap_or(axis), parsed, ..place.clone() };
                 return self.external(&place).map(Shows::Tiles);
             }
-            _ => return Err(refuse("it is neither glTF, b3dm nor a tileset")),
+            _ => return Err(refuse("it is neither glTF, b3dm, i3dm nor a tileset")),
         };
         let mut tile_from_model = axis.z_from_up();
         for (row, center) in center.into_iter().enumerate() {
             tile_from_model[4 * row + 3] = center;
         }
-        self.models.push(Model { path, bytes: [bytes, gltf], tile_from_model, placements: Vec::new() });
-        self.numbers.insert((below, axis), self.models.len() - 1);
-        Ok(Shows::Model(self.models.len() - 1))
+        let number = self.model(path, [bytes, gltf], tile_from_model);
+        let places: Arc<[Affine]> = [IDENTITY].into();
+        self.numbers.insert((below, axis), (number, places.clone()));
+        Ok(Shows::Model(number, places))
+    }
+
+    /// The number of a new model.
+    fn model(&mut self, path: PathBuf, bytes: [Bytes; 2], tile_from_model: Affine) -> usize {
+        self.models.push(Model { path, bytes, tile_from_model, placements: Vec::new() });
+        self.models.len() - 1
+    }
+
+    /// The number of the glTF file that the instanced model at `below` names.
+    fn gltf_at(&mut self, uri: &str, below: &Path, axis: Axis) -> Result<usize, String> {
+        let named = |what: &str| format!("its glTF file \"{}\": {what}", one_line(uri));
+        let from = below.parent().unwrap_or(Path::new(""));
+        let uri::Target::File(gltf) = uri::resolve_from(from, uri).map_err(named)? else {
+            return Err(named("data URIs are not read here"));
+        };
+        let key = (gltf, axis);
+        if let Some((model, _)) = self.numbers.get(&key) {
+            return Ok(*model);
+        }
+        let path = self.folder.join(&key.0);
+        let bytes = Bytes::of_file(&path).map_err(|what| named(&what))?;
+        let number = self.model(path, [bytes.clone(), bytes], axis.z_from_up());
+        self.numbers.insert(key, (number, [IDENTITY].into()));
+        Ok(number)
     }
 }
 
 /// What a content is.
 enum Shows {
-    Model(usize),
+    /// The number of a model, and its places in the tile.
+    Model(usize, Arc<[Affine]>),
     Tiles(Vec<Shown>),
+}
+
+/// What is shown of a tile's own models and of those `below` it. What replaces nothing leaves the coarse model in view.
+fn shows(mut shown: Vec<Shown>, mut below: Vec<Shown>, replaces: bool) -> Vec<Shown> {
+    if replaces && !below.is_empty() {
+        return below;
+    }
+    shown.append(&mut below);
+    shown
 }
 
 /// Whether JSON may begin so.

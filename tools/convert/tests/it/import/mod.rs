@@ -4,6 +4,8 @@ mod defects;
 mod features;
 mod formats;
 mod fuzz;
+mod implicit;
+mod instanced;
 mod oracle;
 mod scenes;
 mod surfaces;

@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// A tileset of version 1.1 with this root tile.
-fn tileset(root: Value) -> Value {
+pub fn tileset(root: Value) -> Value {
     json!({"asset": {"version": "1.1"}, "geometricError": 100, "root": root})
 }
 
-fn write_json(folder: &Path, name: &str, value: &Value) {
+pub fn write_json(folder: &Path, name: &str, value: &Value) {
     write(folder, name, value.to_string().as_bytes());
 }
 
@@ -25,12 +25,12 @@ fn b3dm(glb: &[u8], features: &str, binary: &[u8]) -> Vec<u8> {
     [b"b3dm", &words.collect::<Vec<u8>>()[..], features.as_bytes(), binary, batches, glb].concat()
 }
 
-fn import_tiles(folder: &Path) -> Result<SourceScene, String> {
+pub fn import_tiles(folder: &Path) -> Result<SourceScene, String> {
     import_one(&folder.join("tileset.json"))
 }
 
 /// The tileset of one content in a folder of its own.
-fn import_content(name: &str, bytes: &[u8]) -> Result<SourceScene, String> {
+pub fn import_content(name: &str, bytes: &[u8]) -> Result<SourceScene, String> {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), name, bytes);
     write_json(folder.path(), "tileset.json", &tileset(json!({"refine": "ADD", "content": {"uri": name}})));
@@ -38,7 +38,7 @@ fn import_content(name: &str, bytes: &[u8]) -> Result<SourceScene, String> {
 }
 
 /// A model that is told from others by its one triangle's size.
-fn model(size: f32) -> Vec<u8> {
+pub fn model(size: f32) -> Vec<u8> {
     let mut file = Writer::new();
     let positions = file.floats("VEC3", &[0.0, 0.0, 0.0, size, 0.0, 0.0, 0.0, size, 0.0]);
     let mesh = file.mesh(json!({"attributes": {"POSITION": positions}}));
@@ -47,7 +47,7 @@ fn model(size: f32) -> Vec<u8> {
 }
 
 /// Sizes of the models that are shown, with their places.
-fn shown(scene: &SourceScene) -> Vec<(f64, [f64; 3])> {
+pub fn shown(scene: &SourceScene) -> Vec<(f64, [f64; 3])> {
     let placed = scene.placements.iter().map(|placement| {
         let m = placement.world_from_mesh;
         (scene.meshes[placement.mesh as usize].primitives[0].positions[1][0], [m[3], m[7], m[11]])
@@ -55,12 +55,12 @@ fn shown(scene: &SourceScene) -> Vec<(f64, [f64; 3])> {
     placed.collect()
 }
 
-fn sizes(scene: &SourceScene) -> Vec<f64> {
+pub fn sizes(scene: &SourceScene) -> Vec<f64> {
     shown(scene).into_iter().map(|(size, _)| size).collect()
 }
 
 /// `m`, column-major 4x4, applied to a point: the definition, written out.
-fn apply(m: &[f64; 16], p: [f64; 3]) -> [f64; 3] {
+pub fn apply(m: &[f64; 16], p: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|r| m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r])
 }
 
@@ -201,8 +201,32 @@ fn models_that_several_tiles_show_are_stored_once() {
     assert_eq!((scene.meshes.len(), scene.sources.len()), (2, 3));
     let places: Vec<_> = shown(&scene).into_iter().map(|(size, at)| (size, at[0])).collect();
     assert_eq!(places, [(1.0, 1.0), (1.0, 3.0), (2.0, 2.0)]);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     let names: Vec<_> = scene.sources.iter().map(|source| source.name.as_str()).collect();
     assert_eq!(names, ["tileset.json", "a.glb", "b.glb"]);
+}
+
+/// Two tiles that show a model at one place show it once: the copies coincide, and their ids would differ.
+#[test]
+fn models_at_one_place_are_taken_once() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "a.glb", &model(1.0));
+    let at = |x: f64| [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, 0.0, 0.0, 1.0];
+    // A parent that adds, a child at the same place, one by another way, and others beside it.
+    let child = |x: f64| json!({"transform": at(x), "content": {"uri": "a.glb"}});
+    let split = json!({"transform": at(-3.0), "children": [child(3.0)]});
+    let root = json!({"refine": "ADD", "content": {"uri": "a.glb"},
+        "children": [child(0.0), child(-0.0), split, child(1e-9), child(5.0)]});
+    write_json(folder.path(), "tileset.json", &tileset(root));
+    let scene = import_tiles(folder.path()).unwrap();
+    let places: Vec<f64> = shown(&scene).into_iter().map(|(_, at)| at[0]).collect();
+    assert_eq!(places, [0.0, 1e-9, 5.0]);
+    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(warning.ends_with("3 times tiles show a model where it is shown already; each place is taken once"));
+    // By replacement neither the parent nor what is there twice remains.
+    let root = json!({"refine": "REPLACE", "content": {"uri": "a.glb"}, "children": [child(0.0), child(0.0)]});
+    write_json(folder.path(), "tileset.json", &tileset(root));
+    assert_eq!(sizes(&import_tiles(folder.path()).unwrap()), [1.0]);
 }
 
 #[test]
@@ -262,7 +286,7 @@ fn what_is_not_read_is_named() {
     let error = |root: Value| {
         let folder = tempfile::tempdir().unwrap();
         write(folder.path(), "a.glb", &model(1.0));
-        for kind in ["i3dm", "pnts", "cmpt", "subt", "what"] {
+        for kind in ["pnts", "cmpt", "subt", "what"] {
             write(folder.path(), &format!("a.{kind}"), &[kind.as_bytes(), &[0; 40]].concat());
         }
         write(folder.path(), "wrong.json", b"{\"asset\": 3}");
@@ -273,20 +297,17 @@ fn what_is_not_read_is_named() {
     };
     let of_content = |uri: &str| error(tileset(json!({"content": {"uri": uri}})));
     for (uri, says) in [
-        ("a.i3dm", "content \"a.i3dm\": instanced models (i3dm) are not read"),
-        ("a.pnts", "point clouds (pnts) are not read"),
+        ("a.pnts", "content \"a.pnts\": point clouds (pnts) are not read"),
         ("a.cmpt", "composite tiles (cmpt) are not read"),
         ("a.subt", "subtrees"),
-        ("a.what", "neither glTF, b3dm nor a tileset"),
+        ("a.what", "neither glTF, b3dm, i3dm nor a tileset"),
         ("data:,a", "data URIs"),
         ("https://example.org/a.glb", "not a relative path"),
         ("wrong.json", "not a readable 3D Tiles tileset"),
     ] {
         assert!(of_content(uri).contains(says), "{uri}: {}", of_content(uri));
     }
-    assert!(error(tileset(json!({"implicitTiling": {}}))).contains("tile 0: implicit tiling is not read"));
-    let implicit = json!({"children": [{"extensions": {"3DTILES_implicit_tiling": {}}}]});
-    assert!(error(tileset(implicit)).contains("tile 1: implicit tiling"));
+    assert!(error(tileset(json!({"implicitTiling": {}}))).contains("missing field `subdivisionScheme`"));
     let mut projective = [0.0; 16];
     projective[3] = 1.0;
     assert!(error(tileset(json!({"transform": projective}))).contains("the last row of its transform is not 0 0 0 1"));
