@@ -221,7 +221,7 @@ impl<'a> Info<'a> {
         let what = if is_of_bricks { "two largest bricks" } else { "tiles of a lookup" };
         row("least cache", format!("{} (the {what})", bytes("least_cache_bytes")));
         let (step, unit) = (real("lattice_step"), real("device_unit"));
-        row("lattice", format!("step {step:e}, device unit {unit}, world units"));
+        row("lattice", format!("step 2^{} ({step:e}), device unit {unit}, world units", step.log2()));
         let [leaves, binary, wide] = ["top_level_leaves", "top_level_nodes_binary", "top_level_nodes_wide"].map(number);
         row("top level", format!("{leaves} leaves, {binary} binary nodes, {wide} wide nodes"));
         for (name, value) in self.trees.human() {
