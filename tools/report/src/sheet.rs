@@ -130,27 +130,41 @@ impl Table {
         lines.collect()
     }
 
-    /// As a table of Markdown.
+    /// Whether a column holds words: these begin where its head does, and numbers end where it does.
+    fn is_of_words(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| matches!(row[column], Value::Text(_)))
+    }
+
+    /// As a table of Markdown whose columns are aligned in its text as well.
     pub fn to_markdown(&self) -> String {
-        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-        let rows = self.rows.iter().map(|row| line(row.iter().map(|v| v.show().replace('|', "/")).collect()));
-        let rule = line(vec!["---".into(); self.columns.len()]);
-        line(self.columns.clone()) + &rule + &rows.collect::<String>()
+        let rows = self.rows.iter().map(|row| row.iter().map(|value| value.show().replace('|', "/")).collect());
+        let rows: Vec<Vec<String>> = std::iter::once(self.columns.clone()).chain(rows).collect();
+        let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0).max(3);
+        let columns: Vec<(usize, bool)> =
+            (0..self.columns.len()).map(|column| (width(column), self.is_of_words(column))).collect();
+        let line = |row: &Vec<String>| {
+            let cell = |(text, &(width, is_of_words)): (&String, &(usize, bool))| {
+                if is_of_words { format!("{text:<width$}") } else { format!("{text:>width$}") }
+            };
+            format!("| {} |\n", row.iter().zip(&columns).map(cell).collect::<Vec<_>>().join(" | "))
+        };
+        let rule = |&(width, is_of_words): &(usize, bool)| {
+            if is_of_words { "-".repeat(width) } else { "-".repeat(width - 1) + ":" }
+        };
+        let rule = line(&columns.iter().map(rule).collect());
+        line(&rows[0]) + &rule + &rows[1..].iter().map(line).collect::<String>()
     }
 
     fn html(&self) -> Markup {
         html! {
             @if !self.caption.is_empty() { p.reading { (self.caption) } }
-            div.wide { table {
-                thead { tr { @for column in &self.columns { th { (column) } } } }
+            div.wide { table.sheet {
+                thead { tr {
+                    @for (k, column) in self.columns.iter().enumerate() { th.name[self.is_of_words(k)] { (column) } }
+                } }
                 tbody {
                     @for row in &self.rows { tr {
-                        @for value in row {
-                            @match value {
-                                Value::Text(text) => td.text style="min-width:0" { (text) },
-                                other => td { (other.show()) },
-                            }
-                        }
+                        @for value in row { td.name[matches!(value, Value::Text(_))] { (value.show()) } }
                     } }
                 }
             } }

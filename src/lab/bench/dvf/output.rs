@@ -149,21 +149,20 @@ fn first<'a>() -> Vec<Column<Line<'a>>> {
 }
 
 fn columns<'a>(stage: Stage) -> Vec<Column<Line<'a>>> {
-    let all: [Column<Line>; 8] = [
+    let mut all: Vec<Column<Line>> = vec![
         ("cells", |line| line.number("longest")),
         ("fewer rays", |line| Value::ratio(line.value("fewer"))),
         ("faster", |line| Value::ratio(line.value("faster"))),
         ("FLIP", |line| line.number("flip")),
+        ("FLIP, paper", |line| Value::number(line.paper().map(|paper| paper.1))),
         ("RMSE", |line| line.number("rmse")),
+        ("RMSE, paper", |line| Value::number(line.paper().map(|paper| paper.0))),
         ("bias", |line| line.number("bias")),
         ("pixels that differ, %", |line| percent(line.value("pixels_that_differ"))),
         ("field, s", |line| line.number("seconds")),
     ];
+    all.retain(|(head, _)| [Stage::Points, Stage::Grid].contains(&stage) || !head.ends_with("paper"));
     let own: &[Column<Line>] = match stage {
-        Stage::Points | Stage::Grid => &[
-            ("RMSE, paper", |line| Value::number(line.paper().map(|paper| paper.0))),
-            ("FLIP, paper", |line| Value::number(line.paper().map(|paper| paper.1))),
-        ],
         Stage::Modes => &[
             ("FLIP of other rays alone", |line| line.number("noise_flip")),
             ("RMSE of other rays alone", |line| line.number("noise_rmse")),
@@ -187,14 +186,14 @@ fn columns<'a>(stage: Stage) -> Vec<Column<Line<'a>>> {
 fn making<'a>() -> Vec<Column<Line<'a>>> {
     let all: [Column<Line>; 10] = [
         ("making ÷ exact", |line| line.making(false)),
-        ("making and picture ÷ exact", |line| line.making(true)),
-        ("areas and sums, %", |line| line.share("seconds_areas")),
-        ("points and rays, %", |line| line.share("seconds_rays")),
-        ("labels, %", |line| line.share("seconds_labels")),
         ("making ÷ exact, paper", |line| Value::ratio(line.paper_making(0))),
+        ("making and picture ÷ exact", |line| line.making(true)),
         ("making and picture ÷ exact, paper", |line| Value::ratio(line.paper_making(1))),
+        ("areas and sums, %", |line| line.share("seconds_areas")),
         ("areas and sums, %, paper", |line| percent(line.paper_making(2))),
+        ("points and rays, %", |line| line.share("seconds_rays")),
         ("points and rays, %, paper", |line| percent(line.paper_making(3))),
+        ("labels, %", |line| line.share("seconds_labels")),
         ("labels, %, paper", |line| percent(line.paper_making(4))),
     ];
     [&first(), &all[..]].concat()
