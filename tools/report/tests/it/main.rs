@@ -2,3 +2,4 @@
 
 mod markup;
 mod report;
+mod sheet;
