@@ -10,7 +10,8 @@
 mod common;
 
 use brickwalk::output::atomic;
-use brickwalk::session::opened::{brick_bytes, open_scene};
+use brickwalk::session::opened::open_scene;
+use brickwalk::stream::PayloadSource;
 use clap::Parser;
 use common::{brickwalk, bytes_moved, device_ms, median, number, records, summary, walk};
 use std::fmt::Write;
@@ -93,9 +94,12 @@ fn measure(
         if !file.exists() {
             make(&file, bricks);
         }
-        let mut bytes: Vec<u64> = brick_bytes(&open_scene(&file).expect("the scene"))
+        let mut bytes: Vec<u64> = open_scene(&file)
+            .expect("the scene")
+            .sizes()
+            .bricks
             .iter()
-            .map(|brick| brick.geometry + brick.attributes)
+            .map(|(geometry, attributes)| geometry + attributes)
             .collect();
         bytes.sort_unstable_by(|a, b| b.cmp(a));
         let is_walked_out_of_core = 5 * bytes.iter().take(2).sum::<u64>() <= bytes.iter().sum();

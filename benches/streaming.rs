@@ -7,9 +7,9 @@ mod common;
 use brickwalk::Settings;
 use brickwalk::gpu::device::Gpu;
 use brickwalk::schedule::Load;
-use brickwalk::session::opened::{Opened, brick_bytes, open_scene};
+use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::settings::{CacheSize, ImageSize};
-use brickwalk::stream::{Item, Slot};
+use brickwalk::stream::{Item, PayloadSource, Slot};
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -28,8 +28,8 @@ fn streaming(c: &mut Criterion) {
     let file = open_scene(&path).expect("the scene");
     let mut group = c.benchmark_group("streaming");
     group.sampling_mode(SamplingMode::Flat).sample_size(20).measurement_time(Duration::from_secs(8));
-    let bricks = brick_bytes(&file);
-    let total: u64 = bricks.iter().map(|b| b.geometry).sum();
+    let bricks = file.sizes().bricks;
+    let total: u64 = bricks.iter().map(|brick| brick.0).sum();
     group.throughput(Throughput::Bytes(total));
 
     // The limit: the same bytes of the same map, hashed and copied once by one thread into mapped device memory.
@@ -79,18 +79,18 @@ fn streaming(c: &mut Criterion) {
 }
 
 /// All geometry one after the other in the pages of an empty cache.
-fn place(session: &Opened, bricks: &[brickwalk::schedule::cache::BrickBytes]) -> Vec<Load> {
+fn place(session: &Opened, bricks: &[(u64, u64)]) -> Vec<Load> {
     let pages: Vec<u64> = session.cache.residency.page_sizes().collect();
     let (mut page, mut offset) = (0usize, 0u64);
     let mut loads = Vec::new();
-    for (brick, bytes) in bricks.iter().enumerate() {
-        if offset + bytes.geometry > pages[page] {
+    for (brick, &(bytes, _)) in bricks.iter().enumerate() {
+        if offset + bytes > pages[page] {
             page += 1;
             offset = 0;
         }
         let slot = Slot { page: page as u32, offset: offset as u32 };
         loads.push(Load { item: Item::geometry(brick as u32), slot });
-        offset += bytes.geometry;
+        offset += bytes;
     }
     loads
 }

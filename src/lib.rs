@@ -74,6 +74,7 @@ pub mod math;
 pub mod metrics;
 pub mod output;
 pub mod picture;
+#[cfg(feature = "lab")]
 pub mod reference;
 pub mod scene;
 pub mod schedule;

@@ -154,6 +154,7 @@ fn answer(index: u32, ray: Ray, taken: Taken, begin: f32, is_sifted: bool) -> An
             }
         }
     }
-    let is_known = own.is_part == 0u || t >= ray.t_max;
+    // Without levels all of it lies outside.
+    let is_known = own.levels > 0u && (own.is_part == 0u || t >= ray.t_max);
     return Answer(-1.0, vec3<f32>(0.0), direction, 0.0, is_capped, is_known);
 }

@@ -4,8 +4,8 @@ use super::instances;
 use super::options::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
 use crate::cli::output::{print, print_json};
-use crate::session::opened::scene_bytes;
 use crate::settings::sizes::{human_bytes, human_count};
+use crate::stream::PayloadSource;
 use crate::stream::Residency;
 use anyhow::{Context, Result};
 use bricks::{BRICK_WIDE, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, PunctualLight, SceneFile, Texture};
@@ -88,7 +88,7 @@ impl<'a> Info<'a> {
         let sections = Sections::of(scene);
         // The world object always exists.
         let world = r.objects.first();
-        let sizes = scene_bytes(scene);
+        let sizes = PayloadSource::sizes(scene);
         let facts: [(&str, Value); 50] = [
             ("format", FORMAT.into()),
             ("file", scene.path().display().to_string().into()),
@@ -123,9 +123,9 @@ impl<'a> Info<'a> {
             // Of these, tails: the coarse levels, which stay resident.
             ("texture_tail_bytes", r.textures.iter().map(|texture| texture.tail.bytes).sum::<u64>().into()),
             // Geometry and attributes of the two largest bricks, as loaded.
-            ("two_largest_bricks_bytes", sizes.sizes().two_largest_bricks().into()),
+            ("two_largest_bricks_bytes", sizes.two_largest_bricks().into()),
             // What a cache must hold at least: the two largest bricks, or the tiles of a texture lookup.
-            ("least_cache_bytes", Residency::least_budget(sizes.sizes()).into()),
+            ("least_cache_bytes", Residency::least_budget(&sizes).into()),
             // Step of the world's lattice, world units.
             ("lattice_step", world.map_or(0.0, |o| 2f64.powi(o.step_log2)).into()),
             // World units of one unit of length on the device.

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::BufReader;
 
 /// Raised when a field changes its meaning.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Shares of all bricks and tiles, percent, that are replayed without `--cache`.
 const LADDER: [f64; 5] = [5.0, 10.0, 20.0, 50.0, 100.0];
@@ -104,7 +104,7 @@ fn as_json(trace: &Trace, rungs: &[Rung], skipped: &[u64]) -> Value {
                 "recorded": rung.recorded && *policy == Replay::Cache(trace.policy),
                 "policy": policy.name(),
                 "loads": result.loads,
-                "reloads": result.reloads(),
+                "loaded_again": result.loaded_again(),
                 "evicted": result.evicted,
                 "loaded_bytes": result.loaded_bytes,
                 "hits": result.hits,
@@ -150,19 +150,19 @@ fn as_text(trace: &Trace, rungs: &[Rung], skipped: &[u64]) -> String {
     );
     let _ = writeln!(
         out,
-        "\n{:<22} {:<13} {:>10} {:>10} {:>10} {:>11} {:>8}",
-        "cache", "policy", "loads", "reloads", "evicted", "loaded", "hits"
+        "\n{:<22} {:<13} {:>10} {:>12} {:>10} {:>11} {:>8}",
+        "cache", "policy", "loads", "loaded again", "evicted", "loaded", "hits"
     );
     for rung in rungs {
         for (policy, result) in &rung.results {
             let recorded = rung.recorded && *policy == Replay::Cache(trace.policy);
             let _ = writeln!(
                 out,
-                "{:<22} {:<13} {:>10} {:>10} {:>10} {:>11} {:>6.1} %{}",
+                "{:<22} {:<13} {:>10} {:>12} {:>10} {:>11} {:>6.1} %{}",
                 cache(rung.budget_bytes),
                 policy.name(),
                 human_count(result.loads),
-                human_count(result.reloads()),
+                human_count(result.loaded_again()),
                 human_count(result.evicted),
                 human_bytes(result.loaded_bytes),
                 100.0 * result.hit_rate(),
@@ -170,6 +170,7 @@ fn as_text(trace: &Trace, rungs: &[Rung], skipped: &[u64]) -> String {
             );
         }
     }
+    out += "\nLoaded again: what the walk had loaded before, in any pass. `bricks_reloaded` in records counts within a pass.\n";
     if !skipped.is_empty() {
         let least = Residency::least_budget(&trace.sizes);
         let sizes: Vec<String> = skipped.iter().map(|&bytes| cache(bytes)).collect();

@@ -82,7 +82,8 @@ counters! {
     bricks_hit: Bricks ["bricks"] distinct;
     /// Payloads loaded.
     bricks_loaded: u64 ["payloads"] sum;
-    /// Payloads loaded twice or more in one pass.
+    /// Payloads loaded twice or more in one pass. What is loaded again over a whole walk `replay` tells, as
+    /// `loaded_again`.
     bricks_reloaded: u64 ["payloads"] sum;
     /// Payloads loaded that had been loaded in the same frame before, by whatever pass.
     bricks_reloaded_frame: u64 ["payloads"] sum;
@@ -96,7 +97,8 @@ counters! {
     cache_passes: u64 ["fillings"] max;
     /// Payloads resident when the effect's first pass began.
     bricks_resident_start: u64 ["payloads"] state;
-    /// Payloads resident at its end, but for what passes of other effects loaded and evicted between its own.
+    /// Payloads resident when its last pass ended. Passes of other effects may have loaded and evicted some between its
+    /// own.
     bricks_resident_end: u64 ["payloads"] state;
     /// Batches of loads.
     load_batches: u64 ["batches"] sum;

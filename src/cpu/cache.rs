@@ -49,7 +49,7 @@ impl BrickCache {
     ///
     /// # Errors
     /// The first payload that cannot be read or verified; none of `loads` is resident then.
-    pub fn load(&mut self, scene: &SceneFile, workers: &Workers<Shared>, loads: &[Load]) -> Result<(), ExecutorError> {
+    pub fn load(&mut self, scene: &SceneFile, workers: &Workers, loads: &[Load]) -> Result<(), ExecutorError> {
         for load in loads {
             // What was evicted and not overwritten may come back elsewhere.
             if let Some(held) = self.held[load.item.index()].take() {

@@ -1,7 +1,7 @@
 //! The CPU executor: runs the kernels that a step consists of one after the other, each over all rays or tiles in
 //! parallel.
 
-use super::cache::{BrickCache, Shared};
+use super::cache::BrickCache;
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
 use crate::kernels::dispatch::{Dispatch, are_pairs_culled, dispatches};
 use crate::kernels::lamps::LampTables;
@@ -18,7 +18,7 @@ use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::stream::{PayloadSource, WorkerPool, Workers};
+use crate::stream::{PayloadSource, Workers};
 use bricks::SceneFile;
 use std::any::Any;
 use std::sync::Arc;
@@ -59,7 +59,7 @@ impl Buffers {
 /// Renders one scene on the processor.
 pub struct CpuExecutor {
     file: Arc<SceneFile>,
-    workers: Workers<Shared>,
+    workers: Workers,
     cache: BrickCache,
     scene: Scene,
     texels: Texels,
@@ -87,7 +87,7 @@ impl CpuExecutor {
     ///
     /// # Errors
     /// Textures that cannot be read.
-    pub fn new(file: Arc<SceneFile>, workers: Workers<Shared>, setup: Setup) -> Result<Self, ExecutorError> {
+    pub fn new(file: Arc<SceneFile>, workers: Workers, setup: Setup) -> Result<Self, ExecutorError> {
         let Setup { extent, count, opaque, keep, .. } = setup;
         let rays = extent.rays();
         let sets = [RaySet::new(rays), RaySet::new(rays), RaySet::new(0)];
@@ -284,7 +284,7 @@ impl FrameExecutor for CpuExecutor {
         self.texels.bytes + self.file.resident().opacity_bytes()
     }
 
-    fn workers(&self) -> &dyn WorkerPool {
+    fn workers(&self) -> &Workers {
         &self.workers
     }
 

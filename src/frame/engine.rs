@@ -3,10 +3,11 @@
 use super::{Captures, Effects, Light, Moved};
 use crate::counters::Counters;
 use crate::kernels::FrameExecutor;
-use crate::schedule::auto::{Auto, Fixed};
+use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
+#[cfg(feature = "lab")]
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{ExecutorError, Pass, Shading, Step, Tracing, chc, demand, plain};
+use crate::schedule::{self, ExecutorError, Pass, Shading, Step, Tracer, Tracing};
 use bricks::SceneFile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -55,6 +56,7 @@ pub struct Engine {
     /// Edge of a tile in pixels.
     pub tile: u32,
     /// The temporal fronts, when they are on.
+    #[cfg(feature = "lab")]
     pub fronts: Option<Fronts>,
     /// What [`Schedule::Auto`] has measured.
     pub auto: Auto,
@@ -81,50 +83,44 @@ impl Engine {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
-        let fixed = match self.settings.schedule {
-            Schedule::Chc => Fixed::Chc,
-            Schedule::Demand => Fixed::Demand,
-            Schedule::Plain => Fixed::Plain,
-            Schedule::PlainBinary => {
-                let tracing = &self.settings.tracing;
-                return plain::trace_binary(&mut *self.executor, &mut self.cache, pass, first, tracing, stats);
-            }
-            Schedule::Auto => {
-                let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
-                let start = Instant::now();
-                // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the
-                // schedule.
-                let besides = stats.ms_stream - stats.ms;
-                let rays = stats.rays_traced;
-                self.trace_by(chosen, frame, pass, first, stats)?;
-                let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
-                self.auto.note(pass, ms, stats.rays_traced - rays);
-                return Ok(());
-            }
-        };
-        self.trace_by(fixed, frame, pass, first, stats)
+        let schedule = self.settings.schedule;
+        if schedule != Schedule::Auto {
+            return self.trace_by(schedule, frame, pass, first, stats);
+        }
+        let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
+        let start = Instant::now();
+        // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the schedule.
+        let besides = stats.ms_stream - stats.ms;
+        let rays = stats.rays_traced;
+        self.trace_by(chosen, frame, pass, first, stats)?;
+        let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
+        self.auto.note(pass, ms, stats.rays_traced - rays);
+        Ok(())
     }
 
+    #[cfg_attr(not(feature = "lab"), expect(unused_variables))]
     fn trace_by(
         &mut self,
-        schedule: Fixed,
+        schedule: Schedule,
         frame: u32,
         pass: Pass,
         first: &[Step],
         stats: &mut Counters,
     ) -> Result<(), ExecutorError> {
-        let tracing = &self.settings.tracing;
-        let (executor, cache) = (&mut *self.executor, &mut self.cache);
-        match (schedule, &mut self.fronts) {
-            (Fixed::Plain, _) => plain::trace(executor, cache, pass, first, tracing, stats),
-            (Fixed::Demand, _) => demand::trace(executor, cache, pass, first, tracing, stats),
-            (Fixed::Chc, None) => chc::trace(executor, cache, pass, first, tracing, stats),
-            (Fixed::Chc, Some(fronts)) => {
-                let resident = self.scene.resident();
-                let extent = (self.size.0, self.size.1, self.tile);
-                let setup = FrontPass { resident, extent, frame, pass, tracing };
-                fronts.trace(executor, cache, &setup, first, stats)
-            }
+        #[cfg(feature = "lab")]
+        if let Some(mut fronts) = self.fronts.take_if(|_| schedule == Schedule::Chc) {
+            let scene = self.scene.clone();
+            let setup = FrontPass { resident: scene.resident(), extent: (self.size.0, self.size.1, self.tile), frame };
+            let done = fronts.trace(&mut self.tracer(pass, stats), &setup, first);
+            self.fronts = Some(fronts);
+            return done;
         }
+        schedule::trace(&mut self.tracer(pass, stats), schedule, first)
+    }
+
+    /// What a schedule works with to trace the rays of a pass.
+    pub fn tracer<'a>(&'a mut self, pass: Pass, stats: &'a mut Counters) -> Tracer<'a> {
+        let Self { executor, cache, settings, .. } = self;
+        Tracer { executor: &mut **executor, cache, pass, tracing: &settings.tracing, stats }
     }
 }

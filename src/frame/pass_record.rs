@@ -80,10 +80,8 @@ impl FrameRecords {
         work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
     ) -> Result<(), ExecutorError> {
         let resident = |engine: &Engine| engine.cache.residency.resident().count() as u64;
-        let before = resident(engine);
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
-            let (bricks_resident_start, bricks_resident_end) = (before, before);
-            let stats = Counters { bricks_resident_start, bricks_resident_end, ..Counters::default() };
+            let stats = Counters { bricks_resident_start: resident(engine), ..Counters::default() };
             self.effects.push(EffectRecord { name, stats });
             self.effects.len() - 1
         });
@@ -92,7 +90,7 @@ impl FrameRecords {
         work(engine, stats)?;
         stats.ms += start.elapsed().as_secs_f64() * 1e3;
         stats.cache_passes = stats.cache_passes.max(engine.cache.residency.fillings());
-        stats.bricks_resident_end = stats.bricks_resident_end + resident(engine) - before;
+        stats.bricks_resident_end = resident(engine);
         Ok(())
     }
 

@@ -1,7 +1,6 @@
 //! The frame loop.
 
-use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, Methods, Moved, camera_view};
-use super::{GuideReader, Guides};
+use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, camera_view};
 use crate::counters::{Counters, Record};
 use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::math::sampling::pixel_jitter;

@@ -3,11 +3,10 @@
 
 use super::device::Gpu;
 use super::groups::numbered;
-use super::kernels;
 use super::kernels::Kernels;
-use super::pages::device_error;
 use super::rays::storage;
-use super::wgsl;
+use super::readback::device_error;
+use super::{kernels, wgsl};
 use crate::kernels::layout::BinaryNode;
 use crate::kernels::table::{self, names};
 use crate::kernels::trace::binary_tree::{Tree, top_height, tree_of};

@@ -250,6 +250,12 @@ impl Gpu {
         Ok(Self { device, queue, info, limits, timestamps, upload, local_memory: local_memory(adapter) })
     }
 
+    /// A buffer of so many bytes.
+    pub fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let label = Some(label);
+        self.device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
+    }
+
     /// What summaries say of it.
     pub fn device_info(&self) -> DeviceInfo {
         DeviceInfo {

@@ -9,26 +9,26 @@ use super::family::FamilyBuffers;
 use super::groups::{Buffers, Groups};
 use super::kernels::Kernels;
 use super::lamps::LampBuffers;
-use super::pages::{CachePages, MappedRange};
+use super::pages::CachePages;
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
-use super::readback::Readback;
+use super::readback::{Readback, read};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
 use super::wgsl::Pages;
 use crate::kernels::dispatch::{Dispatch, Workgroups, are_pairs_culled, dispatches};
-use crate::kernels::layout;
 use crate::kernels::layout::Params;
 use crate::kernels::table::{self, Bindings, Family, names};
 use crate::kernels::{
-    DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, reflectance,
-    report, textures,
+    DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, layout, opacity, padded,
+    reflectance, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, Own, PairQuery, Pass, Report, Step};
-use crate::stream::{Item, WorkerPool, Workers};
+use crate::stream::{Item, Workers};
 use bricks::SceneFile;
 use std::any::Any;
 use std::sync::Arc;
+use wgpu::BufferUsages;
 
 /// Most dispatches of one submission.
 const MOST_DISPATCHES: usize = 96;
@@ -41,7 +41,7 @@ const LIST_ENTRIES_PER_TILE: u32 = 64;
 pub struct GpuExecutor {
     gpu: Gpu,
     scene: Arc<SceneFile>,
-    workers: Workers<MappedRange>,
+    workers: Workers,
     kernels: Arc<Kernels>,
     buffers: Buffers,
     groups: Groups,
@@ -68,7 +68,7 @@ impl GpuExecutor {
     pub fn new(
         gpu: Gpu,
         scene: Arc<SceneFile>,
-        workers: Workers<MappedRange>,
+        workers: Workers,
         page_sizes: &[u64],
         setup: Setup,
     ) -> Result<Self, ExecutorError> {
@@ -104,7 +104,7 @@ impl GpuExecutor {
         gpu: Gpu,
         kernels: Arc<Kernels>,
         scene: Arc<SceneFile>,
-        workers: Workers<MappedRange>,
+        workers: Workers,
         page_sizes: &[u64],
         setup: Setup,
     ) -> Result<Self, ExecutorError> {
@@ -125,12 +125,7 @@ impl GpuExecutor {
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),
             demand: storage(&gpu, "demand", bricks, size_of::<layout::Demand>()),
             counters: storage(&gpu, "counters", layout::COUNTERS_AND_WORK, 4),
-            indirect: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("indirect"),
-                size: INDIRECT_BYTES,
-                usage: wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
+            indirect: gpu.buffer("indirect", INDIRECT_BYTES, BufferUsages::INDIRECT | BufferUsages::COPY_DST),
             params: uniform(&gpu, "params", size_of::<Params>()),
             blocks: uniform(&gpu, "blocks", 4 * Own::WORDS),
         };
@@ -171,9 +166,8 @@ impl GpuExecutor {
         &self.kernels
     }
 
-    fn read_all<T: bytemuck::Pod>(&mut self, buffer: impl Fn(&Self) -> &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
-        let bytes = self.readback.read(&self.gpu, buffer(self))?;
-        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    fn read_all<T: bytemuck::Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
+        Ok(bytemuck::pod_collect_to_vec(&read(&self.gpu, buffer)?))
     }
 
     /// What is made of a family.
@@ -317,7 +311,7 @@ impl GpuExecutor {
             report.tiles = textures::demand(&bytemuck::pod_collect_to_vec::<_, layout::TileDemand>(tiles));
         }
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
-            let rays: Vec<u32> = self.read_all(|s| &s.buffers.tiles.pair_rays)?;
+            let rays: Vec<u32> = self.read_all(&self.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
         }
         let times = self.timing.read(&self.gpu, dispatches.len())?;
@@ -392,7 +386,7 @@ impl FrameExecutor for GpuExecutor {
         self.buffers.texels.bytes + self.scene.resident().opacity_bytes()
     }
 
-    fn workers(&self) -> &dyn WorkerPool {
+    fn workers(&self) -> &Workers {
         &self.workers
     }
 
@@ -426,7 +420,7 @@ impl FrameExecutor for GpuExecutor {
 
     fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
         let Some(own) = self.family(family) else { return Ok(Vec::new()) };
-        let bytes = self.readback.read(&self.gpu, own.buffer(buffer))?;
+        let bytes = read(&self.gpu, own.buffer(buffer))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes[..4 * words]))
     }
 
@@ -458,23 +452,23 @@ impl FrameExecutor for GpuExecutor {
     }
 
     fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.read_all(|s| &s.buffers.sets[pass.set()].rays)
+        self.read_all(&self.buffers.sets[pass.set()].rays)
     }
 
     fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.read_all(|s| &s.buffers.sets[pass.set()].hits)
+        self.read_all(&self.buffers.sets[pass.set()].hits)
     }
 
     fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.read_all(|s| &s.buffers.sets[pass.set()].surfaces)
+        self.read_all(&self.buffers.sets[pass.set()].surfaces)
     }
 
     fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read_all(|s| &s.buffers.pixels.gbuffers[0])
+        self.read_all(&self.buffers.pixels.gbuffers[0])
     }
 
     fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.read_all(|s| &s.buffers.pixels.radiance)
+        self.read_all(&self.buffers.pixels.radiance)
     }
 }
 
@@ -524,7 +518,7 @@ impl Executor for GpuExecutor {
 
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
         let bytes = |item: Item| self.scene.loaded_bytes(item.into());
-        self.buffers.cache.load(&self.gpu, &mut self.workers, loads, bytes)
+        self.buffers.cache.load(&self.gpu, &self.workers, loads, bytes)
     }
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
@@ -548,10 +542,5 @@ fn stride(gpu: &Gpu, bytes: usize) -> u64 {
 
 /// A buffer of so many bytes for each dispatch of a submission.
 fn uniform(gpu: &Gpu, label: &str, bytes: usize) -> wgpu::Buffer {
-    gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: (MOST_DISPATCHES as u64) * stride(gpu, bytes),
-        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
+    gpu.buffer(label, (MOST_DISPATCHES as u64) * stride(gpu, bytes), BufferUsages::UNIFORM | BufferUsages::COPY_DST)
 }

@@ -1,9 +1,11 @@
 //! Pages of the brick cache on the device, and how payloads get into them.
 
 use super::device::{Gpu, UploadPath};
+use super::readback::{device_error, map};
 use crate::schedule::{ExecutorError, Load};
 use crate::stream::{Destination, Item, Workers};
 use std::collections::BTreeSet;
+use wgpu::BufferUsages;
 
 /// A mapped range that a worker fills.
 pub struct MappedRange {
@@ -27,16 +29,11 @@ impl CachePages {
     /// Allocates pages of the given sizes; a cache of nothing still has one page, so that there is something to bind.
     pub fn new(gpu: &Gpu, sizes: &[u64]) -> Self {
         let mapped = match gpu.upload {
-            UploadPath::Mapped => wgpu::BufferUsages::MAP_WRITE,
-            UploadPath::Staged => wgpu::BufferUsages::empty(),
+            UploadPath::Mapped => BufferUsages::MAP_WRITE,
+            UploadPath::Staged => BufferUsages::empty(),
         };
         let page = |bytes: u64| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("cache page"),
-                size: bytes.max(256),
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | mapped,
-                mapped_at_creation: false,
-            })
+            gpu.buffer("cache page", bytes.max(256), BufferUsages::STORAGE | BufferUsages::COPY_DST | mapped)
         };
         let mut pages: Vec<_> = sizes.iter().map(|&bytes| page(bytes)).collect();
         if pages.is_empty() {
@@ -58,7 +55,7 @@ impl CachePages {
     pub fn load(
         &mut self,
         gpu: &Gpu,
-        workers: &mut Workers<MappedRange>,
+        workers: &Workers,
         loads: &[Load],
         bytes: impl Fn(Item) -> u64,
     ) -> Result<(), ExecutorError> {
@@ -79,12 +76,7 @@ impl CachePages {
     }
 
     /// Fills the staging buffer from its start, then copies to the places in the pages.
-    fn load_staged(
-        &mut self,
-        gpu: &Gpu,
-        workers: &mut Workers<MappedRange>,
-        in_place: &[Target],
-    ) -> Result<(), ExecutorError> {
+    fn load_staged(&mut self, gpu: &Gpu, workers: &Workers, in_place: &[Target]) -> Result<(), ExecutorError> {
         let mut total = 0;
         let staged = in_place.iter().map(|target| {
             let offset = total;
@@ -94,12 +86,11 @@ impl CachePages {
         let staged: Vec<Target> = staged.collect();
         let staging = match self.staging.take().filter(|s| s.size() >= total) {
             Some(staging) => staging,
-            None => gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("cache staging"),
-                size: total.next_power_of_two().max(1 << 20),
-                usage: wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            }),
+            None => gpu.buffer(
+                "cache staging",
+                total.next_power_of_two().max(1 << 20),
+                BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
+            ),
         };
         let staging = self.staging.insert(staging);
         fill(gpu, workers, std::slice::from_ref(staging), &staged)?;
@@ -123,15 +114,10 @@ struct Target {
 }
 
 /// Maps the buffers that `targets` lie in, has the workers fill them, and unmaps.
-fn fill(
-    gpu: &Gpu,
-    workers: &mut Workers<MappedRange>,
-    buffers: &[wgpu::Buffer],
-    targets: &[Target],
-) -> Result<(), ExecutorError> {
+fn fill(gpu: &Gpu, workers: &Workers, buffers: &[wgpu::Buffer], targets: &[Target]) -> Result<(), ExecutorError> {
     let touched: BTreeSet<usize> = targets.iter().map(|target| target.buffer).collect();
     for &buffer in &touched {
-        map(gpu, &buffers[buffer])?;
+        map(gpu, &buffers[buffer], wgpu::MapMode::Write)?;
     }
     let mut jobs = Vec::with_capacity(targets.len());
     for &Target { item, buffer, offset, bytes } in targets {
@@ -143,24 +129,4 @@ fn fill(
         buffers[buffer].unmap();
     }
     Ok(result?)
-}
-
-/// Maps a whole buffer for writing, once the device is done with it.
-fn map(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<(), ExecutorError> {
-    let (send, receive) = crossbeam::channel::bounded(1);
-    buffer.map_async(wgpu::MapMode::Write, .., move |result| {
-        // The receiver outlives the poll below.
-        let _ = send.send(result);
-    });
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
-    match receive.try_recv() {
-        Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(device_error(error)),
-        Err(error) => Err(device_error(error)),
-    }
-}
-
-/// Puts the driver's words into an executor's error.
-pub fn device_error(error: impl std::fmt::Display) -> ExecutorError {
-    ExecutorError::Device(format!("failed: {error}"))
 }

@@ -6,13 +6,16 @@
 //! compares every result with the twin in [`crate::math::exact`] bit for bit. The pipelines that trace rays are then
 //! compared with each other, see [`compare_pipelines`].
 
-use super::wgsl;
-use super::wgsl::Pages;
+use super::device::Gpu;
+use super::groups::numbered;
+use super::rays::storage;
+use super::readback::read;
+use super::wgsl::{self, Pages};
 use crate::math::exact;
+use crate::schedule::ExecutorError;
 use cases::{ArithmeticCase, TriangleCase};
 use check::{TWIN, no_results};
 use serde::Serialize;
-use std::sync::mpsc;
 use std::time::Instant;
 
 mod cases;
@@ -71,8 +74,8 @@ const TRIANGLE_WORDS: usize = 28;
 /// Runs the probe; about 4,000 cases, some milliseconds beside the compilation of two kernels.
 ///
 /// A device that returns nothing gives a report whose one failure says so.
-pub fn run(device: &wgpu::Device, queue: &wgpu::Queue) -> ProbeReport {
-    run_source(device, queue, &source())
+pub fn run(gpu: &Gpu) -> ProbeReport {
+    run_source(gpu, &source())
 }
 
 /// The text of `shaders/probe/probe.wgsl` with what it includes.
@@ -90,13 +93,10 @@ pub fn source() -> String {
 }
 
 /// [`run`] with another text of the kernels.
-pub fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> ProbeReport {
+pub fn run_source(gpu: &Gpu, source: &str) -> ProbeReport {
     let start = Instant::now();
-    let info = device.adapter_info();
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("probe"),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
+    let info = &gpu.info;
+    let module = module(gpu, source);
     let arithmetic = cases::arithmetic();
     let triangles = cases::triangles();
     let mut report = ProbeReport {
@@ -111,16 +111,22 @@ pub fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> P
         ms: 0.0,
     };
     let words = |c: &ArithmeticCase| c.words;
-    match dispatch(device, queue, &module, "arithmetic", &arithmetic, words, ARITHMETIC_WORDS) {
+    match dispatch(gpu, &module, "arithmetic", &arithmetic, words, ARITHMETIC_WORDS) {
         Ok(results) => check_arithmetic(&mut report, &arithmetic, &results),
-        Err(reason) => report.checks.push(no_results("arithmetic", reason)),
+        Err(reason) => report.checks.push(no_results("arithmetic", &reason)),
     }
-    match dispatch(device, queue, &module, "triangles", &triangles, TriangleCase::words, TRIANGLE_WORDS) {
+    match dispatch(gpu, &module, "triangles", &triangles, TriangleCase::words, TRIANGLE_WORDS) {
         Ok(results) => check_triangles(&mut report, &triangles, &results),
-        Err(reason) => report.checks.push(no_results("triangles", reason)),
+        Err(reason) => report.checks.push(no_results("triangles", &reason)),
     }
     report.ms = start.elapsed().as_secs_f64() * 1e3;
     report
+}
+
+/// What the text of a kernel is compiled to.
+pub fn module(gpu: &Gpu, source: &str) -> wgpu::ShaderModule {
+    let source = wgpu::ShaderSource::Wgsl(source.into());
+    gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("probe"), source })
 }
 
 /// Runs one entry point over all cases; `result_words` words a case come back.
@@ -128,15 +134,14 @@ pub fn run_source(device: &wgpu::Device, queue: &wgpu::Queue, source: &str) -> P
 /// # Errors
 /// The device returns nothing.
 pub fn dispatch<Case, const N: usize>(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
+    gpu: &Gpu,
     module: &wgpu::ShaderModule,
     entry_point: &'static str,
     cases: &[Case],
     words: impl Fn(&Case) -> [u32; N],
     result_words: usize,
-) -> Result<Vec<u32>, String> {
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+) -> Result<Vec<u32>, ExecutorError> {
+    let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(entry_point),
         layout: None,
         module,
@@ -144,45 +149,26 @@ pub fn dispatch<Case, const N: usize>(
         compilation_options: Default::default(),
         cache: None,
     });
-    let buffer = |label, size: u64, usage| {
-        let usage = usage | wgpu::BufferUsages::COPY_DST;
-        device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
-    };
     let input: Vec<u32> = cases.iter().flat_map(words).collect();
-    let bytes = (cases.len() * result_words * 4) as u64;
-    let params = buffer("probe params", 16, wgpu::BufferUsages::UNIFORM);
-    let given = buffer("probe cases", input.len() as u64 * 4, wgpu::BufferUsages::STORAGE);
-    let results = buffer("probe results", bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-    let readable = buffer("probe readback", bytes, wgpu::BufferUsages::MAP_READ);
-    queue.write_buffer(&params, 0, bytemuck::cast_slice(&[0, cases.len() as u32, 0, 0]));
-    queue.write_buffer(&given, 0, bytemuck::cast_slice(&input));
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+    let params = gpu.buffer("probe params", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+    let given = storage(gpu, "probe cases", input.len(), 4);
+    let results = storage(gpu, "probe results", cases.len() * result_words, 4);
+    gpu.queue.write_buffer(&params, 0, bytemuck::cast_slice(&[0, cases.len() as u32, 0, 0]));
+    gpu.queue.write_buffer(&given, 0, bytemuck::cast_slice(&input));
+    let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("probe"),
         layout: &pipeline.get_bind_group_layout(0),
-        entries: &[entry(0, &params), entry(1, &given), entry(2, &results)],
+        entries: &numbered([&params, &given, &results], 0),
     });
-    let mut encoder = device.create_command_encoder(&Default::default());
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
     {
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(&pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(cases.len().div_ceil(64) as u32, 1, 1);
     }
-    encoder.copy_buffer_to_buffer(&results, 0, &readable, 0, bytes);
-    queue.submit([encoder.finish()]);
-    let (send, receive) = mpsc::channel();
-    readable.map_async(wgpu::MapMode::Read, .., move |result| {
-        // The receiver outlives the poll below.
-        let _ = send.send(result);
-    });
-    device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
-    receive.try_recv().map_err(|e| e.to_string())?.map_err(|e| e.to_string())?;
-    let view = readable.get_mapped_range(..).map_err(|e| e.to_string())?;
-    Ok(bytemuck::pod_collect_to_vec(&view))
-}
-
-fn entry(binding: u32, buffer: &wgpu::Buffer) -> wgpu::BindGroupEntry<'_> {
-    wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }
+    gpu.queue.submit([encoder.finish()]);
+    Ok(bytemuck::pod_collect_to_vec(&read(gpu, &results)?))
 }
 
 /// Neither denormal, infinite nor NaN: what the kernels' arithmetic is promised to see and give.

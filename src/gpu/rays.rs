@@ -2,6 +2,7 @@
 
 use super::device::Gpu;
 use crate::kernels::{Extent, layout};
+use wgpu::BufferUsages;
 
 /// Most rays that buffers on this device hold.
 pub fn most_rays(gpu: &Gpu) -> u64 {
@@ -55,12 +56,11 @@ pub struct PixelBuffers {
 
 /// A storage buffer of `count` elements that can be written from and copied to the host.
 pub fn storage(gpu: &Gpu, label: &str, count: usize, stride: usize) -> wgpu::Buffer {
-    gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: (count.max(1) * stride) as u64,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
+    gpu.buffer(
+        label,
+        (count.max(1) * stride) as u64,
+        BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+    )
 }
 
 impl RayBuffers {

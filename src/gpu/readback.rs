@@ -1,8 +1,8 @@
 //! Small buffers read back after each submission, and whole buffers at the end of a frame.
 
 use super::device::Gpu;
-use super::pages::device_error;
 use crate::schedule::ExecutorError;
+use wgpu::BufferUsages;
 
 /// A reused host-visible buffer.
 pub struct Readback {
@@ -11,12 +11,7 @@ pub struct Readback {
 }
 
 fn mappable(gpu: &Gpu, bytes: u64) -> wgpu::Buffer {
-    gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("readback"),
-        size: bytes.max(16).next_multiple_of(8),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
+    gpu.buffer("readback", bytes.max(16).next_multiple_of(8), BufferUsages::MAP_READ | BufferUsages::COPY_DST)
 }
 
 impl Readback {
@@ -42,38 +37,48 @@ impl Readback {
     pub fn wait(&self, gpu: &Gpu) -> Result<Vec<u8>, ExecutorError> {
         take(gpu, &self.buffer, self.used)
     }
+}
 
-    /// Reads a whole buffer, in pieces of bounded size.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn read(&self, gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u8>, ExecutorError> {
-        const PIECE: u64 = 64 << 20;
-        let piece = mappable(gpu, source.size().min(PIECE));
-        let mut out = Vec::with_capacity(source.size() as usize);
-        let mut at = 0;
-        while at < source.size() {
-            let bytes = (source.size() - at).min(PIECE);
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            encoder.copy_buffer_to_buffer(source, at, &piece, 0, bytes);
-            gpu.queue.submit([encoder.finish()]);
-            out.extend_from_slice(&take(gpu, &piece, bytes)?);
-            at += bytes;
-        }
-        Ok(out)
+/// Reads a whole buffer, in pieces of bounded size.
+///
+/// # Errors
+/// The device's.
+pub fn read(gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u8>, ExecutorError> {
+    const PIECE: u64 = 64 << 20;
+    let piece = mappable(gpu, source.size().min(PIECE));
+    let mut out = Vec::with_capacity(source.size() as usize);
+    let mut at = 0;
+    while at < source.size() {
+        let bytes = (source.size() - at).min(PIECE);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(source, at, &piece, 0, bytes);
+        gpu.queue.submit([encoder.finish()]);
+        out.extend_from_slice(&take(gpu, &piece, bytes)?);
+        at += bytes;
     }
+    Ok(out)
 }
 
 /// Maps the first `bytes` of a readable buffer once the device is done, and copies them.
 pub fn take(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, ExecutorError> {
-    let (send, receive) = crossbeam::channel::bounded(1);
-    buffer.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
+    map(gpu, buffer, wgpu::MapMode::Read)?;
+    let copy = buffer.get_mapped_range(..bytes).map_err(device_error)?.to_vec();
+    buffer.unmap();
+    Ok(copy)
+}
+
+/// Maps a whole buffer, once the device is done with it.
+pub fn map(gpu: &Gpu, buffer: &wgpu::Buffer, mode: wgpu::MapMode) -> Result<(), ExecutorError> {
+    let (send, receive) = std::sync::mpsc::sync_channel(1);
+    buffer.map_async(mode, .., move |result| {
         // The receiver outlives the poll below.
         let _ = send.send(result);
     });
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
-    receive.try_recv().map_err(device_error)?.map_err(device_error)?;
-    let copy = buffer.get_mapped_range(..bytes).map_err(device_error)?.to_vec();
-    buffer.unmap();
-    Ok(copy)
+    receive.try_recv().map_err(device_error)?.map_err(device_error)
+}
+
+/// Puts the driver's words into an executor's error.
+pub fn device_error(error: impl std::fmt::Display) -> ExecutorError {
+    ExecutorError::Device(format!("failed: {error}"))
 }

@@ -1,11 +1,12 @@
 //! The resident part of a scene on the device, relative to the reference point of the frame.
 
 use super::device::Gpu;
-use super::pages::device_error;
+use super::readback::device_error;
 use crate::kernels::frame::{Frame, Placement, brick_record};
 use crate::kernels::{layout, opacity};
 use crate::schedule::ExecutorError;
 use bricks::{Resident, SceneFile};
+use wgpu::BufferUsages;
 
 /// The buffers of group 0.
 pub struct SceneBuffers {
@@ -40,12 +41,7 @@ impl SceneBuffers {
             return Err(ExecutorError::Device(text));
         }
         let buffer = |label: &str, count: usize, stride: usize| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: (count.max(1) * stride) as u64,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
+            gpu.buffer(label, (count.max(1) * stride) as u64, BufferUsages::STORAGE | BufferUsages::COPY_DST)
         };
         let count = resident.bricks.len();
         let buffers = Self {

@@ -2,8 +2,8 @@
 //! binding; where their tiles lie in the cache, and what is asked of these.
 
 use super::device::Gpu;
-use super::pages::device_error;
 use super::rays::storage;
+use super::readback::device_error;
 use crate::kernels::{layout, textures};
 use crate::schedule::ExecutorError;
 use bricks::{Payload, SceneFile};

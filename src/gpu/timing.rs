@@ -3,6 +3,7 @@
 use super::device::Gpu;
 use super::readback::take;
 use crate::schedule::ExecutorError;
+use wgpu::BufferUsages;
 
 /// Two timestamps a dispatch.
 pub struct Timing {
@@ -19,16 +20,9 @@ impl Timing {
                 ty: wgpu::QueryType::Timestamp,
                 count: 2 * dispatches,
             });
-            let buffer = |usage| {
-                gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("timestamps"),
-                    size: 16 * u64::from(dispatches),
-                    usage,
-                    mapped_at_creation: false,
-                })
-            };
-            let resolved = buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC);
-            (set, resolved, buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST))
+            let buffer = |usage| gpu.buffer("timestamps", 16 * u64::from(dispatches), usage);
+            let resolved = buffer(BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC);
+            (set, resolved, buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST))
         });
         Self { set, period_ns: f64::from(gpu.queue.get_timestamp_period()) }
     }

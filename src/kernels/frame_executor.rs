@@ -4,7 +4,7 @@ use super::layout::{GBuffer, Hit, Ray, Surface};
 use super::table::Family;
 use super::{Keep, Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
-use crate::stream::WorkerPool;
+use crate::stream::Workers;
 use bricks::SceneFile;
 use serde::Serialize;
 use std::any::Any;
@@ -39,7 +39,7 @@ pub trait FrameExecutor: Executor {
     fn texture_bytes(&self) -> u64;
 
     /// The workers that read payloads.
-    fn workers(&self) -> &dyn WorkerPool;
+    fn workers(&self) -> &Workers;
 
     /// What it leaves out where a scene does not need it, unless it was set up to keep it. On anything else its kernels
     /// decide as they run.

@@ -1,11 +1,9 @@
-//! A plain binary BVH in f64, built by binned SAH.
+//! A plain binary BVH in f64, halved where items lie widest apart.
 
 use super::ray::TruthRay;
 
 /// Most triangles of a leaf.
 const LEAF: usize = 4;
-/// Bins an axis.
-const BINS: usize = 16;
 /// Relative margin of the slab test: many times the roundings of a subtraction, a product and a division.
 const MARGIN: f64 = 64.0 * f64::EPSILON;
 
@@ -59,14 +57,8 @@ impl Bounds {
         }
     }
 
-    fn center(&self, k: usize) -> f64 {
-        0.5 * (self.min[k] + self.max[k])
-    }
-
-    /// Half the surface area; 0 for an empty box.
-    fn area(&self) -> f64 {
-        let e: [f64; 3] = std::array::from_fn(|k| (self.max[k] - self.min[k]).max(0.0));
-        e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
+    fn center(&self) -> [f64; 3] {
+        std::array::from_fn(|k| 0.5 * (self.min[k] + self.max[k]))
     }
 }
 
@@ -137,55 +129,15 @@ impl Bvh {
     }
 }
 
-/// Reorders `items` and returns where to cut them, neither end.
+/// Orders `items` so that those of the first half lie before the others on the axis where they are widest apart; returns
+/// where that half ends.
 fn split(items: &mut [u32], bounds: &[Bounds]) -> usize {
-    let center = |i: u32, k: usize| bounds[i as usize].center(k);
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for &i in items.iter() {
-        for k in 0..3 {
-            low[k] = low[k].min(center(i, k));
-            high[k] = high[k].max(center(i, k));
-        }
-    }
-    let bin = |i: u32, k: usize| {
-        let x = (center(i, k) - low[k]) / (high[k] - low[k]) * BINS as f64;
-        (x as usize).min(BINS - 1)
-    };
-    let mut best = (f64::INFINITY, 0, 0);
-    for k in (0..3).filter(|&k| high[k] > low[k]) {
-        let mut bins = [(Bounds::EMPTY, 0usize); BINS];
-        for &i in items.iter() {
-            let slot = &mut bins[bin(i, k)];
-            *slot = (slot.0.join(&bounds[i as usize]), slot.1 + 1);
-        }
-        let mut right = [0.0; BINS];
-        let mut sum = (Bounds::EMPTY, 0);
-        for cut in (1..BINS).rev() {
-            sum = (sum.0.join(&bins[cut].0), sum.1 + bins[cut].1);
-            right[cut] = sum.0.area() * sum.1 as f64;
-        }
-        let mut sum = (Bounds::EMPTY, 0);
-        for cut in 1..BINS {
-            sum = (sum.0.join(&bins[cut - 1].0), sum.1 + bins[cut - 1].1);
-            let cost = sum.0.area() * sum.1 as f64 + right[cut];
-            if cost < best.0 && sum.1 > 0 && sum.1 < items.len() {
-                best = (cost, k, cut);
-            }
-        }
-    }
-    if best.2 == 0 {
-        // All centres in one place: any halves do.
-        return items.len() / 2;
-    }
-    let (_, k, cut) = best;
-    let mut middle = 0;
-    for i in 0..items.len() {
-        if bin(items[i], k) < cut {
-            items.swap(i, middle);
-            middle += 1;
-        }
-    }
+    let center = |i: u32| bounds[i as usize].center();
+    let all = items.iter().fold(Bounds::EMPTY, |all, &i| all.join(&Bounds::of(&[center(i)])));
+    let width = |k: usize| all.max[k] - all.min[k];
+    let axis = (0..3).fold(0, |widest, k| if width(k) > width(widest) { k } else { widest });
+    let middle = items.len() / 2;
+    items.select_nth_unstable_by(middle, |&a, &b| center(a)[axis].total_cmp(&center(b)[axis]));
     middle
 }
 

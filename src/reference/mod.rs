@@ -13,7 +13,6 @@ mod assessment;
 pub mod bounds;
 mod bvh;
 mod decode;
-mod expansion;
 mod instance;
 mod judge;
 mod opacity;

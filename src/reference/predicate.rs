@@ -4,8 +4,9 @@
 //! V = d·(c×a), W = d·(a×b) weight a, b and c. The ray's line meets the closed triangle where no two of them have
 //! opposite signs and not all are zero; then D = U + V + W is not zero either, and t = N / D with N = a·(b×c).
 
-use super::expansion::{Expansion, cross, dot};
 use super::ray::TruthRay;
+use num_bigint::BigInt;
+use num_traits::ToPrimitive;
 use std::cmp::Ordering;
 
 /// 2^-53.
@@ -46,31 +47,68 @@ fn dot_f64(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The exact quantities of a ray and a triangle.
+/// A vector of whole numbers.
+type Whole3 = [BigInt; 3];
+
+/// The exact quantities of a ray and a triangle, in multiples of one power of two.
 struct Exact {
-    a: [Expansion; 3],
-    b: [Expansion; 3],
-    c: [Expansion; 3],
-    d: [Expansion; 3],
+    vertices: [Whole3; 3],
+    d: Whole3,
+}
+
+/// Whole m and e with x = m 2^e, m odd or 0.
+fn parts(x: f64) -> (i64, i32) {
+    let exponent = (x.to_bits() >> 52 & 0x7ff) as i32;
+    let fraction = (x.to_bits() << 12 >> 12) as i64 | i64::from(exponent > 0) << 52;
+    let zeros = if fraction == 0 { 0 } else { fraction.trailing_zeros() };
+    ((fraction >> zeros) * x.signum() as i64, exponent.max(1) - 1075 + zeros as i32)
+}
+
+fn cross(a: &Whole3, b: &Whole3) -> Whole3 {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &a[i] * &b[j] - &a[j] * &b[i])
+}
+
+fn dot(a: &Whole3, b: &Whole3) -> BigInt {
+    &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
+}
+
+/// The quotient, to some roundings.
+fn quotient(a: &BigInt, b: &BigInt) -> f64 {
+    // Within the range of f64, and with more bits than one has.
+    let beyond = a.bits().max(b.bits()).saturating_sub(1000);
+    let [a, b] = [a, b].map(|x| (x >> beyond).to_f64().unwrap_or(f64::NAN));
+    a / b
+}
+
+fn sign(x: &BigInt) -> i32 {
+    x.cmp(&BigInt::ZERO) as i32
 }
 
 impl Exact {
-    fn new(ray: &TruthRay, [a, b, c]: [[f64; 3]; 3]) -> Self {
-        let relative =
-            |vertex: [f64; 3]| std::array::from_fn(|k| Expansion::sum([vertex[k], -ray.reference[k], -ray.origin[k]]));
-        let d = ray.direction.map(|x| Expansion::sum([x]));
-        Self { a: relative(a), b: relative(b), c: relative(c), d }
+    fn new(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Self {
+        let given = [ray.reference, ray.origin, ray.direction].into_iter().chain(triangle);
+        let exponents = given.flatten().map(parts).filter(|part| part.0 != 0).map(|part| part.1);
+        let unit = exponents.min().unwrap_or(0);
+        let whole = |x: f64| match parts(x) {
+            (0, _) => BigInt::ZERO,
+            (mantissa, exponent) => BigInt::from(mantissa) << (exponent - unit),
+        };
+        let relative = |vertex: [f64; 3]| {
+            std::array::from_fn(|k| whole(vertex[k]) - whole(ray.reference[k]) - whole(ray.origin[k]))
+        };
+        Self { vertices: triangle.map(relative), d: ray.direction.map(whole) }
     }
 
     /// U, V, W.
-    fn edges(&self) -> [Expansion; 3] {
-        [(&self.b, &self.c), (&self.c, &self.a), (&self.a, &self.b)].map(|(p, q)| dot(&self.d, &cross(p, q)))
+    fn edges(&self) -> Whole3 {
+        let [a, b, c] = &self.vertices;
+        [(b, c), (c, a), (a, b)].map(|(p, q)| dot(&self.d, &cross(p, q)))
     }
 
     /// N and D.
-    fn fraction(&self) -> (Expansion, Expansion) {
-        let [u, v, w] = self.edges();
-        (dot(&self.a, &cross(&self.b, &self.c)), u.plus(&v).plus(&w))
+    fn fraction(&self) -> (BigInt, BigInt) {
+        let [a, b, c] = &self.vertices;
+        (dot(a, &cross(b, c)), self.edges().into_iter().sum())
     }
 }
 
@@ -80,7 +118,7 @@ pub(super) fn crossing(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Option<Crossi
     let d = ray.direction;
     let md = d.map(f64::abs);
     let normals = [cross_f64(b, c), cross_f64(c, a), cross_f64(a, b)];
-    let mut edges = normals.map(|n| dot_f64(d, n));
+    let edges = normals.map(|n| dot_f64(d, n));
     let errors = [(mb, mc), (mc, ma), (ma, mb)].map(|(p, q)| TRIPLE_ERROR * dot_f64(md, permanent(p, q)));
 
     // Two edges certain to have opposite signs: a miss, by far the most frequent case.
@@ -101,15 +139,14 @@ pub(super) fn crossing(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Option<Crossi
 
     let exact = Exact::new(ray, triangle);
     let exact_edges = exact.edges();
-    let signs = exact_edges.each_ref().map(Expansion::sign);
+    let signs = exact_edges.each_ref().map(sign);
     if (signs.contains(&1) && signs.contains(&-1)) || signs == [0; 3] {
         return None;
     }
     let (numerator, determinant) = exact.fraction();
-    edges = exact_edges.each_ref().map(Expansion::value);
-    let determinant = determinant.value();
-    let t = numerator.value() / determinant;
-    Some(Crossing { t, t_error: 8.0 * ROUNDING * t.abs(), weights: edges.map(|e| e / determinant) })
+    let t = quotient(&numerator, &determinant);
+    let weights = exact_edges.each_ref().map(|edge| quotient(edge, &determinant));
+    Some(Crossing { t, t_error: 8.0 * ROUNDING * t.abs(), weights })
 }
 
 /// The order of two crossings of one ray along it, exactly.
@@ -119,7 +156,7 @@ pub(super) fn order(ray: &TruthRay, p: (&Crossing, [[f64; 3]; 3]), q: (&Crossing
         return apart.total_cmp(&0.0);
     }
     let ((n0, d0), (n1, d1)) = (Exact::new(ray, p.1).fraction(), Exact::new(ray, q.1).fraction());
-    let difference = n0.times(&d1).minus(&n1.times(&d0)).sign() * d0.sign() * d1.sign();
+    let difference = sign(&(n0 * &d1 - n1 * &d0)) * sign(&d0) * sign(&d1);
     difference.cmp(&0)
 }
 

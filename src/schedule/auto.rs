@@ -5,6 +5,7 @@
 //! counters, never pictures.
 
 use super::Pass;
+use crate::settings::Schedule;
 use std::collections::BTreeMap;
 
 /// What tries of schedules that are not the cheapest cost in the long run, as a share of the cheapest's cost: one that
@@ -15,19 +16,8 @@ const TRIES_APART: f64 = 6.0;
 /// Weight of the newest measurement of a schedule's cost.
 const NEWEST: f64 = 0.5;
 
-/// A schedule that `auto` chooses from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fixed {
-    /// [`super::chc`].
-    Chc,
-    /// [`super::demand`].
-    Demand,
-    /// [`super::plain`].
-    Plain,
-}
-
-/// All of them.
-const ALL: [Fixed; 3] = [Fixed::Chc, Fixed::Demand, Fixed::Plain];
+/// The schedules that `auto` chooses from.
+const ALL: [Schedule; 3] = [Schedule::Chc, Schedule::Demand, Schedule::Plain];
 
 /// What is known of the costs of one kind of pass.
 #[derive(Clone, Debug, Default)]
@@ -39,7 +29,7 @@ struct Costs {
     /// Passes since a schedule that is not the cheapest was tried.
     since_try: u32,
     /// The schedule of the pass before.
-    last: Option<Fixed>,
+    last: Option<Schedule>,
 }
 
 /// Chooses a schedule for every pass.
@@ -53,16 +43,16 @@ pub struct Auto {
 impl Auto {
     /// The schedule for the next pass like `pass`. `is_resident`: everything is resident, so that `plain` may be
     /// chosen; `demand` is then the same as it.
-    pub fn choose(&mut self, pass: Pass, is_resident: bool) -> Fixed {
+    pub fn choose(&mut self, pass: Pass, is_resident: bool) -> Schedule {
         let costs = self.kinds.entry(kind(pass)).or_default();
-        let candidates = if is_resident { [Fixed::Chc, Fixed::Plain] } else { [Fixed::Chc, Fixed::Demand] };
+        let candidates = if is_resident { [Schedule::Chc, Schedule::Plain] } else { [Schedule::Chc, Schedule::Demand] };
         // The first pass starts with nothing resident: its cost says nothing, and is not noted.
         let chosen = if costs.passes == 0 {
-            Fixed::Chc
+            Schedule::Chc
         } else if let Some(&untried) = candidates.iter().find(|&&fixed| costs.of[fixed as usize].is_none()) {
             untried
         } else {
-            let cost = |fixed: Fixed| costs.of[fixed as usize].unwrap_or(f64::INFINITY);
+            let cost = |fixed: Schedule| costs.of[fixed as usize].unwrap_or(f64::INFINITY);
             let [a, b] = candidates;
             let (best, other) = if cost(a) <= cost(b) { (a, b) } else { (b, a) };
             costs.since_try += 1;
@@ -95,17 +85,6 @@ impl Auto {
     }
 }
 
-impl Fixed {
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Fixed::Chc => "chc",
-            Fixed::Demand => "demand",
-            Fixed::Plain => "plain",
-        }
-    }
-}
-
 /// Passes that are alike: all directions of an effect, all lamps.
 fn kind(pass: Pass) -> u32 {
     match pass {
@@ -123,7 +102,7 @@ mod tests {
     use super::*;
 
     /// Runs `passes` passes whose true costs are given and returns the cost of all over that of the best schedule.
-    fn run(auto: &mut Auto, passes: u32, is_resident: bool, cost: impl Fn(Fixed, u32) -> f64) -> f64 {
+    fn run(auto: &mut Auto, passes: u32, is_resident: bool, cost: impl Fn(Schedule, u32) -> f64) -> f64 {
         let (mut sum, mut best) = (0.0, 0.0);
         for i in 0..passes {
             let chosen = auto.choose(Pass::Primary, is_resident);
@@ -138,7 +117,7 @@ mod tests {
     fn the_cheapest_is_found_and_stays() {
         for [chc, demand] in [[1.0, 1.5], [1.5, 1.0], [1.0, 1.0]] {
             let mut auto = Auto::default();
-            let cost = |fixed, _| if fixed == Fixed::Chc { chc } else { demand };
+            let cost = |fixed, _| if fixed == Schedule::Chc { chc } else { demand };
             let over = run(&mut auto, 100, false, cost);
             // The first pass and two tries, then a try each 6 passes or (1.5 - 1) / 0.04 = 12.5.
             assert!(over < 1.0 + (2.0 * 0.5 + 8.0 * 0.5) / 100.0 + 1e-9, "{over} times the best");
@@ -152,7 +131,7 @@ mod tests {
             let mut auto = Auto::default();
             let cost = |fixed, i: u32| {
                 let speed = if ((i + shift) / spell).is_multiple_of(2) { 1.4 } else { 1.0 };
-                speed * if fixed == Fixed::Chc { 1.15 } else { 1.0 }
+                speed * if fixed == Schedule::Chc { 1.15 } else { 1.0 }
             };
             let over = run(&mut auto, 48, false, cost);
             assert!(over < 1.1, "{over} times the best with spells of {spell}, shifted by {shift}");
@@ -162,11 +141,11 @@ mod tests {
     #[test]
     fn a_change_of_view_is_noticed() {
         let mut auto = Auto::default();
-        let cost = |fixed, i| if (fixed == Fixed::Chc) == (i < 100) { 1.0 } else { 1.5 };
+        let cost = |fixed, i| if (fixed == Schedule::Chc) == (i < 100) { 1.0 } else { 1.5 };
         run(&mut auto, 100, false, cost);
         let late = run(&mut auto, 100, false, |fixed, i| cost(fixed, i + 100));
         assert!(late < 1.25, "{late} times the best after the change");
-        let held = (0..50).filter(|_| auto.choose(Pass::Primary, false) == Fixed::Demand).count();
+        let held = (0..50).filter(|_| auto.choose(Pass::Primary, false) == Schedule::Demand).count();
         assert!(held > 40, "{held} of 50");
     }
 
@@ -176,9 +155,9 @@ mod tests {
         assert!((0..100).all(|_| {
             let chosen = auto.choose(Pass::Glossy, false);
             auto.note(Pass::Glossy, 1.0, 1);
-            chosen != Fixed::Plain
+            chosen != Schedule::Plain
         }));
-        run(&mut auto, 20, true, |fixed, _| if fixed == Fixed::Plain { 1.0 } else { 2.0 });
-        assert_eq!(auto.choose(Pass::Primary, true), Fixed::Plain);
+        run(&mut auto, 20, true, |fixed, _| if fixed == Schedule::Plain { 1.0 } else { 2.0 });
+        assert_eq!(auto.choose(Pass::Primary, true), Schedule::Plain);
     }
 }

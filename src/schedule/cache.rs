@@ -11,42 +11,6 @@ pub const BATCH_BRICKS: usize = 8;
 /// Most bytes loaded at once: they take as much memory on their way to the device.
 const BATCH_BYTES: u64 = 64 << 20;
 
-/// Bytes of one brick's payloads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BrickBytes {
-    /// Nodes.
-    pub bvh: u64,
-    /// All that traversal reads, nodes counted.
-    pub geometry: u64,
-    /// What shading reads.
-    pub attributes: u64,
-}
-
-/// Bytes of everything that is streamed of a scene, as it is loaded.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct SceneBytes {
-    /// Of the bricks.
-    pub bricks: Vec<BrickBytes>,
-    /// Of the tiles of textures.
-    pub tiles: Vec<u64>,
-}
-
-impl SceneBytes {
-    /// What residency takes.
-    pub fn sizes(&self) -> Sizes {
-        let bricks = self.bricks.iter().map(|brick| (brick.geometry, brick.attributes)).collect();
-        Sizes { bricks, tiles: self.tiles.clone() }
-    }
-}
-
-/// Without a distinction between nodes and triangles.
-impl From<&Sizes> for SceneBytes {
-    fn from(sizes: &Sizes) -> Self {
-        let brick = |&(geometry, attributes): &(u64, u64)| BrickBytes { bvh: 0, geometry, attributes };
-        Self { bricks: sizes.bricks.iter().map(brick).collect(), tiles: sizes.tiles.clone() }
-    }
-}
-
 /// What is resident, what everything weighs, and what was asked for.
 pub struct Cache {
     /// Placement and eviction.
@@ -54,7 +18,9 @@ pub struct Cache {
     /// Its mirror for executors, with each brick's part in the pass.
     pub states: BrickStates,
     /// Bytes of everything.
-    pub bytes: SceneBytes,
+    pub sizes: Sizes,
+    /// Of bricks' geometry, bytes of nodes; of bricks beyond these it is not told apart.
+    pub nodes: Vec<u64>,
     /// Requests in order, when they are recorded.
     pub trace: Option<Trace>,
     /// Bytes of tiles that may still be loaded in this frame; `None` where every tile is waited for.
@@ -66,10 +32,10 @@ pub struct Cache {
 
 impl Cache {
     /// An empty cache over bricks and tiles of the given sizes.
-    pub fn new(residency: Residency, bytes: SceneBytes, trace: Option<Trace>) -> Self {
-        let states = BrickStates::new(bytes.bricks.len(), bytes.tiles.len());
-        let loaded_in = vec![0; bytes.sizes().rows()];
-        Self { residency, states, bytes, trace, tile_allowance: None, frame: 0, loaded_in }
+    pub fn new(residency: Residency, sizes: Sizes, nodes: Vec<u64>, trace: Option<Trace>) -> Self {
+        let states = BrickStates::new(sizes.bricks.len(), sizes.tiles.len());
+        let loaded_in = vec![0; sizes.rows()];
+        Self { residency, states, sizes, nodes, trace, tile_allowance: None, frame: 0, loaded_in }
     }
 
     /// Starts a pass: nothing is done, nothing is pinned.
@@ -85,7 +51,7 @@ impl Cache {
 
     /// Starts a frame that may load `tile_bytes` of tiles, one of them at least; with `None` it waits for every tile.
     pub fn begin_frame(&mut self, tile_bytes: Option<u64>) {
-        let largest = || self.bytes.tiles.iter().copied().max().unwrap_or(0);
+        let largest = || self.sizes.tiles.iter().copied().max().unwrap_or(0);
         self.tile_allowance = tile_bytes.map(|bytes| bytes.max(largest()));
     }
 
@@ -207,7 +173,7 @@ impl Cache {
             let bytes = self.residency.bytes(load.item);
             match load.item.kind {
                 Kind::Geometry => {
-                    let bvh = self.bytes.bricks[load.item.number as usize].bvh;
+                    let bvh = self.nodes.get(load.item.number as usize).map_or(0, |&bytes| bytes);
                     stats.bytes_bvh += bvh;
                     stats.bytes_geometry += bytes - bvh;
                 }

@@ -5,42 +5,28 @@
 //! An occlusion query for a tile is answered here by the traversal itself: no lists, no pairs. A ray that asked for
 //! nothing needs no brick that is missing, as hits only move nearer, so batches leave it out.
 
-use super::cache::Cache;
-use super::chc::{Batches, measure_needed};
-use super::{Executor, ExecutorError, Pass, Step, Tracing};
-use crate::counters::Counters;
+use super::{ExecutorError, Step, Tracer};
 
-/// Traces the rays of `pass`, after the steps in `first` have made them.
+/// Traces the rays of a pass, after the steps in `first` have made them.
 ///
 /// # Errors
 /// What the executor says.
-pub fn trace(
-    executor: &mut dyn Executor,
-    cache: &mut Cache,
-    pass: Pass,
-    first: &[Step],
-    tracing: &Tracing,
-    stats: &mut Counters,
-) -> Result<(), ExecutorError> {
-    let resident_before = cache.resident_geometry();
-    let optimisations = &tracing.optimisations;
-    let some_missing = !cache.states.all_geometry_resident();
-    let batches = Batches::new(pass, Step::IntersectAllBatch, optimisations);
-    let query = batches.query();
+pub fn trace(t: &mut Tracer, first: &[Step]) -> Result<(), ExecutorError> {
+    let resident_before = t.cache.resident_geometry();
+    let on = &t.tracing.optimisations;
+    let some_missing = !t.cache.states.all_geometry_resident();
+    let query = on.query(Step::IntersectAllBatch);
     let mut steps = first.to_vec();
     steps.push(Step::CountRays);
-    match (some_missing, optimisations.resident_first) {
+    match (some_missing, on.resident_first) {
         (false, _) => steps.push(Step::IntersectAll),
         (true, true) => steps.extend([Step::IntersectAllResident, query]),
         (true, false) => steps.push(query),
     }
-    let report = executor.run(pass, &steps, &cache.states)?;
-    if !some_missing || optimisations.resident_first {
-        cache.finish_resident(&report.used, some_missing, stats);
+    let report = t.executor.run(t.pass, &steps, &t.cache.states)?;
+    if !some_missing || on.resident_first {
+        t.cache.finish_resident(&report.used, some_missing, t.stats);
     }
-    batches.load_and_intersect(executor, cache, report, stats)?;
-    if tracing.measure_needed {
-        measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;
-    }
-    Ok(())
+    t.load_and_intersect(Step::IntersectAllBatch, report)?;
+    t.measure_needed(&resident_before)
 }

@@ -5,13 +5,9 @@
 //! traversal are queried, loaded nearest first and intersected as without fronts. Invisible pairs are queried in every
 //! frame and a pair is only ever left out by a query against present hits, so the final hits are exact.
 
-use super::by_tile::run;
-use super::cache::Cache;
-use super::chc::{Batches, measure_needed};
 use super::multi_query::batches;
 use super::pair_tree::{Front, PairTree, Square};
-use super::{Executor, ExecutorError, PairQuery, Pass, Step, Tracing};
-use crate::counters::Counters;
+use super::{ExecutorError, PairQuery, Pass, Step, Tracer};
 use bricks::Resident;
 use std::collections::BTreeMap;
 
@@ -37,10 +33,6 @@ pub struct FrontPass<'a> {
     pub extent: (u32, u32, u32),
     /// Frame, for lazy queries.
     pub frame: u32,
-    /// Which rays.
-    pub pass: Pass,
-    /// Measurements and optimisations.
-    pub tracing: &'a Tracing,
 }
 
 impl Fronts {
@@ -48,17 +40,10 @@ impl Fronts {
     ///
     /// # Errors
     /// What the executor says.
-    pub fn trace(
-        &mut self,
-        executor: &mut dyn Executor,
-        cache: &mut Cache,
-        setup: &FrontPass,
-        first: &[Step],
-        stats: &mut Counters,
-    ) -> Result<(), ExecutorError> {
+    pub fn trace(&mut self, t: &mut Tracer, setup: &FrontPass, first: &[Step]) -> Result<(), ExecutorError> {
         let (width, height, tile) = setup.extent;
         let top = &setup.resident.top2;
-        let state = setup.pass.visibility_state();
+        let state = t.pass.visibility_state();
         self.passes += 1;
         self.bound(FRONT_BYTES);
         let (tree, used) = self.trees.entry(state).or_insert_with(|| (PairTree::new(width, height, tile), 0));
@@ -66,10 +51,10 @@ impl Fronts {
         if !tree.fits(width, height, tile) {
             *tree = PairTree::new(width, height, tile);
         }
-        let tracing = setup.tracing;
-        let resident_before = cache.resident_geometry();
-        let ahead = tracing.optimisations.resident_first && !cache.states.all_geometry_resident();
-        let mut found = Found { setup, steps: Vec::new(), waiting: Vec::new(), used: Vec::new() };
+        let on = &t.tracing.optimisations;
+        let resident_before = t.cache.resident_geometry();
+        let ahead = on.resident_first && !t.cache.states.all_geometry_resident();
+        let mut found = Found { t, setup, steps: Vec::new(), waiting: Vec::new(), used: Vec::new() };
 
         // Phase 1: what was visible. Rays are counted by the step that bounds the tiles.
         let leaves = tree.leaves();
@@ -77,43 +62,44 @@ impl Fronts {
             leaves.into_iter().partition(|&i| matches!(tree.pair(i).front, Front::Visible { .. }));
         found.steps.extend(first);
         found.steps.push(Step::CountRays);
-        found.intersect(executor, cache, tree, &visible, stats)?;
+        found.intersect(tree, &visible)?;
 
         // Phases 2 and 3: query the invisible front; split what became visible until a front is reached again.
         let mut queue = if top.is_empty() { Vec::new() } else { invisible };
         let mut is_front = true;
         loop {
-            let seen = found.query(executor, cache, tree, &mut queue, is_front, stats)?;
+            let seen = found.query(tree, &mut queue, is_front)?;
             is_front = false;
             let (mut next, mut terminal) = (Vec::new(), Vec::new());
             for (&index, _) in queue.iter().zip(&seen).filter(|(_, rays)| **rays > 0) {
                 if tree.is_terminal(index, top) {
                     // Spread over the frames to come, so that not all fall due at once.
                     let later = 1 + index % REQUERY_FRAMES;
-                    let requery = if tracing.optimisations.lazy_requery { setup.frame + later } else { setup.frame };
+                    let requery = if on.lazy_requery { setup.frame + later } else { setup.frame };
                     tree.set_front(index, Front::Visible { requery });
                     terminal.push(index);
                 } else {
                     next.extend(tree.split(index, top, setup.frame));
                 }
             }
-            stats.queries_interval_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
+            found.t.stats.queries_interval_culled += seen.iter().filter(|&&rays| rays == 0).count() as u64;
             if next.is_empty() && terminal.is_empty() {
                 break;
             }
-            found.intersect(executor, cache, tree, &terminal, stats)?;
+            found.intersect(tree, &terminal)?;
             queue = next;
         }
         found.used.sort_unstable();
         found.used.dedup();
-        cache.touch_geometry(&found.used, ahead, stats);
+        found.t.cache.touch_geometry(&found.used, ahead, found.t.stats);
 
         // What is visible and missing: ask again, load, intersect.
         let waiting = std::mem::take(&mut found.waiting);
         if !waiting.is_empty() {
-            found.load(executor, cache, tree, &waiting, stats)?;
+            found.load(tree, &waiting)?;
         }
-        self.finish(executor, cache, setup, &resident_before, stats)
+        self.finish(t, setup)?;
+        t.measure_needed(&resident_before)
     }
 
     /// A visibility state, a ray (column, row) and a leaf of the top level that are not together in exactly one leaf
@@ -141,16 +127,9 @@ impl Fronts {
     }
 
     /// Lazy queries of the visible front against final hits, pull-up, and the statistics of the fronts.
-    fn finish(
-        &mut self,
-        executor: &mut dyn Executor,
-        cache: &mut Cache,
-        setup: &FrontPass,
-        resident_before: &[bool],
-        stats: &mut Counters,
-    ) -> Result<(), ExecutorError> {
-        let Some((tree, _)) = self.trees.get_mut(&setup.pass.visibility_state()) else { return Ok(()) };
-        let on = &setup.tracing.optimisations;
+    fn finish(&mut self, t: &mut Tracer, setup: &FrontPass) -> Result<(), ExecutorError> {
+        let Some((tree, _)) = self.trees.get_mut(&t.pass.visibility_state()) else { return Ok(()) };
+        let on = &t.tracing.optimisations;
         let (mut due, mut deferred) = (Vec::new(), 0);
         for index in tree.leaves() {
             match tree.pair(index).front {
@@ -159,31 +138,29 @@ impl Fronts {
                 Front::Invisible { .. } | Front::Inner => {}
             }
         }
-        stats.requeries_deferred += deferred;
+        t.stats.requeries_deferred += deferred;
         if !due.is_empty() {
-            let mut found = Found { setup, steps: Vec::new(), waiting: Vec::new(), used: Vec::new() };
-            let seen = found.query(executor, cache, tree, &mut due, false, stats)?;
+            let mut found = Found { t, setup, steps: Vec::new(), waiting: Vec::new(), used: Vec::new() };
+            let seen = found.query(tree, &mut due, false)?;
             for (&index, &rays) in due.iter().zip(&seen) {
                 let visible = Front::Visible { requery: setup.frame + REQUERY_FRAMES };
                 tree.set_front(index, if rays > 0 { visible } else { Front::Invisible { since: setup.frame } });
             }
         }
         if on.pull_up {
-            stats.pulled_up += tree.pull_up();
+            t.stats.pulled_up += tree.pull_up();
         }
         let fronts = tree.leaves();
         let visible = fronts.iter().filter(|&&i| matches!(tree.pair(i).front, Front::Visible { .. })).count();
-        stats.pairs_visible += visible as u64;
-        stats.pairs_invisible += (fronts.len() - visible) as u64;
-        if setup.tracing.measure_needed {
-            measure_needed(executor, cache, setup.pass, &[Step::Lists], resident_before, stats)?;
-        }
+        t.stats.pairs_visible += visible as u64;
+        t.stats.pairs_invisible += (fronts.len() - visible) as u64;
         Ok(())
     }
 }
 
 /// Visible pairs on their way to be intersected.
-struct Found<'a> {
+struct Found<'a, 'b> {
+    t: &'a mut Tracer<'b>,
     setup: &'a FrontPass<'a>,
     /// Steps of the next submission.
     steps: Vec<Step>,
@@ -193,41 +170,23 @@ struct Found<'a> {
     used: Vec<u32>,
 }
 
-impl Found<'_> {
-    /// Submits the steps so far.
-    fn run(
-        &mut self,
-        executor: &mut dyn Executor,
-        cache: &Cache,
-        stats: &mut Counters,
-    ) -> Result<super::Report, ExecutorError> {
-        let steps = std::mem::take(&mut self.steps);
-        run(executor, self.setup.pass, &steps, &cache.states, &self.setup.tracing.optimisations, stats)
-    }
-
+impl Found<'_, '_> {
     /// Asks how many rays see each of `pairs`, after the steps so far. Pairs of `is_front`, the invisible ones of the
     /// frame before, are asked for by multi-queries where that is on, and are put in the order of these.
-    fn query(
-        &mut self,
-        executor: &mut dyn Executor,
-        cache: &Cache,
-        tree: &PairTree,
-        pairs: &mut [u32],
-        is_front: bool,
-        stats: &mut Counters,
-    ) -> Result<Vec<u32>, ExecutorError> {
-        let on = &self.setup.tracing.optimisations;
+    fn query(&mut self, tree: &PairTree, pairs: &mut [u32], is_front: bool) -> Result<Vec<u32>, ExecutorError> {
+        let on = &self.t.tracing.optimisations;
         let queries = if is_front && on.multi_queries {
             multi_queries(tree, pairs, self.setup.frame)
         } else {
             pairs.iter().map(|&index| tree.query(index)).collect()
         };
         let nodes: Vec<u32> = pairs.iter().map(|&index| tree.pair(index).node).collect();
-        executor.set_pairs(&queries, &nodes)?;
+        self.t.executor.set_pairs(&queries, &nodes)?;
         self.steps.push(Step::QueryPairs { tighter: on.tighter_bounds });
-        let mut report = self.run(executor, cache, stats)?;
+        let mut report = self.t.run(&std::mem::take(&mut self.steps))?;
         self.used.extend(&report.used);
         let seen = std::mem::take(&mut report.pair_rays);
+        let stats = &mut *self.t.stats;
         stats.add(report);
         let mut first = 0;
         for query in &queries {
@@ -242,55 +201,41 @@ impl Found<'_> {
 
     /// Has the next submission intersect the pairs whose brick is resident, and lets the others wait. Without
     /// [`super::Optimisations::resident_first`] all are intersected now, as they are wanted.
-    fn intersect(
-        &mut self,
-        executor: &mut dyn Executor,
-        cache: &mut Cache,
-        tree: &PairTree,
-        pairs: &[u32],
-        stats: &mut Counters,
-    ) -> Result<(), ExecutorError> {
-        if !self.setup.tracing.optimisations.resident_first && !cache.states.all_geometry_resident() {
-            return self.load(executor, cache, tree, pairs, stats);
+    fn intersect(&mut self, tree: &PairTree, pairs: &[u32]) -> Result<(), ExecutorError> {
+        let states = &self.t.cache.states;
+        if !self.t.tracing.optimisations.resident_first && !states.all_geometry_resident() {
+            return self.load(tree, pairs);
         }
         let mut present = Vec::new();
         for &index in pairs {
             let brick = brick_of(tree, self.setup.resident, index);
-            if cache.states.geometry(brick as usize).is_some() {
+            if states.geometry(brick as usize).is_some() {
                 present.push(index);
             } else {
                 self.waiting.push(index);
             }
         }
-        self.set_lists(executor, tree, &present)?;
+        self.set_lists(tree, &present)?;
         self.steps.push(Step::IntersectResident);
         Ok(())
     }
 
     /// Asks which of the pairs are still wanted, loads and intersects them.
-    fn load(
-        &mut self,
-        executor: &mut dyn Executor,
-        cache: &mut Cache,
-        tree: &PairTree,
-        pairs: &[u32],
-        stats: &mut Counters,
-    ) -> Result<(), ExecutorError> {
+    fn load(&mut self, tree: &PairTree, pairs: &[u32]) -> Result<(), ExecutorError> {
         if pairs.is_empty() {
             return Ok(());
         }
         // Other pairs than before may name the same bricks.
-        cache.states.begin_pass();
-        self.set_lists(executor, tree, pairs)?;
-        let batches = Batches::new(self.setup.pass, Step::IntersectBatch, &self.setup.tracing.optimisations);
-        self.steps.push(batches.query());
-        let report = self.run(executor, cache, stats)?;
-        batches.load_and_intersect(executor, cache, report, stats)
+        self.t.cache.states.begin_pass();
+        self.set_lists(tree, pairs)?;
+        self.steps.push(self.t.tracing.optimisations.query(Step::IntersectBatch));
+        let report = self.t.run(&std::mem::take(&mut self.steps))?;
+        self.t.load_and_intersect(Step::IntersectBatch, report)
     }
 
     /// Lists leaves of the pairs by tile.
-    fn set_lists(&mut self, executor: &mut dyn Executor, tree: &PairTree, pairs: &[u32]) -> Result<(), ExecutorError> {
-        let near = self.setup.tracing.optimisations.front_to_back;
+    fn set_lists(&mut self, tree: &PairTree, pairs: &[u32]) -> Result<(), ExecutorError> {
+        let near = self.t.tracing.optimisations.front_to_back;
         let mut lists = vec![Vec::new(); tree.tiles()];
         for &index in pairs {
             let pair = tree.pair(index);
@@ -298,7 +243,7 @@ impl Found<'_> {
             lists[tree.tile_index(pair.square)].push(if near { pair.node } else { leaf });
         }
         lists.iter_mut().for_each(|list| list.sort_unstable());
-        executor.set_lists(&lists)?;
+        self.t.executor.set_lists(&lists)?;
         if near {
             self.steps.push(Step::SortNodesNear);
         }

@@ -11,14 +11,16 @@
 
 pub mod attributes;
 pub mod auto;
-mod by_tile;
 pub mod cache;
-pub mod chc;
-pub mod demand;
+mod chc;
+mod demand;
 mod executor;
+#[cfg(feature = "lab")]
 pub mod fronts;
+#[cfg(feature = "lab")]
 mod multi_query;
 pub mod optimisations;
+#[cfg(feature = "lab")]
 mod pair_tree;
 mod pass;
 pub mod plain;
@@ -26,6 +28,7 @@ pub mod pool;
 mod report;
 mod states;
 mod step;
+mod tracer;
 
 pub use executor::{Executor, ExecutorError, Load, Tracing};
 pub use optimisations::{Optimisation, Optimisations, PartOf};
@@ -33,3 +36,21 @@ pub use pass::{Lamp, Pass};
 pub use report::{Demand, OWN_COUNTERS, Report, TileDemand};
 pub use states::BrickStates;
 pub use step::{Over, Own, PairQuery, Query, Shading, Step};
+pub use tracer::Tracer;
+
+use crate::settings::Schedule;
+
+/// Traces the rays of a pass by a schedule, after the steps in `first` have made them. Rays that `auto` has not measured
+/// go by `demand`.
+///
+/// # Errors
+/// A brick that cannot be read, or the device's.
+pub fn trace(t: &mut Tracer, schedule: Schedule, first: &[Step]) -> Result<(), ExecutorError> {
+    match schedule {
+        Schedule::Chc => chc::trace(t, first),
+        Schedule::Demand | Schedule::Auto => demand::trace(t, first),
+        Schedule::Plain => plain::trace(t, Step::IntersectAll, first),
+        #[cfg(feature = "lab")]
+        Schedule::PlainBinary => plain::trace(t, Step::IntersectBinary, first),
+    }
+}

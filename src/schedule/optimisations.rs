@@ -1,9 +1,7 @@
 //! The optimisations of CHC+RT, each of which can be switched off by itself. They change what is asked, loaded
 //! and intersected when, never a hit.
 
-use crate::settings::removed::unknown;
-use crate::settings::value::value_of_name;
-use std::str::FromStr;
+use crate::settings::names;
 
 /// What an optimisation is a part of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,14 +15,15 @@ pub enum PartOf {
 }
 
 macro_rules! optimisations {
-    ($($(#[$doc:meta])* $variant:ident, $field:ident = $name:literal, $part:ident;)*) => {
-        /// One of the optimisations.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        pub enum Optimisation { $($(#[$doc])* $variant,)* }
+    ($($(#[doc = $doc:literal])* $variant:ident, $field:ident = $name:literal, $part:ident;)*) => {
+        names! {
+            /// One of the optimisations.
+            Optimisation { $($(#[doc = $doc])* $variant = $name,)* }
+        }
 
         /// Which optimisations are on.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub struct Optimisations { $($(#[$doc])* pub $field: bool,)* }
+        pub struct Optimisations { $($(#[doc = $doc])* pub $field: bool,)* }
 
         impl Default for Optimisations {
             fn default() -> Self {
@@ -33,11 +32,6 @@ macro_rules! optimisations {
         }
 
         impl Optimisation {
-            /// All of them.
-            pub const ALL: &[Self] = &[$(Self::$variant,)*];
-            /// Their names on the command line, in the same order.
-            pub const NAMES: &[&str] = &[$($name,)*];
-
             /// What it is a part of.
             pub fn part_of(self) -> PartOf {
                 match self { $(Self::$variant => PartOf::$part,)* }
@@ -84,24 +78,6 @@ optimisations! {
     /// so.
     PullUp, pull_up = "pull-up", Fronts;
 }
-
-impl Optimisation {
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-}
-
-impl FromStr for Optimisation {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let found = Self::ALL.iter().copied().find(|which| which.name() == text);
-        found.ok_or_else(|| unknown(text, Self::NAMES, &[]))
-    }
-}
-
-value_of_name!(Optimisation);
 
 #[cfg(test)]
 mod tests {

@@ -1,8 +1,7 @@
 //! The schedules `plain` and `plain-bvh2`: everything resident, every ray from the root. The baselines.
 
 use super::cache::Cache;
-use super::chc::measure_needed;
-use super::{Executor, ExecutorError, Pass, Step, Tracing};
+use super::{Executor, ExecutorError, Step, Tracer};
 use crate::counters::Counters;
 use crate::stream::Item;
 
@@ -27,54 +26,15 @@ pub fn make_all_resident(
     Ok(())
 }
 
-/// Traces the rays of `pass`, after the steps in `first` have made them.
+/// Traces the rays of a pass by `intersect`, after the steps in `first` have made them.
 ///
 /// # Errors
 /// What the executor says.
-pub fn trace(
-    executor: &mut dyn Executor,
-    cache: &mut Cache,
-    pass: Pass,
-    first: &[Step],
-    tracing: &Tracing,
-    stats: &mut Counters,
-) -> Result<(), ExecutorError> {
-    trace_by(Step::IntersectAll, executor, cache, pass, first, tracing, stats)
-}
-
-/// [`trace`] by binary trees, which the executor has been made ready for.
-///
-/// # Errors
-/// What the executor says.
-pub fn trace_binary(
-    executor: &mut dyn Executor,
-    cache: &mut Cache,
-    pass: Pass,
-    first: &[Step],
-    tracing: &Tracing,
-    stats: &mut Counters,
-) -> Result<(), ExecutorError> {
-    trace_by(Step::IntersectBinary, executor, cache, pass, first, tracing, stats)
-}
-
-fn trace_by(
-    intersect: Step,
-    executor: &mut dyn Executor,
-    cache: &mut Cache,
-    pass: Pass,
-    first: &[Step],
-    tracing: &Tracing,
-    stats: &mut Counters,
-) -> Result<(), ExecutorError> {
-    let resident_before = cache.resident_geometry();
-    make_all_resident(executor, cache, stats)?;
-    let mut steps = first.to_vec();
-    steps.extend([Step::CountRays, intersect]);
-    let report = executor.run(pass, &steps, &cache.states)?;
-    cache.finish_resident(&report.used, false, stats);
-    stats.add(report);
-    if tracing.measure_needed {
-        measure_needed(executor, cache, pass, &[Step::Lists], &resident_before, stats)?;
-    }
-    Ok(())
+pub fn trace(t: &mut Tracer, intersect: Step, first: &[Step]) -> Result<(), ExecutorError> {
+    let resident_before = t.cache.resident_geometry();
+    make_all_resident(t.executor, t.cache, t.stats)?;
+    let report = t.executor.run(t.pass, &[first, &[Step::CountRays, intersect]].concat(), &t.cache.states)?;
+    t.cache.finish_resident(&report.used, false, t.stats);
+    t.stats.add(report);
+    t.measure_needed(&resident_before)
 }

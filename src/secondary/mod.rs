@@ -1,5 +1,6 @@
 //! Approximate visibility: what stands for geometry that is not looked at, and how rays are answered by it.
 
+#[cfg(feature = "lab")]
 pub mod df;
 pub mod dvf;
 pub mod occupancy;
@@ -18,7 +19,8 @@ names! {
         Roma = "roma",
         /// By occupancy maps where these find them free, else by tracing them.
         Auto = "auto",
-        /// By distance fields, those that occupancy maps can answer.
+        /// By distance fields, those that occupancy maps can answer: a baseline.
+        #[cfg(feature = "lab")]
         Df = "df",
         /// By fields of visibility, those to the environment.
         Dvf = "dvf",
@@ -26,5 +28,10 @@ names! {
 }
 
 /// The kernels of all methods: what is compared on both executors.
-pub static FAMILIES: [&Family; 4] =
-    [&df::kernels::FAMILY, &dvf::kernels::FAMILY, &roma::kernels::FAMILY, &rsm::kernels::FAMILY];
+pub static FAMILIES: &[&Family] = &[
+    #[cfg(feature = "lab")]
+    &df::kernels::FAMILY,
+    &dvf::kernels::FAMILY,
+    &roma::kernels::FAMILY,
+    &rsm::kernels::FAMILY,
+];

@@ -108,7 +108,7 @@ impl Device {
                 Ok(Box::new(CpuExecutor::new(scene, workers, setup)?))
             }
             Self::Gpu(gpu) => {
-                require(&gpu, &probe::run(&gpu.device, &gpu.queue).checks)?;
+                require(&gpu, &probe::run(&gpu).checks)?;
                 let workers = Workers::new(scene.clone(), host, threads)?;
                 let executor = GpuExecutor::new(*gpu, scene, workers, page_sizes, setup)?;
                 require(executor.gpu(), &probe::compare_pipelines(&executor))?;

@@ -31,7 +31,7 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
     let has_short_rays = has_short_rays(renderer);
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
-    let fits = renderer.cache.residency.budget_bytes() >= renderer.cache.bytes.sizes().sum();
+    let fits = renderer.cache.residency.budget_bytes() >= renderer.cache.sizes.sum();
     let all: [(bool, LeftOut); 7] = [
         (
             fits,

@@ -3,11 +3,11 @@
 use super::device::Device;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::schedule::ExecutorError;
-use crate::schedule::cache::{BrickBytes, Cache, SceneBytes};
+use crate::schedule::cache::Cache;
 use crate::session::Settings;
 use crate::settings::sizes::{human_bytes, option_bytes};
 use crate::settings::{CacheSize, Schedule};
-use crate::stream::{HostCache, Residency, ResidencyError, Sizes, Trace};
+use crate::stream::{HostCache, PayloadSource, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
 use std::path::Path;
@@ -49,22 +49,6 @@ pub struct Needs<'a> {
 /// It is missing, no scene, or damaged.
 pub fn open_scene(path: &Path) -> Result<Arc<SceneFile>> {
     Ok(Arc::new(SceneFile::open(path)?))
-}
-
-/// Bytes of every brick's payloads as they are loaded.
-pub fn brick_bytes(scene: &SceneFile) -> Vec<BrickBytes> {
-    let record = |b: &bricks::Brick| BrickBytes {
-        bvh: u64::from(b.node_count) * size_of::<bricks::Node>() as u64,
-        geometry: b.geometry.bytes,
-        attributes: bricks::AttributeLayout::of(b).bytes,
-    };
-    scene.resident().bricks.iter().map(record).collect()
-}
-
-/// Bytes of everything that is streamed of a scene, as it is loaded.
-pub fn scene_bytes(scene: &SceneFile) -> SceneBytes {
-    let tiles = scene.resident().tiles.iter().map(|tile| tile.bytes).collect();
-    SceneBytes { bricks: brick_bytes(scene), tiles }
 }
 
 /// Room for which an allocation that fails is not tried with half of it.
@@ -157,18 +141,17 @@ impl Opened {
     ) -> Result<Self> {
         let name = path.display();
         let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
-        let bytes = scene_bytes(&scene);
-        let sizes = bytes.sizes();
+        let sizes = scene.sizes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
         let budget = cache_budget(settings.cache, &sizes, page_bytes, room);
         let schedule = match settings.schedule {
-            Schedule::Plain | Schedule::PlainBinary if budget < for_all => bail!(
+            schedule if schedule.is_plain() && budget < for_all => bail!(
                 "{name}: --schedule {} keeps everything resident: give --cache 100% ({for_all} bytes) rather than \
                  {budget} bytes, or use --schedule chc",
                 settings.schedule
             ),
             // Fronts and thresholds belong to chc; with a threshold the schedule shows in the picture.
-            Schedule::Auto if settings.fronts || settings.query_threshold > 0 => Schedule::Chc,
+            Schedule::Auto if settings.has_fronts() || settings.query_threshold > 0 => Schedule::Chc,
             schedule => schedule,
         };
         let policy = settings.evict;
@@ -203,10 +186,13 @@ impl Opened {
         let threads = settings.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
         let mut executor = make(needs).with_context(|| format!("{name}"))?;
+        let node = size_of::<bricks::Node>() as u64;
+        let nodes = scene.resident().bricks.iter().map(|brick| u64::from(brick.node_count) * node).collect();
+        #[cfg(feature = "lab")]
         if schedule == Schedule::PlainBinary {
             executor.make_binary().with_context(|| format!("{name}"))?;
         }
-        Ok(Self { scene, executor, cache: Cache::new(residency, bytes, trace), schedule, extent, warnings })
+        Ok(Self { scene, executor, cache: Cache::new(residency, sizes, nodes, trace), schedule, extent, warnings })
     }
 
     /// Writes the trace of requests, if the settings ask for one.
@@ -215,7 +201,7 @@ impl Opened {
     /// The file cannot be written.
     pub fn write_requests(settings: &Settings, cache: &Cache) -> Result<()> {
         if let (Some(file), Some(trace)) = (&settings.requests_out, &cache.trace) {
-            trace.write_file(file).with_context(|| file.display().to_string())?;
+            trace.write_file(file)?;
         }
         Ok(())
     }

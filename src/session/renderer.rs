@@ -5,8 +5,10 @@ use super::opened::Opened;
 use crate::frame::{Effects, Engine, Light, Methods, Moved, Occlusion, RenderSettings, Renderer};
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
+#[cfg(feature = "lab")]
 use crate::schedule::fronts::Fronts;
 use crate::secondary::Method;
+#[cfg(feature = "lab")]
 use crate::secondary::df::answer::Df;
 use crate::secondary::roma::answer::Roma;
 use crate::session::Settings;
@@ -38,6 +40,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         light,
         size: (extent.width, extent.height),
         tile: extent.tile,
+        #[cfg(feature = "lab")]
         fronts: settings.fronts.then(Fronts::default),
         auto: Auto::default(),
         captures: None,
@@ -49,13 +52,14 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
 /// The methods that answer secondary rays; a field of visibility is made or read later.
 pub fn methods(settings: &Settings) -> Methods {
     let mut methods = Methods::default();
-    let (roma, df) = (&settings.roma, &settings.df);
+    let roma = &settings.roma;
     match settings.secondary {
         Method::Roma | Method::Auto => {
             let is_auto = settings.secondary == Method::Auto;
             methods.set(Roma::new(roma.settings(settings.rsm.settings(), is_auto), roma.bom));
         }
-        Method::Df => methods.set(Df::new(df.settings(), roma.bom)),
+        #[cfg(feature = "lab")]
+        Method::Df => methods.set(Df::new(settings.df.clone(), roma.bom)),
         Method::Exact | Method::Dvf => {}
     }
     methods

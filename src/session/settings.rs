@@ -5,13 +5,14 @@ use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
 use crate::schedule::{Optimisation, Optimisations, PartOf};
-use crate::secondary::{Method, df, dvf, roma, rsm};
+#[cfg(feature = "lab")]
+use crate::secondary::df;
+use crate::secondary::{Method, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
-    Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Rectangle, Rule, Schedule,
+    Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Policy, Rectangle, Rule, Schedule,
     SettingsError, Turn, settings,
 };
-use crate::stream::Policy;
 use std::path::PathBuf;
 
 #[cfg(test)]
@@ -142,6 +143,7 @@ settings! {
         /// Width and height of a screen tile.
         tile: u32 = 64, "--tile PIXELS", Rule::PowerOfTwo(8, 512), "pixels", Schedule, Expert;
         /// Keep query pairs of tiles and nodes from frame to frame (schedule chc).
+        #[cfg(feature = "lab")]
         fronts: bool = false, "--fronts on|off", Rule::Any, "", Schedule, Expert;
         /// Leave a brick out of a tile where at most this many of its rays could see it; 0 is exact. The number is
         /// scaled to a tile of 200x200 pixels. More loads less and misses hits.
@@ -179,6 +181,7 @@ settings! {
         /// Reflective shadow maps.
         rsm: rsm::Options,
         /// Distance fields.
+        #[cfg(feature = "lab")]
         df: df::Options,
         /// Fields of visibility.
         dvf: dvf::Options,
@@ -204,12 +207,12 @@ impl Settings {
             )));
         }
         let is_chc = matches!(self.schedule, Schedule::Chc | Schedule::Auto);
-        let is_plain = matches!(self.schedule, Schedule::Plain | Schedule::PlainBinary);
+        let is_plain = self.schedule.is_plain();
         for which in &self.without {
             let (has_meaning, belongs) = match which.part_of() {
                 PartOf::Loading => (!is_plain, "--schedule chc, demand or auto"),
                 PartOf::Lists => (is_chc, "--schedule chc or auto"),
-                PartOf::Fronts => (is_chc && self.fronts, "--fronts on (schedule chc)"),
+                PartOf::Fronts => (is_chc && self.has_fronts(), "--fronts on (schedule chc)"),
             };
             if !has_meaning {
                 let text = format!("--without {}: it belongs to {belongs}", which.name());
@@ -223,7 +226,7 @@ impl Settings {
     pub fn without_effect(&self) -> Vec<String> {
         let effects = self.effects;
         let maps = matches!(self.secondary, Method::Roma | Method::Auto);
-        let fields = self.secondary == Method::Df;
+        let fields = self.secondary.name() == "df";
         let lit = self.environment.is_some();
         let needs: [(&str, bool, &str); 16] = [
             ("ao_rays", effects.ao, "--effects ao"),
@@ -252,6 +255,14 @@ impl Settings {
             (!has_effect && !is_default).then(|| format!("--{flag} does nothing here; it belongs to {belongs}"))
         };
         Self::entries().iter().filter_map(idle).collect()
+    }
+
+    /// Whether `chc` keeps query pairs from frame to frame.
+    pub fn has_fronts(&self) -> bool {
+        #[cfg(feature = "lab")]
+        return self.fronts;
+        #[cfg(not(feature = "lab"))]
+        false
     }
 
     /// Which optimisations are on.

@@ -18,8 +18,8 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
     let Session { file, settings: s, renderer, lighting, resolve, field, stops, .. } = session;
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
-    let (streamed_bytes, tile_bytes) =
-        (renderer.cache.bytes.sizes().sum(), renderer.cache.bytes.tiles.iter().sum::<u64>());
+    let sizes = &renderer.cache.sizes;
+    let (streamed_bytes, tile_bytes) = (sizes.sum(), sizes.tiles.iter().sum::<u64>());
     let brick_bytes = streamed_bytes - tile_bytes;
     let mut reports: Map<String, Value> =
         renderer.methods.iter().flat_map(|method| method.report()).map(|(name, value)| (name.into(), value)).collect();
@@ -49,7 +49,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "diffuse_rays": s.diffuse_rays,
             "rotation_degrees": s.rotation.0,
             "schedule": renderer.settings.schedule.name(),
-            "fronts": if s.fronts { "on" } else { "off" },
+            "fronts": if s.has_fronts() { "on" } else { "off" },
             "without": without(s),
             "query_threshold": s.query_threshold,
             "tile": s.tile,

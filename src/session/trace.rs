@@ -8,12 +8,11 @@ pub use given::{Approach, DeviceRay, approach, check, device_ray};
 use super::opened::Opened;
 use crate::counters::Counters;
 use crate::kernels::frame::Frame;
-use crate::kernels::layout;
 use crate::kernels::layout::{NONE, Params};
-use crate::kernels::{Directions, Extent, FrameExecutor, View};
+use crate::kernels::{Directions, Extent, FrameExecutor, View, layout};
 use crate::output::npy::{Hit, Ray};
 use crate::schedule::cache::Cache;
-use crate::schedule::{Lamp, Pass, Step, Tracing, attributes, chc, demand, plain};
+use crate::schedule::{self, Lamp, Pass, Step, Tracer, Tracing, attributes};
 use crate::session::Settings;
 use crate::settings::{ImageSize, Schedule};
 use anyhow::Result;
@@ -178,14 +177,8 @@ pub fn trace_device(
     executor.begin_frame(&View { frame: *frame, params: Params::default(), directions: Directions::default() });
     executor.set_rays(pass, rays);
     cache.begin_pass("trace", 0);
-    let trace = match traced.schedule {
-        // Rays that are given have nothing in common that tiles could use.
-        Schedule::Demand | Schedule::Auto => demand::trace,
-        Schedule::Chc => chc::trace,
-        Schedule::Plain => plain::trace,
-        Schedule::PlainBinary => plain::trace_binary,
-    };
-    trace(executor, cache, pass, &[Step::StartHits], &Tracing::default(), stats)?;
+    let mut tracer = Tracer { executor: &mut *executor, cache, pass, tracing: &Tracing::default(), stats };
+    schedule::trace(&mut tracer, traced.schedule, &[Step::StartHits])?;
     let mut hits = executor.read_hits(pass)?;
     hits.truncate(rays.len());
     Ok(hits)

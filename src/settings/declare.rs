@@ -17,7 +17,7 @@
 /// }
 /// ```
 ///
-/// A setting has a type, which is a [`Value`](super::Value), a default, its form on the command line, a rule, a unit, a
+/// `#[cfg(..)]` after its description leaves a setting or a table out of a build. A setting has a type, which is a [`Value`](super::Value), a default, its form on the command line, a rule, a unit, a
 /// heading and a level. The structure, its default, [`Group`] and serde's traits follow.
 macro_rules! settings {
     (
@@ -25,23 +25,24 @@ macro_rules! settings {
         pub struct $name:ident {
             $(
                 $(#[doc = $help:literal])+
+                $(#[cfg($on:meta)])?
                 $field:ident: $type:ty = $default:expr, $usage:literal, $rule:expr, $unit:literal, $heading:ident, $level:ident;
             )*
         }
-        $(tables { $($(#[doc = $about:literal])+ $table:ident: $group:ty,)* })?
+        $(tables { $($(#[doc = $about:literal])+ $(#[cfg($with:meta)])? $table:ident: $group:ty,)* })?
     ) => {
         $(#[doc = $doc])*
         #[derive(Clone, Debug, PartialEq)]
         pub struct $name {
-            $($(#[doc = $help])+ pub $field: $type,)*
-            $($($(#[doc = $about])+ pub $table: $group,)*)?
+            $($(#[doc = $help])+ $(#[cfg($on)])? pub $field: $type,)*
+            $($($(#[doc = $about])+ $(#[cfg($with)])? pub $table: $group,)*)?
         }
 
         impl Default for $name {
             fn default() -> Self {
                 Self {
-                    $($field: $default,)*
-                    $($($table: Default::default(),)*)?
+                    $($(#[cfg($on)])? $field: $default,)*
+                    $($($(#[cfg($with)])? $table: Default::default(),)*)?
                 }
             }
         }
@@ -49,6 +50,7 @@ macro_rules! settings {
         impl $name {
             /// The settings, tables apart.
             pub const FIELDS: &[$crate::settings::Field] = &[$(
+                $(#[cfg($on)])?
                 $crate::settings::Field {
                     key: stringify!($field),
                     usage: $usage,
@@ -74,18 +76,20 @@ macro_rules! settings {
                 #[allow(unused_mut)]
                 let mut all: Vec<_> = own.collect();
                 $($(
-                    let tables = <$group as $crate::settings::Group>::entries().into_iter();
-                    all.extend(tables.map(|entry| $crate::settings::Entry { table: stringify!($table), ..entry }));
+                    $(#[cfg($with)])?
+                    for entry in <$group as $crate::settings::Group>::entries() {
+                        all.push($crate::settings::Entry { table: stringify!($table), ..entry });
+                    }
                 )*)?
                 all
             }
 
             fn get(&self, key: &str) -> Option<$crate::settings::Plain> {
                 match key.split_once('.') {
-                    $($(Some((stringify!($table), key)) => $crate::settings::Group::get(&self.$table, key),)*)?
+                    $($($(#[cfg($with)])? Some((stringify!($table), key)) => $crate::settings::Group::get(&self.$table, key),)*)?
                     Some(_) => None,
                     None => match key {
-                        $(stringify!($field) => Some($crate::settings::Value::plain(&self.$field)),)*
+                        $($(#[cfg($on)])? stringify!($field) => Some($crate::settings::Value::plain(&self.$field)),)*
                         _ => None,
                     },
                 }
@@ -93,13 +97,13 @@ macro_rules! settings {
 
             fn set(&mut self, key: &str, text: &str) -> Result<(), $crate::settings::SettingsError> {
                 match key.split_once('.') {
-                    $($(Some((table @ stringify!($table), inner)) => {
+                    $($($(#[cfg($with)])? Some((table @ stringify!($table), inner)) => {
                         let set = $crate::settings::Group::set(&mut self.$table, inner, text);
                         return set.map_err(|error| error.within(table));
                     })*)?
                     Some(_) => {}
                     None => match key {
-                        $(stringify!($field) => {
+                        $($(#[cfg($on)])? stringify!($field) => {
                             let value = $crate::settings::Value::read(text, $rule, $unit);
                             self.$field = value.map_err(|why| $crate::settings::SettingsError::wrong(key, why))?;
                             return Ok(());

@@ -1,22 +1,24 @@
 //! Closed sets of names.
 
 /// Declares an enum of named values: their names, reading, printing, and [`Value`](crate::settings::Value). Names after
-/// `later` are refused as not being in this version.
+/// `later` are refused as not being in this version. `#[cfg(..)]` after its description leaves a value out of a build.
 macro_rules! names {
-    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* } $(later $later:expr)?) => {
+    ($(#[$doc:meta])* $name:ident {
+        $($(#[doc = $vdoc:literal])* $(#[cfg($on:meta)])? $variant:ident = $text:literal,)*
+    } $(later $later:expr)?) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        pub enum $name { $($(#[$vdoc])* $variant,)* }
+        pub enum $name { $($(#[doc = $vdoc])* $(#[cfg($on)])? $variant,)* }
 
         impl $name {
             /// All of them, in their order.
-            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+            pub const ALL: &[Self] = &[$($(#[cfg($on)])? Self::$variant,)*];
             /// Their names, in the same order.
-            pub const NAMES: &[&str] = &[$($text,)*];
+            pub const NAMES: &[&str] = &[$($(#[cfg($on)])? $text,)*];
 
             /// The value's name.
             pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $text,)* }
+                match self { $($(#[cfg($on)])? Self::$variant => $text,)* }
             }
         }
 

@@ -1,10 +1,8 @@
 //! Types of settings that are no plain numbers.
 
 use super::names::names;
-use super::removed::unknown;
 use super::sizes::{CacheSize, ImageSize};
 use super::value::{Plain, Rule, Value, value_of_text};
-use crate::stream::Policy;
 use glam::DVec3;
 use std::convert::Infallible;
 use std::fmt;
@@ -20,10 +18,30 @@ names! {
         Demand = "demand",
         /// Everything resident, one traversal per ray.
         Plain = "plain",
-        /// The same over binary trees.
+        /// The same over binary trees: a baseline.
+        #[cfg(feature = "lab")]
         PlainBinary = "plain-bvh2",
         /// The cheapest of the first three, pass by pass.
         Auto = "auto",
+    }
+}
+
+impl Schedule {
+    /// Whether it keeps everything resident.
+    pub fn is_plain(self) -> bool {
+        !matches!(self, Self::Chc | Self::Demand | Self::Auto)
+    }
+}
+
+names! {
+    /// What is overwritten when the cache is full.
+    Policy {
+        /// Write at the next position, wrap, evict what is overlapped (the paper's cache).
+        RoundRobin = "round-robin",
+        /// Round robin that passes over once what was used, and stays in place where a cycle of requests does not fit.
+        SecondChance = "second-chance",
+        /// Evict what was not used for longest.
+        Lru = "lru",
     }
 }
 
@@ -279,31 +297,12 @@ impl fmt::Display for Adapter {
 
 value_of_text!(CacheSize, ImageSize, Environment, Adapter; false);
 
-impl Value for Policy {
-    const NAMES: &'static [&'static str] = &["round-robin", "second-chance", "lru"];
-
-    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
-        let found = Self::ALL.iter().copied().find(|value| value.name() == text);
-        found.ok_or_else(|| unknown(text, <Self as Value>::NAMES, &[]))
-    }
-
-    fn plain(&self) -> Plain {
-        Plain::Text(self.name().into())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn read<T: Value>(text: &str) -> Result<T, String> {
         T::read(text, Rule::Any, "")
-    }
-
-    #[test]
-    fn names_of_policies_are_all_there() {
-        assert_eq!(Policy::ALL.map(Policy::name), Policy::NAMES);
-        assert!(read::<Policy>("mru").unwrap_err().contains("lru"));
     }
 
     #[test]

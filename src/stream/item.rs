@@ -1,5 +1,6 @@
-//! What is streamed and where it lies: items, slots, policies.
+//! What is streamed and where it lies: items, slots.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
@@ -19,8 +20,9 @@ impl Kind {
     pub const ALL: [Self; 3] = [Self::Geometry, Self::Attributes, Self::Tile];
 }
 
-/// One streamed payload: the unit that is loaded, placed and evicted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+/// One streamed payload: the unit that is loaded, placed and evicted. Serialised it is its short form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub struct Item {
     /// Number of the brick, or of the tile.
     pub number: u32,
@@ -62,6 +64,20 @@ impl Item {
             Kind::Attributes => format!("a{}", self.number),
             Kind::Tile => format!("t{}", self.number),
         }
+    }
+}
+
+impl From<Item> for String {
+    fn from(item: Item) -> Self {
+        item.code()
+    }
+}
+
+impl TryFrom<String> for Item {
+    type Error = ParseItemError;
+
+    fn try_from(text: String) -> Result<Self, ParseItemError> {
+        text.parse()
     }
 }
 
@@ -107,48 +123,4 @@ pub struct Slot {
     pub page: u32,
     /// Bytes from the start of the page, a multiple of 16.
     pub offset: u32,
-}
-
-/// What is overwritten when the cache is full.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Policy {
-    /// Write at the next position, wrap, evict what is overlapped (the paper's cache).
-    #[default]
-    RoundRobin,
-    /// Round robin that passes over once what was used, and stays in place where a cycle of requests does not fit.
-    SecondChance,
-    /// Evict what was not used for longest.
-    Lru,
-}
-
-impl Policy {
-    /// Every policy, in the order of the command line's help.
-    pub const ALL: [Self; 3] = [Self::RoundRobin, Self::SecondChance, Self::Lru];
-
-    /// The name used on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::RoundRobin => "round-robin",
-            Self::SecondChance => "second-chance",
-            Self::Lru => "lru",
-        }
-    }
-}
-
-impl fmt::Display for Policy {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Policy {
-    type Err = String;
-
-    /// Reads a [`Self::name`]; the error is one line for the user.
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL
-            .into_iter()
-            .find(|policy| policy.name() == text)
-            .ok_or_else(|| format!("{text:?} is not a policy: expected round-robin, second-chance or lru"))
-    }
 }

@@ -29,10 +29,11 @@ mod workers;
 #[cfg(test)]
 mod tests;
 
+pub use crate::settings::Policy;
 pub use host_cache::{HostCache, HostCacheStats, Reservation};
-pub use item::{Item, Kind, ParseItemError, Policy, Slot};
+pub use item::{Item, Kind, ParseItemError, Slot};
 pub use residency::{Counters, KindCounters, NoRoom, Placed, Residency, ResidencyError};
 pub use sizes::Sizes;
 pub use source::{PayloadSource, SourceError};
 pub use trace::{PassRequests, Replay, ReplayResult, Trace, TraceError, replay};
-pub use workers::{Destination, Loaded, StreamError, WorkerPool, Workers, WorkersStats};
+pub use workers::{Destination, Loaded, StreamError, Workers, WorkersStats};

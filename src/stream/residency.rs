@@ -1,10 +1,11 @@
 //! Which items are on the device and where: a pure, deterministic state machine without threads, clocks or a device.
 
-use super::item::{Item, Kind, Policy, Slot};
+use super::item::{Item, Kind, Slot};
 use super::lru::Lru;
 use super::ring::Ring;
 use super::sizes::Sizes;
 use super::space::Space;
+use crate::settings::Policy;
 
 /// Alignment in bytes of sizes, offsets and the budget.
 const ALIGN: u64 = 16;
@@ -107,47 +108,24 @@ impl KindCounters {
     }
 }
 
-/// What happened since the cache was made: resident = loaded − evicted, per kind, in items and in bytes.
+/// What happened since the cache was made, by kind: resident = loaded − evicted, in items and in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Of geometry.
-    pub geometry: KindCounters,
-    /// Of attributes.
-    pub attributes: KindCounters,
-    /// Of tiles.
-    pub tiles: KindCounters,
-}
+pub struct Counters(pub(super) [KindCounters; Kind::ALL.len()]);
 
 impl Counters {
     /// Of one kind.
     pub fn kind(&self, kind: Kind) -> &KindCounters {
-        match kind {
-            Kind::Geometry => &self.geometry,
-            Kind::Attributes => &self.attributes,
-            Kind::Tile => &self.tiles,
-        }
-    }
-
-    fn kind_mut(&mut self, kind: Kind) -> &mut KindCounters {
-        match kind {
-            Kind::Geometry => &mut self.geometry,
-            Kind::Attributes => &mut self.attributes,
-            Kind::Tile => &mut self.tiles,
-        }
+        &self.0[kind as usize]
     }
 
     /// Of all kinds together.
     pub fn total(&self) -> KindCounters {
-        self.geometry.zip(&self.attributes, |a, b| a + b).zip(&self.tiles, |a, b| a + b)
+        self.0.iter().fold(KindCounters::default(), |sum, own| sum.zip(own, |a, b| a + b))
     }
 
     /// What happened between `earlier` and `self`, both read from one cache in this order.
     pub fn since(&self, earlier: &Self) -> Self {
-        Self {
-            geometry: self.geometry.zip(&earlier.geometry, u64::saturating_sub),
-            attributes: self.attributes.zip(&earlier.attributes, u64::saturating_sub),
-            tiles: self.tiles.zip(&earlier.tiles, u64::saturating_sub),
-        }
+        Self(Kind::ALL.map(|kind| self.kind(kind).zip(earlier.kind(kind), u64::saturating_sub)))
     }
 }
 
@@ -350,7 +328,7 @@ impl Residency {
         self.used_in[item.index()] = self.filling;
         match &mut self.placement {
             Placement::RoundRobin(ring) => ring.touch(item),
-            Placement::Lru(lru) => lru.recency.touch(item),
+            Placement::Lru(lru) => lru.touch(item),
         }
     }
 
@@ -412,7 +390,7 @@ impl Residency {
         for &old in &evicted {
             self.release(old, true);
             let old_bytes = self.bytes(old);
-            let counters = self.counters.kind_mut(old.kind);
+            let counters = &mut self.counters.0[old.kind as usize];
             counters.evicted += 1;
             counters.evicted_bytes += old_bytes;
         }
@@ -420,14 +398,14 @@ impl Residency {
         self.place[item.index()] = start;
         self.used_bytes += bytes;
         if let Placement::Lru(lru) = &mut self.placement {
-            lru.recency.touch(item);
+            lru.touch(item);
         }
         let (pass, times) = &mut self.inserted[item.index()];
         if *pass != self.pass {
             (*pass, *times) = (self.pass, 0);
         }
         *times += 1;
-        let counters = self.counters.kind_mut(item.kind);
+        let counters = &mut self.counters.0[item.kind as usize];
         counters.loaded += 1;
         counters.loaded_bytes += bytes;
         counters.reloaded += u64::from(*times > 1);
@@ -443,7 +421,7 @@ impl Residency {
         self.release(item, false);
         let bytes = self.bytes(item);
         let (pass, times) = &mut self.inserted[item.index()];
-        let counters = self.counters.kind_mut(item.kind);
+        let counters = &mut self.counters.0[item.kind as usize];
         counters.loaded -= 1;
         counters.loaded_bytes -= bytes;
         if *pass == self.pass && *times > 0 {
@@ -518,7 +496,7 @@ impl Residency {
             }
             Placement::Lru(lru) => {
                 let mut listed = 0;
-                for item in lru.recency.oldest_first().take(residents + 1) {
+                for item in lru.oldest_first().take(residents + 1) {
                     listed += 1;
                     check(self.place[item.index()] != NOWHERE, &|| format!("{item} has a use and is not resident"))?;
                 }

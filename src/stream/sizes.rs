@@ -72,27 +72,9 @@ impl Sizes {
 }
 
 /// Bricks alone, without textures.
-impl From<&[(u64, u64)]> for Sizes {
-    fn from(bricks: &[(u64, u64)]) -> Self {
-        Self { bricks: bricks.to_vec(), tiles: Vec::new() }
-    }
-}
-
-impl From<&Vec<(u64, u64)>> for Sizes {
-    fn from(bricks: &Vec<(u64, u64)>) -> Self {
-        bricks[..].into()
-    }
-}
-
-impl<const N: usize> From<&[(u64, u64); N]> for Sizes {
-    fn from(bricks: &[(u64, u64); N]) -> Self {
-        bricks[..].into()
-    }
-}
-
-impl From<Vec<(u64, u64)>> for Sizes {
-    fn from(bricks: Vec<(u64, u64)>) -> Self {
-        Self { bricks, tiles: Vec::new() }
+impl<T: AsRef<[(u64, u64)]> + ?Sized> From<&T> for Sizes {
+    fn from(bricks: &T) -> Self {
+        Self { bricks: bricks.as_ref().to_vec(), tiles: Vec::new() }
     }
 }
 

@@ -18,14 +18,16 @@
 //! lies behind: a replay shows what another cache makes of these requests, which are nearly those of the same frames.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{BufRead, BufWriter, Write};
+use std::io::{BufRead, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::item::{Item, Kind, Policy};
+use super::item::{Item, Kind};
 use super::residency::{Residency, ResidencyError};
 use super::sizes::Sizes;
+use crate::output::atomic;
+use crate::settings::Policy;
 
 /// The format number of a trace.
 const FORMAT: u32 = 4;
@@ -59,8 +61,8 @@ pub enum TraceError {
     Cache(#[from] ResidencyError),
 }
 
-/// The requests of one pass, in order.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// The requests of one pass, in order: a line.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PassRequests {
     /// The frame, from 0.
     pub frame: u32,
@@ -73,7 +75,7 @@ pub struct PassRequests {
 }
 
 /// The sequence of requests of a walk.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
     /// Bytes of everything.
     pub sizes: Sizes,
@@ -103,15 +105,6 @@ struct Head {
 #[derive(Deserialize)]
 struct Format {
     format: u32,
-}
-
-/// Every other line.
-#[derive(Serialize, Deserialize)]
-struct Line {
-    frame: u32,
-    pass: String,
-    requests: Vec<String>,
-    batches: Vec<usize>,
 }
 
 impl Trace {
@@ -160,10 +153,8 @@ impl Trace {
         };
         let mut line = |value: serde_json::Result<String>| writeln!(out, "{}", value.map_err(std::io::Error::from)?);
         line(serde_json::to_string(&head))?;
-        for PassRequests { frame, pass, requests, batches } in &self.passes {
-            let (pass, batches) = (pass.clone(), batches.clone());
-            let requests = requests.iter().map(|item| item.code()).collect();
-            line(serde_json::to_string(&Line { frame: *frame, pass, requests, batches }))?;
+        for pass in &self.passes {
+            line(serde_json::to_string(pass))?;
         }
         Ok(out.flush()?)
     }
@@ -172,19 +163,8 @@ impl Trace {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_file(&self, path: &Path) -> Result<(), TraceError> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        #[cfg(unix)]
-        {
-            // Temporary files are private to the user; this one is an output, under the user's mask like any other.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let mut file = builder.tempfile_in(folder)?;
-        self.write(BufWriter::new(&mut file))?;
-        file.persist(path).map_err(|error| error.error)?;
-        Ok(())
+    pub fn write_file(&self, path: &Path) -> anyhow::Result<()> {
+        atomic::write_with(path, |out| Ok(self.write(out)?))
     }
 
     /// Reads what [`Self::write`] wrote.
@@ -208,13 +188,11 @@ impl Trace {
                     trace = Some((Self::new(sizes, head.budget_bytes, head.page_bytes, policy), head.passes));
                 }
                 Some((trace, _)) => {
-                    let Line { frame, pass, requests, batches } = parse(&text).map_err(wrong)?;
-                    let requests: Result<Vec<Item>, _> = requests.iter().map(|code| code.parse()).collect();
-                    let requests = requests.map_err(|error| wrong(error.to_string()))?;
-                    if !batches.is_sorted() || batches.last().is_some_and(|&at| at > requests.len()) {
+                    let pass: PassRequests = parse(&text).map_err(wrong)?;
+                    if !pass.batches.is_sorted() || pass.batches.last().is_some_and(|&at| at > pass.requests.len()) {
                         return Err(wrong("batches are not ascending positions in the requests".to_owned()));
                     }
-                    trace.passes.push(PassRequests { frame, pass, requests, batches });
+                    trace.passes.push(pass);
                 }
             }
         }
@@ -241,7 +219,7 @@ fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
 }
 
 /// What to replay a trace against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replay {
     /// A [`Residency`] with this policy, pages and all.
     Cache(Policy),
@@ -257,7 +235,7 @@ impl Replay {
         [Self::Cache(Policy::RoundRobin), Self::Cache(Policy::SecondChance), Self::Cache(Policy::Lru), Self::Belady];
 
     /// The name in reports.
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Cache(policy) => policy.name(),
             Self::Belady => "belady-greedy",
@@ -290,8 +268,8 @@ impl ReplayResult {
         if self.requests == 0 { 1.0 } else { self.hits as f64 / self.requests as f64 }
     }
 
-    /// Loads of what had been loaded before.
-    pub fn reloads(&self) -> u64 {
+    /// Loads of what had been loaded before, in whatever pass. Not `bricks_reloaded` of records, which is within a pass.
+    pub fn loaded_again(&self) -> u64 {
         self.loads - self.distinct
     }
 }
@@ -313,7 +291,7 @@ pub fn replay(
 ) -> Result<ReplayResult, TraceError> {
     let policy = match against {
         Replay::Cache(policy) => policy,
-        Replay::Belady => Policy::default(),
+        Replay::Belady => Policy::RoundRobin,
     };
     let sizes: Sizes = sizes.into();
     let mut cache = Residency::new(&sizes, budget_bytes, page_bytes, policy)?;

@@ -7,21 +7,15 @@
 //! What is looked up and what room is reserved in the host cache is decided by the caller of [`Workers::load_each`], in
 //! the order of requests, before a worker sees any of them: the counters do not depend on timing.
 
-use std::any::Any;
-use std::convert::Infallible;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::JoinHandle;
-
-use crossbeam::channel::{Receiver, Sender, bounded, select};
-
 use super::host_cache::{HostCache, Reservation};
 use super::item::Item;
 use super::source::{PayloadSource, SourceError};
-
-/// Jobs waiting per thread before [`Workers::load_each`] waits with handing out more.
-const QUEUED_JOBS_PER_THREAD: usize = 4;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::any::Any;
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Where a payload goes, such as a mapped, write-only range of a staging buffer.
 pub trait Destination: Send + 'static {
@@ -34,18 +28,6 @@ pub trait Destination: Send + 'static {
     /// Takes the verified payload in memory of its own, in place of [`Self::fill`], where it lies in such.
     fn share(&mut self, payload: Arc<[u8]>) {
         self.fill(&payload);
-    }
-}
-
-/// What frames ask of workers beside loads, whatever their destinations.
-pub trait WorkerPool {
-    /// As [`Workers::host_cache`].
-    fn host_cache(&self) -> &Arc<HostCache>;
-}
-
-impl<D: Destination> WorkerPool for Workers<D> {
-    fn host_cache(&self) -> &Arc<HostCache> {
-        Self::host_cache(self)
     }
 }
 
@@ -78,15 +60,9 @@ pub enum StreamError {
         /// Text of the panic.
         message: String,
     },
-    /// The worker threads ended before they answered.
-    #[error("{item}: lost, because the worker threads ended")]
-    Lost {
-        /// The item.
-        item: Item,
-    },
     /// A worker thread could not be started.
     #[error("cannot start a worker thread")]
-    Spawn(#[from] std::io::Error),
+    Spawn(#[from] rayon::ThreadPoolBuildError),
 }
 
 /// The answer to one request.
@@ -94,9 +70,8 @@ pub enum StreamError {
 pub struct Loaded<D> {
     /// What was requested.
     pub item: Item,
-    /// The destination given with it; `None` only if it was lost ([`StreamError::Lost`]). After an error its contents
-    /// are unspecified.
-    pub destination: Option<D>,
+    /// The destination given with it. After an error its contents are unspecified.
+    pub destination: D,
     /// Whether the destination holds the payload.
     pub result: Result<(), StreamError>,
 }
@@ -116,53 +91,20 @@ pub struct WorkersStats {
     pub failed: u64,
 }
 
-#[derive(Debug, Default)]
-struct Tally {
-    read: AtomicU64,
-    read_bytes: AtomicU64,
-    cached: AtomicU64,
-    cached_bytes: AtomicU64,
-    failed: AtomicU64,
-}
-
-/// Adds to a counter; counters order nothing.
-fn add(counter: &AtomicU64, amount: u64) {
-    counter.fetch_add(amount, Ordering::Relaxed);
-}
-
-/// A worker's answer: which request, its destination, how it went.
-pub(super) type Answer<D> = (usize, D, Result<(), StreamError>);
-
-/// A request on its way to a worker.
-pub(super) struct Job<D> {
-    index: usize,
-    item: Item,
-    bytes: usize,
-    destination: D,
-    cached: Option<Arc<[u8]>>,
-    reservation: Option<Reservation>,
-    /// Holds every answer of its batch, so that a worker never waits for the caller.
-    answers: Sender<Answer<D>>,
-}
-
-/// What the threads share.
-pub(super) struct Shared {
-    source: Arc<dyn PayloadSource>,
-    host_cache: Arc<HostCache>,
-    tally: Tally,
+thread_local! {
+    /// What a worker copies into; it only ever grows.
+    static BUFFER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
 /// A pool of threads that load payloads into destinations. Dropping it ends them.
-pub struct Workers<D: Destination> {
-    /// `None` only while dropping.
-    jobs: Option<Sender<Job<D>>>,
-    /// Carries nothing; closed when the last thread has ended.
-    ended: Receiver<Infallible>,
-    threads: Vec<JoinHandle<()>>,
-    shared: Arc<Shared>,
+pub struct Workers {
+    threads: ThreadPool,
+    source: Arc<dyn PayloadSource>,
+    host_cache: Arc<HostCache>,
+    stats: Mutex<WorkersStats>,
 }
 
-impl<D: Destination> Workers<D> {
+impl Workers {
     /// Starts `threads` ≥ 1 threads (0 is taken as 1) over `source`.
     ///
     /// # Errors
@@ -172,76 +114,35 @@ impl<D: Destination> Workers<D> {
         host_cache: Arc<HostCache>,
         threads: usize,
     ) -> Result<Self, StreamError> {
-        Self::with_body(source, host_cache, threads, work)
-    }
-
-    /// [`Self::new`] with what a thread does.
-    pub(super) fn with_body(
-        source: Arc<dyn PayloadSource>,
-        host_cache: Arc<HostCache>,
-        threads: usize,
-        body: fn(&Shared, &Receiver<Job<D>>),
-    ) -> Result<Self, StreamError> {
-        let count = threads.max(1);
-        let shared = Arc::new(Shared { source, host_cache, tally: Tally::default() });
-        // The pool keeps no receiver of jobs, so that sending fails, and does not wait, when the last thread has ended.
-        let (jobs, job_queue) = bounded::<Job<D>>(count.saturating_mul(QUEUED_JOBS_PER_THREAD));
-        let (alive, ended) = bounded(0);
-        let mut workers = Self { jobs: Some(jobs), ended, threads: Vec::new(), shared };
-        for number in 0..count {
-            let (job_queue, alive, shared) = (job_queue.clone(), alive.clone(), workers.shared.clone());
-            let thread = std::thread::Builder::new().name(format!("brick worker {number}")).spawn(move || {
-                // Dropped however the thread ends.
-                let _alive: Sender<Infallible> = alive;
-                body(&shared, &job_queue);
-            })?;
-            workers.threads.push(thread);
-        }
-        Ok(workers)
+        let name = |number| format!("brick worker {number}");
+        let threads = ThreadPoolBuilder::new().num_threads(threads.max(1)).thread_name(name).build()?;
+        Ok(Self { threads, source, host_cache, stats: Mutex::default() })
     }
 
     /// Loads every item into its destination, waits for all, and answers in the order of requests.
     ///
     /// Several threads may call it at once.
-    pub fn load_each(&self, requests: Vec<(Item, D)>) -> Vec<Loaded<D>> {
-        let shared = &*self.shared;
-        let (bricks, tiles) = (shared.source.brick_count(), shared.source.tile_count());
-        let cache = &shared.host_cache;
-        let known = |item: Item| shared.source.has(item);
+    pub fn load_each<D: Destination>(&self, requests: Vec<(Item, D)>) -> Vec<Loaded<D>> {
+        let (bricks, tiles) = (self.source.brick_count(), self.source.tile_count());
+        let known = |item: Item| self.source.has(item);
         // First every look-up, then every reservation: what this batch finds is in use and not evicted by it.
         let found: Vec<_> =
-            requests.iter().map(|&(item, _)| if known(item) { cache.get(item) } else { None }).collect();
-        let plans: Vec<_> = requests
-            .iter()
-            .zip(found)
-            .map(|(&(item, _), cached)| {
-                let bytes = if known(item) { shared.source.bytes(item) } else { 0 };
-                let reservation = if cached.is_none() && known(item) { cache.reserve(item, bytes) } else { None };
-                (bytes as usize, cached, reservation)
-            })
-            .collect();
-        let (answers, answered) = bounded(requests.len());
-        let mut items = Vec::with_capacity(requests.len());
-        for (index, ((item, destination), (bytes, cached, reservation))) in requests.into_iter().zip(plans).enumerate()
-        {
-            items.push(item);
-            if !known(item) {
-                // Never blocks nor fails: there is room for one answer a request, and `answered` is alive.
-                let _ = answers.send((index, destination, Err(StreamError::NoSuchItem { item, bricks, tiles })));
-                continue;
-            }
-            let job = Job { index, item, bytes, destination, cached, reservation, answers: answers.clone() };
-            let sent = match &self.jobs {
-                Some(jobs) => jobs.send(job).map_err(|back| back.0),
-                None => Err(job),
+            requests.iter().map(|&(item, _)| if known(item) { self.host_cache.get(item) } else { None }).collect();
+        let plan = |((item, destination), cached): ((Item, D), Option<Arc<[u8]>>)| {
+            let reserves = cached.is_none() && known(item);
+            let reservation = if reserves { self.host_cache.reserve(item, self.source.bytes(item)) } else { None };
+            (item, destination, cached, reservation)
+        };
+        let jobs: Vec<_> = requests.into_iter().zip(found).map(plan).collect();
+        let answer = |(item, mut destination, cached, reservation)| {
+            let result = match known(item) {
+                true => self.answer(item, &mut destination, cached, reservation),
+                false => Err(StreamError::NoSuchItem { item, bricks, tiles }),
             };
-            if let Err(job) = sent {
-                let _ = answers.send((index, job.destination, Err(StreamError::Lost { item })));
-            }
-        }
-        drop(answers);
-        let loaded = collect(&items, &answered, &self.ended);
-        add(&shared.tally.failed, loaded.iter().filter(|one| one.result.is_err()).count() as u64);
+            Loaded { item, destination, result }
+        };
+        let loaded: Vec<_> = self.threads.install(|| jobs.into_par_iter().with_max_len(1).map(answer).collect());
+        self.noted().failed += loaded.iter().filter(|one| one.result.is_err()).count() as u64;
         loaded
     }
 
@@ -250,137 +151,79 @@ impl<D: Destination> Workers<D> {
     /// # Errors
     /// The first error in the order of requests, after everything else has been loaded. [`Self::load_each`] gives back
     /// the destinations of the others as well.
-    pub fn load(&self, requests: Vec<(Item, D)>) -> Result<Vec<(Item, D)>, StreamError> {
-        self.load_each(requests)
-            .into_iter()
-            .map(|Loaded { item, destination, result }| {
-                result?;
-                destination.map(|destination| (item, destination)).ok_or(StreamError::Lost { item })
-            })
-            .collect()
+    pub fn load<D: Destination>(&self, requests: Vec<(Item, D)>) -> Result<Vec<(Item, D)>, StreamError> {
+        let loaded = self.load_each(requests).into_iter();
+        loaded.map(|Loaded { item, destination, result }| result.map(|()| (item, destination))).collect()
     }
 
     /// The host cache.
     pub fn host_cache(&self) -> &Arc<HostCache> {
-        &self.shared.host_cache
+        &self.host_cache
     }
 
     /// What was done so far.
     pub fn stats(&self) -> WorkersStats {
-        let tally = &self.shared.tally;
-        let get = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        WorkersStats {
-            read: get(&tally.read),
-            read_bytes: get(&tally.read_bytes),
-            cached: get(&tally.cached),
-            cached_bytes: get(&tally.cached_bytes),
-            failed: get(&tally.failed),
-        }
+        *self.noted()
     }
-}
 
-impl<D: Destination> Drop for Workers<D> {
-    fn drop(&mut self) {
-        self.jobs = None;
-        for thread in self.threads.drain(..) {
-            // A thread that panicked has already been answered for.
-            let _ = thread.join();
-        }
+    /// Every change of it is complete, so that a poisoned lock guards a sound state.
+    fn noted(&self) -> MutexGuard<'_, WorkersStats> {
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
 
-/// Puts answers, which arrive in any order, into the order of `items`; what never arrives is lost.
-///
-/// Returns when every sender is gone, and each job holds one until it is answered; or when the threads have `ended`,
-/// because jobs that they left in the queue keep theirs.
-pub(super) fn collect<D>(
-    items: &[Item],
-    answers: &Receiver<Answer<D>>,
-    ended: &Receiver<Infallible>,
-) -> Vec<Loaded<D>> {
-    let mut loaded: Vec<Loaded<D>> =
-        items.iter().map(|&item| Loaded { item, destination: None, result: Err(StreamError::Lost { item }) }).collect();
-    let mut put = |(index, destination, result): Answer<D>| {
-        loaded[index].destination = Some(destination);
-        loaded[index].result = result;
-    };
-    loop {
-        select! {
-            recv(answers) -> answer => match answer {
-                Ok(answer) => put(answer),
-                Err(_) => break,
-            },
-            recv(ended) -> _ => {
-                // Answers sent before the last thread ended are here by now.
-                answers.try_iter().for_each(put);
-                break;
+    /// Loads one item, on a worker thread. Everything that it held in the host cache is released when it returns.
+    fn answer<D: Destination>(
+        &self,
+        item: Item,
+        destination: &mut D,
+        cached: Option<Arc<[u8]>>,
+        reservation: Option<Reservation>,
+    ) -> Result<(), StreamError> {
+        // The destination stays outside, so that it comes back whatever happens; the reservation gives its room back
+        // when dropped.
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            if let Some(payload) = cached {
+                let mut stats = self.noted();
+                stats.cached += 1;
+                stats.cached_bytes += payload.len() as u64;
+                drop(stats);
+                destination.share(payload);
+                return Ok(());
             }
-        }
-    }
-    loaded
-}
-
-/// A worker thread.
-fn work<D: Destination>(shared: &Shared, jobs: &Receiver<Job<D>>) {
-    let mut buffer = Vec::new();
-    while let Ok(job) = jobs.recv() {
-        answer(shared, job, &mut buffer);
-    }
-}
-
-/// Loads one item and sends the answer.
-fn answer<D: Destination>(shared: &Shared, job: Job<D>, buffer: &mut Vec<u8>) {
-    let Job { index, item, bytes, mut destination, cached, reservation, answers } = job;
-    // The destination stays outside, so that it comes back whatever happens; the buffer is overwritten by its next use,
-    // and the reservation gives its room back when dropped.
-    let outcome = catch_unwind(AssertUnwindSafe(|| match cached {
-        Some(payload) => {
-            add(&shared.tally.cached, 1);
-            add(&shared.tally.cached_bytes, payload.len() as u64);
-            destination.share(payload);
-            Ok(())
-        }
-        None => {
+            let bytes = self.source.bytes(item) as usize;
             if D::SHARES {
                 // Zeroed in place: the payload is read into the memory in which it stays.
                 let mut payload: Arc<[u8]> = std::iter::repeat_n(0, bytes).collect();
                 if let Some(memory) = Arc::get_mut(&mut payload).filter(|memory| !memory.is_empty()) {
-                    shared.source.copy(item, memory)?;
+                    self.source.copy(item, memory)?;
                 }
                 if let Some(reservation) = reservation {
                     reservation.share(payload.clone());
                 }
                 destination.share(payload);
             } else {
-                let payload = read(shared, item, bytes, buffer)?;
+                let mut buffer = BUFFER.take();
+                buffer.resize(buffer.len().max(bytes), 0);
+                let payload = &mut buffer[..bytes];
+                if bytes > 0 {
+                    self.source.copy(item, payload)?;
+                }
                 destination.fill(payload);
                 if let Some(reservation) = reservation {
                     reservation.fill(payload);
                 }
+                BUFFER.set(buffer);
             }
-            add(&shared.tally.read, 1);
-            add(&shared.tally.read_bytes, bytes as u64);
+            let mut stats = self.noted();
+            stats.read += 1;
+            stats.read_bytes += bytes as u64;
             Ok(())
+        }));
+        match outcome {
+            Ok(result) => result.map_err(|reason| StreamError::Payload { item, reason }),
+            Err(panic) => Err(StreamError::Panicked { item, message: panic_text(panic) }),
         }
-    }));
-    let result = match outcome {
-        Ok(result) => result.map_err(|reason| StreamError::Payload { item, reason }),
-        Err(panic) => Err(StreamError::Panicked { item, message: panic_text(panic) }),
-    };
-    // Everything the batch held in the host cache is released by now. The caller waits for the answer.
-    let _ = answers.send((index, destination, result));
-}
-
-/// Copies and verifies a payload into the buffer, which only ever grows.
-fn read<'a>(shared: &Shared, item: Item, bytes: usize, buffer: &'a mut Vec<u8>) -> Result<&'a [u8], SourceError> {
-    if buffer.len() < bytes {
-        buffer.resize(bytes, 0);
     }
-    let payload = &mut buffer[..bytes];
-    if bytes > 0 {
-        shared.source.copy(item, payload)?;
-    }
-    Ok(payload)
 }
 
 /// The text of a panic.

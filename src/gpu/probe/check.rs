@@ -47,7 +47,7 @@ impl Check {
 }
 
 /// The check of a device that gives no results.
-pub(super) fn no_results(name: &'static str, reason: String) -> Check {
+pub(super) fn no_results(name: &'static str, reason: &dyn std::fmt::Display) -> Check {
     Check {
         name,
         against: TWIN,

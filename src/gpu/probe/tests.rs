@@ -10,21 +10,15 @@ use crate::kernels::{Extent, Keep, Setup};
 use crate::stream::{HostCache, Workers};
 use std::sync::Arc;
 
-/// A device of the first adapter, or a note why the test is skipped.
-fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
-    let Some(adapter) = adapters.into_iter().next() else {
-        println!("skipped: no adapter");
-        return None;
-    };
-    pollster::block_on(adapter.request_device(&Default::default())).ok()
+/// A device, or a note why the test is skipped.
+fn device() -> Option<Gpu> {
+    Gpu::open(None).map_err(|error| println!("skipped: {error}")).ok()
 }
 
 #[test]
 fn a_sound_device_passes() {
-    let Some((device, queue)) = device() else { return };
-    let report = run(&device, &queue);
+    let Some(gpu) = device() else { return };
+    let report = run(&gpu);
     println!("{report:?}");
     assert_eq!(failures(&report.checks), Vec::<String>::new());
     assert!(report.checks.iter().all(|c| c.cases > 500), "{report:?}");
@@ -32,10 +26,7 @@ fn a_sound_device_passes() {
 
 /// An executor over the probe's own scene, with as many pages as asked and one kernel's text changed.
 fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<GpuExecutor> {
-    let Ok(gpu) = Gpu::open(None) else {
-        println!("skipped: no adapter");
-        return None;
-    };
+    let gpu = device()?;
     let pages = Pages { cache: pages, texels: 1, opacity: false, gloss: false };
     let source = |kernel: &str| change(kernel, kernels::source(kernel, pages));
     let kernels = Arc::new(Kernels::from_sources(&gpu, pages, false, &source));
@@ -171,7 +162,7 @@ fn cases_are_of_every_kind() {
 
 #[test]
 fn planted_defects_are_named() {
-    let Some((device, queue)) = device() else { return };
+    let Some(gpu) = device() else { return };
     let defects = [
         // A compiler that sees through the barrier and fuses: the difference of exact products.
         ("barrier", "barrier(x.x * x.y) - barrier(x.z * x.w)", "diffprod(x.x, x.y, x.z, x.w)"),
@@ -194,11 +185,11 @@ fn planted_defects_are_named() {
         ("offset_origin", "select(bits - 1u, bits + 1u, away)", "select(bits - 2u, bits + 2u, away)"),
     ];
     let fused = source().replace("x.x * x.y - x.z * x.w);", "diffprod(x.x, x.y, x.z, x.w));");
-    assert!(run_source(&device, &queue, &fused).traits.contracts);
+    assert!(run_source(&gpu, &fused).traits.contracts);
     for (name, sound, broken) in defects {
         let text = source();
         assert!(text.contains(sound), "{sound}");
-        let report = run_source(&device, &queue, &text.replace(sound, broken));
+        let report = run_source(&gpu, &text.replace(sound, broken));
         let failures = failures(&report.checks);
         assert!(failures.iter().any(|f| f.starts_with(name)), "{name}: {broken}: {failures:?}");
     }

@@ -13,8 +13,9 @@ use crate::gpu::executor::GpuExecutor;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{Hit, NONE, Params, Ray, Surface};
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
-use crate::schedule::cache::{Cache, SceneBytes};
-use crate::schedule::{Executor, ExecutorError, Lamp, Pass, Step, Tracing, chc, demand, plain};
+use crate::schedule::cache::Cache;
+use crate::schedule::{self, Lamp, Pass, Step, Tracer, Tracing};
+use crate::settings::Schedule;
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use glam::DVec3;
@@ -34,7 +35,7 @@ struct Traced {
 ///
 /// A device that fails gives a check that says so.
 pub fn compare_pipelines(executor: &GpuExecutor) -> Vec<Check> {
-    compare(executor).unwrap_or_else(|error| vec![no_results("the traversal pipelines", error.to_string())])
+    compare(executor).unwrap_or_else(|error| vec![no_results("the traversal pipelines", &error)])
 }
 
 fn compare(executor: &GpuExecutor) -> Result<Vec<Check>, Box<dyn std::error::Error>> {
@@ -44,65 +45,28 @@ fn compare(executor: &GpuExecutor) -> Result<Vec<Check>, Box<dyn std::error::Err
     let rays = rays(&twin, frame.unit);
     let [closest, any] = trace(executor, scene, frame, &rays)?;
     let met: Vec<Vec<Hit>> = rays.iter().map(|ray| twin.hits(ray)).collect();
-    let mut checks: Vec<Check> = closest.iter().map(|one| closest_against_twin(one, &rays, &met)).collect();
-    checks.extend(any.iter().map(|one| any_against_twin(one, &rays, &met)));
-    // The first of them are `intersect_all`'s.
-    checks.extend(closest[1..].iter().map(|one| alike(one, &closest[0], &rays)));
-    checks.extend(any[1..].iter().map(|one| occluded_alike(one, &any[0], &rays)));
-    checks.extend(any.iter().zip(&closest).map(|(any, closest)| occluded_alike(any, closest, &rays)));
+    let ways = [(false, &closest), (true, &any)];
+    let mut checks = Vec::new();
+    for (any, all) in ways {
+        checks.extend(all.iter().map(|one| against_brute_force(one, any, &rays, &met)));
+    }
+    for (any, all) in ways {
+        // The first of them are `intersect_all`'s.
+        checks.extend(all[1..].iter().map(|one| alike(one, &all[0], any, &rays)));
+    }
+    checks.extend(any.iter().zip(&closest).map(|(any, closest)| alike(any, closest, true, &rays)));
     Ok(checks)
 }
 
-/// How a pipeline is made to trace.
-struct Way {
-    closest: &'static str,
-    any: &'static str,
-    schedule: Schedule,
-    /// Leaves of the longest list.
-    list_most: u32,
-    /// Whether nothing is resident at first, so that rays go by batches.
-    is_cold: bool,
-}
-
-type Schedule = fn(&mut dyn Executor, &mut Cache, Pass, &[Step], &Tracing, &mut Counters) -> Result<(), ExecutorError>;
-
-/// Every pipeline that intersects. The first makes everything resident for the second.
-const WAYS: [Way; 5] = [
-    Way {
-        closest: "intersect_all (closest hit)",
-        any: "intersect_all (any hit)",
-        schedule: plain::trace,
-        list_most: 0,
-        is_cold: false,
-    },
-    Way {
-        closest: "intersect_from_root_all (closest hit)",
-        any: "intersect_from_root_all (any hit)",
-        schedule: chc::trace,
-        list_most: 0,
-        is_cold: false,
-    },
-    Way {
-        closest: "intersect_list (closest hit)",
-        any: "intersect_list (any hit)",
-        schedule: chc::trace,
-        list_most: u32::MAX,
-        is_cold: true,
-    },
-    Way {
-        closest: "intersect_from_root (closest hit)",
-        any: "intersect_from_root (any hit)",
-        schedule: chc::trace,
-        list_most: 0,
-        is_cold: true,
-    },
-    Way {
-        closest: "intersect_selected (closest hit)",
-        any: "intersect_selected (any hit)",
-        schedule: demand::trace,
-        list_most: 0,
-        is_cold: true,
-    },
+/// Every pipeline that intersects, for closest hits and for any: the schedule by which it does, leaves of the longest
+/// list, and whether nothing is resident at first, so that rays go by batches. The first makes everything resident for
+/// the second.
+const WAYS: [([&str; 2], Schedule, u32, bool); 5] = [
+    (["intersect_all (closest hit)", "intersect_all (any hit)"], Schedule::Plain, 0, false),
+    (["intersect_from_root_all (closest hit)", "intersect_from_root_all (any hit)"], Schedule::Chc, 0, false),
+    (["intersect_list (closest hit)", "intersect_list (any hit)"], Schedule::Chc, u32::MAX, true),
+    (["intersect_from_root (closest hit)", "intersect_from_root (any hit)"], Schedule::Chc, 0, true),
+    (["intersect_selected (closest hit)", "intersect_selected (any hit)"], Schedule::Demand, 0, true),
 ];
 
 /// Traces `rays` through `scene` in every way, for closest hits and for any.
@@ -121,7 +85,7 @@ fn trace(
     let budget = Residency::budget_for_all(&sizes, page_bytes);
     let empty = || -> Result<Cache, ResidencyError> {
         let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin)?;
-        Ok(Cache::new(residency, SceneBytes::from(&sizes), None))
+        Ok(Cache::new(residency, sizes.clone(), Vec::new(), None))
     };
     let mut cache = empty()?;
     let page_sizes: Vec<u64> = cache.residency.page_sizes().collect();
@@ -131,46 +95,35 @@ fn trace(
     let mut executor = GpuExecutor::with_kernels(gpu, kernels, scene, workers, &page_sizes, setup)?;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
     let mut found = [Vec::new(), Vec::new()];
-    for (pass, found) in [Pass::Primary, Pass::Shadow(Lamp::Sun)].into_iter().zip(&mut found) {
-        for way in WAYS {
-            if way.is_cold {
+    for (any, pass) in [Pass::Primary, Pass::Shadow(Lamp::Sun)].into_iter().enumerate() {
+        for (names, by, list_most, is_cold) in WAYS {
+            if is_cold {
                 cache = empty()?;
             }
-            executor.tuning().list_most = way.list_most;
+            executor.tuning().list_most = list_most;
             executor.set_rays(pass, rays);
             cache.begin_pass("probe", 0);
-            let tracing = Tracing::default();
-            (way.schedule)(&mut executor, &mut cache, pass, &[Step::StartHits], &tracing, &mut Counters::default())?;
-            let name = if pass == Pass::Primary { way.closest } else { way.any };
+            let (tracing, stats) = (&Tracing::default(), &mut Counters::default());
+            let mut tracer = Tracer { executor: &mut executor, cache: &mut cache, pass, tracing, stats };
+            schedule::trace(&mut tracer, by, &[Step::StartHits])?;
             let (hits, mut surfaces) = (executor.read_hits(pass)?, executor.read_surfaces(pass)?);
             // What a ray still asks for is no part of its hit.
             surfaces.iter_mut().for_each(|surface| surface.pending = 0);
-            found.push(Traced { name, hits, surfaces });
+            found[any].push(Traced { name: names[any], hits, surfaces });
         }
     }
     Ok(found)
 }
 
-const TWIN: &str = "brute force";
-
-fn closest_against_twin(traced: &Traced, rays: &[Ray], met: &[Vec<Hit>]) -> Check {
-    let mut check = Check::new(traced.name, TWIN);
-    for (i, (ray, met)) in rays.iter().zip(met).enumerate() {
-        let expected = closest(ray, met);
-        let words = |hit: &Hit| -> [u32; 4] { bytemuck::cast(*hit) };
-        check.compare(&words(&traced.hits[i]), &words(&expected), &format_args!("ray {i}, {ray:?}"));
-    }
-    check
-}
-
-/// Any hit is one of those that there are; a miss, if there are none.
-fn any_against_twin(traced: &Traced, rays: &[Ray], met: &[Vec<Hit>]) -> Check {
-    let mut check = Check::new(traced.name, TWIN);
+/// Closest hits are those of brute force; any hit is one of those that there are, a miss if there are none.
+fn against_brute_force(traced: &Traced, any: bool, rays: &[Ray], met: &[Vec<Hit>]) -> Check {
+    let mut check = Check::new(traced.name, "brute force");
     for (i, (ray, met)) in rays.iter().zip(met).enumerate() {
         let found = traced.hits[i];
-        let expected = met.iter().copied().find(|hit| hit.id == found.id).unwrap_or_else(|| closest(ray, met));
-        let words = |hit: &Hit| -> [u32; 4] { bytemuck::cast(*hit) };
-        check.compare(&words(&found), &words(&expected), &format_args!("ray {i}, {ray:?}"));
+        let same = met.iter().copied().find(|hit| any && hit.id == found.id);
+        let words = |hit: Hit| -> [u32; 4] { bytemuck::cast(hit) };
+        let expected = same.unwrap_or_else(|| closest(ray, met));
+        check.compare(&words(found), &words(expected), &format_args!("ray {i}, {ray:?}"));
     }
     check
 }
@@ -183,26 +136,15 @@ impl Traced {
     }
 }
 
-/// Everything is the same.
-fn alike(a: &Traced, b: &Traced, rays: &[Ray]) -> Check {
+/// Everything is the same; of any hits, the same rays have some, and hits of the same triangle are the same: which of its
+/// triangles a ray meets is open.
+fn alike(a: &Traced, b: &Traced, any: bool, rays: &[Ray]) -> Check {
     let mut check = Check::new(a.name, b.name);
     for (i, ray) in rays.iter().enumerate() {
-        check.compare_bits(&a.words(i), &b.words(i), &format_args!("ray {i}, {ray:?}"));
-    }
-    check
-}
-
-/// The same rays have hits, and hits of the same triangle are the same; which of its triangles a ray meets is open.
-fn occluded_alike(a: &Traced, b: &Traced, rays: &[Ray]) -> Check {
-    let mut check = Check::new(a.name, b.name);
-    for (i, ray) in rays.iter().enumerate() {
-        let case = &format_args!("ray {i}, {ray:?}");
         let (x, y) = (a.hits[i].id, b.hits[i].id);
-        if x != y && x != NONE && y != NONE {
-            check.compare_bits(&[], &[], case);
-        } else {
-            check.compare_bits(&a.words(i), &b.words(i), case);
-        }
+        let is_open = any && x != y && x != NONE && y != NONE;
+        let [of_a, of_b] = [a, b].map(|traced| if is_open { Vec::new() } else { traced.words(i) });
+        check.compare_bits(&of_a, &of_b, &format_args!("ray {i}, {ray:?}"));
     }
     check
 }

@@ -11,7 +11,7 @@ use crate::kernels::trace::node::{entered_children, framed_ray, node_hits};
 use crate::kernels::trace::packet::RAYS;
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::PacketScratch;
-use crate::kernels::trace::run::{PacketKernel, RayKernel, Work, for_each_ray, run_for_each_packet};
+use crate::kernels::trace::run::{PacketKernel, Work, for_each_ray, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
 use crate::kernels::vector::least;
 
@@ -19,7 +19,7 @@ use crate::kernels::vector::least;
 /// occluded ask only for the brick that holds their hit.
 pub fn query(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
     if bound.has(PARAM_NEEDED) {
-        for_each_ray(set, bound, Work::Chosen(&lists.chosen), |_, slot| ask(bound, &slot, lists));
+        for_each_ray(set, bound, Work::Chosen(&lists.chosen), |_, slot| needed(bound, &slot, lists));
     } else {
         run_for_each_packet(set, bound, Work::Chosen(&lists.chosen), &Query { bound, lists });
     }
@@ -31,13 +31,6 @@ struct Query<'a> {
     lists: &'a TileLists,
 }
 
-impl RayKernel for Query<'_> {
-    #[inline(always)]
-    fn run<I: Isa>(&self, _: I, _: &mut Scratch, slot: Slot) {
-        ask(self.bound, &slot, self.lists);
-    }
-}
-
 impl PacketKernel for Query<'_> {
     #[inline(always)]
     fn takes(&self, slot: &Slot) -> bool {
@@ -45,7 +38,7 @@ impl PacketKernel for Query<'_> {
         slot.is_traced() && !is_occluded && self.lists.nearest[slot.tile] <= slot.hit.t
     }
 
-    /// As [`ask`], where the rays that enter no child of a root are told together.
+    /// As [`needed`] for hits that are not final, where the rays that enter no child of a root are told together.
     #[inline(always)]
     fn run_packet<I: Isa>(&self, isa: I, _: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
         let Self { bound, lists } = self;
@@ -111,21 +104,18 @@ impl PacketKernel for Query<'_> {
     }
 }
 
-fn ask(bound: &Bound, slot: &Slot, lists: &TileLists) {
+/// What a ray needed, its hit being final.
+fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
     let entry = lists.lists[slot.tile];
     if !slot.is_traced() {
         return;
     }
     let (ray, hit) = (slot.ray, &slot.hit);
     let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
-    if occluded && !bound.has(PARAM_NEEDED) {
-        return;
-    }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     let mut r = BrickRay::outside(&world);
     // The brick that it enters before any other that it asks for, and where.
     let mut first: Option<(usize, f32)> = None;
-    let mut limit = hit.t;
     for next in entry.first..entry.first + entry.selected {
         let position = lists.selection[next as usize] as usize;
         let listed = lists.list[position];
@@ -136,21 +126,18 @@ fn ask(bound: &Bound, slot: &Slot, lists: &TileLists) {
             }
             continue;
         }
-        if listed.near > limit {
+        if listed.near > hit.t {
             continue;
         }
         r.enter_leaf(bound.scene, &world, leaf);
         let brick = bound.brick_of(leaf);
         let root = &bound.scene.roots[brick];
-        let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, limit);
+        let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, hit.t);
         let (entered, near) = entered_children(&boxes, root);
         if entered != 0 {
             lists.pair_demand[position].add_ray(near);
             if first.is_none_or(|(_, nearest)| near < nearest) {
                 first = Some((brick, near));
-                if bound.has(PARAM_NEXT) {
-                    limit = least(limit, near);
-                }
             }
         }
     }

@@ -7,7 +7,7 @@ use super::leaf::BrickRay;
 use super::node::{FramedRay, UNIT, framed_ray};
 use super::run::{Work, for_each_ray};
 use super::scratch::Scratch;
-use super::walk_brick::{Visits, finish_walk};
+use super::walk_brick::{Visits, write_found};
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{BINARY_LEAF, BinaryNode, COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT, TopNode2};
 use crate::kernels::rays::{RaySet, Slot};
@@ -95,16 +95,14 @@ pub fn intersect_binary(bound: &Bound, set: &mut RaySet, trees: &BinaryTrees) {
     for_each_ray(set, bound, Work::All, |scratch, slot| trace(bound, scratch, slot, trees));
 }
 
-fn trace(bound: &Bound, scratch: &mut Scratch, mut slot: Slot, trees: &BinaryTrees) {
+fn trace(bound: &Bound, scratch: &mut Scratch, slot: Slot, trees: &BinaryTrees) {
     let ray = *slot.ray;
     if !slot.is_traced() || bound.params.top_count == 0 {
         return;
     }
     let any_hit = bound.has(PARAM_ANY_HIT);
-    let before = *slot.hit;
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let source = slot.surface.source;
-    let mut best = Best { t: before.t, id: before.id, leaf: NONE, triangle: 0, hit: Default::default(), source };
+    let mut best = Best::before(&slot);
     let mut visits = Visits::default();
     let mut r = BrickRay::outside(&world);
     let Scratch { nodes, tally, .. } = scratch;
@@ -173,5 +171,6 @@ fn trace(bound: &Bound, scratch: &mut Scratch, mut slot: Slot, trees: &BinaryTre
         }
         at = walk.pop();
     }
-    finish_walk(bound, &world, &best, visits, &mut slot, tally);
+    write_found(bound, &world, &best, slot.hit, slot.surface);
+    visits.count(bound, tally);
 }

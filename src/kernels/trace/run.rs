@@ -145,14 +145,9 @@ pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn
     });
 }
 
-/// A kernel that is compiled for every instruction set. Implementations are always inlined, so that all of it is.
-pub trait RayKernel: Sync {
-    /// Runs it for one ray.
-    fn run<I: Isa>(&self, isa: I, scratch: &mut Scratch, slot: Slot);
-}
-
-/// A kernel that rays of one octant may run together.
-pub trait PacketKernel: RayKernel {
+/// A kernel that rays of one octant run together, compiled for every instruction set. Implementations are always
+/// inlined, so that all of it is.
+pub trait PacketKernel: Sync {
     /// Whether it does anything for a ray.
     fn takes(&self, slot: &Slot) -> bool;
 
@@ -169,8 +164,6 @@ const BANDS: usize = 8;
 /// So many rays of a square of 8 x 8 go together if they are of one octant; others wait for those of their octant in
 /// the block.
 const LEAST_SQUARE: usize = 16;
-/// Fewer rays of an octant go one by one.
-const LEAST_PACKET: usize = 4;
 
 /// [`for_each_ray`] with the dispatch's instruction set, rays of an octant together.
 pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
@@ -235,12 +228,6 @@ fn run_block<I: Isa>(
     groups.clear();
     while groups.next(isa, bound, kernel, band, &block) {
         let places = &groups.places[..groups.count];
-        if places.len() < LEAST_PACKET {
-            for &at in places {
-                kernel.run(isa, &mut task.scratch, band.slot(block.tile, at as usize));
-            }
-            continue;
-        }
         packets.packet.clear(groups.octant as u32);
         for &at in places {
             let slot = band.slot(block.tile, at as usize);

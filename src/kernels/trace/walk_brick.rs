@@ -5,7 +5,6 @@ use super::leaf::BrickRay;
 use super::node::{FramedRay, inner_before};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{COUNTER_NODES, COUNTER_STACK_OVERFLOW, COUNTER_TRIANGLES, Hit, NONE, Surface};
-use crate::kernels::rays::Slot;
 use crate::kernels::simd::isa::Isa;
 
 /// MAX_BRICK_HEIGHT + MAX_TOP_HEIGHT and the entries that a change of tree leaves.
@@ -134,11 +133,4 @@ impl Visits {
             tally.add(COUNTER_TRIANGLES, self.triangles);
         }
     }
-}
-
-/// Writes and counts what a walk found.
-#[inline(always)]
-pub fn finish_walk(bound: &Bound, world: &FramedRay, best: &Best, visits: Visits, slot: &mut Slot, tally: &mut Tally) {
-    write_found(bound, world, best, slot.hit, slot.surface);
-    visits.count(bound, tally);
 }

@@ -140,9 +140,9 @@ pub fn open(scene: &Path, settings: &Settings) -> Result<Renderer> {
 /// None that the first one did not have.
 pub fn empty_cache(renderer: &mut Renderer) -> Result<()> {
     let page_bytes = renderer.executor.page_bytes();
-    let Cache { bytes, residency: old, .. } = &renderer.cache;
-    let residency = Residency::new(bytes.sizes(), old.budget_bytes(), page_bytes, old.policy())?;
-    renderer.cache = Cache::new(residency, bytes.clone(), None);
+    let Cache { sizes, nodes, residency: old, .. } = &renderer.cache;
+    let residency = Residency::new(sizes, old.budget_bytes(), page_bytes, old.policy())?;
+    renderer.cache = Cache::new(residency, sizes.clone(), nodes.clone(), None);
     Ok(())
 }
 

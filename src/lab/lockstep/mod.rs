@@ -21,8 +21,9 @@ use crate::secondary::df::kernels as df;
 use crate::secondary::dvf::kernels as dvf;
 use crate::secondary::roma::kernels as roma;
 use crate::secondary::rsm::kernels as rsm;
-use crate::stream::WorkerPool;
+use crate::stream::Workers;
 use bricks::SceneFile;
+use delegate::delegate;
 use std::any::Any;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -274,7 +275,7 @@ impl Lockstep {
             findings.words("rays of points", context, &rays, &self.cpu.read_rays(pass)?);
         }
         let ran = |family: &&Family| steps.iter().filter_map(own_kernel).any(|name| family.kernel(name).is_some());
-        for family in FAMILIES.into_iter().filter(ran) {
+        for family in FAMILIES.iter().copied().filter(ran) {
             for (number, buffer) in family.buffers.iter().enumerate().filter(|(_, buffer)| buffer.is_written) {
                 let own = self.cpu.words(family, number);
                 let words = self.gpu.read(family, number, own.len())?;
@@ -380,25 +381,25 @@ impl Executor for Lockstep {
 }
 
 impl FrameExecutor for Lockstep {
-    fn device(&self) -> DeviceInfo {
-        self.gpu.device()
-    }
-
-    fn page_bytes(&self) -> u64 {
-        self.gpu.page_bytes()
+    delegate! {
+        to self.gpu {
+            fn device(&self) -> DeviceInfo;
+            fn page_bytes(&self) -> u64;
+            fn workers(&self) -> &Workers;
+            fn leaves_out(&self) -> Keep;
+            fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError>;
+            fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>>;
+            fn read_rays(&mut self, pass: Pass) -> Result<Vec<Ray>, ExecutorError>;
+            fn read_hits(&mut self, pass: Pass) -> Result<Vec<Hit>, ExecutorError>;
+            fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<Surface>, ExecutorError>;
+            fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError>;
+            fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError>;
+        }
     }
 
     fn texture_bytes(&self) -> u64 {
         assert_eq!(self.gpu.texture_bytes(), self.cpu.texture_bytes());
         self.gpu.texture_bytes()
-    }
-
-    fn workers(&self) -> &dyn WorkerPool {
-        self.gpu.workers()
-    }
-
-    fn leaves_out(&self) -> Keep {
-        self.gpu.leaves_out()
     }
 
     fn allow_bounces(&mut self) {
@@ -450,14 +451,6 @@ impl FrameExecutor for Lockstep {
         self.cpu.write(family, buffer, at, &own);
     }
 
-    fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
-        self.gpu.read(family, buffer, words)
-    }
-
-    fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>> {
-        self.gpu.held(family)
-    }
-
     fn set_scene(&mut self, scene: &Arc<SceneFile>) {
         self.gpu.set_scene(scene);
         self.cpu.set_scene(scene);
@@ -476,25 +469,5 @@ impl FrameExecutor for Lockstep {
     fn set_rays(&mut self, pass: Pass, rays: &[Ray]) {
         self.gpu.set_rays(pass, rays);
         self.cpu.set_rays(pass, rays);
-    }
-
-    fn read_rays(&mut self, pass: Pass) -> Result<Vec<Ray>, ExecutorError> {
-        self.gpu.read_rays(pass)
-    }
-
-    fn read_hits(&mut self, pass: Pass) -> Result<Vec<Hit>, ExecutorError> {
-        self.gpu.read_hits(pass)
-    }
-
-    fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<Surface>, ExecutorError> {
-        self.gpu.read_surfaces(pass)
-    }
-
-    fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError> {
-        self.gpu.read_gbuffer()
-    }
-
-    fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.gpu.read_radiance()
     }
 }

@@ -19,19 +19,17 @@ use crate::kernels::table::KERNELS;
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
 use crate::scene::path::path_from_bounds;
 use crate::schedule::auto::Auto;
-use crate::schedule::cache::{Cache, SceneBytes};
+use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
 use crate::schedule::{Executor, Lamp, Optimisation, Pass, Step, Tracing};
 use crate::secondary::df::answer::Df;
-use crate::secondary::df::kernels as df;
 use crate::secondary::df::maps::DfMaps;
-use crate::secondary::df::{DfSettings, DistanceField, LEVELS};
-use crate::secondary::dvf::Renewal;
-use crate::secondary::dvf::{Cells, DvfSettings, DvfUse};
-use crate::secondary::dvf::{Dvf, DvfTracing, Region};
+use crate::secondary::df::{DistanceField, LEVELS, Options, kernels as df};
+use crate::secondary::dvf::{Cells, Dvf, DvfSettings, DvfTracing, DvfUse, Region, Renewal};
 use crate::secondary::occupancy::{Bom, Cascades, Source};
 use crate::secondary::roma::answer::Roma;
-use crate::secondary::roma::{Grid, Role, RomaPass, RomaSettings};
+use crate::secondary::roma::maps::RomaMaps;
+use crate::secondary::roma::{Grid, Role, RomaPart, RomaPass, RomaSettings, Sift};
 use crate::secondary::rsm::RsmSettings;
 use crate::secondary::{FAMILIES, Method};
 use crate::session::Settings;
@@ -243,8 +241,8 @@ fn roma((steps, role): (u32, Role)) -> RomaSettings {
 }
 
 /// Small fields.
-fn field(steps: u32) -> DfSettings {
-    DfSettings { size: 32, occlusion_steps: steps, shadow_steps: steps, lift: 1.75, hit: 0.75 }
+fn field(steps: u32) -> Options {
+    Options { size: 32, steps: Some(steps), lift: 1.75, hit: 0.75 }
 }
 
 /// A field of visibility of few points.
@@ -310,7 +308,7 @@ fn render(
     let engine = Engine {
         scene: scene.clone(),
         executor: Box::new(executor),
-        cache: Cache::new(residency, SceneBytes::from(&sizes), None),
+        cache: Cache::new(residency, sizes.clone(), Vec::new(), None),
         settings: RenderSettings {
             tile_bytes: variant.tile_bytes,
             schedule: variant.schedule,
@@ -441,7 +439,7 @@ fn twins_agree_with_their_kernels() {
     }
     let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
-    let families = FAMILIES.into_iter().flat_map(|family| family.kernels);
+    let families = FAMILIES.iter().flat_map(|family| family.kernels);
     let all = KERNELS.iter().chain(families).map(|kernel| kernel.name);
     let left: Vec<&str> = all.filter(|name| !found.kernels.contains(name) && *name != "start_hits").collect();
     assert_eq!(left, Vec::<&str>::new(), "kernels that did not run");
@@ -522,17 +520,46 @@ fn rays(cells: u32) -> Vec<Ray> {
     (0..EXTENT.width * EXTENT.height).map(ray).collect()
 }
 
-#[test]
-fn distance_fields_of_all_sizes_are_those_of_their_twins() {
-    let Some(device) = device() else { return };
+/// A unit of which is one of the world.
+const FRAME: Frame = Frame { reference: [0; 3], unit: 1.0, origin: DVec3::ZERO };
+
+/// A scene for rays that maps answer, the pages of a cache for all of it, and that cache.
+fn given(device: &(Gpu, Arc<Kernels>)) -> (Arc<SceneFile>, Vec<u64>, Cache) {
     let scene = Arc::new(probe::scene().unwrap());
     let sizes = scene.sizes();
     let page_bytes = device.0.page_bytes();
     let budget = Residency::budget_for_all(&sizes, page_bytes);
     let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin).unwrap();
-    let pages: Vec<u64> = residency.page_sizes().collect();
-    let cache = Cache::new(residency, SceneBytes::from(&sizes), None);
-    let frame = Frame { reference: [0; 3], unit: 1.0, origin: DVec3::ZERO };
+    let pages = residency.page_sizes().collect();
+    (scene, pages, Cache::new(residency, sizes.clone(), Vec::new(), None))
+}
+
+/// Where no map is of use, maps neither end rays nor answer any: all are left to be traced.
+#[test]
+fn rays_are_sifted_by_maps_alone() {
+    let Some(device) = device() else { return };
+    let (scene, pages, cache) = given(&device);
+    let pass = Pass::Shadow(Lamp::Sun);
+    let roma = RomaPass { grid: Grid { k: 4, size: 32, samples: 1 }, steps: 8, role: Role::Sift { most_wrong: None } };
+    let boms = base_maps(32, None);
+    for levels in [0, 2] {
+        let findings = Arc::new(Mutex::new(Findings::default()));
+        let mut executor = lockstep(&device, &scene, &pages, 0, &findings);
+        executor.begin_frame(&View { frame: FRAME, params: Params::default(), directions: Directions::default() });
+        let maps = RomaMaps::new(&boms, levels, &FRAME, roma, (0, 0));
+        maps.give(&mut executor, &boms).unwrap();
+        executor.set_rays(pass, &rays(32));
+        let steps = [Step::StartHits, maps.rotate(), maps.trace(8, RomaPart::Sift(Sift::default()))];
+        let answered = executor.run(pass, &steps, &cache.states).unwrap().counters.rays_answered;
+        assert_eq!(answered > 0, levels > 0, "{answered} of nothing but free rays");
+        assert_eq!(findings.lock().unwrap().differences, Vec::<String>::new());
+    }
+}
+
+#[test]
+fn distance_fields_of_all_sizes_are_those_of_their_twins() {
+    let Some(device) = device() else { return };
+    let (scene, pages, cache) = given(&device);
     let pass = Pass::Shadow(Lamp::Sun);
     for (cells, every) in [(32, None), (32, Some(32_768)), (32, Some(20)), (64, Some(50)), (96, Some(100))] {
         for defect in [None, Some(Defect::Fields)] {
@@ -541,10 +568,10 @@ fn distance_fields_of_all_sizes_are_those_of_their_twins() {
             if let Some(defect) = defect {
                 executor = executor.with_defect(defect);
             }
-            executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
+            executor.begin_frame(&View { frame: FRAME, params: Params::default(), directions: Directions::default() });
             let maps = base_maps(cells, every);
             let own: Vec<DistanceField> = maps.levels.iter().map(DistanceField::new).collect();
-            let fields = DfMaps::new(&maps, &frame, &field(64));
+            let fields = DfMaps::new(&maps, &FRAME, &field(64));
             fields.give(&mut executor).unwrap();
             executor.run(pass, &fields.make(), &cache.states).unwrap();
             let is_own = executor.words(&df::FAMILY, df::DISTANCES) == words_of(&own);

@@ -13,13 +13,12 @@
 use super::case::Checks;
 use super::lab::{Lab, cached, settings};
 use super::rays::{Aim, ray};
-use crate::gpu::kernels;
-use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
+use crate::gpu::{kernels, probe};
 use crate::kernels::layout::{Ray, T_INFINITE};
 use crate::kernels::trace::node::{framed_ray, node_hits};
 use crate::session::device::Device;
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use bricks::Node;
 use brickwalk_scenes::{Rng, Stiff, stiff};
 
@@ -205,12 +204,7 @@ fn entered(lab: &Lab, cases: &[BoxCase]) -> Result<Vec<(u32, [f32; 8])>> {
     };
     let text = kernels::source("probe/probe_boxes", Pages { cache: 1, texels: 1, opacity: false, gloss: false });
     let text = lab.defect.map_or(text.clone(), |defect| defect.plant(text));
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("probe_boxes"),
-        source: wgpu::ShaderSource::Wgsl(text.into()),
-    });
-    let words = probe::dispatch(&gpu.device, &gpu.queue, &module, "boxes", cases, BoxCase::words, 9)
-        .map_err(|reason| anyhow!("the device returned no results: {reason}"))?;
+    let words = probe::dispatch(gpu, &probe::module(gpu, &text), "boxes", cases, BoxCase::words, 9)?;
     let one = |words: &[u32]| (words[0], std::array::from_fn(|i| f32::from_bits(words[1 + i])));
     Ok(words.chunks_exact(9).map(one).collect())
 }

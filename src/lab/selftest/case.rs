@@ -10,7 +10,7 @@ use std::fmt::Display;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// Exact arithmetic: expansions of f64, integers.
+    /// Exact arithmetic: integers.
     Exact,
     /// f64, brute force, with exact predicates where it does not decide.
     Reference,

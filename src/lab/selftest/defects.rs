@@ -12,9 +12,10 @@ use crate::kernels::layout::{GBuffer, Hit, Ray, Surface};
 use crate::kernels::table::Family;
 use crate::kernels::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
-use crate::stream::WorkerPool;
+use crate::stream::Workers;
 use anyhow::{Result, bail};
 use bricks::SceneFile;
+use delegate::delegate;
 use glam::DVec3;
 use std::any::Any;
 use std::sync::Arc;
@@ -192,12 +193,11 @@ impl Executor for Faulty {
         Ok(())
     }
 
-    fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
-        self.inner.set_lists(lists)
-    }
-
-    fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError> {
-        self.inner.set_pairs(queries, nodes)
+    delegate! {
+        to self.inner {
+            fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError>;
+            fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError>;
+        }
     }
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
@@ -214,60 +214,28 @@ impl Executor for Faulty {
 }
 
 impl FrameExecutor for Faulty {
-    fn device(&self) -> DeviceInfo {
-        self.inner.device()
-    }
-
-    fn page_bytes(&self) -> u64 {
-        self.inner.page_bytes()
-    }
-
-    fn texture_bytes(&self) -> u64 {
-        self.inner.texture_bytes()
-    }
-
-    fn workers(&self) -> &dyn WorkerPool {
-        self.inner.workers()
-    }
-
-    fn leaves_out(&self) -> Keep {
-        self.inner.leaves_out()
-    }
-
-    fn allow_bounces(&mut self) {
-        self.inner.allow_bounces();
-    }
-
-    fn make_binary(&mut self) -> Result<(), ExecutorError> {
-        self.inner.make_binary()
-    }
-
-    fn tuning(&mut self) -> &mut Tuning {
-        self.inner.tuning()
-    }
-
-    fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError> {
-        self.inner.set_lamps(lamps)
-    }
-
-    fn reserve(&mut self, family: &'static Family, elements: &[usize]) -> Result<(), ExecutorError> {
-        self.inner.reserve(family, elements)
-    }
-
-    fn write(&mut self, family: &'static Family, buffer: usize, at: usize, bytes: &[u8]) {
-        self.inner.write(family, buffer, at, bytes);
-    }
-
-    fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
-        self.inner.read(family, buffer, words)
-    }
-
-    fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>> {
-        self.inner.held(family)
-    }
-
-    fn set_scene(&mut self, scene: &Arc<SceneFile>) {
-        self.inner.set_scene(scene);
+    delegate! {
+        to self.inner {
+            fn device(&self) -> DeviceInfo;
+            fn page_bytes(&self) -> u64;
+            fn texture_bytes(&self) -> u64;
+            fn workers(&self) -> &Workers;
+            fn leaves_out(&self) -> Keep;
+            fn allow_bounces(&mut self);
+            fn make_binary(&mut self) -> Result<(), ExecutorError>;
+            fn tuning(&mut self) -> &mut Tuning;
+            fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError>;
+            fn reserve(&mut self, family: &'static Family, elements: &[usize]) -> Result<(), ExecutorError>;
+            fn write(&mut self, family: &'static Family, buffer: usize, at: usize, bytes: &[u8]);
+            fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError>;
+            fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>>;
+            fn set_scene(&mut self, scene: &Arc<SceneFile>);
+            fn read_rays(&mut self, pass: Pass) -> Result<Vec<Ray>, ExecutorError>;
+            fn read_hits(&mut self, pass: Pass) -> Result<Vec<Hit>, ExecutorError>;
+            fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<Surface>, ExecutorError>;
+            fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError>;
+            fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError>;
+        }
     }
 
     fn begin_frame(&mut self, view: &View) {
@@ -285,25 +253,5 @@ impl FrameExecutor for Faulty {
     fn set_rays(&mut self, pass: Pass, rays: &[Ray]) {
         let rays: Vec<Ray> = rays.iter().map(|ray| Ray { origin: self.point(ray.origin), ..*ray }).collect();
         self.inner.set_rays(pass, &rays);
-    }
-
-    fn read_rays(&mut self, pass: Pass) -> Result<Vec<Ray>, ExecutorError> {
-        self.inner.read_rays(pass)
-    }
-
-    fn read_hits(&mut self, pass: Pass) -> Result<Vec<Hit>, ExecutorError> {
-        self.inner.read_hits(pass)
-    }
-
-    fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<Surface>, ExecutorError> {
-        self.inner.read_surfaces(pass)
-    }
-
-    fn read_gbuffer(&mut self) -> Result<Vec<GBuffer>, ExecutorError> {
-        self.inner.read_gbuffer()
-    }
-
-    fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.inner.read_radiance()
     }
 }

@@ -1,7 +1,7 @@
 //! `brickwalk selftest`: is the arithmetic of this device what exact rendering needs, case by case?
 //!
 //! The kernels and the schedules that render are run, not copies of them, on scenes made to be hard, and compared with
-//! truth that does not depend on them: integers of 128 bits and expansions of f64, which are exact; brute force in f64;
+//! truth that does not depend on them: integers of 128 bits and more, which are exact; brute force in f64;
 //! closed forms; or two ways through the program that must give the same bits. Bounds follow from the arithmetic, γₙ =
 //! n u / (1 − n u) with u = 2⁻²⁴, and are derived where they are used and in [`crate::reference::bounds`]; where a
 //! comparison is exact its bound is 0.
@@ -174,7 +174,7 @@ fn device_traits(device: &Device, defect: Option<Defect>) -> (Traits, Option<Pro
         }
         Device::Gpu(gpu) => {
             let text = defect.map_or_else(probe::source, |defect| defect.plant(probe::source()));
-            let report = probe::run_source(&gpu.device, &gpu.queue, &text);
+            let report = probe::run_source(gpu, &text);
             (report.traits.clone(), Some(report))
         }
     }

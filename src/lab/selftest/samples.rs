@@ -2,8 +2,7 @@
 
 use super::case::Checks;
 use super::lab::{Lab, camera, primary, settings};
-use crate::frame::Engine;
-use crate::frame::{Accumulation, BATCH_SAMPLES, Renderer, camera_view};
+use crate::frame::{Accumulation, BATCH_SAMPLES, Engine, Renderer, camera_view};
 use crate::scene::Camera;
 use crate::schedule::{Lamp, Pass, Shading, Step};
 use crate::session::Settings;

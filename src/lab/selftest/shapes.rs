@@ -194,7 +194,7 @@ pub fn flat_scene(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let hits = stage.note(checks, "rays at it and along it", &rays)?;
     checks.at_least("hits", count as u64 - misses(&hits), count as u64 / 4);
     let settings = Settings { cells: 32, ..Settings::default() };
-    let levels = assemble(&stage.file, &settings, DVec3::new(1.0, 2.0, -1.0))?.0.levels;
+    let levels = assemble(&stage.file, &settings, DVec3::new(1.0, 2.0, -1.0))?.levels;
     let points = (-16..=16).flat_map(|x| (-16..=16).map(move |z| DVec3::new(f64::from(x), 0.0, f64::from(z)) / 4.0));
     let coarsest = levels.last().context("the scene has occupancy")?;
     let (empty, of) = points.fold((0, 0), |(empty, of), p| {

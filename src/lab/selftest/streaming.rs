@@ -125,7 +125,7 @@ pub fn least_cache(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let of_bytes = |bytes| Settings { cache: CacheSize::Bytes(bytes), ..options(100) };
     let small = lab.renderer(&place.scene, &of_bytes(least - 16));
     checks.refuses("one unit less than two bricks", small.map(|_| ()), &["too small", "two largest bricks"]);
-    for evict in Policy::ALL {
+    for &evict in Policy::ALL {
         let options = Settings { schedule: Schedule::Chc, evict, ..of_bytes(least) };
         let mut renderer = lab.renderer(&place.scene, &options)?;
         let differ = unlike(&mut renderer, &place, 0)? + unlike(&mut renderer, &place, 2)?;
@@ -133,7 +133,7 @@ pub fn least_cache(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     }
     let mut rng = lab.random(&[35]);
     let (mut lost, mut of) = (0, 0);
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         let sizes: Vec<(u64, u64)> =
             (0..40).map(|_| (16 * rng.int(1, 64) as u64, 16 * rng.int(0, 16) as u64)).collect();
         let mut residency = Residency::new(&sizes, 3 * Residency::least_budget(&sizes), 4096, policy)?;

@@ -6,10 +6,10 @@ use crate::frame::{Equirectangular, environment};
 use crate::kernels::Lamps;
 use crate::kernels::layout::{DvfTriangle, MET, NONE, Ray};
 use crate::schedule::{Lamp, Pass, Step};
-use crate::secondary::dvf::kernels;
 use crate::secondary::dvf::maps::{DvfMaps, directions, sum};
-use crate::secondary::dvf::{Areas, Cells, DvfField, DvfSettings, DvfUse, Shape, mask};
-use crate::secondary::dvf::{Dvf, DvfTracing, Region};
+use crate::secondary::dvf::{
+    Areas, Cells, Dvf, DvfField, DvfSettings, DvfTracing, DvfUse, Region, Shape, kernels, mask,
+};
 use crate::session::Settings;
 use crate::settings::{Effect, EffectList};
 use anyhow::Result;

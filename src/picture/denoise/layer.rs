@@ -1,11 +1,10 @@
 //! A kind of light with its history: averaged over frames, then filtered.
 
 use super::antilag::{Averages, change, held};
-use super::atrous;
 use super::atrous::Lit;
 use super::grid::Grid;
 use super::reproject::Taps;
-use super::{Moments, firefly};
+use super::{Moments, atrous, firefly};
 use crate::frame::Seen;
 use crate::picture::color::{is_finite, lerp, luminance};
 

@@ -1,6 +1,6 @@
 //! Occlusion and shadow rays that distance fields answer: of which maps, and when they are made.
 
-use super::DfSettings;
+use super::Options;
 use super::maps::DfMaps;
 use crate::frame::{Displaced, Engine, Plan, Secondary};
 use crate::kernels::View;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Rays answered by distance fields.
 pub struct Df {
-    settings: DfSettings,
+    settings: Options,
     /// The base maps.
     pub base: BaseMaps,
     /// What the fields that the executor has were made of.
@@ -21,21 +21,16 @@ pub struct Df {
 
 impl Df {
     /// With base maps that are made of `source`.
-    pub fn new(settings: DfSettings, source: Source) -> Self {
+    pub fn new(settings: Options, source: Source) -> Self {
         Self { settings, base: BaseMaps::new(source), made: None }
-    }
-
-    /// The settings.
-    pub fn settings(&self) -> &DfSettings {
-        &self.settings
     }
 
     /// Look-ups of a ray of `pass` at most; `None` where rays are traced.
     fn steps_of(&self, pass: Pass) -> Option<u32> {
         match pass {
-            Pass::Occlusion(_) => Some(self.settings.occlusion_steps),
+            Pass::Occlusion(_) => Some(self.settings.occlusion_steps()),
             Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
-                Some(self.settings.shadow_steps)
+                Some(self.settings.shadow_steps())
             }
             _ => None,
         }
@@ -72,14 +67,14 @@ impl Secondary for Df {
     }
 
     fn report(&self) -> Vec<(&'static str, Value)> {
-        let DfSettings { size, occlusion_steps, shadow_steps, lift, hit } = self.settings;
+        let of = &self.settings;
         let report = json!({
             "bom": self.base.source().name(),
-            "size": size,
-            "steps": occlusion_steps,
-            "shadow_steps": shadow_steps,
-            "lift": lift,
-            "hit": hit,
+            "size": of.size,
+            "steps": of.occlusion_steps(),
+            "shadow_steps": of.shadow_steps(),
+            "lift": of.lift,
+            "hit": of.hit as f32,
             "finest_cell": self.finest_cell(),
         });
         vec![("df", report)]

@@ -25,7 +25,7 @@ pub struct DistanceField {
     /// Cells of the finest level on each axis.
     cells: u32,
     /// The side of a cell, world units.
-    side: f64,
+    pub side: f64,
     /// Cell (0, 0, 0), in cells from the world's origin.
     first: [i64; 3],
     /// From the middle of a cell to that of the nearest occupied one, in cells of the finest level; infinite where none
@@ -58,35 +58,15 @@ pub fn halve(fine: &[f16], cells: u32, coarse: &mut [f16]) {
 impl DistanceField {
     /// The field of a map by jump flooding.
     pub fn new(map: &Bom) -> Self {
-        let mut field = Self::unfilled(map);
-        field.fill(&jump_flood(map));
-        for level in 1..LEVELS {
-            field.halve(level);
-        }
-        field
-    }
-
-    /// The field of a map whose distances are not known yet.
-    pub fn unfilled(map: &Bom) -> Self {
         let cells = map.cells();
-        let levels = std::array::from_fn(|level| vec![f16::INFINITY; (cells >> level).pow(3) as usize]);
+        let mut levels: [_; LEVELS] =
+            std::array::from_fn(|level| vec![f16::INFINITY; (cells >> level).pow(3) as usize]);
+        distances(&jump_flood(map), cells, &mut levels[0]);
+        for level in 1..LEVELS {
+            let (fine, coarse) = levels.split_at_mut(level);
+            halve(&fine[level - 1], cells >> (level - 1), &mut coarse[0]);
+        }
         Self { cells, side: map.side(), first: map.first, levels }
-    }
-
-    /// Makes the finest level from the nearest occupied cells of its own, as of [`jump_flood`].
-    pub fn fill(&mut self, nearest: &[u32]) {
-        distances(nearest, self.cells, &mut self.levels[0]);
-    }
-
-    /// Makes a level, 1 or above, from the one before.
-    pub fn halve(&mut self, level: usize) {
-        let (fine, coarse) = self.levels.split_at_mut(level);
-        halve(&fine[level - 1], self.cells >> (level - 1), &mut coarse[0]);
-    }
-
-    /// The side of a cell of the finest level, world units.
-    pub fn side(&self) -> f64 {
-        self.side
     }
 
     /// Cells of a level on each axis.
@@ -118,16 +98,13 @@ impl DistanceField {
 /// The distances of a field.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldView<'a> {
-    cells: u32,
-    levels: [&'a [f16]; LEVELS],
+    /// Cells of the finest level on each axis.
+    pub cells: u32,
+    /// Its levels.
+    pub levels: [&'a [f16]; LEVELS],
 }
 
-impl<'a> FieldView<'a> {
-    /// Of a field of so many cells on each axis.
-    pub fn new(cells: u32, levels: [&'a [f16]; LEVELS]) -> Self {
-        Self { cells, levels }
-    }
-
+impl FieldView<'_> {
     /// Cells of a level on each axis.
     pub fn cells(&self, level: usize) -> u32 {
         self.cells >> level

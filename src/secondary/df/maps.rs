@@ -1,7 +1,7 @@
 //! Distance fields as kernels see them: placed in a frame.
 
 use super::kernels::{BOMS, FAMILY, MAPS};
-use super::{DfSettings, LEVELS};
+use super::{LEVELS, Options};
 use crate::kernels::FrameExecutor;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::Level;
@@ -23,7 +23,7 @@ pub struct DfMaps {
 
 impl DfMaps {
     /// Those of `cascades`.
-    pub fn new(cascades: &Arc<Cascades>, frame: &Frame, settings: &DfSettings) -> Self {
+    pub fn new(cascades: &Arc<Cascades>, frame: &Frame, settings: &Options) -> Self {
         let level = |bom: &Bom| {
             let first = frame.origin / bom.side() - DVec3::from_array(bom.first.map(|x| x as f64));
             let per_unit = frame.unit / bom.side();
@@ -35,7 +35,7 @@ impl DfMaps {
             }
         };
         let levels = cascades.levels.iter().map(level).collect();
-        Self { cascades: cascades.clone(), levels, hit: settings.hit }
+        Self { cascades: cascades.clone(), levels, hit: settings.hit as f32 }
     }
 
     /// Cells of each on each axis.
@@ -87,7 +87,7 @@ mod tests {
         let frame = Frame { reference: [0; 3], unit: 0.25, origin: DVec3::new(5.0, -3.0, 2.0) };
         let boms = vec![Bom::new(64, -2, [-4, -20, 1]), Bom::new(64, -1, [-10, -18, -7])];
         let cascades = Arc::new(Cascades { levels: boms });
-        let settings = DfSettings { size: 64, occlusion_steps: 64, shadow_steps: 16, lift: 2.0, hit: 0.75 };
+        let settings = Options { size: 64, lift: 2.0, hit: 0.75, ..Options::default() };
         let maps = DfMaps::new(&cascades, &frame, &settings);
         for (bom, level) in cascades.levels.iter().zip(&maps.levels) {
             // A point of the world and how far along it lies in the frame.

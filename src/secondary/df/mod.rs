@@ -22,19 +22,4 @@ pub mod twin;
 pub use field::{DistanceField, FieldView, LEVELS, distance_f16};
 pub use flood::{NO_SEED, flood, flood_steps, jump_flood, seeds};
 pub use settings::Options;
-pub use trace::{LEAST_STEP, LocalRay, LocalTraced, Traced, Tracing, Way};
-
-/// How distance fields answer the rays of walks.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DfSettings {
-    /// Cells of a field on each axis: a multiple of 32 up to 256.
-    pub size: u32,
-    /// Look-ups of an occlusion ray at most.
-    pub occlusion_steps: u32,
-    /// Look-ups of a shadow ray at most.
-    pub shadow_steps: u32,
-    /// Cells by which rays start off their surface.
-    pub lift: f64,
-    /// As of [`Tracing`].
-    pub hit: f32,
-}
+pub use trace::{LEAST_STEP, Traced, Tracing, Way};

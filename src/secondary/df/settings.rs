@@ -1,6 +1,6 @@
 //! Options of `--secondary df`.
 
-use super::{DfSettings, Tracing};
+use super::Tracing;
 use crate::settings::{Rule, settings};
 
 /// Look-ups of shadow rays (Zeng et al., §7).
@@ -25,14 +25,13 @@ settings! {
 }
 
 impl Options {
-    /// How rays are answered.
-    pub fn settings(&self) -> DfSettings {
-        DfSettings {
-            size: self.size,
-            occlusion_steps: self.steps.unwrap_or(Tracing::default().iterations),
-            shadow_steps: self.steps.unwrap_or(SHADOW_STEPS),
-            lift: self.lift,
-            hit: self.hit as f32,
-        }
+    /// Look-ups of an occlusion ray at most.
+    pub fn occlusion_steps(&self) -> u32 {
+        self.steps.unwrap_or(Tracing::default().iterations)
+    }
+
+    /// Look-ups of a shadow ray at most.
+    pub fn shadow_steps(&self) -> u32 {
+        self.steps.unwrap_or(SHADOW_STEPS)
     }
 }

@@ -35,19 +35,6 @@ pub struct Traced {
     pub is_capped: bool,
 }
 
-/// A ray in cells of the finest level, from the first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LocalRay {
-    /// Where it starts.
-    pub origin: [f32; 3],
-    /// Where its interval starts, in lengths of `direction`.
-    pub t_min: f32,
-    /// Of length 1.
-    pub direction: [f32; 3],
-    /// Where its interval ends.
-    pub t_max: f32,
-}
-
 /// How a ray goes on from one look-up to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Way {
@@ -55,17 +42,6 @@ pub struct Way {
     pub level: usize,
     /// Look-ups that it made.
     pub look_ups: u32,
-}
-
-/// What a ray met, in cells.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LocalTraced {
-    /// Where it hit.
-    pub t: Option<f32>,
-    /// As of [`Traced`].
-    pub iterations: u32,
-    /// As of [`Traced`].
-    pub is_capped: bool,
 }
 
 impl FieldView<'_> {
@@ -111,19 +87,11 @@ impl DistanceField {
     /// Traces the ray from `origin`, world units, along `direction`, which has length 1, from `t_min` to `t_max`, world
     /// units. Outside of the field there is nothing.
     pub fn trace(&self, tracing: &Tracing, origin: [f64; 3], direction: [f64; 3], t_min: f64, t_max: f64) -> Traced {
-        let [t_min, t_max] = [t_min, t_max].map(|t| (t / self.side()) as f32);
-        let ray = LocalRay { origin: self.local(origin), t_min, direction: direction.map(|x| x as f32), t_max };
-        let LocalTraced { t, iterations, is_capped } = self.trace_local(tracing, &ray);
-        Traced { t: t.map(|t| f64::from(t) * self.side()), iterations, is_capped }
-    }
-
-    /// [`Self::trace`] in f32.
-    pub fn trace_local(&self, tracing: &Tracing, ray: &LocalRay) -> LocalTraced {
-        let size = self.cells(0) as f32;
-        let (mut t, mut end) = (ray.t_min, ray.t_max);
+        let (origin, direction) = (self.local(origin), direction.map(|x| x as f32));
+        let [mut t, mut end] = [t_min, t_max].map(|t| (t / self.side) as f32);
+        let size = self.view().cells as f32;
         let mut is_in = true;
-        for k in 0..3 {
-            let (origin, along) = (ray.origin[k], ray.direction[k]);
+        for (&origin, &along) in origin.iter().zip(&direction) {
             if along == 0.0 {
                 is_in &= (0.0..=size).contains(&origin);
             } else {
@@ -132,8 +100,8 @@ impl DistanceField {
             }
         }
         let mut way = Way { level: LEVELS - 1, look_ups: 0 };
-        let found = is_in.then(|| self.view().through(tracing, ray.origin, ray.direction, [t, end], &mut way));
+        let found = is_in.then(|| self.view().through(tracing, origin, direction, [t, end], &mut way));
         let (t, is_capped) = found.unwrap_or_default();
-        LocalTraced { t, iterations: way.look_ups, is_capped }
+        Traced { t: t.map(|t| f64::from(t) * self.side), iterations: way.look_ups, is_capped }
     }
 }

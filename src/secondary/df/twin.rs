@@ -31,7 +31,7 @@ fn field_of(distances: &[u32], cells: u32, level: u32) -> FieldView<'_> {
         (words, rest) = rest.split_at(mip_words(cells, mip));
         bytemuck::cast_slice::<u32, u16>(words).reinterpret_cast()
     });
-    FieldView::new(cells, levels)
+    FieldView { cells, levels }
 }
 
 /// The distances of level `mip` of field `level`, and those of the level before.

@@ -1,10 +1,9 @@
 //! Which rays of frames a field of visibility answers.
 
-use super::kernels;
 use super::maps::DvfMaps;
 use super::plan::Renewal;
 use super::renew::{Marked, renew};
-use super::{DvfField, DvfUse};
+use super::{DvfField, DvfUse, kernels};
 use crate::frame::{Displaced, Engine, FrameRecords, Plan, Secondary};
 use crate::kernels::View;
 use crate::kernels::frame::Frame;

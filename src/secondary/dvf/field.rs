@@ -1,8 +1,7 @@
 //! A field, and what it says of rays.
 
-use super::mask;
 use super::mask::{OCCLUDED, UNKNOWN, VISIBLE};
-use super::{Areas, DvfUse, Shape};
+use super::{Areas, DvfUse, Shape, mask};
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -18,7 +18,7 @@
 //! Nothing is used before the checksum is found right.
 
 use super::{Areas, DvfField, DvfKept, Shape, mask};
-use glam::DVec3;
+use bytemuck::{Pod, Zeroable};
 use std::io;
 use thiserror::Error;
 use xxhash_rust::xxh3::xxh3_64;
@@ -28,8 +28,23 @@ pub const MAGIC: [u8; 8] = *b"BWDVF\x1a\n\0";
 /// The version of the format.
 pub const VERSION: u32 = 2;
 
-/// Bytes before the cells.
-const HEAD: usize = 8 + 4 + 4 + 8 + 24 + 8 + 12 + 8 + 4;
+/// What stands before the cells.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Head {
+    magic: [u8; 8],
+    version: u32,
+    octahedral: u32,
+    key: u64,
+    corner: [f64; 3],
+    side: f64,
+    size: [u32; 3],
+    areas: [f32; 2],
+    known: u32,
+}
+
+/// Its bytes.
+const HEAD: usize = size_of::<Head>();
 
 /// Why a file is of no use.
 #[derive(Debug, Error)]
@@ -57,24 +72,21 @@ pub fn encode(kept: &DvfKept, key: u64) -> Vec<u8> {
     let shape = &field.shape;
     let words = shape.words();
     let known: Vec<usize> = (0..field.labels.len()).filter(|&cell| field.labels[cell] != mask::UNKNOWN).collect();
-    let mut bytes = Vec::with_capacity(HEAD + known.len() * 4 * (1 + words) + 8);
-    bytes.extend(MAGIC);
-    for word in [VERSION, shape.octahedral] {
-        bytes.extend(word.to_le_bytes());
-    }
-    bytes.extend(key.to_le_bytes());
-    for value in [shape.corner.x, shape.corner.y, shape.corner.z, shape.side] {
-        bytes.extend(value.to_le_bytes());
-    }
-    let areas = [areas.scale, areas.total].map(f32::to_bits);
-    for word in shape.size.into_iter().chain(areas).chain([known.len() as u32]) {
-        bytes.extend(word.to_le_bytes());
-    }
+    let head = Head {
+        magic: MAGIC,
+        version: VERSION,
+        octahedral: shape.octahedral,
+        key,
+        corner: shape.corner.to_array(),
+        side: shape.side,
+        size: shape.size,
+        areas: [areas.scale, areas.total],
+        known: known.len() as u32,
+    };
+    let mut bytes = bytemuck::bytes_of(&head).to_vec();
     for cell in known {
-        let masks = &field.masks[cell * words..(cell + 1) * words];
-        for word in std::iter::once(cell as u32).chain(masks.iter().copied()) {
-            bytes.extend(word.to_le_bytes());
-        }
+        bytes.extend(bytemuck::bytes_of(&(cell as u32)));
+        bytes.extend_from_slice(bytemuck::cast_slice(&field.masks[cell * words..(cell + 1) * words]));
     }
     let checksum = xxh3_64(&bytes);
     bytes.extend(checksum.to_le_bytes());
@@ -89,12 +101,10 @@ pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfKept, FileError> {
     if bytes.get(..8) != Some(&MAGIC[..]) {
         return Err(FileError::Foreign);
     }
-    let array = |at: usize| bytes.get(at..at + 8).and_then(|b| <[u8; 8]>::try_from(b).ok());
-    let word =
-        |at: usize| bytes.get(at..at + 4).and_then(|b| <[u8; 4]>::try_from(b).ok()).map_or(0, u32::from_le_bytes);
-    let version = word(8);
-    if bytes.len() >= HEAD && version != VERSION {
-        return Err(FileError::Version(version));
+    let head = bytes.get(..HEAD).map(bytemuck::pod_read_unaligned::<Head>);
+    let head = head.ok_or(FileError::Damaged("it is too short"))?;
+    if head.version != VERSION {
+        return Err(FileError::Version(head.version));
     }
     if bytes.len() < HEAD + 8 {
         return Err(FileError::Damaged("it is too short"));
@@ -103,14 +113,11 @@ pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfKept, FileError> {
     if checksum != xxh3_64(body).to_le_bytes() {
         return Err(FileError::Damaged("its checksum is another than stated"));
     }
-    if array(16) != Some(key.to_le_bytes()) {
+    if head.key != key {
         return Err(FileError::Other);
     }
-    let value = |at: usize| array(at).map_or(0.0, f64::from_le_bytes);
-    let octahedral = word(12);
-    let size = [56, 60, 64].map(word);
-    let [scale, total] = [68, 72].map(|at| f32::from_bits(word(at)));
-    let shape = Shape { corner: DVec3::new(value(24), value(32), value(40)), side: value(48), size, octahedral };
+    let Head { octahedral, side, size, areas: [scale, total], .. } = head;
+    let shape = Shape { corner: head.corner.into(), side, size, octahedral };
     let is_sound = [8, 16, 32].contains(&octahedral)
         && shape.side > 0.0
         && shape.side.is_finite()
@@ -118,13 +125,13 @@ pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfKept, FileError> {
         && [scale, total].iter().all(|x| *x > 0.0 && x.is_finite())
         && size.iter().all(|n| (1..=1 << 16).contains(n))
         && shape.cells().checked_mul(4 * shape.words() as u64).is_some_and(|bytes| bytes <= most);
-    let (count, words) = (word(76) as usize, if is_sound { shape.words() } else { 0 });
+    let (count, words) = (head.known as usize, if is_sound { shape.words() } else { 0 });
     if !is_sound || body.len() - HEAD != count * 4 * (1 + words) {
         return Err(FileError::Damaged("its numbers cannot be"));
     }
     let mut field = DvfField::unknown(shape);
     for entry in body[HEAD..].chunks_exact(4 * (1 + words)) {
-        let entry: Vec<u32> = entry.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
+        let entry: Vec<u32> = bytemuck::pod_collect_to_vec(entry);
         let cell = entry[0] as usize;
         if cell >= field.labels.len() {
             return Err(FileError::Damaged("a cell lies outside"));
@@ -139,6 +146,7 @@ pub fn decode(bytes: &[u8], key: u64, most: u64) -> Result<DvfKept, FileError> {
 mod tests {
     use super::*;
     use crate::math::sampling::pcg;
+    use glam::DVec3;
 
     fn kept() -> DvfKept {
         let mut field = DvfField::unknown(Shape::new(DVec3::ZERO, DVec3::new(3.0, 2.0, 1.0), 6, 8));

@@ -1,19 +1,19 @@
 //! Fields of visibility made, by passes of their own.
 
 use super::field::best;
-use super::kernels;
 use super::maps::{DvfMaps, directions, sum};
-use super::mask;
 use super::plan::{DvfTracing, EFFECT, PASS, Plan, Renewal, unread};
 use super::source::{Group, Region, groups, groups_of_moved, triangles};
 use super::strew::{Strewing, Strewn, Traced};
-use super::{Areas, Cells, DvfField, DvfKept, DvfSettings, DvfUse, MOST_TRIAL_BYTES, Shape, TRIAL_CELLS, Trial};
+use super::{
+    Areas, Cells, DvfField, DvfKept, DvfSettings, DvfUse, MOST_TRIAL_BYTES, Shape, TRIAL_CELLS, Trial, kernels, mask,
+};
 use crate::counters::{Counters, Record};
 use crate::frame::{Engine, FrameRecords, RenderError, Schedule};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::NONE;
 use crate::scene::Camera;
-use crate::schedule::{ExecutorError, Pass, Step, demand, plain};
+use crate::schedule::{self, ExecutorError, Pass, Step};
 use bricks::SceneFile;
 use glam::DVec3;
 use std::sync::Arc;
@@ -210,14 +210,9 @@ impl Engine {
 
     /// Traces rays that have nothing in common with those of a frame.
     fn trace_block(&mut self, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
-        let (executor, cache) = (&mut *self.executor, &mut self.cache);
-        let trace = match self.settings.schedule {
-            Schedule::Plain => plain::trace,
-            Schedule::PlainBinary => plain::trace_binary,
-            // Rays of points go everywhere: no tile of them agrees on what is near.
-            Schedule::Chc | Schedule::Demand | Schedule::Auto => demand::trace,
-        };
-        trace(executor, cache, pass, first, &self.settings.tracing, stats)
+        // Rays of points go everywhere: no tile of them agrees on what is near.
+        let by = Some(self.settings.schedule).filter(|by| *by != Schedule::Chc).unwrap_or(Schedule::Demand);
+        schedule::trace(&mut self.tracer(pass, stats), by, first)
     }
 }
 

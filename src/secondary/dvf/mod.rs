@@ -105,16 +105,6 @@ pub struct DvfUse {
 
 impl Default for DvfSettings {
     fn default() -> Self {
-        Self {
-            points: 400_000,
-            rays: 128,
-            cells: Cells::Auto,
-            octahedral: 32,
-            dilate: true,
-            hammersley: true,
-            round: false,
-            both: false,
-            seed: 0,
-        }
+        Options::default().settings()
     }
 }

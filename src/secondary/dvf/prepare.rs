@@ -1,9 +1,7 @@
 //! The field of visibility of a walk: read from its file, or made and kept there.
 
-use super::Renewal;
 use super::file::{FileError, decode, encode};
-use super::{Cells, DvfKept, DvfSettings, Options, RegionKind};
-use super::{Dvf, DvfMade, DvfTracing, EFFECT, Region};
+use super::{Cells, Dvf, DvfKept, DvfMade, DvfSettings, DvfTracing, EFFECT, Options, Region, RegionKind, Renewal};
 use crate::counters::Record;
 use crate::frame::{RenderError, Renderer};
 use crate::output::atomic;

@@ -17,13 +17,12 @@
 //! accepted: the budget is never exceeded. Rays of points are made, wait for bricks and are entered as those of a whole
 //! field are ([`super::strew`]).
 
-use super::kernels;
 use super::maps::{DvfMaps, directions};
 use super::plan::{DvfTracing, EFFECT, PASS, Plan, Renewal};
 use super::source::{groups, groups_of_moved};
 use super::strew::Strewing;
 use super::worth::{Candidate, MADE, Worth};
-use super::{Cells, Concerned, DvfField, DvfKept, DvfSettings, DvfUse, Fresh};
+use super::{Cells, Concerned, DvfField, DvfKept, DvfSettings, DvfUse, Fresh, kernels};
 use crate::counters::Counters;
 use crate::frame::{Engine, FrameRecords};
 use crate::kernels::View;

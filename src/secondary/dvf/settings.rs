@@ -1,9 +1,7 @@
 //! Options of `--secondary dvf`.
 
-use super::DvfTracing;
-use super::{CELLS, Cells, DvfSettings, DvfUse, POINTS, RAYS};
-use crate::settings::names;
-use crate::settings::{Plain, Rule, Value, settings};
+use super::{CELLS, Cells, DvfSettings, DvfTracing, DvfUse, POINTS, RAYS};
+use crate::settings::{Plain, Rule, Value, names, settings};
 use std::path::PathBuf;
 
 names! {
@@ -51,7 +49,8 @@ names! {
     Mode {
         /// It answers rays.
         SameSample = "same-sample",
-        /// What it does in the paper.
+        /// What it does in the paper: a baseline.
+        #[cfg(feature = "lab")]
         Paper = "paper",
     }
 }
@@ -155,6 +154,6 @@ impl Options {
 
     /// How rays are answered by it.
     pub fn how(&self) -> DvfUse {
-        DvfUse { doubt: self.trust == Trust::Masks, paper: self.mode == Mode::Paper }
+        DvfUse { doubt: self.trust == Trust::Masks, paper: self.mode != Mode::SameSample }
     }
 }

@@ -5,18 +5,16 @@
 //! those that are answered. Of the groups of triangles in which rays wait the triangles are kept, so that no brick is
 //! read for them again.
 
-use super::kernels;
 use super::plan::{EFFECT, PASS, Plan, unread};
 use super::source::{Group, triangles};
-use super::{DvfSettings, Fresh, Shape};
+use super::{DvfSettings, Fresh, Shape, kernels};
 use crate::counters::Counters;
 use crate::frame::{Engine, Schedule};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{DvfTriangle, Hit, NONE, Params, Ray};
 use crate::kernels::{Directions, View};
-use crate::schedule::chc::measure_needed;
 use crate::schedule::pool::Pool;
-use crate::schedule::{ExecutorError, Report, Step, plain};
+use crate::schedule::{self, ExecutorError, Report};
 use glam::DVec3;
 
 /// Most triangles that are kept of groups in which rays wait: 192 MiB.
@@ -331,22 +329,19 @@ impl<'a> Strewing<'a> {
         let enters = block.kind == Kind::Masks;
         let words = self.words();
         let Engine { executor, cache, .. } = &mut *self.renderer;
-        let trace = match schedule {
-            Schedule::Plain => plain::trace,
-            Schedule::PlainBinary => plain::trace_binary,
-            // Rays of points go everywhere: no tile of them agrees on what is near.
-            Schedule::Chc | Schedule::Demand | Schedule::Auto => {
-                let (steps, may_wait) = Pool::first(cache);
-                // There is a free one: room has been made.
-                block.place = may_wait.then(|| self.state.places.pop()).flatten();
-                let waiting = block.place.map(|place| place * words);
-                let steps = [&[make], steps, &[kernels::write(waiting, enters)]].concat();
-                let report = executor.run(PASS, &steps, &cache.states)?;
-                cache.touch_geometry(&report.used, may_wait, self.stats);
-                return self.traced(block, report, tracing.measure_needed);
-            }
-        };
-        trace(&mut **executor, cache, PASS, &[make], &tracing, self.stats)?;
+        // Rays of points go everywhere: no tile of them agrees on what is near.
+        if matches!(schedule, Schedule::Chc | Schedule::Demand | Schedule::Auto) {
+            let (steps, may_wait) = Pool::first(cache);
+            // There is a free one: room has been made.
+            block.place = may_wait.then(|| self.state.places.pop()).flatten();
+            let waiting = block.place.map(|place| place * words);
+            let steps = [&[make], steps, &[kernels::write(waiting, enters)]].concat();
+            let report = executor.run(PASS, &steps, &cache.states)?;
+            cache.touch_geometry(&report.used, may_wait, self.stats);
+            return self.traced(block, report, tracing.measure_needed);
+        }
+        schedule::trace(&mut self.renderer.tracer(PASS, self.stats), schedule, &[make])?;
+        let Engine { executor, cache, .. } = &mut *self.renderer;
         let report = executor.run(PASS, &[kernels::write(None, enters)], &cache.states)?;
         self.traced(block, report, false)
     }
@@ -371,8 +366,7 @@ impl<'a> Strewing<'a> {
             state.strewn.trials.extend(ended.map(|(_, (ray, hit))| in_world(frame, ray, hit)));
         }
         if measure {
-            let Engine { executor, cache, .. } = &mut **renderer;
-            measure_needed(&mut **executor, cache, PASS, &[Step::Lists], &state.resident, stats)?;
+            renderer.tracer(PASS, stats).measure_needed(&state.resident)?;
         }
         state.answered += block.left - left;
         if left > 0 {

@@ -1,18 +1,17 @@
 //! The maps of a frame, brought together from those of bricks, anew or from those of the frame before.
 
 use super::boxes::{boxes, region};
-use super::maps::{Maps, Reads};
+use super::maps::Maps;
 use super::place::{Cells, Place};
-use super::plan::{Detail, Settings, maps};
+use super::plan::{Settings, maps};
 use super::region::Region;
 use super::{Bom, Cascades};
-use bricks::{Occupancy, RESIDENT_LEVEL, Resident, SceneFile, TOP_LEAF, TopNode2};
+use bricks::{Occupancy, OccupancyMap, RESIDENT_LEVEL, Resident, SceneFile, TOP_LEAF, TopNode2};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 /// 64³ maps in hand at once, 10 MB, whatever the budget.
 const BATCH: usize = 256;
@@ -43,29 +42,6 @@ pub enum BomError {
     Read(#[from] bricks::Error),
 }
 
-/// What was done for a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Assembly {
-    /// Bricks brought in, those of every instance, level and part of it by itself.
-    pub bricks: u64,
-    /// Of these from 64³ maps.
-    pub detailed: u64,
-    /// Of these from the resident 16³ level, where a 64³ map was wanted.
-    pub coarse: u64,
-    /// Cells that were entered because a brick has larger ones there.
-    pub repeated_cells: u64,
-    /// 64³ maps read.
-    pub maps_read: u64,
-    /// Bytes of these in the file.
-    pub bytes_read: u64,
-    /// Levels that were moved, not made anew.
-    pub levels_moved: u64,
-    /// Cells that were made anew.
-    pub cells_filled: u64,
-    /// Wall time.
-    pub time: Duration,
-}
-
 /// A brick to be brought into a level.
 struct Job {
     leaf: u32,
@@ -84,9 +60,6 @@ struct Level {
     /// What of it is empty and to be filled.
     regions: Vec<Region>,
     jobs: Vec<Job>,
-    /// Bricks are in it from the resident level for want of their maps.
-    is_coarse: bool,
-    is_moved: bool,
 }
 
 /// What of the scene a frame was made of, as far as it may change.
@@ -100,9 +73,7 @@ struct Placed {
 pub struct Assembler {
     settings: Settings,
     maps: Maps,
-    cascades: Cascades,
-    /// Of the levels of `cascades`: see [`Level::is_coarse`].
-    coarse: Vec<bool>,
+    pub(super) cascades: Cascades,
     placed: Placed,
 }
 
@@ -110,10 +81,10 @@ pub struct Assembler {
 ///
 /// # Errors
 /// As of [`Assembler`].
-pub fn assemble(file: &Arc<SceneFile>, settings: &Settings, camera: DVec3) -> Result<(Cascades, Assembly), BomError> {
+pub fn assemble(file: &Arc<SceneFile>, settings: &Settings, camera: DVec3) -> Result<Cascades, BomError> {
     let mut assembler = Assembler::new(file.clone(), *settings)?;
-    let assembly = assembler.assemble(file.resident(), camera)?;
-    Ok((assembler.cascades, assembly))
+    assembler.advance(file.resident(), camera)?;
+    Ok(assembler.cascades)
 }
 
 /// log2 of the steps of the world's lattice in a cell of a level.
@@ -140,7 +111,7 @@ impl Assembler {
         }
         let maps = Maps::new(file, settings.budget_bytes);
         let placed = Placed { matrices: Vec::new(), boxes: Vec::new() };
-        Ok(Self { settings, maps, cascades: Cascades::default(), coarse: Vec::new(), placed })
+        Ok(Self { settings, maps, cascades: Cascades::default(), placed })
     }
 
     /// The maps of the frame made last.
@@ -148,67 +119,35 @@ impl Assembler {
         &self.cascades
     }
 
-    /// Makes the maps around `camera`, world units, anew. `resident` is the file's, or that with instances moved:
-    /// matrices, and the binary top-level tree with bounds that follow from them.
+    /// Makes the maps around `camera`, world units, from the maps made last: what they have in common with the new ones
+    /// is moved, and only the rest is filled, and what instances that moved leave and enter. They are the same bit for
+    /// bit as maps made anew. `resident` is the file's, or that with instances moved: matrices, and the binary
+    /// top-level tree with bounds that follow from them. Returns how many cells were filled.
     ///
     /// # Errors
     /// A damaged file.
-    pub fn assemble(&mut self, resident: &Resident, camera: DVec3) -> Result<Assembly, BomError> {
-        self.cascades.levels.clear();
-        self.coarse.clear();
-        self.advance(resident, camera)
-    }
-
-    /// As [`Self::assemble`], from the maps made last: what they have in common with the new ones is moved, and only
-    /// the rest is filled, and what instances that moved leave and enter. With [`Detail::All`] and [`Detail::Resident`]
-    /// the maps are the same bit for bit.
-    ///
-    /// # Errors
-    /// A damaged file.
-    pub fn advance(&mut self, resident: &Resident, camera: DVec3) -> Result<Assembly, BomError> {
-        let start = Instant::now();
+    pub fn advance(&mut self, resident: &Resident, camera: DVec3) -> Result<u64, BomError> {
         let moved = self.note_moved(resident);
-        let old = std::mem::take(&mut self.cascades.levels);
-        let is_coarse = std::mem::take(&mut self.coarse);
-        let from: Vec<(Bom, bool)> = old.into_iter().zip(is_coarse).collect();
+        let from = std::mem::take(&mut self.cascades.levels);
         let settings = &self.settings;
         let mut levels: Vec<Level> = maps(resident, settings, camera.to_array())
             .into_par_iter()
             .map(|map| {
-                let before = from.iter().find(|(old, _)| old.cell_log2 == map.cell_log2);
-                // Maps that came since might make one finer that was made from resident levels.
-                let before = before.filter(|(_, is_coarse)| !is_coarse).map(|(old, _)| old);
+                let before = from.iter().find(|old| old.cell_log2 == map.cell_log2);
                 let mut level = Level::new(resident, map, before, moved.as_deref());
                 level.collect(resident, settings);
                 level
             })
             .collect();
         let order = self.order(resident, &mut levels, camera);
-        let mut assembly = Assembly {
-            levels_moved: levels.iter().filter(|level| level.is_moved).count() as u64,
-            cells_filled: levels.iter().flat_map(|level| &level.regions).map(Region::count).sum(),
-            bricks: levels.iter().map(|level| level.jobs.len() as u64).sum(),
-            ..Assembly::default()
-        };
-        let jobs = || levels.iter().flat_map(|level| &level.jobs);
-        assembly.detailed = jobs().filter(|job| job.order > 0).count() as u64;
-        assembly.coarse = jobs().filter(|job| job.is_wanted && job.order == 0).count() as u64;
-        let enter = |levels: &mut [Level], first: u32, maps: &[Arc<bricks::OccupancyMap>]| -> u64 {
-            levels.par_iter_mut().map(|level| level.enter(resident, first, maps)).sum()
-        };
-        assembly.repeated_cells = enter(&mut levels, 0, &[]);
+        levels.par_iter_mut().for_each(|level| level.enter(resident, 0, &[]));
         for (batch, bricks) in (0u32..).zip(order.chunks(BATCH)) {
-            let (maps, Reads { maps: read, bytes }) = self.maps.get(bricks)?;
-            assembly.maps_read += read;
-            assembly.bytes_read += bytes;
-            assembly.repeated_cells += enter(&mut levels, 1 + batch * BATCH as u32, &maps);
+            let maps = self.maps.get(bricks)?;
+            levels.par_iter_mut().for_each(|level| level.enter(resident, 1 + batch * BATCH as u32, &maps));
         }
-        for level in levels {
-            self.coarse.push(level.is_coarse);
-            self.cascades.levels.push(level.map);
-        }
-        assembly.time = start.elapsed();
-        Ok(assembly)
+        let filled = levels.iter().flat_map(|level| &level.regions).map(Region::count).sum();
+        self.cascades.levels.extend(levels.into_iter().map(|level| level.map));
+        Ok(filled)
     }
 
     /// The bounds that moved instances had and have; `None`: other leaves than before.
@@ -247,21 +186,13 @@ impl Assembler {
         }
         let mut bricks: Vec<(f64, u32)> = wanted.into_iter().map(|(brick, distance)| (distance, brick)).collect();
         bricks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        if let Detail::AtMost(most) = self.settings.detail {
-            let mut read = 0;
-            bricks.retain(|&(_, brick)| {
-                let is_held = self.maps.holds(brick);
-                read += u32::from(!is_held);
-                is_held || read <= most
-            });
-        }
         let order: Vec<u32> = bricks.into_iter().rev().map(|(_, brick)| brick).collect();
         let place: HashMap<u32, u32> = order.iter().copied().zip(1..).collect();
         for level in levels {
             for job in &mut level.jobs {
-                let brick = resident.leaves[job.leaf as usize].brick;
-                job.order = if job.is_wanted { place.get(&brick).copied().unwrap_or(0) } else { 0 };
-                level.is_coarse |= job.is_wanted && job.order == 0;
+                if job.is_wanted {
+                    job.order = place[&resident.leaves[job.leaf as usize].brick];
+                }
             }
             level.jobs.sort_unstable_by_key(|job| job.order);
         }
@@ -274,7 +205,7 @@ impl Level {
     fn new(resident: &Resident, map: Bom, before: Option<&Bom>, moved: Option<&[[[i64; 3]; 2]]>) -> Self {
         let whole = Region::whole(map.cells());
         let (Some(before), Some(moved)) = (before, moved) else {
-            return Self { map, regions: vec![whole], jobs: Vec::new(), is_coarse: false, is_moved: false };
+            return Self { map, regions: vec![whole], jobs: Vec::new() };
         };
         let (mut map, mut regions) = before.moved(map.first);
         let steps_log2 = cell_steps_log2(resident, &map);
@@ -283,11 +214,11 @@ impl Level {
         left.dedup();
         if left.iter().chain(&regions).map(Region::count).sum::<u64>() >= whole.count() {
             map.clear(&whole);
-            return Self { map, regions: vec![whole], jobs: Vec::new(), is_coarse: false, is_moved: false };
+            return Self { map, regions: vec![whole], jobs: Vec::new() };
         }
         left.iter().for_each(|region| map.clear(region));
         regions.append(&mut left);
-        Self { map, regions, jobs: Vec::new(), is_coarse: false, is_moved: true }
+        Self { map, regions, jobs: Vec::new() }
     }
 
     /// Finds the leaves in the regions.
@@ -313,17 +244,16 @@ impl Level {
                 let is_inside = (0..3).all(|k| all.lo[k] > 0 && all.hi[k] < self.map.cells());
                 let is_one_cell = is_inside && all.count() == 1;
                 let wide_log2 = self.map.cell_log2 - (place.cell_log2() + RESIDENT_LEVEL as i32);
-                let is_wanted = settings.detail != Detail::Resident && wide_log2 < settings.detail_log2 && !is_one_cell;
+                let is_wanted = wide_log2 < settings.detail_log2 && !is_one_cell;
                 self.jobs.push(Job { leaf: node.left, region, is_one_cell, order: 0, is_wanted });
             }
         }
     }
 
     /// Enters the bricks numbered from `first`: 0 those from resident levels, else as many as there are maps.
-    fn enter(&mut self, resident: &Resident, first: u32, maps: &[Arc<bricks::OccupancyMap>]) -> u64 {
+    fn enter(&mut self, resident: &Resident, first: u32, maps: &[Arc<OccupancyMap>]) {
         let from = self.jobs.partition_point(|job| job.order < first);
         let end = self.jobs.partition_point(|job| job.order < first + (maps.len() as u32).max(1));
-        let mut repeated = 0;
         for job in &self.jobs[from..end] {
             if job.is_one_cell {
                 self.map.occupy(job.region.lo);
@@ -340,11 +270,11 @@ impl Level {
             let object = &resident.objects[instance.object as usize];
             // Cells of a wide, flat brick reach far beside it; the boxes of its root's children do not.
             for of_child in boxes(object, &resident.bricks[leaf.brick as usize]) {
-                let within = region(&self.map, instance, of_child).and_then(|region| region.and(&job.region));
-                repeated += within.map_or(0, |within| place.enter(&mut self.map, &within, &cells));
+                if let Some(within) = region(&self.map, instance, of_child).and_then(|region| region.and(&job.region)) {
+                    place.enter(&mut self.map, &within, &cells);
+                }
             }
         }
-        repeated
     }
 }
 

@@ -1,5 +1,6 @@
 //! Base occupancy maps around the camera: assembled for a frame, kept as long as nothing changes in them.
 
+#[cfg(feature = "lab")]
 use super::raster::Raster;
 use super::{Assembler, Bom, BomError, Cascades, Settings, Source};
 use crate::kernels::View;
@@ -19,6 +20,7 @@ pub struct BaseMaps {
     assembler: Option<(Wanted, Assembler)>,
     source: Source,
     /// The scene's triangles, if base maps are made of these.
+    #[cfg(feature = "lab")]
     raster: Option<Raster>,
     cascades: Arc<Cascades>,
     view: Option<BaseView>,
@@ -113,7 +115,7 @@ impl BaseMaps {
     /// Occupancy that cannot be read.
     pub fn assemble(&mut self, scene: &Arc<SceneFile>, size: u32, cells: u32) -> Result<&Arc<Cascades>, ExecutorError> {
         let usual_log2 = self.usual_log2(scene);
-        let Some(BaseView { camera, sample, seed, .. }) = &self.view else { return Ok(&self.cascades) };
+        let Some(view) = &self.view else { return Ok(&self.cascades) };
         let failed = |error: BomError| ExecutorError::Device(format!("got no occupancy maps: {error}"));
         let wanted = Wanted { size, cells, usual_log2 };
         let mut assembler = match self.assembler.take() {
@@ -127,18 +129,18 @@ impl BaseMaps {
             }
         };
         if !self.is_assembled {
-            assembler.advance(scene.resident(), *camera).map_err(failed)?;
-            let raster = match (self.source, self.raster.take()) {
-                (Source::Bricks, _) => None,
-                (Source::Triangles, Some(raster)) => Some(raster),
-                (Source::Triangles, None) => Some(Raster::new(scene).map_err(failed)?),
-            };
-            if let Some(raster) = &raster {
-                self.cascades = Arc::new(raster.maps(scene, assembler.cascades(), *sample, *seed));
-            } else if *self.cascades != *assembler.cascades() {
-                self.cascades = Arc::new(assembler.cascades().clone());
+            assembler.advance(scene.resident(), view.camera).map_err(failed)?;
+            let made = assembler.cascades();
+            match self.source {
+                Source::Bricks if *self.cascades == *made => {}
+                Source::Bricks => self.cascades = Arc::new(made.clone()),
+                #[cfg(feature = "lab")]
+                Source::Triangles => {
+                    let raster = self.raster.take().map_or_else(|| Raster::new(scene), Ok).map_err(failed)?;
+                    self.cascades = Arc::new(raster.maps(scene, made, view.sample, view.seed));
+                    self.raster = Some(raster);
+                }
             }
-            self.raster = raster;
             self.is_assembled = true;
         }
         self.assembler = Some((wanted, assembler));

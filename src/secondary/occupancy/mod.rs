@@ -20,14 +20,17 @@ mod clearance;
 mod maps;
 mod place;
 mod plan;
-pub mod raster;
+#[cfg(feature = "lab")]
+mod raster;
 mod region;
+#[cfg(feature = "lab")]
 mod voxelise;
 
-pub use assemble::{Assembler, Assembly, BomError, assemble};
+pub use assemble::{Assembler, BomError, assemble};
 pub use base::{BaseMaps, BaseView, MOST_LEVELS};
 pub use clearance::{BLOCK_CELLS, clearance, clearance_bytes};
-pub use plan::{Detail, MAX_LEVELS, SNAP_CELLS, Settings};
+pub use plan::Settings;
+#[cfg(feature = "lab")]
 pub use voxelise::{Voxelisation, voxelise};
 
 use bricks::Resident;
@@ -105,7 +108,8 @@ crate::settings::names! {
     Source {
         /// The maps that bricks carry. No geometry is read, and no occupied cell is missed.
         Bricks = "bricks",
-        /// All triangles, in every sample anew: [`Voxelisation::Raster`].
+        /// All triangles, in every sample anew: [`Voxelisation::Raster`]. A baseline.
+        #[cfg(feature = "lab")]
         Triangles = "raster",
     }
 }

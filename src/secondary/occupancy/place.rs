@@ -110,15 +110,11 @@ impl Place {
         }
     }
 
-    /// Enters cells into a region of a map. Returns how many cells were entered, where they are smaller than the
-    /// brick's.
-    pub fn enter(&self, map: &mut Bom, region: &Region, cells: &Cells<'_>) -> u64 {
+    /// Enters cells into a region of a map.
+    pub fn enter(&self, map: &mut Bom, region: &Region, cells: &Cells<'_>) {
         match self {
             Self::Aligned { cell_log2, origin } => enter_aligned(map, region, cells, *cell_log2, origin),
-            Self::Turned { matrix, side, origin, cell_log2 } => {
-                let entered = enter_turned(map, region, cells, matrix, *side, origin);
-                if cell_log2 + cells.level as i32 > map.cell_log2 { entered } else { 0 }
-            }
+            Self::Turned { matrix, side, origin, .. } => enter_turned(map, region, cells, matrix, *side, origin),
         }
     }
 }
@@ -166,7 +162,7 @@ impl Axis {
 }
 
 /// Cells on a common lattice: each cell of the map is the OR of those that it meets, one axis after the other.
-fn enter_aligned(map: &mut Bom, region: &Region, cells: &Cells<'_>, cell_log2: i32, origin: &[i64; 3]) -> u64 {
+fn enter_aligned(map: &mut Bom, region: &Region, cells: &Cells<'_>, cell_log2: i32, origin: &[i64; 3]) {
     let shift = map.cell_log2 - cell_log2;
     let [x_axis, y_axis, z_axis]: [Axis; 3] =
         std::array::from_fn(|k| Axis { shift, level: cells.level, origin: origin[k], first: map.first[k] });
@@ -174,8 +170,6 @@ fn enter_aligned(map: &mut Bom, region: &Region, cells: &Cells<'_>, cell_log2: i
     let columns = x_axis.meeting(count, region.lo[0], region.hi[0]);
     let z_range = (i64::from(region.lo[2]), i64::from(region.hi[2]));
     let words = map.column_words() as usize;
-    let is_repeated = shift < cells.level as i32;
-    let mut repeated = 0;
     let mut rows = [0u64; OCCUPANCY_CELLS as usize];
     let mut rows_of = None;
     for (y, first_y, last_y) in y_axis.meeting(count, region.lo[1], region.hi[1]) {
@@ -205,12 +199,8 @@ fn enter_aligned(map: &mut Bom, region: &Region, cells: &Cells<'_>, cell_log2: i
             for (word, bits) in map.column_mut(x, y).iter_mut().zip(&expanded[..words]) {
                 *word |= bits;
             }
-            if is_repeated {
-                repeated += expanded.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
-            }
         }
     }
-    repeated
 }
 
 /// The runs of ones: the first and the last bit of each.
@@ -231,7 +221,7 @@ fn enter_turned(
     matrix: &[f64; 12],
     finest_side: f64,
     origin: &[i64; 3],
-) -> u64 {
+) {
     let count = f64::from(cells.count());
     let side = finest_side * f64::from(cells.level).exp2();
     let per_world = 1.0 / map.side();
@@ -259,7 +249,6 @@ fn enter_turned(
         half[k] += 32.0 * UNIT * (size * per_world + first.abs() + f64::from(map.cells()));
     }
     let (lo, hi) = (region.lo.map(f64::from), region.hi.map(|x| f64::from(x) - 1.0));
-    let mut entered = 0;
     for y in 0..cells.count() {
         for x in 0..cells.count() {
             for (from, to) in runs(cells.column(x, y)) {
@@ -276,12 +265,10 @@ fn enter_turned(
                         (found.lo[k], found.hi[k]) = (first as u32, last as u32 + 1);
                     }
                     map.fill(&found);
-                    entered += found.count();
                 }
             }
         }
     }
-    entered
 }
 
 #[cfg(test)]
@@ -325,7 +312,7 @@ mod tests {
                 let first = std::array::from_fn(|k| start(k) - rng.int(0, 30));
                 let mut map = Bom::new(64, shift - 3, first);
                 let place = Place::Aligned { cell_log2: -3, origin };
-                let repeated = place.enter(&mut map, &region, &Cells::of(&brick, level));
+                place.enter(&mut map, &region, &Cells::of(&brick, level));
                 // In units of an eighth of the finest cell, which divides all.
                 let mut expected = Bom::new(64, shift - 3, first);
                 for cell in cells_of(64 >> level).filter(|&cell| brick.is_occupied(level, cell)) {
@@ -341,7 +328,6 @@ mod tests {
                     }
                 }
                 assert_eq!(map, expected, "shift {shift}, level {level}");
-                assert_eq!(repeated > 0, shift < level as i32 && map.occupied() > 0);
                 set += map.occupied();
             }
         }

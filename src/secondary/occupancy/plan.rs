@@ -5,26 +5,14 @@ use super::{Bom, extent};
 use bricks::{Resident, TOP_LEAF, TopNode2};
 
 /// Corners of maps are multiples of this many of their cells, so that they seldom move, by whole cells.
-pub const SNAP_CELLS: i64 = 8;
+const SNAP_CELLS: i64 = 8;
 
 /// Most maps.
-pub const MAX_LEVELS: u32 = 12;
+const MAX_LEVELS: u32 = 12;
 
 /// log2 of the largest distance from the world's origin, in cells: positions within are exact to a 32nd of a cell in
 /// f64.
 const REACH_CELLS_LOG2: i32 = 48;
-
-/// Which 64³ maps are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Detail {
-    /// None: the resident 16³ levels serve.
-    Resident,
-    /// At most so many a frame, of the nearest bricks first, besides those that are held. A frame then depends on those
-    /// before.
-    AtMost(u32),
-    /// All that are wanted: a frame depends on the scene, the camera and the settings alone.
-    All,
-}
 
 /// What maps are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,13 +22,8 @@ pub struct Settings {
     /// log2 of the side of the finest cells, world units. `None`, the default: the finest whose map reaches a brick
     /// with cells no larger. Either is raised where [`Self::levels`] would not hold the scene.
     pub finest_log2: Option<i32>,
-    /// Least distance that the finest map reaches to all sides of the camera where `finest_log2` is `None`, world
-    /// units; 0 by default.
-    pub reach: f64,
-    /// Most maps, 1 to [`MAX_LEVELS`], its default.
+    /// Most maps, 1 to 12, the default.
     pub levels: u32,
-    /// Which 64³ maps are read; all that are wanted by default.
-    pub detail: Detail,
     /// A 64³ map is wanted where a cell is less than 2^this cells of the brick's 16³ level wide; 1 by default.
     pub detail_log2: i32,
     /// Bytes of 64³ maps held; 64 MiB by default.
@@ -49,15 +32,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            cells: 128,
-            finest_log2: None,
-            reach: 0.0,
-            levels: MAX_LEVELS,
-            detail: Detail::All,
-            detail_log2: 1,
-            budget_bytes: 64 << 20,
-        }
+        Self { cells: 128, finest_log2: None, levels: MAX_LEVELS, detail_log2: 1, budget_bytes: 64 << 20 }
     }
 }
 
@@ -97,10 +72,7 @@ pub(crate) fn maps(resident: &Resident, settings: &Settings, camera: [f64; 3]) -
     let farthest = bounds.as_flattened().iter().fold(0.0f64, |far, x| far.max(x.abs()));
     let held = coarsest.saturating_sub(settings.levels.clamp(1, MAX_LEVELS) as i32 - 1);
     let exact = if farthest > 0.0 { ceil_log2(farthest) - REACH_CELLS_LOG2 } else { i32::MIN };
-    let finest = settings.finest_log2.unwrap_or_else(|| {
-        let wanted = if settings.reach > 0.0 { ceil_log2(settings.reach / reached) } else { i32::MIN };
-        finest_near(resident, &middle, settings.cells).max(wanted)
-    });
+    let finest = settings.finest_log2.unwrap_or_else(|| finest_near(resident, &middle, settings.cells));
     let finest = finest.max(held).max(exact);
     let level = |cell_log2: i32| {
         let first = middle.map(|x| {

@@ -3,8 +3,7 @@
 use super::{CLOSED, Grid, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings, THIN};
 use crate::secondary::occupancy::Source;
 use crate::secondary::rsm::RsmSettings;
-use crate::settings::names;
-use crate::settings::{Rule, settings};
+use crate::settings::{Rule, names, settings};
 
 /// Square roots of numbers of maps.
 const K: Rule = Rule::OneOf(&[4, 8]);

@@ -482,7 +482,7 @@ pub fn roma_trace(
             // What has been traced is not answered, though maps go on with it or correct it.
             let mut is_answered = own.part == ROMA_WHOLE || !is_traced(ray, hit);
             if of.levels.is_empty() {
-                tally.add(COUNTER_RAYS_ANSWERED, u32::from(is_answered));
+                tally.add(COUNTER_RAYS_ANSWERED, u32::from(is_answered && !is_sifted));
                 continue;
             }
             let normal = normal_of(seen, index);

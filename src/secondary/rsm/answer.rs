@@ -4,12 +4,12 @@
 use super::maps::{LampView, RsmMaps};
 use super::{LampViews, RsmSettings};
 use crate::counters::Counters;
-use crate::frame::{Engine, FrameRecords, Schedule};
+use crate::frame::{Engine, FrameRecords};
 use crate::kernels::frame::Frame;
 use crate::kernels::lamps::Emitter;
 use crate::kernels::layout::{NONE, Params, Ray, RsmMap};
 use crate::kernels::{Directions, View};
-use crate::schedule::{ExecutorError, Lamp, Pass, Step, attributes, chc, demand, plain};
+use crate::schedule::{self, ExecutorError, Lamp, Pass, Step, attributes};
 use crate::secondary::occupancy::Cascades;
 use bricks::Resident;
 use glam::DVec3;
@@ -205,12 +205,6 @@ fn lamp_view(engine: &Engine, lamp: &LampView, frame: Frame) -> View {
 
 /// Traces rays that were given, which have nothing in common with the frame before.
 fn trace_given(engine: &mut Engine, stats: &mut Counters) -> Result<(), ExecutorError> {
-    let trace = match engine.settings.schedule {
-        Schedule::Chc => chc::trace,
-        Schedule::Demand | Schedule::Auto => demand::trace,
-        Schedule::Plain => plain::trace,
-        Schedule::PlainBinary => plain::trace_binary,
-    };
-    let (executor, cache) = (&mut *engine.executor, &mut engine.cache);
-    trace(executor, cache, Pass::Primary, &[Step::StartHits], &engine.settings.tracing, stats)
+    let by = engine.settings.schedule;
+    schedule::trace(&mut engine.tracer(Pass::Primary, stats), by, &[Step::StartHits])
 }

@@ -2,7 +2,7 @@
 
 use super::model::{Broken, Model, Random, bytes};
 use crate::stream::residency::Placement;
-use crate::stream::{Item, NoRoom, Policy, Residency, ResidencyError, Sizes, Slot};
+use crate::stream::{Item, Kind, NoRoom, Policy, Residency, ResidencyError, Sizes, Slot};
 
 /// Sizes, budget and page of a random small cache; the budget is often the least one.
 fn random_cache(random: &mut Random) -> (Sizes, u64, u64) {
@@ -95,7 +95,7 @@ fn run_schedule(seed: u64, policy: Policy, broken: Broken, steps: usize) -> Resu
 
 #[test]
 fn random_schedules_match_the_naive_model() {
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         for seed in 0..150 {
             run_schedule(seed, policy, Broken::Not, 400).unwrap();
         }
@@ -150,8 +150,8 @@ fn validate_notices_each_broken_invariant() {
         ("used bytes", |cache| cache.used_bytes += 16),
         ("lost place", |cache| cache.place[Item::geometry(0).index()] = u64::MAX),
         ("other place", |cache| cache.place[Item::geometry(0).index()] = 64),
-        ("counters", |cache| cache.counters.geometry.loaded += 1),
-        ("counted bytes", |cache| cache.counters.attributes.evicted_bytes += 16),
+        ("counters", |cache| cache.counters.0[0].loaded += 1),
+        ("counted bytes", |cache| cache.counters.0[1].evicted_bytes += 16),
         ("pin without a flag", |cache| cache.is_pinned[Item::geometry(1).index()] = false),
         ("pin of what is not resident", |cache| {
             cache.is_pinned[Item::geometry(3).index()] = true;
@@ -164,7 +164,7 @@ fn validate_notices_each_broken_invariant() {
             cache.place[item.index()] = 144;
         }),
     ];
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         for (name, damage) in damages {
             let mut cache = filled(policy);
             // The straddling item needs free bytes at the border of the pages.
@@ -181,7 +181,7 @@ fn validate_notices_each_broken_invariant() {
     }
     let mut cache = filled(Policy::Lru);
     let Placement::Lru(lru) = &mut cache.placement else { unreachable!() };
-    lru.recency.remove(Item::geometry(0));
+    lru.recency.pop(&Item::geometry(0));
     assert!(cache.validate().is_err(), "a missing use was not noticed");
     let mut cache = filled(Policy::Lru);
     let Placement::Lru(lru) = &mut cache.placement else { unreachable!() };
@@ -192,7 +192,7 @@ fn validate_notices_each_broken_invariant() {
 #[test]
 fn the_least_cache_holds_the_two_largest_bricks() {
     let sizes = [(160, 32), (320, 64), (16, 16), (320, 16)];
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         let needed = 320 + 64 + 320 + 16;
         assert_eq!(
             Residency::new(&sizes, needed - 1, 1 << 20, policy).unwrap_err(),
@@ -224,7 +224,7 @@ fn the_least_cache_holds_the_tiles_of_any_lookup() {
     let sizes = Sizes { bricks: vec![(48, 16), (32, 0)], tiles: vec![64; 30] };
     let least = Residency::least_budget(&sizes);
     assert_eq!(least, 2 * 8 * 64);
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         let what = "the tiles of a texture lookup";
         let refused = Residency::new(&sizes, least - 16, 1 << 20, policy).unwrap_err();
         assert_eq!(refused, ResidencyError::CacheTooSmall { what, needed: least, given: least - 16 });
@@ -248,7 +248,7 @@ fn the_least_cache_holds_the_tiles_of_any_lookup() {
             cache.validate().unwrap();
         }
         assert!(had > 100 && full == 500, "{policy}: {had}, {full}");
-        let tiles = cache.counters().tiles;
+        let tiles = *cache.counters().kind(Kind::Tile);
         assert_eq!(tiles.loaded_bytes, 64 * tiles.loaded);
         assert!(cache.counters().total().loaded > tiles.loaded);
     }
@@ -261,7 +261,7 @@ fn one_brick_and_no_brick() {
     cache.insert(Item::attributes(0)).unwrap();
     assert_eq!(cache.used_bytes(), 112);
     assert!(Residency::new(&[(96, 16)], 111, 1 << 20, Policy::Lru).unwrap_err().to_string().contains("112 bytes"));
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         let cache = Residency::new(&[], 0, 1 << 20, policy).unwrap();
         assert_eq!((cache.page_sizes().len(), cache.budget_bytes()), (0, 0));
         cache.validate().unwrap();
@@ -296,7 +296,7 @@ fn sizes_beyond_32_bits() {
         Residency::new(&[(u64::MAX - 15, u64::MAX - 15); 2], 1 << 40, 1 << 30, Policy::Lru).unwrap_err(),
         ResidencyError::CacheTooSmall { what: "the two largest bricks", needed: u64::MAX, given: 1 << 40 }
     );
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         let mut cache = Residency::new(&sizes, 5 * item, u64::MAX, policy).unwrap();
         assert_eq!(cache.page_sizes().next(), Some(u32::MAX as u64 - 15));
         let slots: Vec<Slot> = (0..3).map(|brick| cache.insert(Item::geometry(brick)).unwrap().slot).collect();
@@ -334,7 +334,7 @@ fn a_wrap_in_mid_batch_skips_what_is_pinned() {
 
 #[test]
 fn pinned_fragments_can_leave_no_place() {
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         let mut cache = Residency::new(&[(64, 0), (64, 0), (32, 0), (32, 0), (32, 0)], 128, 128, policy).unwrap();
         for brick in [2, 3, 4] {
             cache.insert(Item::geometry(brick)).unwrap();
@@ -388,22 +388,22 @@ fn counters_tell_loaded_reloaded_and_evicted_apart() {
     assert_eq!((cache.counters().total().loaded, cache.counters().total().reloaded), (4, 0));
     assert!(cache.withdraw(Item::geometry(1)));
     assert!(!cache.withdraw(Item::geometry(1)));
-    assert_eq!((cache.counters().geometry.loaded, cache.counters().geometry.evicted), (1, 0));
-    assert_eq!(cache.counters().geometry.loaded_bytes, 64);
+    assert_eq!((cache.counters().kind(Kind::Geometry).loaded, cache.counters().kind(Kind::Geometry).evicted), (1, 0));
+    assert_eq!(cache.counters().kind(Kind::Geometry).loaded_bytes, 64);
     // A retry after a withdrawal is no reload, and one after an eviction is.
     let before = cache.counters();
     assert_eq!(cache.insert(Item::geometry(1)).unwrap().evicted, [Item::geometry(0)]);
-    assert_eq!(cache.counters().since(&before).geometry.reloaded, 0);
+    assert_eq!(cache.counters().since(&before).kind(Kind::Geometry).reloaded, 0);
     cache.insert(Item::geometry(0)).unwrap();
     let since = cache.counters().since(&before);
-    assert_eq!((since.geometry.loaded, since.geometry.reloaded), (2, 1));
-    assert_eq!((since.geometry.evicted, since.geometry.evicted_bytes), (1, 64));
+    assert_eq!((since.kind(Kind::Geometry).loaded, since.kind(Kind::Geometry).reloaded), (2, 1));
+    assert_eq!((since.kind(Kind::Geometry).evicted, since.kind(Kind::Geometry).evicted_bytes), (1, 64));
     // In the next pass it is none.
     cache.begin_pass();
     let before = cache.counters();
     cache.withdraw(Item::geometry(0));
     cache.insert(Item::geometry(0)).unwrap();
-    assert_eq!(cache.counters().since(&before).geometry.reloaded, 0);
+    assert_eq!(cache.counters().since(&before).kind(Kind::Geometry).reloaded, 0);
     cache.validate().unwrap();
 }
 
@@ -413,7 +413,7 @@ fn the_budget_for_all_holds_all() {
         let mut random = Random(seed);
         let (sizes, _, page) = random_cache(&mut random);
         let budget = Residency::budget_for_all(&sizes, page);
-        for policy in Policy::ALL {
+        for &policy in Policy::ALL {
             let mut cache = Residency::new(&sizes, budget, page, policy).unwrap();
             for _ in 0..sizes.rows() * 2 {
                 let item = Item::from_index(random.below(sizes.rows() as u64) as usize).unwrap();
@@ -438,7 +438,7 @@ fn items_and_policies_round_trip_as_text() {
         assert!(wrong.parse::<Item>().is_err(), "{wrong:?}");
     }
     assert_eq!(Item::attributes(17).to_string(), "brick 17 attributes");
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         assert_eq!(policy.name().parse(), Ok(policy));
     }
     assert!("fifo".parse::<Policy>().is_err());
@@ -446,7 +446,7 @@ fn items_and_policies_round_trip_as_text() {
 
 #[test]
 fn fillings_are_counted_within_a_pass() {
-    for policy in Policy::ALL {
+    for &policy in Policy::ALL {
         // Room for four; a pass that uses ten.
         let mut cache = Residency::new(&[(32, 0); 10], 128, 128, policy).unwrap();
         cache.begin_pass();

@@ -68,7 +68,7 @@ fn a_damaged_brick_is_named_and_the_others_load() {
                 Err(error @ StreamError::Payload { .. }) => {
                     assert_eq!(one.item, bad);
                     assert!(error.to_string().contains(&bad.to_string()), "{error}");
-                    assert!(one.destination.unwrap().0.is_empty());
+                    assert!(one.destination.0.is_empty());
                 }
                 Err(error) => panic!("{error}"),
             }

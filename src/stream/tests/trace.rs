@@ -4,8 +4,8 @@ use super::model::Random;
 use crate::stream::{Counters, Item, Policy, Replay, ReplayResult, Residency, Sizes, Trace, TraceError, replay};
 
 /// Passes that ask for one brick each.
-fn trace_of(bricks: &[u32], sizes: Vec<(u64, u64)>) -> Trace {
-    let mut trace = Trace::new(sizes, 1 << 20, 1 << 20, Policy::RoundRobin);
+fn trace_of(bricks: &[u32], sizes: &[(u64, u64)]) -> Trace {
+    let mut trace = Trace::new(&sizes, 1 << 20, 1 << 20, Policy::RoundRobin);
     for &brick in bricks {
         trace.begin_pass(0, "primary");
         trace.request(Item::geometry(brick));
@@ -81,7 +81,7 @@ fn a_cycle_longer_than_the_cache() {
     // Four equal bricks round and round through room for three: round robin and LRU never hit, Bélády does.
     let sizes = vec![(16, 0); 4];
     let cycle: Vec<u32> = (0..400).map(|request| request % 4).collect();
-    let trace = trace_of(&cycle, sizes.clone());
+    let trace = trace_of(&cycle, &sizes);
     let results = Replay::ALL.map(|against| replay(&trace, &sizes, 48, 48, against).unwrap());
     let [round_robin, _, lru, belady] = results;
     let none = ReplayResult {
@@ -95,7 +95,7 @@ fn a_cycle_longer_than_the_cache() {
         ..ReplayResult::default()
     };
     assert_eq!((round_robin, lru), (none, none));
-    assert_eq!((round_robin.reloads(), belady.evicted), (396, belady.loads - 3));
+    assert_eq!((round_robin.loaded_again(), belady.evicted), (396, belady.loads - 3));
     // After the first three loads one of three requests misses.
     assert_eq!(belady.loads, 3 + 397_u64.div_ceil(3));
     assert_eq!(belady.hits + belady.loads, 400);
@@ -105,7 +105,7 @@ fn a_cycle_longer_than_the_cache() {
         assert_eq!(replay(&trace, &sizes, 64, 64, against).unwrap().loads, 4);
     }
     // In one pass what is resident comes first, so that every cache loads but one brick a round.
-    let mut rounds = Trace::new(sizes.clone(), 48, 48, Policy::RoundRobin);
+    let mut rounds = Trace::new(&sizes, 48, 48, Policy::RoundRobin);
     for _ in 0..100 {
         rounds.begin_pass(0, "primary");
         (0..4).for_each(|brick| rounds.request(Item::geometry(brick)));
@@ -123,7 +123,7 @@ fn second_chances_keep_most_of_a_cycle_that_does_not_fit() {
     for (n, below) in [(101, 0.02), (105, 0.02), (110, 0.03), (125, 0.045), (150, 0.07)] {
         let sizes = vec![(16, 0); n as usize];
         let cycle: Vec<u32> = (0..40 * n).map(|request| request % n).collect();
-        let trace = trace_of(&cycle, sizes.clone());
+        let trace = trace_of(&cycle, &sizes);
         let results = Replay::ALL.map(|against| replay(&trace, &sizes, 1600, 1600, against).unwrap().hit_rate());
         let [round_robin, second_chance, lru, belady] = results;
         println!("{n}: {results:?}");
@@ -154,7 +154,7 @@ fn belady_is_the_optimum_for_one_size() {
     for seed in 0..200 {
         let mut random = Random(seed);
         let requests: Vec<u32> = (0..12).map(|_| random.below(5) as u32).collect();
-        let trace = trace_of(&requests, sizes.clone());
+        let trace = trace_of(&requests, &sizes);
         let best = fewest_loads(&requests, 0, 3) as u64;
         let results = Replay::ALL.map(|against| replay(&trace, &sizes, 48, 48, against).unwrap());
         assert_eq!(results[3].loads, best, "seed {seed}: {requests:?}");
@@ -228,7 +228,7 @@ fn walk(seed: u64, policy: Policy) -> (Trace, Counters) {
 fn a_replay_with_the_recorded_cache_does_what_it_did() {
     let mut differ = 0;
     for seed in 0..100 {
-        for policy in Policy::ALL {
+        for &policy in Policy::ALL {
             let (trace, counters) = walk(seed, policy);
             let counters = counters.total();
             let again = |trace: &Trace, budget| {
@@ -252,7 +252,7 @@ fn a_replay_with_the_recorded_cache_does_what_it_did() {
 
 #[test]
 fn replay_checks_what_it_is_given() {
-    let trace = trace_of(&[0, 1, 2], vec![(16, 0); 3]);
+    let trace = trace_of(&[0, 1, 2], &[(16, 0); 3]);
     assert!(matches!(
         replay(&trace, &[(16, 0); 2], 64, 64, Replay::Belady),
         Err(TraceError::NoSuchItem { item, bricks: 2, tiles: 0 }) if item == Item::geometry(2)
@@ -261,7 +261,7 @@ fn replay_checks_what_it_is_given() {
         assert!(matches!(replay(&trace, &[(16, 0); 3], 16, 64, against), Err(TraceError::Cache(_))));
     }
     // Items without bytes do not count.
-    let mut trace = Trace::new(vec![(16, 0)], 64, 64, Policy::RoundRobin);
+    let mut trace = Trace::new(&[(16, 0)], 64, 64, Policy::RoundRobin);
     trace.begin_pass(0, "primary");
     trace.request(Item::attributes(0));
     trace.request(Item::geometry(0));

@@ -1,12 +1,10 @@
-//! The workers: order, corrupt payloads, panics, lost and late answers, host cache, shutdown.
+//! The workers: order, corrupt payloads, panics, host cache, shutdown.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use super::model::Random;
-use crate::stream::workers::collect;
 use crate::stream::{Destination, HostCache, Item, Kind, PayloadSource, SourceError, StreamError, Workers};
 
 /// What the mock does with an item.
@@ -15,7 +13,6 @@ enum Fault {
     Corrupt,
     Panic,
     PanicWithBomb,
-    Slow,
 }
 
 /// Payloads made from the item's number; faults on request.
@@ -69,10 +66,6 @@ impl PayloadSource for Mock {
             }
             Some(Fault::Panic) => panic!("mock panic at {item}"),
             Some(Fault::PanicWithBomb) => std::panic::panic_any(Bomb),
-            Some(Fault::Slow) => {
-                std::thread::sleep(Duration::from_millis(30));
-                Ok(())
-            }
         }
     }
 }
@@ -92,7 +85,7 @@ impl Destination for Sink {
     }
 }
 
-fn start(mock: Mock, host_bytes: u64, threads: usize) -> (Workers<Sink>, Arc<Mock>) {
+fn start(mock: Mock, host_bytes: u64, threads: usize) -> (Workers, Arc<Mock>) {
     let mock = Arc::new(mock);
     (Workers::new(mock.clone(), HostCache::new(host_bytes), threads).unwrap(), mock)
 }
@@ -117,7 +110,7 @@ fn every_destination_gets_its_payload_in_the_order_of_requests() {
         let stats = workers.stats();
         assert_eq!((stats.read, stats.cached, stats.failed), (400, 0, 0));
         assert_eq!(stats.read_bytes, mock.sizes().sum());
-        assert!(workers.load(Vec::new()).unwrap().is_empty());
+        assert!(workers.load(requests([])).unwrap().is_empty());
     }
 }
 
@@ -131,7 +124,7 @@ fn a_corrupt_payload_is_named_and_the_others_complete() {
     let (workers, _) = start(Mock { bricks: 12, faults: faults.clone(), ..Mock::default() }, 1 << 20, 2);
     for _ in 0..3 {
         for one in workers.load_each(requests(all_items(12))) {
-            let sink = one.destination.expect("destinations come back");
+            let sink = one.destination;
             match (&one.result, faults.get(&one.item)) {
                 (Ok(()), None) => assert_eq!(sink.bytes.as_deref(), Some(&payload(one.item)[..])),
                 (Err(error), Some(_)) => {
@@ -172,57 +165,6 @@ fn a_brick_beyond_the_last_is_an_error() {
     assert!(matches!(loaded[0].result, Err(StreamError::NoSuchItem { bricks: 4, .. })));
     assert!(loaded[1].result.is_ok());
     assert_eq!(mock.copies.load(Ordering::Relaxed), 1);
-}
-
-#[test]
-fn late_answers_find_their_place_and_lost_ones_are_errors() {
-    let items = [0, 1, 2, 3].map(Item::geometry);
-    let (sender, receiver) = crossbeam::channel::bounded(4);
-    // Out of order, one after a while, one never.
-    sender.send((2, "two", Ok(()))).unwrap();
-    let late = std::thread::spawn(move || {
-        std::thread::sleep(Duration::from_millis(20));
-        sender.send((0, "zero", Ok(()))).unwrap();
-        sender.send((3, "three", Err(StreamError::Lost { item: items[3] }))).unwrap();
-    });
-    let loaded = collect(&items, &receiver, &crossbeam::channel::never());
-    late.join().unwrap();
-    assert_eq!(
-        loaded.iter().map(|one| one.destination).collect::<Vec<_>>(),
-        [Some("zero"), None, Some("two"), Some("three")]
-    );
-    assert_eq!(loaded.iter().map(|one| one.result.is_ok()).collect::<Vec<_>>(), [true, false, true, false]);
-    assert!(matches!(loaded[1].result, Err(StreamError::Lost { item }) if item == items[1]));
-
-    // A slow payload keeps its batch waiting, and the next batch gets its own answers.
-    let faults = HashMap::from([(Item::geometry(1), Fault::Slow)]);
-    let (workers, _) = start(Mock { bricks: 8, faults, ..Mock::default() }, 0, 2);
-    for _ in 0..3 {
-        let loaded = workers.load(requests([1, 2, 3].map(Item::geometry))).unwrap();
-        assert!(loaded.iter().all(|(item, sink)| sink.bytes.as_deref() == Some(&payload(*item)[..])));
-    }
-}
-
-#[test]
-fn threads_that_end_lose_items_and_hang_nobody() {
-    let mock = Arc::new(Mock { bricks: 100, ..Mock::default() });
-    let cache = HostCache::new(1 << 20);
-    // The only thread takes three jobs, answers none and ends: with jobs queued, and more to come than the queue holds.
-    let workers: Workers<Sink> = Workers::with_body(mock.clone(), cache.clone(), 1, |_, jobs| {
-        (0..3).for_each(|_| drop(jobs.recv()));
-    })
-    .unwrap();
-    for _ in 0..2 {
-        let loaded = workers.load_each(requests((0..100).map(Item::geometry)));
-        assert_eq!(loaded.len(), 100);
-        for (brick, one) in (0..).zip(loaded) {
-            assert_eq!(one.item, Item::geometry(brick));
-            assert!(matches!(one.result, Err(StreamError::Lost { item }) if item == one.item));
-        }
-    }
-    drop(workers);
-    assert_eq!(cache.stats().used_bytes, 0, "lost jobs keep room reserved");
-    assert_eq!(mock.copies.load(Ordering::Relaxed), 0);
 }
 
 #[test]

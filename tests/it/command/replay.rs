@@ -56,7 +56,7 @@ fn a_replay_reproduces_the_walk() {
         let trace = folder.path().join(format!("trace{i}.jsonl"));
         walk(&scene, &out, &format!("{} {options} --requests-out {}", near(&scene), trace.display()));
         let replayed = replayed(&trace, &[]);
-        assert_eq!(replayed["format"], 1);
+        assert_eq!(replayed["format"], 2);
         let rows = replayed["results"].as_array().expect("rows");
         let recorded: Vec<&Value> = rows.iter().filter(|row| row["recorded"] == true).collect();
         assert_eq!(recorded.len(), 1, "{options}");
@@ -64,6 +64,10 @@ fn a_replay_reproduces_the_walk() {
         let bytes: u64 =
             ["bytes_bvh", "bytes_geometry", "bytes_attributes"].iter().map(|field| total(&out, field)).sum();
         assert_eq!(row["loads"], total(&out, "bricks_loaded"), "{options}");
+        // Over the walk; in records it is told within a pass, where no brick is loaded twice.
+        let again = row["loads"].as_u64().zip(replayed["distinct"].as_u64()).map(|(loads, distinct)| loads - distinct);
+        assert_eq!(row["loaded_again"].as_u64(), again, "{options}");
+        assert_eq!((total(&out, "bricks_reloaded"), &row["reloads"]), (0, &Value::Null), "{options}");
         assert_eq!(row["evicted"], total(&out, "bricks_evicted"), "{options}");
         assert_eq!(row["loaded_bytes"], bytes, "{options}");
         loads.push(row["loads"].as_u64().expect("a count"));
@@ -112,6 +116,7 @@ fn a_replay_reproduces_the_walk() {
     let text = succeed(["replay", trace.to_str().expect("UTF-8"), "--cache", "16"]);
     assert!(
         text.contains("as recorded")
+            && text.contains("Loaded again: what the walk had loaded before")
             && text
                 .contains(&format!("Skipped, below the two largest bricks, or the tiles of a texture lookup ({least}"))
     );

@@ -10,13 +10,13 @@ use brickwalk::kernels::frame::Frame;
 use brickwalk::kernels::layout::{NONE, Ray, T_INFINITE};
 use brickwalk::reference::{Truth, TruthRay, Verdict, judge};
 use brickwalk::scene::path::CameraPath;
-use brickwalk::schedule::auto::Fixed;
 use brickwalk::schedule::{
-    BrickStates, Executor, ExecutorError, Load, Optimisations, PairQuery, Pass, Report, Step, Tracing, attributes, chc,
-    demand,
+    self, BrickStates, Executor, ExecutorError, Load, Optimisations, PairQuery, Pass, Report, Step, Tracer, Tracing,
+    attributes,
 };
 use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::session::renderer::renderer;
+use brickwalk::settings::Schedule;
 use brickwalk::stream::{Item, Kind, Slot};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -226,9 +226,9 @@ fn records_are_what_a_spy_counts() {
     let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
     let mut noticed = BTreeSet::new();
     for (options, schedule) in [
-        ("--cache 10%", Fixed::Chc),
-        ("--cache 10% --evict second-chance", Fixed::Demand),
-        ("--cache 6% --evict lru", Fixed::Chc),
+        ("--cache 10%", Schedule::Chc),
+        ("--cache 10% --evict second-chance", Schedule::Demand),
+        ("--cache 6% --evict lru", Schedule::Chc),
     ] {
         let mut renderer = open(&scene, options);
         let mut memory = Memory::default();
@@ -248,8 +248,9 @@ fn records_are_what_a_spy_counts() {
                 cache.begin_pass("primary", number);
                 let inner = &mut *renderer.engine.executor;
                 let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
-                let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
-                trace(&mut spy, cache, Pass::Primary, &[Step::Generate], &tracing, &mut stats).expect("a pass");
+                let (tracing, pass) = (&tracing, Pass::Primary);
+                let mut tracer = Tracer { executor: &mut spy, cache: &mut *cache, pass, tracing, stats: &mut stats };
+                schedule::trace(&mut tracer, schedule, &[Step::Generate]).expect("a pass");
                 attributes::resolve(&mut spy, cache, Pass::Primary, &mut stats).expect("attributes");
                 stats.ms = start.elapsed().as_secs_f64() * 1e3;
                 let mut record = Record::of(number, "primary", stats.clone());
@@ -302,7 +303,7 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
     let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
     let mut in_vain = BTreeMap::new();
     for (schedule, nearest_first) in
-        [(Fixed::Chc, true), (Fixed::Demand, true), (Fixed::Chc, false), (Fixed::Demand, false)]
+        [(Schedule::Chc, true), (Schedule::Demand, true), (Schedule::Chc, false), (Schedule::Demand, false)]
     {
         let mut renderer = open(&scene, "--cache 100%");
         for number in 0..3 {
@@ -317,17 +318,41 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
             let mut stats = Counters::default();
             let inner = &mut *renderer.engine.executor;
             let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
-            let trace = if schedule == Fixed::Chc { chc::trace } else { demand::trace };
             let cache = &mut renderer.engine.cache;
-            trace(&mut spy, cache, Pass::Primary, &[Step::Generate], &tracing, &mut stats).expect("a pass");
+            let (tracing, pass) = (&tracing, Pass::Primary);
+            let mut tracer = Tracer { executor: &mut spy, cache, pass, tracing, stats: &mut stats };
+            schedule::trace(&mut tracer, schedule, &[Step::Generate]).expect("a pass");
             let needed: BTreeSet<u32> = stats.bricks_needed.distinct().into_iter().collect();
             let loaded = spy.batches.iter().flatten().map(|load| load.item.number);
             let vain = loaded.filter(|brick| !needed.contains(brick)).count();
-            *in_vain.entry((schedule == Fixed::Chc, nearest_first)).or_insert(0) += vain;
+            *in_vain.entry((schedule == Schedule::Chc, nearest_first)).or_insert(0) += vain;
             assert!(number > 0 || !spy.batches.is_empty(), "something is loaded");
         }
     }
     assert_eq!((in_vain[&(true, true)], in_vain[&(false, true)]), (0, 0), "{in_vain:?}");
     // Control: in another order some are.
     assert!(in_vain[&(true, false)] > 0 && in_vain[&(false, false)] > 0, "{in_vain:?}");
+}
+
+/// Passes of effects take turns: what those of one evict, those of another may have loaded.
+#[test]
+fn what_is_resident_when_an_effect_ends_is_no_balance_of_its_own() {
+    let folder = common::folder();
+    let scene = common::city(folder.path(), "40K", "512");
+    let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
+    let mut renderer = open(&scene, "--cache 6% --effects diffuse --diffuse-rays 2 --rotation full");
+    // Geometry and attributes of each.
+    let payloads = 2 * renderer.scene.resident().bricks.len() as u64;
+    let mut unbalanced = 0;
+    for number in 0..3 {
+        let records = renderer.frame(number, &path.frame(number, 3)).expect("a frame").records;
+        let resident = renderer.cache.residency.resident().count() as u64;
+        assert!(records.iter().any(|record| record.bricks_resident_end == resident), "one ended last");
+        for record in &records {
+            let n = [record.bricks_resident_start, record.bricks_loaded, record.bricks_evicted];
+            assert!(record.bricks_resident_end <= payloads, "{}: {n:?}, {}", record.pass, record.bricks_resident_end);
+            unbalanced += u64::from(n[0] + n[1] != n[2] + record.bricks_resident_end);
+        }
+    }
+    assert!(unbalanced > 0, "control: some effect's own loads and evictions do not add up");
 }

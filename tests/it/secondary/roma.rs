@@ -400,7 +400,7 @@ fn unmarked(scene: &Path, camera: DVec3) -> (usize, usize, f64) {
     let truth = Truth::load(&file).expect("triangles");
     let (mut empty, mut of, mut occupied, mut cells) = (0, 0, 0u64, 0u64);
     let settings = Settings { cells: 64, ..Settings::default() };
-    for bom in assemble(&file, &settings, camera).expect("occupancy").0.levels {
+    for bom in assemble(&file, &settings, camera).expect("occupancy").levels {
         let side = f64::from(bom.cell_log2).exp2();
         for [a, b, c] in truth.ids().filter_map(|id| truth.vertices(id)).map(|t| t.map(DVec3::from)) {
             for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.3), (0.5, 0.5), (0.1, 0.6)] {

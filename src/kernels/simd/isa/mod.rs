@@ -2,7 +2,7 @@
 //! give the same bits: the same operations in the same order, none of them fused.
 
 use super::wide::{Portable, Wide};
-use crate::kernels::trace::node::{FramedRay, by_priority, node_hits, traversal_mask};
+use crate::kernels::trace::node::{FramedRay, node_hits, traversal_mask};
 use crate::kernels::vector::{Vec3, xyz};
 use bricks::Node;
 
@@ -71,10 +71,6 @@ pub trait Isa: Copy + Send + Sync {
     /// The traversal mask of a brick's node ([`traversal_mask`]): what `ray` enters of it up to `t_max`. `lanes` are
     /// the ray's.
     fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32;
-
-    /// The children of a node of the top level that `ray` enters up to `t_max`, inner ones and leaves alike, by
-    /// priority in the high byte. `slack`: see [`crate::kernels::trace::node::NodeFrame::new`].
-    fn open_top(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32;
 }
 
 /// Numbers for which [`crate::math::exact::is_inside`] holds lie in these bounds, the upper one excluded.
@@ -133,11 +129,6 @@ impl Isa for Scalar {
         let (high, low) = (xyz(lanes.offset_high), xyz(lanes.offset_low));
         let entered = node_hits(ray, node, high, low, 0.0, t_max).mask;
         traversal_mask(entered, node, ray.flip)
-    }
-
-    #[inline(always)]
-    fn open_top(self, ray: &FramedRay, _: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
-        by_priority(node_hits(ray, node, [0.0; 3], [0.0; 3], slack, t_max).mask, node, ray.flip)
     }
 }
 
@@ -200,12 +191,6 @@ macro_rules! isa_over_intrinsics {
             fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
                 // SAFETY: a value of the type exists only where the instructions have been detected.
                 unsafe { open(ray, lanes, node, t_max) }
-            }
-
-            #[inline(always)]
-            fn open_top(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe { open_top(ray, lanes, node, slack, t_max) }
             }
         }
     };

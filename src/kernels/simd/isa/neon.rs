@@ -84,18 +84,14 @@ fn extended(x: float32x4_t) -> float32x4x2_t {
 /// All bits set in the lanes of the children that `ray` enters: `NodeFrame::new` and `node_hits`.
 #[inline]
 #[target_feature(enable = "neon")]
-fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> [uint32x4_t; 2] {
+fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> [uint32x4_t; 2] {
     let [p, s] = grid(node);
     let low = vector(&lanes.offset_low);
     let pc = vaddq_f32(vaddq_f32(p, vector(&lanes.offset_high)), low);
     let origin = vector(&lanes.origin);
     let w = vsubq_f32(pc, origin);
     let m = most3(vaddq_f32(vabsq_f32(w), vmulq_n_f32(s, 255.0)));
-    let mut all = vmulq_n_f32(m, 64.0 * UNIT);
-    if slack != 0.0 {
-        let o = most3(vabsq_f32(origin));
-        all = vaddq_f32(all, vmulq_n_f32(vaddq_f32(m, o), slack));
-    }
+    let all = vmulq_n_f32(m, 64.0 * UNIT);
     let delta =
         vaddq_f32(vaddq_f32(all, vmulq_n_f32(vabsq_f32(pc), 4.0 * UNIT)), vmulq_n_f32(vabsq_f32(low), 2.0 * UNIT));
     let inverse = vector(&lanes.inverse);
@@ -142,7 +138,7 @@ fn any(x: [uint32x4_t; 2]) -> u32 {
 #[inline]
 #[target_feature(enable = "neon")]
 fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
-    let entered = entered(ray, lanes, node, 0.0, t_max);
+    let entered = entered(ray, lanes, node, t_max);
     let what = vector_of_bytes(&node.meta);
     let count = words(vshr_n_u8::<5>(what));
     let both = vdup_n_u8(24);
@@ -152,18 +148,4 @@ fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
     let first = vand_u8(what, vdup_n_u8(31));
     let shift = words(vbsl_u8(inner, priority, first));
     any([0, 1].map(|i| vshlq_u32(vandq_u32(count[i], entered[i]), vreinterpretq_s32_u32(shift[i]))))
-}
-
-#[inline]
-#[target_feature(enable = "neon")]
-fn open_top(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
-    let [low, high] = entered(ray, lanes, node, slack, t_max);
-    let entered = vmovn_u16(vuzp1q_u16(vreinterpretq_u16_u32(low), vreinterpretq_u16_u32(high)));
-    let what = vector_of_bytes(&node.meta);
-    let slots = vector_of_bytes(&[0, 1, 2, 3, 4, 5, 6, 7]);
-    // Shifts to the left by numbers that are not positive.
-    let shift = vneg_s8(vreinterpret_s8_u8(veor_u8(slots, vdup_n_u8(ray.flip as u8))));
-    let bits = vshl_u8(vdup_n_u8(0x80), shift);
-    // No two have the same.
-    u32::from(vaddv_u8(vand_u8(vand_u8(entered, vtst_u8(what, what)), bits))) << 24
 }

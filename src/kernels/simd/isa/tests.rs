@@ -69,7 +69,7 @@ fn eight_at_once_are_each_alone() {
 }
 
 fn compare_with_scalar(isa: impl Isa) {
-    let (mut entered, mut met) = (0, 0);
+    let mut entered = 0;
     let mut rng = Rng(11);
     println!("seed 11");
     for case in 0..200_000 {
@@ -77,7 +77,7 @@ fn compare_with_scalar(isa: impl Isa) {
         let (high, low) = (rng.point(4.0), if case % 2 == 0 { [0.0; 3] } else { rng.point(1e-3) });
         let aim = [0, 1, 2].map(|k| {
             let step = f32::from_bits(u32::from(node.exponent[k]) << 23);
-            // At the node where a brick has it, or where the top level has it.
+            // At the node, or beside it.
             [high[k], 0.0][case / 2 % 2] + node.origin[k] + step * 255.0 * (0.5 + 0.5 * rng.signed())
         });
         let origin = rng.point([1.0, 30.0, 3e4][case % 3]);
@@ -96,12 +96,6 @@ fn compare_with_scalar(isa: impl Isa) {
             assert_eq!(bits(isa.numbers(&node.lo[k])), bits(Scalar.numbers(&node.lo[k])), "case {case}: {node:?}");
         }
         assert_eq!(isa.grid(&node).map(bits), Scalar.grid(&node).map(bits), "case {case}: {node:?}");
-        let slack = [0.0, 1e-6][case % 2];
-        let lanes = Lanes::new(&ray, [0.0; 3], [0.0; 3]);
-        let one = Scalar.open_top(&ray, &lanes, &node, slack, t_max);
-        assert_eq!(isa.open_top(&ray, &lanes, &node, slack, t_max), one, "case {case}: {ray:?} {node:?}");
-        met += u32::from(one != 0);
     }
-    let some = 10_000..190_000;
-    assert!(some.contains(&entered) && some.contains(&met), "{entered} and {met} of 200,000 rays enter a child");
+    assert!((10_000..190_000).contains(&entered), "{entered} of 200,000 rays enter a child");
 }

@@ -90,18 +90,14 @@ fn extended(x: __m128) -> __m256 {
 /// All bits set in the lanes of the children that `ray` enters: `NodeFrame::new` and `node_hits`.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> __m256i {
+fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> __m256i {
     let [p, s] = grid(node);
     let low = vector(&lanes.offset_low);
     let pc = _mm_add_ps(_mm_add_ps(p, vector(&lanes.offset_high)), low);
     let origin = vector(&lanes.origin);
     let w = _mm_sub_ps(pc, origin);
     let m = most3(_mm_add_ps(magnitude(w), _mm_mul_ps(_mm_set1_ps(255.0), s)));
-    let mut all = _mm_mul_ps(_mm_set1_ps(64.0 * UNIT), m);
-    if slack != 0.0 {
-        let o = most3(magnitude(origin));
-        all = _mm_add_ps(all, _mm_mul_ps(_mm_set1_ps(slack), _mm_add_ps(m, o)));
-    }
+    let all = _mm_mul_ps(_mm_set1_ps(64.0 * UNIT), m);
     let delta = _mm_add_ps(
         _mm_add_ps(all, _mm_mul_ps(_mm_set1_ps(4.0 * UNIT), magnitude(pc))),
         _mm_mul_ps(_mm_set1_ps(2.0 * UNIT), magnitude(low)),
@@ -151,7 +147,7 @@ fn meta(node: &Node) -> __m256i {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
-    let entered = entered(ray, lanes, node, 0.0, t_max);
+    let entered = entered(ray, lanes, node, t_max);
     let what = meta(node);
     let count = _mm256_and_si256(_mm256_srli_epi32::<5>(what), entered);
     let both = _mm256_set1_epi32(24);
@@ -161,15 +157,4 @@ fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
     let priority = _mm256_sub_epi32(_mm256_set1_epi32(31), slot);
     let first = _mm256_and_si256(what, _mm256_set1_epi32(31));
     any(_mm256_sllv_epi32(count, _mm256_blendv_epi8(first, priority, inner)))
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn open_top(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> u32 {
-    let entered = entered(ray, lanes, node, slack, t_max);
-    let absent = _mm256_cmpeq_epi32(meta(node), _mm256_setzero_si256());
-    let slots = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    let shift = _mm256_xor_si256(slots, _mm256_set1_epi32(ray.flip as i32));
-    let bits = _mm256_srlv_epi32(_mm256_set1_epi32(i32::MIN), shift);
-    any(_mm256_and_si256(_mm256_andnot_si256(absent, entered), bits))
 }

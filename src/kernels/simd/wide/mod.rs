@@ -91,58 +91,27 @@ impl Portable {
     }
 }
 
-impl Add for Portable {
-    type Output = Self;
+/// Operators of [`Portable`], each by a function of a lane of both.
+macro_rules! portable {
+    ($($operator:ident $method:ident $of_lanes:expr;)*) => { $(
+        impl $operator for Portable {
+            type Output = Self;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.with(other, |a, b| a + b)
-    }
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                self.with(other, $of_lanes)
+            }
+        }
+    )* };
 }
 
-impl Sub for Portable {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.with(other, |a, b| a - b)
-    }
-}
-
-impl Mul for Portable {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.with(other, |a, b| a * b)
-    }
-}
-
-impl Div for Portable {
-    type Output = Self;
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.with(other, |a, b| a / b)
-    }
-}
-
-impl BitXor for Portable {
-    type Output = Self;
-
-    #[inline(always)]
-    fn bitxor(self, other: Self) -> Self {
-        self.with(other, |a, b| f32::from_bits(a.to_bits() ^ b.to_bits()))
-    }
-}
-
-impl BitAnd for Portable {
-    type Output = Self;
-
-    #[inline(always)]
-    fn bitand(self, other: Self) -> Self {
-        self.with(other, |a, b| f32::from_bits(a.to_bits() & b.to_bits()))
-    }
+portable! {
+    Add add |a, b| a + b;
+    Sub sub |a, b| a - b;
+    Mul mul |a, b| a * b;
+    Div div |a, b| a / b;
+    BitXor bitxor |a, b| f32::from_bits(a.to_bits() ^ b.to_bits());
+    BitAnd bitand |a, b| f32::from_bits(a.to_bits() & b.to_bits());
 }
 
 impl Wide for Portable {
@@ -237,75 +206,30 @@ macro_rules! over_intrinsics {
             }
         }
 
-        over_intrinsics!(operator Add, add, $name, $add);
-        over_intrinsics!(operator Sub, sub, $name, $sub);
-        over_intrinsics!(operator Mul, mul, $name, $mul);
-        over_intrinsics!(operator Div, div, $name, $div);
-
-        over_intrinsics!(operator BitAnd, bitand, $name, $and);
-        over_intrinsics!(operator BitXor, bitxor, $name, $xor);
+        over_intrinsics!(operator $name; Add add $add);
+        over_intrinsics!(operator $name; Sub sub $sub);
+        over_intrinsics!(operator $name; Mul mul $mul);
+        over_intrinsics!(operator $name; Div div $div);
+        over_intrinsics!(operator $name; BitAnd bitand $and);
+        over_intrinsics!(operator $name; BitXor bitxor $xor);
 
         impl Wide for $name {
             const LANES: usize = $lanes;
 
-            #[inline(always)]
-            fn most(self, other: Self) -> Self {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                Self(unsafe { $max(self.0, other.0) })
-            }
-
-            #[inline(always)]
-            fn least(self, other: Self) -> Self {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                Self(unsafe { $min(self.0, other.0) })
-            }
-
-            #[inline(always)]
-            fn abs(self) -> Self {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                Self(unsafe { $abs(self.0) })
-            }
-
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                Self(unsafe { $sqrt(self.0) })
-            }
-
-            #[inline(always)]
-            fn less(self, other: Self) -> u32 {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                unsafe { $less(self.0, other.0) }
-            }
-
-            #[inline(always)]
-            fn less_equal(self, other: Self) -> u32 {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                unsafe { $less_equal(self.0, other.0) }
-            }
+            over_intrinsics!(numbers most $max other);
+            over_intrinsics!(numbers least $min other);
+            over_intrinsics!(numbers abs $abs);
+            over_intrinsics!(numbers sqrt $sqrt);
+            over_intrinsics!(numbers add_bits $add_bits other);
+            over_intrinsics!(bits less $less);
+            over_intrinsics!(bits less_equal $less_equal);
+            over_intrinsics!(bits same_bits $same_bits);
+            over_intrinsics!(bits less_bits $less_bits);
 
             #[inline(always)]
             fn or_else(self, bits: u32, other: Self) -> Self {
                 // SAFETY: a value of the type exists only where the processor has the instructions.
                 Self(unsafe { $blend(bits, self.0, other.0) })
-            }
-
-            #[inline(always)]
-            fn same_bits(self, other: Self) -> u32 {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                unsafe { $same_bits(self.0, other.0) }
-            }
-
-            #[inline(always)]
-            fn less_bits(self, other: Self) -> u32 {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                unsafe { $less_bits(self.0, other.0) }
-            }
-
-            #[inline(always)]
-            fn add_bits(self, other: Self) -> Self {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                Self(unsafe { $add_bits(self.0, other.0) })
             }
 
             #[inline(always)]
@@ -317,15 +241,25 @@ macro_rules! over_intrinsics {
             }
         }
     };
-    (operator $operator:ident, $method:ident, $name:ident, $intrinsic:ident) => {
+    (operator $name:ident; $operator:ident $method:ident $intrinsic:ident) => {
         impl $operator for $name {
             type Output = Self;
 
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                // SAFETY: a value of the type exists only where the processor has the instructions.
-                Self(unsafe { $intrinsic(self.0, other.0) })
-            }
+            over_intrinsics!(numbers $method $intrinsic other);
+        }
+    };
+    (numbers $method:ident $intrinsic:ident $($other:ident)?) => {
+        #[inline(always)]
+        fn $method(self $(, $other: Self)?) -> Self {
+            // SAFETY: a value of the type exists only where the processor has the instructions.
+            Self(unsafe { $intrinsic(self.0 $(, $other.0)?) })
+        }
+    };
+    (bits $method:ident $intrinsic:ident) => {
+        #[inline(always)]
+        fn $method(self, other: Self) -> u32 {
+            // SAFETY: a value of the type exists only where the processor has the instructions.
+            unsafe { $intrinsic(self.0, other.0) }
         }
     };
 }

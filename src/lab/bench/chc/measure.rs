@@ -3,8 +3,7 @@
 use super::cells::{Passes, PictureError};
 use super::paper::THRESHOLDS;
 use super::plan::{Case, PLAIN, PLAIN_BVH2, Variant};
-use crate::counters::Counters;
-use crate::counters::Record;
+use crate::counters::{Counters, Record};
 use crate::frame::{Engine, Renderer};
 use crate::lab::bench::args::Settings;
 use crate::lab::bench::scenes::{self, Place, empty_cache};
@@ -109,7 +108,7 @@ impl<'a> Bench<'a> {
     /// Makes everything resident, so that walks in core begin alike.
     fn load_all(&mut self) -> Result<()> {
         let Engine { executor, cache, .. } = &mut self.renderer.engine;
-        let items: Vec<Item> = cache.bytes.sizes().items().map(|(item, _)| item).collect();
+        let items: Vec<Item> = cache.sizes.items().map(|(item, _)| item).collect();
         let mut rest = &items[..];
         while !rest.is_empty() {
             let count = cache.load(&mut **executor, rest, AT_A_TIME, &mut Counters::default())?;

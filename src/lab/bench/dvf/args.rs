@@ -2,8 +2,7 @@
 
 use crate::lab::bench::args as bench;
 use crate::secondary::dvf::{Cells, Count, Mode, Options, RegionKind, Sequence, Sides, Trust};
-use crate::settings::names;
-use crate::settings::{Adapter, CacheSize, Field, Group, ImageSize, Lines, Rule, settings};
+use crate::settings::{Adapter, CacheSize, Field, Group, ImageSize, Lines, Rule, names, settings};
 use std::path::PathBuf;
 
 names! {
