@@ -103,7 +103,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
 
 /// What the laboratory talks to: standard output, and Ctrl-C.
 fn console() -> Console<'static> {
-    Console { show: &print, stop: interrupt::flag(), job: &interrupt::job }
+    Console { show: &print, stop: interrupt::flag(), job: &interrupt::job, until: None }
 }
 
 /// Options that do not go together are wrong usage.

@@ -4,4 +4,5 @@ pub mod alias;
 pub mod blue_noise;
 pub mod exact;
 pub mod octahedral;
+pub mod random;
 pub mod sampling;

@@ -1,20 +1,8 @@
 //! FLIP against the authors' implementations: `nv-flip` (their C++) in the test itself for pictures of low dynamic
 //! range, and recorded results of their Python package for HDR-FLIP.
 
+use crate::math::random::Rng;
 use crate::metrics::*;
-
-/// A reproducible stream of values in 0..1 (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-    }
-}
 
 /// Linear images of 8-bit sRGB codes, which is what the oracle takes.
 fn decode(width: usize, codes: &[u8]) -> Image {
@@ -42,9 +30,9 @@ fn codes(width: usize, height: usize, mut code: impl FnMut(usize, usize, usize) 
 
 /// Pairs (test, reference) of 8-bit images: noise, edges, thin lines, colour shifts, gradients.
 fn pairs(width: usize, height: usize) -> Vec<(&'static str, Vec<u8>, Vec<u8>)> {
-    let mut random = Random(7);
-    let noise = codes(width, height, |_, _, _| random.next());
-    let other = codes(width, height, |_, _, _| random.next());
+    let mut random = Rng(7);
+    let noise = codes(width, height, |_, _, _| 0.5 + 0.5 * random.signed());
+    let other = codes(width, height, |_, _, _| 0.5 + 0.5 * random.signed());
     let gradient = codes(width, height, |x, y, c| [x as f32 / width as f32, y as f32 / height as f32, 0.4][c]);
     let shifted = codes(width, height, |x, y, c| [x as f32 / width as f32 + 0.03, y as f32 / height as f32, 0.3][c]);
     let edges = codes(width, height, |x, y, _| if (x / 4 + y / 3) % 2 == 0 { 0.9 } else { 0.1 });

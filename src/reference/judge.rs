@@ -110,14 +110,8 @@ pub enum Verdict {
 pub struct Tally {
     /// [`Verdict::Equal`].
     pub equal: u64,
-    /// [`Excuse::Edge`].
-    pub edge: u64,
-    /// [`Excuse::Tie`].
-    pub tie: u64,
-    /// [`Excuse::IntervalEnd`].
-    pub interval_end: u64,
-    /// [`Excuse::Opacity`].
-    pub opacity: u64,
+    /// By each [`Excuse`].
+    pub by_excuse: [u64; 4],
     /// [`Verdict::Mismatch`].
     pub mismatches: u64,
     /// The first mismatch: which in the order of adding, counted from 0, and what.
@@ -130,10 +124,7 @@ impl Tally {
         let index = self.total();
         match verdict {
             Verdict::Equal => self.equal += 1,
-            Verdict::Excused(Excuse::Edge) => self.edge += 1,
-            Verdict::Excused(Excuse::Tie) => self.tie += 1,
-            Verdict::Excused(Excuse::IntervalEnd) => self.interval_end += 1,
-            Verdict::Excused(Excuse::Opacity) => self.opacity += 1,
+            Verdict::Excused(excuse) => self.by_excuse[excuse as usize] += 1,
             Verdict::Mismatch(fault) => {
                 self.mismatches += 1;
                 self.first.get_or_insert((index, fault));
@@ -141,9 +132,17 @@ impl Tally {
         }
     }
 
+    /// Counts those of another.
+    pub fn join(&mut self, other: Self) {
+        self.equal += other.equal;
+        self.by_excuse.iter_mut().zip(other.by_excuse).for_each(|(sum, own)| *sum += own);
+        self.mismatches += other.mismatches;
+        self.first = self.first.or(other.first);
+    }
+
     /// Verdicts excused.
     pub fn excused(&self) -> u64 {
-        self.edge + self.tie + self.interval_end + self.opacity
+        self.by_excuse.iter().sum()
     }
 
     /// All verdicts.
@@ -163,11 +162,8 @@ impl FromIterator<Verdict> for Tally {
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} rays: {} equal, {} excused ", self.total(), self.equal, self.excused())?;
-        write!(
-            f,
-            "({} at edges, {} ties, {} at interval ends, {} by alpha), ",
-            self.edge, self.tie, self.interval_end, self.opacity
-        )?;
+        let [edge, tie, end, opacity] = self.by_excuse;
+        write!(f, "({edge} at edges, {tie} ties, {end} at interval ends, {opacity} by alpha), ")?;
         write!(f, "{} mismatches", self.mismatches)?;
         if let Some((ray, fault)) = &self.first {
             write!(f, ", first of ray {ray}: {fault:?}")?;

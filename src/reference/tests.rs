@@ -2,6 +2,7 @@
 
 use super::bounds::assess;
 use crate::math::exact::{intersect_triangle, ray_frame};
+use crate::math::random::Rng;
 use crate::reference::*;
 use bricks::ORIGIN_STEPS;
 use glam::{DMat3, DVec3};
@@ -9,29 +10,14 @@ use glam::{DMat3, DVec3};
 mod exclusion;
 mod padding;
 
-/// A reproducible stream (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
+impl Rng {
     /// In -1..1.
-    fn signed(&mut self) -> f64 {
+    fn real(&mut self) -> f64 {
         self.bits() as f64 / 2.0f64.powi(63) - 1.0
     }
 
     fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.signed(), self.signed(), self.signed())
+        DVec3::new(self.real(), self.real(), self.real())
     }
 }
 
@@ -129,7 +115,7 @@ fn lattice(p: DVec3) -> [i64; 3] {
 }
 
 /// A bumpy closed surface of 4 n² triangles around `center`, ids from `first`.
-fn closed_mesh(random: &mut Random, n: usize, center: DVec3, size: f64, first: u32) -> Vec<TruthTriangle> {
+fn closed_mesh(random: &mut Rng, n: usize, center: DVec3, size: f64, first: u32) -> Vec<TruthTriangle> {
     let point = |bumps: &[f64], i: usize, j: usize| {
         let (theta, phi) =
             (i as f64 / n as f64 * std::f64::consts::PI, (j % (2 * n)) as f64 / n as f64 * std::f64::consts::PI);
@@ -138,7 +124,7 @@ fn closed_mesh(random: &mut Random, n: usize, center: DVec3, size: f64, first: u
         let ring = if i == 0 || i == n { 0.0 } else { theta.sin() };
         lattice(center + radius * DVec3::new(ring * phi.cos(), ring * phi.sin(), theta.cos()))
     };
-    let bumps: Vec<f64> = (0..(n + 1) * 2 * n).map(|_| random.signed()).collect();
+    let bumps: Vec<f64> = (0..(n + 1) * 2 * n).map(|_| random.real()).collect();
     let mut triangles = Vec::new();
     for i in 0..n {
         for j in 0..2 * n {
@@ -157,14 +143,14 @@ fn closed_mesh(random: &mut Random, n: usize, center: DVec3, size: f64, first: u
 }
 
 /// Triangles of very different sizes and shapes, slivers and coplanar ones among them, near `center`.
-fn soup(random: &mut Random, count: u32, center: DVec3, first: u32) -> Vec<TruthTriangle> {
+fn soup(random: &mut Rng, count: u32, center: DVec3, first: u32) -> Vec<TruthTriangle> {
     let mut triangles: Vec<TruthTriangle> = Vec::new();
     while triangles.len() < count as usize {
-        let size = 10.0 * 2.0f64.powf(6.0 * random.signed() - 4.0);
+        let size = 10.0 * 2.0f64.powf(6.0 * random.real() - 4.0);
         let p = center + 10.0 * random.vector();
         let [q, mut r] = [(); 2].map(|()| p + size * random.vector());
         if random.below(4) == 0 {
-            r = p + (q - p) * random.signed() + 2e-4 * random.vector();
+            r = p + (q - p) * random.real() + 2e-4 * random.vector();
         }
         let mut vertices = [p, q, r].map(lattice);
         if random.below(6) == 0 {
@@ -190,7 +176,7 @@ fn identity(base: u32) -> TruthInstance {
 /// A world of a closed mesh around a soup, whole copies of some triangles under higher ids, `cells` reference cells
 /// from the world's origin.
 fn world(seed: u64, cells: i64) -> (Truth, [i64; 3]) {
-    let mut random = Random(seed);
+    let mut random = Rng(seed);
     let reference = [cells * ORIGIN_STEPS, -cells * ORIGIN_STEPS, ORIGIN_STEPS];
     let center = DVec3::from(reference.map(|r| r as f64 * STEP)) + DVec3::new(3.0, -2.0, 5.0);
     let mut triangles = closed_mesh(&mut random, 6, center, 30.0, 0);
@@ -204,7 +190,7 @@ fn world(seed: u64, cells: i64) -> (Truth, [i64; 3]) {
 
 /// Closed meshes as rotated, scaled and mirrored instances in reach of each other.
 fn instanced(seed: u64) -> (Truth, [i64; 3]) {
-    let mut random = Random(seed);
+    let mut random = Rng(seed);
     let reference = [40 * ORIGIN_STEPS, 0, -20 * ORIGIN_STEPS];
     let center = DVec3::from(reference.map(|r| r as f64 * STEP));
     let mesh = closed_mesh(&mut random, 5, DVec3::new(100.0, 0.0, -70.0), 3.0, 0);
@@ -212,8 +198,8 @@ fn instanced(seed: u64) -> (Truth, [i64; 3]) {
     let objects = vec![TruthObject::new(STEP_LOG2, vec![]), TruthObject::new(STEP_LOG2, mesh)];
     let mut instances = vec![identity(0)];
     for i in 0..8 {
-        let turn = DMat3::from_axis_angle(random.vector().normalize(), 3.0 * random.signed());
-        let scale = DVec3::new(1.0 + 0.9 * random.signed(), 2.0, if i % 2 == 0 { 1.0 } else { -0.5 });
+        let turn = DMat3::from_axis_angle(random.vector().normalize(), 3.0 * random.real());
+        let scale = DVec3::new(1.0 + 0.9 * random.real(), 2.0, if i % 2 == 0 { 1.0 } else { -0.5 });
         let a = turn * DMat3::from_diagonal(scale);
         let place = center + 20.0 * random.vector() - a * DVec3::new(100.0, 0.0, -70.0);
         let rows: [DVec3; 3] = std::array::from_fn(|k| a.row(k));
@@ -225,10 +211,10 @@ fn instanced(seed: u64) -> (Truth, [i64; 3]) {
 
 /// Rays that look for trouble: aimed at vertices, edges and along surfaces, some with an interval that ends near the
 /// hit.
-fn adversarial_ray(random: &mut Random, kernel: &Kernel) -> Ray32 {
+fn adversarial_ray(random: &mut Rng, kernel: &Kernel) -> Ray32 {
     let truth = kernel.truth;
-    let target = truth.world_vertices(random.below(truth.triangle_count())).map(DVec3::from);
-    let s = 0.5 + 0.5 * random.signed();
+    let target = truth.world_vertices(random.below(truth.triangle_count() as u64) as usize).map(DVec3::from);
+    let s = 0.5 + 0.5 * random.real();
     let aim = match random.below(4) {
         0 => target[0],
         1 => target[0].lerp(target[1], s),
@@ -239,13 +225,13 @@ fn adversarial_ray(random: &mut Random, kernel: &Kernel) -> Ray32 {
     let mut direction = random.vector();
     if random.below(4) == 0 {
         // Grazing.
-        direction -= direction.dot(normal) * normal * (1.0 - 1e-4 * random.signed());
+        direction -= direction.dot(normal) * normal * (1.0 - 1e-4 * random.real());
     }
-    let from = aim + direction * 10.0f64.powf(1.5 * random.signed() + 0.5);
+    let from = aim + direction * 10.0f64.powf(1.5 * random.real() + 0.5);
     let mut ray = kernel.ray(from, aim);
     if random.below(8) == 0 {
         // Zero components.
-        ray.d[random.below(3)] = 0.0;
+        ray.d[random.below(3) as usize] = 0.0;
     }
     if ray.d == [0.0; 3] {
         ray.d = [0.0, 1.0, 0.0];
@@ -261,7 +247,7 @@ fn adversarial_ray(random: &mut Random, kernel: &Kernel) -> Ray32 {
 fn tree_agrees_with_brute_force() {
     for (truth, reference) in [world(1, 3), world(2, 100_000), instanced(3)] {
         let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
-        let mut random = Random(17);
+        let mut random = Rng(17);
         let mut hits = 0;
         for _ in 0..2000 {
             let ray = kernel.truth_ray(&adversarial_ray(&mut random, &kernel));
@@ -280,9 +266,9 @@ fn no_gap_in_closed_meshes() {
     let (truth, reference) = world(5, 1000);
     let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
     let center = DVec3::from(kernel.reference_world()) + DVec3::new(3.0, -2.0, 5.0);
-    let mut random = Random(6);
+    let mut random = Rng(6);
     for _ in 0..2000 {
-        let corners = truth.world_vertices(random.below(100)).map(DVec3::from);
+        let corners = truth.world_vertices(random.below(100) as usize).map(DVec3::from);
         let aim = if random.below(2) == 0 { corners[0] } else { corners[0].midpoint(corners[2]) };
         let ray = kernel.truth_ray(&kernel.ray(center + random.vector(), aim));
         assert!(truth.closest(&ray).is_some(), "{ray:?}");
@@ -295,7 +281,7 @@ fn kernels_are_never_wrong() {
         [("near", world(1, 0)), ("10^6 m away", world(2, 16_000)), ("instances", instanced(3)), ("more", instanced(4))]
     {
         let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
-        let mut random = Random(99);
+        let mut random = Rng(99);
         let tally: Tally = (0..6000)
             .map(|_| {
                 let ray = adversarial_ray(&mut random, &kernel);
@@ -317,7 +303,7 @@ fn kernels_are_never_wrong() {
             .collect();
         println!("{name}, not aimed: {tally}");
         // What ties are left are overlapping triangles of one plane.
-        assert!(tally.mismatches == 0 && tally.edge <= 2 && tally.tie <= 10, "{name}: {tally}");
+        assert!(tally.mismatches == 0 && tally.by_excuse[0] <= 2 && tally.by_excuse[1] <= 10, "{name}: {tally}");
 
         // Control: with coordinates of 16 bits, as watertight as before, the judge sees the difference.
         let coarse = Kernel { lost_bits: 8, ..kernel };
@@ -336,7 +322,7 @@ fn kernels_are_never_wrong() {
 fn occlusion_is_judged() {
     let (truth, reference) = world(8, 2);
     let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
-    let mut random = Random(9);
+    let mut random = Rng(9);
     let (mut equal, mut wrong) = (0, 0);
     for _ in 0..3000 {
         let ray = adversarial_ray(&mut random, &kernel);
@@ -355,7 +341,7 @@ fn occlusion_is_judged() {
 fn planted_errors_are_found() {
     let (truth, reference) = world(11, 5);
     let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
-    let mut random = Random(12);
+    let mut random = Rng(12);
     let (mut planted, mut missed, mut moved, mut gone) = (0, 0, 0, 0);
     for _ in 0..1500 {
         let ray = adversarial_ray(&mut random, &kernel);
@@ -484,7 +470,7 @@ fn weights_follow_the_source_order() {
 fn bounds_are_of_the_order_of_f32() {
     let (truth, reference) = world(1, 16_000);
     let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
-    let mut random = Random(5);
+    let mut random = Rng(5);
     for _ in 0..300 {
         let ray = adversarial_ray(&mut random, &kernel);
         let truth_ray = kernel.truth_ray(&ray);

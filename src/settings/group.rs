@@ -1,61 +1,31 @@
 //! Settings, described, and groups of them.
 
+use super::names::names;
 use super::value::{Plain, Rule};
 
-/// What a setting is about: the heading that it stands under.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Heading {
-    /// Where the camera goes.
-    Camera,
-    /// What is traced.
-    Effects,
-    /// What shines.
-    Light,
-    /// Samples and pictures.
-    Quality,
-    /// What is written.
-    Output,
-    /// Memory, and how bricks come into it.
-    Cache,
-    /// How rays find what they hit.
-    Schedule,
-    /// Approximations of secondary rays.
-    Methods,
-    /// What is measured beside the picture.
-    Measurement,
-    /// The device.
-    Device,
-}
-
-impl Heading {
-    /// All of them, in the order of pages.
-    pub const ALL: [Self; 10] = [
-        Self::Camera,
-        Self::Effects,
-        Self::Light,
-        Self::Quality,
-        Self::Output,
-        Self::Cache,
-        Self::Schedule,
-        Self::Methods,
-        Self::Measurement,
-        Self::Device,
-    ];
-
-    /// The heading's text.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Camera => "Camera",
-            Self::Effects => "Effects",
-            Self::Light => "Light",
-            Self::Quality => "Quality",
-            Self::Output => "Output",
-            Self::Cache => "Cache",
-            Self::Schedule => "Schedule",
-            Self::Methods => "Methods",
-            Self::Measurement => "Measurement",
-            Self::Device => "Device",
-        }
+names! {
+    /// What a setting is about: the heading that it stands under, in the order of pages.
+    Heading {
+        /// Where the camera goes.
+        Camera = "Camera",
+        /// What is traced.
+        Effects = "Effects",
+        /// What shines.
+        Light = "Light",
+        /// Samples and pictures.
+        Quality = "Quality",
+        /// What is written.
+        Output = "Output",
+        /// Memory, and how bricks come into it.
+        Cache = "Cache",
+        /// How rays find what they hit.
+        Schedule = "Schedule",
+        /// Approximations of secondary rays.
+        Methods = "Methods",
+        /// What is measured beside the picture.
+        Measurement = "Measurement",
+        /// The device.
+        Device = "Device",
     }
 }
 

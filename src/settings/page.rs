@@ -20,7 +20,7 @@ bold, `--help` those without \"expert\", `--help-all` all. Sizes take K, M, G (p
 /// The page of a group.
 pub fn options_page<G: Group>() -> String {
     let mut text = String::from(HEAD);
-    for heading in Heading::ALL {
+    for &heading in Heading::ALL {
         let mut entries: Vec<Entry> = G::entries().into_iter().filter(|e| e.field.heading == heading).collect();
         entries.sort_by_key(|entry| entry.table);
         text += &format!("\n## {}\n\n", heading.name());

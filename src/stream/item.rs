@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::str::FromStr;
 
 /// The kind of a streamed payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -73,11 +72,20 @@ impl From<Item> for String {
     }
 }
 
+/// Reads the short form written by [`Item::code`].
 impl TryFrom<String> for Item {
-    type Error = ParseItemError;
+    type Error = String;
 
-    fn try_from(text: String) -> Result<Self, ParseItemError> {
-        text.parse()
+    fn try_from(text: String) -> Result<Self, String> {
+        let read = || {
+            let (kind, digits) = text.split_at_checked(1)?;
+            let kind = Kind::ALL["gat".find(kind)?];
+            let are_digits = digits.bytes().all(|b| b.is_ascii_digit());
+            digits.parse().ok().filter(|_| are_digits).map(|number| Self { number, kind })
+        };
+        read().ok_or_else(|| {
+            format!("{text:?} is not an item: expected g or a and a brick number, or t and that of a tile, such as g17")
+        })
     }
 }
 
@@ -88,31 +96,6 @@ impl fmt::Display for Item {
             Kind::Attributes => write!(f, "brick {} attributes", self.number),
             Kind::Tile => write!(f, "tile {}", self.number),
         }
-    }
-}
-
-/// A string is not the short form of an [`Item`].
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not an item: expected g or a and a brick number, or t and that of a tile, such as g17")]
-pub struct ParseItemError(pub String);
-
-impl FromStr for Item {
-    type Err = ParseItemError;
-
-    /// Reads the short form written by [`Item::code`].
-    fn from_str(text: &str) -> Result<Self, ParseItemError> {
-        let error = || ParseItemError(text.to_owned());
-        let make = match text.as_bytes().first() {
-            Some(b'g') => Self::geometry,
-            Some(b'a') => Self::attributes,
-            Some(b't') => Self::tile,
-            _ => return Err(error()),
-        };
-        let digits = &text[1..];
-        if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
-            return Err(error());
-        }
-        digits.parse().map(make).map_err(|_| error())
     }
 }
 

@@ -31,7 +31,7 @@ mod tests;
 
 pub use crate::settings::Policy;
 pub use host_cache::{HostCache, HostCacheStats, Reservation};
-pub use item::{Item, Kind, ParseItemError, Slot};
+pub use item::{Item, Kind, Slot};
 pub use residency::{Counters, KindCounters, NoRoom, Placed, Residency, ResidencyError};
 pub use sizes::Sizes;
 pub use source::{PayloadSource, SourceError};

@@ -1,5 +1,6 @@
 //! The fixed cases of the probe.
 
+use crate::math::random::Rng;
 use std::fmt;
 
 /// Four numbers for the kernel `arithmetic`.
@@ -41,48 +42,14 @@ impl TriangleCase {
     }
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
-pub struct Rng(pub u64);
-
-impl Rng {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number below n.
-    pub fn below(&mut self, n: u32) -> u32 {
-        (self.next() >> 32) as u32 % n
-    }
-
-    /// A number in [-1, 1).
-    pub fn signed(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / 8_388_608.0 - 1.0
-    }
-
-    /// A normal number with an exponent in `-range..=range`, its significand random, sparse or dense.
-    fn float(&mut self, range: u32) -> f32 {
-        let exponent = 127 - range + self.below(2 * range + 1);
-        let r = self.next() as u32;
-        let significand = match r >> 30 {
-            0 => 1 << (r % 23),
-            1 => 0x7f_ffff ^ (1 << (r % 23)),
-            _ => r & 0x7f_ffff,
-        };
-        f32::from_bits((self.next() as u32 & 1 << 31) | exponent << 23 | significand)
-    }
-}
-
 /// 2,048 random cases, a third of them with products that cancel when rounded, then special values.
 pub fn arithmetic() -> Vec<ArithmeticCase> {
     let mut rng = Rng(1);
     let mut cases = Vec::new();
     let mut push = |x: [f32; 4], cancels: bool| cases.push(ArithmeticCase { words: x.map(f32::to_bits), cancels });
     for i in 0..2048 {
-        let (a, b) = (rng.float(40), rng.float(40));
-        let near = |x: f32, r: &mut Rng| f32::from_bits(x.to_bits() + r.below(9) - 4);
+        let (a, b) = (rng.float(-40, 40), rng.float(-40, 40));
+        let near = |x: f32, r: &mut Rng| f32::from_bits(x.to_bits() + r.below(9) as u32 - 4);
         match i % 3 {
             0 => {
                 let c = near(a, &mut rng);
@@ -91,7 +58,7 @@ pub fn arithmetic() -> Vec<ArithmeticCase> {
                 push([a, b, c, d], cancels);
             }
             1 => push([a, near(a, &mut rng), near(b, &mut rng), b], false),
-            _ => push([a, b, rng.float(40), rng.float(40)], false),
+            _ => push([a, b, rng.float(-40, 40), rng.float(-40, 40)], false),
         }
     }
     let ends = [0.0, -0.0, 1.0, -1.0, f32::MAX, f32::MIN_POSITIVE, 16_777_216.0, 3.0, 1e-30, 1e30];

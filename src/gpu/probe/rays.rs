@@ -1,8 +1,8 @@
 //! The fixed rays of the probe.
 
-use super::cases::Rng;
 use super::twin::Twin;
 use crate::kernels::layout::{Ray, T_INFINITE};
+use crate::math::random::Rng;
 
 /// Number of rays.
 pub const RAYS: usize = 2048;
@@ -22,7 +22,7 @@ pub fn rays(twin: &Twin, unit: f64) -> Vec<Ray> {
     let size = (3.0 / unit) as f32;
     (0..RAYS)
         .map(|i| {
-            let [a, b, c] = triangles[rng.below(triangles.len() as u32) as usize];
+            let [a, b, c] = triangles[rng.below(triangles.len() as u64) as usize];
             let s = 0.5 + 0.5 * rng.signed();
             let t = (0.5 + 0.5 * rng.signed()) * (1.0 - s);
             let between = |s: f32, t: f32| each(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]));

@@ -2,24 +2,20 @@
 //! anew.
 
 use crate::kernels::layout::{BRICK_INDEX32, BRICK_WIDE};
+use crate::math::random::Rng;
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene};
 
-/// SplitMix64 (Steele, Lea, Flood 2014): numbers in -1..1, multiples of 2^-20.
-struct Rng(u64);
-
 impl Rng {
-    fn signed(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 43) as f64 / f64::from(1 << 20) - 1.0
+    /// A number in -1..1, a multiple of 2^-20.
+    fn coordinate(&mut self) -> f64 {
+        (self.bits() >> 43) as f64 / f64::from(1 << 20) - 1.0
     }
 
     fn point(&mut self, size: f64) -> [f64; 3] {
-        [self.signed() * size, self.signed() * size, self.signed() * size]
+        [0; 3].map(|_| self.coordinate() * size)
     }
 }
 
@@ -96,7 +92,7 @@ fn ball() -> Mesh {
         faces = faces.iter().flat_map(divide).collect();
     }
     let bumpy = points.iter().map(|p| {
-        let radius = 1.0 + 0.1 * rng.signed();
+        let radius = 1.0 + 0.1 * rng.coordinate();
         p.map(|x| x * radius)
     });
     mesh("ball", bumpy.collect(), faces.into_iter().flatten().collect())

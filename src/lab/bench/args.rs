@@ -93,7 +93,8 @@ settings! {
         /// "table2/city/100%/tile 64/near/primary,ao,diffuse/chc+fronts/threshold 0/turn 36"; cells.jsonl holds them.
         /// [default: all]
         only: Lines<String> = Lines::default(), "--only TEXT", Rule::Any, "", Measurement, Common;
-        /// Begin no walk after so many minutes. The results hold what is measured until then. [default: no limit]
+        /// Measure for so many minutes at most. What is under way then is left for the next start; the results hold the
+        /// rest. [default: no limit]
         minutes: Option<f64> = None, "--minutes N", MINUTES, "", Measurement, Common;
         /// Insist that DIR holds measurements to go on with.
         resume: bool = false, "--resume", Rule::Any, "", Measurement, Common;

@@ -2,11 +2,10 @@
 //! is over or someone interrupts it.
 
 use super::store::{Entry, Store};
-use crate::lab::console::Console;
+use crate::lab::console::{Console, Stopped};
 use anyhow::{Result, bail};
 use brickwalk_convert::progress::Progress;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 /// How far a run came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,19 +18,19 @@ enum Ended {
 /// A run of a bench.
 pub struct Runner<'a> {
     console: Console<'a>,
-    deadline: Option<Instant>,
     ended: Ended,
+    /// Measurements of this run.
+    measured: usize,
 }
 
 impl<'a> Runner<'a> {
-    /// Begins a run of so many minutes.
-    pub fn new(minutes: Option<f64>, console: Console<'a>) -> Self {
-        let deadline = minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
-        Self { console, deadline, ended: Ended::Finished }
+    /// Begins a run.
+    pub fn new(console: Console<'a>) -> Self {
+        Self { console, ended: Ended::Finished, measured: 0 }
     }
 
     /// Measures those of `jobs` of which `store` lacks one of the `keys`. What `measure` gives back may be less than
-    /// that: the rest cannot be measured, or was interrupted.
+    /// that: the rest cannot be measured. [`Stopped`] ends the run.
     ///
     /// # Errors
     /// Those of `measure`; the file cannot be written.
@@ -46,17 +45,21 @@ impl<'a> Runner<'a> {
         progress.phase("measurements", jobs.iter().map(|job| keys(job).len() as u64).sum());
         for job in jobs {
             let keys = keys(job);
-            let is_done = |store: &Store<T>| keys.iter().all(|key| store.has(key));
-            if !is_done(store) {
+            if !keys.iter().all(|key| store.has(key)) {
                 if self.is_over() {
                     break;
                 }
-                for entry in measure(job)? {
-                    store.push(entry)?;
-                }
-                if self.console.is_stopped() && !is_done(store) {
-                    self.ended = Ended::Interrupted;
-                    break;
+                match measure(job) {
+                    Err(error) if error.is::<Stopped>() => {
+                        self.is_over();
+                        break;
+                    }
+                    entries => {
+                        for entry in entries? {
+                            store.push(entry)?;
+                            self.measured += 1;
+                        }
+                    }
                 }
             }
             progress.advance(keys.len() as u64);
@@ -67,9 +70,9 @@ impl<'a> Runner<'a> {
 
     /// Whether to begin no other measurement.
     fn is_over(&mut self) -> bool {
-        if self.console.is_stopped() {
+        if self.console.is_interrupted() {
             self.ended = Ended::Interrupted;
-        } else if self.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+        } else if self.console.is_stopped() {
             self.ended = Ended::OutOfTime;
         }
         self.ended != Ended::Finished
@@ -83,10 +86,54 @@ impl<'a> Runner<'a> {
         self.console.show(text)?;
         match self.ended {
             Ended::Finished => Ok(()),
+            Ended::OutOfTime if self.measured == 0 => {
+                self.console.show("Out of time before a measurement was done; give more --minutes.\n")
+            }
             Ended::OutOfTime => self.console.show("Out of time: the same command goes on where this one stopped.\n"),
             Ended::Interrupted => {
                 bail!("interrupted; {} holds what is measured, and the same command goes on", folder.display())
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::bench::store::{Header, Row, Rows, Values};
+    use serde_json::json;
+    use std::cell::RefCell;
+    use std::sync::atomic::AtomicBool;
+
+    #[test]
+    fn a_measurement_that_time_runs_out_on_is_left_for_the_next_start() {
+        let folder = tempfile::tempdir().unwrap();
+        let (stop, shown) = (AtomicBool::new(false), RefCell::new(String::new()));
+        let show = |text: &str| {
+            shown.borrow_mut().push_str(text);
+            Ok(())
+        };
+        let console = Console { show: &show, stop: &stop, job: &Progress::hidden, until: None };
+        // The second of three takes longer than there is; whoever says so is not told of a fault.
+        let run = |console: Console| {
+            let header = Header { format: 1, settings: json!({}), adapter: json!({}), commit: String::new() };
+            let mut rows = Rows::open(folder.path().join("rows.jsonl"), header, false).unwrap();
+            let mut runner = Runner::new(console);
+            let measure = |job: &u32| {
+                while *job == 2 && console.until.is_some() {
+                    console.go_on()?;
+                }
+                Ok(vec![Row { key: job.to_string(), values: Values::new() }])
+            };
+            runner.measure(&mut rows, &[1, 2, 3], |job| vec![job.to_string()], measure).unwrap();
+            runner.end(folder.path(), "").unwrap();
+            rows.all().len()
+        };
+        assert_eq!(run(console.within(Some(0.0))), 0);
+        assert!(shown.take().contains("give more --minutes"));
+        assert_eq!(run(console.within(Some(0.002))), 1);
+        assert!(shown.take().contains("goes on where this one stopped"));
+        assert_eq!(run(console), 3);
+        assert_eq!(shown.take(), "");
     }
 }

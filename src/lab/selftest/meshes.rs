@@ -117,11 +117,7 @@ pub fn scale_sweep(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     for decade in (-12..=12).filter(|&decade| decade != 0) {
         let (tally, hits) = run(10f64.powi(decade))?;
         missed += misses(&hits);
-        sum.equal += tally.equal;
-        sum.edge += tally.edge;
-        sum.tie += tally.tie;
-        sum.mismatches += tally.mismatches;
-        sum.first = sum.first.or(tally.first);
+        sum.join(tally);
     }
     checks.judged("powers of ten from 1e-12 to 1e12", &sum);
     checks.none("powers of ten: misses inside a closed mesh", missed, sum.total());

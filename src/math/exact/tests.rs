@@ -1,22 +1,9 @@
 //! Arithmetic against oracles, the triangle test against exact edge functions, and planted defects that must show.
 
 use crate::math::exact::*;
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Rng(u64);
+use crate::math::random::Rng;
 
 impl Rng {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: u64) -> u64 {
-        self.next() % n
-    }
-
     /// An integer in `-n..=n`.
     fn about(&mut self, n: i64) -> i64 {
         self.below(2 * n as u64 + 1) as i64 - n
@@ -24,24 +11,7 @@ impl Rng {
 
     /// A number in [0, 1) with 24 bits.
     fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / 16_777_216.0
-    }
-
-    /// A number in [-1, 1).
-    fn signed(&mut self) -> f32 {
-        2.0 * self.unit() - 1.0
-    }
-
-    /// A normal f32 with an unbiased exponent in `low..=high`, its significand random, sparse or all ones.
-    fn float(&mut self, low: i32, high: i32) -> f32 {
-        let exponent = (low + self.below((high - low + 1) as u64) as i32 + 127) as u32;
-        let r = self.next() as u32;
-        let significand = match r >> 30 {
-            0 => 1 << (r % 23),
-            1 => 0x7f_ffff ^ (1 << (r % 23)),
-            _ => r & 0x7f_ffff,
-        };
-        f32::from_bits((self.next() as u32 & SIGN) | exponent << 23 | significand)
+        (self.bits() >> 40) as f32 / 16_777_216.0
     }
 }
 

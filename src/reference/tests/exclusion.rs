@@ -6,7 +6,7 @@ use crate::reference::tests::*;
 fn excluded_triangles_are_passed() {
     for (truth, reference) in [world(21, 3), instanced(22)] {
         let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
-        let mut random = Random(23);
+        let mut random = Rng(23);
         let (mut hits, mut behind, mut planted) = (0, 0, 0);
         for _ in 0..1000 {
             let ray = kernel.truth_ray(&adversarial_ray(&mut random, &kernel));

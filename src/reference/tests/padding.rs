@@ -28,7 +28,7 @@ fn boxes_are_padded_enough() {
         ("stretched", stretched(3)),
     ] {
         let kernel = Kernel { truth: &truth, reference, lost_bits: 0 };
-        let mut random = Random(31);
+        let mut random = Rng(31);
         // Greatest part of the pad that 4 ε_edge takes.
         let mut used = 0.0f64;
         for _ in 0..300 {

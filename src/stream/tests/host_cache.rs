@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::model::Random;
+use crate::math::random::Rng;
 use crate::stream::{HostCache, Item};
 
 fn put(cache: &Arc<HostCache>, brick: u32, bytes: usize) -> bool {
@@ -87,7 +87,7 @@ fn an_unfilled_or_misfilled_reservation_gives_its_room_back() {
 #[test]
 fn random_use_matches_a_naive_list() {
     for seed in 0..40 {
-        let mut random = Random(seed);
+        let mut random = Rng(seed);
         let budget = 1 + random.below(400);
         let cache = HostCache::new(budget);
         let sizes: Vec<usize> = (0..30).map(|_| 1 + random.below(90) as usize).collect();

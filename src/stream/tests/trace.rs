@@ -1,6 +1,6 @@
 //! Traces: file format, replay against caches, Bélády's rule against exhaustive search.
 
-use super::model::Random;
+use crate::math::random::Rng;
 use crate::stream::{Counters, Item, Policy, Replay, ReplayResult, Residency, Sizes, Trace, TraceError, replay};
 
 /// Passes that ask for one brick each.
@@ -152,7 +152,7 @@ fn belady_is_the_optimum_for_one_size() {
     let sizes = vec![(16, 0); 5];
     let mut worse = 0;
     for seed in 0..200 {
-        let mut random = Random(seed);
+        let mut random = Rng(seed);
         let requests: Vec<u32> = (0..12).map(|_| random.below(5) as u32).collect();
         let trace = trace_of(&requests, &sizes);
         let best = fewest_loads(&requests, 0, 3) as u64;
@@ -167,7 +167,7 @@ fn belady_is_the_optimum_for_one_size() {
 
 /// What a cache does when it pins each batch that it loads, as the render loop does, and the trace of it.
 fn walk(seed: u64, policy: Policy) -> (Trace, Counters) {
-    let mut random = Random(seed);
+    let mut random = Rng(seed);
     let bricks = (0..30).map(|_| (16 * (1 + random.below(9)), 16 * random.below(3))).collect();
     let sizes = Sizes { bricks, tiles: (0..30).map(|_| 16 * (1 + random.below(2))).collect() };
     let budget = Residency::least_budget(&sizes) + 16 * random.below(40);

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::model::Random;
+use crate::math::random::Rng;
 use crate::stream::{Destination, HostCache, Item, Kind, PayloadSource, SourceError, StreamError, Workers};
 
 /// What the mock does with an item.
@@ -188,7 +188,7 @@ fn the_host_cache_answers_the_second_time() {
 /// The statistics after a seeded sequence of batches through a host cache far too small for them.
 fn stats_of_a_walk(threads: usize, seed: u64) -> impl PartialEq + std::fmt::Debug {
     let (workers, _) = start(Mock { bricks: 60, tiles: 40, ..Mock::default() }, 1200, threads);
-    let mut random = Random(seed);
+    let mut random = Rng(seed);
     for _ in 0..60 {
         let count = random.below(30);
         let items: Vec<Item> = (0..count).map(|_| Item::from_index(random.below(120) as usize).unwrap()).collect();

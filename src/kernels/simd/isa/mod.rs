@@ -141,44 +141,18 @@ macro_rules! isa_over_intrinsics {
             type Wide = $wide;
             type Eight = $eight;
 
-            #[inline(always)]
-            fn eight(self, x: f32) -> $eight {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe { <$eight>::splat(x) }
-            }
-
-            #[inline(always)]
-            fn load_eight(self, from: &[f32; 8]) -> $eight {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe { <$eight>::load(from) }
-            }
-
-            #[inline(always)]
-            fn numbers(self, bytes: &[u8; 8]) -> $eight {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe { <$eight>::of(numbers(bytes)) }
-            }
-
-            #[inline(always)]
-            fn grid(self, node: &Node) -> [$eight; 2] {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe {
-                    let [origin, step] = grid(node);
-                    [<$eight>::of(extended(origin)), <$eight>::of(extended(step))]
-                }
-            }
-
-            #[inline(always)]
-            fn splat(self, x: f32) -> $wide {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe { <$wide>::splat(x) }
-            }
-
-            #[inline(always)]
-            fn load(self, from: &[f32]) -> $wide {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe { <$wide>::load(from) }
-            }
+            isa_over_intrinsics!(fn eight(x: f32) -> $eight { <$eight>::splat(x) });
+            isa_over_intrinsics!(fn load_eight(from: &[f32; 8]) -> $eight { <$eight>::load(from) });
+            isa_over_intrinsics!(fn numbers(bytes: &[u8; 8]) -> $eight { <$eight>::of(numbers(bytes)) });
+            isa_over_intrinsics!(fn grid(node: &Node) -> [$eight; 2] {
+                let [origin, step] = grid(node);
+                [<$eight>::of(extended(origin)), <$eight>::of(extended(step))]
+            });
+            isa_over_intrinsics!(fn splat(x: f32) -> $wide { <$wide>::splat(x) });
+            isa_over_intrinsics!(fn load(from: &[f32]) -> $wide { <$wide>::load(from) });
+            isa_over_intrinsics!(fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
+                open(ray, lanes, node, t_max)
+            });
 
             #[inline(always)]
             fn prefetch<T>(self, at: &T) {
@@ -186,12 +160,13 @@ macro_rules! isa_over_intrinsics {
                     prefetch_line(std::ptr::from_ref(at).cast::<u8>().wrapping_add(64 * line));
                 }
             }
-
-            #[inline(always)]
-            fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
-                // SAFETY: a value of the type exists only where the instructions have been detected.
-                unsafe { open(ray, lanes, node, t_max) }
-            }
+        }
+    };
+    (fn $method:ident($($given:ident: $type:ty),*) -> $out:ty { $($body:tt)* }) => {
+        #[inline(always)]
+        fn $method(self, $($given: $type),*) -> $out {
+            // SAFETY: a value of the type exists only where the instructions have been detected.
+            unsafe { $($body)* }
         }
     };
 }

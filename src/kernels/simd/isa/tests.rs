@@ -1,31 +1,16 @@
 use crate::kernels::simd::isa::*;
 use crate::kernels::simd::wide::Wide;
 use crate::kernels::trace::node::framed_ray;
+use crate::math::random::Rng;
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Rng(u64);
-
-impl Rng {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn signed(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / 8_388_608.0 - 1.0
-    }
-
-    fn point(&mut self, size: f32) -> Vec3 {
-        [0; 3].map(|_| size * self.signed())
-    }
+fn point(rng: &mut Rng, size: f32) -> Vec3 {
+    [0; 3].map(|_| size * rng.signed())
 }
 
 /// A node as the reader accepts it: every child inner, or a leaf of 1 to 3 triangles, or absent.
 fn node(rng: &mut Rng) -> Node {
     let mut node = Node {
-        origin: rng.point(20.0),
+        origin: point(rng, 20.0),
         exponent: [0; 3].map(|_| 115 + (rng.bits() % 8) as u8),
         inner_mask: 0,
         child_base: 1,
@@ -74,13 +59,13 @@ fn compare_with_scalar(isa: impl Isa) {
     println!("seed 11");
     for case in 0..200_000 {
         let node = node(&mut rng);
-        let (high, low) = (rng.point(4.0), if case % 2 == 0 { [0.0; 3] } else { rng.point(1e-3) });
+        let (high, low) = (point(&mut rng, 4.0), if case % 2 == 0 { [0.0; 3] } else { point(&mut rng, 1e-3) });
         let aim = [0, 1, 2].map(|k| {
             let step = f32::from_bits(u32::from(node.exponent[k]) << 23);
             // At the node, or beside it.
             [high[k], 0.0][case / 2 % 2] + node.origin[k] + step * 255.0 * (0.5 + 0.5 * rng.signed())
         });
-        let origin = rng.point([1.0, 30.0, 3e4][case % 3]);
+        let origin = point(&mut rng, [1.0, 30.0, 3e4][case % 3]);
         let mut direction = [0, 1, 2].map(|k| aim[k] - origin[k]);
         if case % 5 == 0 {
             // Of either sign.

@@ -136,29 +136,27 @@ impl<'a> Bench<'a> {
         self.renderer.frame(frame, &camera).with_context(|| self.place.scene.display().to_string())
     }
 
-    /// One walk. `None`: interrupted.
+    /// One walk.
     ///
     /// # Errors
-    /// A brick that cannot be read, the device's, pixels that are not finite.
-    pub fn walk(&mut self, case: &Case, console: Console) -> Result<Option<Passes>> {
+    /// A brick that cannot be read, the device's, pixels that are not finite; the run is to come to an end.
+    pub fn walk(&mut self, case: &Case, console: Console) -> Result<Passes> {
         self.prepare(case)?;
         let path = self.place.path(case.view)?;
         let mut passes = Passes::new();
         for frame in 0..self.settings.frames {
-            if console.is_stopped() {
-                return Ok(None);
-            }
+            console.go_on()?;
             for record in self.frame(&path, frame)?.records {
                 if case.effects.iter().any(|effect| effect.name() == record.pass) {
                     note(&mut passes, &record)?;
                 }
             }
         }
-        Ok(Some(passes))
+        Ok(passes)
     }
 
     /// How far the pictures of `case` are from those of threshold 0, in five frames along the walk; each is rendered
-    /// from an empty cache. `None` for threshold 0 and when interrupted.
+    /// from an empty cache. `None` for threshold 0.
     ///
     /// # Errors
     /// As [`Self::walk`].
@@ -173,9 +171,7 @@ impl<'a> Bench<'a> {
         frames.dedup();
         let mut all = PictureError::default();
         for &frame in &frames {
-            if console.is_stopped() {
-                return Ok(None);
-            }
+            console.go_on()?;
             let mut picture = |case: &Case| -> Result<Vec<[u8; 3]>> {
                 self.prepare(case)?;
                 let radiance = self.frame(&path, frame)?.pixels.radiance;

@@ -33,12 +33,12 @@ const FORMAT: u32 = 2;
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
 pub fn run(args: &ChcArgs, console: Console) -> Result<()> {
-    let settings = args.settings();
+    let (settings, console) = (args.settings(), console.within(args.minutes));
     if settings.frames <= settings.skip {
         let text = format!("--frames {}: it must be above {}", settings.frames, settings.skip);
         return Err(SettingsError::Conflict(text).into());
     }
-    let mut runner = Runner::new(args.minutes, console);
+    let mut runner = Runner::new(console);
     let plan = |stages: &[Stage]| plan::walks(stages, settings.tile, settings.repeat, args.sponza.is_some());
     let mut walks = plan(&wanted(Stage::ALL, &args.stages));
     walks.retain(|(case, _)| args.wants(&case.to_string()));
@@ -86,12 +86,9 @@ pub fn run(args: &ChcArgs, console: Console) -> Result<()> {
         let Some(bench) = opened.as_mut().filter(|bench| bench.refuses(&case.variant).is_none()) else {
             return Ok(Vec::new());
         };
-        let Some(passes) = bench.walk(case, console)? else { return Ok(Vec::new()) };
+        let passes = bench.walk(case, console)?;
         // The pictures are the same in every walk.
         let error = if *repetition == 0 { bench.picture_error(case, console)? } else { None };
-        if console.is_stopped() {
-            return Ok(Vec::new());
-        }
         Ok(vec![Cell { case: case.to_string(), repetition: *repetition, run, passes, error }])
     };
     runner.measure(&mut store, &walks, |walk| vec![key(walk)], measure)?;

@@ -59,8 +59,8 @@ settings! {
         /// pictures change from frame to frame that exact rays do not), memory (a cache of --cache, the field of what
         /// is seen). [default: all]
         stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
-        /// Begin no measurement after so many minutes. The results hold what is measured until then. [default: no
-        /// limit]
+        /// Measure for so many minutes at most. What is under way then is left for the next start; the results hold the
+        /// rest. [default: no limit]
         minutes: Option<f64> = None, "--minutes N", bench::MINUTES, "", Measurement, Common;
         /// Width and height of the pictures.
         size: ImageSize = ImageSize { width: 320, height: 180 }, "--size WxH", Rule::Any, "pixels", Camera, Common;

@@ -78,6 +78,7 @@ struct View<'a> {
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be read; the device's.
 pub fn run(args: &DvfBenchArgs, console: Console) -> Result<()> {
+    let console = console.within(args.minutes);
     atomic::create_folder(&args.output)?;
     let places = places(args, console)?;
     let names: Vec<&str> = places.iter().map(|place| place.name.as_str()).collect();
@@ -91,7 +92,7 @@ pub fn run(args: &DvfBenchArgs, console: Console) -> Result<()> {
         "environment": args.environment.as_ref().map(|file| file.display().to_string()),
     });
     let mut rows = Rows::open(args.output.join("rows.jsonl"), Header::new(FORMAT, &args.adapter, own)?, false)?;
-    let mut runner = Runner::new(args.minutes, console);
+    let mut runner = Runner::new(console);
     let stages = wanted(Stage::ALL, &args.stages);
     let jobs: Vec<(&Place, Stage, Measurement)> = places
         .iter()
@@ -190,6 +191,7 @@ impl<'a> View<'a> {
 
     /// A picture; `frame` says by which rays.
     fn picture(&mut self, frame: u32) -> Result<Picture> {
+        self.console.go_on()?;
         let output =
             self.renderer.frame(frame, &self.place.camera).with_context(|| self.place.scene.display().to_string())?;
         let record = output.records.iter().find(|record| record.pass == "environment");
@@ -226,6 +228,8 @@ impl<'a> View<'a> {
         };
         let made = prepare::make(&mut self.renderer, &options.settings(), &region, options.tracing(), &mut watch);
         progress.finish();
+        // Else it is a part of a field.
+        console.go_on()?;
         made
     }
 

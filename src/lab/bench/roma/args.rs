@@ -11,7 +11,7 @@ settings! {
         /// Folder for the results: roma.json, roma.md, report.html, a CSV a table, and rows.jsonl, which grows with
         /// every job. Started again with the same folder and settings, the bench goes on where it stopped.
         output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
-        /// Small scenes, small pictures, few samples. It takes minutes on two cores without a GPU.
+        /// Small scenes, small pictures, few samples. It takes about 3 minutes on two cores without a GPU.
         quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
         /// Triangles of the city, and of the plant of pipes. [default: 12M; with --quick 100K]
         triangles: Option<u64> = None, "--triangles N", bench::TRIANGLES, "", Quality, Common;
@@ -26,13 +26,14 @@ settings! {
         /// bricks together, out of core), seams (errors by the distance from where larger cells take over), leaks
         /// (columns that pass through single sheets). [default: all]
         stages: Vec<Stage> = Vec::new(), "--stages LIST", Rule::Any, "", Measurement, Common;
-        /// Begin no job after so many minutes. The results hold what is measured until then. [default: no limit]
+        /// Measure for so many minutes at most. What is under way then is left for the next start; the results hold the
+        /// rest. [default: no limit]
         minutes: Option<f64> = None, "--minutes N", bench::MINUTES, "", Measurement, Common;
         /// Width and height of the pictures. [default: 1920x1080; with --quick 160x90]
         size: Option<ImageSize> = None, "--size WxH", Rule::Any, "pixels", Camera, Common;
-        /// Turns of every way, beside one that brings in what frames need. [default: 5; with --quick 3]
+        /// Turns of every way, beside one that brings in what frames need. [default: 5; with --quick 2]
         repeat: Option<u32> = None, "--repeat N", bench::REPETITIONS, "", Measurement, Common;
-        /// Samples per pixel of pictures that are converged, 2 to 65536. [default: 1024; with --quick 64]
+        /// Samples per pixel of pictures that are converged, 2 to 65536. [default: 1024; with --quick 8]
         samples: Option<u32> = None, "--samples N", Rule::Whole(2, 65_536), "", Quality, Common;
         /// Length of ambient-occlusion rays, in world units.
         ao_length: f64 = 16.0, "--ao-length LENGTH", Rule::Real(1e-6, 1e9), "", Effects, Common;
@@ -66,8 +67,8 @@ impl RomaBenchArgs {
         Settings {
             triangles: self.triangles.unwrap_or(if self.quick { 100_000 } else { 12_000_000 }),
             size: self.size.unwrap_or(ImageSize { width, height }),
-            repeat: self.repeat.unwrap_or(or(5, 3)),
-            samples: self.samples.unwrap_or(or(1024, 64)),
+            repeat: self.repeat.unwrap_or(or(5, 2)),
+            samples: self.samples.unwrap_or(or(1024, 8)),
             ao_length: self.ao_length,
             tile: or(64, 16),
         }

@@ -33,7 +33,7 @@ const FORMAT: u32 = 2;
 /// # Errors
 /// The folder holds other measurements or cannot be written; a scene cannot be generated or read; the device's.
 pub fn run(args: &RomaBenchArgs, console: Console) -> Result<()> {
-    let settings = args.settings();
+    let (settings, console) = (args.settings(), console.within(args.minutes));
     let stages = wanted(Stage::ALL, &args.stages);
     let mut jobs = plan::jobs(&settings, args.sponza.is_some());
     jobs.retain(|job| stages.contains(&job.stage));
@@ -50,10 +50,10 @@ pub fn run(args: &RomaBenchArgs, console: Console) -> Result<()> {
         "sponza": scenes.sponza_name(),
     });
     let mut rows = Rows::open(args.output.join("rows.jsonl"), Header::new(FORMAT, &args.adapter, own)?, false)?;
-    let mut runner = Runner::new(args.minutes, console);
+    let mut runner = Runner::new(console);
     // Ways are compared with each other, so that all of a job are measured together.
     let keys = |job: &Job| job.ways.iter().map(|way| job.key(way)).collect();
-    runner.measure(&mut rows, &jobs, keys, |job| measure(job, args, &settings, &scenes))?;
+    runner.measure(&mut rows, &jobs, keys, |job| measure(job, args, &settings, &scenes, console))?;
     runner.measure(
         &mut rows,
         leaks,
@@ -86,10 +86,16 @@ fn leak_name(wide: usize, samples: u32) -> String {
 }
 
 /// Everything that is measured of the ways of a job.
-fn measure(job: &Job, args: &RomaBenchArgs, settings: &Settings, scenes: &Scenes) -> Result<Vec<Row>> {
+fn measure(
+    job: &Job,
+    args: &RomaBenchArgs,
+    settings: &Settings,
+    scenes: &Scenes,
+    console: Console,
+) -> Result<Vec<Row>> {
     let place = scenes.place(job.scene)?;
     let mut all: Vec<(Way, Values)> = job.ways.iter().map(|way| (*way, Values::new())).collect();
-    let mut view = View::open(job, &place, settings, &args.adapter)?;
+    let mut view = View::open(job, &place, settings, &args.adapter, console)?;
     if job.times {
         // In turns: a drift of the machine meets all ways alike. What the first turn brings in is not counted.
         let mut turns: Vec<Vec<Values>> = vec![Vec::new(); all.len()];

@@ -7,6 +7,7 @@ use crate::counters::Record;
 use crate::frame::Renderer;
 use crate::lab::bench::scenes::{Place, View as Path, empty_cache, open};
 use crate::lab::bench::store::Values;
+use crate::lab::console::Console;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::scene::{Camera, CameraPath};
 use crate::secondary::df::answer::Df;
@@ -27,6 +28,7 @@ pub struct View<'a> {
     camera: Camera,
     settings: &'a Scale,
     adapter: &'a Adapter,
+    console: Console<'a>,
 }
 
 /// A picture and what its pass took.
@@ -43,13 +45,19 @@ impl<'a> View<'a> {
     ///
     /// # Errors
     /// The scene's, the device's.
-    pub fn open(job: &'a Job, place: &Place, settings: &'a Scale, adapter: &'a Adapter) -> Result<Self> {
+    pub fn open(
+        job: &'a Job,
+        place: &Place,
+        settings: &'a Scale,
+        adapter: &'a Adapter,
+        console: Console<'a>,
+    ) -> Result<Self> {
         let scene = place.scene.clone();
         let own = of_job(job, &job.settings, &Way::Exact, settings, adapter);
         let renderer = open(&scene, &own)?;
         let path = place.path(Path::Near)?;
         let camera = path.frame(job.frames[0], 30);
-        Ok(Self { job, scene, renderer, path, camera, settings, adapter })
+        Ok(Self { job, scene, renderer, path, camera, settings, adapter, console })
     }
 
     /// Takes the camera of another of thirty frames of the path.
@@ -60,7 +68,7 @@ impl<'a> View<'a> {
     /// A picture of `samples` a pixel with the seed `seed`.
     ///
     /// # Errors
-    /// A brick that cannot be read, the device's, pixels that are not finite.
+    /// A brick that cannot be read, the device's, pixels that are not finite; the run is to come to an end.
     pub fn picture(&mut self, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
         let Picture { mut image, depth, values } = self.whole(&self.job.settings, way, samples, seed)?;
         if let Some(without) = self.job.without.as_ref().filter(|_| self.job.errors) {
@@ -74,6 +82,7 @@ impl<'a> View<'a> {
 
     /// A picture of all that `settings` ask for.
     fn whole(&mut self, settings: &Settings, way: &Way, samples: u32, seed: u32) -> Result<Picture> {
+        self.console.go_on()?;
         let own = of_job(self.job, settings, way, self.settings, self.adapter);
         let own = Settings { spp: samples, seed: seed.into(), ..own };
         let renderer = &mut self.renderer;

@@ -15,9 +15,8 @@ fn table() -> Table {
 #[test]
 fn columns_of_markdown_are_aligned_in_the_text() {
     let text = table().to_markdown();
-    let borders = |line: &str| -> Vec<usize> {
-        line.chars().enumerate().filter(|(_, c)| *c == '|').map(|(at, _)| at).collect()
-    };
+    let borders =
+        |line: &str| -> Vec<usize> { line.chars().enumerate().filter(|(_, c)| *c == '|').map(|(at, _)| at).collect() };
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), 4, "{text}");
     assert!(lines.iter().all(|line| borders(line) == borders(lines[0])), "{text}");
