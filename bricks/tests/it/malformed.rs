@@ -652,7 +652,8 @@ fn contents() {
         put(b, 80 + offset_of!(Node, hi) as u64, [254]);
     });
     let step = scene.resident.objects[0].step_log2 - scene.resident.objects[0].unit_log2;
-    for value in [2f32.powi(step) * 0.5, 2f32.powi(step) * 1e6] {
+    // Beside the lattice; beyond the bounds, or what the low part of a wide vertex holds.
+    for value in [2f32.powi(step) * 0.5, 2f32.powi(step) * 5e6] {
         contents_refused(Payload::Geometry(0), "vertex 1 at", |b| put(b, near.vertices + 12, value.to_le_bytes()));
         contents_refused(Payload::Geometry(1), "vertex 1 at", |b| put(b, wide.vertices + 24, value.to_le_bytes()));
         contents_refused(Payload::Geometry(1), "vertex 1 at", |b| put(b, wide.vertices + 36, value.to_le_bytes()));

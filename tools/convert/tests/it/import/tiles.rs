@@ -299,7 +299,7 @@ fn what_is_not_read_is_named() {
     for (uri, says) in [
         ("a.pnts", "content \"a.pnts\": point clouds (pnts) are not read"),
         ("a.cmpt", "composite tiles (cmpt) are not read"),
-        ("a.subt", "subtrees"),
+        ("a.subt", "it is a subtree, which implicitTiling must name"),
         ("a.what", "neither glTF, b3dm, i3dm nor a tileset"),
         ("data:,a", "data URIs"),
         ("https://example.org/a.glb", "not a relative path"),
