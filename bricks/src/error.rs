@@ -28,6 +28,18 @@ pub enum Part {
     PaddingAfterPayload(Payload),
 }
 
+impl Part {
+    /// What to do when it is damaged.
+    fn remedy(&self) -> &'static str {
+        match self {
+            Part::Payload(_) | Part::PaddingAfterPayload(_) => {
+                "run `brickwalk repair`, copy the file again, or convert again"
+            }
+            _ => "copy the file again, or convert again",
+        }
+    }
+}
+
 impl fmt::Display for Part {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -93,9 +105,8 @@ pub enum Error {
     },
     /// The file has a version of the format that this program does not read.
     #[error(
-        "{}: the header is of another format version: found version {found}, expected version {VERSION}; \
-         the file is {} than this program reads: convert again with this program",
-        path.display(), if *found < VERSION { "older" } else { "newer" }
+        "{}: the file has format version {found}, this program reads version {VERSION}; {}",
+        path.display(), if *found < VERSION { "convert again" } else { "use a newer brickwalk, or convert again" }
     )]
     Version {
         /// The file.
@@ -105,9 +116,8 @@ pub enum Error {
     },
     /// The file is shorter or longer than its header says.
     #[error(
-        "{}: the file is {} than the header says: found {found} bytes, expected {expected}; \
-         copy the file again from where it is whole, or convert again",
-        path.display(), if found < expected { "shorter" } else { "longer" }
+        "{}: the file is too {}: found {found} bytes, expected {expected}; copy it again, or convert again",
+        path.display(), if found < expected { "short" } else { "long" }
     )]
     Length {
         /// The file.
@@ -119,9 +129,8 @@ pub enum Error {
     },
     /// Bytes of the file are not those that were written.
     #[error(
-        "{}: {part} is damaged: found checksum {found:016x}, expected {expected:016x}; \
-         copy the file again from where it is whole, or convert again",
-        path.display()
+        "{}: {part} is damaged: found checksum {found:016x}, expected {expected:016x}; {}",
+        path.display(), part.remedy()
     )]
     Corrupt {
         /// The file.
@@ -135,9 +144,8 @@ pub enum Error {
     },
     /// A byte of padding, which is zero when written, is not.
     #[error(
-        "{}: {part} is damaged: found {found:#04x} at byte {offset}, expected zero; \
-         copy the file again from where it is whole, or convert again",
-        path.display()
+        "{}: {part} is damaged: found {found:#04x} at byte {offset}, expected zero; {}",
+        path.display(), part.remedy()
     )]
     Padding {
         /// The file.
@@ -162,7 +170,7 @@ pub enum Error {
     },
     /// A payload was asked for that the scene does not have, or with a buffer of the wrong length.
     #[error(
-        "{}: {payload}: found a request for {found}, expected {expected}; this is an error of the caller",
+        "{}: {payload}: asked for {found}, expected {expected}; this is a bug of the caller",
         path.display()
     )]
     Request {

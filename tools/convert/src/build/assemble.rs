@@ -106,11 +106,12 @@ impl Dropped {
 
     /// Says so.
     pub fn warn(&self, warnings: &mut Vec<String>) {
-        if self.zero_area > 0 {
-            warnings.push(format!("{} triangles without area were left out", self.zero_area));
+        let triangles = |count| if count == 1 { "triangle" } else { "triangles" };
+        if let count @ 1.. = self.zero_area {
+            warnings.push(format!("{count} degenerate {} skipped", triangles(count)));
         }
-        if self.non_finite > 0 {
-            warnings.push(format!("{} triangles with vertices that are not finite were left out", self.non_finite));
+        if let count @ 1.. = self.non_finite {
+            warnings.push(format!("{count} {} with non-finite vertices skipped", triangles(count)));
         }
     }
 }

@@ -15,13 +15,13 @@ const LINE_CHARS: usize = 200;
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The extension is not one that is read.
-    #[error("{file}: files of this kind are not read; give {ACCEPTED}")]
+    #[error("{file}: unsupported file type; give {ACCEPTED}")]
     Format {
         /// The input as given.
         file: String,
     },
     /// A file is missing or cannot be read.
-    #[error("{file}: cannot be read: {reason}; check the path and its permissions")]
+    #[error("{file}: cannot read the file: {reason}; check its path and permissions")]
     Read {
         /// The input as given.
         file: String,

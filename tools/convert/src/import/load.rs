@@ -41,7 +41,7 @@ pub fn load_all(source: &dyn Source) -> Result<SourceScene, SourceError> {
             }
             Err(problem) => {
                 renumbered.push(NONE);
-                warnings.push(format!("{problem}; it is left out"));
+                warnings.push(format!("{problem}; skipped"));
             }
         }
     }

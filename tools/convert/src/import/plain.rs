@@ -136,10 +136,10 @@ pub(super) fn repair(primitive: &mut Primitive, mut tell: impl FnMut(&'static st
     let is_bad = |values: &[f32]| values.iter().any(|value| !value.is_finite());
     for normal in primitive.normals.iter_mut().flatten().filter(|normal| is_bad(&normal[..])) {
         *normal = [0.0; 3];
-        tell("normals that are not finite are set to zero");
+        tell("non-finite normals set to zero");
     }
     for uv in primitive.uvs.iter_mut().flatten().filter(|uv| is_bad(&uv[..])) {
         *uv = [0.0; 2];
-        tell("texture coordinates that are not finite are set to zero");
+        tell("non-finite texture coordinates set to zero");
     }
 }

@@ -59,7 +59,7 @@ pub(super) fn open(
             return Err(fault(path, "header", problem));
         }
         if !fits {
-            start.warnings.add("bytes behind the last triangle are ignored", String::new);
+            start.warnings.add("bytes after the last triangle ignored", String::new);
         }
         // Vertices follow the normal. An empty table needs no bytes.
         let first = (HEADER_BYTES + 12).min(bytes.len());

@@ -101,7 +101,7 @@ pub(crate) fn write(
                     stored.names.push(names[index as usize].clone());
                 }
                 Err(error) => {
-                    let warning = format!("{error}; the texture is left out");
+                    let warning = format!("{error}; texture skipped");
                     if !stored.warnings.contains(&warning) {
                         stored.warnings.push(warning);
                     }

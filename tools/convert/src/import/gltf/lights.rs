@@ -22,7 +22,7 @@ pub(super) fn place(
         light.0.as_ref().map_err(String::clone)
     });
     let found = found.and_then(|light| convert(light, world_from_node, warnings, place));
-    let left_out = |problem| warnings.add("its light is left out", || format!("{} ({problem})", place()));
+    let left_out = |problem| warnings.add("light skipped", || format!("{} ({problem})", place()));
     found.map_err(left_out).ok()
 }
 
@@ -36,20 +36,20 @@ fn convert(
         "point" => LIGHT_POINT,
         "spot" => LIGHT_SPOT,
         "directional" => LIGHT_DISTANT,
-        _ => return Err("its type is not one of glTF".to_owned()),
+        _ => return Err("unknown type".to_owned()),
     };
     let direction = direction(world_from_node, [0.0, 0.0, -1.0]);
     let direction = match (direction, kind) {
         (Some(direction), _) => direction,
         // Points shine to all sides.
         (None, LIGHT_POINT) => [0.0, 0.0, -1.0],
-        (None, _) => return Err("its node is flat along the light".to_owned()),
+        (None, _) => return Err("its node is scaled to zero along the light".to_owned()),
     };
     let intensity = light.intensity.unwrap_or(1.0);
     let color = light.color.unwrap_or([1.0; 3]).map(|c| (c * intensity) as f32);
     let range = light.range.unwrap_or(0.0) as f32;
     if color.iter().chain([&range]).any(|value| !value.is_finite() || *value < 0.0) {
-        return Err("its colour, intensity or range is negative or not finite".to_owned());
+        return Err("colour, intensity or range is negative or not finite".to_owned());
     }
     let mut cone = [0.0; 2];
     if kind == LIGHT_SPOT {
@@ -58,7 +58,7 @@ fn convert(
         let sound = outer.clamp(0.0, FRAC_PI_2);
         cone = [inner.clamp(0.0, sound), sound].map(|angle| angle as f32);
         if inner < 0.0 || inner >= outer || outer != sound {
-            warnings.add("the angles of its cone are not in order up to a right one; they are clamped", place);
+            warnings.add("cone angles out of order or above 90 degrees; clamped", place);
         }
         // A right angle rounded up would be more than one.
         cone = cone.map(|angle| angle.min(std::f32::consts::FRAC_PI_2));

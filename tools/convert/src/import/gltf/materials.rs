@@ -104,9 +104,7 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
         let json = match json {
             Ok(json) => json,
             Err(problem) => {
-                warnings.add("the material is malformed, white takes its place", || {
-                    format!("material {index} ({problem})")
-                });
+                warnings.add("malformed material; white used instead", || format!("material {index} ({problem})"));
                 materials.push(default_material());
                 continue;
             }
@@ -118,9 +116,7 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
             let found = match texture(document, info.index, warnings, &place) {
                 Ok(texture) => texture,
                 Err(problem) => {
-                    warnings.add("its texture cannot be used, white takes its place", || {
-                        format!("{} ({})", place(), problem.what)
-                    });
+                    warnings.add("unusable texture; white used instead", || format!("{} ({})", place(), problem.what));
                     continue;
                 }
             };
@@ -128,8 +124,7 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
                 continue;
             }
             let Some(set) = set(info) else {
-                warnings
-                    .add("sets of texture coordinates beyond the second are not read; its texture is left out", place);
+                warnings.add("uses a third set of texture coordinates or a later one; texture ignored", place);
                 continue;
             };
             *material.textures_mut()[number] = *known.entry(found).or_insert_with_key(|texture| {
@@ -139,9 +134,7 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
             material.uv_sets |= (set as u32) << number;
             match rows(info) {
                 Some(rows) => material.uv_from_set[2 * number..2 * number + 2].copy_from_slice(&rows),
-                None => {
-                    warnings.add("the transformation of its texture is beyond the range of numbers; left out", place)
-                }
+                None => warnings.add("texture transform out of range; ignored", place),
             }
         }
         materials.push(material);
@@ -158,7 +151,7 @@ fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> 
         Valid(AlphaMode::Mask) => MATERIAL_MASK,
         Valid(AlphaMode::Blend) => MATERIAL_BLEND,
         Invalid => {
-            warnings.add("its alpha mode is not one of glTF; opaque is used", place);
+            warnings.add("unknown alpha mode; treated as opaque", place);
             0
         }
     };
@@ -205,7 +198,7 @@ fn reflect(json: &Json, material: &mut Material, warnings: &mut Warnings, place:
         material.specular = extension.specular_factor.unwrap_or([1.0; 3]).map(unit);
         material.specular_weight = if material.specular == [0.0; 3] { 0.0 } else { 1.0 };
         if extension.specular_glossiness_texture.is_some() {
-            warnings.add("textures of specular colour and glossiness are not read; its factors alone are used", place);
+            warnings.add("specular-glossiness textures ignored; factors used", place);
         }
         return;
     }
@@ -214,7 +207,7 @@ fn reflect(json: &Json, material: &mut Material, warnings: &mut Warnings, place:
         // An index of 0 stands for infinity.
         along_normal = if index > 0.0 { ((index - 1.0) / (index + 1.0)).powi(2) } else { 1.0 };
         if index != 0.0 && index < 1.0 {
-            warnings.add("its index of refraction is below 1, which no material has", place);
+            warnings.add("index of refraction below 1", place);
         }
     }
     let (mut color, mut weight) = ([1.0; 3], 1.0);
@@ -222,7 +215,7 @@ fn reflect(json: &Json, material: &mut Material, warnings: &mut Warnings, place:
         color = extension.specular_color_factor.unwrap_or([1.0; 3]);
         weight = extension.specular_factor.unwrap_or(1.0).clamp(0.0, 1.0);
         if extension.specular_texture.is_some() || extension.specular_color_texture.is_some() {
-            warnings.add("textures of KHR_materials_specular are not read; its factors alone are used", place);
+            warnings.add("KHR_materials_specular textures ignored; factors used", place);
         }
     }
     material.specular = color.map(|c| unit((along_normal * c).clamp(0.0, 1.0) * weight));
@@ -237,7 +230,7 @@ fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &d
     let textures =
         [&extension.clearcoat_texture, &extension.clearcoat_roughness_texture, &extension.clearcoat_normal_texture];
     if material.clearcoat > 0.0 && textures.into_iter().any(Option::is_some) {
-        warnings.add("textures of the clear coat are not read; its factors alone are used", place);
+        warnings.add("clear-coat textures ignored; factors used", place);
     }
 }
 
@@ -259,15 +252,15 @@ fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place
         return;
     }
     if material.flags & MATERIAL_MASK != 0 {
-        warnings.add("transmission beside alpha MASK is not read", place);
+        warnings.add("transmission ignored beside alpha MASK", place);
         return;
     }
     if extension.transmission_texture.is_some() {
-        warnings.add("textures of transmission are not read; its factor alone is used", place);
+        warnings.add("transmission textures ignored; factor used", place);
     }
     let [r, g, b, _] = material.base_color;
     if r != g || g != b {
-        warnings.add("what is seen through it is not tinted by its colour", place);
+        warnings.add("transmitted light is not tinted", place);
     }
     let passing = transmission * (1.0 - material.metallic) * r.max(g).max(b);
     let most = material.specular.into_iter().fold(0.0, f32::max);
@@ -304,13 +297,13 @@ fn texture(
                 Valid(WrappingMode::ClampToEdge) => WRAP_CLAMP,
                 Valid(WrappingMode::MirroredRepeat) => WRAP_MIRROR,
                 Invalid => {
-                    warnings.add("the wrap mode of its texture is not one of glTF; it is repeated", place);
+                    warnings.add("unknown texture wrap mode; repeat used", place);
                     WRAP_REPEAT
                 }
             };
         }
         if sampler.mag_filter == Some(Valid(MagFilter::Nearest)) {
-            warnings.add("its texture asks for the nearest texel; textures are always interpolated", place);
+            warnings.add("nearest filtering ignored; textures are always interpolated", place);
         }
     }
     // What extensions name comes first: the plain image is for readers that do not know them.
@@ -320,7 +313,7 @@ fn texture(
     let plain = Some(texture.source).filter(|source| source.value() != u32::MAX as usize);
     let sources: Vec<_> = extensions.filter_map(|extension| extension.source).chain(plain).collect();
     if sources.is_empty() {
-        return Err(Problem::new(format!("texture {index} names no image in a format that is read")));
+        return Err(Problem::new(format!("texture {index}: no image in a supported format")));
     }
     let found: Vec<_> = sources.iter().map(|&image| item(&document.images, image, "image").map(|_| image)).collect();
     let images: Vec<usize> = found.iter().flatten().map(|image| image.value()).collect();

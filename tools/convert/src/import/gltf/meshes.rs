@@ -127,16 +127,14 @@ pub(super) fn check(
         // A malformed one is told where materials are read.
         Ok(_) => Some(index.value()),
         Err(problem) => {
-            warnings.add("its material is not in the file; the default one is used", || {
-                format!("{} ({})", place(), problem.what)
-            });
+            warnings.add("unknown material; default material used", || format!("{} ({})", place(), problem.what));
             None
         }
     });
     let draco = json.more.extensions.draco.as_ref();
     let topology = match json.mode {
         Valid(Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) => {
-            warnings.add("points and lines are left out", place);
+            warnings.add("points and lines skipped", place);
             return Ok(Checked { material, geometry: None });
         }
         Valid(Mode::Triangles) => Topology::Triangles,
@@ -144,7 +142,7 @@ pub(super) fn check(
         Valid(_) if draco.is_some() => Topology::Triangles,
         Valid(Mode::TriangleStrip) => Topology::Strip,
         Valid(Mode::TriangleFan) => Topology::Fan,
-        Invalid => return Err(Problem::new("its mode is not one of glTF")),
+        Invalid => return Err(Problem::new("unknown primitive mode")),
     };
     let compressed = match draco {
         Some(draco) => Some((draco, draco::find(&file.document, decoded, draco)?)),
@@ -167,7 +165,7 @@ pub(super) fn check(
         }
     };
     let Some(positions) = attribute(Semantic::Positions, &POSITION)? else {
-        warnings.add("without POSITION; left out", place);
+        warnings.add("no POSITION; skipped", place);
         return Ok(Checked { material, geometry: None });
     };
     let normals = attribute(Semantic::Normals, &NORMAL)?;
@@ -191,7 +189,7 @@ pub(super) fn check(
         }
     }
     if json.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-        warnings.add("has morph targets; its geometry is taken at rest", place);
+        warnings.add("morph targets ignored; rest shape used", place);
     }
     let indices = match json.indices {
         _ if let Some((_, decoded)) = compressed => Some(decoded.indices.clone()),
@@ -203,7 +201,7 @@ pub(super) fn check(
     };
     let elements = indices.as_ref().map_or(positions.count, |a| a.count);
     if topology == Topology::Triangles && !elements.is_multiple_of(3) {
-        warnings.add("ends within a triangle, which is left out", place);
+        warnings.add("incomplete last triangle skipped", place);
     }
     let triangles = topology.triangles(elements);
     let geometry =
@@ -261,7 +259,7 @@ impl Checked {
             let normal = |normal: [f64; 3]| {
                 let mut normal = normal.map(|c| c as f32);
                 if normal.iter().any(|c| !c.is_finite()) {
-                    normal.iter_mut().for_each(|c| repair(c, 0.0, "normals that are not finite are set to zero"));
+                    normal.iter_mut().for_each(|c| repair(c, 0.0, "non-finite normals set to zero"));
                     normal = [0.0; 3];
                 }
                 normal
@@ -272,7 +270,7 @@ impl Checked {
             let uvs = uvs.as_ref().map(|uvs| uvs.gather::<2>(&used)).transpose().map_err(unreadable)?;
             let uv = |uv: [f64; 2]| {
                 let mut uv = uv.map(|c| c as f32);
-                uv.iter_mut().for_each(|c| repair(c, 0.0, "texture coordinates that are not finite are set to zero"));
+                uv.iter_mut().for_each(|c| repair(c, 0.0, "non-finite texture coordinates set to zero"));
                 uv
             };
             Ok::<_, Problem>(uvs.map(|uvs| uvs.into_iter().map(uv).collect::<Vec<_>>()))
@@ -283,7 +281,7 @@ impl Checked {
             let tangent = |tangent: &[f64; 4]| {
                 let mut tangent = tangent.map(|c| c as f32);
                 if tangent.iter().any(|c| !c.is_finite()) {
-                    tangent.iter_mut().for_each(|c| repair(c, 0.0, "tangents that are not finite are left out"));
+                    tangent.iter_mut().for_each(|c| repair(c, 0.0, "non-finite tangents ignored"));
                     tangent = [0.0; 4];
                 }
                 tangent
@@ -298,7 +296,7 @@ impl Checked {
                 if width == 3 {
                     color[3] = 1.0;
                 }
-                color.iter_mut().for_each(|c| repair(c, 1.0, "colours that are not finite are set to one"));
+                color.iter_mut().for_each(|c| repair(c, 1.0, "non-finite colours set to one"));
                 color.map(|c| c.clamp(0.0, 1.0))
             };
             colors.into_iter().map(color).collect()

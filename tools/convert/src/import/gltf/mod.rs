@@ -111,7 +111,7 @@ pub(super) fn open_within(
     })?;
     let has_animation = !document.animations.is_empty();
     if has_animation {
-        warnings.add("animations are ignored; geometry is taken at rest", String::new);
+        warnings.add("animations ignored; rest pose used", String::new);
     }
     meshopt::decode_views(&mut file)?;
     let document = &file.document;

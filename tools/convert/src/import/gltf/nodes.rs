@@ -123,7 +123,7 @@ pub(super) fn uses(
         }
         if let Some(mesh) = node.mesh {
             if node.skin.is_some() {
-                warnings.add("skinned; its geometry is taken at rest", || node_place(document, index));
+                warnings.add("skinning ignored; rest pose used", || node_place(document, index));
             }
             let instances = instances(file, index).map_err(fault)?;
             // In range: `parents` checked it.
@@ -146,7 +146,7 @@ pub(super) fn uses(
     }
     let left_out = document.nodes.len() - visited;
     if left_out > 0 && document.nodes.iter().any(|node| node.mesh.is_some()) {
-        warnings.add(format!("nodes outside the default scene are left out: {left_out}"), String::new);
+        warnings.add(format!("nodes outside the default scene skipped: {left_out}"), String::new);
     }
     if uses.is_empty() && !document.meshes.is_empty() {
         warnings.add("no node of the scene has a mesh", String::new);

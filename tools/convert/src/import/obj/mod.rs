@@ -147,9 +147,7 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
                     known.entry(definition.name.clone()).or_insert(definition);
                 }
             }
-            Err(problem) => {
-                warnings.add("the materials cannot be read", || format!("{} ({problem})", one_line(library)))
-            }
+            Err(problem) => warnings.add("cannot read the materials", || format!("{} ({problem})", one_line(library))),
         }
     }
     let mut textures: Vec<Texture> = Vec::new();
@@ -160,7 +158,7 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
         let Some(definition) = known.get(name) else {
             // Faces before any `usemtl` have the unnamed material.
             if !name.is_empty() {
-                warnings.add("is in none of the files of materials; white is used", place);
+                warnings.add("is in no material library; white used instead", place);
             }
             materials.push(plain::material());
             continue;

@@ -96,7 +96,7 @@ impl Definition {
             "Tr" => set_opacity(material, first.map(|transparency| 1.0 - transparency)),
             // Exporters write white and black of opaque materials too.
             "Tf" if values().zip(values().skip(1)).any(|(a, b)| a != b) => {
-                self.warn("the tint of what is seen through it (Tf) is not read");
+                self.warn("Tf (transmission filter) ignored");
             }
             "Pr" => (material.roughness, self.has_roughness) = (first.map_or(material.roughness, unit), true),
             "Pm" => (material.metallic, self.has_metallic) = (first.map_or(material.metallic, unit), true),
@@ -109,7 +109,7 @@ impl Definition {
             "map_d" => self.alpha = map(rest),
             "norm" => self.normals = map(rest),
             "bump" | "map_bump" | "map_Bump" => {
-                self.warn("maps of heights (map_Bump, bump) are not read; those of normals (norm) are");
+                self.warn("bump maps (map_Bump, bump) ignored; normal maps (norm) are read");
             }
             "disp" | "decal" | "refl" | "Ps" | "map_Ps" | "aniso" | "anisor" => self.warn(OTHER_MAPS),
             _ if keyword.starts_with("map_") => self.warn(OTHER_MAPS),
@@ -123,7 +123,7 @@ impl Definition {
             if self.color.as_ref().is_some_and(|(color, _)| *color == alpha.0) {
                 self.material.flags |= MATERIAL_BLEND;
             } else {
-                self.warn("a map of opacity (map_d) that is not that of the colour is not read");
+                self.warn("map_d ignored; opacity comes from map_Kd alone");
             }
         }
         let material = &mut self.material;
@@ -156,7 +156,7 @@ impl Definition {
     }
 }
 
-const OTHER_MAPS: &str = "maps other than map_Kd, map_Ke, map_Pr, map_Pm, map_d and norm are not read";
+const OTHER_MAPS: &str = "maps other than map_Kd, map_Ke, map_Pr, map_Pm, map_d and norm ignored";
 
 /// Reads all materials.
 pub(super) fn read(lines: &mut Lines) -> io::Result<Vec<Definition>> {

@@ -154,9 +154,9 @@ impl Parser<'_> {
                     self.libraries.push(library);
                 }
             }
-            b"p" | b"l" => warnings.add("points and lines are left out", || format!("line {number}")),
+            b"p" | b"l" => warnings.add("points and lines skipped", || format!("line {number}")),
             b"curv" | b"curv2" | b"surf" => {
-                warnings.add("curves and surfaces are left out", || format!("line {number}"));
+                warnings.add("curves and surfaces skipped", || format!("line {number}"));
             }
             // Comments, smoothing groups, what only those who wrote it know.
             _ => {}
@@ -210,7 +210,7 @@ impl Parser<'_> {
             (previous, corners) = (corner, corners + 1);
         }
         if corners < 3 {
-            warnings.add("faces of fewer than three vertices are left out", || format!("line {number}"));
+            warnings.add("faces with fewer than three vertices skipped", || format!("line {number}"));
         }
         Ok(())
     }

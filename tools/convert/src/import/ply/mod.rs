@@ -216,7 +216,7 @@ fn read_faces(
         });
         read.map_err(|failure| FaceError::Row(row, failure))?;
         if corners < 3 {
-            warnings.add("faces of fewer than three vertices are left out", || format!("face {row}"));
+            warnings.add("faces with fewer than three vertices skipped", || format!("face {row}"));
         }
         budget.add(label, 1, triangles.count() - before).map_err(FaceError::Import)?;
     }

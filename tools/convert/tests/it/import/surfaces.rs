@@ -231,7 +231,7 @@ fn lights_are_placed_by_their_nodes() {
     assert_eq!(default.cone, [0.0, std::f32::consts::FRAC_PI_4]);
     assert_eq!(wide.cone, [1.0, std::f32::consts::FRAC_PI_2]);
     assert_eq!(scene.warnings.len(), 2, "five left out, one cone clamped: {:?}", scene.warnings);
-    assert!(scene.warnings.iter().any(|warning| warning.contains("and 4 more: its light is left out")));
+    assert!(scene.warnings.iter().any(|warning| warning.contains("and 4 more: light skipped")));
 
     // Placements of the whole input move lights too.
     let folder = tempfile::tempdir().unwrap();
