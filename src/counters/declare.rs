@@ -105,6 +105,7 @@ macro_rules! counters {
     (@add max $to:expr, $from:expr) => { $to = $to.max($from); };
     (@add state $to:expr, $from:expr) => { let _ = $from; };
     (@add distinct $to:expr, $from:expr) => { $to.add(&$from); };
+    (@add names $to:expr, $from:expr) => { $to.add(&$from); };
     (@count distinct $to:expr) => { $to.forget(); };
     (@count $kind:ident $to:expr) => {};
     (@entry $self:ident $map:ident $name:ident $sum:ident [unwritten]) => {};
@@ -113,6 +114,9 @@ macro_rules! counters {
     };
     (@entry $self:ident $map:ident $name:ident distinct []) => {
         $map.serialize_entry(stringify!($name), &$self.$name.count())?;
+    };
+    (@entry $self:ident $map:ident $name:ident names []) => {
+        $map.serialize_entry(stringify!($name), &$self.$name.to_string())?;
     };
     (@entry $self:ident $map:ident $name:ident $sum:ident []) => {
         $map.serialize_entry(stringify!($name), &$self.$name)?;
@@ -124,6 +128,7 @@ macro_rules! counters {
     (@kind max) => { Kind::Max };
     (@kind state) => { Kind::State };
     (@kind distinct) => { Kind::Distinct };
+    (@kind names) => { Kind::Names };
     (@kind derived) => { Kind::Derived };
     (@source host) => { Source::Host };
     (@source device) => { Source::Device };

@@ -11,6 +11,7 @@ pub(crate) use table::device_words;
 pub use table::{COLUMNS, Counters};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
+use std::fmt;
 use std::ops::{Deref, DerefMut};
 
 /// A field of records.
@@ -53,6 +54,8 @@ pub enum Kind {
     State,
     /// A set of bricks; records have how many there are.
     Distinct,
+    /// Names, each once; records have a text.
+    Names,
     /// Follows from other counters.
     Derived,
 }
@@ -110,6 +113,30 @@ impl Bricks {
     fn forget(&mut self) {
         self.count = self.count();
         self.numbers = Vec::new();
+    }
+}
+
+/// Names, each once, in the order in which they came.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Names(Vec<&'static str>);
+
+impl Names {
+    /// Adds a name.
+    pub fn push(&mut self, name: &'static str) {
+        if !self.0.contains(&name) {
+            self.0.push(name);
+        }
+    }
+
+    /// Adds those of more work.
+    pub fn add(&mut self, other: &Self) {
+        other.0.iter().for_each(|name| self.push(name));
+    }
+}
+
+impl fmt::Display for Names {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.join("+"))
     }
 }
 
@@ -199,6 +226,12 @@ mod tests {
         };
         let mut sum = of(3, 2, 7, &[4, 1]);
         sum.add(of(5, 1, 9, &[1, 6]));
+        for names in [["chc", "demand"], ["demand", "plain"]] {
+            let mut other = Counters::default();
+            names.into_iter().for_each(|name| other.schedule.push(name));
+            sum.add(other);
+        }
+        assert_eq!(sum.schedule.to_string(), "chc+demand+plain");
         sum.rays_answered += 10;
         assert_eq!((sum.rays_traced, sum.cache_passes, sum.cells_left), (8, 2, 7));
         assert_eq!((sum.rays(), sum.mrays_per_s(), sum.bricks_hit.distinct()), (18, 0.002, vec![1, 4, 6]));

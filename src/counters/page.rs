@@ -20,6 +20,7 @@ these lines.
 | most | the greatest |
 | state | said once, when the effect ends; sums over frames mean nothing |
 | distinct | a set of bricks; the field says how many are in it |
+| names | a text; each name once |
 | derived | follows from other fields |
 
 Kernels count where *counted by* says device, else the host.
@@ -40,6 +41,7 @@ pub fn page() -> String {
             Kind::Max => "most",
             Kind::State => "state",
             Kind::Distinct => "distinct",
+            Kind::Names => "names",
             Kind::Derived => "derived",
         };
         let source = match source {

@@ -1,10 +1,13 @@
 //! The table of counters: one row each. `docs/records.md` is written from it, and the fields of `records.jsonl`.
 
 use super::declare::counters;
-use super::{Bricks, Column, Kind, Source};
+use super::{Bricks, Column, Kind, Names, Source};
 use serde::ser::SerializeMap;
 
 counters! {
+    /// Schedules that the effect's passes were traced by, with `+` between them, the first used first: `chc`, `demand`,
+    /// `plain`, `plain-bvh2`. Empty where nothing was traced.
+    schedule: Names ["name"] names;
     /// Rays generated: `rays_traced` + `rays_answered`. A ray with an empty interval is none.
     rays: u64 ["rays"] = |c| c.rays_traced + c.rays_answered;
     /// Rays that were traced through bricks, if only a part of their way.

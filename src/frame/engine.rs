@@ -109,6 +109,7 @@ impl Engine {
     ) -> Result<(), ExecutorError> {
         #[cfg(feature = "lab")]
         if let Some(mut fronts) = self.fronts.take_if(|_| schedule == Schedule::Chc) {
+            stats.schedule.push(schedule.name());
             let scene = self.scene.clone();
             let setup = FrontPass { resident: scene.resident(), extent: (self.size.0, self.size.1, self.tile), frame };
             let done = fronts.trace(&mut self.tracer(pass, stats), &setup, first);

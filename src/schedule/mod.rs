@@ -46,7 +46,9 @@ use crate::settings::Schedule;
 /// # Errors
 /// A brick that cannot be read, or the device's.
 pub fn trace(t: &mut Tracer, schedule: Schedule, first: &[Step]) -> Result<(), ExecutorError> {
-    match schedule {
+    let by = if schedule == Schedule::Auto { Schedule::Demand } else { schedule };
+    t.stats.schedule.push(by.name());
+    match by {
         Schedule::Chc => chc::trace(t, first),
         Schedule::Demand | Schedule::Auto => demand::trace(t, first),
         Schedule::Plain => plain::trace(t, Step::IntersectAll, first),

@@ -1,98 +1,60 @@
 //! One plot over the frames of a walk, or over sizes of a cache, drawn as SVG.
 //!
 //! The picture is scaled by its viewBox, so its text has to stay legible at the width of a phone: the box is narrow,
-//! and legend, title and reading aid are HTML beside it. Colours are written as plain SVG attributes, which the rules
-//! of [`colour_rules`] override where the reader prefers a dark page.
+//! and legend, title and reading aid are HTML beside it. Beside the picture goes its data, for the script that shows
+//! values where the pointer is.
 
+use crate::axis::{Axis, frame_ticks, log_ticks, tick_label, ticks};
+use crate::ink::{AXIS, GRID, Ink, LABEL};
 use crate::{ReportError, format};
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
 use plotters::prelude::*;
-use std::fmt::Write as _;
+use serde_json::json;
 
 /// The box in user units; the drawing library places on integers, hence a grid [`FINE`] times as fine.
 const WIDTH: u32 = 440;
 const HEIGHT: u32 = 270;
 const FINE: u32 = 4;
+/// Margins in user units: left, top, right, bottom.
+const MARGINS: [u32; 4] = [58, 10, 12, 46];
 /// Line height of text in user units; the drawing library makes the letters 1.24 times smaller.
 const TEXT: u32 = 18;
+/// Dashes of lines, in user units: lengths of a dash and of a gap.
+const DASHES: [(u32, u32); 3] = [(10, 4), (5, 4), (2, 3)];
+/// Dash of limits.
+const LIMIT: (u32, u32) = (6, 4);
+/// Dash of marks.
+const MARK: (u32, u32) = (2, 2);
+/// Above so many marks the notes count the rest.
+const NOTED_MARKS: usize = 8;
 /// Above so many frames single values are no longer marked.
 const MARKED_FRAMES: usize = 40;
 /// Above so many frames neighbours are drawn as one point, their mean: more would be a solid band.
 const DRAWN_FRAMES: u64 = 200;
-
-/// A series' colour: on a light and on a dark page.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ink {
-    light: [u8; 3],
-    dark: [u8; 3],
-}
-
-/// Colours that stay apart in both modes and for colour-blind readers; a quantity keeps its ink in all plots.
-pub const BLUE: Ink = Ink { light: [0x1f, 0x6f, 0xd0], dark: [0x6c, 0xae, 0xff] };
-/// See [`BLUE`].
-pub const ORANGE: Ink = Ink { light: [0xe0, 0x70, 0x10], dark: [0xff, 0xa1, 0x4a] };
-/// See [`BLUE`].
-pub const GREEN: Ink = Ink { light: [0x12, 0x96, 0x72], dark: [0x3f, 0xd0, 0xa4] };
-/// See [`BLUE`].
-pub const PURPLE: Ink = Ink { light: [0x9a, 0x47, 0xb8], dark: [0xd2, 0x92, 0xee] };
-/// See [`BLUE`].
-pub const RED: Ink = Ink { light: [0xc8, 0x28, 0x4e], dark: [0xff, 0x7f, 0x9c] };
-/// See [`BLUE`]; of totals and limits.
-pub const GREY: Ink = Ink { light: [0x56, 0x60, 0x6c], dark: [0xb4, 0xbe, 0xca] };
-/// See [`BLUE`]; of what is read against bars.
-pub const BLACK: Ink = Ink { light: [0x1a, 0x1f, 0x25], dark: [0xff, 0xff, 0xff] };
-/// The inks in the order in which passes take them.
-pub const INKS: [Ink; 6] = [BLUE, ORANGE, GREEN, PURPLE, RED, GREY];
-
-/// Ink of the axes.
-const AXIS: Ink = Ink { light: [0x8a, 0x93, 0x9e], dark: [0x6f, 0x79, 0x85] };
-/// Ink of the grid.
-const GRID: Ink = Ink { light: [0xe2, 0xe6, 0xea], dark: [0x2d, 0x34, 0x3c] };
-/// Ink of the axes' labels.
-const LABEL: Ink = Ink { light: [0x4a, 0x53, 0x5e], dark: [0xb0, 0xba, 0xc6] };
-
-/// [`LABEL`] as it is written.
-pub const LABEL_HEX: &str = "#4A535E";
-
-impl Ink {
-    fn rgb(self) -> RGBColor {
-        RGBColor(self.light[0], self.light[1], self.light[2])
-    }
-
-    /// The colour as the drawing library writes it.
-    pub fn light_hex(self) -> String {
-        let [r, g, b] = self.light;
-        format!("#{r:02X}{g:02X}{b:02X}")
-    }
-
-    fn dark_hex(self) -> String {
-        let [r, g, b] = self.dark;
-        format!("#{r:02X}{g:02X}{b:02X}")
-    }
-}
-
-/// Style rules, for use under a query for dark pages, that replace every light ink of a plot by its dark one.
-pub fn colour_rules() -> String {
-    let mut rules = String::new();
-    for ink in INKS.into_iter().chain([BLACK, AXIS, GRID, LABEL]) {
-        let (light, dark) = (ink.light_hex(), ink.dark_hex());
-        // Writing to a string cannot fail.
-        let _ = write!(rules, ".plot [stroke=\"{light}\"]{{stroke:{dark}}}.plot [fill=\"{light}\"]{{fill:{dark}}}");
-    }
-    rules
-}
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// A line.
     Line,
+    /// A dashed line; its number chooses the dash.
+    Dashed(usize),
     /// A thicker line, of a total.
     Total,
     /// A dashed line, of a limit.
     Limit,
     /// Bars that stand on those of the stacked series before.
     Stacked,
+}
+
+impl Shape {
+    /// Lengths of its dashes and of the gaps between them; `None`: it has none.
+    pub fn dash(self) -> Option<(u32, u32)> {
+        match self {
+            Self::Dashed(number) => Some(DASHES[number % DASHES.len()]),
+            Self::Limit => Some(LIMIT),
+            Self::Line | Self::Total | Self::Stacked => None,
+        }
+    }
 }
 
 /// What a plot's values count.
@@ -119,6 +81,19 @@ pub enum Across {
     Shares,
     /// What the name says, from 0.
     Named(&'static str),
+    /// What the name says; both axes are logarithmic.
+    Log(&'static str),
+}
+
+impl Across {
+    /// What stands at the axis.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Frames => "frame",
+            Self::Shares => "cache, % of all bricks",
+            Self::Named(name) | Self::Log(name) => name,
+        }
+    }
 }
 
 impl Unit {
@@ -129,7 +104,7 @@ impl Unit {
             Self::MegaRays => ("Mrays/s", 1.0),
             Self::Bytes => format::byte_unit(max),
             Self::Percent => ("%", 1.0),
-            Self::Count if max >= 1e9 => ("thousand millions", 1e9),
+            Self::Count if max >= 1e9 => ("billions", 1e9),
             Self::Count if max >= 2e6 => ("millions", 1e6),
             Self::Count if max >= 2e4 => ("thousands", 1e3),
             Self::Count => ("", 1.0),
@@ -176,6 +151,8 @@ pub struct Chart {
     pub across: Across,
     /// The series in drawing order; stacked ones from the bottom.
     pub series: Vec<Series>,
+    /// Where something changed, and to what: dashed upright lines.
+    pub marks: Vec<(f64, String)>,
 }
 
 /// A drawn plot.
@@ -185,8 +162,10 @@ pub struct Drawing {
     pub svg: String,
     /// The unit of the vertical axis; empty for plain counts.
     pub unit: &'static str,
-    /// Sentences on values beyond the vertical axis and on frames drawn as one; empty where there are none.
+    /// Sentences on values beyond the vertical axis, on frames drawn as one and on marks; empty where there are none.
     pub notes: String,
+    /// The plot's data as JSON that HTML may hold: axes, series and values as they are shown.
+    pub data: String,
 }
 
 impl Drawing {
@@ -243,7 +222,7 @@ impl Chart {
         let extent = self.extent();
         let group = ((extent.to - extent.from) as u64).div_ceil(DRAWN_FRAMES).max(1);
         let mut chart = self.clone();
-        if group == 1 || self.across == Across::Shares {
+        if group == 1 || self.across != Across::Frames {
             return (chart, 1);
         }
         for series in chart.series.iter_mut().filter(|s| s.shape != Shape::Limit) {
@@ -273,41 +252,104 @@ impl Chart {
         let extent = chart.extent();
         let cut = self.across == Across::Frames && extent.first_is_beyond();
         let max = if cut { extent.rest } else { extent.first.max(extent.rest) };
-        let (unit, size) = self.unit.scale(max);
-        let ticks = ticks(max / size, 4);
-        let top = ticks.last().copied().unwrap_or(1.0);
-        let scale = Scale { ticks, top, size, group: group as f64 };
+        let (unit, size) = if self.is_log() { (self.unit.scale(1.0).0, 1.0) } else { self.unit.scale(max) };
+        let axes = chart.axes(&extent, max / size, group as f64);
         let mut text = String::new();
         let failed = |reason| ReportError::Draw { plot: self.title.clone(), reason };
-        chart.draw_into(&mut text, &extent, &scale).map_err(failed)?;
+        chart.draw_into(&mut text, &extent, &axes, size, group as f64).map_err(failed)?;
         let mut notes = Vec::new();
-        if cut && extent.first > top * size {
+        if cut && extent.first > axes[1].high * size {
             notes.push(format!("Frame {:.0} is beyond the axis with {}.", extent.from, self.unit.show(extent.first)));
         }
         if group > 1 {
             notes.push(format!("Each point is the mean of {group} frames."));
         }
-        Ok(Drawing { svg: inner(&text).to_string(), unit, notes: notes.join(" ") })
+        if let Some((_, last)) = self.marks.last() {
+            let marks = &self.marks;
+            let mut named: Vec<String> =
+                marks.iter().take(NOTED_MARKS).map(|(frame, what)| format!("{what} from frame {frame:.0}")).collect();
+            if let more @ 1.. = marks.len().saturating_sub(NOTED_MARKS) {
+                named.push(format!("{more} more, {last} at last"));
+            }
+            notes.push(format!("Dashed upright: auto changed the schedule: {}.", named.join(", ")));
+        }
+        let data = chart.data(&axes[0]);
+        Ok(Drawing { svg: inner(&text).to_string(), unit, notes: notes.join(" "), data })
     }
 
-    fn draw_into(&self, text: &mut String, extent: &Extent, scale: &Scale) -> Result<(), String> {
-        let Scale { top, size, .. } = *scale;
-        let clip = |value: f64| (value / size).min(top);
-        let marked = extent.frames <= MARKED_FRAMES;
-        let half_bar = if marked { 0.36 } else { 0.5 * scale.group };
+    /// Whether both axes are logarithmic.
+    fn is_log(&self) -> bool {
+        matches!(self.across, Across::Log(_))
+    }
+
+    /// The horizontal axis, and the vertical one up to `max` of its units.
+    fn axes(&self, extent: &Extent, max: f64, group: f64) -> [Axis; 2] {
+        let &Extent { from, to, .. } = extent;
+        if self.is_log() {
+            let all = || self.series.iter().flat_map(|s| &s.points).filter(|p| p.0 > 0.0 && p.1 > 0.0);
+            let least = |of: fn(&(f64, f64)) -> f64| all().map(of).fold(f64::INFINITY, f64::min);
+            let most = |of: fn(&(f64, f64)) -> f64| all().map(of).fold(0.0, f64::max);
+            return [(least(|p| p.0), most(|p| p.0)), (least(|p| p.1), most(|p| p.1))].map(|(least, most)| {
+                let ticks = log_ticks(least, most);
+                Axis { low: ticks[0], high: ticks[ticks.len() - 1], ticks, is_log: true }
+            });
+        }
         let has_bars = self.series.iter().any(|s| s.shape == Shape::Stacked);
         // A still needs a range, and the outer bars stand half outside of the range of frames.
-        let margin =
-            if has_bars || extent.from == extent.to { 0.6 * scale.group } else { (extent.to - extent.from) * 0.01 };
-        let frames = frame_ticks(extent.from, extent.to);
-        let x_axis = Axis { low: extent.from - margin, high: extent.to + margin, ticks: frames };
-        let y_axis = Axis { low: 0.0, high: top, ticks: scale.ticks.clone() };
+        let margin = if has_bars || from == to { 0.6 * group } else { (to - from) * 0.01 };
+        let ticks = ticks(max, 4);
+        let frames = frame_ticks(from, to);
+        [
+            Axis { low: from - margin, high: to + margin, ticks: frames, is_log: false },
+            Axis { low: 0.0, high: ticks.last().copied().unwrap_or(1.0), ticks, is_log: false },
+        ]
+    }
+
+    /// What a reader's pointer is told.
+    fn data(&self, across: &Axis) -> String {
+        let [left, top, right, bottom] = MARGINS;
+        let point = |&(x, value): &(f64, f64)| json!([x, self.unit.show(value)]);
+        let series = |s: &Series| {
+            let points: Vec<_> = s.points.iter().map(point).collect();
+            json!({ "name": s.name, "ink": s.ink.light_hex(), "points": points })
+        };
+        // A limit is the same everywhere.
+        let drawn = self.series.iter().filter(|s| s.shape != Shape::Limit || self.is_log());
+        let data = json!({
+            "across": self.across.name(),
+            "from": across.low,
+            "to": across.high,
+            "log": across.is_log,
+            "box": [left * FINE, top * FINE, (WIDTH - right) * FINE, (HEIGHT - bottom) * FINE],
+            "series": drawn.map(series).collect::<Vec<_>>(),
+            "marks": self.marks,
+        });
+        // A script ends at its end tag, whatever is around it.
+        data.to_string().replace('<', "\\u003c")
+    }
+
+    /// Draws on `axes`, the vertical one in units of `size`, where a point stands for `group` frames.
+    fn draw_into(
+        &self,
+        text: &mut String,
+        extent: &Extent,
+        axes: &[Axis; 2],
+        size: f64,
+        group: f64,
+    ) -> Result<(), String> {
+        let [x_axis, y_axis] = axes.clone();
+        let (low, top) = (y_axis.low, y_axis.high);
+        let is_shown = |point: &&(f64, f64)| !self.is_log() || (point.0 > 0.0 && point.1 > 0.0);
+        let clip = |value: f64| (value / size).clamp(low, top);
+        let marked = extent.frames <= MARKED_FRAMES;
+        let half_bar = if marked { 0.36 } else { 0.5 * group };
+        let [left, above, right, below] = MARGINS.map(|margin| margin * FINE);
         let root = SVGBackend::with_string(text, (WIDTH * FINE, HEIGHT * FINE)).into_drawing_area();
         let mut chart = ChartBuilder::on(&root)
-            .margin_top(10 * FINE)
-            .margin_right(12 * FINE)
-            .set_label_area_size(LabelAreaPosition::Left, 58 * FINE)
-            .set_label_area_size(LabelAreaPosition::Bottom, 46 * FINE)
+            .margin_top(above)
+            .margin_right(right)
+            .set_label_area_size(LabelAreaPosition::Left, left)
+            .set_label_area_size(LabelAreaPosition::Bottom, below)
             .build_cartesian_2d(x_axis, y_axis)
             .map_err(|e| e.to_string())?;
         let label = ("sans-serif", TEXT * FINE).into_font().color(&LABEL.rgb());
@@ -319,16 +361,18 @@ impl Chart {
             .axis_style(AXIS.rgb().stroke_width(FINE))
             .label_style(label.clone())
             .axis_desc_style(label)
-            .x_desc(match self.across {
-                Across::Frames => "frame",
-                Across::Shares => "cache, % of all bricks",
-                Across::Named(name) => name,
-            })
+            .x_desc(self.across.name())
             .set_all_tick_mark_size(4 * FINE)
-            .x_label_formatter(&|frame| format::count(*frame))
+            .x_label_formatter(&|x| if self.is_log() { tick_label(*x) } else { format::count(*x) })
             .y_label_formatter(&|value| tick_label(*value))
             .draw()
             .map_err(|e| e.to_string())?;
+        for &(at, _) in &self.marks {
+            let (dash, gap) = MARK;
+            let line =
+                DashedLineSeries::new([(at, low), (at, top)], dash * FINE, gap * FINE, AXIS.rgb().stroke_width(FINE));
+            chart.draw_series(line).map_err(|e| e.to_string())?;
+        }
         for (ink, bars) in self.bars() {
             let rectangle = |(frame, low, high): Bar| {
                 Rectangle::new([(frame - half_bar, clip(low)), (frame + half_bar, clip(high))], ink.rgb().filled())
@@ -337,62 +381,27 @@ impl Chart {
             chart.draw_series(seen.map(rectangle)).map_err(|e| e.to_string())?;
         }
         for series in self.series.iter().filter(|s| s.shape != Shape::Stacked) {
-            let points: Vec<(f64, f64)> = series.points.iter().map(|&(frame, value)| (frame, clip(value))).collect();
+            let points = series.points.iter().filter(is_shown);
+            let points: Vec<(f64, f64)> = points.map(|&(frame, value)| (frame, clip(value))).collect();
             let width = FINE * if series.shape == Shape::Total { 5 } else { 4 } / 2;
             let style = series.ink.rgb().stroke_width(width);
-            if series.shape == Shape::Limit {
-                let line = DashedLineSeries::new(points, 6 * FINE, 4 * FINE, style);
-                chart.draw_series(line).map_err(|e| e.to_string())?;
-                continue;
-            }
-            if marked {
+            if marked && series.shape != Shape::Limit {
                 let radius = FINE * if extent.frames == 1 { 5 } else { 2 };
                 let dots = points.iter().map(|&point| Circle::new(point, radius, series.ink.rgb().filled()));
                 chart.draw_series(dots).map_err(|e| e.to_string())?;
             }
-            chart.draw_series(LineSeries::new(points, style)).map_err(|e| e.to_string())?;
+            match series.shape.dash() {
+                Some((dash, gap)) => {
+                    let line = DashedLineSeries::new(points, dash * FINE, gap * FINE, style);
+                    chart.draw_series(line).map_err(|e| e.to_string())?;
+                }
+                None => {
+                    chart.draw_series(LineSeries::new(points, style)).map_err(|e| e.to_string())?;
+                }
+            }
         }
         root.present().map_err(|e| e.to_string())
     }
-}
-
-/// A linear axis with labels at chosen values: the library's own choice has fractions of frames.
-#[derive(Clone, Debug)]
-struct Axis {
-    low: f64,
-    high: f64,
-    ticks: Vec<f64>,
-}
-
-impl Ranged for Axis {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let along = (value - self.low) / (self.high - self.low);
-        limit.0 + (f64::from(limit.1 - limit.0) * along).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
-    }
-
-    fn range(&self) -> std::ops::Range<f64> {
-        self.low..self.high
-    }
-}
-
-/// The vertical axis, and how coarse the horizontal one is.
-#[derive(Debug)]
-struct Scale {
-    /// Labelled values in units of the axis, from 0.
-    ticks: Vec<f64>,
-    /// The last of them.
-    top: f64,
-    /// The unit of the axis in recorded units.
-    size: f64,
-    /// Frames a point stands for.
-    group: f64,
 }
 
 /// What a plot spans, in recorded units.
@@ -412,37 +421,6 @@ impl Extent {
     }
 }
 
-/// Round numbers from 0 to at least `max`, about `parts` steps.
-fn ticks(max: f64, parts: u32) -> Vec<f64> {
-    let max = if max > 0.0 && max.is_finite() { max } else { 1.0 };
-    let rough = max / f64::from(parts);
-    let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().map(|s| s * power).find(|s| *s >= rough * 0.999).unwrap_or(rough);
-    let count = (max / step * 0.9999).ceil().max(1.0) as u32;
-    (0..=count).map(|k| f64::from(k) * step).collect()
-}
-
-/// At most seven frames for the horizontal axis, at round numbers.
-fn frame_ticks(from: f64, to: f64) -> Vec<f64> {
-    let steps = (0..).flat_map(|power| [1.0, 2.0, 5.0].map(|s| s * 10f64.powi(power)));
-    let step = steps.into_iter().find(|step| (to - from) / step <= 6.0).unwrap_or(1.0);
-    let first = (from / step).ceil();
-    let count = ((to / step).floor() - first).max(0.0) as u32;
-    (0..=count).map(|k| (first + f64::from(k)) * step).collect()
-}
-
-/// A tick's value without digits that say nothing: `0`, `0.25`, `2.5`, `1,000`.
-fn tick_label(value: f64) -> String {
-    if value >= 1000.0 {
-        return format::count(value);
-    }
-    if value != 0.0 && value < 0.001 {
-        return format!("{value:.0e}");
-    }
-    let text = format!("{value:.4}");
-    text.trim_end_matches('0').trim_end_matches('.').to_string()
-}
-
 /// What is inside of the drawing library's `svg` element: the page has its own, which scales.
 fn inner(svg: &str) -> &str {
     let start = svg.find('>').map_or(0, |at| at + 1);
@@ -453,46 +431,11 @@ fn inner(svg: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ink::BLUE;
 
     fn chart(points: Vec<(f64, f64)>, shape: Shape) -> Chart {
         let series = vec![Series { name: "one".into(), points, shape, ink: BLUE }];
-        Chart { title: "a title".into(), unit: Unit::Milliseconds, across: Across::Frames, series }
-    }
-
-    #[test]
-    fn ticks_are_round_and_cover_the_maximum() {
-        assert_eq!(ticks(4.0, 4), [0.0, 1.0, 2.0, 3.0, 4.0]);
-        assert_eq!(ticks(90.0, 4), [0.0, 25.0, 50.0, 75.0, 100.0]);
-        for exponent in -12..12 {
-            for mantissa in 1..100 {
-                let max = f64::from(mantissa) * 10f64.powi(exponent);
-                let ticks = ticks(max, 4);
-                assert!(ticks[ticks.len() - 1] >= max * 0.999, "{max}: {ticks:?}");
-                assert!((2..=6).contains(&ticks.len()), "{max}: {ticks:?}");
-            }
-        }
-        assert_eq!(ticks(0.0, 4).first(), Some(&0.0));
-    }
-
-    #[test]
-    fn frame_ticks_are_integers_within_the_range() {
-        assert_eq!(frame_ticks(0.0, 0.0), [0.0]);
-        assert_eq!(frame_ticks(7.0, 7.0), [7.0]);
-        assert_eq!(frame_ticks(0.0, 29.0), [0.0, 5.0, 10.0, 15.0, 20.0, 25.0]);
-        for to in 0..3000 {
-            let ticks = frame_ticks(3.0, 3.0 + f64::from(to));
-            assert!(ticks.len() <= 7, "{ticks:?}");
-            assert!(ticks.iter().all(|t| t.fract() == 0.0 && (3.0..=3.0 + f64::from(to)).contains(t)), "{ticks:?}");
-        }
-    }
-
-    #[test]
-    fn tick_labels_keep_what_tells_them_apart() {
-        assert_eq!(tick_label(0.0), "0");
-        assert_eq!(tick_label(0.25), "0.25");
-        assert_eq!(tick_label(10.0), "10");
-        assert_eq!(tick_label(2500.0), "2,500");
-        assert_eq!(tick_label(0.0001), "1e-4");
+        Chart { title: "a title".into(), unit: Unit::Milliseconds, across: Across::Frames, series, marks: Vec::new() }
     }
 
     #[test]
@@ -531,6 +474,47 @@ mod tests {
         assert!(!bars.contains("<circle"));
         let one = chart(vec![(4.0, 2.0)], Shape::Line).draw().unwrap().svg;
         assert!(one.contains("<circle"), "a single frame must be seen");
+    }
+
+    #[test]
+    fn marks_are_drawn_and_named() {
+        let mut chart = chart((0..6).map(|k| (f64::from(k), 1.0)).collect(), Shape::Line);
+        let without = chart.draw().unwrap().svg;
+        chart.marks = vec![(1.0, "demand".into()), (2.0, "chc".into())];
+        let drawing = chart.draw().unwrap();
+        assert!(drawing.svg.len() > without.len());
+        assert!(drawing.notes.ends_with("auto changed the schedule: demand from frame 1, chc from frame 2."));
+        chart.marks = (1..=11).map(|k| (f64::from(k), format!("s{k}"))).collect();
+        assert!(chart.draw().unwrap().notes.ends_with("s8 from frame 8, 3 more, s11 at last."));
+    }
+
+    #[test]
+    fn logarithmic_plots_leave_out_what_has_no_logarithm() {
+        let points = vec![(0.0, 3.0), (1.0, 1.0), (4.0, 0.5), (16.0, 0.0), (64.0, 0.125)];
+        let mut chart = chart(points, Shape::Line);
+        chart.across = Across::Log("samples");
+        let drawing = chart.draw().unwrap();
+        assert_eq!(drawing.svg.matches("<circle").count(), 3);
+        let data: serde_json::Value = serde_json::from_str(&drawing.data).unwrap();
+        assert_eq!(
+            (data["from"].as_f64(), data["to"].as_f64(), data["log"].as_bool()),
+            (Some(1.0), Some(100.0), Some(true))
+        );
+        // A slope of -1/2 is a straight line: equal ratios are equal lengths.
+        let heights: Vec<f64> =
+            drawing.svg.split("cy=\"").skip(1).map(|t| t.split('"').next().unwrap().parse().unwrap()).collect();
+        assert!(((heights[1] - heights[0]) * 2.0 - (heights[2] - heights[1])).abs() < 4.0, "{heights:?}");
+    }
+
+    #[test]
+    fn data_is_what_the_plot_shows() {
+        let mut chart = chart(vec![(0.0, 1.0), (1.0, 2.0)], Shape::Line);
+        chart.series[0].name = "</script>".into();
+        let data = chart.draw().unwrap().data;
+        assert!(!data.contains('<'));
+        let data: serde_json::Value = serde_json::from_str(&data).unwrap();
+        assert_eq!(data["series"][0]["name"], "</script>");
+        assert_eq!(data["series"][0]["points"], json!([[0.0, "1.00 ms"], [1.0, "2.00 ms"]]));
     }
 
     #[test]

@@ -7,6 +7,8 @@ pub struct Field {
     pub name: &'static str,
     /// What it means, and its unit.
     pub meaning: String,
+    /// In which walks it is not zero, such as "with `--fronts on`"; empty: in any.
+    pub only: &'static str,
     /// Whether its sum over frames means anything; that of a state does not.
     pub adds_up: bool,
 }

@@ -1,18 +1,23 @@
 //! Turns the records of a walk, or the results of a replay, into one offline HTML page.
 //!
 //! The input is the folder that `brickwalk walk` writes: `records.jsonl` (one object per frame and pass),
-//! `summary.json` and `frames/*.png`. The output is `report.html` beside them: one file without scripts or references
-//! to anything outside the folder. Plots are SVG, a dozen frames are embedded, and the others are linked by relative
-//! paths.
+//! `summary.json` and `frames/*.png`, and `checkpoints.jsonl` where errors were measured. The output is `report.html`
+//! beside them: one file without references to anything outside the folder. Plots are SVG, a dozen frames are embedded,
+//! and the others are linked by relative paths. A script in the page shows values under the pointer, sorts tables and
+//! saves them as CSV; without it the page says the same. `records.csv` and `checkpoints.csv` are written, too.
 //!
 //! The page depends on field names only. A field that is missing, zero throughout or unknown does not stop it; the page
 //! says what it left out. Statistics are computed here from the records, not copied from the summary.
 
+mod axis;
 mod chart;
+mod checkpoints;
+mod csv;
 mod error;
 mod field;
 mod format;
 mod frames;
+mod ink;
 mod page;
 mod plots;
 mod replay;
@@ -28,8 +33,9 @@ pub use sheet::{Graph, GraphShape, Line, Section, Sheet, Table, Value, write_she
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes `dir/report.html` from `dir/records.jsonl`, `dir/summary.json` and `dir/frames/*.png`. `fields` says what
-/// fields of records mean.
+/// Writes `dir/report.html` from `dir/records.jsonl`, `dir/summary.json` and `dir/frames/*.png`, and the records as
+/// `dir/records.csv`; where there is `dir/checkpoints.jsonl`, `dir/checkpoints.csv` as well. `fields` says what fields of
+/// records mean.
 ///
 /// The page appears complete or not at all: it is written under a temporary name in `dir`, then renamed, and an older
 /// report is replaced. A walk without a finished frame gives a page that says so.
@@ -40,7 +46,12 @@ use std::path::{Path, PathBuf};
 pub fn write(dir: &Path, fields: &[Field]) -> Result<(), ReportError> {
     let walk = walk::Walk::read(dir)?;
     let gallery = frames::Gallery::read(dir, &walk)?;
-    let html = page::render(&walk, &gallery, fields)?;
+    let checkpoints = checkpoints::Checkpoints::read(dir)?;
+    let html = page::render(&walk, &gallery, &checkpoints, fields)?;
+    publish(dir.join("records.csv"), csv::records(&walk).as_bytes())?;
+    if !checkpoints.is_empty() {
+        publish(dir.join("checkpoints.csv"), checkpoints.to_csv().as_bytes())?;
+    }
     publish(dir.join("report.html"), html.as_bytes())
 }
 

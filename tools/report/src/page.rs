@@ -1,14 +1,17 @@
 //! The page: headline facts, frames, plots, tables.
 
-use crate::chart::{self, Drawing, Shape};
+use crate::chart::{Chart, Drawing, Shape};
+use crate::checkpoints::Checkpoints;
 use crate::frames::{Gallery, Picture, dimensions};
 use crate::plots::{self, Plot};
-use crate::walk::{Statistics, Walk};
-use crate::{Field, ReportError, format, tables};
+use crate::walk::{Pass, Statistics, Walk};
+use crate::{Field, ReportError, format, ink, tables};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
 
 const STYLE: &str = include_str!("style.css");
+/// Values under the pointer, sorting, CSV.
+const SCRIPT: &str = include_str!("script.js");
 /// Parts of the summary that the page shows in places of their own, or computes from the records.
 const SHOWN_APART: [&str; 7] =
     ["settings", "scene", "adapter", "left_out", "memory", "passes", "texture_bytes_resident"];
@@ -17,7 +20,12 @@ const SHOWN_APART: [&str; 7] =
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn render(walk: &Walk, gallery: &Gallery, fields: &[Field]) -> Result<String, ReportError> {
+pub fn render(
+    walk: &Walk,
+    gallery: &Gallery,
+    checkpoints: &Checkpoints,
+    fields: &[Field],
+) -> Result<String, ReportError> {
     let scene = walk.text("scene/file").unwrap_or_else(|| "unnamed scene".into());
     let head = html! {
         p.kicker { "brickwalk · walk" }
@@ -28,7 +36,8 @@ pub fn render(walk: &Walk, gallery: &Gallery, fields: &[Field]) -> Result<String
     let main = html! {
         (medians(walk))
         section { h2 { "Frames" } (frames(walk, gallery)) }
-        (all_plots(walk)?)
+        (checkpoints.section()?)
+        (all_plots(walk, fields)?)
         (all_tables(walk, fields))
     };
     Ok(whole(&format!("Walk through {scene}"), &head, &main))
@@ -36,7 +45,7 @@ pub fn render(walk: &Walk, gallery: &Gallery, fields: &[Field]) -> Result<String
 
 /// A page from its parts.
 pub fn whole(title: &str, head: &Markup, main: &Markup) -> String {
-    let dark = chart::colour_rules();
+    let dark = ink::colour_rules();
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -47,7 +56,7 @@ pub fn whole(title: &str, head: &Markup, main: &Markup) -> String {
                 title { (title) }
                 style { (PreEscaped(STYLE)) "@media (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
             }
-            body { header { (head) } main { (main) } }
+            body { header { (head) } main { (main) } script { (PreEscaped(SCRIPT)) } }
         }
     };
     page.into_string()
@@ -152,20 +161,20 @@ fn frames(walk: &Walk, gallery: &Gallery) -> Markup {
             }
         }
         @if !embedded.is_empty() {
-            p.reading { "Choose a frame to enlarge it; its number leads to the file beside this page." }
+            p.reading { "Click a frame to enlarge it. Its number links to the file." }
             div.gallery {
                 @for picture in &embedded { (figure(picture, time(picture.frame))) }
             }
         }
         @if !linked.is_empty() {
             details {
-                summary { (linked.len()) " more frames beside this page" }
+                summary { (linked.len()) " more frames" }
                 p.links { @for picture in &linked { a href={ "frames/" (picture.name) } { (picture.frame) } " " } }
             }
         }
         @if !gallery.left_out.is_empty() {
             p.note {
-                "Left out, because they belong to no record of this walk or hold no PNG: "
+                "Skipped, because they are not of this walk or not PNG files: "
                 (gallery.left_out.join(", ")) "."
             }
         }
@@ -191,38 +200,39 @@ fn figure(picture: &Picture, ms: Option<f64>) -> Markup {
     }
 }
 
-fn all_plots(walk: &Walk) -> Result<Markup, ReportError> {
+fn all_plots(walk: &Walk, fields: &[Field]) -> Result<Markup, ReportError> {
     if walk.passes.is_empty() {
         return Ok(html! {});
     }
-    let shared = section_of("All passes", &plots::of_walk(walk))?;
-    let passes = walk.passes.iter().map(|pass| section_of(&format!("Pass: {}", pass.name), &plots::of_pass(pass)));
-    let passes = passes.collect::<Result<Vec<_>, _>>()?;
+    let shared = section_of("All passes", &plots::of_walk(walk), tables::schedules(walk))?;
+    let of_pass = |pass: &Pass| section_of(&format!("Pass: {}", pass.name), &plots::of_pass(walk, pass, fields), None);
+    let passes = walk.passes.iter().map(of_pass).collect::<Result<Vec<_>, _>>()?;
     Ok(html! { (shared) @for pass in passes { (pass) } })
 }
 
-fn section_of(title: &str, plots: &[Plot]) -> Result<Markup, ReportError> {
+fn section_of(title: &str, plots: &[Plot], table: Option<Markup>) -> Result<Markup, ReportError> {
     let drawn = plots.iter().map(plot).collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
         section {
             h2 { (title) }
-            p.reading { "Numbers beside the names are medians over the frames." }
+            p.reading { "Numbers beside names are medians over the frames. Point at a plot for the values of a frame." }
             div.plots { @for figure in drawn.into_iter().flatten() { (figure) } }
             @for plot in plots.iter().filter(|plot| plot.chart.is_none()) {
                 p.note { (plot.title) ": not drawn, because " (undrawn(plot)) "." }
             }
+            @if let Some(table) = table { (table) }
         }
     })
 }
 
-/// Why series are not drawn: which are zero and which are not measured.
+/// Why series are not drawn: which are zero, which are off and which are not measured.
 fn undrawn(plot: &Plot) -> String {
     fn are(names: &[String], what: &str) -> Option<String> {
         let verb = if names.len() == 1 { "is" } else { "are" };
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         (!names.is_empty()).then(|| format!("{} {verb} {what}", format::list(&names)))
     }
-    let parts = [are(&plot.zero, "zero in every frame"), are(&plot.missing, "not measured")];
+    let parts = [are(&plot.zero, "zero in every frame"), are(&plot.off, "off"), are(&plot.missing, "not measured")];
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }
 
@@ -236,7 +246,7 @@ fn plot(plot: &Plot) -> Result<Option<Markup>, ReportError> {
 
 /// A chart with its title, its legend, in which `value` stands beside each name, and how to read it.
 pub fn drawn(
-    chart: &chart::Chart,
+    chart: &Chart,
     title: &str,
     reading: &str,
     note: Option<&str>,
@@ -261,7 +271,10 @@ pub fn drawn(
                     }
                 }
             }
-            svg viewBox=(Drawing::view_box()) role="img" aria-label=(chart.title) { (PreEscaped(drawing.svg)) }
+            svg viewBox=(Drawing::view_box()) role="img" aria-label=(chart.title) {
+                (PreEscaped(drawing.svg)) line.cursor stroke="currentColor" {}
+            }
+            script type="application/json" { (PreEscaped(drawing.data)) }
             div {
                 p.reading { (reading) }
                 @if !drawing.notes.is_empty() { p.note { (drawing.notes) } }
@@ -278,8 +291,10 @@ pub fn key(shape: Shape, colour: &str) -> Markup {
             Shape::Stacked => { rect x="2" y="0" width="12" height="10" fill=(colour) {} }
             Shape::Line => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="2.5" {} }
             Shape::Total => { line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="3.5" {} }
-            Shape::Limit => {
-                line x1="0" y1="5" x2="16" y2="5" stroke=(colour) stroke-width="2.5" stroke-dasharray="5 4" {}
+            Shape::Dashed(_) | Shape::Limit => {
+                @let (dash, gap) = shape.dash().unwrap_or_default();
+                line x1="0" y1="5" x2="20" y2="5" stroke=(colour) stroke-width="2.5"
+                    stroke-dasharray={ (dash) " " (gap) } {}
             }
         }
     }
@@ -306,7 +321,7 @@ fn all_tables(walk: &Walk, fields: &[Field]) -> Markup {
                         }
                         (table)
                     }
-                    None => p.note { "This walk did not measure which bricks its rays needed." },
+                    None => p.note { "Not measured: walk with --measure-needed." },
                 }
             }
             section {
@@ -316,6 +331,7 @@ fn all_tables(walk: &Walk, fields: &[Field]) -> Markup {
                     (tables::all_fields(walk, fields))
                 }
                 details { summary { "Frame by frame" } (tables::per_frame(walk)) }
+                p { a href="records.csv" { "records.csv" } ", " a href="records.jsonl" { "records.jsonl" } }
             }
         }
         section { h2 { "Left out, and why" } (left_out(walk)) }
@@ -327,7 +343,7 @@ fn all_tables(walk: &Walk, fields: &[Field]) -> Markup {
                     summary { (title) }
                     @match walk.summary(part).and_then(tables::pairs) {
                         Some(table) => (table),
-                        None => p.note { "The summary does not tell." },
+                        None => p.note { "Not recorded." },
                     }
                 }
             }
@@ -343,7 +359,7 @@ fn left_out(walk: &Walk) -> Markup {
     let items = walk.summary("left_out").and_then(Value::as_array);
     html! {
         @match items.map(Vec::as_slice) {
-            Some([]) => p { "Nothing: the scene needs every part." },
+            Some([]) => p { "Nothing." },
             Some(items) => ul {
                 @for item in items {
                     @match (item.get("what").and_then(Value::as_str), item.get("why").and_then(Value::as_str)) {
@@ -352,7 +368,7 @@ fn left_out(walk: &Walk) -> Markup {
                     }
                 }
             },
-            None => p.note { "The summary does not tell." },
+            None => p.note { "Not recorded." },
         }
     }
 }
@@ -362,12 +378,12 @@ fn memory(walk: &Walk) -> Markup {
         @match walk.summary("memory").and_then(tables::pairs) {
             Some(table) => {
                 p.reading {
-                    "Peak of the process without mapped files; mapped pages are listed apart. On a software adapter "
-                    "the cache is part of it."
+                    "Peak of the process without mapped files, which are listed apart. With a software adapter or on "
+                    "the processor it includes the cache."
                 }
                 (table)
             }
-            None => p.note { "The system did not tell how much memory the walk used." },
+            None => p.note { "Not known on this system." },
         }
         @if let Some(bytes) = walk.number("texture_bytes_resident") {
             p { "Coarse levels of textures on the device: " (format::bytes(bytes)) ", outside of the cache's budget." }

@@ -1,6 +1,8 @@
 //! Which plots a report has, and how each is read.
 
-use crate::chart::{Across, BLACK, BLUE, Chart, GREEN, GREY, INKS, Ink, ORANGE, PURPLE, RED, Series, Shape, Unit};
+use crate::Field;
+use crate::chart::{Across, Chart, Series, Shape, Unit};
+use crate::ink::{BLACK, BLUE, GREEN, GREY, INKS, Ink, ORANGE, PURPLE, RED};
 use crate::walk::{Pass, Walk};
 
 /// A plot, or the reason why there is none.
@@ -14,6 +16,8 @@ pub struct Plot {
     pub chart: Option<Chart>,
     /// Series that are zero in all frames.
     pub zero: Vec<String>,
+    /// Series of what was off.
+    pub off: Vec<String>,
     /// Series that no record has, or that this walk did not measure.
     pub missing: Vec<String>,
 }
@@ -47,6 +51,8 @@ struct PassPlot {
     lines: &'static [Line],
     /// Whether the plot says nothing where needs were not measured.
     of_needs: bool,
+    /// Whether frames are marked from which on another schedule traces.
+    marks_schedules: bool,
 }
 
 /// The plot that most walks do not ask for, and that is not missed where there is no error.
@@ -56,6 +62,7 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Time per phase",
         of_needs: false,
+        marks_schedules: true,
         reading: "Lower is faster. Phases 1 to 3 are device time (known work, queries, new work), loading and \
                   total are wall time; parts may overlap, so they need not add up.",
         unit: Unit::Milliseconds,
@@ -70,9 +77,10 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Queries",
         of_needs: false,
+        marks_schedules: false,
         reading: "Pairs (tile, node) whose visibility was asked. Those culled by the interval test cost no ray; \
                   the visible ones lead to work. Multi-queries ask over several nodes at once and are repeated \
-                  one by one where they fail.",
+                  one by one if they fail.",
         unit: Unit::Count,
         lines: &[
             line("visible", &["queries_visible"], BLUE),
@@ -85,6 +93,7 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Pairs",
         of_needs: false,
+        marks_schedules: false,
         reading: "Pairs (tile, leaf). Visible and invisible: the cut at the end of the pass; intersected: the \
                   work done for it; pulled up: pairs whose children were merged.",
         unit: Unit::Count,
@@ -98,6 +107,7 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Bytes moved",
         of_needs: false,
+        marks_schedules: false,
         reading: "A bar is what one frame moved to the device. The line is what it needed and did not have: bars \
                   of BVH and geometry above the line were moved in vain.",
         unit: Unit::Bytes,
@@ -112,6 +122,7 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Bytes needed",
         of_needs: true,
+        marks_schedules: false,
         reading: "BVH and geometry. Needed: of all bricks that the rays had to look at; missing: of those not \
                   resident when the pass began; moved should be close to missing.",
         unit: Unit::Bytes,
@@ -124,6 +135,7 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: ERROR,
         of_needs: false,
+        marks_schedules: false,
         reading: "Mean absolute difference of the effect's part of the picture from the exact one, linear radiance: \
                   over all pixels, and over the tile where it is largest. Measured with --measure-error.",
         unit: Unit::Count,
@@ -132,8 +144,10 @@ const PASS_PLOTS: [PassPlot; 7] = [
     PassPlot {
         title: "Bricks",
         of_needs: false,
+        marks_schedules: false,
         reading: "Needed and hit count bricks; loaded, loaded again and evicted count payloads (geometry and \
-                  attributes are one each). Loading again within one pass means that the cache is too small.",
+                  attributes are one each). Loaded again: within one pass, which means that the cache is too small; \
+                  `brickwalk replay` counts reloads over the whole walk.",
         unit: Unit::Count,
         lines: &[
             total("needed", &["bricks_needed"]),
@@ -146,13 +160,14 @@ const PASS_PLOTS: [PassPlot; 7] = [
 ];
 
 /// The plots of one pass.
-pub fn of_pass(pass: &Pass) -> Vec<Plot> {
-    let plots = PASS_PLOTS.iter().map(|plot| of_lines(plot, pass));
+pub fn of_pass(walk: &Walk, pass: &Pass, fields: &[Field]) -> Vec<Plot> {
+    let is_off = |name: &str| fields.iter().any(|field| field.name == name && walk.is_off(field.only));
+    let plots = PASS_PLOTS.iter().map(|plot| of_lines(plot, pass, &is_off));
     plots.filter(|plot| plot.title != ERROR || plot.chart.is_some()).collect()
 }
 
-fn of_lines(plot: &PassPlot, pass: &Pass) -> Plot {
-    let (mut series, mut zero, mut missing) = (Vec::new(), Vec::new(), Vec::new());
+fn of_lines(plot: &PassPlot, pass: &Pass, is_off: &dyn Fn(&str) -> bool) -> Plot {
+    let (mut series, mut zero, mut off, mut missing) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let measured = pass.has_nonzero("bytes_needed");
     for line in plot.lines {
         let has_one = |field: &&&str| pass.rows.iter().any(|row| row.get(field).is_some());
@@ -161,7 +176,8 @@ fn of_lines(plot: &PassPlot, pass: &Pass) -> Plot {
         if unmeasured || line.fields.iter().find(has_one).is_none() {
             missing.push(line.name.to_string());
         } else if !line.fields.iter().any(|field| pass.has_nonzero(field)) {
-            zero.push(line.name.to_string());
+            let undrawn = if line.fields.iter().all(|field| is_off(field)) { &mut off } else { &mut zero };
+            undrawn.push(line.name.to_string());
         } else {
             let rows = pass.rows.iter().filter(|row| line.fields.iter().any(|f| row.get(f).is_some()));
             let points = rows.map(|row| (row.frame as f64, row.sum(line.fields))).collect();
@@ -170,8 +186,9 @@ fn of_lines(plot: &PassPlot, pass: &Pass) -> Plot {
     }
     let drawn = !series.is_empty() && (measured || !plot.of_needs);
     let title = format!("{}, {}", plot.title, pass.name);
-    let chart = drawn.then_some(Chart { title, unit: plot.unit, across: Across::Frames, series });
-    Plot { title: plot.title, reading: plot.reading, chart, zero, missing }
+    let marks = if plot.marks_schedules { pass.switches() } else { Vec::new() };
+    let chart = drawn.then_some(Chart { title, unit: plot.unit, across: Across::Frames, series, marks });
+    Plot { title: plot.title, reading: plot.reading, chart, zero, off, missing }
 }
 
 /// The plots in which all passes are side by side.
@@ -226,10 +243,16 @@ fn of_field(walk: &Walk, title: &'static str, reading: &'static str, unit: Unit,
             ink: INKS[k % INKS.len()],
         })
         .collect();
-    let chart = (!series.is_empty()).then(|| Chart { title: title.into(), unit, across: Across::Frames, series });
+    let chart = (!series.is_empty()).then(|| Chart {
+        title: title.into(),
+        unit,
+        across: Across::Frames,
+        series,
+        marks: Vec::new(),
+    });
     let undrawn = |has: bool| {
         let passes = walk.passes.iter().filter(move |p| !p.has_nonzero(field) && p.series(field).is_empty() != has);
         passes.map(|pass| pass.name.clone()).collect()
     };
-    Plot { title, reading, chart, zero: undrawn(true), missing: undrawn(false) }
+    Plot { title, reading, chart, zero: undrawn(true), off: Vec::new(), missing: undrawn(false) }
 }

@@ -1,11 +1,16 @@
 //! The page of a replay: what caches of every size and policy make of one trace of requests.
 
-use crate::chart::{Across, Chart, INKS, Series, Shape, Unit};
-use crate::{ReportError, format, page};
+use crate::chart::{Across, Chart, Series, Shape, Unit};
+use crate::ink::INKS;
+use crate::{ReportError, csv, format, page};
 use maud::{Markup, html};
 use serde_json::Value;
 
+/// The policy that knows the future, which the others are measured by.
+const BOUND: &str = "belady-greedy";
+
 /// One policy's result in one cache.
+#[derive(Clone, Copy)]
 struct Row<'a> {
     policy: &'a str,
     cache_bytes: f64,
@@ -14,19 +19,32 @@ struct Row<'a> {
     loads: f64,
     loaded_bytes: f64,
     hit_rate: f64,
+    /// Percent of bytes loaded beyond those of [`BOUND`] in the same cache; 0 where it loads less, or is not there.
+    beyond: f64,
 }
 
 /// Title, reading, unit and value of a plot with a curve a policy.
 type Curve = (&'static str, &'static str, Unit, fn(&Row) -> f64);
 
-const CURVES: [Curve; 3] = [
+const CURVES: [Curve; 4] = [
+    (
+        "Loaded beyond the bound",
+        "Lower is better: bytes loaded beyond those of belady-greedy in the same cache.",
+        Unit::Percent,
+        |row| row.beyond,
+    ),
     (
         "Bytes loaded",
         "Lower is better. Where a curve is level, the cache holds all that is asked for again.",
         Unit::Bytes,
         |row| row.loaded_bytes,
     ),
-    ("Loads", "Payloads loaded: geometry or attributes of a brick.", Unit::Count, |row| row.loads),
+    (
+        "Loads",
+        "Payloads loaded: geometry or attributes of a brick. Those beyond the first load of each are reloads.",
+        Unit::Count,
+        |row| row.loads,
+    ),
     (
         "Hit rate",
         "Higher is better: requests for what was resident. No policy can do better than the first \
@@ -38,7 +56,8 @@ const CURVES: [Curve; 3] = [
 
 /// The page for what `brickwalk replay --json` prints; `name` is that of the trace. Rows without a number are left out.
 pub fn render(name: &str, replay: &Value) -> Result<String, ReportError> {
-    let rows: Vec<Row> = replay["results"].as_array().map_or(&[][..], Vec::as_slice).iter().filter_map(row).collect();
+    let rows = replay["results"].as_array().map_or(&[][..], Vec::as_slice).iter().filter_map(row);
+    let rows = beyond_bound(rows.collect());
     let mut policies: Vec<&str> = Vec::new();
     for row in &rows {
         if !policies.contains(&row.policy) {
@@ -73,12 +92,38 @@ pub fn render(name: &str, replay: &Value) -> Result<String, ReportError> {
     let main = html! {
         section {
             h2 { "Against the size of the cache" }
-            p.reading { "Every cache begins empty. belady-greedy knows the future: a bound for the others." }
+            p.reading { "Every cache begins empty. belady-greedy knows the future (it evicts what is used again last): a bound for "
+                "the others." }
             div.plots { @for plot in plots.into_iter().flatten() { (plot) } }
         }
-        section { h2 { "Numbers" } (table(&policies, &rows)) }
+        section {
+            h2 { "Numbers" }
+            (table(&policies, &rows))
+            p { a href=(data_link(&rows)) download="replay.csv" { "CSV" } }
+        }
     };
     Ok(page::whole(&format!("Replay of {name}"), &head, &main))
+}
+
+/// The rows with what each policy loads beyond the bound.
+fn beyond_bound(rows: Vec<Row>) -> Vec<Row> {
+    let bound = |cache: f64| rows.iter().find(|row| row.policy == BOUND && row.cache_bytes == cache);
+    let beyond = |row: &Row| {
+        let least = bound(row.cache_bytes).map(|bound| bound.loaded_bytes).filter(|bytes| *bytes > 0.0);
+        least.map_or(0.0, |least| (100.0 * (row.loaded_bytes / least - 1.0)).max(0.0))
+    };
+    rows.iter().map(|row| Row { beyond: beyond(row), ..*row }).collect()
+}
+
+/// The rows as a link that holds them as comma-separated values.
+fn data_link(rows: &[Row]) -> String {
+    let mut text = String::from("cache_bytes,cache_percent,policy,loads,loaded_bytes,hit_rate\n");
+    for row in rows {
+        let Row { policy, cache_bytes, percent, loads, loaded_bytes, hit_rate, .. } = row;
+        let policy = csv::quoted(policy);
+        text += &format!("{cache_bytes},{percent},{policy},{loads},{loaded_bytes},{hit_rate}\n");
+    }
+    format!("data:text/csv;base64,{}", format::base64(text.as_bytes()))
 }
 
 fn row(value: &Value) -> Option<Row<'_>> {
@@ -91,6 +136,7 @@ fn row(value: &Value) -> Option<Row<'_>> {
         loads: number("loads")?,
         loaded_bytes: number("loaded_bytes")?,
         hit_rate: number("hit_rate")?,
+        beyond: 0.0,
     })
 }
 
@@ -102,11 +148,13 @@ fn plot(curve: &Curve, policies: &[&str], rows: &[Row]) -> Result<Option<Markup>
     let series = |(k, &policy): (usize, &&str)| Series {
         name: policy.to_owned(),
         points: rows.iter().filter(|row| row.policy == policy).map(|row| (row.percent, value(row))).collect(),
-        shape: Shape::Line,
+        // Curves often lie on each other: gaps of one show the other.
+        shape: k.checked_sub(1).map_or(Shape::Line, Shape::Dashed),
         ink: INKS[k % INKS.len()],
     };
-    let series = policies.iter().enumerate().map(series).collect();
-    let chart = Chart { title: title.into(), unit, across: Across::Shares, series };
+    let is_drawn = |(_, policy): &(usize, &&str)| rows.iter().any(|row| row.policy == **policy && value(row) > 0.0);
+    let series = policies.iter().enumerate().filter(is_drawn).map(series).collect();
+    let chart = Chart { title: title.into(), unit, across: Across::Shares, series, marks: Vec::new() };
     page::drawn(&chart, title, reading, None, |_| None).map(Some)
 }
 

@@ -1,7 +1,9 @@
 //! A page of tables and plots whose contents the caller gives: the results of measurements. The same tables go into CSV
 //! and Markdown, so that all of them say the same.
 
-use crate::chart::{Across, Chart, Drawing, INKS, LABEL_HEX, Series, Shape, Unit};
+use crate::chart::{Across, Chart, Drawing, Series, Shape, Unit};
+use crate::csv::quoted;
+use crate::ink::{INKS, LABEL_HEX};
 use crate::walk::Statistics;
 use crate::{ReportError, format, page};
 use maud::{Markup, html};
@@ -115,10 +117,6 @@ impl From<f64> for Value {
 impl Table {
     /// As comma-separated values (RFC 4180), numbers in full.
     pub fn to_csv(&self) -> String {
-        let quoted = |text: &str| {
-            let special = text.contains([',', '"', '\n', '\r']);
-            if special { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_string() }
-        };
         let value = |value: &Value| match value {
             Value::Text(text) => quoted(text),
             Value::Number(value) | Value::Of(value, _) => value.to_string(),
@@ -252,7 +250,13 @@ fn graph(graph: &Graph) -> Result<Option<Markup>, ReportError> {
             if series.is_empty() {
                 return Ok(None);
             }
-            let chart = Chart { title: graph.title.clone(), across: Across::Named(across), unit: *unit, series };
+            let chart = Chart {
+                title: graph.title.clone(),
+                across: Across::Named(across),
+                unit: *unit,
+                series,
+                marks: Vec::new(),
+            };
             let median = |values| Statistics::of(values).map(|s| chart.unit.show(s.median));
             Ok(Some(page::drawn(&chart, &graph.title, &graph.reading, None, median)?))
         }

@@ -1,6 +1,6 @@
 //! The tables of a report.
 
-use crate::walk::{Pass, Statistics, Walk};
+use crate::walk::{Pass, Row, Statistics, Walk};
 use crate::{Field, format};
 use maud::{Markup, html};
 use serde_json::Value;
@@ -11,6 +11,8 @@ pub const MOVED: [&str; 4] = ["bytes_bvh", "bytes_geometry", "bytes_attributes",
 const MOVED_GEOMETRY: [&str; 2] = ["bytes_bvh", "bytes_geometry"];
 /// What stands for a value that is not recorded.
 const NONE: &str = "–";
+/// What stands for a count of what is off.
+const OFF: &str = "off";
 
 fn cell(value: Option<f64>, show: fn(f64) -> String) -> String {
     value.map_or_else(|| NONE.into(), show)
@@ -49,6 +51,39 @@ pub fn out_of_core(walk: &Walk) -> Markup {
             }
         } }
     }
+}
+
+/// The schedules of every pass: in how many frames, and how long these took; `None` where records do not say.
+pub fn schedules(walk: &Walk) -> Option<Markup> {
+    let is_recorded = walk.passes.iter().any(|pass| pass.rows.iter().any(|row| !row.schedule.is_empty()));
+    let ms = |rows: &[&Row]| Statistics::of(rows.iter().filter_map(|row| row.get("ms")).collect());
+    is_recorded.then(|| {
+        html! {
+            h3 { "Schedules" }
+            p.reading {
+                "With auto, a pass now and then tries a schedule that was slower before; such frames stand out in plots. "
+                "A pass with several schedules has directions, lamps or samples that were traced by either."
+            }
+            div.wide { table {
+                thead { tr {
+                    th.text { "Pass" } th.text { "Schedule" } th { "Frames" } th { "median ms" } th { "p95 ms" }
+                } }
+                tbody {
+                    @for pass in &walk.passes {
+                        @for (schedule, rows) in pass.by_schedule() {
+                            @let ms = ms(&rows);
+                            tr {
+                                th scope="row" { (pass.name) } td.text { (schedule) }
+                                td { (format::count(rows.len() as f64)) }
+                                td { (cell(ms.map(|s| s.median), format::number)) }
+                                td { (cell(ms.map(|s| s.p95), format::number)) }
+                            }
+                        }
+                    }
+                }
+            } }
+        }
+    })
 }
 
 /// Rays that were traced, and those that a method answered besides.
@@ -125,10 +160,12 @@ pub fn all_fields(walk: &Walk, known: &[Field]) -> Markup {
             tbody {
                 @for field in &walk.fields {
                     @let known = known.iter().find(|known| known.name == field);
+                    @let is_off = known.is_some_and(|known| walk.is_off(known.only));
                     tr {
                         th scope="row" { code { (field) } }
                         @for pass in &walk.passes {
                             @match pass.statistics(field) {
+                                Some(s) if is_off && s.total == 0.0 => { td { (OFF) } td { (OFF) } td { (OFF) } }
                                 Some(s) => {
                                     td { (cell(total(pass, field, known, s.total), value)) }
                                     td { (value(s.median)) } td { (value(s.p95)) }
@@ -149,7 +186,7 @@ pub fn per_frame(walk: &Walk) -> Markup {
     html! {
         div.wide { table {
             thead { tr {
-                th { "Frame" } th.text { "Pass" } th { "Rays traced" } th { "answered" } th { "Mray/s" } th { "ms" }
+                th { "Frame" } th.text { "Pass" } th.text { "Schedule" } th { "Rays traced" } th { "answered" } th { "Mray/s" } th { "ms" }
                 th { "Queries" } th { "MiB moved" } th { "of it BVH" } th { "geometry" }
                 th { "Loaded" } th { "Evicted" }
             } }
@@ -160,7 +197,7 @@ pub fn per_frame(walk: &Walk) -> Markup {
                         @let start = pass.rows.partition_point(|row| row.frame < *frame);
                         @for row in pass.rows[start..].iter().take_while(|row| row.frame == *frame) {
                             tr {
-                                th scope="row" { (frame) } td.text { (pass.name) }
+                                th scope="row" { (frame) } td.text { (pass.name) } td.text { (row.schedule) }
                                 @for field in RAYS { td { (cell(row.get(field), value)) } }
                                 @for field in ["mrays_per_s", "ms"] { td { (cell(row.get(field), format::number)) } }
                                 td { (cell(row.get("queries"), value)) } td { (format::mebibytes(row.sum(&MOVED))) }
@@ -205,7 +242,7 @@ fn flatten(prefix: &str, value: &Value, rows: &mut Vec<(String, String)>) {
 fn readable(name: &str, value: &Value) -> String {
     let numbers_of = |text: &str| name.ends_with(text);
     match value {
-        Value::Null => "not known".into(),
+        Value::Null => OFF.into(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.into(),
         Value::String(text) => text.clone(),
         Value::Array(items) => items.iter().map(|item| readable(name, item)).collect::<Vec<_>>().join(", "),

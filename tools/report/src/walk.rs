@@ -13,6 +13,8 @@ const SUMMARY_FORMAT: u64 = 2;
 pub struct Row {
     /// Frame, from 0.
     pub frame: u64,
+    /// The schedules that its rays were traced by; empty where it had none, or where they are not recorded.
+    pub schedule: String,
     /// The numeric fields by name, `frame` left out. Integers are exact up to 2⁵³.
     values: HashMap<String, f64>,
 }
@@ -44,6 +46,24 @@ impl Pass {
         self.rows.iter().filter_map(|row| Some((row.frame as f64, row.get(field)?))).collect()
     }
 
+    /// Frames that have another schedule than the one before, with what they have.
+    pub fn switches(&self) -> Vec<(f64, String)> {
+        let changes = self.rows.windows(2).filter(|pair| pair[0].schedule != pair[1].schedule);
+        changes.map(|pair| (pair[1].frame as f64, named(&pair[1].schedule).to_owned())).collect()
+    }
+
+    /// The frames by schedule, in the order in which these were used first.
+    pub fn by_schedule(&self) -> Vec<(&str, Vec<&Row>)> {
+        let mut groups: Vec<(&str, Vec<&Row>)> = Vec::new();
+        for row in &self.rows {
+            match groups.iter_mut().find(|(name, _)| *name == named(&row.schedule)) {
+                Some((_, rows)) => rows.push(row),
+                None => groups.push((named(&row.schedule), vec![row])),
+            }
+        }
+        groups
+    }
+
     /// Statistics of a field over the frames; `None` where no record has it.
     pub fn statistics(&self, field: &str) -> Option<Statistics> {
         Statistics::of(self.rows.iter().filter_map(|row| row.get(field)).collect())
@@ -59,6 +79,11 @@ impl Pass {
     pub fn has_nonzero(&self, field: &str) -> bool {
         self.rows.iter().any(|row| row.get(field).is_some_and(|v| v != 0.0))
     }
+}
+
+/// The name of a schedule.
+fn named(schedule: &str) -> &str {
+    if schedule.is_empty() { "none" } else { schedule }
 }
 
 /// Statistics of one field.
@@ -143,12 +168,13 @@ impl Walk {
             Some(value) => value.as_u64().ok_or("\"frame\" must be an integer from 0")?,
             None => return Err("the record has no \"frame\"".into()),
         };
-        let mut values = HashMap::new();
+        let (mut values, mut schedule) = (HashMap::new(), String::new());
         for (key, value) in object {
             if key == "frame" || key == "pass" {
                 continue;
             }
             match value {
+                Value::String(text) if key == "schedule" => schedule = text,
                 // An optional field may be spelled out as absent.
                 Value::Null => {}
                 Value::Number(number) => {
@@ -162,7 +188,7 @@ impl Walk {
                 _ => return Err(format!("\"{key}\" must be a number")),
             }
         }
-        Ok((pass, Row { frame, values }))
+        Ok((pass, Row { frame, schedule, values }))
     }
 
     fn add(&mut self, pass: &str, row: Row) {
@@ -183,6 +209,18 @@ impl Walk {
     /// A number of the summary.
     pub fn number(&self, path: &str) -> Option<f64> {
         self.summary(path)?.as_f64()
+    }
+
+    /// Whether what a field counts was off: `only` says with which option it is not zero.
+    pub fn is_off(&self, only: &str) -> bool {
+        let Some(options) = self.summary("options") else { return false };
+        let Some(flag) = only.split("--").nth(1) else { return false };
+        let key: String = flag.chars().take_while(|c| c.is_alphanumeric() || *c == '-').collect();
+        match options.get(key.replace('-', "_")) {
+            None | Some(Value::Null | Value::Bool(false)) => true,
+            Some(Value::String(text)) => ["off", "none", "exact"].contains(&text.as_str()),
+            Some(_) => false,
+        }
     }
 
     /// A text of the summary; numbers and truth values are spelled as JSON spells them.

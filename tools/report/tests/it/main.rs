@@ -2,4 +2,5 @@
 
 mod markup;
 mod report;
+mod researchers;
 mod sheet;

@@ -29,9 +29,11 @@ pub fn check(html: &str) -> Result<(), String> {
             return Err(format!("no element: <{tag}>"));
         }
         attributes(tag[name.len()..].trim_end_matches('/'))?;
-        if name == "style" {
-            let end = rest.find("</style>").ok_or("the style does not end")?;
-            rest = &rest[end..];
+        for raw in ["style", "script"] {
+            if name == raw {
+                let end = rest.find(&format!("</{raw}>")).ok_or_else(|| format!("{raw} does not end"))?;
+                rest = &rest[end..];
+            }
         }
         if !tag.ends_with('/') && !VOID.contains(&name) {
             open.push(name);
