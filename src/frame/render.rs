@@ -85,11 +85,11 @@ impl Renderer {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
-        self.frame_watched(frame, camera, &mut |_, _| true)
+        self.frame_watched(frame, camera, &[], &mut |_, _| true)
     }
 
     /// [`Renderer::frame`]; `watch` is told the number of finished samples, and their sum, after every
-    /// [`BATCH_SAMPLES`] and at the end, and says whether to go on.
+    /// [`BATCH_SAMPLES`], after as many as `checkpoints` name, and at the end, and says whether to go on.
     ///
     /// # Errors
     /// As those of [`Renderer::frame`], or `watch` said no.
@@ -97,6 +97,7 @@ impl Renderer {
         &mut self,
         frame: u32,
         camera: &Camera,
+        checkpoints: &[u32],
         watch: &mut dyn FnMut(u32, &Accumulation) -> bool,
     ) -> Result<FrameOutput, RenderError> {
         let Self { engine, methods } = self;
@@ -172,11 +173,19 @@ impl Renderer {
                 )?;
             }
             let finished = sample + 1;
-            if finished.is_multiple_of(BATCH_SAMPLES) || finished == engine.settings.samples {
+            let is_batch = finished.is_multiple_of(BATCH_SAMPLES) || finished == engine.settings.samples;
+            let goes_on = if is_batch {
                 accumulation.add(&engine.executor.read_radiance()?);
-                if !watch(finished, &accumulation) {
-                    return Err(RenderError::Interrupted);
-                }
+                watch(finished, &accumulation)
+            } else if checkpoints.contains(&finished) {
+                let mut so_far = accumulation.clone();
+                so_far.add(&engine.executor.read_radiance()?);
+                watch(finished, &so_far)
+            } else {
+                true
+            };
+            if !goes_on {
+                return Err(RenderError::Interrupted);
             }
         }
         output.pixels.radiance = accumulation.mean();

@@ -11,6 +11,8 @@ use crate::stream::{HostCache, Workers};
 use anyhow::{Result, bail};
 use bricks::SceneFile;
 use std::sync::Arc;
+use std::time::Instant;
+use tracing::info;
 
 /// What was chosen, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,17 +53,21 @@ impl Device {
     /// # Errors
     /// No such adapter, or one that gives no device or lacks what is needed.
     pub fn open(adapter: &Adapter) -> Result<Self> {
-        match adapter {
-            Adapter::Cpu => Ok(Self::Cpu),
-            Adapter::Named(name) => Ok(Self::Gpu(Box::new(Gpu::open(Some(name))?))),
+        let (device, why) = match adapter {
+            Adapter::Cpu => (Self::Cpu, "asked for"),
+            Adapter::Named(name) => (Self::Gpu(Box::new(Gpu::open(Some(name))?)), "asked for"),
             Adapter::Auto => {
                 let candidates = candidates();
-                match automatic(&candidates).candidate {
-                    Some(number) => Ok(Self::Gpu(Box::new(candidates[number].open()?))),
-                    None => Ok(Self::Cpu),
+                let Choice { candidate, why } = automatic(&candidates);
+                match candidate {
+                    Some(number) => (Self::Gpu(Box::new(candidates[number].open()?)), why),
+                    None => (Self::Cpu, why),
                 }
             }
-        }
+        };
+        let DeviceInfo { name, driver, driver_info, backend, .. } = device.info();
+        info!("adapter: {name} ({backend}, {driver} {driver_info}): {why}");
+        Ok(device)
     }
 
     /// What summaries say of it.
@@ -102,19 +108,22 @@ impl Device {
         page_sizes: &[u64],
         setup: Setup,
     ) -> Result<Box<dyn FrameExecutor>> {
-        match self {
+        let start = Instant::now();
+        let executor: Box<dyn FrameExecutor> = match self {
             Self::Cpu => {
                 let workers = Workers::new(scene.clone(), host, threads)?;
-                Ok(Box::new(CpuExecutor::new(scene, workers, setup)?))
+                Box::new(CpuExecutor::new(scene, workers, setup)?)
             }
             Self::Gpu(gpu) => {
                 require(&gpu, &probe::run(&gpu).checks)?;
                 let workers = Workers::new(scene.clone(), host, threads)?;
                 let executor = GpuExecutor::new(*gpu, scene, workers, page_sizes, setup)?;
                 require(executor.gpu(), &probe::compare_pipelines(&executor))?;
-                Ok(Box::new(executor))
+                Box::new(executor)
             }
-        }
+        };
+        info!("kernels: built and tested in {:.0} ms; {threads} loader threads", start.elapsed().as_secs_f64() * 1e3);
+        Ok(executor)
     }
 }
 
@@ -125,7 +134,7 @@ fn require(gpu: &Gpu, checks: &[probe::Check]) -> Result<()> {
         return Ok(());
     }
     bail!(
-        "{} does not compute as exact rendering needs: {}; choose another with --adapter",
+        "{} fails the start-up test that exact rendering needs: {}; choose another with --adapter",
         gpu.info.name,
         failures.join(", ")
     );

@@ -8,6 +8,7 @@ use crate::kernels::Lamps;
 use crate::kernels::lamps::{Emitter, Shape};
 use crate::session::Settings;
 use crate::settings;
+use crate::settings::sizes::counted;
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::{LIGHT_DISTANT, LIGHT_SPOT, PunctualLight, Resident, SceneFile};
 use exr::prelude::{MetaData, ReadChannels, ReadLayers};
@@ -86,7 +87,7 @@ pub fn lighting(settings: &Settings, file: &SceneFile, path: &Path) -> Result<Li
             if image.width != 2 * image.height {
                 let (width, height) = (image.width, image.height);
                 warnings.push(format!(
-                    "{}: an image of all directions is twice as wide as high; this one of {width} x {height} is stretched",
+                    "{}: an environment is twice as wide as high; this image of {width} x {height} is stretched",
                     path.display()
                 ));
             }
@@ -98,10 +99,8 @@ pub fn lighting(settings: &Settings, file: &SceneFile, path: &Path) -> Result<Li
     let (environment, notes) = prepared.unzip();
     if let (Some(notes), Some(choice)) = (notes, &settings.environment) {
         if notes.bad_texels > 0 {
-            let count = notes.bad_texels;
-            warnings.push(format!(
-                "{choice}: {count} texels are infinite, negative or no numbers; they are taken as black"
-            ));
+            let count = counted(notes.bad_texels, "texel");
+            warnings.push(format!("{choice}: {count} infinite, negative or NaN; treated as black"));
         }
         if notes.energy_change.abs() > 1e-4 {
             warnings.push(format!("{choice}: scaling it down changed its power by {:e}", notes.energy_change));
@@ -122,9 +121,8 @@ pub fn lighting(settings: &Settings, file: &SceneFile, path: &Path) -> Result<Li
         }
     }
     if effects.environment && effects.ao {
-        warnings.push(
-            "--effects ao adds nothing beside environment, whose light has its own shadows: it is left out".into(),
-        );
+        warnings
+            .push("--effects ao has no effect together with environment, which traces its own shadows; skipped".into());
     }
     let resident = file.resident();
     light.lamps = Arc::new(Lamps::new(environment, sources.emitters(resident), radius(resident)));
@@ -176,11 +174,11 @@ fn physical_sky(light: &mut Light, sun_intensity: f64, sky_intensity: f64) -> Eq
 pub fn read(path: &Path) -> Result<Equirectangular> {
     let name = path.display();
     let mut magic = [0; 4];
-    let found = File::open(path).and_then(|mut file| file.read_exact(&mut magic)).with_context(|| {
-        format!("{name}: the environment cannot be read; give an .hdr or .exr image, or the word sky")
-    });
+    let found = File::open(path)
+        .and_then(|mut file| file.read_exact(&mut magic))
+        .with_context(|| format!("{name}: cannot read the environment; give an .hdr or .exr image, or the word sky"));
     found?;
-    let damaged = || format!("{name}: the environment is damaged or cut off; give a whole .hdr or .exr image");
+    let damaged = || format!("{name}: the environment is damaged or truncated; give a complete .hdr or .exr image");
     let image = match &magic {
         b"#?RA" | b"#?RG" => read_hdr(path),
         [0x76, 0x2f, 0x31, 0x01] => read_exr(path),
@@ -261,19 +259,19 @@ mod tests {
         let image = read(&file("two.hdr", hdr)).unwrap();
         assert_eq!((image.width, image.height, image.texels[0]), (2, 1, [1.0; 3]));
         assert!((image.texels[1][0] / 1e6 - 1.0).abs() < 0.01, "{:?}", image.texels);
-        assert!(refused(&file("cut.hdr", &hdr[..hdr.len() - 3])).contains("cut off"));
+        assert!(refused(&file("cut.hdr", &hdr[..hdr.len() - 3])).contains("truncated"));
         let huge = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\n\x80\x80\x80\x81";
         assert!(refused(&file("huge.hdr", huge)).contains("scale it down"));
         let vast = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8000 +X 16000\n\x80\x80\x80\x81";
         assert!(refused(&file("vast.hdr", vast)).contains("cannot hold"));
         assert!(refused(&file("what.png", b"\x89PNG\r\n")).contains("neither"));
         assert!(refused(&file("empty.exr", b"")).contains("word sky"));
-        assert!(refused(&folder.path().join("missing.hdr")).contains("cannot be read"));
+        assert!(refused(&folder.path().join("missing.hdr")).contains("cannot read"));
         let path = folder.path().join("three.exr");
         exr::prelude::write_rgb_file(&path, 3, 1, |x, _| (x as f32, 1e6f32, -1.0f32)).unwrap();
         assert_eq!(read(&path).unwrap().texels, [[0.0, 1e6, -1.0], [1.0, 1e6, -1.0], [2.0, 1e6, -1.0]]);
         let whole = std::fs::read(&path).unwrap();
-        assert!(refused(&file("cut.exr", &whole[..whole.len() - 9])).contains("cut off"));
-        assert!(refused(&file("head.exr", &whole[..40])).contains("cut off"));
+        assert!(refused(&file("cut.exr", &whole[..whole.len() - 9])).contains("truncated"));
+        assert!(refused(&file("head.exr", &whole[..40])).contains("truncated"));
     }
 }

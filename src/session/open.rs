@@ -1,5 +1,6 @@
 //! A scene, opened for frames and for rays.
 
+use super::checkpoints::{Checkpoint, ErrorMeter, References};
 use super::left_out::{self, LeftOut};
 use super::lighting::{Lighting, lighting};
 use super::motion::SceneMotion;
@@ -52,6 +53,8 @@ pub struct Frame {
     pub pixels: Pixels,
     /// What each pass did.
     pub records: Vec<Record>,
+    /// Its errors after fewer samples, where the settings ask for them.
+    pub checkpoints: Vec<Checkpoint>,
     /// Stops (EV) that pictures of it are exposed by.
     pub exposure_ev: f64,
     /// How pictures of it show what is brighter than a display.
@@ -110,6 +113,8 @@ pub struct Session {
     pub(super) stops: Vec<f64>,
     meter: Meter,
     motion: Option<SceneMotion>,
+    /// What the samples of frames are measured against.
+    references: Option<References>,
     /// Renders every frame exactly as well.
     reference: Option<Renderer>,
     /// What the first frame showed, to be rendered once more.
@@ -125,6 +130,7 @@ impl Session {
     pub fn open(file: impl AsRef<Path>, settings: &Settings) -> Result<Self> {
         let file = file.as_ref();
         settings.check()?;
+        let references = References::open(settings)?;
         let scene = open_scene(file)?;
         check_occupancy(&scene, file, settings)?;
         let manifest = &scene.resident().manifest;
@@ -140,7 +146,10 @@ impl Session {
         let motion = motion.transpose()?;
         let opened = Opened::open(scene.clone(), file, settings)?;
         let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned();
-        let warnings = settings.without_effect().into_iter().chain(warnings).collect();
+        let mut warnings: Vec<String> = settings.without_effect().into_iter().chain(warnings).collect();
+        if settings.frames > 1 && references.as_ref().is_some_and(|references| !references.is_of_all()) {
+            warnings.push("--reference is a file: it is the reference of frame 0; name a folder to measure all".into());
+        }
         let reference = settings.measure_error.then(|| reference(scene, file, settings, lighting.light.clone()));
         let mut renderer = lit_renderer(opened, settings, lighting.light.clone());
         renderer.captures = settings.measure_error.then(Captures::default);
@@ -155,6 +164,7 @@ impl Session {
             stops: Vec::new(),
             meter: Meter::new(settings.exposure),
             motion,
+            references,
             reference: reference.transpose()?,
             first: None,
             warnings,
@@ -229,10 +239,21 @@ impl Session {
         if is_first && self.settings.measure_left_out {
             self.first = Some((renderer.scene.clone(), renderer.light.clone()));
         }
-        let mut output = match renderer.frame_watched(number, camera, &mut |done, sum| watch.samples(done, sum)) {
+        let meter = self.references.as_ref().map(|references| references.meter(number)).transpose()?;
+        let (mut meter, mut failed) = (meter.flatten(), None);
+        let checkpoints = &self.settings.checkpoints;
+        let output = renderer.frame_watched(number, camera, checkpoints, &mut |done, sum| {
+            failed = meter.as_mut().and_then(|meter| meter.note(done, sum).err());
+            failed.is_none() && watch.samples(done, sum)
+        });
+        if let Some(error) = failed {
+            return Err(error).with_context(name);
+        }
+        let mut output = match output {
             Err(RenderError::Interrupted) => return Ok(None),
             output => output.with_context(name)?,
         };
+        let checkpoints = meter.map_or_else(Vec::new, ErrorMeter::finish);
         if is_first {
             self.warnings.extend(short_rays(renderer).into_iter().chain(dark_lamps(renderer)));
         }
@@ -248,6 +269,7 @@ impl Session {
             size: renderer.size,
             pixels: output.pixels,
             records: output.records,
+            checkpoints,
             exposure_ev: stops,
             tone_map: self.settings.tone_map,
         }))

@@ -5,13 +5,14 @@ use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::schedule::ExecutorError;
 use crate::schedule::cache::Cache;
 use crate::session::Settings;
-use crate::settings::sizes::{human_bytes, option_bytes};
+use crate::settings::sizes::{counted, human_bytes, option_bytes};
 use crate::settings::{CacheSize, Schedule};
 use crate::stream::{HostCache, PayloadSource, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
 use std::path::Path;
 use std::sync::Arc;
+use tracing::info;
 
 /// A scene on a device.
 pub struct Opened {
@@ -120,6 +121,7 @@ impl Opened {
                 // What a driver says is free is not trusted.
                 Err(error) if settings.cache == CacheSize::Auto && room.bytes > LEAST_ROOM && is_of_device(&error) => {
                     room.bytes /= 2;
+                    info!("cache: the allocation failed; trying {}", human_bytes(room.bytes));
                 }
                 made => break made?,
             }
@@ -176,12 +178,20 @@ impl Opened {
         }
         if settings.query_threshold > threshold && threshold == 0 {
             warnings.push(format!(
-                "--query-threshold {} is less than one ray of a tile of {}: nothing is left out; use a larger --tile",
+                "--query-threshold {} is less than one ray of a tile of {} and has no effect; use a larger --tile",
                 settings.query_threshold, extent.tile
             ));
         }
         let setup = Setup { extent, threshold, count: settings.count, opaque: settings.opaque, keep: Keep::default() };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
+        info!(
+            "cache: {} of {} of bricks and tiles, {policy}, in {}; host cache {}",
+            human_bytes(budget),
+            human_bytes(sizes.sum()),
+            counted(page_sizes.len() as u64, "page"),
+            human_bytes(settings.host_cache)
+        );
+        info!("schedule: {schedule}");
         let host = HostCache::new(settings.host_cache);
         let threads = settings.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };

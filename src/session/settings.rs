@@ -160,6 +160,13 @@ settings! {
         /// walk.
         secondary: Method = Method::Exact, "--secondary METHOD", Rule::Any, "", Methods, Common;
 
+        /// Measure the error of frames after so many samples per pixel, as 1,4,16,64. `--reference` is what they are
+        /// measured against; `checkpoints.jsonl` and the report have RMSE, relMSE, bias and FLIP over samples and over
+        /// seconds. `--spp` is at least the greatest of them. Not together with --denoise and --taa.
+        checkpoints: Vec<u32> = Vec::new(), "--checkpoints LIST", Rule::Whole(1, 1_000_000), "samples", Measurement, Usual;
+        /// Reference for --checkpoints: an EXR for frame 0, or a folder with one for each frame. In a folder they are
+        /// called 0000.exr, 0001.exr and so on, as `walk --aov` writes them. [default: none]
+        reference: Option<PathBuf> = None, "--reference FILE.exr|DIR", Rule::Any, "", Measurement, Usual;
         /// Record which bricks every pass needed (`bricks_needed`). It takes a traversal more a pass.
         measure_needed: bool = false, "--measure-needed", Rule::Any, "", Measurement, Expert;
         /// Record how far each effect is from the exact picture (`error_mean`, `error_worst_tile`, `error_pixels`). A
@@ -195,7 +202,7 @@ impl Settings {
     /// Which one to leave out.
     pub fn check(&self) -> Result<(), SettingsError> {
         if self.taa && self.aov {
-            let text = "--aov: depth, normals, ids and albedo are taken through the centres of pixels, which --taa moves; leave one out";
+            let text = "--aov and --taa exclude each other: AOVs are sampled at pixel centres, which --taa jitters; leave one out";
             return Err(SettingsError::Conflict(text.into()));
         }
         if let Some(file) = self.video.as_ref().filter(|file| file.extension().is_none_or(|ending| ending != "y4m")) {
@@ -206,6 +213,16 @@ impl Settings {
                 right.display()
             )));
         }
+        if !self.checkpoints.is_empty() {
+            let text = match (&self.reference, self.denoise || self.taa) {
+                (None, _) => "--checkpoints needs a reference; give --reference FILE.exr, as walk --aov writes it",
+                (Some(_), true) => "--checkpoints measures samples as they are; leave out --denoise and --taa",
+                (Some(_), false) => "",
+            };
+            if !text.is_empty() {
+                return Err(SettingsError::Conflict(text.into()));
+            }
+        }
         let is_chc = matches!(self.schedule, Schedule::Chc | Schedule::Auto);
         let is_plain = self.schedule.is_plain();
         for which in &self.without {
@@ -215,7 +232,7 @@ impl Settings {
                 PartOf::Fronts => (is_chc && self.has_fronts(), "--fronts on (schedule chc)"),
             };
             if !has_meaning {
-                let text = format!("--without {}: it belongs to {belongs}", which.name());
+                let text = format!("--without {}: only with {belongs}", which.name());
                 return Err(SettingsError::Conflict(text));
             }
         }
@@ -228,7 +245,7 @@ impl Settings {
         let maps = matches!(self.secondary, Method::Roma | Method::Auto);
         let fields = self.secondary.name() == "df";
         let lit = self.environment.is_some();
-        let needs: [(&str, bool, &str); 16] = [
+        let needs: [(&str, bool, &str); 17] = [
             ("ao_rays", effects.ao, "--effects ao"),
             ("ao_length", effects.ao, "--effects ao"),
             ("diffuse_rays", effects.diffuse, "--effects diffuse"),
@@ -237,7 +254,8 @@ impl Settings {
             ("environment_intensity", lit, "--environment"),
             ("rect_light_intensity", self.rect_light.is_some(), "--rect-light"),
             ("video_fps", self.video.is_some(), "--video"),
-            ("progressive", self.spp > BATCH_SAMPLES, "--spp above 64"),
+            ("reference", !self.checkpoints.is_empty(), "--checkpoints"),
+            ("progressive", self.samples() > BATCH_SAMPLES, "--spp above 64"),
             ("roma.bom", maps || fields, "--secondary roma, auto or df"),
             ("roma.", maps, "--secondary roma or auto"),
             ("rsm.", self.secondary == Method::Roma, "--secondary roma"),
@@ -252,7 +270,7 @@ impl Settings {
             let &(_, has_effect, belongs) = needs.iter().find(|(name, ..)| is_of(name))?;
             let is_default = self.get(&key) == Some((entry.field.default)());
             let flag = entry.field.flag();
-            (!has_effect && !is_default).then(|| format!("--{flag} does nothing here; it belongs to {belongs}"))
+            (!has_effect && !is_default).then(|| format!("--{flag} has no effect without {belongs}"))
         };
         Self::entries().iter().filter_map(idle).collect()
     }
@@ -270,6 +288,11 @@ impl Settings {
         let mut on = Optimisations::default();
         self.without.iter().for_each(|&which| on.set(which, false));
         on
+    }
+
+    /// Samples of a pixel: as many as were chosen, and as checkpoints need.
+    pub fn samples(&self) -> u32 {
+        self.checkpoints.iter().copied().fold(self.spp, u32::max)
     }
 
     /// Threads that read bricks, at least 1.

@@ -63,7 +63,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "df": reports.remove("df"),
             "dvf": field.as_ref().and_then(Option::as_ref).map(|note| note.report(renderer, &s.dvf, s.motion.is_some(), records)),
             "rsm": reports.remove("rsm"),
-            "spp": s.spp,
+            "spp": s.samples(),
             "seed": s.seed,
             "sun": s.sun.unit().to_array(),
             "sun_angle_degrees": s.sun_angle,
@@ -161,7 +161,7 @@ fn passes(records: &[Record]) -> Value {
 fn statistics(rows: &[Value]) -> Value {
     let (mut totals, mut medians, mut p95) = (Map::new(), Map::new(), Map::new());
     let Some(Value::Object(first)) = rows.first() else { return Value::Null };
-    for key in first.keys().filter(|k| *k != "frame" && *k != "pass") {
+    for key in first.keys().filter(|key| *key != "frame" && first[*key].is_number()) {
         if rows.iter().all(|row| row[key].is_u64()) {
             let total: u64 = rows.iter().filter_map(|row| row[key].as_u64()).sum();
             totals.insert(key.clone(), total.into());

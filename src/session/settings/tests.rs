@@ -183,7 +183,7 @@ fn the_options_page_is_that_of_the_settings() {
 #[test]
 fn settings_without_effect_are_named() {
     let named = |options: &str| Settings::from_options(options).unwrap().without_effect();
-    assert_eq!(named("--ao-length 2"), ["--ao-length does nothing here; it belongs to --effects ao"]);
+    assert_eq!(named("--ao-length 2"), ["--ao-length has no effect without --effects ao"]);
     assert_eq!(named("--roma-k 8 --dvf-rays 64").len(), 2);
     assert!(named("--effects ao --ao-length 2 --secondary roma --roma-k 8").is_empty());
     // `--bom` is of two methods.
