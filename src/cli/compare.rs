@@ -3,7 +3,7 @@
 use super::options::args::CompareArgs;
 use crate::cli::output::{print, print_json};
 use crate::metrics::{Comparison, FlipKind, compare, load};
-use crate::settings::sizes::human_count;
+use crate::settings::sizes::counted;
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt::Write;
@@ -43,17 +43,17 @@ fn human(c: &Comparison) -> String {
     row("RMSE", format!("{:.6}", p.rmse));
     row("relMSE", format!("{:.6}", p.rel_mse));
     row("bias", format!("{:+.6} ({})", p.bias, rgb(p.bias_rgb)));
-    row("greatest error", format!("{:.6}", p.max_error));
+    row("max error", format!("{:.6}", p.max_error));
     let kind = match c.flip_kind {
         FlipKind::Ldr => "FLIP",
         FlipKind::Hdr => "HDR-FLIP",
     };
-    row(kind, format!("{:.6}, greatest {:.6}, at {:.0} pixels per degree", c.flip, c.flip_max, c.pixels_per_degree));
+    row(kind, format!("{:.6}, max {:.6}, at {:.0} pixels per degree", c.flip, c.flip_max, c.pixels_per_degree));
     if p.non_finite_pixels > 0 {
-        row("left out", format!("{} pixels that are not finite", human_count(p.non_finite_pixels)));
+        row("skipped", format!("{} non-finite", counted(p.non_finite_pixels, "pixel")));
     }
     if let Some(ids) = c.ids_differing {
-        row("triangle ids", format!("{} differ", human_count(ids)));
+        row("triangle ids", format!("differ in {}", counted(ids, "pixel")));
     }
     text
 }
@@ -91,7 +91,7 @@ mod tests {
         let comparison = compare(&loaded, &load(&b).unwrap()).unwrap();
         assert_eq!((comparison.pixels.rmse, comparison.ids_differing), (0.0, Some(1)));
         let text = human(&comparison);
-        assert!(text.contains("HDR-FLIP") && text.contains("1 differ") && text.contains("8x6"), "{text}");
+        assert!(text.contains("HDR-FLIP") && text.contains("differ in 1 pixel") && text.contains("8x6"), "{text}");
         let json = serde_json::to_value(Document { format: FORMAT, comparison: &comparison }).unwrap();
         assert_eq!((json["format"].as_u64(), json["ids_differing"].as_u64()), (Some(1), Some(1)));
 

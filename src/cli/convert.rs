@@ -2,14 +2,14 @@
 
 use super::interrupt;
 use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
-use crate::cli::output::{Usage, print};
-use crate::settings::sizes::{human_bytes, human_count};
+use crate::cli::output::{Usage, note, warn};
+use crate::settings::sizes::{counted, human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
 use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, TILESET, import};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use tracing::info;
 
 /// Deepest nesting of folders that is searched.
 const MAX_DEPTH: u32 = 64;
@@ -82,20 +82,20 @@ pub fn usage(built: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
 pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<()> {
     let scene = bricks::SceneFile::open(path)?;
     let resident = scene.resident();
-    for warning in &resident.manifest.warnings {
-        let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(warning));
-    }
-    print(&format!(
-        "{}: {} triangles ({} with instances) in {} bricks, {}, {:.1} s\n",
+    warn(&resident.manifest.warnings);
+    let (stored, instanced) = (resident.manifest.triangles_stored, resident.manifest.triangles_instanced);
+    note(&format!(
+        "{}: {}{}, {}, {}, {:.1} s\n",
         path.display(),
-        human_count(resident.manifest.triangles_stored),
-        human_count(resident.manifest.triangles_instanced),
-        human_count(resident.bricks.len() as u64),
+        counted(stored, "triangle"),
+        if instanced == stored { String::new() } else { format!(" ({} with instances)", human_count(instanced)) },
+        counted(resident.bricks.len() as u64, "brick"),
         human_bytes(scene.file_bytes()),
         start.elapsed().as_secs_f64()
     ))?;
     let phases = summary.phases.iter().map(|(phase, time)| format!("{phase} {:.1} s", time.as_secs_f64()));
-    print(&format!("{}: {}\n", path.display(), phases.collect::<Vec<_>>().join(", ")))
+    info!("{}: {}", path.display(), phases.collect::<Vec<_>>().join(", "));
+    Ok(())
 }
 
 /// The files that the inputs name: a folder stands for its `tileset.json`, else for the scene files in it and below,

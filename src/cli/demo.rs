@@ -2,7 +2,7 @@
 
 use super::options::args::{DemoArgs, SceneArgs, VerifyArgs};
 use super::{scene, verify, walk};
-use crate::cli::output::print;
+use crate::cli::output::note;
 use crate::output::atomic;
 use crate::session::Settings;
 use crate::settings::Group;
@@ -18,9 +18,9 @@ pub fn run(args: &DemoArgs) -> Result<()> {
     let (name, output) = (file.display(), args.output.display());
     let city = SceneArgs::city(file.clone(), args.triangles, args.seed);
     let generate = format!("scene city -o {name} --triangles {} --seed {}", args.triangles, args.seed);
-    step("generate and convert a city", &generate)?;
+    step("generate a city and convert it", &generate)?;
     scene::run(&city)?;
-    step("check every byte of it", &format!("verify {name}"))?;
+    step("verify every byte", &format!("verify {name}"))?;
     verify::run(&VerifyArgs { scene: file.clone() })?;
     let settings = Settings {
         path: Some(args.output.join("city.near.json")),
@@ -31,12 +31,10 @@ pub fn run(args: &DemoArgs) -> Result<()> {
         adapter: args.adapter.clone(),
         ..Settings::default()
     };
-    step("walk through it, out of core", &format!("walk {name} -o {output} {}", settings.options()))?;
-    walk::walk(&file, &args.output, &settings, false)?;
-    let report = args.output.join("report.html");
-    print(&format!("Done. Frames: {}\nReport: {}\n", args.output.join("frames").display(), report.display()))
+    step("walk through it out of core", &format!("walk {name} -o {output} {}", settings.options()))?;
+    walk::walk(&file, &args.output, &settings, false)
 }
 
 fn step(what: &str, command: &str) -> Result<()> {
-    print(&format!("\n# {what}\n$ brickwalk {command}\n"))
+    note(&format!("\n# {what}\n$ brickwalk {command}\n"))
 }

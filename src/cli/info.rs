@@ -183,10 +183,10 @@ impl<'a> Info<'a> {
             row("source", format!("{} ({}, xxh3 {})", source.name, human_bytes(source.bytes), source.hash));
         }
         let [stored, instanced, ids] = ["triangles_stored", "triangles_instanced", "triangle_ids"].map(count);
-        row("triangles", format!("{stored} stored, {instanced} with every instance, {ids} ids"));
+        row("triangles", format!("{stored} stored, {instanced} with instances, {ids} ids"));
         if m.dropped_zero_area + m.dropped_non_finite > 0 {
             let [zero, bad] = ["dropped_zero_area", "dropped_non_finite"].map(count);
-            row("dropped", format!("{zero} of zero area, {bad} with a non-finite vertex"));
+            row("skipped", format!("{zero} degenerate, {bad} with non-finite vertices"));
         }
         if number("bricks") > 0 {
             let ([x0, y0, z0], [x1, y1, z1]) = (m.min, m.max);
@@ -332,8 +332,8 @@ fn origin(scene: &SceneFile, id: u32) -> Result<Origin> {
     find(manifest, id).with_context(|| {
         let file = scene.path().display();
         match manifest.triangle_ids {
-            0 => format!("{file}: no triangle has the id {id}; the scene is empty"),
-            n => format!("{file}: no triangle has the id {id}; its ids are 0 to {}", n - 1),
+            0 => format!("{file}: no triangle has id {id}; the scene is empty"),
+            n => format!("{file}: no triangle has id {id}; ids are 0 to {}", n - 1),
         }
     })
 }

@@ -54,7 +54,7 @@ pub fn origin(manifest: &Manifest, id: u32) -> Option<&Provenance> {
 /// The same, a line each.
 pub fn human(rows: &[Row]) -> String {
     if rows.is_empty() {
-        return "no instance: everything is baked into the world; convert --movable NAME keeps the meshes of a node apart\n".into();
+        return "no instances: every mesh is part of the world object; convert with --movable NAME to keep a node's meshes apart\n".into();
     }
     let mut text = String::new();
     for row in rows {

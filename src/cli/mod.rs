@@ -10,6 +10,7 @@ pub mod demo;
 pub mod info;
 pub mod instances;
 pub mod interrupt;
+pub mod man;
 pub mod options;
 pub mod output;
 pub mod quality;
@@ -23,7 +24,8 @@ pub mod walk;
 use clap::{CommandFactory, Parser};
 use options::args::{Cli, Command};
 use options::removed;
-use output::{ClosedPipe, Usage, print};
+use output::{ClosedPipe, Usage, one_line, print};
+use std::ffi::OsString;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -36,8 +38,8 @@ const BAD_INPUT: u8 = 1;
 pub fn main() -> ExitCode {
     install_panic_hook();
     let words: Vec<_> = std::env::args_os().collect();
-    if words.get(1).is_some_and(|word| word == "walk") && words.iter().any(|word| word == "--help-all") {
-        return match print(&walk_help_all()) {
+    if words.iter().any(|word| word == "--help-all") {
+        return match print(&help_all(&words)) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => report(&error),
         };
@@ -50,6 +52,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
+    cli.verbosity.set();
     // Whatever is half done is dropped with the call: a panic leaves nothing behind that is used afterwards.
     match catch_unwind(AssertUnwindSafe(|| run(&cli.command))) {
         Ok(Ok(())) => ExitCode::SUCCESS,
@@ -77,17 +80,23 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         #[cfg(feature = "lab")]
         Command::Bench(args) => bench::run(args),
         Command::Adapters(args) => adapters::run(args),
+        Command::Completions(args) => man::completions(args),
+        Command::Man(args) => man::run(args),
         #[cfg(feature = "lab")]
         Command::Selftest(args) => bench::test(args),
     }
 }
 
-/// The help of `walk` with all its options.
-fn walk_help_all() -> String {
-    let mut cli = Cli::command();
-    cli.build();
-    let walk = cli.find_subcommand("walk").cloned().unwrap_or(cli);
-    walk.mut_args(|argument| argument.hide_long_help(false)).render_long_help().to_string()
+/// The help of the command that `words` name, with all its options.
+fn help_all(words: &[OsString]) -> String {
+    let mut command = Cli::command();
+    command.build();
+    for word in words.iter().skip(1) {
+        if let Some(below) = word.to_str().and_then(|word| command.find_subcommand(word)) {
+            command = below.clone();
+        }
+    }
+    command.mut_args(|argument| argument.hide_long_help(false)).render_long_help().to_string()
 }
 
 /// Prints an error as one line and chooses the exit status.
@@ -108,19 +117,13 @@ fn chain(error: &anyhow::Error) -> String {
         if text.is_empty() {
             text = message;
         } else if !text.contains(&message) {
-            text.push_str(": ");
-            text.push_str(&message);
+            // The file that both are about is named once.
+            let name = text.split(": ").next().unwrap_or_default();
+            let rest = message.strip_prefix(name).and_then(|rest| rest.strip_prefix(": ")).unwrap_or(&message);
+            text += &format!(": {rest}");
         }
     }
     text
-}
-
-/// `text` with every run of control characters and white space as one space.
-fn one_line(text: &str) -> String {
-    text.split(|c: char| c.is_whitespace() || c.is_control())
-        .filter(|word| !word.is_empty())
-        .collect::<Vec<_>>()
-        .join(" ")
 }
 
 /// Whether the reader of standard output went away, as in `brickwalk info S.bricks | head -1`.
@@ -144,7 +147,7 @@ fn install_panic_hook() {
         let place = info.location().map_or(String::new(), |at| format!(" at {}:{}", at.file(), at.line()));
         let _ = writeln!(
             std::io::stderr(),
-            "brickwalk: internal error{place}: {}; this is a defect of brickwalk, please report it with the command line",
+            "brickwalk: internal error{place}: {}; this is a bug in brickwalk; please report it with the command line",
             one_line(message)
         );
     }));
@@ -162,6 +165,8 @@ mod tests {
         assert_eq!(one_line(&chain(&error)), "a.bricks: cannot write: disk full !");
         let repeated = anyhow::anyhow!("full").context("a.bricks: full; free some space");
         assert_eq!(chain(&repeated), "a.bricks: full; free some space");
+        let named = anyhow::anyhow!("a.bricks: brick 7 is damaged").context("a.bricks");
+        assert_eq!(chain(&named), "a.bricks: brick 7 is damaged");
     }
 
     #[test]

@@ -8,8 +8,8 @@
 use super::convert::{expand, mesh_settings, usage, work_settings};
 use super::options::args::RepairArgs;
 use super::{interrupt, verify};
-use crate::cli::output::{Usage, print};
-use crate::settings::sizes::human_bytes;
+use crate::cli::output::{Usage, note};
+use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::layout::PAGE_BYTES;
 use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};
@@ -36,13 +36,13 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     let progress = interrupt::job();
     let damaged = damaged_payloads(&verify::watched(&progress, |progress| scene.verify(progress))?)?;
     if damaged.is_empty() {
-        return print(&format!("{name}: whole; nothing to repair\n"));
+        return note(&format!("{name}: OK, nothing to repair\n"));
     }
     // Before the long work, so that a file that cannot be written is found at once.
     let mut file = OpenOptions::new()
         .write(true)
         .open(&args.scene)
-        .with_context(|| format!("{name}: cannot write the file; check its permissions"))?;
+        .with_context(|| format!("{name}: cannot write this file; check its permissions"))?;
 
     let target = args.scene.canonicalize().unwrap_or_else(|_| args.scene.clone());
     // Until the end, so that no other process repairs it.
@@ -56,9 +56,9 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     for &payload in &damaged {
         bytes += replace(&scene, &rebuilt, payload, &mut file)?;
     }
-    file.sync_all().with_context(|| format!("{name}: cannot sync the file to the disk; repair it again"))?;
+    file.sync_all().with_context(|| format!("{name}: cannot sync this file to the disk; repair it again"))?;
     let parts: Vec<String> = damaged.iter().map(Payload::to_string).collect();
-    print(&format!("{name}: {} rebuilt, {}\n", parts.join(", "), human_bytes(bytes)))
+    note(&format!("{name}: repaired {} ({})\n", parts.join(", "), human_bytes(bytes)))
 }
 
 /// Reserves the repair of the scene for this process, by a file beside it that goes with the last process.
@@ -67,7 +67,7 @@ fn reserve(scene: &Path, target: &Path) -> Result<Partial> {
     name.push(".repair");
     Writer::reserve(target.with_file_name(name)).map_err(|error| match error {
         Error::Io { source, .. } if source.kind() == ErrorKind::ResourceBusy => {
-            anyhow!("{}: another process is repairing it; wait for that", scene.display())
+            anyhow!("{}: another process is repairing this file; wait for it", scene.display())
         }
         error => error.into(),
     })
@@ -77,7 +77,7 @@ fn reserve(scene: &Path, target: &Path) -> Result<Partial> {
 /// what a process left that was killed is removed by the next.
 fn scratch_folder(asked: Option<&Path>, target: &Path) -> Result<TempDir> {
     let folder = asked.or_else(|| target.parent()).unwrap_or(Path::new("."));
-    let context = || format!("{}: cannot make a scratch folder; name another place with --scratch", folder.display());
+    let context = || format!("{}: cannot create a scratch folder; choose another with --scratch", folder.display());
     let name = target.file_name().unwrap_or_default().to_string_lossy();
     let name = format!(".{name}.{:016x}.repair", xxh3_64(target.as_os_str().as_encoded_bytes()));
     match std::fs::remove_dir_all(folder.join(&name)) {
@@ -141,7 +141,7 @@ fn source(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Progr
     }
     let settings = generated(&scene.resident().manifest).ok_or_else(|| {
         let name = scene.path().display();
-        Usage(format!("{name} is no generated scene: give what it was converted from with --from"))
+        Usage(format!("{name}: not a generated scene; give the inputs of its conversion with --from"))
     })?;
     Ok(Box::new(generate(&settings, progress)?))
 }
@@ -168,8 +168,8 @@ fn same_sources(scene: &SceneFile, given: &[bricks::Source]) -> Result<()> {
     let made_from = &scene.resident().manifest.sources;
     ensure!(
         given.len() == made_from.len(),
-        "{name}: it was converted from {} files, --from names {}; give them all, in their order",
-        made_from.len(),
+        "{name}: converted from {}, but --from gives {}; give all of them, in order",
+        counted(made_from.len() as u64, "file"),
         given.len()
     );
     for (given, made_from) in given.iter().zip(made_from) {
@@ -177,8 +177,8 @@ fn same_sources(scene: &SceneFile, given: &[bricks::Source]) -> Result<()> {
         let same_name = made_from.bytes > 0 || given.name == made_from.name;
         ensure!(
             same_name && (given.bytes, &given.hash) == (made_from.bytes, &made_from.hash),
-            "{name}: the input {} is not the one it was converted from: found {} bytes with checksum {}, expected {} of {} \
-             bytes with checksum {}; give that file",
+            "{name}: input {} has changed: found {} bytes with checksum {}, expected {} of {} bytes with checksum {}; give \
+             the original file",
             given.name,
             given.bytes,
             given.hash,
@@ -198,10 +198,10 @@ fn check(scene: &SceneFile, rebuilt: &SceneFile, payload: Payload) -> Result<()>
     }
     let (was, is) = (&scene.resident().manifest.generator, &rebuilt.resident().manifest.generator);
     let remedy = match was == is {
-        true => "give the options of the conversion, and check the buffers and images beside the inputs".into(),
-        false => format!("it was written by {was}, this is {is}: use that version, or convert again"),
+        true => "give the options of the conversion, and check buffers and images beside the inputs".into(),
+        false => format!("the file was written by {was}, this is {is}; use that version, or convert again"),
     };
-    bail!("{}: {payload} comes out differently; nothing was changed; {remedy}", scene.path().display())
+    bail!("{}: the rebuilt {payload} differs from the original; nothing was changed; {remedy}", scene.path().display())
 }
 
 /// Writes a rebuilt payload and the zeros after it; returns its length.

@@ -36,8 +36,9 @@ struct Rung {
 /// The file cannot be read, is no trace, or is not whole.
 pub fn run(args: &ReplayArgs) -> Result<()> {
     let name = args.requests.display().to_string();
-    let file = File::open(&args.requests).with_context(|| format!("{name}: cannot be opened"))?;
-    ensure!(!file.metadata()?.is_dir(), "{name}: it is a folder; give the file that --requests-out wrote");
+    let file = File::open(&args.requests)
+        .with_context(|| format!("{name}: cannot open this file; check its path and permissions"))?;
+    ensure!(!file.metadata()?.is_dir(), "{name}: this is a folder; give the file that --requests-out wrote");
     let trace = Trace::read(BufReader::new(file)).with_context(|| name.clone())?;
     let ladder = if args.plot.is_some() { &DENSE[..] } else { &LADDER };
     let asked = if args.cache.is_empty() {
@@ -176,7 +177,8 @@ fn as_text(trace: &Trace, rungs: &[Rung], skipped: &[u64]) -> String {
         let sizes: Vec<String> = skipped.iter().map(|&bytes| cache(bytes)).collect();
         let _ = writeln!(
             out,
-            "\nSkipped, below the two largest bricks, or the tiles of a texture lookup ({least} bytes): {}",
+            "\nSkipped, smaller than the least cache of this scene ({}): {}",
+            human_bytes(least),
             sizes.join(", ")
         );
     }

@@ -4,8 +4,8 @@ use super::convert::{build_settings, refuse_folder, summarise, usage};
 use super::interrupt;
 use super::options::args::{BuildArgs, SceneArgs};
 use super::options::scene_kind::SceneKind;
-use crate::cli::output::{Usage, print};
-use crate::settings::sizes::human_count;
+use crate::cli::output::{Usage, note};
+use crate::settings::sizes::counted;
 use anyhow::{Context, Result};
 use brickwalk_convert::build::{BuildSettings, BuildSummary, build_source};
 use brickwalk_convert::progress::Progress;
@@ -35,16 +35,16 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     progress.finish();
     match summary {
         Written::Bricks(summary) => summarise(&args.output, &summary, start)?,
-        Written::Gltf { triangles } => print(&format!(
-            "{}: {} triangles with instances, {:.1} s\n",
+        Written::Gltf { triangles } => note(&format!(
+            "{}: {} with instances, {:.1} s\n",
             args.output.display(),
-            human_count(triangles),
+            counted(triangles, "triangle"),
             start.elapsed().as_secs_f64()
         ))?,
     }
     for path in paths {
         let is_motion = path.to_string_lossy().ends_with(".motion.json");
-        print(&format!("{}: {}\n", path.display(), if is_motion { "a motion" } else { "a camera path" }))?;
+        note(&format!("{}: {}\n", path.display(), if is_motion { "motion" } else { "camera path" }))?;
     }
     Ok(())
 }
@@ -52,7 +52,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
 /// Writes a scene of a kind and its paths.
 fn generated(args: &SceneArgs, kind: Kind, progress: &Progress) -> Result<(Vec<PathBuf>, Written)> {
     if args.case.is_some() {
-        return Err(Usage(format!("--case: {kind} has none; the kind stiff has")).into());
+        return Err(Usage(format!("--case: {kind} has no cases; only stiff has")).into());
     }
     let settings = Settings {
         kind,
@@ -78,21 +78,18 @@ fn generated(args: &SceneArgs, kind: Kind, progress: &Progress) -> Result<(Vec<P
 fn made_stiff(args: &SceneArgs, progress: &Progress) -> Result<(Vec<PathBuf>, Written)> {
     let Some(case) = args.case else {
         let names = Stiff::ALL.map(Stiff::name).join(", ");
-        return Err(Usage(format!("stiff: name the scene with --case: {names}")).into());
+        return Err(Usage(format!("stiff: choose a scene with --case: {names}")).into());
     };
     if args.instanced || args.copies > 1 {
-        return Err(Usage("--instanced, --copies: a stiff scene is one mesh, placed once".into()).into());
+        return Err(Usage("--instanced, --copies: stiff scenes are a single mesh; leave them out".into()).into());
     }
     let triangles = args.triangles.unwrap_or(case.default_triangles());
     if triangles > Stiff::MOST_TRIANGLES {
         let most = Stiff::MOST_TRIANGLES;
-        return Err(Usage(format!(
-            "--triangles: a stiff scene of {triangles} is not possible; ask for at most {most}"
-        ))
-        .into());
+        return Err(Usage(format!("--triangles: a stiff scene has at most {most} triangles, not {triangles}")).into());
     }
     if case == Stiff::Empty && GltfForm::of(&args.output).is_some() {
-        return Err(Usage("--case empty: glTF has no buffer of no bytes; write S.bricks".into()).into());
+        return Err(Usage("--case empty: glTF cannot hold an empty scene; write S.bricks".into()).into());
     }
     let scene = stiff(case, case.size_of(triangles), args.seed);
     let path = far_path(&scene);
@@ -136,9 +133,7 @@ fn refuse_building(args: &BuildArgs) -> Result<()> {
         ("--no-proxies", args.no_proxies),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
-        Some((option, _)) => {
-            Err(Usage(format!("{option}: this is for .bricks files; glTF is written as it is generated")).into())
-        }
+        Some((option, _)) => Err(Usage(format!("{option}: only for .bricks files; leave it out for glTF")).into()),
         None => Ok(()),
     }
 }
@@ -149,7 +144,7 @@ fn in_pool<T: Send>(threads: Option<u32>, work: impl FnOnce() -> T + Send) -> Re
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads as usize)
         .build()
-        .with_context(|| format!("cannot start {threads} threads; give --threads a smaller number"))?;
+        .with_context(|| format!("cannot start {threads} threads; use fewer with --threads"))?;
     Ok(pool.install(work))
 }
 

@@ -1,7 +1,7 @@
 //! `brickwalk trace`: closest hits, or occlusion, of given rays.
 
 use super::options::args::TraceArgs;
-use crate::cli::output::print_json;
+use crate::cli::output::{print_json, warn};
 use crate::kernels::layout::NONE;
 use crate::output::npy::{self, Rays};
 use crate::session::trace::{check, for_rays, trace};
@@ -20,14 +20,17 @@ pub fn run(args: &TraceArgs) -> Result<()> {
         check(ray).with_context(|| format!("{}: row {row}", args.rays.display()))?;
     }
     let mut opened = Opened::open(open_scene(&args.scene)?, &args.scene, &settings)?;
-    super::walk::warn(std::mem::take(&mut opened.warnings));
+    warn(std::mem::take(&mut opened.warnings));
     let progress = Progress::new();
     progress.phase("rays", rays.len() as u64);
     let traced = trace(&mut opened.traced(), &rays, args.any, &mut |rays| progress.advance(rays));
     let (hits, stats) = traced.with_context(|| args.scene.display().to_string())?;
     progress.finish();
     if let Some(row) = hits.iter().position(|hit| hit.t.is_nan() || hit.u.is_nan() || hit.v.is_nan()) {
-        bail!("the hit of row {row} is not a number: {:?}; this is a defect, see brickwalk selftest", hits[row]);
+        bail!(
+            "the hit of row {row} is not a number: {:?}; this is a bug in brickwalk, see brickwalk selftest",
+            hits[row]
+        );
     }
     if args.any {
         let any: Vec<bool> = hits.iter().map(|h| h.triangle != NONE).collect();

@@ -1,8 +1,8 @@
 //! `verify`: every checksum and reference of a `.bricks` file.
 
 use super::options::args::VerifyArgs;
-use crate::cli::output::print;
-use crate::settings::sizes::{human_bytes, human_count};
+use crate::cli::output::note;
+use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Result, bail};
 use bricks::{Error, Part, Payload, Section, VerifyReport};
 use brickwalk_convert::progress::Progress;
@@ -20,11 +20,11 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
     if let Some(message) = problems(&report) {
         bail!("{message}");
     }
-    print(&format!(
-        "{}: whole: {} in {} payloads, every byte as it was written\n",
+    note(&format!(
+        "{}: OK: {}, {}\n",
         args.scene.display(),
-        human_bytes(report.file_bytes),
-        human_count(report.payloads)
+        counted(report.payloads, "payload"),
+        human_bytes(report.file_bytes)
     ))
 }
 

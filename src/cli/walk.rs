@@ -1,17 +1,19 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::options::args::WalkArgs;
-use crate::cli::output::print;
+use crate::cli::output::{is_quiet, note, print, warn};
 use crate::counters::{COLUMNS, Column, Kind, Record};
 use crate::frame::{Accumulation, BATCH_SAMPLES};
 use crate::output::atomic;
 use crate::session::{Pictures, Session, Settings, Watch, summary};
+use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Result, bail};
 use brickwalk_convert::progress::Progress;
 use brickwalk_report::Field;
 use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use tracing::info;
 
 /// Runs the command.
 ///
@@ -36,7 +38,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     warn(session.take_warnings());
     atomic::create_folder(&output.join("frames"))?;
     let _owned = atomic::Owned::take(output)?;
-    for stale in ["summary.json", "report.html"] {
+    for stale in ["summary.json", "report.html", "records.csv", "checkpoints.jsonl", "checkpoints.csv"] {
         // What is left of an earlier walk must not be taken for a part of this one.
         let _ = std::fs::remove_file(output.join(stale));
     }
@@ -46,21 +48,29 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     warn(session.take_warnings());
     let mut pictures = Pictures::create(output, settings)?;
     let mut lines = atomic::JsonLines::create(&output.join("records.jsonl"))?;
+    let measures = !settings.checkpoints.is_empty();
+    let checkpoints = measures.then(|| atomic::JsonLines::create(&output.join("checkpoints.jsonl")));
+    let mut checkpoints = checkpoints.transpose()?;
     let progress = Progress::new();
     // A frame of many samples takes long: the samples are counted then.
-    let counts_samples = settings.spp > BATCH_SAMPLES;
+    let spp = settings.samples();
+    let counts_samples = spp > BATCH_SAMPLES;
     match counts_samples {
-        true => progress.phase("samples", u64::from(settings.frames) * u64::from(settings.spp)),
+        true => progress.phase("samples", u64::from(settings.frames) * u64::from(spp)),
         false => progress.phase("frames", settings.frames.into()),
     }
     let mut records: Vec<Record> = Vec::new();
     let mut finished = 0;
     while finished < settings.frames && !stop.load(Ordering::Relaxed) {
         let preview = settings.progressive.then_some(&pictures);
-        let mut watcher = Watcher { preview, spp: settings.spp, counts_samples, ..Watcher::new(&progress, stop) };
+        let mut watcher = Watcher { preview, spp, counts_samples, ..Watcher::new(&progress, stop) };
         let Some(frame) = session.frame_watched(finished, &mut watcher)? else { break };
         warn(session.take_warnings());
         pictures.frame(&frame)?;
+        if let Some(checkpoints) = &mut checkpoints {
+            frame.checkpoints.iter().try_for_each(|checkpoint| checkpoints.push(checkpoint).map(drop))?;
+        }
+        info!("{}", told(finished, &frame.records));
         for record in frame.records {
             let line = lines.push(&record)?;
             if json {
@@ -73,20 +83,41 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     }
     progress.finish();
     let (video, commands) = pictures.finish()?;
-    say(&commands, json)?;
     let left_out = session.left_out()?;
     let summary = summary::summary(&mut session, &records, left_out, video);
     atomic::write(&output.join("summary.json"), (serde_json::to_string_pretty(&summary)? + "\n").as_bytes())?;
     session.write_requests()?;
     brickwalk_report::write(output, &fields())?;
+    let frames = output.join("frames");
+    let mut last = vec![format!("{}: {}", frames.display(), counted(finished.into(), "frame"))];
+    last.push(format!("{}: report", output.join("report.html").display()));
+    say(&[last, commands].concat(), json)?;
     if finished < settings.frames {
-        bail!("interrupted after {finished} of {} frames; {} holds what is done", settings.frames, output.display());
+        bail!(
+            "interrupted after {finished} of {} frames; the finished ones are in {}",
+            settings.frames,
+            output.display()
+        );
     }
     let non_finite: u64 = records.iter().map(|r| r.non_finite).sum();
     if non_finite > 0 {
-        bail!("{non_finite} pixels were not finite; this is a defect, see records.jsonl for the frames");
+        let pixels = counted(non_finite, "non-finite pixel");
+        bail!("{pixels}; this is a bug in brickwalk, records.jsonl names the frames");
     }
     Ok(())
+}
+
+/// A frame in a line: how long it took, and of each effect the time, the schedule and what was loaded.
+fn told(frame: u32, records: &[Record]) -> String {
+    let effect = |r: &Record| {
+        let schedule = r.schedule.to_string();
+        let by = if schedule.is_empty() { String::new() } else { format!(" by {schedule}") };
+        let bytes = r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures;
+        let loaded = if bytes > 0 { format!(", {} loaded", human_bytes(bytes)) } else { String::new() };
+        format!("{} {:.1} ms{by}{loaded}", r.pass, r.ms)
+    };
+    let ms: f64 = records.iter().map(|r| r.ms).sum();
+    format!("frame {frame}: {ms:.1} ms: {}", records.iter().map(effect).collect::<Vec<_>>().join("; "))
 }
 
 /// What reports say of the fields of records.
@@ -95,7 +126,8 @@ fn fields() -> Vec<Field> {
     let of = |column: &Column| Field {
         name: column.name,
         meaning: format!("{} Unit: {}.", column.description(), column.unit),
-        adds_up: !matches!(column.kind, Kind::State | Kind::Max),
+        only: column.only,
+        adds_up: !matches!(column.kind, Kind::State | Kind::Max | Kind::Names),
     };
     written.map(of).collect()
 }
@@ -145,18 +177,11 @@ impl Watch for Watcher<'_> {
     }
 }
 
-/// Prints warnings on standard error.
-pub(super) fn warn(warnings: Vec<String>) {
-    for warning in warnings {
-        let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", super::one_line(&warning));
-    }
-}
-
-/// Prints lines on standard output, or beside it where records go there.
+/// Says lines on standard output, or beside it where records go there.
 fn say(lines: &[String], json: bool) -> Result<()> {
     let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
-    if !json {
-        return print(&text);
+    if !json || is_quiet() {
+        return note(&text);
     }
     // Whoever closed standard error does not want to know.
     let _ = std::io::stderr().write_all(text.as_bytes());

@@ -136,7 +136,7 @@ impl BrickCache {
 }
 
 fn missing(item: Item) -> ExecutorError {
-    ExecutorError::Device(format!("was to use {item}, which it does not hold; this is a defect"))
+    ExecutorError::Device(format!("was to use {item}, which it does not hold; this is a bug in brickwalk"))
 }
 
 #[cfg(test)]

@@ -173,7 +173,10 @@ fn run_kernel(
         (Some(kernel), _) => (kernel, &mut [][..]),
         (None, Some(of_family)) => of_family,
         (None, None) => {
-            return Err(ExecutorError::Device(format!("has no kernel {}; this is a defect", dispatch.kernel)));
+            return Err(ExecutorError::Device(format!(
+                "has no kernel {}; this is a bug in brickwalk",
+                dispatch.kernel
+            )));
         }
     };
     let mut target = Target {

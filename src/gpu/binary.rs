@@ -156,7 +156,7 @@ fn pipeline(
         immediate_size: 0,
     });
     let kernel = table::kernel(names::intersect_binary)
-        .ok_or_else(|| ExecutorError::Device("has no kernel over binary trees; this is a defect".into()))?;
+        .ok_or_else(|| ExecutorError::Device("has no kernel over binary trees; this is a bug in brickwalk".into()))?;
     let pipeline = kernels.make(gpu, kernel, &layout, kernels::source_with(kernel.file, kernels.pages, &binary));
     Ok((group, pipeline))
 }

@@ -263,7 +263,7 @@ impl GpuExecutor {
                 (None, None) => self.kernels.pipeline(dispatch.kernel),
             };
             let (Some(kernel), Some(pipeline)) = (kernel, pipeline) else {
-                let text = format!("has no kernel {}; this is a defect", dispatch.kernel);
+                let text = format!("has no kernel {}; this is a bug in brickwalk", dispatch.kernel);
                 return Err(ExecutorError::Device(text));
             };
             compute.set_pipeline(pipeline);

@@ -82,7 +82,7 @@ pub struct Target<'a> {
 pub fn words<const N: usize>(buffers: &mut [Vec<u32>]) -> Result<[&mut [u32]; N], ExecutorError> {
     <&mut [Vec<u32>; N]>::try_from(buffers)
         .map(|all| all.each_mut().map(Vec::as_mut_slice))
-        .map_err(|_| ExecutorError::Device("has other buffers than the kernel; this is a defect".into()))
+        .map_err(|_| ExecutorError::Device("has other buffers than the kernel; this is a bug in brickwalk".into()))
 }
 
 /// Words that several threads write.
@@ -253,7 +253,7 @@ kernels! {
             intersect_binary(b, t.own, trees);
             Ok(())
         }
-        None => Err(ExecutorError::Device("has no binary trees; this is a defect".into())),
+        None => Err(ExecutorError::Device("has no binary trees; this is a bug in brickwalk".into())),
     };
 }
 

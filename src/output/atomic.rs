@@ -170,7 +170,7 @@ impl JsonLines {
     /// # Errors
     /// The value does not serialise to JSON, or the disk is full.
     pub fn push(&mut self, row: &impl serde::Serialize) -> Result<String> {
-        let mut line = serde_json::to_string(row).with_context(|| format!("{}: a record is no JSON", self.name))?;
+        let mut line = serde_json::to_string(row).with_context(|| format!("{}: a record is not JSON", self.name))?;
         line.push('\n');
         self.file
             .write_all(line.as_bytes())

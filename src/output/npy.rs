@@ -82,13 +82,13 @@ pub fn read_rays(path: &Path) -> Result<Rays> {
     let rows = shape.iter().try_fold(1u64, |rows, &n| rows.checked_mul(n));
     // One row or none is the same in both orders.
     if header.order() != Order::C && rows != Some(0) && rows != Some(1) {
-        bail!("{name}: its rows are in Fortran order; {remedy}");
+        bail!("{name}: the array is in Fortran order; {remedy}");
     }
     let row_bytes = columns * number_bytes;
     let data = rows.and_then(|rows| rows.checked_mul(row_bytes));
     ensure!(
         data.and_then(|bytes| bytes.checked_add(header_bytes)) == Some(length),
-        "{name}: it has {length} bytes where its header promises rays of {row_bytes} in shape {shape:?}; write it again"
+        "{name}: found {length} bytes, but the header promises rays of {row_bytes} bytes in shape {shape:?}; write it again"
     );
     // As many as the file has bytes for.
     let mut rays = Vec::with_capacity(usize::try_from(rows.unwrap_or(0)).context("too many rays for this machine")?);

@@ -24,7 +24,7 @@ const MOST_NAMES: usize = 16;
 #[derive(Debug, Error)]
 pub enum MotionError {
     /// The file cannot be read.
-    #[error("{}: {source}; check the path of the motion", file.display())]
+    #[error("{}: cannot read the motion: {source}", file.display())]
     Read {
         /// The file.
         file: PathBuf,
@@ -156,7 +156,7 @@ impl RawPose {
         // Dividing by the largest component first keeps the squares in range.
         let largest = rotation.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         if !(largest > 0.0 && largest.is_finite() && rotation.iter().all(|x| x.is_finite())) {
-            return Err(format!("its rotation {rotation:?} is no quaternion [x, y, z, w] of non-zero length"));
+            return Err(format!("its rotation {rotation:?} is not a quaternion [x, y, z, w] of non-zero length"));
         }
         if !SCALES.contains(&scale) {
             return Err(format!("its scale {scale} is not from {:e} to {:e}", SCALES.start(), SCALES.end()));
@@ -257,7 +257,7 @@ fn instances_of(resident: &Resident, target: &Target) -> Result<Vec<u32>, String
     let last = resident.instances.len() as u32 - 1;
     let name = match target {
         Target::Instance(number) if (1..=last).contains(number) => return Ok(vec![*number]),
-        Target::Instance(0) => return Err("instance 0 is the world that all else is baked into; name another".into()),
+        Target::Instance(0) => return Err("instance 0 is the world object, which cannot move; choose another".into()),
         Target::Instance(_) if last == 0 => return Err(NOTHING.into()),
         Target::Instance(_) => {
             return Err(format!("the scene has instances 1 to {last}; brickwalk info --instances lists them"));

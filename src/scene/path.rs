@@ -37,7 +37,7 @@ pub struct Keyframe {
 #[derive(Debug, Error)]
 pub enum PathError {
     /// The file cannot be read.
-    #[error("{}: {source}; check the path of the camera path", file.display())]
+    #[error("{}: cannot read the camera path: {source}", file.display())]
     Read {
         /// The file.
         file: PathBuf,
@@ -150,7 +150,7 @@ impl CameraPath {
             })?;
         }
         if !(path.keyframes[path.keyframes.len() - 1].time - path.keyframes[0].time).is_finite() {
-            return Err(whole("its times span more than a number can hold".into()));
+            return Err(whole("its times are too far apart for a number".into()));
         }
         Ok(path)
     }

@@ -129,6 +129,11 @@ pub fn human_count(count: u64) -> String {
     out
 }
 
+/// A count and what is counted, in the plural unless there is one: `1 brick`, `2,000 bricks`.
+pub fn counted(count: u64, thing: &str) -> String {
+    format!("{} {thing}{}", human_count(count), if count == 1 { "" } else { "s" })
+}
+
 /// The device memory for bricks and tiles of textures: bytes, or a share of the sum over all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CacheSize {

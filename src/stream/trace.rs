@@ -36,7 +36,7 @@ const FORMAT: u32 = 4;
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// The file cannot be read or written.
-    #[error("the request trace cannot be read or written")]
+    #[error("cannot read or write the recorded requests")]
     Io(#[from] std::io::Error),
     /// A line is not what it should be.
     #[error("line {line} of the request trace: {reason}")]

@@ -7,6 +7,7 @@ mod common;
 
 /// Commands on good and bad input: outputs, progress, interruption, repair.
 mod command {
+    mod checkpoints;
     mod command_line;
     mod crafted;
     mod defaults;
@@ -17,6 +18,7 @@ mod command {
     mod resume;
     mod scene_commands;
     mod trace;
+    mod words;
 }
 
 /// Hits and records against truth; equal bits whatever the cache, the schedule, the executor and the motion.

@@ -7,7 +7,7 @@ use super::scene_kind::{SceneKind, scene_help};
 use super::units::UNITS;
 #[cfg(feature = "lab")]
 use crate::cli::bench::{BenchArgs, TestArgs};
-use crate::cli::output::Usage;
+use crate::cli::output::{Usage, Verbosity};
 use crate::session::Settings;
 use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
 use crate::settings::{Adapter, CacheSize, ImageSize, SettingsError};
@@ -24,6 +24,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Parser)]
 #[command(name = "brickwalk", bin_name = "brickwalk", version, after_help = UNITS, max_term_width = 110)]
 pub struct Cli {
+    /// How much is said.
+    #[command(flatten)]
+    pub verbosity: Verbosity,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -32,34 +35,56 @@ pub struct Cli {
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Generate a city larger than the demo's cache, convert it, walk through it, write a report
+    /// Generate a city larger than the cache, convert it, walk through it, write a report
     Demo(DemoArgs),
     /// Convert scenes (.gltf, .glb, .obj, .ply, .stl) into one .bricks file
     Convert(ConvertArgs),
     /// Generate a scene and camera paths through it
     Scene(SceneArgs),
-    /// Show what a .bricks file holds, or where a triangle comes from
+    /// Show the contents of a .bricks file, or where a triangle comes from
     Info(InfoArgs),
     /// Check every checksum and reference of a .bricks file
     Verify(VerifyArgs),
-    /// Rebuild the damaged bricks and textures of a .bricks file from what it was converted from
+    /// Rebuild damaged bricks and textures of a .bricks file from its inputs
     Repair(RepairArgs),
-    /// Render a camera path to images, records and a report, without a window
+    /// Render frames along a camera path, with records and a report
     Walk(Box<WalkArgs>),
     /// Find the closest hits of given rays
     Trace(TraceArgs),
-    /// Replay a trace of brick requests against other cache sizes and policies
+    /// Replay recorded brick requests with other cache sizes and policies
     Replay(ReplayArgs),
-    /// Measure how far an image is from a reference: RMSE, relMSE, bias, FLIP
+    /// Compare an image with a reference: RMSE, relMSE, bias, FLIP
     Compare(CompareArgs),
-    /// Measure: the experiments of the CHC+RT paper, repeated
+    /// Run benchmarks: the experiments of the papers
     #[cfg(feature = "lab")]
     Bench(BenchArgs),
-    /// List what can render, and what is chosen
+    /// List the devices that can render
     Adapters(AdaptersArgs),
-    /// Check the numerical stability of this machine's device, case by case
+    /// Test this machine's device: exactness and numerical stability
     #[cfg(feature = "lab")]
     Selftest(TestArgs),
+    /// Print a completion script for a shell
+    Completions(CompletionsArgs),
+    /// Write man pages, one per command
+    Man(ManArgs),
+}
+
+/// Options of `completions`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Bash: brickwalk completions bash > ~/.local/share/bash-completion/completions/brickwalk")]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_name = "SHELL", value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// Options of `man`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Read a page with man -l DIR/brickwalk-walk.1, or write them to a man1 folder of MANPATH.")]
+pub struct ManArgs {
+    /// Folder for the pages; created if missing
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
 }
 
 /// Options of `adapters`.
@@ -75,10 +100,10 @@ pub struct AdaptersArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct DemoArgs {
-    /// Folder for the scene, the frames and the report; created when missing
+    /// Output folder for scene, frames and report; created if missing
     #[arg(short, long, value_name = "DIR", default_value = "demo-out")]
     pub output: PathBuf,
-    /// Triangles of the city, about
+    /// Triangles of the city, approximately
     #[arg(long, value_name = "COUNT", default_value = "2M", value_parser = positive_count)]
     pub triangles: u64,
     /// Frames of the walk
@@ -90,7 +115,7 @@ pub struct DemoArgs {
     /// Device memory for bricks: a size, or a share P% of all bricks
     #[arg(long, value_name = "SIZE|P%", default_value = "25%")]
     pub cache: CacheSize,
-    /// Seed of the city and of random sampling
+    /// Random seed of the city and of sampling
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
@@ -112,14 +137,13 @@ pub struct ConvertArgs {
     /// How to cut and round.
     #[command(flatten)]
     pub build: BuildArgs,
-    /// How textures are stored: bc7 (blocks, a byte a texel, of BC5 for normals, the loss measured in
-    /// docs/results/textures.md) or raw (RGBA8, four bytes)
-    #[arg(long, value_name = "ENCODING", value_parser = textures(), default_value = "bc7")]
+    /// Texture format: bc7 (BC7 blocks, BC5 for normal maps, 1 byte per texel; loss: docs/results/textures.md) or raw
+    /// (RGBA8, 4 bytes per texel)
+    #[arg(long, help_heading = "Textures", value_name = "ENCODING", value_parser = textures(), default_value = "bc7")]
     pub textures: TextureEncoding,
-    /// Keep the meshes of the nodes called NAME, and of those below them, as instances of their own, so that walk
-    /// --motion can move them; * stands for any characters, ? for one. Give it once for each name [default: none;
-    /// meshes that are used once are baked into the world]
-    #[arg(long, value_name = "NAME")]
+    /// Keep the meshes of nodes called NAME, and of nodes below them, as instances that walk --motion can move; * matches
+    /// any characters, ? one. May be repeated [default: none; meshes used once become part of the world object]
+    #[arg(long, help_heading = "Meshes", value_name = "NAME")]
     pub movable: Vec<String>,
     /// What becomes of triangles and meshes.
     #[command(flatten)]
@@ -138,15 +162,16 @@ fn textures() -> impl TypedValueParser<Value = TextureEncoding> {
 
 /// Options of what becomes of the triangles and meshes of inputs.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Meshes")]
 pub struct MeshArgs {
-    /// Drop triangles with a vertex that is not a finite number instead of refusing the input
+    /// Skip triangles with non-finite vertices instead of refusing the input
     #[arg(long)]
     pub drop_non_finite: bool,
-    /// Instances of a mesh that is used twice or more are stored once if it has at least this many triangles; smaller
-    /// ones are copied into the world
+    /// Store a mesh that is used twice or more once, if it has at least this many triangles; copies of smaller ones are
+    /// baked into the world object
     #[arg(long, value_name = "COUNT", default_value = "1K", value_parser = positive_count32)]
     pub instance_min_triangles: u32,
-    /// Most triangles of smaller meshes, all copies counted, that are copied into the world; beyond it they are stored
+    /// Most triangles of smaller meshes, all copies counted, to bake into the world object; beyond this they are stored
     /// once
     #[arg(long, value_name = "COUNT", default_value = "4M", value_parser = positive_count)]
     pub bake_budget: u64,
@@ -154,16 +179,17 @@ pub struct MeshArgs {
 
 /// Options of everything that writes a `.bricks` file.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Bricks")]
 pub struct BuildArgs {
-    /// Most triangles of a brick, 1 to 1048576; larger is faster in core, smaller reads less out of core [default:
-    /// 16384]
+    /// Most triangles per brick, 1 to 1048576; large bricks are faster in core, small ones load less out of core
+    /// [default: 16384]
     #[arg(long, value_name = "COUNT", value_parser = ranged::<1, { 1 << 20 }>)]
     pub brick_triangles: Option<u32>,
-    /// Leave out the occupancy maps of bricks, which approximate secondary rays where no brick is loaded
+    /// Write no occupancy maps; --secondary roma, auto and df need them
     #[arg(long)]
     pub no_proxies: bool,
-    /// Continue a conversion with the same inputs and options that was interrupted; without this it starts anew
-    #[arg(long)]
+    /// Continue an interrupted conversion with the same inputs and options
+    #[arg(long, help_heading = "Conversion")]
     pub resume: bool,
     /// How to work and to round.
     #[command(flatten)]
@@ -172,22 +198,22 @@ pub struct BuildArgs {
 
 /// Options of everything that converts.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Conversion")]
 pub struct WorkArgs {
-    /// Threads that convert [default: one per core]
+    /// Threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = ranged::<1, 1024>)]
     pub threads: Option<u32>,
-    /// log2 of the step that positions are rounded to, in world units [default: from the sizes of the bricks]
-    #[arg(long, value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-126..=96))]
+    /// log2 of the lattice step that positions are rounded to, in world units [default: from brick sizes]
+    #[arg(long, help_heading = "Bricks", value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-126..=96))]
     pub lattice: Option<i32>,
-    /// Memory to get by with; what does not fit goes to the disk, about 250 bytes a triangle beside the output. The
-    /// file is the same [default: a quarter of the machine's]
+    /// Memory limit; what does not fit goes to scratch files, about 250 bytes per triangle. The result is the same
+    /// [default: a quarter of the machine's memory]
     #[arg(long, value_name = "SIZE", value_parser = size_bytes)]
     pub memory: Option<u64>,
-    /// Folder for scratch files [default: that of the output]
+    /// Folder for scratch files [default: the output's folder]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
-    /// Build the trees in bricks faster: about a quarter less work in all (city, 12M triangles), for trees that cost a
-    /// ray about 6 % more (city, 1M triangles)
+    /// Build BVHs faster: about 25 % less work in all, for trees that cost about 6 % more per ray
     #[arg(long)]
     pub fast: bool,
 }
@@ -213,14 +239,14 @@ pub struct SceneArgs {
     /// 1M; of stiff scenes as listed below]
     #[arg(long, value_name = "COUNT", value_parser = positive_count)]
     pub triangles: Option<u64>,
-    /// Seed; the same seed and count make the same scene
+    /// Random seed; equal seeds and counts make equal scenes
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Store the city's trees and vehicles once and place them as instances; the triangles are the same. Terrain always
-    /// does so with what grows on it
+    /// uses instances for plants
     #[arg(long)]
     pub instanced: bool,
-    /// Place the whole scene so many times, in a square; meshes of 1000 triangles and more are stored once
+    /// Place N copies of the whole scene in a square; meshes of 1000 triangles and more are stored once
     #[arg(long, value_name = "N", default_value = "1", value_parser = ranged::<1, 1024>, conflicts_with = "instanced")]
     pub copies: u32,
     /// How to cut and round.
@@ -248,14 +274,14 @@ pub struct InfoArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Read all bricks too: the surface-area cost of the whole tree
+    /// Read all bricks, too, and show the SAH cost of the whole tree
     #[arg(long, conflicts_with = "id")]
     pub deep: bool,
-    /// Say which file, node, mesh, primitive and triangle the triangle with this id comes from
+    /// Show which file, node, mesh, primitive and triangle the triangle with id N comes from
     #[arg(long, value_name = "N")]
     pub id: Option<u32>,
-    /// List the instances, which walk --motion can move: number, node, nodes above it that convert --movable named,
-    /// mesh, triangles, bounds in world units
+    /// List the instances that walk --motion can move: number, node, parents named by convert --movable, mesh,
+    /// triangles, bounds in world units
     #[arg(long, conflicts_with_all = ["id", "deep"])]
     pub instances: bool,
 }
@@ -273,7 +299,7 @@ pub struct VerifyArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct RepairArgs {
-    /// The scene; damaged bricks and textures are written in place, everything else stays as it is
+    /// The scene; damaged bricks and textures are rewritten in place
     #[arg(value_name = "S.bricks")]
     pub scene: PathBuf,
     /// What the scene was converted from.
@@ -294,19 +320,19 @@ pub struct WalkArgs {
     /// The scene
     #[arg(value_name = "S.bricks", required_unless_present = "print_settings")]
     scene: Option<PathBuf>,
-    /// Folder for frames, records and report; created when missing
+    /// Output folder for frames, records and report; created if missing
     #[arg(short, long, value_name = "DIR", required_unless_present = "print_settings")]
     output: Option<PathBuf>,
-    /// Take settings from a file (TOML), which options of the command line go before [default: none]
+    /// Read settings from a file (TOML); options on the command line override it [default: none]
     #[arg(long = "settings", value_name = "F.toml")]
     file: Option<PathBuf>,
-    /// Print the settings in force as such a file, and end
+    /// Print the settings as a TOML file and exit
     #[arg(long)]
     pub print_settings: bool,
-    /// Print the records on standard output too, one JSON object a line
+    /// Print records on standard output, too, one JSON object per line
     #[arg(long, hide_short_help = true)]
     pub json: bool,
-    /// Show all options
+    /// Show all options, with those for experts
     #[arg(long, action = clap::ArgAction::HelpLong)]
     pub help_all: Option<bool>,
     /// Everything that renders.
@@ -356,13 +382,13 @@ pub struct TraceArgs {
     /// Without t_min and t_max they are 0 and infinity. N may be any number of axes.
     #[arg(long, value_name = "R.npy")]
     pub rays: PathBuf,
-    /// Hits: a NumPy structured array, one element a ray, shaped as the rays: t (f8), triangle (u4), u (f4), v (f4)
+    /// Hits: a NumPy structured array, one element per ray, shaped as the rays: t (f8), triangle (u4), u (f4), v (f4)
     ///
     /// t counts in lengths of the direction, +inf on a miss, where triangle is 4294967295. u weights vertex 1 and v
     /// vertex 2 of the triangle in the order of the source file; 1 - u - v weights vertex 0.
     #[arg(short, long, value_name = "H.npy")]
     pub output: PathBuf,
-    /// Ask only whether anything is hit; the output is an array of bool
+    /// Test only whether a ray hits anything; the output is an array of bool
     #[arg(long)]
     pub any: bool,
     /// Add a field to the hits: normal (three f4), the triangle's unit normal in world space
@@ -370,10 +396,10 @@ pub struct TraceArgs {
     /// Seen from its tip, vertices 0, 1, 2 of the source file run counter-clockwise. It is zero on a miss.
     #[arg(long, conflicts_with = "any")]
     pub normals: bool,
-    /// Print what was loaded as a JSON object on standard output
+    /// Print statistics as a JSON object
     #[arg(long)]
     pub json: bool,
-    /// Take settings from a file (TOML), which options of the command line go before [default: none]
+    /// Read settings from a file (TOML); options on the command line override it [default: none]
     #[arg(long = "settings", value_name = "F.toml")]
     file: Option<PathBuf>,
     /// What streams bricks.
@@ -396,23 +422,23 @@ impl TraceArgs {
 }
 
 /// What the columns of `replay` are.
-const REPLAY: &str = "A request is one use of a payload (geometry or attributes of a brick) by a pass; a load is a request \
-     that found it missing; a reload is a load of what had been loaded before. Every cache begins empty. belady-greedy evicts \
-     what is used again last: a bound that needs to know the future and ignores pages. Sizes below the two largest bricks are \
-     skipped.";
+const REPLAY: &str = "A request is one use of a payload (geometry or attributes of a brick) by a pass; a load is a request that \
+     misses the cache; loaded again is what an earlier load had brought, in any pass. Every cache begins empty. \
+     belady-greedy evicts what is used again last: a bound that knows the future and ignores pages. Sizes below the two \
+     largest bricks are skipped.";
 
 /// Options of `replay`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = format!("{REPLAY}\n\n{UNITS}"))]
 pub struct ReplayArgs {
-    /// The trace that walk or trace wrote with --requests-out
+    /// The requests that walk or trace wrote with --requests-out
     #[arg(value_name = "F")]
     pub requests: PathBuf,
-    /// Caches beside the recorded one: sizes, or shares P% of all bricks [default: 5% 10% 20% 50% 100%; with --plot 26
-    /// shares from 2% to 100%]
+    /// Cache sizes to replay beside the recorded one: sizes, or shares P% of all bricks [default: 5% 10% 20% 50% 100%;
+    /// with --plot 26 shares from 2% to 100%]
     #[arg(long, value_name = "SIZE|P%", num_args = 1.., value_delimiter = ',')]
     pub cache: Vec<CacheSize>,
-    /// Write a page with plots against the size of the cache, and a table; one file that opens offline [default: none]
+    /// Write an HTML page with plots over the cache size and a table; one file that opens offline [default: none]
     #[arg(long, value_name = "FILE.html")]
     pub plot: Option<PathBuf>,
     /// Print JSON

@@ -34,20 +34,21 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
                 .value_name(value)
                 .value_parser(parser)
                 .action(ArgAction::Append)
+                .help_heading("Inputs")
                 .allow_hyphen_values(id == "transform")
                 .help(help)
         };
         let inputs = Arg::new("inputs").value_name("INPUT").num_args(1..).value_parser(value_parser!(PathBuf));
         let inputs = match AFTER_FROM {
             false => inputs.required(true).help(
-                "Scene files (.gltf, .glb, .obj, .ply, .stl, the tileset.json of 3D Tiles) or folders of them; triangle ids \
-                 count through them in this order. --transform, --scene, --up and --unit belong to the input before them, or \
-                 to all inputs if they come before the first",
+                "Scene files (.gltf, .glb, .obj, .ply, .stl, tileset.json of 3D Tiles) or folders of them; triangle ids are \
+                 numbered in this order. --transform, --scene, --up and --unit apply to the input before them, or to all \
+                 inputs if they come first",
             ),
             // It is listed last.
             true => inputs.long("from").action(ArgAction::Append).display_order(999).help(
-                "The inputs of the conversion in their order, with their --transform, --scene, --up and --unit; give its \
-                 other options too [default: what a generated scene is made from]",
+                "The inputs of the conversion in the same order, with their --transform, --scene, --up and --unit; give \
+                 its other options, too [default: generate the scene again, if it was generated]",
             ),
         };
         command
@@ -56,9 +57,9 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
                 "transform",
                 "STEPS|MATRIX",
                 ValueParser::new(parse_transform),
-                "Placement of the input: steps in the order in which they happen (translate X Y Z, scale S or scale X Y \
-                 Z, rotate x|y|z DEGREES; metres, Y up), as in \"scale 0.5 rotate y 90 translate 10 0 -5\"; or the 12 or \
-                 16 numbers of a matrix, row by row [default: where it is]",
+                "Placement of the input: steps in order (translate X Y Z, scale S or scale X Y Z, rotate x|y|z DEGREES; \
+                 metres, Y up), as in \"scale 0.5 rotate y 90 translate 10 0 -5\"; or a matrix, 12 or 16 numbers row by \
+                 row [default: identity]",
             ))
             .arg(option(
                 "scene",
@@ -97,14 +98,14 @@ impl<const AFTER_FROM: bool> FromArgMatches for Inputs<AFTER_FROM> {
         for (i, (_, path)) in paths.into_iter().enumerate() {
             let kind = Kind::of(&path);
             let given = |option: &str, own: bool, fits: bool, remedy: &str| match own && !fits {
-                true => Err(usage(format!("--{option} does not belong to {}; {remedy}", path.display()))),
+                true => Err(usage(format!("--{option} does not apply to {}; {remedy}", path.display()))),
                 false => Ok(()),
             };
             let has_scenes = !matches!(kind, Kind::Plain | Kind::Tiles);
-            given("scene", scenes.is_own[i], has_scenes, "only glTF files have several scenes")?;
-            let remedy = "glTF is in metres with Y up: use --transform instead";
+            given("scene", scenes.is_own[i], has_scenes, "only glTF files have scenes")?;
+            let remedy = "glTF is in metres with Y up; use --transform instead";
             given("up", ups.is_own[i], kind != Kind::Gltf, remedy)?;
-            let remedy = if kind == Kind::Tiles { "tilesets are in metres: use --transform instead" } else { remedy };
+            let remedy = if kind == Kind::Tiles { "tilesets are in metres; use --transform instead" } else { remedy };
             given("unit", units.is_own[i], !matches!(kind, Kind::Gltf | Kind::Tiles), remedy)?;
             let mut input = Input::from(path);
             input.transform = transforms.values[i].unwrap_or(input.transform);
@@ -227,12 +228,12 @@ mod tests {
     #[test]
     fn what_does_not_belong_is_usage() {
         for (arguments, expected) in [
-            ("a.glb|--up|z", "--up does not belong to a.glb"),
+            ("a.glb|--up|z", "--up does not apply to a.glb"),
             ("a.glb|--unit|mm", "use --transform"),
-            ("a.stl|--scene|1", "--scene does not belong to a.stl"),
+            ("a.stl|--scene|1", "--scene does not apply to a.stl"),
             ("a.stl|--up|z|--up|y", "given twice"),
             ("a.stl|--up|x", "must be y or z"),
-            ("tileset.json|--scene|1", "--scene does not belong to tileset.json"),
+            ("tileset.json|--scene|1", "--scene does not apply to tileset.json"),
             ("tileset.json|--unit|mm", "tilesets are in metres"),
             ("a.stl|--unit|km", "mm, cm, m, in or ft"),
             ("a.stl|--transform|sideways", "cannot read"),

@@ -28,12 +28,12 @@ impl FromStr for SceneKind {
 
 /// What the help of `scene` ends with: the stiff scenes, one a line, with their triangles.
 pub fn scene_help() -> String {
-    let mut text = String::from("Cases of stiff, and their triangles unless --triangles says otherwise:\n");
+    let mut text = String::from("Cases of stiff, with their default --triangles:\n");
     for kind in Stiff::ALL {
         // Writing to a string does not fail.
         let _ = writeln!(text, "  {:<16} {:>8}  {}", kind.name(), kind.default_triangles(), kind.about());
     }
-    text + "Of these, slivers, scale-mix and far-origin have a --lattice of their own, and all but duplicates and series bricks of 64\n\
-            triangles unless --brick-triangles says otherwise. glTF holds f32, in which slivers are no longer as thin.\n\n"
+    text + "By default slivers, scale-mix and far-origin have their own --lattice, and all but duplicates and series have 64\n\
+            triangles per brick. glTF stores positions as f32, in which slivers are less thin.\n\n"
         + UNITS
 }

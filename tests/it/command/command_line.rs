@@ -78,7 +78,7 @@ fn bad_scenes_are_refused_with_status_1() {
     let everything = ["--cache", "100%", "--schedule", "plain", "--frames", "1", "--size", "32x32"];
     let (damaged, flipped_out) = (at("flipped.bricks"), at("flipped"));
     let words = [&["walk", text(&damaged), "-o", text(&flipped_out)], &everything[..]].concat();
-    refuse(&words, 1, &["flipped.bricks", "brick 7"]);
+    refuse(&words, 1, &["flipped.bricks", "brick 7", "brickwalk repair"]);
     refuse(&["walk", text(&scene), "-o", text(&out), "--cache", "1K"], 1, &["cache", "two largest bricks"]);
     refuse(
         &["walk", text(&scene), "-o", text(&out), "--cache", "20%", "--schedule", "plain"],

@@ -270,7 +270,7 @@ fn the_command_walks_with_motion_and_names_what_cannot_move() {
     let text = |path: &Path| path.display().to_string();
     let scene = at("box.bricks");
     let said = common::succeed(["scene", "cornell", "--triangles", "10K", "-o", &text(&scene)]);
-    assert!(said.contains("box.motion.json: a motion"), "{said}");
+    assert!(said.contains("box.motion.json: motion"), "{said}");
     let instances = common::succeed(["info", &text(&scene), "--instances"]);
     assert!(instances.contains("instance 1: node orbiting box"), "{instances}");
     let listed: Value =

@@ -6,6 +6,9 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Whether nothing is drawn.
+static IS_SILENT: AtomicBool = AtomicBool::new(false);
+
 /// Somebody asked a job to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
@@ -21,9 +24,14 @@ pub struct Progress {
 impl Progress {
     /// Draws on standard error when it is a terminal, else nothing.
     pub fn new() -> Self {
-        let target =
-            if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let is_drawn = std::io::stderr().is_terminal() && !IS_SILENT.load(Ordering::Relaxed);
+        let target = if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         Self { bar: ProgressBar::with_draw_target(None, target), interrupted: Arc::default() }
+    }
+
+    /// From now on nothing is drawn in this process.
+    pub fn silence() {
+        IS_SILENT.store(true, Ordering::Relaxed);
     }
 
     /// Draws nothing.

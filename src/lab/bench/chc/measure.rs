@@ -204,7 +204,7 @@ fn difference(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, tile: usize) -> Pictur
 /// Adds a frame's record of a pass.
 fn note(passes: &mut Passes, record: &Record) -> Result<()> {
     if record.non_finite > 0 {
-        bail!("{} pixels of frame {} were not finite; this is a defect", record.non_finite, record.frame);
+        bail!("{} pixels of frame {} were not finite; this is a bug in brickwalk", record.non_finite, record.frame);
     }
     let values = serde_json::to_value(record)?;
     let fields = passes.entry(record.pass.to_string()).or_default();

@@ -110,7 +110,7 @@ impl<'a> View<'a> {
         let loaded = |value: fn(&Record) -> f64| own().chain(maps()).map(value).sum::<f64>();
         let is_exact = way.is_traced();
         if output.records.iter().any(|record| record.non_finite > 0) {
-            bail!("{}: {way}: pixels were not finite; this is a defect", self.scene.display());
+            bail!("{}: {way}: pixels were not finite; this is a bug in brickwalk", self.scene.display());
         }
         let values = [
             (
