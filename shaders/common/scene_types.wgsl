@@ -71,6 +71,7 @@ struct Slot {             // where a brick lies in the cache, and its part in th
 
 const INSTANCE_IDENTITY: u32 = 1u; // object units are world units, the matrix is the identity
 const INSTANCE_MIRRORED: u32 = 2u; // the determinant of the matrix is negative
+const INSTANCE_STRETCHED: u32 = 4u; // the matrix scales directions differently; known for every frame, not in the file
 const BRICK_WIDE: u32 = 1u;        // vertices have a high and a low part
 const BRICK_INDEX32: u32 = 2u;     // indices are u32, not u16
 const BRICK_OPACITY: u32 = 4u;     // rays may pass through some of its triangles

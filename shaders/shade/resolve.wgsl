@@ -23,6 +23,12 @@ fn octahedral(word: u32) -> vec3<f32> {
     return normalize(n);
 }
 
+// Normals and tangents of vertices are unit vectors in the world before they are interpolated, as of a copy that was
+// baked into the world; where an instance does not stretch them, interpolating first gives the same directions.
+fn unit_or_zero(v: vec3<f32>) -> vec3<f32> {
+    return v * inverseSqrt(max(dot(v, v), 1.0e-30));
+}
+
 // x y + ..., rounded after every operation.
 fn rounded_dot(a: vec3<f32>, b: vec3<f32>) -> f32 {
     return barrier(barrier(barrier(a.x * b.x) + barrier(a.y * b.y)) + barrier(a.z * b.z));
@@ -83,21 +89,30 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let hit = seen_hits[index];
     let weights = vec3<f32>(1.0 - hit.u - hit.v, hit.u, hit.v);
+    let place = instances[leaf.instance];
+    let m = place.object_from_world;
+    let is_stretched = (place.flags & INSTANCE_STRETCHED) != 0u;
     var normal = vec3<f32>(0.0);
     var uvs: array<vec2<f32>, 3>;
     var uv = vec2<f32>(0.0);
     var color = vec4<f32>(0.0);
     for (var k = 0u; k < 3u; k++) {
         let v = cache_vec4(page, (at >> 2u) + corner[k]);
-        normal += weights[k] * octahedral(v.x);
+        var n = octahedral(v.x);
+        if is_stretched {
+            n = unit_or_zero(m[0].xyz * n.x + m[1].xyz * n.y + m[2].xyz * n.z);
+        }
+        normal += weights[k] * n;
         uvs[k] = bitcast<vec2<f32>>(v.yz);
         // Rounded as it stands: which tiles are read depends on it.
         uv.x = barrier(uv.x + barrier(weights[k] * uvs[k].x));
         uv.y = barrier(uv.y + barrier(weights[k] * uvs[k].y));
         color += weights[k] * unpack4x8unorm(v.w);
     }
-    let m = instances[leaf.instance].object_from_world;
-    var n = m[0].xyz * normal.x + m[1].xyz * normal.y + m[2].xyz * normal.z;
+    var n = normal;
+    if !is_stretched {
+        n = m[0].xyz * normal.x + m[1].xyz * normal.y + m[2].xyz * normal.z;
+    }
     let size = dot(n, n);
     // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric
     // one.
@@ -128,24 +143,31 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if g.state != GBUFFER_READ {
         g.footprint = footprint_of(seen_rays[index], hit.t, surface, uvs);
         if (b.flags & BRICK_DETAIL) != 0u {
+            let w = place.world_from_object;
             var along = vec3<f32>(0.0);
             for (var k = 0u; k < 3u; k++) {
                 let v = cache_vec4(page, ((at + b.details) >> 2u) + corner[k]);
-                along += weights[k] * octahedral(v.x);
+                var t = octahedral(v.x);
+                if is_stretched {
+                    t = unit_or_zero(vec3<f32>(dot(w[0].xyz, t), dot(w[1].xyz, t), dot(w[2].xyz, t)));
+                }
+                along += weights[k] * t;
                 g.handedness = bitcast<f32>(v.y);
                 uvs[k] = bitcast<vec2<f32>>(v.zw);
                 g.uv1.x = barrier(g.uv1.x + barrier(weights[k] * uvs[k].x));
                 g.uv1.y = barrier(g.uv1.y + barrier(weights[k] * uvs[k].y));
             }
             g.footprint1 = footprint_of(seen_rays[index], hit.t, surface, uvs);
-            let w = instances[leaf.instance].world_from_object;
-            g.tangent = vec3<f32>(dot(w[0].xyz, along), dot(w[1].xyz, along), dot(w[2].xyz, along));
+            g.tangent = along;
+            if !is_stretched {
+                g.tangent = vec3<f32>(dot(w[0].xyz, along), dot(w[1].xyz, along), dot(w[2].xyz, along));
+            }
             // Seen from behind, the frame is turned about with its normal.
             if is_turned {
                 g.tangent = -g.tangent;
                 g.handedness = -g.handedness;
             }
-            if (instances[leaf.instance].flags & INSTANCE_MIRRORED) != 0u {
+            if (place.flags & INSTANCE_MIRRORED) != 0u {
                 g.handedness = -g.handedness;
             }
         }

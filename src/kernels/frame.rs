@@ -160,6 +160,9 @@ impl Placed {
         let norm = |m: &DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
         let ratio = (norm(&linear) * norm(&inverse)).max(1.0);
         record.scale = ratio as f32;
+        if is_stretched(&linear) {
+            record.flags |= layout::INSTANCE_STRETCHED;
+        }
         record.volume = forward.determinant().abs() as f32;
         // numerics.md, "Instances": 3.5 u κ on the direction and 3.7 u κ (|o| + |c|) on the origin; c, seen from the
         // world, is bounded by |t| and the scene's own extent, which the kernel's reach holds. 32 leaves a wide margin.
@@ -182,6 +185,15 @@ impl Placed {
         }
         out
     }
+}
+
+/// Whether a matrix scales directions differently, by more than rounding: then the inverse transpose of a sum of normals
+/// is not along the sum of theirs.
+fn is_stretched(linear: &DMat3) -> bool {
+    let squares = linear.transpose() * *linear;
+    let size = (squares.x_axis.x + squares.y_axis.y + squares.z_axis.z) / 3.0;
+    let off = (squares - DMat3::from_diagonal(DVec3::splat(size))).to_cols_array();
+    off.into_iter().any(|x| x.abs() > 1e-6 * size)
 }
 
 /// Bounds of an object's bricks in its lattice steps.

@@ -54,6 +54,7 @@ mod scenes {
 mod shading {
     mod aov;
     mod gloss;
+    mod instances;
     mod light;
     mod maps;
     mod opacity;

@@ -3,7 +3,8 @@
 
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
-    GBUFFER_FIRST, GBUFFER_READ, GBuffer, INSTANCE_MIRRORED, NO_NORMAL, NONE, Params, Ray, STATE_ATTRIBUTES, Surface,
+    GBUFFER_FIRST, GBUFFER_READ, GBuffer, INSTANCE_MIRRORED, INSTANCE_STRETCHED, NO_NORMAL, NONE, Params, Ray,
+    STATE_ATTRIBUTES, Surface,
 };
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
@@ -28,6 +29,12 @@ fn octahedral(word: u32) -> Vec3 {
     n[0] += if n[0] >= 0.0 { -t } else { t };
     n[1] += if n[1] >= 0.0 { -t } else { t };
     normalize(n)
+}
+
+/// Normals and tangents of vertices are unit vectors in the world before they are interpolated; see the kernel.
+fn unit_or_zero(v: Vec3) -> Vec3 {
+    let inverse = 1.0 / most(dot(v, v), 1.0e-30).sqrt();
+    v.map(|x| x * inverse)
 }
 
 /// What the pixel covers of the textures' unit square, an area, by ray cones; see the kernel.
@@ -72,15 +79,21 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
     let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
     let (mut normal, mut uv, mut color) = ([0.0; 3], [0.0; 2], [0.0; 4]);
     let corners = attributes.corners(surface.triangle);
+    let instance = bound.scene.leaves[surface.leaf as usize].instance;
+    let place = &bound.scene.instances[instance as usize];
+    let is_stretched = place.flags & INSTANCE_STRETCHED != 0;
+    let m = &place.object_from_world;
+    let turned = |n: Vec3| each(|k| m[0][k] * n[0] + m[1][k] * n[1] + m[2][k] * n[2]);
     for (weight, v) in weights.into_iter().zip(&corners) {
-        let (n, c) = (octahedral(v.normal), unpack4x8unorm(v.color));
+        let (mut n, c) = (octahedral(v.normal), unpack4x8unorm(v.color));
+        if is_stretched {
+            n = unit_or_zero(turned(n));
+        }
         normal = each(|k| normal[k] + weight * n[k]);
         uv = [0, 1].map(|k| uv[k] + weight * v.uv[k]);
         color = [0, 1, 2, 3].map(|k| color[k] + weight * c[k]);
     }
-    let instance = bound.scene.leaves[surface.leaf as usize].instance;
-    let m = &bound.scene.instances[instance as usize].object_from_world;
-    let mut n = each(|k| m[0][k] * normal[0] + m[1][k] * normal[1] + m[2][k] * normal[2]);
+    let mut n = if is_stretched { normal } else { turned(normal) };
     let size = dot(n, n);
     // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric
     // one.
@@ -115,16 +128,19 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
         let footprint = |uvs| footprint_of(bound.params, &seen.rays[index], hit.t, surface, uvs);
         g.footprint = footprint(corners.map(|v| v.uv));
         if let Some(details) = attributes.details(surface.triangle) {
+            let turned = |t: Vec3| place.world_from_object.map(|row| dot(xyz(row), t));
             let mut along = [0.0; 3];
             for (weight, v) in weights.into_iter().zip(&details) {
-                let t = octahedral(v.tangent);
+                let mut t = octahedral(v.tangent);
+                if is_stretched {
+                    t = unit_or_zero(turned(t));
+                }
                 along = each(|k| along[k] + weight * t[k]);
                 g.uv1 = [0, 1].map(|k| g.uv1[k] + weight * v.uv[k]);
                 g.handedness = v.handedness;
             }
             g.footprint1 = footprint(details.map(|v| v.uv));
-            let place = &bound.scene.instances[instance as usize];
-            g.tangent = place.world_from_object.map(|row| dot(xyz(row), along));
+            g.tangent = if is_stretched { along } else { turned(along) };
             // Seen from behind, the frame is turned about with its normal.
             if is_turned {
                 g.tangent = g.tangent.map(|x| -x);
