@@ -39,7 +39,7 @@ struct Params {           // What every kernel is told.
     direction: u32,       // number of the pass's direction
     environment_width: u32,  // texels of a row of the environment; 0: the sky is the background
     environment_height: u32, // rows of the environment
-    // density of the points that rays to emitters are drawn from: of an area of 1, by the luminance of its radiance
+    // density of points of emitters by power: of an area of 1, by the luminance of its radiance
     emitter_density: f32,
     diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
     padding0: u32,

@@ -26,10 +26,11 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if (params.flags & PARAM_EMITTER) != 0u {
         // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction
         // leads from the surface to the point.
-        let e = emitter_of(index);
+        let e = emitters[surfaces[index].emitter];
         let squared = dot(d, d);
         let shone = shines(e, d);
-        light = e.radiance * max(dot(g.normal, d), 0.0) * shone / (PI * squared * squared) / e.probability;
+        light = e.radiance * max(dot(g.normal, d), 0.0) * shone / (PI * squared * squared) / surfaces[index].area;
+        // By power, however it was drawn: what shares the light with it must know the same density of what it met.
         if (e.kind & EMITTER_KIND) == EMITTER_TRIANGLE {
             density = e.probability * squared * sqrt(squared) / shone;
         }

@@ -5,6 +5,7 @@
 #include "common/exact.wgsl"
 #include "common/random.wgsl"
 #include "shade/lamps.wgsl"
+#include "shade/choose.wgsl"
 
 // Rays to emitters end short of them by this share of the distance, so that what lies in their plane casts no shadow.
 const SHORT_OF_LIGHT: f32 = 1.0 / 65536.0;
@@ -52,15 +53,21 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     let index = global.y * params.width + global.x;
     let surface = seen_surfaces[index];
     var ray = Ray(surface.point, 1.0, params.sun.xyz, 0.0);
+    var chosen = Chosen(0u, 0.0);
     if surface.leaf != NONE {
         let r = random2(index, params.stream, params.seed);
         var faces = true;
         var t_max = T_INFINITE;
         if (params.flags & PARAM_EMITTER) != 0u {
-            let e = emitter_of(index);
-            ray.direction = toward(e, surface.point, r);
-            faces = shines(e, ray.direction) > 0.0;
-            t_max = select(1.0 - SHORT_OF_LIGHT, T_INFINITE, (e.kind & EMITTER_KIND) == EMITTER_DISTANT);
+            // The first two words draw the point.
+            chosen = choose_emitter(lamp_words(index).z, surface.point, surface.normal);
+            faces = chosen.emitter != NONE;
+            if faces {
+                let e = emitters[chosen.emitter];
+                ray.direction = toward(e, surface.point, r);
+                faces = shines(e, ray.direction) > 0.0;
+                t_max = select(1.0 - SHORT_OF_LIGHT, T_INFINITE, (e.kind & EMITTER_KIND) == EMITTER_DISTANT);
+            }
         } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
             let drawn = environment_sample(lamp_words(index));
             ray.direction = drawn.direction;
@@ -80,4 +87,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     rays[index] = ray;
     start_hit(index, ray.t_max, seen_hits[index].id);
+    surfaces[index].emitter = chosen.emitter;
+    surfaces[index].area = chosen.probability;
 }

@@ -147,20 +147,6 @@ fn drawn_density(drawn: EnvironmentSample) -> f32 {
     return environment[drawn.texel].w / max(drawn.level, 1.0e-7);
 }
 
-// The emitter that the ray of a pixel leads to.
-fn emitter_of(index: u32) -> Emitter {
-    if params.emitter_count == 1u {
-        return emitters[0];
-    }
-    let words = lamp_words(index);
-    // The first two draw the point.
-    let drawn = emitters[multiply_high(words.z, params.emitter_count)];
-    if words.w >= drawn.threshold {
-        return emitters[drawn.other];
-    }
-    return drawn;
-}
-
 // How an emitter shines along `d`, which leads from a surface to the point of it that was drawn: what its radiance
 // times the cosine of the surface, with d unnormalised, times this over d^4 gives is the irradiance; 0 where it does
 // not shine. Of areas that is the area turned to the surface, times the length of d; points and spots fall off by

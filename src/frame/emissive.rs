@@ -8,7 +8,7 @@ use bricks::{
 };
 use glam::DVec3;
 
-/// Most triangles of a scene that are lights: 64 MiB on the device.
+/// Most triangles of a scene that are lights: with their groups 128 MiB on the device.
 pub const MOST_TRIANGLES: u64 = 1 << 20;
 
 /// The triangles of a scene that shine, of every object.

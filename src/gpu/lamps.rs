@@ -41,14 +41,14 @@ impl LampBuffers {
         if Arc::ptr_eq(&self.lamps, lamps) {
             return Ok(false);
         }
-        let (texels, emitters) = (lamps.texels(), lamps.emitters().len());
+        let (texels, emitters) = (lamps.texels(), lamps.entries());
         let most = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
         let bytes = (emitters * size_of::<layout::Emitter>()).max(size_of_val(texels)) as u64;
         if bytes > most {
             let text = format!(
                 "{:?} holds at most {} lights and an environment of {} texels; leave emission out, or choose another --adapter",
                 gpu.info.name,
-                most / size_of::<layout::Emitter>() as u64,
+                most / (2 * size_of::<layout::Emitter>()) as u64,
                 most / 16
             );
             return Err(ExecutorError::Device(text));

@@ -1,9 +1,9 @@
 //! The environment and the emitters: what lamps beside the sun consist of, and as kernels see them.
 
+use super::emitter_groups::{Group, groups};
+pub use super::emitters::{Emitter, Shape};
 use super::frame::Frame;
 use super::layout;
-use crate::math::alias::AliasTable;
-use glam::DVec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -16,132 +16,12 @@ pub struct Environment {
     pub height: u32,
     /// Linear radiance; w is the density, over both angles, by which the texel's directions are drawn.
     pub texels: Vec<[f32; 4]>,
-    /// [`AliasTable::words`] over the texels.
+    /// [`crate::math::alias::AliasTable::words`] over the texels.
     pub table: Vec<[u32; 2]>,
     /// Its turn about +Y, radians.
     pub turn: f64,
     /// What a white surface reflects of it, by terms of its normal: `ambient` in `shaders/shade/light.wgsl`.
     pub ambient: [[f32; 3]; 9],
-}
-
-/// What an emitter is and where, in the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// Shines evenly to the side of the cross product of its edges.
-    Parallelogram {
-        /// A corner.
-        corner: DVec3,
-        /// The edges that start there.
-        edges: [DVec3; 2],
-    },
-    /// Half of that; a surface of the scene itself.
-    Triangle {
-        /// A corner.
-        corner: DVec3,
-        /// The edges that start there.
-        edges: [DVec3; 2],
-    },
-    /// Shines from a point to all sides.
-    Point {
-        /// Where.
-        position: DVec3,
-        /// The distance at which it ends (KHR_lights_punctual); 0: nowhere.
-        range: f64,
-    },
-    /// Shines from a point into a cone.
-    Spot {
-        /// Where.
-        position: DVec3,
-        /// Unit vector along the axis.
-        direction: DVec3,
-        /// As of a point.
-        range: f64,
-        /// Angles from the axis where the light begins to fall off, and where it ends, radians.
-        cone: [f64; 2],
-    },
-    /// Shines from infinity.
-    Distant {
-        /// Unit vector along the light.
-        direction: DVec3,
-    },
-}
-
-/// A light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Emitter {
-    /// What and where.
-    pub shape: Shape,
-    /// Whether an area shines to both sides.
-    pub two_sided: bool,
-    /// Linear radiance of areas, W/(m² sr); radiant intensity of points and spots, W/sr; irradiance of distant lights,
-    /// W/m².
-    pub radiance: [f32; 3],
-}
-
-impl Emitter {
-    /// What it sends out, up to a factor that all have; distant lights by what meets a scene of this radius.
-    fn power(&self, radius: f64) -> f64 {
-        let [r, g, b] = self.radiance.map(f64::from);
-        let luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-        let sides = if self.two_sided { 2.0 } else { 1.0 };
-        luminance
-            * match self.shape {
-                Shape::Parallelogram { edges: [u, v], .. } => PI * sides * u.cross(v).length(),
-                Shape::Triangle { edges: [u, v], .. } => 0.5 * PI * sides * u.cross(v).length(),
-                Shape::Point { .. } => 4.0 * PI,
-                Shape::Spot { cone: [inner, outer], .. } => 2.0 * PI * (1.0 - 0.5 * (inner.cos() + outer.cos())),
-                Shape::Distant { .. } => PI * radius * radius,
-            }
-    }
-
-    /// As kernels see it in `frame`, but for how it is drawn.
-    fn placed(&self, frame: &Frame) -> layout::Emitter {
-        let length = |d: DVec3| (d / frame.unit).as_vec3().to_array();
-        let sided = if self.two_sided { layout::EMITTER_TWO_SIDED } else { 0 };
-        let of_point = layout::Emitter {
-            // Intensity is by the square of the world's unit, distances are by that of the device's.
-            radiance: self.radiance.map(|c| (f64::from(c) / (frame.unit * frame.unit)) as f32),
-            ..Default::default()
-        };
-        let inverse = |range: f64| if range > 0.0 { (frame.unit / range) as f32 } else { 0.0 };
-        match self.shape {
-            Shape::Parallelogram { corner, edges } | Shape::Triangle { corner, edges } => layout::Emitter {
-                kind: sided
-                    | match self.shape {
-                        Shape::Triangle { .. } => layout::EMITTER_TRIANGLE,
-                        _ => layout::EMITTER_PARALLELOGRAM,
-                    },
-                corner: frame.point(corner),
-                u: length(edges[0]),
-                v: length(edges[1]),
-                radiance: self.radiance,
-                ..Default::default()
-            },
-            Shape::Point { position, range } => layout::Emitter {
-                kind: layout::EMITTER_POINT,
-                corner: frame.point(position),
-                v: [0.0, 0.0, inverse(range)],
-                ..of_point
-            },
-            Shape::Spot { position, direction, range, cone: [inner, outer] } => {
-                // KHR_lights_punctual, "Inner and outer cone angles".
-                let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
-                layout::Emitter {
-                    kind: layout::EMITTER_SPOT,
-                    corner: frame.point(position),
-                    u: direction.as_vec3().to_array(),
-                    v: [scale as f32, (-outer.cos() * scale) as f32, inverse(range)],
-                    ..of_point
-                }
-            }
-            Shape::Distant { direction } => layout::Emitter {
-                kind: layout::EMITTER_DISTANT,
-                u: direction.as_vec3().to_array(),
-                radiance: self.radiance,
-                ..Default::default()
-            },
-        }
-    }
 }
 
 /// All lamps beside the sun.
@@ -150,27 +30,28 @@ pub struct Lamps {
     /// The background, where it is not the sky of [`layout::Params`].
     pub environment: Option<Environment>,
     emitters: Vec<Emitter>,
-    /// Of each emitter, by which probability it is drawn.
+    /// Of each emitter, its share of the power of all.
     probabilities: Vec<f32>,
-    table: Vec<[u32; 2]>,
+    /// By which one is drawn.
+    groups: Vec<Group>,
     /// [`Emitter::power`] of all.
     power: f64,
 }
 
 impl Lamps {
-    /// Of `emitters`, one of which is drawn by its power for every ray, in a scene of this radius in world units. Those
-    /// without light are left out.
+    /// Of `emitters`, one of which is drawn for every ray, in a scene of this radius in world units. Those without light
+    /// are left out.
     pub fn new(environment: Option<Environment>, mut emitters: Vec<Emitter>, radius: f64) -> Self {
-        // Powers that overflow draw evenly: what they light is counted as not finite.
+        // What powers that overflow light is counted as not finite.
         let power = |emitter: &Emitter| emitter.power(radius).min(1e300);
         emitters.retain(|emitter| power(emitter) > 0.0);
         let greatest = emitters.iter().map(power).fold(0.0, f64::max);
-        // What an f32 cannot divide by is drawn a little too often instead.
+        // What an f32 cannot divide by counts for a little more.
         let powers: Vec<f64> = emitters.iter().map(|e| (power(e) / greatest).max(1e-30)).collect();
         let sum: f64 = powers.iter().sum();
-        let table = AliasTable::new(&powers).unwrap_or_default().words();
         let probabilities = powers.iter().map(|p| (p / sum) as f32).collect();
-        Self { environment, emitters, probabilities, table, power: sum * greatest }
+        let groups = groups(&emitters);
+        Self { environment, emitters, probabilities, groups, power: sum * greatest }
     }
 
     /// By which a point of a surface of luminance 1 that shines to one side is drawn, for an area of 1 in world units;
@@ -190,21 +71,22 @@ impl Lamps {
         &self.emitters
     }
 
-    /// Of each emitter, by which probability it is drawn: its share of the power of all.
+    /// Of each emitter, its share of the power of all.
     pub fn probabilities(&self) -> &[f32] {
         &self.probabilities
     }
 
-    /// The emitters as kernels see them in `frame`.
+    /// The emitters as kernels see them in `frame`, and behind them their groups.
     pub fn placed(&self, frame: &Frame) -> Vec<layout::Emitter> {
-        let drawn = self.probabilities.iter().zip(&self.table);
-        let placed = |(emitter, (&probability, &[threshold, other])): (&Emitter, (&f32, &[u32; 2]))| layout::Emitter {
-            probability,
-            threshold,
-            other,
-            ..emitter.placed(frame)
-        };
-        self.emitters.iter().zip(drawn).map(placed).collect()
+        let placed =
+            |(emitter, &probability): (&Emitter, &f32)| layout::Emitter { probability, ..emitter.placed(frame) };
+        let emitters = self.emitters.iter().zip(&self.probabilities).map(placed);
+        emitters.chain(self.groups.iter().map(|group| group.placed(frame))).collect()
+    }
+
+    /// How many [`Lamps::placed`] are.
+    pub fn entries(&self) -> usize {
+        self.emitters.len() + self.groups.len()
     }
 
     /// Texels of the environment, none without one.
@@ -239,7 +121,7 @@ impl LampTables {
         &self.lamps
     }
 
-    /// The emitters in the present frame.
+    /// The emitters in the present frame, and their groups.
     pub fn emitters(&self) -> &[layout::Emitter] {
         &self.emitters
     }

@@ -10,6 +10,8 @@
 
 pub mod bound;
 pub mod dispatch;
+pub mod emitter_groups;
+pub mod emitters;
 pub mod frame;
 mod frame_executor;
 pub mod lamps;

@@ -1,8 +1,9 @@
 //! Rays from the camera and from hits: twins of `shaders/shade/generate_primary.wgsl`, `generate_shadow.wgsl`,
 //! `generate_around.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
 
+use super::choose::{Chosen, choose_emitter};
 use super::gloss::Gloss;
-use super::lamps::{drawn_light, emitter_of, environment_sample, lamp_words, shines};
+use super::lamps::{drawn_light, environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
@@ -25,14 +26,15 @@ const SHORT_OF_LIGHT: f32 = 1.0 / 65_536.0;
 /// instances.
 const BESIDE: f32 = 1.0 / 1_048_576.0;
 
-/// Makes every ray of `own`, with the triangle that it starts from.
-fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32) + Sync) {
+/// Makes every ray of `own`, with the triangle that it starts from and the emitter that it leads to.
+fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32, Chosen) + Sync) {
     let RaySet { rays, hits, surfaces } = own;
     let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
     all.enumerate().with_min_len(1024).for_each(|(index, ((ray, hit), surface))| {
-        let source;
-        (*ray, source) = make(index);
+        let (source, chosen);
+        (*ray, source, chosen) = make(index);
         (*hit, *surface) = start_hit(ray.t_max, source);
+        (surface.emitter, surface.area) = (chosen.emitter, chosen.probability);
     });
 }
 
@@ -56,7 +58,7 @@ pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
         let x = barrier(column as f32 + p.jitter[0]);
         let y = barrier(row as f32 + p.jitter[1]);
         let direction = each(|k| along(p.base[k], x, p.step_x[k], y, p.step_y[k]));
-        (Ray { origin: xyz(p.origin), t_min: 0.0, direction, t_max: T_INFINITE }, NONE)
+        (Ray { origin: xyz(p.origin), t_min: 0.0, direction, t_max: T_INFINITE }, NONE, Chosen::default())
     });
 }
 
@@ -96,15 +98,23 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
     for_each_new(own, |index| {
         let surface = &seen.surfaces[index];
         let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
+        let mut chosen = Chosen::default();
         if surface.leaf != NONE {
             let r = random2(index as u32, p.stream, p.seed);
             let mut faces = true;
             let mut t_max = T_INFINITE;
             if bound.has(PARAM_EMITTER) {
-                let e = emitter_of(bound, index, throughput);
-                ray.direction = toward(e, surface.point, r);
-                faces = shines(e, ray.direction) > 0.0;
-                t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
+                // The first two words draw the point.
+                let random = lamp_words(bound, index, throughput)[2];
+                let emitters = bound.lamps.emitters();
+                chosen = choose_emitter(emitters, p.emitter_count, random, surface.point, surface.normal);
+                faces = chosen.emitter != NONE;
+                if faces {
+                    let e = &emitters[chosen.emitter as usize];
+                    ray.direction = toward(e, surface.point, r);
+                    faces = shines(e, ray.direction) > 0.0;
+                    t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
+                }
             } else if bound.has(PARAM_ENVIRONMENT) {
                 let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
                 ray.direction = drawn.direction;
@@ -122,7 +132,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
                 ray.t_max = t_max;
             }
         }
-        (ray, seen.hits[index].id)
+        (ray, seen.hits[index].id, chosen)
     });
 }
 
@@ -163,7 +173,7 @@ pub fn for_each_leaving(own: &mut RaySet, seen: &RaySet, make: impl Fn(usize, &S
     for_each_new(own, |index| {
         let surface = &seen.surfaces[index];
         let ray = if surface.leaf == NONE { none(surface.point) } else { make(index, surface) };
-        (ray, seen.hits[index].id)
+        (ray, seen.hits[index].id, Chosen::default())
     });
 }
 

@@ -163,18 +163,6 @@ pub fn drawn_density(bound: &Bound, drawn: &EnvironmentSample) -> f32 {
     bound.lamps.lamps().texels()[drawn.texel as usize][3] / most(drawn.level, 1.0e-7)
 }
 
-/// The emitter that the ray of a pixel leads to.
-pub fn emitter_of<'a>(bound: &Bound<'a>, index: usize, throughput: &[[f32; 4]]) -> &'a Emitter {
-    let emitters = bound.lamps.emitters();
-    if let [alone] = emitters {
-        return alone;
-    }
-    // The first two draw the point.
-    let [_, _, which, stays] = lamp_words(bound, index, throughput);
-    let drawn = &emitters[multiply_high(which, bound.params.emitter_count) as usize];
-    if stays >= drawn.threshold { &emitters[drawn.other as usize] } else { drawn }
-}
-
 /// How an emitter shines along `d`, which leads from a surface to the point of it that was drawn: what its radiance
 /// times the cosine of the surface, with d unnormalised, times this over d^4 gives is the irradiance; 0 where it does
 /// not shine. Of areas that is the area turned to the surface, times the length of d; points and spots fall off by

@@ -1,5 +1,6 @@
 //! Twins of the kernels that make rays and shade what they hit.
 
+pub mod choose;
 pub mod generate;
 pub mod gloss;
 pub mod lamps;

@@ -3,8 +3,7 @@
 
 use super::gloss::Gloss;
 use super::lamps::{
-    drawn_density, drawn_light, emitter_of, environment_density, environment_sample, lamp_words, outweighs, shines,
-    sun_density,
+    drawn_density, drawn_light, environment_density, environment_sample, lamp_words, outweighs, shines, sun_density,
 };
 use super::light::{add_light as add, ambient, background, sunlight};
 use crate::kernels::bound::{Bound, Tally};
@@ -202,13 +201,14 @@ pub fn add_light(
         let light = if bound.has(PARAM_EMITTER) {
             // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction
             // leads from the surface to the point.
-            let e = emitter_of(bound, index, throughput);
+            let chosen = &own.surfaces[index];
+            let e = bound.lamps.emitter(chosen.emitter);
             let squared = dot(d, d);
             let shone = shines(e, d);
             if e.kind & EMITTER_KIND == EMITTER_TRIANGLE {
                 density = e.probability * squared * squared.sqrt() / shone;
             }
-            each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / e.probability)
+            each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / chosen.area)
         } else if bound.has(PARAM_ENVIRONMENT) {
             let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
             density = drawn_density(bound, &drawn);

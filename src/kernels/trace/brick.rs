@@ -109,7 +109,7 @@ impl BrickRay<'_> {
             area,
             source: best.source,
             pending: surface.pending,
-            padding: 0,
+            emitter: 0,
         };
     }
 }

@@ -235,7 +235,7 @@ impl Points {
             area: self.area[lane],
             source: best.source,
             pending: surface.pending,
-            padding: 0,
+            emitter: 0,
         };
     }
 }
