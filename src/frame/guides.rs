@@ -59,7 +59,7 @@ pub struct Guides {
     pub jitter: [f64; 2],
     /// Pixel by pixel.
     pub seen: Vec<Seen>,
-    /// What hits show by themselves and the light of the lamps, the mean over the samples.
+    /// What hits show by themselves and the light of sun and emitters, the mean over the samples.
     pub direct: Vec<[f32; 3]>,
     /// What has moved since the frame before.
     pub moved: Moved,
@@ -110,7 +110,7 @@ impl GuideReader {
         }
     }
 
-    /// Takes the light of the lamps, whose passes for sample `sample` have just ended.
+    /// Takes the light of sun and emitters, whose passes for sample `sample` have just ended.
     ///
     /// # Errors
     /// The device's.

@@ -145,10 +145,11 @@ impl Renderer {
                     method.after_camera_rays(engine, &mut records, &view)?;
                 }
             }
-            light(engine, methods, &mut records, ["primary", "shadow", "environment"], Pass::Shadow)?;
+            light(engine, methods, &mut records, ["primary", "shadow"], Pass::Shadow)?;
             if let Some(guides) = &mut guides {
                 guides.lamps(&mut *engine.executor, sample)?;
             }
+            light_environment(engine, methods, &mut records, "environment", Pass::Shadow)?;
             let directions = |count: u32| sample * count..(sample + 1) * count;
             for index in directions(effects.occlusion.map_or(0, |occlusion| occlusion.rays)) {
                 records
@@ -201,7 +202,7 @@ impl Renderer {
 }
 
 /// Traces rays from primary hits whose own hits are shaded, and lights those: `names` are the effects that it counts
-/// for, as in [`light`].
+/// for, as in [`light`] and [`light_environment`].
 fn bounce(
     engine: &mut Engine,
     methods: &mut Methods,
@@ -240,18 +241,21 @@ fn bounce(
             stats.add(r.executor.run(Pass::BounceShadow(Lamp::Sun), &steps, &r.cache.states)?);
             Ok(())
         }),
-        None => light(engine, methods, records, names, Pass::BounceShadow),
+        None => {
+            light(engine, methods, records, [names[0], names[1]], Pass::BounceShadow)?;
+            light_environment(engine, methods, records, names[2], Pass::BounceShadow)
+        }
     }
 }
 
-/// Lights the hits that the passes `of_lamp` start from by all lamps, with shadows if they are on; the environment has
-/// them always. The sun without shadows has been added before. Light without shadows counts for the first of the
-/// effects, rays to sun and emitters for the second, those to the environment for the third.
+/// Lights the hits that the passes `of_lamp` start from by sun and emitters, with shadows if they are on. The sun without
+/// shadows has been added before. Light without shadows counts for the first of the effects, rays to lamps for the
+/// second.
 fn light(
     engine: &mut Engine,
     methods: &mut Methods,
     records: &mut FrameRecords,
-    [name, shadow, environment]: [&'static str; 3],
+    [name, shadow]: [&'static str; 2],
     of_lamp: impl Fn(Lamp) -> Pass,
 ) -> Result<(), ExecutorError> {
     let frame = records.frame();
@@ -268,9 +272,21 @@ fn light(
             })?;
         }
     }
+    Ok(())
+}
+
+/// Lights the same hits by the environment, which always has shadows, if it is drawn; counts for the effect `name`.
+fn light_environment(
+    engine: &mut Engine,
+    methods: &mut Methods,
+    records: &mut FrameRecords,
+    name: &'static str,
+    of_lamp: impl Fn(Lamp) -> Pass,
+) -> Result<(), ExecutorError> {
     if engine.draws_environment() {
+        let frame = records.frame();
         let pass = of_lamp(Lamp::Environment);
-        records.pass(engine, environment, |r, stats| trace_and_add(r, methods, frame, pass, stats))?;
+        records.pass(engine, name, |r, stats| trace_and_add(r, methods, frame, pass, stats))?;
     }
     Ok(())
 }

@@ -35,7 +35,7 @@ pub fn not_a_number(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
             for layer in denoiser.layers_mut() {
                 for (pixel, past) in layer.past.iter_mut().enumerate().filter(|(pixel, _)| pixel % 7 == 0) {
                     past.averages.long[pixel % 3] = [f32::NAN, f32::INFINITY][pixel % 2];
-                    past.moments.mean = f64::NAN;
+                    past.moments.mean[pixel % 3] = f64::NAN;
                 }
             }
         }
@@ -48,7 +48,8 @@ pub fn not_a_number(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
         }
         shown += not_finite(&output.pixels.radiance);
         let left = denoiser.layers_mut().iter().flat_map(|layer| &layer.past);
-        let bad = left.filter(|past| !past.averages.long.iter().all(|x| x.is_finite()) || past.moments.mean.is_nan());
+        let values = left.map(|past| (past.averages.long, past.moments.mean));
+        let bad = values.filter(|(long, mean)| !long.iter().all(|x| x.is_finite()) || mean.iter().any(|x| x.is_nan()));
         checks.none(&format!("frame {frame}: pixels of the history that are not finite"), bad.count() as u64, hits);
     }
     checks.none("pixels of four pictures that are not finite", shown, 4 * 64 * 64);
@@ -67,7 +68,7 @@ pub fn running_variance(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
         // The sum of twelve even numbers has variance 1.
         let normal = (0..12).map(|_| random.unit()).sum::<f64>() - 6.0;
         let value = 1e8 + normal;
-        moments.push(value, 1.0 / f64::from(k + 1));
+        moments.push([value; 3], 1.0 / f64::from(k + 1));
         // What was put in, about the known mean.
         let put = value - 1e8;
         below += put;

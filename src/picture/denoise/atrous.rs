@@ -2,7 +2,7 @@
 
 use super::grid::Grid;
 use crate::frame::Seen;
-use crate::picture::color::luminance;
+use crate::picture::color::{difference, size};
 
 /// Levels; the pixels of level k are 2^k apart.
 pub const LEVELS: u32 = 5;
@@ -17,14 +17,14 @@ const PLANE_FIRST: f32 = 0.25;
 /// ... and the least. The more frames an average has, the less it needs of what lies around, and edges stay sharp.
 const PLANE_LEAST: f32 = 0.06;
 
-/// Light and the variance of its luminance.
+/// Light and its variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lit {
     /// Light divided by the albedo.
     pub color: [f32; 3],
-    /// Variance of its luminance, of the estimate as it stands.
+    /// Variance of the estimate as it stands, of all channels ([`size`]).
     pub variance: f32,
-    /// Whether samples are too few to tell it: then luminance tells nothing apart.
+    /// Whether samples are too few to tell it: then colour tells nothing apart.
     pub is_young: bool,
     /// Frames in the average, at least 1.
     pub length: f32,
@@ -52,7 +52,7 @@ fn smooth_variance(grid: &Grid, seen: &[Seen], lit: &[Lit], pixel: usize) -> f32
 }
 
 /// One level. Pixels without variance around them stay as they are, but for young ones. `tolerance`: standard
-/// deviations of luminance that count as alike.
+/// deviations of colour that count as alike.
 pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32) -> Vec<Lit> {
     let step = 1i32 << level;
     grid.map(|pixel| {
@@ -64,8 +64,7 @@ pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32
         if variance <= 0.0 && !own.is_young {
             return own;
         }
-        let per_luminance = if own.is_young { 0.0 } else { 1.0 / (tolerance * variance.sqrt() + 1e-12) };
-        let centre = luminance(own.color);
+        let per_size = if own.is_young { 0.0 } else { 1.0 / (tolerance * variance.sqrt() + 1e-12) };
         let plane = (PLANE_FIRST / own.length).max(PLANE_LEAST);
         let (x, y) = grid.position(pixel);
         let mut sum = [0.0f32; 3];
@@ -78,7 +77,7 @@ pub fn level(grid: &Grid, seen: &[Seen], lit: &[Lit], level: u32, tolerance: f32
             if other != pixel {
                 let distance = dx.abs().max(dy.abs()) as f32 * step as f32;
                 let off = surface.off_plane(&seen[other]) / (plane * distance);
-                let apart = (luminance(lit[other].color) - centre).abs() * per_luminance;
+                let apart = size(difference(lit[other].color, own.color)) * per_size;
                 weight *= of_normals(surface, &seen[other]) * (-off - apart).exp();
             }
             for (sum, c) in sum.iter_mut().zip(lit[other].color) {

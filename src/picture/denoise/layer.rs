@@ -6,7 +6,7 @@ use super::grid::Grid;
 use super::reproject::Taps;
 use super::{Moments, atrous, firefly};
 use crate::frame::Seen;
-use crate::picture::color::{is_finite, lerp, luminance};
+use crate::picture::color::{difference, is_finite, lerp, luminance, size, squared};
 
 /// Frames that the long average weighs alike; after them a new one weighs 1/12.
 const LONG: f32 = 12.0;
@@ -16,7 +16,7 @@ const SHORT: f32 = 4.0;
 const FEW: f32 = 2.0;
 /// The variance of sparse light is not told by a neighbourhood with fewer samples that found light.
 const LEAST_FOUND: f64 = 10.0;
-/// What a frame leaves of the luminance that counted as brightest before it.
+/// What a frame leaves of the size that counted as brightest before it.
 const FADE: f32 = 0.8;
 
 /// How a kind of light is filtered.
@@ -24,7 +24,7 @@ const FADE: f32 = 0.8;
 pub struct Kind {
     /// The neighbourhood from which variance is taken where it is not of the pixel alone, pixels to each side.
     variance_radius: i32,
-    /// Standard deviations of luminance that the filter takes as alike (σ_l of the paper).
+    /// Standard deviations of colour that the filter takes as alike (σ_l of the paper).
     tolerance: f32,
     /// Whether most of a pixel's samples may find nothing and a few much: then single pixels may be far brighter than
     /// what they stand for, and those that are black are not for that certain to be. The neighbourhood's samples tell
@@ -37,7 +37,7 @@ impl Kind {
     /// so that the variance over frames is taken as soon as there is one. Its samples are bounded by what shines: there
     /// are no fireflies.
     pub const LAMPS: Self = Self { variance_radius: 1, tolerance: 1.0, is_sparse: false };
-    /// All other light.
+    /// All other light, the environment's among it.
     pub const OTHER: Self = Self { variance_radius: 3, tolerance: 4.0, is_sparse: true };
 }
 
@@ -46,9 +46,9 @@ impl Kind {
 pub struct Past {
     /// The averages; the long one after the first level of the filter.
     pub averages: Averages,
-    /// Of the luminance of single frames.
+    /// Of single frames.
     pub moments: Moments,
-    /// The brightest luminance of single frames, uncut; it fades.
+    /// The greatest size of single frames, uncut; it fades.
     pub brightest: f32,
     /// Frames that the long average has, 0 where there is none.
     pub length: f32,
@@ -57,7 +57,7 @@ pub struct Past {
 impl Past {
     fn is_finite(&self) -> bool {
         let Self { averages, moments, brightest, length } = self;
-        let sum = moments.mean + moments.spread + moments.squares + f64::from(*brightest);
+        let sum = moments.mean.iter().sum::<f64>() + moments.spread + moments.squares + f64::from(*brightest);
         is_finite(&averages.long) && is_finite(&averages.short) && sum.is_finite() && length.is_finite()
     }
 }
@@ -119,20 +119,21 @@ fn advanced(mut past: Past, light: Option<[f32; 3]>) -> Past {
     let alpha = 1.0 / past.length;
     past.averages.long = lerp(past.averages.long, light, alpha);
     past.averages.short = lerp(past.averages.short, light, alpha.max(1.0 / SHORT));
-    past.moments.push(luminance(light).into(), alpha.into());
+    past.moments.push(light.map(f64::from), alpha.into());
     past
 }
 
-/// Variance of the luminance of the long averages around `pixel`, about their mean.
+/// Variance of the long averages around `pixel`, about their mean.
 fn variance_around(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, radius: i32) -> f32 {
-    let (mut count, mut mean, mut squares) = (0u32, 0.0f32, 0.0f32);
+    let (mut count, mut mean, mut squares) = (0u32, [0.0f32; 3], 0.0f32);
     let same = |other: &usize| seen[pixel].is_same_surface(&seen[*other]) && past[*other].length > 0.0;
     for other in grid.around(pixel, radius).filter(same) {
-        let l = luminance(past[other].averages.long);
+        let color = past[other].averages.long;
         count += 1;
-        let delta = l - mean;
-        mean += delta / count as f32;
-        squares += delta * (l - mean);
+        let off = difference(color, mean);
+        mean = lerp(mean, color, 1.0 / count as f32);
+        // The square of the distance from the mean before times its share that the new mean leaves.
+        squares += squared(off.map(f64::from)) as f32 * (1.0 - 1.0 / count as f32);
     }
     if count < 2 { 0.0 } else { squares.max(0.0) / (count - 1) as f32 }
 }
@@ -142,20 +143,20 @@ fn variance_around(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, radi
 /// found light: a share p of samples that find the same have the relative variance 1/p - 1, so that n of them have
 /// found n / (1 + variance / mean²) times.
 fn variance_pooled(grid: &Grid, seen: &[Seen], past: &[Past], pixel: usize, radius: i32) -> Option<f32> {
-    let (mut sum, mut mean, mut freedom) = (0.0f64, 0.0f64, 0.0f64);
+    let (mut sum, mut mean, mut freedom) = (0.0f64, [0.0f64; 3], 0.0f64);
     for other in grid.around(pixel, radius).filter(|&other| seen[pixel].is_same_surface(&seen[other])) {
         let moments = &past[other].moments;
         if let Some(variance) = moments.variance() {
             // Of n samples alike n - 1 are free, the share 1 - 1/n of them.
             let free = 1.0 / moments.squares - 1.0;
             sum += free * variance;
-            mean += free * moments.mean;
+            mean = [0, 1, 2].map(|k| mean[k] + free * moments.mean[k]);
             freedom += free;
         }
     }
-    let squared = (mean / freedom).powi(2);
+    let of_mean = squared(mean.map(|c| c / freedom));
     // Of no samples, or of none that found light, it is no number.
-    let found = freedom * squared / (squared + sum / freedom);
+    let found = freedom * of_mean / (of_mean + sum / freedom);
     (found >= LEAST_FOUND).then(|| (sum / freedom * past[pixel].moments.squares) as f32)
 }
 
@@ -185,7 +186,7 @@ impl Layer {
         let mut known = grid.map(|pixel| recall(&self.past, taps[pixel].as_ref()));
         let brightest: Vec<f32> = known.iter().map(|past| past.brightest).collect();
         for (past, light) in known.iter_mut().zip(&light) {
-            past.brightest = (FADE * past.brightest).max(light.map_or(0.0, luminance));
+            past.brightest = (FADE * past.brightest).max(light.map_or(0.0, size));
         }
         let light = if kind.is_sparse { cut(grid, seen, light, &brightest, &mut report) } else { light };
         let mut now = grid.map(|pixel| match seen[pixel].is_hit() {
@@ -232,7 +233,7 @@ fn cut(
     let mut cut = light;
     for ((light, limit), seen) in cut.iter_mut().zip(limits).zip(seen) {
         let Some(color) = light else { continue };
-        let l = luminance(*color);
+        let l = size(*color);
         if l > limit {
             let kept = color.map(|x| x * (limit / l));
             let lost = [0, 1, 2].map(|k| seen.albedo[k] * (color[k] - kept[k]));

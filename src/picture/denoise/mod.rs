@@ -2,13 +2,14 @@
 //!
 //! *Theory.* Spatiotemporal variance-guided filtering (Schied et al., "Spatiotemporal Variance-Guided Filtering", HPG
 //! 2017): light is divided by the albedo, averaged over frames where the same surface was seen, and what noise is left
-//! is filtered in space by an edge-avoiding à-trous wavelet (Dammertz et al., HPG 2010) whose tolerance in luminance
-//! follows the variance of each pixel. Light that changes is told from noise by a second, short average (Zhdan,
+//! is filtered in space by an edge-avoiding à-trous wavelet (Dammertz et al., HPG 2010) whose tolerance follows the
+//! variance of each pixel. Light that changes is told from noise by a second, short average (Zhdan,
 //! "ReBLUR", Ray Tracing Gems II, chapter 49).
 //!
-//! *What is changed.* The light of the lamps and what the other effects add are two layers, each with a history of its
-//! own ([`Layer`]): edges of shadows, which have little noise, are not mixed with the noise of occlusion and of
-//! bounces. The variance is Welford's, weighted (West 1979), and it is that of the mean, which falls as samples come
+//! *What is changed.* The light of sun and emitters and what the other effects add are two layers, each with a history
+//! of its own ([`Layer`]): edges of shadows, which have little noise, are not mixed with the noise of occlusion, of an
+//! environment and of bounces. Distances and variances of light are those of all channels, not of luminance, by which
+//! directions to an environment are drawn. The variance is Welford's, weighted (West 1979), and it is that of the mean, which falls as samples come
 //! in, so that the filter narrows. The long average gives way to the short one as far as their difference over a
 //! neighbourhood is more than chance; differences in pairs leave out what the signal itself does there. Fireflies are
 //! cut at what their neighbours allow, and the energy cut off is reported. Light that comes by a bounce may be
@@ -70,7 +71,7 @@ pub struct DenoiseReport {
 pub struct Denoiser {
     /// What the frame before saw; `None` before the first and after a change of size.
     before: Option<Guides>,
-    /// The light of the lamps, and all other light.
+    /// The light of sun and emitters, and all other light.
     layers: [Layer; 2],
     report: DenoiseReport,
 }

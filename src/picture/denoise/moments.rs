@@ -1,13 +1,15 @@
-//! Running mean and variance with weights.
+//! Running mean and variance of colours, with weights.
 
-/// Mean and variance of a stream in which a new value weighs α: Welford's recurrence as West has it for weights
+use crate::picture::color::squared;
+
+/// Mean and variance of a stream of colours in which a new value weighs α: Welford's recurrence as West has it for weights
 /// ("Updating Mean and Variance Estimates", CACM 1979). No difference of large numbers is taken, so that a spread far
 /// below the mean stays right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
     /// Weighted mean.
-    pub mean: f64,
-    /// Weighted mean of squared distances from it.
+    pub mean: [f64; 3],
+    /// Weighted mean of squared distances from it ([`squared`]).
     pub spread: f64,
     /// Sum of the squares of the weights, which sum to 1: 1/n of n equal ones; 0 before the first value.
     pub squares: f64,
@@ -16,11 +18,11 @@ pub struct Moments {
 impl Moments {
     /// Takes a value in with weight `alpha`, over 0 and at most 1; what was before keeps the rest. With 1, 1/2, 1/3...
     /// all weigh alike.
-    pub fn push(&mut self, value: f64, alpha: f64) {
+    pub fn push(&mut self, value: [f64; 3], alpha: f64) {
         let rest = 1.0 - alpha;
-        let delta = value - self.mean;
-        self.mean += alpha * delta;
-        self.spread = rest * (self.spread + alpha * delta * delta);
+        let delta = [0, 1, 2].map(|k| value[k] - self.mean[k]);
+        self.mean = [0, 1, 2].map(|k| self.mean[k] + alpha * delta[k]);
+        self.spread = rest * (self.spread + alpha * squared(delta));
         self.squares = rest * rest * self.squares + alpha * alpha;
     }
 
@@ -37,7 +39,7 @@ impl Moments {
 
     /// Adds `weight` times another.
     pub fn add(&mut self, other: &Self, weight: f64) {
-        self.mean += weight * other.mean;
+        self.mean = [0, 1, 2].map(|k| self.mean[k] + weight * other.mean[k]);
         self.spread += weight * other.spread;
         self.squares += weight * other.squares;
     }
@@ -53,11 +55,11 @@ mod tests {
         let mut moments = Moments::default();
         assert_eq!(moments.variance(), None);
         for (k, value) in values.into_iter().enumerate() {
-            moments.push(value, 1.0 / (k + 1) as f64);
+            moments.push([value; 3], 1.0 / (k + 1) as f64);
         }
         let mean = values.iter().sum::<f64>() / 5.0;
         let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 4.0;
-        assert!((moments.mean - mean).abs() < 1e-12 && (moments.squares - 0.2).abs() < 1e-12);
+        assert!((moments.mean[1] - mean).abs() < 1e-12 && (moments.squares - 0.2).abs() < 1e-12);
         assert!((moments.variance().unwrap() / variance - 1.0).abs() < 1e-12);
         assert!((moments.variance_of_mean().unwrap() / (variance / 5.0) - 1.0).abs() < 1e-12);
     }
@@ -65,7 +67,18 @@ mod tests {
     #[test]
     fn one_value_has_no_variance() {
         let mut moments = Moments::default();
-        moments.push(7.0, 1.0);
-        assert_eq!((moments.mean, moments.variance()), (7.0, None));
+        moments.push([7.0; 3], 1.0);
+        assert_eq!((moments.mean, moments.variance()), ([7.0; 3], None));
+    }
+
+    /// Directions to an environment are drawn by luminance, so that samples may differ in colour alone.
+    #[test]
+    fn colours_of_one_luminance_vary() {
+        let mut moments = Moments::default();
+        for k in 0..10 {
+            let color = if k % 2 == 0 { [1.0 / 0.2126, 0.0, 0.0] } else { [0.0, 0.0, 1.0 / 0.0722] };
+            moments.push(color, 1.0 / f64::from(k + 1));
+        }
+        assert!(moments.variance().is_some_and(|variance| variance > 1.0), "{moments:?}");
     }
 }

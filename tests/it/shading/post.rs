@@ -1,12 +1,14 @@
 //! Denoising and temporal anti-aliasing, frame after frame, against pictures of many samples.
 
 use crate::common;
-use brickwalk::frame::{FrameOutput, Guides, Light, Renderer};
+use brickwalk::frame::{Equirectangular, FrameOutput, Guides, Light, Moved, Renderer, Seen, environment};
+use brickwalk::kernels::Lamps;
 use brickwalk::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr};
 use brickwalk::picture::denoise::{Denoiser, Taa};
-use brickwalk::scene::Camera;
-use glam::DVec3;
+use brickwalk::scene::{Camera, Projection};
+use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 54;
@@ -241,6 +243,97 @@ fn a_still_view_converges_and_a_cut_begins_anew() {
     let (_, going_on) = denoised(&mut noisy, &mut denoiser, 25, &cut);
     let (_, fresh) = denoised(&mut noisy, &mut Denoiser::default(), 25, &cut);
     assert!(going_on != fresh, "histories are not used");
+}
+
+/// A small warm sun in a sky that is blue on one side and green on the other: directions are drawn by luminance, so that
+/// most samples that find light differ in colour alone.
+fn coloured_sky() -> Lamps {
+    let image = Equirectangular::of(128, 64, |d| match DVec3::from_array(d) {
+        d if d.dot(DVec3::new(0.4, 0.8, 0.45).normalize()) > 0.999 => [600.0, 400.0, 200.0],
+        d if d.x > 0.0 => [0.1, 0.3, 2.0],
+        _ => [0.2, 0.7, 0.1],
+    });
+    Lamps::new(Some(environment(image, 1.0, 0.0).0), Vec::new(), 1.0)
+}
+
+#[test]
+fn light_of_an_environment_loses_its_noise_and_its_wrong_colours() {
+    let folder = common::folder();
+    let scene = court(folder.path());
+    let renderer = |rays: &str| {
+        let options = "--effects shadow,environment,diffuse --sun-intensity 0 --denoise";
+        let mut renderer = renderer_of(&scene, &format!("{options} {rays}"));
+        renderer.light.lamps = Arc::new(coloured_sky());
+        renderer
+    };
+    let (mut noisy, mut centres) = (renderer("--diffuse-rays 1"), renderer("--diffuse-rays 4"));
+    let exact = truth_at_centres(&mut centres, &eye(0));
+    let mut output = noisy.frame(0, &eye(0)).expect("a frame");
+    let (guides, input) = (guides(&mut output), output.pixels.radiance);
+    let filtered = |guides: &Guides| {
+        let mut radiance = input.clone();
+        Denoiser::default().frame(guides.clone(), &mut radiance);
+        radiance
+    };
+    let radiance = filtered(&guides);
+    // The control: taken as light of lamps, whose samples are alike, it keeps most of its noise.
+    let as_lamps = filtered(&Guides { direct: input.clone(), ..guides });
+    let [before, after, control] = [&input, &radiance, &as_lamps].map(|picture| flip(picture, &exact));
+    let [noise, left, kept] = [&input, &radiance, &as_lamps].map(|picture| rmse(picture, &exact));
+    println!("FLIP {before:.4} to {after:.4}, as lamps {control:.4}; RMSE {noise:.4} to {left:.4}, as lamps {kept:.4}");
+    assert!(before > 2.0 * after && noise > 3.0 * left, "FLIP {before} to {after}, RMSE {noise} to {left}");
+    assert!(control > 1.3 * after, "FLIP {control} as lamps, {after}");
+}
+
+/// A wall of grey light with some noise, and in it pixels far too bright, one in blue alone, whose luminance is no more
+/// than chance.
+#[test]
+fn fireflies_of_any_colour_are_cut() {
+    let camera = eye(0);
+    let size = (WIDTH as u32, HEIGHT as u32);
+    let projection = Projection::new(&camera, size);
+    let basis = camera.ray_basis(size.0, size.1);
+    let toward = (camera.position - camera.target).normalize();
+    let seen = |i: usize| {
+        let direction = basis.direction((i % WIDTH) as f64 + 0.5, (i / WIDTH) as f64 + 0.5);
+        let point = camera.position - direction * (5.0 / direction.dot(toward));
+        let normal = toward.as_vec3();
+        let footprint = projection.footprint(point) as f32;
+        Seen { point, plane: normal, normal, id: 1, footprint, albedo: [0.5; 3], emission: [0.0; 3] }
+    };
+    let guides = Guides {
+        size,
+        projection,
+        jitter: [0.5; 2],
+        seen: (0..WIDTH * HEIGHT).map(seen).collect(),
+        direct: vec![[0.0; 3]; WIDTH * HEIGHT],
+        moved: Moved::default(),
+    };
+    let grey = |i: usize| 0.2 + 0.1 * (i.wrapping_mul(2_654_435_761) % 1024) as f32 / 1024.0;
+    let clean: Vec<[f32; 3]> = (0..WIDTH * HEIGHT).map(|i| [grey(i); 3]).collect();
+    let filtered = |planted: &[(usize, [f32; 3])]| {
+        let mut radiance = clean.clone();
+        planted.iter().for_each(|&(at, color)| radiance[at] = color);
+        let mut denoiser = Denoiser::default();
+        denoiser.frame(guides.clone(), &mut radiance);
+        (radiance, denoiser.report().fireflies)
+    };
+    let (expected, none) = filtered(&[]);
+    let place = |x: usize, y: usize| y * WIDTH + x;
+    let planted = [(place(20, 20), [900.0; 3]), (place(50, 30), [0.25, 0.25, 2.0])];
+    let (found, cut) = filtered(&planted);
+    assert_eq!((none, cut), (0, 2), "cut of the clean wall, and of two planted pixels");
+    let off = |found: &[[f32; 3]], at: usize| {
+        let of = |a: &[f32; 3], b: &[f32; 3]| Vec3::from_array(*a).distance(Vec3::from_array(*b));
+        let around = (0..9).map(|k| at - WIDTH - 1 + k % 3 + k / 3 * WIDTH);
+        around.map(|i| of(&found[i], &expected[i])).fold(0.0, f32::max)
+    };
+    for (at, _) in planted {
+        assert!(off(&found, at) < 0.03, "{} of a firefly is left", off(&found, at));
+    }
+    // The control: two beside each other vouch for each other, and stay.
+    let (found, _) = filtered(&[planted[0], (place(22, 20), [900.0; 3])]);
+    assert!(off(&found, planted[0].0) > 1.0, "light that several find is kept");
 }
 
 #[test]
