@@ -36,9 +36,10 @@ fn rounded_dot(a: vec3<f32>, b: vec3<f32>) -> f32 {
 
 // What the pixel covers of the textures' unit square, an area, by ray cones (Akenine-Möller et al. 2021, "Improved
 // shader and texture level of detail using ray cones", eq. 2): the cone's width at the hit by the cosine there,
-// squared, times the area of the triangle in texture coordinates by that in the world. Cones are as wide as a pixel and
-// go on from hits without a change, so their width follows from the way from the camera. Rounded as it stands: which
-// tiles are read depends on it.
+// squared, times the area of the triangle in texture coordinates by that in the world. A cone is as wide as the part of
+// a pixel that its sample stands for, the pixel over the root of the number of samples, so that many samples show what
+// a larger picture does. Cones go on from hits without a change, so their width follows from the way from the camera.
+// Rounded as it stands: which tiles are read depends on it.
 fn footprint_of(ray: Ray, t: f32, surface: Surface, uvs: array<vec2<f32>, 3>) -> f32 {
     let e1 = uvs[1] - uvs[0];
     let e2 = uvs[2] - uvs[0];

@@ -121,6 +121,8 @@ impl Renderer {
             let mut view =
                 camera_view(engine.scene.resident(), camera, &engine.light, &effects, engine.size, sample, seed);
             view.directions.scatter = engine.settings.guides;
+            // Each sample stands for its share of the pixel: textures are looked up by that.
+            view.params.step_y[3] /= (engine.settings.samples as f32).sqrt();
             if engine.settings.taa {
                 let [x, y] = pixel_jitter(frame, sample, engine.settings.samples);
                 view.params.jitter = [x, y, 0.0, 0.0];
