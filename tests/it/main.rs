@@ -59,6 +59,7 @@ mod shading {
     mod maps;
     mod opacity;
     mod post;
+    mod supersampling;
 }
 
 /// Methods of secondary visibility against closed forms and exact rays.
