@@ -1,13 +1,19 @@
 //! brickwalk ray traces scenes that do not fit in GPU memory, and walks a camera through them.
 //!
-//! A scene is converted once into *bricks*: subtrees of a BVH with their triangles, in one memory-mapped file. A
-//! renderer streams the bricks that rays need through a small cache on the device, a GPU or the processor. Whatever the
-//! cache holds, the picture is the same: its size changes time alone.
+#![doc = include_str!("../docs/session.svg")]
+//!
+//! # The model
+//!
+//! - A *scene* is converted once into *bricks*: subtrees of a BVH with their triangles, in one memory-mapped file.
+//!   `brickwalk convert` and `brickwalk scene` write it.
+//! - A [`Session`] opens a scene on a device, a GPU or the processor. It streams the bricks that rays need through a
+//!   small cache. Whatever the cache holds, the picture is the same: its size changes time alone.
+//! - [`Settings`] say what to render. Each has a default, its unit, range and meaning ([`settings`]), and a place in a
+//!   settings file and on the command line.
+//! - [`Session::frame`] makes a picture for a camera, and a record of what each pass did. [`Session::trace`] finds the
+//!   closest hits of given rays.
 //!
 //! # A picture and a ray
-//!
-//! [`Session`] opens a scene file. [`Settings`] say what to render; each has a default, its unit, range and meaning
-//! ([`settings`]), and a place in a settings file and on the command line.
 //!
 //! ```
 //! use brickwalk::scene::Camera;
@@ -81,6 +87,9 @@ pub mod schedule;
 pub mod secondary;
 pub mod session;
 pub mod settings;
+#[cfg(test)]
+#[path = "../tests/skip.rs"]
+mod skip;
 pub mod stream;
 
 pub use session::{Session, Settings};

@@ -25,7 +25,7 @@ if [ -z "${BRICKWALK_SCENES:-}" ] && [ -d "$root/../shared/scenes" ]; then
     export BRICKWALK_SCENES
 fi
 if [ -z "${BRICKWALK_BIN:-}" ]; then
-    prepare vulkan
+    prepare tests
     cargo build --release --quiet --manifest-path "$root/Cargo.toml"
     BRICKWALK_BIN=${CARGO_TARGET_DIR:-$root/target}/release/brickwalk
     export BRICKWALK_BIN

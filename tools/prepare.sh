@@ -1,4 +1,4 @@
-# Sourced by the scripts beside it: makes sure that cargo, a C++ compiler and linker, and for tests a Vulkan driver are
+# Sourced by the scripts beside it: makes sure that cargo, a C++ compiler and linker, and what tests want are
 # there. On Debian and its relatives it installs what is missing with apt-get; elsewhere it says what to install.
 # shellcheck shell=bash
 
@@ -44,6 +44,19 @@ have_vulkan_driver() {
     return 1
 }
 
+# A python3 that has NumPy, in any folder of PATH.
+have_numpy() {
+    local folder
+    local -a folders
+    IFS=: read -ra folders <<<"$PATH"
+    for folder in "${folders[@]}"; do
+        if [ -x "$folder/python3" ] && "$folder/python3" -c 'import numpy' 2>/dev/null; then
+            return 0
+        fi
+    done
+    return 1
+}
+
 install_packages() {
     if ! have apt-get; then
         fail "missing: $*. Install a C++ compiler, the Vulkan loader and a Vulkan driver (Fedora: gcc-c++ vulkan-loader" \
@@ -60,7 +73,18 @@ install_packages() {
         fail "apt-get install $* failed; install them, then run this again"
 }
 
-# With the argument `vulkan`, a driver too.
+# Says which tests were skipped, by the lines of the file BRICKWALK_SKIPPED; fails if there are any.
+tell_skipped() {
+    local count=0
+    if [ -s "$BRICKWALK_SKIPPED" ]; then
+        sort -u "$BRICKWALK_SKIPPED"
+        count=$(sort -u "$BRICKWALK_SKIPPED" | wc -l)
+    fi
+    echo "$count tests skipped"
+    [ "$count" -eq 0 ]
+}
+
+# With the argument `tests`, what tests want: a Vulkan driver, and NumPy where apt-get brings it.
 prepare() {
     if ! have cargo && [ -r "${HOME:-/root}/.cargo/env" ]; then
         # shellcheck source=/dev/null
@@ -73,9 +97,10 @@ prepare() {
         missing+=(g++)
     fi
     # The graphics systems of other platforms need no package.
-    if [ "${1:-}" = vulkan ] && [ "$(uname -s)" = Linux ]; then
+    if [ "${1:-}" = tests ] && [ "$(uname -s)" = Linux ]; then
         have_vulkan_loader || missing+=(libvulkan1)
         have_vulkan_driver || missing+=(mesa-vulkan-drivers)
+        ! have apt-get || have_numpy || missing+=(python3-numpy)
     fi
     if [ "${#missing[@]}" -gt 0 ]; then
         install_packages "${missing[@]}"

@@ -1,9 +1,18 @@
 #!/usr/bin/env bash
-# Runs all tests. Options go to `cargo test`. BRICKWALK_SCENES may name a folder of scene files that some tests read.
+# Runs all tests, and says at the end which were skipped and why. Options go to `cargo test`. BRICKWALK_SCENES may name
+# a folder of scene files that some tests read. Skipped tests are lines of the file that BRICKWALK_SKIPPED names.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 . "$root/tools/prepare.sh"
 
-prepare vulkan
-exec cargo test --release --workspace --manifest-path "$root/Cargo.toml" "$@"
+prepare tests
+if [ -z "${BRICKWALK_SKIPPED:-}" ]; then
+    BRICKWALK_SKIPPED=$(mktemp)
+    trap 'rm -f "$BRICKWALK_SKIPPED"' EXIT
+fi
+export BRICKWALK_SKIPPED
+status=0
+cargo test --release --workspace --manifest-path "$root/Cargo.toml" "$@" || status=$?
+tell_skipped || true
+exit "$status"

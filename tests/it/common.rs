@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Arc;
 
+pub use crate::skip::{shared_scenes, skip};
+
 /// Runs `brickwalk` with the given words.
 pub fn brickwalk<S: AsRef<std::ffi::OsStr>>(words: impl IntoIterator<Item = S>) -> Output {
     Command::new(env!("CARGO_BIN_EXE_brickwalk")).args(words).output().expect("the command starts")
@@ -38,27 +40,20 @@ pub fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
-/// The shared scenes, or `None` with a word of why.
-pub fn shared_scenes() -> Option<PathBuf> {
-    match std::env::var_os("BRICKWALK_SCENES") {
-        Some(path) => Some(PathBuf::from(path)),
-        None => {
-            println!("skipped: BRICKWALK_SCENES is not set");
-            None
-        }
+/// The name of a software adapter that can render; without one the test is skipped.
+pub fn software() -> Option<String> {
+    let listed: Value = serde_json::from_str(&succeed(["adapters", "--json"])).expect("JSON");
+    let adapters = listed["adapters"].as_array().expect("a list");
+    let found = adapters.iter().find(|a| a["kind"] == "software" && a["lacks"].is_null());
+    if found.is_none() {
+        skip("no software Vulkan");
     }
+    found.map(|a| a["name"].as_str().expect("a name").to_string())
 }
 
 /// The processor, and software Vulkan where there is some.
 pub fn adapters() -> Vec<String> {
-    let listed: Value = serde_json::from_str(&succeed(["adapters", "--json"])).expect("JSON");
-    let all = listed["adapters"].as_array().expect("a list");
-    let software = all.iter().find(|a| a["kind"] == "software" && a["lacks"].is_null());
-    let name = software.map(|a| a["name"].as_str().expect("a name").to_string());
-    if name.is_none() {
-        println!("skipped in part: no software Vulkan");
-    }
-    ["cpu".to_string()].into_iter().chain(name).collect()
+    ["cpu".to_string()].into_iter().chain(software()).collect()
 }
 
 /// A generated city in `folder`.

@@ -4,6 +4,8 @@
 //! A family of tests is a folder. `cargo test --release --test it -- exact::records::` runs one file.
 
 mod common;
+#[path = "../skip.rs"]
+mod skip;
 
 /// Commands on good and bad input: outputs, progress, interruption, repair.
 mod command {
@@ -12,6 +14,8 @@ mod command {
     mod crafted;
     mod defaults;
     mod outputs;
+    #[cfg(unix)]
+    mod pages;
     mod progress;
     mod repair;
     mod replay;
@@ -35,6 +39,7 @@ mod exact {
 
 /// The sources themselves: arrows, circles, folders.
 mod house {
+    mod skipped;
     mod sources;
     mod structure;
 }

@@ -7,12 +7,13 @@ use crate::gpu::kernels::Kernels;
 use crate::gpu::probe::*;
 use crate::kernels::frame::Frame;
 use crate::kernels::{Extent, Keep, Setup};
+use crate::skip::skip;
 use crate::stream::{HostCache, Workers};
 use std::sync::Arc;
 
-/// A device, or a note why the test is skipped.
+/// A device, or the test is skipped.
 fn device() -> Option<Gpu> {
-    Gpu::open(None).map_err(|error| println!("skipped: {error}")).ok()
+    Gpu::open(None).map_err(|error| skip(&error.to_string())).ok()
 }
 
 #[test]

@@ -48,10 +48,10 @@ const BOUND: f32 = 1.0 / 65_536.0;
 
 const EXTENT: Extent = Extent { width: 40, height: 28, tile: 16 };
 
-/// A device and its kernels, or a note why the test is skipped.
+/// A device and its kernels, or the test is skipped.
 fn device() -> Option<(Gpu, Arc<Kernels>)> {
     let Ok(gpu) = Gpu::open(None) else {
-        println!("skipped: no adapter");
+        crate::skip::skip("no adapter");
         return None;
     };
     let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true }, true));

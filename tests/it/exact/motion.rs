@@ -147,14 +147,9 @@ fn every_schedule_renders_what_a_scene_converted_there_shows() {
 
 #[test]
 fn graphics_devices_render_it_too() {
-    let listed: Value = serde_json::from_str(&common::succeed(["adapters", "--json"])).expect("JSON");
-    let adapters = listed["adapters"].as_array().expect("a list");
-    let Some(found) = adapters.iter().find(|a| a["kind"] == "software" && a["lacks"].is_null()) else {
-        println!("skipped: no software Vulkan");
-        return;
-    };
+    let Some(found) = common::software() else { return };
     // A part of the name without spaces.
-    let name = found["name"].as_str().expect("a name").split_whitespace().next().expect("a word").to_owned();
+    let name = found.split_whitespace().next().expect("a word").to_owned();
     let folder = common::folder();
     let scenes = scenes(folder.path(), false);
     let options = format!("--effects shadow,ao --ao-rays 1 --aov --adapter {name}");

@@ -2,7 +2,7 @@
 //! few pixels, the same bricks loaded by the same queries; and it does so whatever the number of its threads, and where
 //! there is no driver.
 
-use crate::common::{brickwalk, city, folder, frames, polished, polished_city, shared_scenes, succeed, walk};
+use crate::common::{brickwalk, city, folder, frames, polished, polished_city, shared_scenes, software, succeed, walk};
 use exr::prelude::{FlatSamples, read_all_flat_layers_from_file};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -11,17 +11,6 @@ use std::process::Command;
 
 const VIEW: &str = "--frames 2 --size 104x72 --aov";
 const EFFECTS: &str = "--effects shadow,ao,diffuse,glossy --ao-rays 2 --ao-length 4 --diffuse-rays 2 --rotation full";
-
-/// The name of a software adapter, or a note why the test is skipped.
-fn software() -> Option<String> {
-    let listed: Value = serde_json::from_str(&succeed(["adapters", "--json"])).expect("JSON");
-    let adapters = listed["adapters"].as_array().expect("a list");
-    let found = adapters.iter().find(|a| a["kind"] == "software" && a["lacks"].is_null());
-    if found.is_none() {
-        println!("skipped: no software Vulkan");
-    }
-    found.map(|a| a["name"].as_str().expect("a name").to_string())
-}
 
 /// Bits of the channels of an EXR by name.
 fn channels(file: &Path) -> BTreeMap<String, Vec<u32>> {

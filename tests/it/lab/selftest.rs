@@ -1,6 +1,6 @@
 //! The selftest passes with few rays, prints what scripts read, and fails with every planted defect.
 
-use crate::common;
+use crate::common::{self, skip};
 use brickwalk::gpu::device::candidates;
 use brickwalk::lab::selftest::args::SelftestArgs;
 use brickwalk::lab::selftest::case::Status;
@@ -45,7 +45,7 @@ fn every_case_passes_on_the_processor() {
 #[test]
 fn every_planted_defect_is_noticed() {
     let Some(adapter) = candidates().into_iter().find(|candidate| candidate.flaw.is_none()) else {
-        println!("skipped: no graphics adapter");
+        skip("no graphics adapter");
         return;
     };
     let name = adapter.info.name.split_whitespace().next().unwrap_or_default().to_string();

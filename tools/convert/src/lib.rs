@@ -5,4 +5,7 @@ pub mod build;
 pub mod import;
 pub mod pattern;
 pub mod progress;
+#[cfg(test)]
+#[path = "../../../tests/skip.rs"]
+mod skip;
 pub mod source;

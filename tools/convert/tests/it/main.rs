@@ -2,3 +2,5 @@
 
 mod build;
 mod import;
+#[path = "../../../../tests/skip.rs"]
+mod skip;

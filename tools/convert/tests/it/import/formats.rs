@@ -1,7 +1,7 @@
 //! OBJ, PLY and STL: what is read, and what is refused.
 
-use super::scenes::scenes;
 use super::writer::*;
+use crate::skip::shared_scenes;
 use brickwalk_convert::import::{Input, Up};
 use brickwalk_convert::source::{IDENTITY, SourceScene};
 
@@ -357,7 +357,7 @@ fn large_files_are_read_in_parts() {
 
 #[test]
 fn scans() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     for (file, expected) in [
         ("scans/bunny.ply", 69_451),
         ("scans/lucy.ply", 99_970),
@@ -406,7 +406,7 @@ fn near<const N: usize>(a: Option<&[f32; N]>, b: Option<&[f32; N]>, tolerance: f
 
 #[test]
 fn the_compressed_sponza_is_the_plain_one() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     let plain = import_one(&folder.join("sponza/Sponza.gltf")).unwrap();
     let mut compressed = import_one(&folder.join("sponza_draco/sponza_cd.glb")).unwrap();
     assert_eq!(sponza_difference(&plain, &compressed), None);

@@ -1,8 +1,8 @@
 //! Mutated bytes: importing may fail, but neither panics nor allocates out of proportion.
 
 use super::formats::{ply, stl};
-use super::scenes::scenes;
 use super::writer::*;
+use crate::skip::shared_scenes;
 use brickwalk_convert::source::SourceScene;
 use proptest::prelude::*;
 use serde_json::json;
@@ -235,7 +235,7 @@ proptest! {
     fn mutated_compressed_data_does_no_harm(
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
     ) {
-        let Some(folder) = scenes() else { return Ok(()) };
+        let Some(folder) = shared_scenes() else { return Ok(()) };
         // A file of bytes, and the file that is imported.
         for (data, scene) in [
             ("stress/DracoCompressed/0.bin", "stress/DracoCompressed/CesiumMilkTruck.gltf"),

@@ -1,7 +1,8 @@
 //! Our reading of geometry against that of the `gltf` crate, on files that both accept.
 
-use super::scenes::{files, scenes};
+use super::scenes::files;
 use super::writer::import_one;
+use crate::skip::shared_scenes;
 use brickwalk_convert::source::{Primitive, SourceScene};
 use std::path::Path;
 
@@ -74,7 +75,7 @@ fn close<const N: usize>(a: Option<Vec<[f32; N]>>, b: Option<Vec<[f32; N]>>) -> 
 
 #[test]
 fn geometry_agrees_with_the_gltf_crate() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     let mut paths = files(&folder.join("stress/asset-generator"));
     paths.retain(|path| !path.ends_with("Compatibility_04.gltf") && !path.ends_with("Compatibility_05.gltf"));
     paths.push(folder.join("stress/SimpleSparseAccessor/glTF/SimpleSparseAccessor.gltf"));

@@ -1,18 +1,10 @@
 //! The scene files of BRICKWALK_SCENES.
 
 use super::writer::import_one;
+use crate::skip::shared_scenes;
 use brickwalk_convert::source::SourceScene;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// The folder of scene files, or a note that the test is skipped.
-pub fn scenes() -> Option<PathBuf> {
-    let folder = std::env::var_os("BRICKWALK_SCENES").filter(|folder| !folder.is_empty()).map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: BRICKWALK_SCENES is not set");
-    }
-    folder
-}
 
 /// All glTF files in and below `folder`, sorted.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
@@ -40,7 +32,7 @@ fn triangles(scene: &SourceScene) -> u64 {
 
 #[test]
 fn sponza() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     let scene = scene_of(&folder.join("sponza/Sponza.gltf"));
     assert_eq!(triangles(&scene), 262_267);
     assert_eq!(scene.meshes.iter().map(|m| m.primitives.len()).sum::<usize>(), 103);
@@ -56,7 +48,7 @@ fn sponza() {
 
 #[test]
 fn asset_generator() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     let mut total = 0;
     let mut files = files(&folder.join("stress/asset-generator"));
     // Two that a reader of glTF 2.0 must refuse.
@@ -90,7 +82,7 @@ fn asset_generator() {
 /// A mirrored node: the determinant's sign is that of the product of its scales.
 #[test]
 fn negative_scales() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     let folder = folder.join("stress/asset-generator/Node_NegativeScale");
     for (file, mirrored) in
         [("00", false), ("01", true), ("02", false), ("03", true), ("04", true), ("05", false), ("06", true)]
@@ -105,7 +97,7 @@ fn negative_scales() {
 
 #[test]
 fn stress_files() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     let counts = [
         ("stress/TriangleWithoutIndices/glTF-Embedded/TriangleWithoutIndices.gltf", 1),
         ("stress/TriangleWithPaddingInGlbBin/TriangleWithPaddingInGlbBin.glb", 1),
@@ -136,7 +128,7 @@ fn stress_files() {
 
 #[test]
 fn bad_files_do_no_harm() {
-    let Some(folder) = scenes() else { return };
+    let Some(folder) = shared_scenes() else { return };
     let (mut imported, mut refused) = (0, 0);
     for path in files(&folder.join("bad")) {
         let start = Instant::now();
