@@ -44,7 +44,21 @@ pub fn device_info() -> DeviceInfo {
 pub fn available_memory() -> Option<u64> {
     let mut system = sysinfo::System::new();
     system.refresh_memory();
+    free_memory(&system)
+}
+
+/// What of a system's memory is free; sysinfo knows a control group only where it knows the machine.
+fn free_memory(system: &sysinfo::System) -> Option<u64> {
+    let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0 && system.total_memory() > 0)?;
     let group = system.cgroup_limits().map(|limits| limits.free_memory);
-    let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0);
-    machine.into_iter().chain(group).min()
+    Some(group.map_or(machine, |group| group.min(machine)))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn memory_that_is_not_told_is_unknown() {
+        assert_eq!(super::free_memory(&sysinfo::System::new()), None);
+        assert!(super::available_memory().is_none_or(|bytes| bytes > 0));
+    }
 }

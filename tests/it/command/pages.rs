@@ -125,7 +125,8 @@ fn commands_of_all_pages_are_understood() {
     let mut count = 0;
     for page in pages() {
         let text = std::fs::read_to_string(&page).expect("a page");
-        let own: Vec<String> = commands(&text).into_iter().filter(|command| command.starts_with("brickwalk ")).collect();
+        let own: Vec<String> =
+            commands(&text).into_iter().filter(|command| command.starts_with("brickwalk ")).collect();
         count += own.len();
         let refused = own.iter().filter_map(|command| misunderstood(command));
         wrong.extend(refused.map(|why| format!("{}: {why}", page.display())));

@@ -80,7 +80,9 @@ impl Stiff {
         match self {
             Self::FarOrigin => ("far-origin", "a closed bumpy sphere of radius 1, 10^7 m from the origin", 5120),
             Self::ScaleMix => ("scale-mix", "closed spheres in each other, of sizes from 10^-4 to 10^6 m", 880),
-            Self::Slivers => ("slivers", "triangles a hundred million times longer than wide", 4000),
+            Self::Slivers => {
+                ("slivers", "triangles a hundred million times longer than wide, too thin to be seen", 4000)
+            }
             Self::Sheets => ("sheets", "four sheets in one place, triangle by triangle", 1152),
             Self::Series => ("series", "a geometric series of triangles at one corner: very deep trees", 1000),
             Self::EqualCentroids => ("equal-centroids", "triangles whose boxes all have one centre", 1000),

@@ -211,7 +211,15 @@ impl Needs {
 pub(crate) fn default_memory() -> u64 {
     let mut system = sysinfo::System::new();
     system.refresh_memory();
+    share(&system)
+}
+
+/// A quarter of the memory of a system; of 4 GiB where it does not tell, as without `/proc`.
+fn share(system: &sysinfo::System) -> u64 {
     let machine = system.total_memory();
+    if machine == 0 {
+        return 1 << 30;
+    }
     let group = system.cgroup_limits().map(|limits| limits.total_memory).filter(|&limit| limit > 0);
     group.map_or(machine, |group| group.min(machine)) / 4
 }
@@ -232,3 +240,12 @@ pub(super) fn give_back() {
 /// Other allocators give back by themselves.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(super) fn give_back() {}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn memory_that_is_not_told_is_assumed() {
+        assert_eq!(super::share(&sysinfo::System::new()), 1 << 30);
+        assert!(super::default_memory() > 1 << 24);
+    }
+}
