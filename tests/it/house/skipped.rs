@@ -1,7 +1,19 @@
 //! Tests that are skipped are counted.
 
+use super::sources::files;
 use crate::common::folder;
+use std::path::Path;
 use std::process::Command;
+
+/// No test skips by a word of its own, except those that another test runs.
+#[test]
+fn tests_skip_by_one_function() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let word = ["println!(\"", "skipped"].concat();
+    let says = |file: &String| std::fs::read_to_string(root.join(file)).is_ok_and(|text| text.contains(&word));
+    let found: Vec<String> = files(root, ".rs").into_iter().filter(says).collect();
+    assert_eq!(found, ["bricks/tests/it/writer.rs", "tests/skip.rs"]);
+}
 
 /// A test that reads scene files, run without them, leaves a line that names it.
 #[test]
