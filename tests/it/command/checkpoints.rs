@@ -32,8 +32,16 @@ fn errors_fall_as_noise_does_and_are_those_of_compare() {
         for k in frame..frame + 3 {
             let samples: f64 = [4.0, 4.0, 6.0][k - frame];
             let [root, square] = [rmse[k] / rmse[k + 1], rel_mse[k] / rel_mse[k + 1]];
-            assert!((root / samples.sqrt() - 1.0).abs() < 0.2, "RMSE fell by {root} over {samples} times the samples");
-            assert!((square / samples - 1.0).abs() < 0.45, "relMSE fell by {square} over {samples} times the samples");
+            // Directions of a pixel's samples are spread evenly, so that it may fall faster than 1/√N, and not slower.
+            let (root, square) = (root / samples.sqrt(), square / samples);
+            assert!(
+                (0.85..1.7).contains(&root),
+                "RMSE fell {root} times as much as 1/√N over {samples} times the samples"
+            );
+            assert!(
+                (0.7..2.9).contains(&square),
+                "relMSE fell {square} times as much as 1/N over {samples} times the samples"
+            );
             assert!(seconds[k] < seconds[k + 1]);
         }
     }

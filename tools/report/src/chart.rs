@@ -23,7 +23,7 @@ const DASHES: [(u32, u32); 3] = [(10, 4), (5, 4), (2, 3)];
 /// Dash of limits.
 const LIMIT: (u32, u32) = (6, 4);
 /// Dash of marks.
-const MARK: (u32, u32) = (2, 2);
+const MARK: (u32, u32) = (3, 2);
 /// Above so many marks the notes count the rest.
 const NOTED_MARKS: usize = 8;
 /// Above so many frames single values are no longer marked.
@@ -369,8 +369,8 @@ impl Chart {
             .map_err(|e| e.to_string())?;
         for &(at, _) in &self.marks {
             let (dash, gap) = MARK;
-            let line =
-                DashedLineSeries::new([(at, low), (at, top)], dash * FINE, gap * FINE, AXIS.rgb().stroke_width(FINE));
+            let style = LABEL.rgb().stroke_width(FINE * 3 / 2);
+            let line = DashedLineSeries::new([(at, low), (at, top)], dash * FINE, gap * FINE, style);
             chart.draw_series(line).map_err(|e| e.to_string())?;
         }
         for (ink, bars) in self.bars() {
@@ -386,7 +386,7 @@ impl Chart {
             let width = FINE * if series.shape == Shape::Total { 5 } else { 4 } / 2;
             let style = series.ink.rgb().stroke_width(width);
             if marked && series.shape != Shape::Limit {
-                let radius = FINE * if extent.frames == 1 { 5 } else { 2 };
+                let radius = FINE * if extent.frames == 1 && !self.is_log() { 5 } else { 2 };
                 let dots = points.iter().map(|&point| Circle::new(point, radius, series.ink.rgb().filled()));
                 chart.draw_series(dots).map_err(|e| e.to_string())?;
             }
