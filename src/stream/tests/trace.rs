@@ -5,7 +5,7 @@ use crate::stream::{Counters, Item, Policy, Replay, ReplayResult, Residency, Siz
 
 /// Passes that ask for one brick each.
 fn trace_of(bricks: &[u32], sizes: &[(u64, u64)]) -> Trace {
-    let mut trace = Trace::new(&sizes, 1 << 20, 1 << 20, Policy::RoundRobin);
+    let mut trace = Trace::new(sizes, 1 << 20, 1 << 20, Policy::RoundRobin);
     for &brick in bricks {
         trace.begin_pass(0, "primary");
         trace.request(Item::geometry(brick));
