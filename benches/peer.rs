@@ -17,9 +17,10 @@ use brickwalk::kernels::payloads::BrickView;
 use brickwalk::kernels::trace::leaf::rows_point;
 use brickwalk::kernels::{Directions, Extent, View};
 use brickwalk::scene::path::CameraPath;
-use brickwalk::schedule::{Lamp, Pass, Step, plain};
+use brickwalk::schedule::{Lamp, Pass, Step};
 use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::settings::{Adapter, CacheSize, ImageSize, Schedule};
+use brickwalk::stream::Item;
 use glam::DVec3;
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
@@ -84,7 +85,8 @@ impl Ours {
         let frame = Frame::near(scene.resident(), camera.position);
         session.executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
         let Opened { executor, cache, .. } = &mut session;
-        plain::make_all_resident(&mut **executor, cache, &mut Counters::default()).expect("room for all");
+        let bricks: Vec<Item> = (0..cache.states.len() as u32).map(Item::geometry).collect();
+        cache.load_all(&mut **executor, &bricks, 64, &mut Counters::default()).expect("room for all");
         let basis = camera.ray_basis(EXTENT.width, EXTENT.height);
         let origin = frame.point(camera.position);
         let ray = |i: usize| {

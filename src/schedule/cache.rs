@@ -102,6 +102,24 @@ impl Cache {
         self.load_beside(executor, items, most, stats)
     }
 
+    /// Loads all of `items`, at most so many at a time; a cache that does not hold them all keeps the last.
+    ///
+    /// # Errors
+    /// What the executor says.
+    pub fn load_all(
+        &mut self,
+        executor: &mut dyn Executor,
+        mut items: &[Item],
+        most: usize,
+        stats: &mut Counters,
+    ) -> Result<(), ExecutorError> {
+        while !items.is_empty() {
+            let count = self.load(executor, items, most, stats)?;
+            items = &items[count..];
+        }
+        Ok(())
+    }
+
     /// The same without these limits: as many as the cache holds.
     ///
     /// # Errors

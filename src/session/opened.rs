@@ -195,6 +195,7 @@ impl Opened {
         let host = HostCache::new(settings.host_cache);
         let threads = settings.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
+        #[cfg_attr(not(feature = "lab"), expect(unused_mut))]
         let mut executor = make(needs).with_context(|| format!("{name}"))?;
         let node = size_of::<bricks::Node>() as u64;
         let nodes = scene.resident().bricks.iter().map(|brick| u64::from(brick.node_count) * node).collect();

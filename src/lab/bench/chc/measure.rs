@@ -109,12 +109,7 @@ impl<'a> Bench<'a> {
     fn load_all(&mut self) -> Result<()> {
         let Engine { executor, cache, .. } = &mut self.renderer.engine;
         let items: Vec<Item> = cache.sizes.items().map(|(item, _)| item).collect();
-        let mut rest = &items[..];
-        while !rest.is_empty() {
-            let count = cache.load(&mut **executor, rest, AT_A_TIME, &mut Counters::default())?;
-            rest = &rest[count..];
-        }
-        Ok(())
+        Ok(cache.load_all(&mut **executor, &items, AT_A_TIME, &mut Counters::default())?)
     }
 
     /// Sets the renderer up for a walk; a cache that does not hold everything is emptied.
