@@ -337,6 +337,9 @@ impl Material {
         [u, v, u, v, u, v, u, v, u, v]
     };
 
+    /// What stands for a material where a source has neither one nor vertex colours: grey, opaque and Lambertian.
+    pub const GREY: Self = Self { base_color: [0.7, 0.7, 0.7, 1.0], ..Self::DIFFUSE };
+
     /// White, opaque and Lambertian, without textures.
     pub const DIFFUSE: Self = Self {
         base_color: [1.0; 4],

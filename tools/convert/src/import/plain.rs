@@ -29,19 +29,20 @@ pub(super) fn start(path: &Path) -> Result<Start, ImportError> {
     Ok(Start { label, bytes, warnings })
 }
 
-/// The outline of `meshes` of the file at `path`, which has `hash`: each placed once, white.
+/// The outline of `meshes` of the file at `path`, which has `hash`: each placed once, of [`bare`] material.
 pub(super) fn outline(
     path: &Path,
     Start { bytes, warnings, .. }: Start,
     hash: &Xxh3,
     axes: &[f64; 12],
     meshes: Vec<MeshOutline>,
+    has_colors: bool,
 ) -> Outline {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     Outline {
         placements: meshes.iter().enumerate().map(|(m, mesh)| placement(m, &mesh.name, axes)).collect(),
         meshes,
-        materials: vec![material()],
+        materials: vec![bare(has_colors)],
         sources: vec![bricks::Source { name, bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) }],
         warnings: warnings.into_lines(),
         ..Outline::default()
@@ -51,6 +52,12 @@ pub(super) fn outline(
 /// White and matt, seen from both sides: scans and exported surfaces do not promise a winding.
 pub(super) fn material() -> Material {
     Material { flags: MATERIAL_DOUBLE_SIDED, ..Material::DIFFUSE }
+}
+
+/// The same where the file names no material: grey, unless vertices have colours.
+pub(super) fn bare(has_colors: bool) -> Material {
+    let base_color = if has_colors { Material::DIFFUSE } else { Material::GREY }.base_color;
+    Material { base_color, ..material() }
 }
 
 /// The name of a mesh that has none: that of its file without the extension.

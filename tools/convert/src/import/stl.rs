@@ -73,7 +73,7 @@ pub(super) fn open(
     let label = start.label.clone();
     budget.add(&label, 1, triangles.count())?;
     let mesh = plain::one_primitive(plain::stem(path), triangles.count());
-    let outline = plain::outline(path, start, &hash, axes, vec![mesh]);
+    let outline = plain::outline(path, start, &hash, axes, vec![mesh], false);
     Ok(Opened { outline, parts: Box::new(Stl { label, triangles, width }) })
 }
 

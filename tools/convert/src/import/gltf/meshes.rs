@@ -222,7 +222,12 @@ impl Checked {
         self.geometry.as_ref().map_or(0, |g| g.triangles)
     }
 
-    /// Material of the file; `None`: the default one.
+    /// Whether its vertices have colours.
+    pub fn has_colors(&self) -> bool {
+        self.geometry.as_ref().is_some_and(|geometry| geometry.colors.is_some())
+    }
+
+    /// Material of the file; `None`: there is none.
     pub fn material(&self) -> Option<usize> {
         self.material
     }

@@ -131,7 +131,7 @@ pub(super) fn open_within(
     }
     let (mut materials, textures) = materials::load(&file, &is_used, &mut warnings);
     if needs_default {
-        materials.push(materials::default_material());
+        materials.extend([materials::default_material(), bricks::Material::GREY]);
     }
     let image_name = |texture: &Texture| {
         let image = texture.images[0];
@@ -147,6 +147,7 @@ pub(super) fn open_within(
         sources: vec![file.source],
         warnings: warnings.into_lines(),
         has_animation,
+        has_own_light: false,
     };
     let materials = file.document.materials.len();
     let repairs = Repairs::new(file.label.clone());
@@ -158,7 +159,9 @@ impl Parts for Gltf {
     fn part(&self, mesh: usize, part: usize) -> Result<Primitive, SourceError> {
         let in_mesh = &self.meshes[mesh];
         let (number, primitive, first, end) = in_mesh.part(part);
-        let material = primitive.material().unwrap_or(self.materials) as u32;
+        // Where there is none, the default one of glTF shows the vertices' colours, grey stands for what has none.
+        let default = || self.materials + usize::from(!primitive.has_colors());
+        let material = primitive.material().unwrap_or_else(default) as u32;
         let place = || format!("{} primitive {number}", in_mesh.label);
         let read = primitive.read(first, end, material).map_err(|Problem { what, remedy }| {
             let file = self.label.clone();

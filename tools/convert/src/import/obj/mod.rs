@@ -109,7 +109,7 @@ pub(super) fn open(
     let outline = Outline {
         materials,
         textures: textures.iter().map(|texture| texture.name.clone()).collect(),
-        ..plain::outline(path, start, &hash, axes, meshes)
+        ..plain::outline(path, start, &hash, axes, meshes, false)
     };
     let Parsed { positions, colors, uvs, normals, triangles, .. } = parsed;
     let repairs = Repairs::new(label.clone());
@@ -158,9 +158,9 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
         let Some(definition) = known.get(name) else {
             // Faces before any `usemtl` have the unnamed material.
             if !name.is_empty() {
-                warnings.add("is in no material library; white used instead", place);
+                warnings.add("is in no material library; grey used instead", place);
             }
-            materials.push(plain::material());
+            materials.push(plain::bare(parsed.colors.is_some()));
             continue;
         };
         let mut material = definition.material;

@@ -78,7 +78,7 @@ pub(super) fn open(
         remedy: "give a mesh: point clouds are not read",
     })?;
     let mesh = plain::one_primitive(plain::stem(path), triangles.count());
-    let outline = plain::outline(path, start, &hash, axes, vec![mesh]);
+    let outline = plain::outline(path, start, &hash, axes, vec![mesh], vertices.colors.is_some());
     let repairs = Repairs::new(label.clone());
     Ok(Opened { outline, parts: Box::new(Ply { label, vertices, triangles, repairs }) })
 }
