@@ -1,10 +1,12 @@
 //! What a frame looks at and from where: cameras and camera paths, in f64 world space.
 
 pub mod camera;
+pub mod framing;
 pub mod motion;
 pub mod path;
 mod projection;
 
 pub use camera::{Camera, RayBasis};
-pub use path::{CameraPath, Keyframe, PathError, path_from_bounds};
+pub use framing::{Picture, path_from_bounds};
+pub use path::{CameraPath, Keyframe, PathError};
 pub use projection::Projection;

@@ -155,6 +155,17 @@ impl CameraPath {
         Ok(path)
     }
 
+    /// A path of keyframes that are known to be cameras, 10 s long, +Y up.
+    pub(super) fn of_views(fov_y_degrees: f64, views: impl ExactSizeIterator<Item = [DVec3; 2]>) -> Self {
+        let step = 10.0 / (views.len().max(2) - 1) as f64;
+        let key = |(k, [position, target]): (usize, [DVec3; 2])| Keyframe {
+            time: k as f64 * step,
+            position: position.to_array(),
+            target: target.to_array(),
+        };
+        Self { fov_y_degrees, up: default_up(), keyframes: views.enumerate().map(key).collect() }
+    }
+
     /// The keyframes, at least one, times strictly ascending.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
@@ -247,74 +258,6 @@ pub(super) fn spline<K>(
         + m_a * (s3 - 2.0 * s2 + s)
         + value(b) * (3.0 * s2 - 2.0 * s3)
         + m_b * (s3 - s2)
-}
-
-/// A path through a scene of which only the world bounds are known, 60° high, 10 s long:
-///
-/// - flatter than a quarter of its width (a city, a landscape): a flight inward above it, looking at the middle;
-/// - longer than wide, not taller than long, and in metres of a size to walk in, 10 long, 2.5 wide, 2.5 to 50 high (a
-///   hall, a street, a nave): a walk inside, along the longer horizontal axis from 1/5 to 4/5 of it, at a quarter of
-///   the height, looking ahead;
-/// - else (an object): a quarter turn around it from outside, a third of the height above the middle.
-///
-/// Bounds that are empty (`min > max`), not finite or a single point are taken as a unit cube around their middle or
-/// the origin.
-pub fn path_from_bounds(min: [f64; 3], max: [f64; 3]) -> CameraPath {
-    let (mut min, mut max) = (DVec3::from(min), DVec3::from(max));
-    if !(min.is_finite() && max.is_finite() && min.cmple(max).all() && (max - min).is_finite()) {
-        (min, max) = (DVec3::splat(-0.5), DVec3::splat(0.5));
-    }
-    let centre = min + (max - min) * 0.5;
-    // A size that moves the camera by more than the rounding of its coordinates.
-    let least = (centre.abs().max_element() * 1e-6).max(f64::MIN_POSITIVE * 1e6);
-    let mut size = max - min;
-    if size.max_element() < least {
-        size = DVec3::splat(least.max(1.0));
-        min = centre - size * 0.5;
-    }
-    let x_is_longer = size.x >= size.z;
-    let (along, across) = if x_is_longer { (DVec3::X, DVec3::Z) } else { (DVec3::Z, DVec3::X) };
-    let (length, width) = if x_is_longer { (size.x, size.z) } else { (size.z, size.x) };
-
-    let key = |time: f64, position: DVec3, target: DVec3| Keyframe {
-        time,
-        position: position.to_array(),
-        target: target.to_array(),
-    };
-    let keyframes = if size.y < 0.25 * width {
-        let above = size.y + 0.15 * length;
-        let from = centre.with_y(min.y + above) - along * (0.5 * length) - across * (0.3 * width);
-        let to = centre.with_y(min.y + 0.6 * above + 0.4 * size.y) - along * (0.15 * length) - across * (0.1 * width);
-        let middle = centre.with_y(min.y + 0.5 * size.y);
-        vec![key(0.0, from, middle), key(10.0, to, middle + along * (0.1 * length))]
-    } else if length > 1.25 * width
-        && size.y <= length
-        && length >= 10.0
-        && width >= 2.5
-        && (2.5..=50.0).contains(&size.y)
-    {
-        let at = |s: f64| centre.with_y(min.y + 0.25 * size.y) + along * ((s - 0.5) * length);
-        let sway = across * (0.04 * width);
-        let ahead = along * (0.4 * length) + DVec3::Y * (0.03 * size.y);
-        vec![
-            key(0.0, at(0.2), at(0.2) + ahead),
-            key(5.0, at(0.5) + sway, at(0.5) + ahead + sway),
-            key(10.0, at(0.8), at(0.8) + ahead - sway),
-        ]
-    } else {
-        // Far enough that the sphere around the box fills the 60° between 2/3 and all.
-        let distance = 1.1 * size.length();
-        let keys = 5;
-        (0..keys)
-            .map(|i| {
-                let share = f64::from(i) / f64::from(keys - 1);
-                let angle = (30.0 + 90.0 * share).to_radians();
-                let away = DVec3::new(angle.cos(), 0.0, angle.sin()) * distance + DVec3::Y * (size.y / 3.0);
-                key(10.0 * share, centre + away, centre)
-            })
-            .collect()
-    };
-    CameraPath { fov_y_degrees: 60.0, up: [0.0, 1.0, 0.0], keyframes }
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 use crate::frame::Renderer;
 use crate::lab::console::Console;
 use crate::output::atomic;
-use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::scene::framing::path_from_bounds;
+use crate::scene::path::CameraPath;
 use crate::schedule::cache::Cache;
 use crate::session::Settings;
 use crate::session::opened::{Opened, open_scene};

@@ -17,7 +17,7 @@ use crate::kernels::lamps::{Emitter, Lamps, Shape};
 use crate::kernels::layout::{MET, NONE, Params, Ray};
 use crate::kernels::table::KERNELS;
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
-use crate::scene::path::path_from_bounds;
+use crate::scene::framing::path_from_bounds;
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
@@ -317,6 +317,7 @@ fn render(
             seed: 3,
             tracing,
             guides: false,
+            coverage: false,
             taa: false,
             aov: false,
         },
@@ -328,7 +329,7 @@ fn render(
         captures: None,
         moved: Moved::default(),
     };
-    let mut usual = Settings { secondary: variant.method, ..Settings::default() };
+    let mut usual = Settings { secondary: variant.method, ..Settings::exact() };
     (usual.roma.size, usual.rsm.size, usual.df.size) = (32, 64, 32);
     let mut renderer = Renderer { engine, methods: methods(&usual) };
     if let Some(settings) = variant.roma.map(roma) {

@@ -4,7 +4,7 @@ use super::case::Checks;
 use super::lab::{Built, GOOD, Lab, Stage, cached, different, misses, scheduled, settings, triangles, truth_ray};
 use super::rays::{Aim, lattice_point, ray};
 use crate::kernels::layout::{NONE, Ray};
-use crate::scene::path::path_from_bounds;
+use crate::scene::framing::path_from_bounds;
 use crate::secondary::occupancy::{Settings, assemble};
 use crate::settings::{Group, Schedule};
 use anyhow::{Context, Result};

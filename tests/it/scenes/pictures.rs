@@ -1,9 +1,9 @@
 //! What every file of the shared scenes shows on its default path, and that mirrored nodes show their front.
 
-use crate::common::{folder, shared_scenes, succeed, walk};
+use crate::common::{folder, settings, shared_scenes, succeed, walk};
+use brickwalk::Session;
 use brickwalk::metrics::{Channel, load};
 use brickwalk::scene::Camera;
-use brickwalk::scene::path::path_from_bounds;
 use glam::{DMat4, DVec3};
 use std::path::{Path, PathBuf};
 
@@ -52,8 +52,9 @@ impl Picture {
         let normals = ["normal.X", "normal.Y", "normal.Z"].map(&mut floats);
         let radiance = ["R", "G", "B"].map(floats);
         let Some(Channel::Integer(ids)) = channels.remove("triangle.id") else { panic!("ids are integers") };
+        let session = Session::open(&scene, &settings(&format!("--adapter cpu --size {WIDTH}x{HEIGHT}")));
         Picture {
-            camera: path_from_bounds(min, max).frame(1, 3),
+            camera: session.expect("a session").path().frame(1, 3),
             bounds: [min, max].map(DVec3::from_array),
             triangles: info["triangles_stored"].as_u64().expect("a count"),
             all_ids: info["triangle_ids"].as_u64().expect("a count"),
