@@ -77,7 +77,7 @@ impl Ours {
             schedule: Schedule::Plain,
             size: ImageSize { width: EXTENT.width, height: EXTENT.height },
             tile: EXTENT.tile,
-            ..Settings::default()
+            ..Settings::exact()
         };
         let scene = open_scene(path).expect("the scene");
         let mut session = Opened::open(scene.clone(), path, &settings).expect("a session");

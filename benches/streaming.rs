@@ -62,7 +62,7 @@ fn streaming(c: &mut Criterion) {
 
     for (name, host_cache) in [("file", 0), ("host cache", 4 << 30)] {
         let size = ImageSize { width: 64, height: 64 };
-        let settings = Settings { cache: CacheSize::Percent(100.0), host_cache, size, ..Settings::default() };
+        let settings = Settings { cache: CacheSize::Percent(100.0), host_cache, size, ..Settings::exact() };
         let mut session = Opened::open(file.clone(), &path, &settings).expect("a session");
         let upload = session.executor.device().upload;
         let loads = place(&session, &bricks);

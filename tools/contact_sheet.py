@@ -32,7 +32,7 @@ def render(args, scene, name, options, view):
     folder = args.output / f"{name.split('.')[0].replace(' ', '-').replace(',', '')}-{view}"
     picture = folder / "frames" / "0000.png"
     if not picture.exists():
-        command = [args.brickwalk, "walk", scene, "-o", folder, "--path", f"paths/sponza_{view}.json", "--frames", "1"]
+        command = [args.brickwalk, "walk", scene, "-o", folder, "--path", f"paths/sponza_{view}.json", "--frames", "1", "--quality", "exact"]
         command += ["--size", args.size, "--effects", EFFECTS, "--diffuse-rays", "8", "--rotation", "full", "--cache", "100%"]
         command += ["--exposure", "auto", "--tone-map", "agx", "--spp", str(args.spp), *options] + (["--denoise"] if args.denoise else [])
         subprocess.run([str(word) for word in command], check=True)

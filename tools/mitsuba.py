@@ -253,6 +253,7 @@ def ours(binary, bricks, case, view, environment, white, spp, folder):
     picture, took = folder / "frames" / "0000.exr", folder / "seconds"
     if not took.exists():
         words = [binary, "walk", bricks, "-o", folder, "--path", view, "--frames", "1", "--size", f"{SIZE[0]}x{SIZE[1]}"]
+        words += ["--quality", "exact"]
         words += ["--spp", str(spp), "--aov", "--cache", "100%", *LIGHT[case]]
         if case in ("environment", "bounce"):
             words += ["--environment", environment]

@@ -22,7 +22,7 @@ pub fn city(triangles: &str, scene: &Path) {
 
 /// Walks `scene` along `path` into `output`.
 pub fn walk(scene: &Path, path: &Path, output: &Path, words: &str) {
-    brickwalk("walk", &[scene, Path::new("--path"), path, Path::new("-o"), output], words);
+    brickwalk("walk --quality exact", &[scene, Path::new("--path"), path, Path::new("-o"), output], words);
 }
 
 /// The summary of a walk.

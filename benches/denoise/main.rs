@@ -189,7 +189,7 @@ fn main() {
         return;
     }
     let tone_map: ToneMap = options.tone_map.parse().expect("a tone map");
-    let stops = Meter::new(Exposure::Auto).stops(&mean(&halves[&0][0], &halves[&0][1]), 0.0);
+    let stops = Meter::new(Exposure::AUTO, tone_map.white()).stops(&mean(&halves[&0][0], &halves[&0][1]), &[], 0.0);
     let display = Display { stops, tone_map, size: options.size() };
 
     let words = |light: &str| format!("{light} --diffuse-rays {} --seed {} --denoise", options.rays, options.seed);

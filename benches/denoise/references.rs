@@ -26,7 +26,7 @@ pub fn renderer(options: &Options, words: &str) -> Renderer {
         cache: CacheSize::Percent(100.0),
         schedule: Schedule::Plain,
         adapter: Adapter::Cpu,
-        ..Settings::default()
+        ..Settings::exact()
     };
     settings.set_options(words).expect("options of walk");
     let scene = open_scene(&options.scene).expect("the scene");

@@ -39,6 +39,9 @@ pub struct Manifest {
     pub has_alpha_blend: bool,
     /// Any emissive material in use.
     pub has_emission: bool,
+    /// It stands in a room of its own, and its emitters are all that lights it: no sun and no sky shines on it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub has_own_light: bool,
     /// Any instance besides the world.
     pub has_instances: bool,
     /// Any animation in the source (ignored, reported).
@@ -57,6 +60,10 @@ pub struct Manifest {
     pub movable: Vec<String>,
     /// Where ranges of global triangle ids come from, ascending, covering all ids; for `info --id`.
     pub provenance: Vec<Provenance>,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// One input file.

@@ -89,7 +89,7 @@ impl<'a> Info<'a> {
         // The world object always exists.
         let world = r.objects.first();
         let sizes = PayloadSource::sizes(scene);
-        let facts: [(&str, Value); 50] = [
+        let facts: [(&str, Value); 51] = [
             ("format", FORMAT.into()),
             ("file", scene.path().display().to_string().into()),
             ("file_bytes", scene.file_bytes().into()),
@@ -145,6 +145,7 @@ impl<'a> Info<'a> {
             ("has_alpha_mask", m.has_alpha_mask.into()),
             ("has_alpha_blend", m.has_alpha_blend.into()),
             ("has_emission", m.has_emission.into()),
+            ("has_own_light", m.has_own_light.into()),
             ("has_instances", m.has_instances.into()),
             ("has_animation", m.has_animation.into()),
             ("has_wide_bricks", m.has_wide_bricks.into()),

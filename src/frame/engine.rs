@@ -17,6 +17,8 @@ pub use crate::settings::Schedule;
 /// How frames are rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderSettings {
+    /// Say which pixels saw a surface.
+    pub coverage: bool,
     /// The schedule of every pass.
     pub schedule: Schedule,
     /// What is traced beside camera rays.

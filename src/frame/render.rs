@@ -52,6 +52,8 @@ pub struct FrameOutput {
     pub pixels: Pixels,
     /// One record a pass.
     pub records: Vec<Record>,
+    /// Whether the ray through the pixel's centre met a surface, where settings ask for it; else empty.
+    pub coverage: Vec<bool>,
     /// What it saw, where settings ask for it.
     pub guides: Option<Guides>,
 }
@@ -163,6 +165,9 @@ impl Renderer {
             }
             if effects.glossy {
                 bounce(engine, methods, &mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
+            }
+            if sample == 0 && engine.settings.coverage {
+                output.coverage = engine.executor.read_hits(Pass::Primary)?.iter().map(|hit| hit.id != NONE).collect();
             }
             if sample == 0 && engine.settings.aov {
                 read_aovs(engine, view.frame.unit, &mut output.pixels)?;

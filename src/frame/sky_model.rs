@@ -24,8 +24,8 @@ const MIE_HEIGHT: f64 = 1.2;
 const MIE_G: f64 = 0.8;
 /// Absorption of ozone, 1/km, at its most: 25 km above the ground, with none 15 km below and above that.
 const OZONE: Color = [0.650e-3, 1.881e-3, 0.085e-3];
-/// What the ground reflects.
-const ALBEDO: f64 = 0.3;
+/// What the ground reflects: dry grass and stone.
+const ALBEDO: Color = [0.24, 0.22, 0.18];
 /// Height of the viewer, km.
 const VIEWER: f64 = 0.2;
 /// Steps of a ray; of the rays that the tables are made of.
@@ -166,7 +166,7 @@ impl SkyModel {
             let azimuth = 2.0 * PI * (f64::from(i % SIDE) + 0.5) / f64::from(SIDE);
             let along = mu * sun + (1.0 - mu * mu).sqrt() * (1.0 - sun * sun).max(0.0).sqrt() * azimuth.cos();
             let ray = self.gather(r, mu, sun, along, TABLE_STEPS, |_| 1.0 / (4.0 * PI), |_| 1.0 / (4.0 * PI));
-            let ground = self.ground(&ray, [0.0; 3]);
+            let ground = self.ground(&ray, 1.0, [0.0; 3]);
             for k in 0..3 {
                 second[k] += (ray.light[k] + ground[k]) / f64::from(SIDE * SIDE);
                 share[k] += ray.even[k] / f64::from(SIDE * SIDE);
@@ -175,13 +175,15 @@ impl SkyModel {
         map(|k| second[k] / (1.0 - share[k]))
     }
 
-    /// What the ground at the end of a ray sends along it, lit by the sun and by a sky of this irradiance.
-    fn ground(&self, ray: &Gathered, sky: Color) -> Color {
+    /// What the ground at the end of a ray sends along it, lit by a sun of this irradiance outside of the atmosphere and
+    /// by a sky of this irradiance.
+    fn ground(&self, ray: &Gathered, sun_irradiance: f64, sky: Color) -> Color {
         if !ray.reaches_ground {
             return [0.0; 3];
         }
         let sun = self.transmittance.get(GROUND, ray.sun_at_end);
-        map(|k| ray.transmittance[k] * ALBEDO / PI * (sun[k] * ray.sun_at_end.max(0.0) + sky[k]))
+        let cosine = ray.sun_at_end.max(0.0);
+        map(|k| ray.transmittance[k] * ALBEDO[k] / PI * (sun_irradiance * sun[k] * cosine + sky[k]))
     }
 
     /// Light scattered once along a ray from radius `r`, and, as the table has it by now, more often. `mu` and `sun`
@@ -235,8 +237,14 @@ impl SkyModel {
         self.transmittance.get(GROUND + VIEWER, cosine)
     }
 
-    /// The sky and the ground, with the sun at a unit direction; +Y is up.
-    pub fn image(&self, sun: [f64; 3], width: u32, height: u32) -> Equirectangular {
+    /// The sky, `sky_scale` times as bright, and the ground, which this sky and a sun of `sun_irradiance` outside of the
+    /// atmosphere light; the sun is at a unit direction, +Y is up. Where both scales are the same, this is the model's.
+    pub fn image(
+        &self,
+        sun: [f64; 3],
+        [sun_irradiance, sky_scale]: [f64; 2],
+        [width, height]: [u32; 2],
+    ) -> Equirectangular {
         let r = GROUND + VIEWER;
         let trace = |v: f64, u: f64| {
             let (level, mu) = (PI * v).sin_cos();
@@ -255,11 +263,11 @@ impl SkyModel {
         for (row, rays) in (0..).zip(rays.chunks(width as usize)) {
             let down = |row: u32| (PI * f64::from(row) / f64::from(height)).min(PI / 2.0).sin().powi(2);
             let weight = PI * (down(row + 1) - down(row)) / f64::from(width);
-            rays.iter().for_each(|ray| (0..3).for_each(|k| sky[k] += weight * ray.light[k]));
+            rays.iter().for_each(|ray| (0..3).for_each(|k| sky[k] += weight * sky_scale * ray.light[k]));
         }
         let texel = |ray: &Gathered| {
-            let ground = self.ground(ray, sky);
-            map(|k| ray.light[k] + ground[k]).map(|c| c as f32)
+            let ground = self.ground(ray, sun_irradiance, sky);
+            map(|k| sky_scale * ray.light[k] + ground[k]).map(|c| c as f32)
         };
         Equirectangular { width, height, texels: rays.iter().map(texel).collect() }
     }
@@ -295,12 +303,36 @@ mod tests {
         }
     }
 
+    /// Looking down one sees what the ground reflects of the light that there is, and no more.
+    #[test]
+    fn the_ground_shows_the_light_that_falls_on_it() {
+        let (model, sun) = (SkyModel::new(), [0.0, 0.8, -0.6]);
+        for scales in [[1.0, 1.0], [2.0, 5.0], [0.0, 1.0], [3.0, 0.0]] {
+            let image = model.image(sun, scales, [64, 32]);
+            let sky = SkyModel::irradiance(&image);
+            let direct = model.sun(sun[1]);
+            let below = image.texels[31 * 64 + 7];
+            for k in 0..3 {
+                let reflected = ALBEDO[k] / PI * (scales[0] * direct[k] * sun[1] + sky[k]);
+                // Through 200 m of air, which takes a little and adds a little.
+                let seen = f64::from(below[k]);
+                assert!(
+                    (0.9 * reflected..1.2 * reflected + 1e-4 * scales[1]).contains(&seen),
+                    "{scales:?}: {seen} {reflected}"
+                );
+            }
+            // At the horizon the air hides where the ground ends.
+            let [above, under] = [15, 16].map(|row| f64::from(image.texels[row * 64][1]));
+            assert!(scales[1] == 0.0 || (0.5..2.0).contains(&(under / above)), "{scales:?}: {above} {under}");
+        }
+    }
+
     #[test]
     fn the_sky_is_blue_by_day_red_at_dusk_and_finite_at_night() {
         let model = SkyModel::new();
         let at = |elevation: f64| {
             let (up, level) = elevation.to_radians().sin_cos();
-            model.image([0.0, up, -level], 64, 32)
+            model.image([0.0, up, -level], [1.0; 2], [64, 32])
         };
         // Known by measurement: of a clear day's light at the ground a tenth to a fifth is the sky's.
         let (noon, sun) = (at(60.0), model.sun(60f64.to_radians().sin()));
@@ -326,8 +358,8 @@ mod tests {
         assert!(before < 1e-6, "{before}");
         // Light of all orders is more than light of one.
         let once = SkyModel { multiple: Table { columns: 2, rows: 2, values: vec![[0.0; 3]; 4] }, ..SkyModel::new() };
-        let single = SkyModel::irradiance(&once.image([0.0, 0.5, -0.866], 64, 32))[2];
-        let all = SkyModel::irradiance(&model.image([0.0, 0.5, -0.866], 64, 32))[2];
+        let single = SkyModel::irradiance(&once.image([0.0, 0.5, -0.866], [1.0; 2], [64, 32]))[2];
+        let all = SkyModel::irradiance(&model.image([0.0, 0.5, -0.866], [1.0; 2], [64, 32]))[2];
         assert!((1.05..2.5).contains(&(all / single)), "{}", all / single);
     }
 }

@@ -60,6 +60,16 @@ const ACES_OUTPUT: [[f32; 3]; 3] =
     [[1.604_75, -0.531_08, -0.073_67], [-0.102_08, 1.108_13, -0.006_05], [-0.003_27, -0.072_76, 1.076_02]];
 
 impl ToneMap {
+    /// What components may be before a picture of them is white, or one of its channels is full.
+    pub fn white(self) -> f32 {
+        match self {
+            Self::None => 0.95,
+            Self::AgX => 4.0,
+            Self::Aces => 2.0,
+            Self::Reinhard => 1.0,
+        }
+    }
+
     /// What a display shows of `color`; but for [`Self::None`], which leaves everything as it is, at least 0 and
     /// finite.
     pub fn apply(self, color: [f32; 3]) -> [f32; 3] {
@@ -149,6 +159,21 @@ mod tests {
                 let mapped = map.apply([r, g, b]);
                 assert!(mapped.iter().all(|x| x.is_finite() && *x >= 0.0), "{}: {r} {g} {b}: {mapped:?}", map.name());
             }
+        }
+    }
+
+    #[test]
+    fn white_is_not_yet_full() {
+        let colors =
+            [[1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.9, 0.6], [0.4, 0.6, 1.0]];
+        for &map in ToneMap::ALL {
+            let white = map.white();
+            for color in colors {
+                let shown = map.apply(color.map(|c| c * white));
+                // Full is 254 of 255 in sRGB.
+                assert!(shown.iter().all(|c| *c < 0.99), "{}: {color:?} becomes {shown:?}", map.name());
+            }
+            assert!(map.apply([white; 3])[1] > 0.45, "{}: it could be brighter", map.name());
         }
     }
 

@@ -24,7 +24,7 @@ const MOST_SIZE: usize = 1 << 15;
 const MOST_TEXELS: usize = 1 << 27;
 
 /// Size of the image of the physical sky.
-const SKY_SIZE: (u32, u32) = (1024, 512);
+const SKY_SIZE: [u32; 2] = [1024, 512];
 
 /// What lights a walk.
 #[derive(Clone, Debug)]
@@ -74,13 +74,16 @@ fn radius(resident: &Resident) -> f64 {
 /// # Errors
 /// An image that cannot be read or is too large; a brick that cannot be read.
 pub fn lighting(settings: &Settings, file: &SceneFile, path: &Path) -> Result<Lighting> {
+    let settings = &settings.suited(&file.resident().manifest);
     let effects = settings.effects;
     let (sun_intensity, sky_intensity) = (settings.sun_intensity(), settings.sky_intensity);
     let mut warnings = Vec::new();
     let mut light = Light::new(settings.sun.unit(), settings.sun_angle, sun_intensity as f32, sky_intensity as f32);
     let mut turn = 0.0;
     let image = match &settings.environment {
-        Some(settings::Environment::Sky) => Some(physical_sky(&mut light, sun_intensity, sky_intensity)),
+        Some(settings::Environment::Auto | settings::Environment::Sky) => {
+            Some(physical_sky(&mut light, sun_intensity, sky_intensity))
+        }
         Some(settings::Environment::File(path)) => {
             turn = settings.environment_rotation;
             let image = read(path)?;
@@ -150,21 +153,20 @@ fn punctual(light: &PunctualLight, scale: f64) -> Emitter {
     Emitter { shape, two_sided: false, radiance }
 }
 
-/// The sky of the sun of `light`, which takes the colour that the air leaves it. At an elevation of 45 degrees both are
+/// The sky of the sun of `light`, which takes the colour that the air leaves it, over a ground that both light. At an elevation of 45 degrees both are
 /// as bright as those that they replace.
 fn physical_sky(light: &mut Light, sun_intensity: f64, sky_intensity: f64) -> Equirectangular {
     let model = SkyModel::new();
     let luminance = |c: [f64; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
     let [usual_sun, usual_sky] = Light::usual_luminance();
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    let reference = SkyModel::irradiance(&model.image([0.0, half, -half], 128, 64));
+    let reference = SkyModel::irradiance(&model.image([0.0, half, -half], [1.0; 2], [128, 64]));
     let sun = model.sun(light.sun_direction.y);
     let sun_scale = sun_intensity * usual_sun / luminance(model.sun(half));
     light.sun_color = sun.map(|c| (c * sun_scale) as f32);
     let sky_scale = sky_intensity * usual_sky * std::f64::consts::PI / luminance(reference);
-    let mut image = model.image(light.sun_direction.to_array(), SKY_SIZE.0, SKY_SIZE.1);
-    image.texels.iter_mut().for_each(|texel| *texel = texel.map(|c| (f64::from(c) * sky_scale) as f32));
-    image
+    // The sun's colour is what white reflects of it.
+    model.image(light.sun_direction.to_array(), [sun_scale * std::f64::consts::PI, sky_scale], SKY_SIZE)
 }
 
 /// Reads an equirectangular image of linear radiance: Radiance HDR or OpenEXR, told apart by their first bytes.

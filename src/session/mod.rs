@@ -10,8 +10,10 @@ pub mod opened;
 mod pictures;
 pub mod renderer;
 mod settings;
+mod sight;
 pub mod summary;
 pub mod trace;
+mod viewpoint;
 
 pub use crate::output::npy::{Hit, Ray};
 pub use open::{Frame, Session, Watch, developed};

@@ -7,6 +7,7 @@ use super::motion::SceneMotion;
 use super::opened::{Opened, open_scene};
 use super::renderer::{finest_cell, lit_renderer};
 use super::trace::{self, Traced};
+use super::viewpoint;
 use crate::counters::Record;
 use crate::frame::{Accumulation, Captures, Engine, Light, Pixels, RenderError, Renderer};
 use crate::output::npy::{Hit, Ray};
@@ -15,7 +16,8 @@ use crate::picture::denoise::Resolve;
 use crate::picture::exposure::Meter;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::Camera;
-use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::scene::Picture;
+use crate::scene::path::CameraPath;
 use crate::secondary::Method;
 use crate::secondary::dvf::prepare::{Note, Walk, prepare};
 use crate::secondary::roma::LEAST_CELLS;
@@ -133,10 +135,13 @@ impl Session {
         let references = References::open(settings)?;
         let scene = open_scene(file)?;
         check_occupancy(&scene, file, settings)?;
-        let manifest = &scene.resident().manifest;
+        let settings = &settings.suited(&scene.resident().manifest);
         let mut path = match &settings.path {
             Some(file) => CameraPath::read(file)?,
-            None => path_from_bounds(manifest.min, manifest.max),
+            None => {
+                let aspect = f64::from(settings.size.width) / f64::from(settings.size.height);
+                viewpoint::path(&scene, Picture { aspect, fov_y_degrees: settings.fov })
+            }
         };
         if let Some(fov) = settings.fov {
             path = path.with_fov_y_degrees(fov)?;
@@ -162,7 +167,7 @@ impl Session {
             resolve: Resolve::new(settings.denoise, settings.taa),
             field: (settings.secondary != Method::Dvf).then_some(None),
             stops: Vec::new(),
-            meter: Meter::new(settings.exposure),
+            meter: Meter::new(settings.exposure, settings.tone_map.white()),
             motion,
             references,
             reference: reference.transpose()?,
@@ -262,7 +267,8 @@ impl Session {
             note_errors(&mut output.records, renderer, reference);
         }
         self.resolve.frame(&mut output);
-        let stops = self.meter.stops(&output.pixels.radiance, self.path.frame_time(self.settings.frames));
+        let seconds = self.path.frame_time(self.settings.frames);
+        let stops = self.meter.stops(&output.pixels.radiance, &output.coverage, seconds);
         self.stops.push(stops);
         Ok(Some(Frame {
             number,

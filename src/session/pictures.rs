@@ -81,7 +81,7 @@ impl Pictures {
     pub fn preview(&self, radiance: &[[f32; 3]]) -> Result<()> {
         let stops = match (self.stops, self.exposure) {
             (Some(stops), _) | (None, Exposure::Fixed(stops)) => stops,
-            (None, Exposure::Auto) => Meter::new(Exposure::Auto).stops(radiance, 0.0),
+            (None, auto) => Meter::new(auto, self.tone_map.white()).stops(radiance, &[], 0.0),
         };
         png::write(&self.preview, self.size.0, self.size.1, &developed(radiance, stops, self.tone_map))
     }

@@ -3,6 +3,7 @@
 use super::lighting::lighting;
 use super::opened::Opened;
 use crate::frame::{Effects, Engine, Light, Methods, Moved, Occlusion, RenderSettings, Renderer};
+use crate::picture::Exposure;
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 #[cfg(feature = "lab")]
@@ -12,7 +13,7 @@ use crate::secondary::Method;
 use crate::secondary::df::answer::Df;
 use crate::secondary::roma::answer::Roma;
 use crate::session::Settings;
-use crate::settings::Schedule;
+use crate::settings::{Length, Schedule};
 use anyhow::Result;
 use std::path::Path;
 
@@ -28,6 +29,7 @@ pub fn renderer(opened: Opened, path: &Path, settings: &Settings) -> Result<Rend
 /// The same with this light.
 pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Renderer {
     let Opened { scene, mut executor, cache, schedule, extent, .. } = opened;
+    let settings = &settings.suited(&scene.resident().manifest);
     let render = render_settings(settings, schedule);
     if render.effects.has_bounces() {
         executor.allow_bounces();
@@ -81,6 +83,7 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         tracing: Tracing { measure_needed: settings.measure_needed, optimisations: settings.optimisations() },
         aov: settings.aov,
         guides: settings.denoise || settings.taa,
+        coverage: matches!(settings.exposure, Exposure::Auto { .. }),
         taa: settings.taa,
         tile_bytes: settings.interactive,
     }
@@ -89,7 +92,12 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
 /// The effects of every frame.
 pub fn effects(settings: &Settings) -> Effects {
     let all = settings.effects;
-    let occlusion = Occlusion { rays: settings.ao_rays, length: settings.ao_length };
+    let length = match settings.ao_length {
+        Length::World(length) => length,
+        // Of a scene that settings have not been suited to.
+        Length::Auto => 1.0,
+    };
+    let occlusion = Occlusion { rays: settings.ao_rays, length };
     Effects {
         shadow: all.shadow,
         environment: all.environment,

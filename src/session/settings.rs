@@ -10,13 +10,17 @@ use crate::secondary::df;
 use crate::secondary::{Method, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
-    Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Policy, Rectangle, Rule, Schedule,
-    SettingsError, Turn, settings,
+    Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Length, Policy, Rectangle, Rule,
+    Schedule, SettingsError, Turn, settings,
 };
 use std::path::PathBuf;
 
+mod presets;
+mod suited;
 #[cfg(test)]
 mod tests;
+
+pub use presets::Quality;
 
 /// Without an upper bound.
 const ANY: f64 = f64::INFINITY;
@@ -30,7 +34,7 @@ settings! {
     /// use brickwalk::Settings;
     /// use brickwalk::settings::{CacheSize, Schedule};
     /// let settings = Settings { schedule: Schedule::Chc, cache: CacheSize::Bytes(64 << 20), ..Settings::default() };
-    /// assert_eq!(settings.spp, 1);
+    /// assert_eq!((settings.spp, Settings::exact().spp), (4, 1));
     /// ```
     pub struct Settings {
         /// Camera path (JSON). [default: one made from the scene's bounds]
@@ -49,18 +53,20 @@ settings! {
         /// primary. `shadow`: of the sun, the lights, and surfaces that emit. `ao`: ambient occlusion of the sky's
         /// light. `diffuse`: one bounce between surfaces, with the sky's light. `glossy`: what metals and polished
         /// surfaces mirror. `environment`: the environment's light with shadows; it takes the place of `ao`.
-        effects: EffectList = EffectList::SHADOW, "--effects LIST", Rule::Any, "", Effects, Common;
+        effects: EffectList = EffectList::LIT, "--effects LIST", Rule::Any, "", Effects, Common;
         /// Rays of `ao` per pixel and sample.
-        ao_rays: u32 = 20, "--ao-rays N", RAYS, "", Effects, Usual;
-        /// Length of the rays of `ao`, in world units (metres in glTF).
-        ao_length: f64 = 0.5, "--ao-length LENGTH", Rule::Real(1e-6, 1e9), "", Effects, Usual;
+        ao_rays: u32 = 2, "--ao-rays N", RAYS, "", Effects, Usual;
+        /// Length of the rays of `ao`, in world units (metres in glTF), or auto. `auto` is a fifth of the shortest side
+        /// of the scene's bounds, but no less than a hundredth of their diagonal and no more than a tenth.
+        ao_length: Length = Length::Auto, "--ao-length LENGTH|auto", Rule::Real(1e-6, 1e9), "", Effects, Usual;
         /// Rays of `diffuse` per pixel and sample; they are as long as the scene.
-        diffuse_rays: u32 = 20, "--diffuse-rays N", RAYS, "", Effects, Usual;
+        diffuse_rays: u32 = 4, "--diffuse-rays N", RAYS, "", Effects, Usual;
         /// Every triangle stops every ray, whatever its alpha.
         opaque: bool = false, "--opaque", Rule::Any, "", Effects, Expert;
         /// Greatest random turn of the directions of `ao` and `diffuse` about the normal, or full. A small one keeps
-        /// rays of neighbouring pixels alike. --denoise and --taa give every pixel directions of its own instead.
-        rotation: Turn = Turn(36.0), "--rotation DEG|full", Rule::Real(0.0, 360.0), "degrees", Effects, Expert;
+        /// rays of neighbouring pixels alike, and shows ghosts of edges. --denoise and --taa give every pixel directions
+        /// of its own instead.
+        rotation: Turn = Turn::FULL, "--rotation DEG|full", Rule::Real(0.0, 360.0), "degrees", Effects, Expert;
 
         /// Direction towards the sun, world space, any length.
         sun: Direction = Direction([0.4, 0.8, 0.45]), "--sun X,Y,Z", Rule::Any, "", Light, Usual;
@@ -70,10 +76,12 @@ settings! {
         sun_intensity: Option<f64> = None, "--sun-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
         /// Radiance of the sky. It is the same in all directions, and without `ao` and `diffuse` it has no shadows.
         sky_intensity: f64 = 0.35, "--sky-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
-        /// What surrounds the scene: an image (.hdr, .exr), or the word sky. An image is linear, +Y up, its middle
-        /// along -Z and its right along +X. `sky` is a physical sky with the sun of --sun. With `--effects environment`
-        /// it lights with shadows, else by its spherical harmonics, or by `diffuse`. [default: none]
-        environment: Option<Environment> = None, "--environment FILE|sky", Rule::Any, "", Light, Common;
+        /// What surrounds the scene: an image (.hdr, .exr), sky, auto, or none. An image is linear, +Y up, its middle
+        /// along -Z and its right along +X. `sky` is a physical sky with the sun of --sun, over a ground that both
+        /// light. `auto` is `sky`, but black and without a sun around generated scenes that have their own light. `none`
+        /// is a sky of one colour. With `--effects environment` it lights with shadows, else by its spherical harmonics,
+        /// or by `diffuse`.
+        environment: Option<Environment> = Some(Environment::Auto), "--environment FILE|NAME", Rule::Any, "", Light, Common;
         /// Turn of the environment's image about +Y, counter-clockwise seen from above.
         environment_rotation: f64 = 0.0, "--environment-rotation DEG", Rule::Real(-360.0, 360.0), "degrees", Light, Usual;
         /// Factor of the environment's radiance.
@@ -86,18 +94,22 @@ settings! {
         /// Radiance of the rectangular light.
         rect_light_intensity: f64 = 10.0, "--rect-light-intensity X", Rule::Real(0.0, ANY), "", Light, Expert;
 
+        /// What pictures are made for: preview, exact. It stands for other settings, and single options win over it.
+        /// `preview`: the defaults. `exact`: one camera ray and one shadow ray a pixel, without exposure and tone map,
+        /// for measurements. Hits are exact with all of them.
+        quality: Quality = Quality::Preview, "--quality NAME", Rule::Any, "", Quality, Common;
         /// Samples per pixel. Beyond 64 they are summed in f64.
-        spp: u32 = 1, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
+        spp: u32 = 4, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
         /// Seed of random sampling.
         seed: u64 = 0, "--seed N", Rule::Any, "", Quality, Usual;
         /// Exposure of PNGs and video in stops (EV), or auto. Radiance is multiplied by 2^EV before the tone map.
-        /// `auto` brings the log-average luminance of a frame to middle grey and adapts along the path. EXR keeps the
-        /// radiance.
-        exposure: Exposure = Exposure::Fixed(0.0), "--exposure EV|auto", Rule::Real(-32.0, 32.0), "stops", Quality, Usual;
+        /// `auto` brings the log-average luminance of what a frame hits to middle grey, keeps 98 % of it from white, and
+        /// adapts along the path; it stays within 8 stops of 0, or from MIN to MAX. EXR keeps the radiance.
+        exposure: Exposure = Exposure::AUTO, "--exposure EV|auto|auto:MIN,MAX", Rule::Real(-32.0, 32.0), "stops", Quality, Usual;
         /// How PNGs and video show what is brighter than a display: none, agx, aces, reinhard. `none` cuts off at 1;
         /// `agx` is AgX, base look; `aces` is Hill's fit of the ACES transforms; `reinhard` works on luminance, 4 is
         /// white. EXR keeps the radiance.
-        tone_map: ToneMap = ToneMap::None, "--tone-map NAME", Rule::Any, "", Quality, Usual;
+        tone_map: ToneMap = ToneMap::AgX, "--tone-map NAME", Rule::Any, "", Quality, Usual;
         /// Take the noise of few samples out of the frames. Variance-guided filtering over frames and neighbours (SVGF)
         /// trades noise for a small error; without it a picture is the unbiased estimate. EXR has the filtered
         /// radiance. `summary.json` says what energy was cut off fireflies.
@@ -264,15 +276,14 @@ impl Settings {
             ("dvf.", self.secondary == Method::Dvf, "--secondary dvf"),
             ("fronts", matches!(self.schedule, Schedule::Chc | Schedule::Auto), "--schedule chc"),
         ];
-        let idle = |entry: &Entry| {
+        let idle = |entry: Entry| {
             let key = entry.key();
             let is_of = |name: &str| key == name || (name.ends_with('.') && key.starts_with(name));
             let &(_, has_effect, belongs) = needs.iter().find(|(name, ..)| is_of(name))?;
-            let is_default = self.get(&key) == Some((entry.field.default)());
             let flag = entry.field.flag();
-            (!has_effect && !is_default).then(|| format!("--{flag} has no effect without {belongs}"))
+            (!has_effect).then(|| format!("--{flag} has no effect without {belongs}"))
         };
-        Self::entries().iter().filter_map(idle).collect()
+        self.chosen().into_iter().filter_map(idle).collect()
     }
 
     /// Whether `chc` keeps query pairs from frame to frame.
@@ -307,6 +318,14 @@ impl Settings {
         self.sun_intensity.unwrap_or(if has_image { 0.0 } else { 2.4 })
     }
 
+    /// What `--quality exact` stands for: a sample a pixel of the camera's and the sun's rays, shown as it is.
+    pub fn exact() -> Self {
+        let mut settings = Self::default();
+        // What a preset sets are values, as a test shows.
+        let _ = settings.set("quality", Quality::Exact.name());
+        settings
+    }
+
     /// Settings from options of the command line, words separated by spaces: what [`Group::options`] writes.
     ///
     /// # Errors
@@ -334,8 +353,7 @@ impl Settings {
 
     /// What does not count for `trace`, though it is not as it is by default.
     pub fn for_frames_alone(&self) -> Option<Entry> {
-        let is_default = |entry: &Entry| self.get(&entry.key()) == Some((entry.field.default)());
-        Self::entries().into_iter().find(|entry| !TRACE.contains(&entry.key().as_str()) && !is_default(entry))
+        self.chosen().into_iter().find(|entry| !TRACE.contains(&entry.key().as_str()))
     }
 }
 

@@ -3,9 +3,8 @@
 use super::open::Session;
 use crate::counters::Record;
 use crate::frame::Renderer;
-use crate::picture::exposure::Exposure;
 use crate::session::Settings;
-use crate::settings::Schedule;
+use crate::settings::{Length, Schedule, Value as _};
 use serde_json::{Map, Value, json};
 
 /// Raised when a field changes its meaning.
@@ -45,7 +44,10 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "height": s.size.height,
             "effects": s.effects.to_string(),
             "ao_rays": s.ao_rays,
-            "ao_length": s.ao_length,
+            "ao_length": match s.ao_length {
+                Length::World(length) => Some(length),
+                Length::Auto => None,
+            },
             "diffuse_rays": s.diffuse_rays,
             "rotation_degrees": s.rotation.0,
             "schedule": renderer.settings.schedule.name(),
@@ -86,10 +88,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
         },
         "frames": stops.len(),
         "pictures": {
-            "exposure": match s.exposure {
-                Exposure::Fixed(stops) => json!(stops),
-                Exposure::Auto => json!("auto"),
-            },
+            "exposure": s.exposure.plain(),
             "exposure_ev": stops,
             "tone_map": s.tone_map.name(),
             "video": video,

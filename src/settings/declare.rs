@@ -60,6 +60,7 @@ macro_rules! settings {
                     names: <$type as $crate::settings::Value>::NAMES,
                     is_list: <$type as $crate::settings::Value>::IS_LIST,
                     is_signed: <$type as $crate::settings::Value>::IS_SIGNED,
+                    is_preset: <$type as $crate::settings::Value>::IS_PRESET,
                     heading: $crate::settings::Heading::$heading,
                     level: $crate::settings::Level::$level,
                     default: || {
@@ -106,7 +107,8 @@ macro_rules! settings {
                         $($(#[cfg($on)])? stringify!($field) => {
                             let value = $crate::settings::Value::read(text, $rule, $unit);
                             self.$field = value.map_err(|why| $crate::settings::SettingsError::wrong(key, why))?;
-                            return Ok(());
+                            let presets = $crate::settings::Value::presets(&self.$field).iter();
+                            return presets.copied().try_for_each(|(key, text)| $crate::settings::Group::set(self, key, text));
                         })*
                         _ => {}
                     },

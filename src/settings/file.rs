@@ -16,10 +16,11 @@ enum Held {
     Table(BTreeMap<String, Plain>),
 }
 
-/// As a file or a summary has a value: what is absent although it is not by default is written as `off`.
-fn shown(value: Plain, entry: &Entry) -> Option<Plain> {
-    match value {
-        Plain::Absent if (entry.field.default)() == Plain::Absent => None,
+/// As a file or a summary has a value: what is absent although it is not so in `base` is written as `off`.
+fn shown<G: Group>(group: &G, base: &G, entry: &Entry) -> Option<Plain> {
+    let key = entry.key();
+    match group.get(&key)? {
+        Plain::Absent if base.get(&key) == Some(Plain::Absent) => None,
         Plain::Absent => Some(Plain::Text(Plain::Absent.to_string())),
         value => Some(value),
     }
@@ -30,8 +31,8 @@ fn shown(value: Plain, entry: &Entry) -> Option<Plain> {
 /// # Errors
 /// The serialiser's.
 pub fn serialize<G: Group, S: Serializer>(group: &G, serializer: S) -> Result<S::Ok, S::Error> {
-    let entries = G::entries();
-    let value = |entry: &Entry| group.get(&entry.key()).and_then(|value| shown(value, entry));
+    let (entries, base) = (G::entries(), group.base());
+    let value = |entry: &Entry| shown(group, &base, entry);
     let mut map = serializer.serialize_map(None)?;
     let mut tables: Vec<&'static str> = Vec::new();
     for entry in &entries {
@@ -63,17 +64,16 @@ pub fn deserialize<'de, G: Group, D: Deserializer<'de>>(deserializer: D) -> Resu
 }
 
 fn fill<G: Group>(group: &mut G, held: BTreeMap<String, Held>) -> Result<(), SettingsError> {
+    let mut all = Vec::new();
     for (key, held) in held {
         match held {
-            Held::Plain(value) => group.set(&key, &value.to_string())?,
+            Held::Plain(value) => all.push((key, value.to_string())),
             Held::Table(table) => {
-                for (inner, value) in table {
-                    group.set(&format!("{key}.{inner}"), &value.to_string())?;
-                }
+                all.extend(table.into_iter().map(|(inner, value)| (format!("{key}.{inner}"), value.to_string())));
             }
         }
     }
-    Ok(())
+    group.set_all(&all)
 }
 
 /// Gives a group what the TOML in `text` says.
@@ -103,7 +103,7 @@ pub fn read_file<G: Group>(group: &mut G, file: &Path) -> anyhow::Result<()> {
 pub fn to_toml<G: Group>(group: &G) -> String {
     let mut text = String::from("# Settings of brickwalk; read them with --settings FILE.\n");
     let (mut table, mut heading) = ("", None);
-    let mut entries = G::entries();
+    let (mut entries, base) = (G::entries(), group.base());
     entries.sort_by_key(|entry| (entry.table, entry.field.heading));
     for entry in entries {
         let field = entry.field;
@@ -120,8 +120,7 @@ pub fn to_toml<G: Group>(group: &G) -> String {
             notes.push(field.names.join(", "));
         }
         text += &format!("# {}\n", notes.join("; "));
-        let value = group.get(&entry.key()).and_then(|value| shown(value, &entry));
-        text += &match value {
+        text += &match shown(group, &base, &entry) {
             Some(value) => format!("{} = {}\n", field.key, toml_value(&value)),
             None => format!("# {} =\n", field.key),
         };

@@ -59,6 +59,8 @@ pub struct Field {
     pub is_list: bool,
     /// Values may begin with a minus sign.
     pub is_signed: bool,
+    /// Choosing it chooses other settings as well.
+    pub is_preset: bool,
     /// What it is about.
     pub heading: Heading,
     /// Who needs it.
@@ -185,6 +187,36 @@ pub trait Group: Clone + Default + Send + Sync + 'static {
     /// There is no such setting, or the text is none of its values.
     fn set(&mut self, key: &str, text: &str) -> Result<(), SettingsError>;
 
+    /// Gives settings the values that texts stand for. Presets come first, so that single settings win over them
+    /// whatever their order.
+    ///
+    /// # Errors
+    /// As of [`Group::set`].
+    fn set_all(&mut self, given: &[(String, String)]) -> Result<(), SettingsError> {
+        let entries = Self::entries();
+        let is_preset = |key: &str| entries.iter().any(|entry| entry.field.is_preset && entry.key() == key);
+        let (presets, single): (Vec<_>, Vec<_>) = given.iter().partition(|(key, _)| is_preset(key));
+        presets.into_iter().chain(single).try_for_each(|(key, text)| self.set(key, text))
+    }
+
+    /// The defaults, with the presets of this group: what its single settings differ from.
+    fn base(&self) -> Self {
+        let mut base = Self::default();
+        for entry in Self::entries().iter().filter(|entry| entry.field.is_preset) {
+            // A value that the group has is one of the setting.
+            let _ = self.get(&entry.key()).map(|value| base.set(&entry.key(), &value.to_string()));
+        }
+        base
+    }
+
+    /// The settings that are not as in [`Group::base`].
+    fn chosen(&self) -> Vec<Entry> {
+        let base = self.base();
+        let mut entries = Self::entries();
+        entries.retain(|entry| self.get(&entry.key()) != base.get(&entry.key()));
+        entries
+    }
+
     /// The setting with this flag, which is without dashes.
     fn by_flag(flag: &str) -> Option<Entry> {
         Self::entries().into_iter().find(|entry| entry.field.flag() == flag)
@@ -196,6 +228,7 @@ pub trait Group: Clone + Default + Send + Sync + 'static {
     /// There is no such option, or its value is none of the setting.
     fn set_options(&mut self, text: &str) -> Result<(), SettingsError> {
         let mut words = text.split_whitespace();
+        let mut all = Vec::new();
         while let Some(word) = words.next() {
             let (flag, given) = word.split_once('=').map_or((word, None), |(flag, value)| (flag, Some(value)));
             let known = || Self::entries().iter().map(|entry| format!("--{}", entry.field.flag())).collect::<Vec<_>>();
@@ -206,22 +239,24 @@ pub trait Group: Clone + Default + Send + Sync + 'static {
                 (None, None) => "on",
                 (None, Some(_)) => words.next().ok_or_else(|| SettingsError::wrong(flag, "it needs a value".into()))?,
             };
-            self.set(&entry.key(), value)?;
+            all.push((entry.key(), value.to_string()));
         }
-        Ok(())
+        self.set_all(&all)
     }
 
     /// The settings that are not as they are by default, as options of the command line.
     fn options(&self) -> String {
+        let presets = Self::entries().into_iter().filter(|entry| entry.field.is_preset);
+        let presets = presets.filter(|entry| self.get(&entry.key()) != Some((entry.field.default)()));
         let of = |entry: Entry| {
-            let value = self.get(&entry.key()).filter(|value| *value != (entry.field.default)())?;
+            let value = self.get(&entry.key())?;
             let flag = entry.field.flag();
             Some(match entry.field.value_name() {
                 Some(_) => format!("--{flag} {value}"),
                 None => format!("--{flag}"),
             })
         };
-        Self::entries().into_iter().filter_map(of).collect::<Vec<_>>().join(" ")
+        presets.chain(self.chosen()).filter_map(of).collect::<Vec<_>>().join(" ")
     }
 }
 

@@ -21,7 +21,7 @@ pub mod value;
 
 pub use group::{Entry, Field, Group, Heading, Level, SettingsError};
 pub use sizes::{CacheSize, ImageSize};
-pub use types::{Adapter, Direction, Effect, EffectList, Environment, Policy, Rectangle, Schedule, Turn};
+pub use types::{Adapter, Direction, Effect, EffectList, Environment, Length, Policy, Rectangle, Schedule, Turn};
 pub use value::{Lines, Plain, Rule, Value};
 
 pub(crate) use declare::settings;

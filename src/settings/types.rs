@@ -83,6 +83,8 @@ impl EffectList {
     pub const PRIMARY: Self = Self { shadow: false, ao: false, diffuse: false, glossy: false, environment: false };
     /// Primary rays and shadows.
     pub const SHADOW: Self = Self { shadow: true, ..Self::PRIMARY };
+    /// Primary rays, shadows, and ambient occlusion.
+    pub const LIT: Self = Self { ao: true, ..Self::SHADOW };
 
     /// Primary rays and these.
     pub fn of(effects: &[Effect]) -> Self {
@@ -232,9 +234,36 @@ impl Value for Turn {
     }
 }
 
+/// A length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Length {
+    /// What suits the scene.
+    Auto,
+    /// In world units.
+    World(f64),
+}
+
+impl Value for Length {
+    fn read(text: &str, rule: Rule, unit: &str) -> Result<Self, String> {
+        match text {
+            AUTO => Ok(Self::Auto),
+            text => f64::read(text, rule, unit).map(Self::World).map_err(|why| format!("{why}, or auto")),
+        }
+    }
+
+    fn plain(&self) -> Plain {
+        match self {
+            Self::Auto => Plain::Text(AUTO.into()),
+            Self::World(length) => length.plain(),
+        }
+    }
+}
+
 /// What surrounds a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Environment {
+    /// A physical sky, or nothing where a scene has a light of its own.
+    Auto,
     /// A physical sky.
     Sky,
     /// An image.
@@ -245,19 +274,26 @@ impl FromStr for Environment {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(if text == "sky" { Self::Sky } else { Self::File(text.into()) })
+        Ok(match text {
+            AUTO => Self::Auto,
+            "sky" => Self::Sky,
+            file => Self::File(file.into()),
+        })
     }
 }
 
 impl fmt::Display for Environment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Auto => f.write_str(AUTO),
             Self::Sky => f.write_str("sky"),
             Self::File(path) => path.display().fmt(f),
         }
     }
 }
 
+/// What is left to the scene or the machine.
+const AUTO: &str = "auto";
 /// The name of the processor among the adapters.
 const CPU: &str = "cpu";
 
@@ -278,7 +314,7 @@ impl FromStr for Adapter {
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(match text {
-            "auto" => Self::Auto,
+            AUTO => Self::Auto,
             CPU => Self::Cpu,
             name => Self::Named(name.into()),
         })
@@ -288,7 +324,7 @@ impl FromStr for Adapter {
 impl fmt::Display for Adapter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Auto => "auto",
+            Self::Auto => AUTO,
             Self::Cpu => CPU,
             Self::Named(name) => name,
         })
@@ -334,6 +370,16 @@ mod tests {
         for bad in ["0,0,0,1,0,0,2,0,0", "0,0,0,1,0,0", "0,0,0,1,0,0,0,0,x", "0,0,0,1,0,0,0,0,inf", ""] {
             assert!(bad.parse::<Rectangle>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn lengths_are_left_to_the_scene_or_stated() {
+        let rule = Rule::Real(1e-6, 1e9);
+        for (text, length) in [("auto", Length::Auto), ("0.5", Length::World(0.5))] {
+            assert_eq!(Length::read(text, rule, ""), Ok(length));
+            assert_eq!(length.plain().to_string(), text);
+        }
+        assert!(Length::read("0", rule, "").unwrap_err().ends_with("or auto"));
     }
 
     #[test]

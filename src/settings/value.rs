@@ -95,6 +95,8 @@ pub trait Value: Sized {
     const IS_SIGNED: bool = false;
     /// The names that it can have, where these are all.
     const NAMES: &'static [&'static str] = &[];
+    /// Choosing it may choose other settings, see [`Value::presets`].
+    const IS_PRESET: bool = false;
 
     /// Reads and checks a value.
     ///
@@ -104,6 +106,11 @@ pub trait Value: Sized {
 
     /// The value as files hold it.
     fn plain(&self) -> Plain;
+
+    /// What choosing the value chooses besides: keys of the group, and values for them.
+    fn presets(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
 }
 
 /// [`Value`] of an enum that [`names!`](super::names::names) declares.

@@ -109,9 +109,9 @@ pub fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3;
     *count += row * (squares[1] + 1);
 }
 
-/// Settings that options of the command line stand for; the adapter is that of the environment unless they name one.
+/// Settings that options of the command line stand for, beside those of `--quality exact`; the adapter is that of the environment unless they name one.
 pub fn settings(options: &str) -> Settings {
-    let mut settings = Settings::default();
+    let mut settings = Settings::exact();
     if let Ok(adapter) = std::env::var("BRICKWALK_ADAPTER") {
         settings.set("adapter", &adapter).expect("an adapter");
     }
@@ -134,9 +134,10 @@ pub fn evenly_lit(scene: &Path, effects: &str, options: &str) -> Renderer {
     renderer
 }
 
-/// Options of a walk beside scene and output.
+/// Walks with these options, beside scene, output and `--quality exact`.
 pub fn walk(scene: &Path, output: &Path, options: &str) -> String {
-    let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()];
+    let exact = ["--quality".as_ref(), "exact".as_ref()];
+    let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()].into_iter().chain(exact);
     succeed(words.into_iter().chain(options.split_whitespace().map(std::ffi::OsStr::new)))
 }
 

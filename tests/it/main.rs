@@ -48,6 +48,7 @@ mod house {
 mod scenes {
     mod expected;
     mod file_lights;
+    mod finished;
     mod millimetres;
     mod pictures;
     mod samples;

@@ -20,6 +20,11 @@ pub trait View: Clone + Send + Sync + 'static {
         true
     }
 
+    /// What settings are where nothing is given.
+    fn base() -> Self::Group {
+        Self::Group::default()
+    }
+
     /// Who is shown a setting; `None`: nobody, it is known to be refused.
     fn level(entry: &Entry) -> Option<Level> {
         Some(entry.field.level)
@@ -43,6 +48,11 @@ pub struct OfTrace;
 
 impl View for OfTrace {
     type Group = Settings;
+
+    // There is no picture.
+    fn base() -> Settings {
+        Settings::exact()
+    }
 
     fn level(entry: &Entry) -> Option<Level> {
         TRACE.contains(&entry.key().as_str()).then_some(Level::Common)
@@ -69,13 +79,11 @@ impl<V: View> GroupArgs<V> {
     /// # Errors
     /// A bad file.
     pub fn over(&self, file: Option<&Path>) -> anyhow::Result<V::Group> {
-        let mut group = V::Group::default();
+        let mut group = V::base();
         if let Some(file) = file {
             file::read_file(&mut group, file)?;
         }
-        for (key, value) in &self.given {
-            group.set(key, value)?;
-        }
+        group.set_all(&self.given)?;
         Ok(group)
     }
 

@@ -158,7 +158,7 @@ fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapt
         diffuse_rays: settings.rays,
         aov: true,
         adapter: adapter.clone(),
-        ..WalkSettings::default()
+        ..WalkSettings::exact()
     };
     let renderer = scenes::open(scene, &own)?;
     let info = renderer.executor.device();

@@ -205,7 +205,7 @@ impl Lab {
 
 /// Settings with a cache of so many per cent.
 pub fn cached(percent: u32) -> Settings {
-    Settings { cache: CacheSize::Percent(percent.into()), ..Settings::default() }
+    Settings { cache: CacheSize::Percent(percent.into()), ..Settings::exact() }
 }
 
 /// The same by a schedule.

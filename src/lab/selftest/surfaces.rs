@@ -11,7 +11,7 @@ use crate::reference::Truth;
 use crate::schedule::Pass;
 use crate::session::Settings;
 use crate::session::trace::EXTENT;
-use crate::settings::{Effect, EffectList, Schedule, Turn};
+use crate::settings::{Effect, EffectList, Length, Schedule, Turn};
 use anyhow::Result;
 use brickwalk_scenes::{Rng, Stiff, moved, stiff};
 use glam::{DVec3, Vec3};
@@ -119,7 +119,8 @@ fn sky_in_a_box(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let eye = [0.1, 0.2, -0.3];
     let views = [DVec3::new(1.0, 1.0, 1.0), DVec3::new(-1.0, 0.9, 0.3), DVec3::NEG_Y];
     let (sun_intensity, rotation) = (Some(0.0), Turn::FULL);
-    let options = Settings { sun_intensity, rotation, ao_length: 10.0, aov: false, ..lit(64, 48, 100, 2) };
+    let options =
+        Settings { sun_intensity, rotation, ao_length: Length::World(10.0), aov: false, ..lit(64, 48, 100, 2) };
     let (mut lit, mut pixels) = (0, 0);
     for effect in [Effect::Ao, Effect::Diffuse] {
         let options = Settings { effects: EffectList::of(&[effect]), ..options.clone() };

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 #[test]
 fn defaults_are_the_documented_ones() {
-    let s = Settings::default();
+    let s = Settings::exact();
     assert_eq!((s.frames, s.size), (30, ImageSize { width: 1280, height: 720 }));
     assert_eq!(s.effects.to_string(), "primary,shadow");
     assert_eq!((s.spp, s.seed, s.tile), (1, 0, 64));
@@ -15,6 +15,13 @@ fn defaults_are_the_documented_ones() {
     assert_eq!((s.query_threshold, s.evict), (0, crate::stream::Policy::RoundRobin));
     assert_eq!((s.sun, s.sun_angle, s.sun_intensity()), (Direction([0.4, 0.8, 0.45]), 0.53, 2.4));
     assert!(s.path.is_none() && !s.aov && s.fov.is_none() && s.worker_count() >= 1);
+    assert_eq!((s.exposure, s.tone_map, s.environment), (Exposure::Fixed(0.0), ToneMap::None, None));
+    assert_eq!((s.ao_rays, s.ao_length, s.diffuse_rays), (20, Length::World(0.5), 20));
+    assert_eq!((s.rotation, s.denoise, s.taa), (Turn(36.0), false, false));
+    let s = Settings::default();
+    assert_eq!((s.effects.to_string().as_str(), s.spp, s.rotation), ("primary,shadow,ao", 4, Turn::FULL));
+    assert_eq!((s.exposure, s.tone_map, s.secondary), (Exposure::AUTO, ToneMap::AgX, Method::Exact));
+    assert_eq!((s.environment, s.ao_length), (Some(Environment::Auto), Length::Auto));
 }
 
 #[test]
@@ -45,7 +52,9 @@ fn keys_and_flags_are_unique_and_described() {
 /// Settings none of which is as it is by default.
 fn others() -> Settings {
     let mut settings = Settings::default();
-    for entry in Settings::entries() {
+    let mut entries = Settings::entries();
+    entries.sort_by_key(|entry| !entry.field.is_preset);
+    for entry in entries {
         let field = entry.field;
         let candidates = [
             "1000",
@@ -183,12 +192,12 @@ fn the_options_page_is_that_of_the_settings() {
 #[test]
 fn settings_without_effect_are_named() {
     let named = |options: &str| Settings::from_options(options).unwrap().without_effect();
-    assert_eq!(named("--ao-length 2"), ["--ao-length has no effect without --effects ao"]);
+    assert_eq!(named("--quality exact --ao-length 2"), ["--ao-length has no effect without --effects ao"]);
     assert_eq!(named("--roma-k 8 --dvf-rays 64").len(), 2);
     assert!(named("--effects ao --ao-length 2 --secondary roma --roma-k 8").is_empty());
     // `--bom` is of two methods.
     assert!(named("--secondary df --bom raster").is_empty() && named("--bom raster").len() == 1);
-    assert!(named("").is_empty());
+    assert!(named("").is_empty() && named("--quality exact").is_empty());
 }
 
 #[test]

@@ -106,7 +106,7 @@ fn an_interrupted_walk_leaves_a_video_of_what_it_finished() {
             "--video".as_ref(),
             video.as_os_str(),
         ])
-        .args("--frames 100000 --size 64x36 --spp 65 --adapter cpu".split(' '))
+        .args("--quality exact --frames 100000 --size 64x36 --spp 65 --adapter cpu".split(' '))
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
@@ -242,7 +242,7 @@ fn a_frame_of_many_samples_is_shown_while_it_is_made() {
     let folder = common::folder();
     let scene = common::city(folder.path(), "10K", "1K");
     let output = folder.path().join("out");
-    let options = "--frames 1 --size 64x48 --cache 100% --spp 100K --progressive";
+    let options = "--quality exact --frames 1 --size 64x48 --cache 100% --spp 100K --progressive";
     let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()];
     let words = words.into_iter().chain(options.split(' ').map(std::ffi::OsStr::new));
     let mut command =

@@ -75,7 +75,7 @@ fn check(folder: &Path, software: &str, name: &str, scene: &Path, options: &str)
     let outputs = ["cpu", software].map(|adapter| {
         let output = folder.join(format!("{name}-{}", if adapter == "cpu" { "cpu" } else { "vulkan" }));
         let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str(), "--adapter".as_ref()];
-        let options = format!("{VIEW} {options}");
+        let options = format!("--quality exact {VIEW} {options}");
         let options: Vec<&str> = options.split_whitespace().collect();
         succeed(words.into_iter().chain([adapter.as_ref()]).chain(options.iter().map(std::ffi::OsStr::new)));
         output
@@ -176,7 +176,7 @@ fn the_number_of_threads_does_not_show() {
     let run = |threads: &str, options: &str| {
         let output = folder.path().join(format!("threads-{threads}"));
         let path = scene.with_extension("near.json");
-        let options = format!("{VIEW} {EFFECTS} {options} --adapter cpu --path {}", path.display());
+        let options = format!("--quality exact {VIEW} {EFFECTS} {options} --adapter cpu --path {}", path.display());
         let status = Command::new(env!("CARGO_BIN_EXE_brickwalk"))
             .env("RAYON_NUM_THREADS", threads)
             .args(["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()])

@@ -328,7 +328,7 @@ const VIEW: &str = "--frames 2 --size 64x48 --tile 16 --effects shadow,ao --ao-r
 
 fn walk_of(scene: &Path, output: &Path, options: &str, threads: &str) -> Vec<Value> {
     let path = scene.with_extension("near.json");
-    let options = format!("{VIEW} {options} --path {}", path.display());
+    let options = format!("--quality exact {VIEW} {options} --path {}", path.display());
     let status = Command::new(env!("CARGO_BIN_EXE_brickwalk"))
         .env("RAYON_NUM_THREADS", threads)
         .args(["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()])

@@ -340,7 +340,9 @@ fn bad_texels_are_counted_and_damaged_images_refused() {
     let walk = |environment: &str| {
         let output = folder.join("out");
         let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()];
-        let options = format!("--frames 1 --size 16x16 --cache 100% --effects environment --environment {environment}");
+        let options = format!(
+            "--quality exact --frames 1 --size 16x16 --cache 100% --effects environment --environment {environment}"
+        );
         let done = common::brickwalk(words.into_iter().chain(options.split_whitespace().map(std::ffi::OsStr::new)));
         (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
     };

@@ -72,6 +72,8 @@ pub struct Outline {
     pub warnings: Vec<String>,
     /// Whether any source has animation.
     pub has_animation: bool,
+    /// See [`bricks::Manifest::has_own_light`].
+    pub has_own_light: bool,
 }
 
 /// A mesh without its geometry.
@@ -124,6 +126,7 @@ impl From<SourceScene> for InMemory {
             sources: scene.sources,
             warnings: scene.warnings,
             has_animation: scene.has_animation,
+            has_own_light: false,
         };
         Self { outline, meshes: scene.meshes, textures: scene.textures }
     }

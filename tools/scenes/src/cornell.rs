@@ -208,6 +208,7 @@ pub fn generate(settings: &Settings, progress: &Progress) -> Scene {
     let columns = ((left / (12 * u64::from(rows))) as u32).max(1);
     let squares = [[standing; 2], [standing; 2], [columns, rows]];
     let mut draft = Draft::new(materials(), settings);
+    draft.outline.has_own_light = true;
     let mesh = draft.mesh("room".into(), [10 * room_squares.pow(2), 2]);
     draft.place("room".into(), mesh, IDENTITY);
     for (Solid { name, middle, turn, .. }, squares) in solids().into_iter().zip(squares) {

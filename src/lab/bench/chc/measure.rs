@@ -233,6 +233,6 @@ fn of_case(case: &Case, settings: &Settings, adapter: &Adapter) -> WalkSettings 
         measure_needed: needed,
         without: without.to_vec(),
         adapter: adapter.clone(),
-        ..WalkSettings::default()
+        ..WalkSettings::exact()
     }
 }

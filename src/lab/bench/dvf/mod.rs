@@ -18,7 +18,8 @@ use crate::lab::console::Console;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::output::atomic;
 use crate::scene::Camera;
-use crate::scene::path::{CameraPath, path_from_bounds};
+use crate::scene::framing::path_from_bounds;
+use crate::scene::path::CameraPath;
 use crate::secondary::dvf::{Dvf, DvfMade, EFFECT as DVF_EFFECT, Options, Region, RegionKind, prepare};
 use crate::session::Settings;
 use crate::session::opened::open_scene;
@@ -179,7 +180,7 @@ impl<'a> View<'a> {
             aov: true,
             cache,
             adapter: args.adapter.clone(),
-            ..Settings::default()
+            ..Settings::exact()
         };
         let renderer = scenes::open(&place.scene, &settings)?;
         let image = Image { width: 0, height: 0, rgb: Vec::new() };

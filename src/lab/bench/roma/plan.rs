@@ -5,7 +5,7 @@ use crate::lab::bench::scenes::SceneId;
 use crate::secondary::Method;
 use crate::secondary::roma::{self, Unsnapped};
 use crate::session::Settings;
-use crate::settings::{Effect, EffectList, Turn, names};
+use crate::settings::{Effect, EffectList, Length, Turn, names};
 use std::fmt;
 
 names! {
@@ -190,7 +190,7 @@ impl Job {
 fn occlusion(length: f64) -> Settings {
     let effects = EffectList::of(&[Effect::Ao]);
     let (sun_intensity, rotation) = (Some(0.0), Turn::FULL);
-    Settings { effects, ao_rays: 1, ao_length: length, sun_intensity, rotation, ..Settings::default() }
+    Settings { effects, ao_rays: 1, ao_length: Length::World(length), sun_intensity, rotation, ..Settings::exact() }
 }
 
 /// The sun alone, and what is lit by what it lights, if `effects` have that.
@@ -202,7 +202,7 @@ fn bounce(effects: &[Effect]) -> Settings {
         sun_angle: 0.0,
         rotation: Turn::FULL,
         roma: roma::Options { steps: 64, ..roma::Options::default() },
-        ..Settings::default()
+        ..Settings::exact()
     }
 }
 
@@ -251,7 +251,7 @@ pub fn jobs(settings: &Scale, has_sponza: bool) -> Vec<Job> {
     jobs.extend(halved.map(|length| of_length(Stage::Radius, city, length, &[USUAL, FIELD])));
     let shadows = [of(4, 128, false), of(8, 128, false), of(4, 128, true), of(8, 128, true), FIELD];
     for (light, sun_angle) in [("sun of 0.5 degrees", 0.53), ("sun of 10 degrees", 10.0)] {
-        let settings = Settings { effects: EffectList::SHADOW, sky_intensity: 0.0, sun_angle, ..Settings::default() };
+        let settings = Settings { effects: EffectList::SHADOW, sky_intensity: 0.0, sun_angle, ..Settings::exact() };
         jobs.push(Job { effect: "shadow", settings, ..job(Stage::Shadows, city, light, &shadows) });
     }
     let (empty, filled) = ("cache 15 %, empty", "cache 15 %, filled");

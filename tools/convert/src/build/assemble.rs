@@ -154,6 +154,7 @@ pub(super) fn manifest(
         has_emission: any(&|material| material.emission.iter().any(|x| *x > 0.0)),
         has_instances: resident.instances.len() > 1,
         has_animation: scene.has_animation,
+        has_own_light: scene.has_own_light,
         has_wide_bricks: resident.bricks.iter().any(|brick| brick.flags & BRICK_WIDE != 0),
         has_proxies: !resident.occupancy.is_empty(),
         instance_scale_ratio: plan.instances.iter().fold(1.0, |most, instance| instance.matrix.scale_ratio().max(most)),
