@@ -3,9 +3,12 @@
 use super::color::luminance;
 use crate::settings::{Plain, Rule, Value};
 
-/// Middle grey, which an automatic exposure brings the log-average luminance of a frame to (Reinhard et al. 2002,
+/// Middle grey, beside which an automatic exposure brings the log-average luminance of a frame (Reinhard et al. 2002,
 /// equation 2).
 const MIDDLE_GREY: f64 = 0.18;
+
+/// By how many stops it is brighter: what a picture is of is brighter than all that there is.
+const LIFT: f64 = 0.5;
 
 /// The share of pixels at each end of the range that does not count: lamps, mirrored suns, cracks.
 const TRIMMED: f64 = 0.05;
@@ -31,7 +34,7 @@ const USUAL_STOPS: f64 = 8.0;
 pub enum Exposure {
     /// So many stops (EV): radiance is multiplied by 2 to the power of it.
     Fixed(f64),
-    /// What brings the log-average luminance of what a frame hits to middle grey and keeps most of it from white; from
+    /// What brings the log-average luminance of what a frame hits half a stop above middle grey and keeps most of it from white; from
     /// frame to frame it adapts, by the times of the path, so that it depends on the frames alone.
     Auto {
         /// Stops that it does not go below.
@@ -74,7 +77,7 @@ impl Value for Exposure {
     }
 }
 
-/// The stops that bring the log-average luminance of the pixels of `radiance` that count to middle grey, or less where
+/// The stops that bring the log-average luminance of the pixels of `radiance` that count above middle grey, or less where
 /// these would show more of them brighter than `white` than may be; `None` if they are all black. Where none counts, all
 /// do. Pixels that are not finite do not count.
 fn metered(radiance: &[[f32; 3]], counts: &[bool], white: f64) -> Option<f64> {
@@ -106,7 +109,7 @@ fn metered(radiance: &[[f32; 3]], counts: &[bool], white: f64) -> Option<f64> {
     let average = middle.iter().map(|&y| f64::from(y).max(mean * FLOOR).log2()).sum::<f64>() / count;
     let brightest = sorted(|color| color.into_iter().fold(0.0, f32::max));
     let bright = brightest[((brightest.len() - 1) as f64 * (1.0 - WHITE_SHARE)) as usize];
-    Some((MIDDLE_GREY.log2() - average).min((white / f64::from(bright)).log2()))
+    Some((MIDDLE_GREY.log2() + LIFT - average).min((white / f64::from(bright)).log2()))
 }
 
 /// Gives every frame of a walk its exposure.
@@ -161,9 +164,14 @@ mod tests {
         }
     }
 
-    /// What all of a picture asks for where nothing becomes white.
+    /// What a picture asks for where nothing becomes white, beyond the lift.
+    fn of(radiance: &[[f32; 3]], counts: &[bool]) -> Option<f64> {
+        metered(radiance, counts, f64::INFINITY).map(|stops| stops - LIFT)
+    }
+
+    /// The same of all of it.
     fn asked(radiance: &[[f32; 3]]) -> Option<f64> {
-        metered(radiance, &[], f64::INFINITY)
+        of(radiance, &[])
     }
 
     #[test]
@@ -183,10 +191,10 @@ mod tests {
         let seen = |i: usize| i.is_multiple_of(10);
         let picture: Vec<[f32; 3]> = (0..1000).map(|i| if seen(i) { [0.18; 3] } else { [11.52; 3] }).collect();
         let counts: Vec<bool> = (0..1000).map(seen).collect();
-        assert!(metered(&picture, &counts, f64::INFINITY).unwrap().abs() < 1e-6);
+        assert!(of(&picture, &counts).unwrap().abs() < 1e-6);
         assert!(asked(&picture).unwrap() < -5.0, "the control: all of it");
         // A picture of the sky alone is exposed for it.
-        assert!((metered(&[[11.52; 3]; 4], &[false; 4], f64::INFINITY).unwrap() + 6.0).abs() < 1e-6);
+        assert!((of(&[[11.52; 3]; 4], &[false; 4]).unwrap() + 6.0).abs() < 1e-6);
         // Lamps of a million in a twentieth of it.
         let lamps: Vec<[f32; 3]> = (0..100).map(|i| if i % 20 == 0 { [1e6; 3] } else { [0.18; 3] }).collect();
         assert!(asked(&lamps).unwrap().abs() < 1e-6);
@@ -200,7 +208,7 @@ mod tests {
         assert!((stops + 5.76f64.log2()).abs() < 1e-6, "{stops}");
         // One in a hundred may become white.
         let picture: Vec<[f32; 3]> = (0..1000).map(|i| [[0.18; 3], [5.76; 3]][usize::from(i < 10)]).collect();
-        assert!(metered(&picture, &[], 1.0).unwrap().abs() < 1e-6);
+        assert!((metered(&picture, &[], 1.0).unwrap() - LIFT).abs() < 1e-6);
     }
 
     #[test]
@@ -216,7 +224,7 @@ mod tests {
         let dim = [[1e-6f32; 3]; 4];
         assert_eq!(Meter::new(Exposure::AUTO, 1.0).stops(&dim, &[], 0.0), USUAL_STOPS);
         let wide = Exposure::Auto { least: -MOST_STOPS, most: MOST_STOPS };
-        assert!((Meter::new(wide, 1.0).stops(&dim, &[], 0.0) - (0.18f64 / 1e-6).log2()).abs() < 1e-4);
+        assert!((Meter::new(wide, 1.0).stops(&dim, &[], 0.0) - (0.18f64 / 1e-6).log2() - LIFT).abs() < 1e-4);
     }
 
     #[test]
@@ -224,15 +232,15 @@ mod tests {
         let (dark, light) = (vec![[0.045f32; 3]], vec![[0.72f32; 3]]);
         let auto = || Meter::new(Exposure::AUTO, 1.0);
         let mut meter = auto();
-        assert!((meter.stops(&dark, &[], 0.1) - 2.0).abs() < 1e-6, "the first frame has what it asks for");
-        assert!((meter.stops(&light, &[], ADAPTATION_S) - (-2.0 + 4.0 / 1f64.exp())).abs() < 1e-6);
+        assert!((meter.stops(&dark, &[], 0.1) - 2.0 - LIFT).abs() < 1e-6, "the first frame has what it asks for");
+        assert!((meter.stops(&light, &[], ADAPTATION_S) - (-2.0 + 4.0 / 1f64.exp()) - LIFT).abs() < 1e-6);
         // Twice half a step is a step.
         let mut halves = auto();
         for (picture, seconds) in [(&dark, 0.0), (&light, 0.5 * ADAPTATION_S), (&light, 0.5 * ADAPTATION_S)] {
             halves.stops(picture, &[], seconds);
         }
         assert!((halves.adapted.unwrap() - meter.adapted.unwrap()).abs() < 1e-12);
-        assert!((meter.stops(&light, &[], 1e3) + 2.0).abs() < 1e-6);
+        assert!((meter.stops(&light, &[], 1e3) + 2.0 - LIFT).abs() < 1e-6);
         assert_eq!(meter.stops(&[[0.0; 3]], &[], 1.0), meter.stops(&[[0.0; 3]], &[], 1.0));
         assert_eq!(auto().stops(&[[0.0; 3]], &[], 1.0), 0.0);
         assert_eq!(Meter::new(Exposure::Fixed(-1.5), 1.0).stops(&light, &[], 1.0), -1.5);

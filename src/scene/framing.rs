@@ -9,7 +9,7 @@ const FILL: f64 = 0.9;
 const OUTSIDE_FOV: f64 = 40.0;
 const INSIDE_FOV: f64 = 60.0;
 /// How far above the horizon the camera is, of what is high and of what is flat, degrees.
-const RISE: [f64; 2] = [18.0, 30.0];
+const RISE: [f64; 2] = [12.0, 24.0];
 /// Where a path begins and what part of a circle it goes, degrees about +Y from +X to +Z.
 const START: f64 = 60.0;
 const SPAN: f64 = 90.0;
@@ -186,7 +186,7 @@ mod tests {
                     assert!(width[0].max(height[0]) <= FILL + slack);
                     let tight = usize::from(height[0] > width[0]);
                     assert!([width, height][tight][1].abs() < 0.02 + slack, "{boxes:?}: {width:?} {height:?}");
-                    assert!(camera.frame().2.y < -0.2, "from above");
+                    assert!(camera.frame().2.y < -0.1, "from above");
                 }
             }
         }

@@ -9,6 +9,10 @@ use std::collections::HashMap;
 
 /// Bricks that are read at most.
 const MOST_BRICKS: usize = 256;
+/// Share of the triangles that is not ground.
+const GROUND: f64 = 0.9;
+/// What is smaller than this share of the whole stands on a ground.
+const SMALL: f64 = 0.5;
 /// Leaves that are looked through at most.
 const MOST_LEAVES: usize = 1 << 16;
 
@@ -54,9 +58,28 @@ impl<'a> Sight<'a> {
         Some(Self { file, places: resident.leaves.iter().map(place).collect(), triangles: HashMap::new() })
     }
 
-    /// The boxes of all bricks, world units.
-    pub fn boxes(&self) -> Vec<[DVec3; 2]> {
-        self.places.iter().map(|place| [place.min, place.max]).collect()
+    /// The boxes of the bricks that show what the scene is about, world units: all, but for a wide ground of few
+    /// triangles around it.
+    pub fn worth_seeing(&self) -> Vec<[DVec3; 2]> {
+        let count = |place: &Place| u64::from(self.file.resident().bricks[place.brick as usize].triangle_count);
+        let mut places: Vec<&Place> = self.places.iter().collect();
+        places.sort_by(|a, b| (a.max - a.min).length().total_cmp(&(b.max - b.min).length()));
+        let enough = GROUND * places.iter().map(|place| count(place)).sum::<u64>() as f64;
+        let mut seen = 0;
+        let dense = places.iter().take_while(|place| {
+            let is_needed = (seen as f64) < enough;
+            seen += count(place);
+            is_needed
+        });
+        let dense = dense.count();
+        let boxes: Vec<[DVec3; 2]> = places.iter().map(|place| [place.min, place.max]).collect();
+        let span = |boxes: &[[DVec3; 2]]| {
+            let whole = boxes.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+            whole.map_or(0.0, |[min, max]| (max - min).length())
+        };
+        // Parts of one object are not left out of its picture.
+        let stands_on_ground = span(&boxes[..dense]) < SMALL * span(&boxes);
+        if stands_on_ground { boxes[..dense].to_vec() } else { boxes }
     }
 
     /// What a ray with this unit direction meets first; `None`: a brick cannot be read, or it would be too many.
