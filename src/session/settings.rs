@@ -180,7 +180,7 @@ settings! {
         /// Reference for --checkpoints: an EXR for frame 0, or a folder with one for each frame. In a folder they are
         /// called 0000.exr, 0001.exr and so on, as `walk --aov` writes them. [default: none]
         reference: Option<PathBuf> = None, "--reference FILE.exr|DIR", Rule::Any, "", Measurement, Usual;
-        /// Record which bricks every pass needed (`bricks_needed`). It takes a traversal more a pass.
+        /// Record which bricks every pass needed (`bricks_needed`). It takes one more traversal per pass.
         measure_needed: bool = false, "--measure-needed", Rule::Any, "", Measurement, Expert;
         /// Record how far each effect is from the exact picture (`error_mean`, `error_worst_tile`, `error_pixels`). A
         /// second session renders that picture: it takes twice the time and device memory.

@@ -92,10 +92,10 @@ fn agree(output: &Path) {
     let html = std::fs::read_to_string(output.join("report.html")).unwrap();
     let markdown = std::fs::read_to_string(output.join("chc.md")).unwrap();
     assert!(html.contains("Figure 7") && html.contains("Figure 8") && html.contains("<svg"));
-    assert!(!html.contains("<script") && !html.contains("http://") && !html.contains("https://"));
+    assert!(!html.contains("<script src") && !html.contains("http://") && !html.contains("https://"));
 
     let start = ["city", "near", "primary", "chc"];
-    let ratio = number(&entry(table2, &start, "over plain-bvh2, wall"));
+    let ratio = number(&entry(table2, &start, "speed-up over plain-bvh2, wall"));
     let cells = json["cells"].as_array().unwrap();
     let ms = |schedule: &str| {
         let path = format!("table2/city/100%/tile 64/near/primary,ao,diffuse/{schedule}/threshold 0/turn 36");

@@ -16,8 +16,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 const TITLE: &str = "The experiments of CHC+RT";
-const READING: &str = "Ratios are of medians over the repetitions of the mean frame; what is compared takes turns in one process. The \
-                       paper: Mattausch et al. 2015, an NVIDIA Titan, 1920 x 1080, 20 secondary rays a pixel; its scenes are like ours \
+const READING: &str = "Ratios compare medians over repetitions of the mean frame; what is compared takes turns in one process. The \
+                       paper: Mattausch et al. 2015, an NVIDIA Titan, 1920 x 1080, 20 secondary rays per pixel; its scenes resemble ours \
                        in size and kind, not the same.";
 
 /// Writes the results; returns what to print.
@@ -90,11 +90,12 @@ fn summary(folder: &Path, (done, planned): (usize, usize), sections: &[Section],
     };
     let table2 = sections.iter().flat_map(|section| &section.tables).find(|table| table.name == "table2");
     if let Some(Table { columns, rows, .. }) = table2 {
-        line(["in core, wall time", "over plain", "over plain-bvh2", "paper"]);
+        line(["speed-up in core, wall time", "over plain", "over plain-bvh2", "paper"]);
         let entry =
             |row: &[Value], name: &str| columns.iter().position(|column| column == name).map(|at| row[at].clone());
         for row in rows {
-            let all = ["over plain, wall", "over plain-bvh2, wall", "paper"].map(|name| entry(row, name));
+            let all =
+                ["speed-up over plain, wall", "speed-up over plain-bvh2, wall", "paper"].map(|name| entry(row, name));
             let [Some(plain), Some(binary), Some(paper)] = all else { continue };
             if paper != Value::Missing {
                 let name = row[..4].iter().map(Value::show).collect::<Vec<_>>().join(" ");

@@ -18,7 +18,7 @@ pub fn all(measured: &Measured) -> Vec<Section> {
         ("Table 5: random turns", table("table5", TABLE5, of(Stage::Table5), &table5())),
         ("Sizes of tiles", table("figure5", FIGURE5, of(Stage::Figure5), &figure5())),
         ("Moved against needed", table("targets", TARGETS, of(Stage::Targets), &targets())),
-        ("What size costs", scale(measured)),
+        ("Cost of scene size", scale(measured)),
     ];
     let section =
         |(title, table): (&str, Table)| Section { title: title.into(), tables: vec![table], ..Section::default() };
@@ -78,8 +78,9 @@ fn of_paper<T>(pass: &Pass, value: impl Fn(PaperScene) -> Option<T>) -> Option<T
     paper::scene(pass.case.scene).and_then(value)
 }
 
-const TABLE2: &str = "In core. Milliseconds a frame and pass, medians; wall time (as the paper's) and device time of the three phases. The \
-                      paper's speed-up is over a binary tree walked from its root: our column over plain-bvh2 is its like.";
+const TABLE2: &str = "In core. Medians of milliseconds per frame and pass: wall time, as in the paper, and device time of the three phases. \
+                      A speed-up above 1 is faster. The paper's is over a binary tree traversed from its root: compare it with ours over \
+                      plain-bvh2.";
 
 fn table2<'a>() -> [Column<Pass<'a>>; 11] {
     /// The paper's numbers do not concern the baselines.
@@ -93,19 +94,19 @@ fn table2<'a>() -> [Column<Pass<'a>>; 11] {
         ("schedule", schedule),
         ("wall ms", wall),
         ("device ms", device),
-        ("over plain, wall", |pass| over(pass, PLAIN, WALL)),
-        ("over plain-bvh2, wall", |pass| over(pass, PLAIN_BVH2, WALL)),
+        ("speed-up over plain, wall", |pass| over(pass, PLAIN, WALL)),
+        ("speed-up over plain-bvh2, wall", |pass| over(pass, PLAIN_BVH2, WALL)),
         ("paper", |pass| {
             let speed_up = of_paper(pass, |scene| paper::at(&scene.speed_up?, pass.case.view, pass.effect));
             Value::ratio(speed_up.filter(|_| is_ours(pass)))
         }),
-        ("over plain, device", |pass| over(pass, PLAIN, Device)),
-        ("over plain-bvh2, device", |pass| over(pass, PLAIN_BVH2, Device)),
+        ("speed-up over plain, device", |pass| over(pass, PLAIN, Device)),
+        ("speed-up over plain-bvh2, device", |pass| over(pass, PLAIN_BVH2, Device)),
     ]
 }
 
-const TABLE3: &str = "Out of core, at the paper's share of the cache. Per frame, the first frames left out. Far ÷ near is the ratio of wall times; \
-                      a paper's MB has attributes in it.";
+const TABLE3: &str = "Out of core, with the paper's share of the cache. Per frame, without the first frames. Far ÷ near is a ratio of wall times. \
+                      The paper's MB include attributes.";
 
 fn table3<'a>() -> [Column<Pass<'a>>; 16] {
     fn traffic(pass: &Pass, which: usize) -> Value {
@@ -143,9 +144,9 @@ fn table3<'a>() -> [Column<Pass<'a>>; 16] {
     ]
 }
 
-const TABLE4: &str = "Aggressive culling of diffuse rays out of core: bricks that at most so many rays of a tile could see (of one of 200 x 200 \
-                      pixels) are left out. Errors are of 255 levels, against threshold 0, over five frames that begin with an empty cache; the \
-                      paper states a mean of 9.04 for 20 pixels in one picture.";
+const TABLE4: &str = "Aggressive culling of diffuse rays out of core: bricks that at most so many rays of a tile of 200 x 200 pixels could see are \
+                      skipped. A speed-up above 1 is faster. Errors are in levels of 255 against threshold 0, over five frames that begin \
+                      with an empty cache; the paper states a mean of 9.04 for 20 pixels in one picture.";
 
 fn table4<'a>() -> [Column<Pass<'a>>; 8] {
     [
@@ -153,7 +154,7 @@ fn table4<'a>() -> [Column<Pass<'a>>; 8] {
         ("path", path),
         ("threshold", |pass| pass.case.variant.threshold.to_string().into()),
         ("wall ms", wall),
-        ("over threshold 0", |pass| {
+        ("speed-up over threshold 0", |pass| {
             let exact = with(pass.case, Variant { threshold: 0, ..pass.case.variant });
             Value::ratio(pass.under(&exact, WALL))
         }),
@@ -163,12 +164,11 @@ fn table4<'a>() -> [Column<Pass<'a>>; 8] {
             Value::ratio(ms.zip(at).map(|(ms, at)| ms[0] / ms[at]))
         }),
         ("mean absolute error", |pass| Value::number(pass.error().map(|error| error.mean))),
-        ("that of the worst tile", |pass| Value::number(pass.error().map(|error| error.worst_tile))),
+        ("mean of the worst tile", |pass| Value::number(pass.error().map(|error| error.worst_tile))),
     ]
 }
 
-const TABLE5: &str =
-    "Random turn of a pixel's rays about the normal, at most so many degrees; in core, near. The ratio is to no turn.";
+const TABLE5: &str = "Random turn of a pixel's rays about the normal, up to so many degrees; in core, near. Slowdowns are over no turn; above 1 is slower.";
 
 fn table5<'a>() -> [Column<Pass<'a>>; 9] {
     fn slower(pass: &Pass, metric: Metric) -> Value {
@@ -181,8 +181,8 @@ fn table5<'a>() -> [Column<Pass<'a>>; 9] {
         ("turn", |pass| format!("{}°", pass.case.variant.rotation).into()),
         ("wall ms", wall),
         ("device ms", device),
-        ("slower, wall", |pass| slower(pass, WALL)),
-        ("slower, device", |pass| slower(pass, Device)),
+        ("slowdown, wall", |pass| slower(pass, WALL)),
+        ("slowdown, device", |pass| slower(pass, Device)),
         ("paper", |pass| {
             let at = ROTATIONS.iter().position(|&rotation| rotation == pass.case.variant.rotation);
             let rays = SECONDARY.iter().position(|&effect| effect == pass.effect);
@@ -192,8 +192,7 @@ fn table5<'a>() -> [Column<Pass<'a>>; 9] {
     ]
 }
 
-const FIGURE5: &str =
-    "Primary rays in core by the size of tiles. The paper found tiles of 200 pixels best on its hardware.";
+const FIGURE5: &str = "Primary rays in core by tile size. The paper found tiles of 200 pixels best on its hardware.";
 
 fn figure5<'a>() -> [Column<Pass<'a>>; 7] {
     [
@@ -207,8 +206,8 @@ fn figure5<'a>() -> [Column<Pass<'a>>; 7] {
     ]
 }
 
-const TARGETS: &str = "BVH and triangles moved ÷ needed, near: of the first frame, which begins with an empty cache, and of the others, of what was \
-                       not resident. 1 is the least.";
+const TARGETS: &str = "BVH and triangles, near. Cold: moved ÷ needed in the first frame, which begins with an empty cache. Steady: moved ÷ missing in \
+                       all others. 1 is optimal.";
 
 fn targets<'a>() -> [Column<Pass<'a>>; 8] {
     /// Of the first frame, or of the others.
@@ -231,8 +230,8 @@ fn targets<'a>() -> [Column<Pass<'a>>; 8] {
     ]
 }
 
-const SCALE: &str = "What size costs: the larger scene ÷ the smaller, of walks that were not interleaved. In core on both sides, or out of \
-                     core ÷ in core, as in the paper.";
+const SCALE: &str = "Time of the larger scene ÷ time of the smaller one, not interleaved. Both in core, or out of core ÷ in core, as in the \
+                     paper.";
 
 /// What the size of a scene costs: ratios between scenes, which no walks interleave.
 fn scale(measured: &Measured) -> Table {
