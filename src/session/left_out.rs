@@ -86,7 +86,7 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
 fn has_short_rays(renderer: &mut Renderer) -> bool {
     let Renderer { engine, methods } = renderer;
     let Some(roma) = methods.get_mut::<Roma>() else { return false };
-    let is_help = roma.settings.is_some_and(|settings| settings.occlusion.role.is_help());
+    let is_help = roma.settings.is_some_and(|settings| settings.occlusion.is_some_and(|pass| pass.role.is_help()));
     let length = engine.settings.effects.occlusion.map(|occlusion| occlusion.length);
     is_help && length.is_some_and(|length| roma.is_short(&engine.scene, length))
 }

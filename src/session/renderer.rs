@@ -54,15 +54,13 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
 /// The methods that answer secondary rays; a field of visibility is made or read later.
 pub fn methods(settings: &Settings) -> Methods {
     let mut methods = Methods::default();
-    let roma = &settings.roma;
-    match settings.secondary {
-        Method::Roma | Method::Auto => {
-            let is_auto = settings.secondary == Method::Auto;
-            methods.set(Roma::new(roma.settings(settings.rsm.settings(), is_auto), roma.bom));
-        }
-        #[cfg(feature = "lab")]
-        Method::Df => methods.set(Df::new(settings.df.clone(), roma.bom)),
-        Method::Exact | Method::Dvf => {}
+    let (roma, chosen) = (&settings.roma, settings.secondary);
+    if chosen.has(Method::Roma) || chosen.has(Method::Auto) {
+        methods.set(Roma::new(roma.settings(settings.rsm.settings(), chosen), roma.bom));
+    }
+    #[cfg(feature = "lab")]
+    if chosen.has(Method::Df) {
+        methods.set(Df::new(settings.df.clone(), chosen, roma.bom));
     }
     methods
 }

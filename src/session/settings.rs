@@ -7,7 +7,7 @@ use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
 use crate::schedule::{Optimisation, Optimisations, PartOf};
 #[cfg(feature = "lab")]
 use crate::secondary::df;
-use crate::secondary::{Method, dvf, roma, rsm};
+use crate::secondary::{EffectMethods, Method, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
     Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Length, Policy, Rectangle, Rule,
@@ -166,12 +166,12 @@ settings! {
         /// --fronts on: multi-queries, tighter-bounds, lazy-requery, pull-up. docs/methods/chc.md says what each does.
         without: Vec<Optimisation> = Vec::new(), "--without LIST", Rule::Any, "", Schedule, Expert;
 
-        /// How secondary rays are answered: exact, roma, auto, df, dvf. `exact`: all are traced. `roma`: those of `ao`,
-        /// `shadow` and `diffuse` by occupancy maps, with a bias of a few cells and without a brick loaded. `auto`:
-        /// those of `ao` and `shadow` that the maps find free are not traced. `df`: those of `ao` and `shadow` by
-        /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
-        /// walk.
-        secondary: Method = Method::Exact, "--secondary METHOD", Rule::Any, "", Methods, Common;
+        /// How secondary rays are answered: exact, roma, auto, df, dvf, or EFFECT=METHOD with commas between them, as
+        /// in ao=roma,environment=dvf. `exact`: all are traced. `roma`: those of `ao` and `diffuse` by occupancy maps,
+        /// with a bias of a few cells and without a brick loaded. `auto`: those of `ao` that the maps find free are not
+        /// traced. `df`: those of `ao` by distance fields, a baseline. `dvf`: those to the environment by a field of
+        /// visibility, made on the first walk. Rays of `shadow` are traced unless asked: shadow=roma, auto or df.
+        secondary: EffectMethods = EffectMethods::EXACT, "--secondary METHOD", Rule::Any, "", Methods, Common;
 
         /// Measure the error of frames after so many samples per pixel, as 1,4,16,64. `--reference` is what they are
         /// measured against; `checkpoints.jsonl` and the report have RMSE, relMSE, bias and FLIP over samples and over
@@ -255,10 +255,12 @@ impl Settings {
     /// Settings that were chosen and have no effect, a line each: what they belong to is not on.
     pub fn without_effect(&self) -> Vec<String> {
         let effects = self.effects;
-        let maps = matches!(self.secondary, Method::Roma | Method::Auto);
-        let fields = self.secondary.name() == "df";
+        let chosen = self.secondary;
+        let by_maps = |method| matches!(method, Method::Roma | Method::Auto);
+        let maps = chosen.has(Method::Roma) || chosen.has(Method::Auto);
+        let fields = chosen.list().iter().any(|(_, method)| method.name() == "df");
         let lit = self.environment.is_some();
-        let needs: [(&str, bool, &str); 17] = [
+        let needs: [(&str, bool, &str); 22] = [
             ("ao_rays", effects.ao, "--effects ao"),
             ("ao_length", effects.ao, "--effects ao"),
             ("diffuse_rays", effects.diffuse, "--effects diffuse"),
@@ -270,11 +272,16 @@ impl Settings {
             ("reference", !self.checkpoints.is_empty(), "--checkpoints"),
             ("progressive", self.samples() > BATCH_SAMPLES, "--spp above 64"),
             ("roma.bom", maps || fields, "--secondary roma, auto or df"),
+            ("roma.k", by_maps(chosen.ao), "--secondary ao=roma or ao=auto"),
+            ("roma.shadow_k", by_maps(chosen.shadow), "--secondary shadow=roma or shadow=auto"),
+            ("roma.diffuse_k", by_maps(chosen.diffuse), "--secondary diffuse=roma"),
+            ("roma.one_in", chosen.ao == Method::Auto, "--secondary ao=auto"),
+            ("roma.error", chosen.has(Method::Auto), "--secondary auto"),
             ("roma.", maps, "--secondary roma or auto"),
-            ("rsm.", self.secondary == Method::Roma, "--secondary roma"),
+            ("rsm.", chosen.diffuse == Method::Roma, "--secondary diffuse=roma"),
             ("df.", fields, "--secondary df"),
-            ("dvf.renew", self.secondary == Method::Dvf && self.motion.is_some(), "--secondary dvf and --motion"),
-            ("dvf.", self.secondary == Method::Dvf, "--secondary dvf"),
+            ("dvf.renew", chosen.has(Method::Dvf) && self.motion.is_some(), "--secondary dvf and --motion"),
+            ("dvf.", chosen.has(Method::Dvf), "--secondary dvf"),
             ("fronts", matches!(self.schedule, Schedule::Chc | Schedule::Auto), "--schedule chc"),
         ];
         let idle = |entry: Entry| {
@@ -284,7 +291,23 @@ impl Settings {
             let flag = entry.field.flag();
             (!has_effect).then(|| format!("--{flag} has no effect without {belongs}"))
         };
-        self.chosen().into_iter().filter_map(idle).collect()
+        self.chosen().into_iter().filter_map(idle).chain(self.idle_methods()).collect()
+    }
+
+    /// Says that no effect that is on has a method of those chosen.
+    fn idle_methods(&self) -> Option<String> {
+        let EffectMethods { ao, diffuse, shadow, .. } = self.secondary;
+        let effects = self.effects;
+        let is_on = [(ao, effects.ao && !effects.environment), (diffuse, effects.diffuse), (shadow, effects.shadow)];
+        let is_idle = self.secondary.has_maps() && is_on.iter().all(|(method, on)| !on || *method == Method::Exact);
+        let list = self.secondary.list().into_iter().filter(|(_, method)| *method != Method::Exact);
+        let of: Vec<&str> = list.map(|(effect, _)| effect).collect();
+        let hint = match effects.shadow {
+            true => format!("; shadows are traced unless --secondary shadow={} asks", Method::Roma),
+            false => String::new(),
+        };
+        let (chosen, of) = (self.secondary, of.join(" or "));
+        is_idle.then(|| format!("--secondary {chosen} has no effect without --effects {of}{hint}"))
     }
 
     /// Whether `chc` keeps query pairs from frame to frame.

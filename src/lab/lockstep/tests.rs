@@ -31,7 +31,7 @@ use crate::secondary::roma::answer::Roma;
 use crate::secondary::roma::maps::RomaMaps;
 use crate::secondary::roma::{Grid, Role, RomaPart, RomaPass, RomaSettings, Sift};
 use crate::secondary::rsm::RsmSettings;
-use crate::secondary::{FAMILIES, Method};
+use crate::secondary::{EffectMethods, FAMILIES, Method};
 use crate::session::Settings;
 use crate::session::renderer::methods;
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
@@ -237,7 +237,7 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
 fn roma((steps, role): (u32, Role)) -> RomaSettings {
     let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 4 }, steps, role };
     let diffuse = (!role.is_help()).then(|| RomaPass { role: Role::Answer, ..pass(4) });
-    RomaSettings { occlusion: pass(4), shadow: pass(8), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
+    RomaSettings { occlusion: Some(pass(4)), shadow: Some(pass(8)), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
 }
 
 /// Small fields.
@@ -329,14 +329,14 @@ fn render(
         captures: None,
         moved: Moved::default(),
     };
-    let mut usual = Settings { secondary: variant.method, ..Settings::exact() };
+    let mut usual = Settings { secondary: EffectMethods::every(variant.method), ..Settings::exact() };
     (usual.roma.size, usual.rsm.size, usual.df.size) = (32, 64, 32);
     let mut renderer = Renderer { engine, methods: methods(&usual) };
     if let Some(settings) = variant.roma.map(roma) {
         renderer.methods.set(Roma::new(settings, Source::default()));
     }
     if let Some(settings) = variant.field.map(field) {
-        renderer.methods.set(Df::new(settings, Source::default()));
+        renderer.methods.set(Df::new(settings, EffectMethods::every(Method::Df), Source::default()));
     }
     let path = path_from_bounds(manifest.min, manifest.max);
     if let Some(settings) = &variant.dvf {

@@ -7,12 +7,15 @@ use crate::kernels::View;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass};
 use crate::secondary::occupancy::{BaseMaps, Cascades, Source};
+use crate::secondary::{EffectMethods, Method};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// Rays answered by distance fields.
 pub struct Df {
     settings: Options,
+    /// Which method answers the rays of which effect.
+    chosen: EffectMethods,
     /// The base maps.
     pub base: BaseMaps,
     /// What the fields that the executor has were made of.
@@ -21,19 +24,20 @@ pub struct Df {
 
 impl Df {
     /// With base maps that are made of `source`.
-    pub fn new(settings: Options, source: Source) -> Self {
-        Self { settings, base: BaseMaps::new(source), made: None }
+    pub fn new(settings: Options, chosen: EffectMethods, source: Source) -> Self {
+        Self { settings, chosen, base: BaseMaps::new(source), made: None }
     }
 
     /// Look-ups of a ray of `pass` at most; `None` where rays are traced.
     fn steps_of(&self, pass: Pass) -> Option<u32> {
-        match pass {
-            Pass::Occlusion(_) => Some(self.settings.occlusion_steps()),
+        let (method, steps) = match pass {
+            Pass::Occlusion(_) => (self.chosen.ao, self.settings.occlusion_steps()),
             Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
-                Some(self.settings.shadow_steps())
+                (self.chosen.shadow, self.settings.shadow_steps())
             }
-            _ => None,
-        }
+            _ => return None,
+        };
+        (method == Method::Df).then_some(steps)
     }
 }
 

@@ -68,11 +68,9 @@ impl Roma {
     /// How the rays of `pass` are answered; `None` where they are traced.
     pub fn pass_of(settings: &RomaSettings, pass: Pass) -> Option<RomaPass> {
         match pass {
-            Pass::Occlusion(_) => Some(settings.occlusion),
+            Pass::Occlusion(_) => settings.occlusion,
             Pass::Diffuse(_) => settings.diffuse,
-            Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
-                Some(settings.shadow)
-            }
+            Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => settings.shadow,
             _ => None,
         }
     }
@@ -195,21 +193,28 @@ impl Secondary for Roma {
 
     fn report(&self) -> Vec<(&'static str, Value)> {
         let of = |roma: &RomaSettings| {
-            let RomaPass { grid, role, steps, .. } = roma.occlusion;
+            let RomaSettings { occlusion, shadow, diffuse, .. } = *roma;
+            let [role, shadow_role] = [occlusion, shadow].map(|pass| pass.map(|pass| pass.role));
+            let [k, shadow_k, diffuse_k] = [occlusion, shadow, diffuse].map(|pass| pass.map(|pass| pass.grid.k));
+            let [steps, shadow_steps, diffuse_steps] =
+                [occlusion, shadow, diffuse].map(|pass| pass.map(|pass| pass.steps));
+            let most_wrong =
+                |role| if let Role::Sift { most_wrong: Some(n) } = role { 1e-6 * f64::from(n) } else { 0.0 };
+            let first = occlusion.or(shadow).or(diffuse);
             json!({
                 "bom": self.base.source().name(),
-                "k": grid.k,
-                "shadow_k": roma.shadow.grid.k,
-                "size": grid.size,
-                "samples": grid.samples,
+                "k": k,
+                "shadow_k": shadow_k,
+                "size": first.map(|pass| pass.grid.size),
+                "samples": first.map(|pass| pass.grid.samples),
                 "steps": steps,
-                "shadow_steps": roma.shadow.steps,
-                "diffuse_k": roma.diffuse.map(|pass| pass.grid.k),
-                "diffuse_steps": roma.diffuse.map(|pass| pass.steps),
-                "one_in": if let Role::Correct(one_in) = role { one_in } else { 1 },
-                "most_wrong": if let Role::Sift { most_wrong: Some(n) } = role { 1e-6 * f64::from(n) } else { 0.0 },
-                "ao_handover": self.handovers[0].report(role),
-                "shadow_handover": self.handovers[1].report(roma.shadow.role),
+                "shadow_steps": shadow_steps,
+                "diffuse_k": diffuse_k,
+                "diffuse_steps": diffuse_steps,
+                "one_in": if let Some(Role::Correct(one_in)) = role { one_in } else { 1 },
+                "most_wrong": role.or(shadow_role).map_or(0.0, most_wrong),
+                "ao_handover": role.map(|role| self.handovers[0].report(role)),
+                "shadow_handover": shadow_role.map(|role| self.handovers[1].report(role)),
                 "finest_cell": self.finest_cell(),
             })
         };

@@ -122,11 +122,11 @@ pub struct RomaPass {
 /// How ROMA answers the rays of walks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RomaSettings {
-    /// Occlusion rays.
-    pub occlusion: RomaPass,
+    /// Occlusion rays; `None` where maps do nothing for them.
+    pub occlusion: Option<RomaPass>,
     /// Rays to the sun and to emitters.
-    pub shadow: RomaPass,
-    /// Diffuse rays; `None` where they are traced.
+    pub shadow: Option<RomaPass>,
+    /// Diffuse rays.
     pub diffuse: Option<RomaPass>,
     /// What lights the hits of diffuse rays.
     pub rsm: RsmSettings,

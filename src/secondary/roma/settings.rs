@@ -3,6 +3,7 @@
 use super::{CLOSED, Grid, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings, THIN};
 use crate::secondary::occupancy::Source;
 use crate::secondary::rsm::RsmSettings;
+use crate::secondary::{EffectMethods, Method};
 use crate::settings::{Rule, names, settings};
 
 /// Square roots of numbers of maps.
@@ -62,30 +63,31 @@ settings! {
 }
 
 impl Options {
-    /// How rays are answered; with `is_auto` exact ones are traced as far as `error` or `one_in` have it.
-    pub fn settings(&self, rsm: RsmSettings, is_auto: bool) -> RomaSettings {
+    /// How rays are answered; where `chosen` has `auto`, exact ones are traced as far as `error` or `one_in` have it.
+    pub fn settings(&self, rsm: RsmSettings, chosen: EffectMethods) -> RomaSettings {
         let most_wrong = self.error.map(|percent| (1e4 * percent).round() as u32);
-        let pass = |k, is_unsnapped, one_in: Option<u32>, stride| {
-            let role = match (is_auto, one_in) {
-                (true, Some(one_in)) => Role::Correct(one_in),
-                (true, None) => Role::Sift { most_wrong },
-                (false, _) => Role::Answer,
+        let pass = |method, k, is_unsnapped, one_in: Option<u32>, stride| {
+            let role = match (method, one_in) {
+                (Method::Roma, _) => Role::Answer,
+                (Method::Auto, Some(one_in)) => Role::Correct(one_in),
+                (Method::Auto, None) => Role::Sift { most_wrong },
+                _ => return None,
             };
             let is_sifted = matches!(role, Role::Sift { .. });
             let steps = if is_sifted { MOST_STEPS } else { self.steps };
             let stride = if is_sifted { CLOSED } else { stride };
             let grid = Grid { k, size: self.size, samples: 1 }.with_stride(stride);
-            RomaPass {
+            Some(RomaPass {
                 grid: Grid { samples: self.samples.unwrap_or(grid.samples), ..grid },
                 steps: if is_unsnapped || is_sifted { steps } else { 0 },
                 role,
-            }
+            })
         };
         let keeps = |rays| self.unsnapped.iter().any(|named| [rays, Unsnapped::All].contains(named));
         RomaSettings {
-            occlusion: pass(self.k, keeps(Unsnapped::Ao), self.one_in, THIN),
-            shadow: pass(self.shadow_k, keeps(Unsnapped::Shadow), None, CLOSED),
-            diffuse: (!is_auto).then(|| pass(self.diffuse_k, keeps(Unsnapped::Diffuse), None, CLOSED)),
+            occlusion: pass(chosen.ao, self.k, keeps(Unsnapped::Ao), self.one_in, THIN),
+            shadow: pass(chosen.shadow, self.shadow_k, keeps(Unsnapped::Shadow), None, CLOSED),
+            diffuse: pass(chosen.diffuse, self.diffuse_k, keeps(Unsnapped::Diffuse), None, CLOSED),
             rsm,
         }
     }

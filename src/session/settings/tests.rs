@@ -11,7 +11,7 @@ fn defaults_are_the_documented_ones() {
     assert_eq!(s.effects.to_string(), "primary,shadow");
     assert_eq!((s.spp, s.seed, s.tile), (1, 0, 64));
     assert_eq!((s.cache, s.host_cache), (CacheSize::Auto, 1 << 30));
-    assert_eq!((s.secondary, s.schedule, s.fronts), (Method::Exact, Schedule::Auto, false));
+    assert_eq!((s.secondary, s.schedule, s.fronts), (crate::secondary::EffectMethods::EXACT, Schedule::Auto, false));
     assert_eq!((s.query_threshold, s.evict), (0, crate::stream::Policy::RoundRobin));
     assert_eq!((s.sun, s.sun_angle, s.sun_intensity()), (Direction([0.4, 0.8, 0.45]), 0.53, 2.4));
     assert!(s.path.is_none() && !s.aov && s.fov.is_none() && s.worker_count() >= 1);
@@ -196,7 +196,14 @@ fn settings_without_effect_are_named() {
     assert_eq!(named("--roma-k 8 --dvf-rays 64").len(), 2);
     assert!(named("--effects ao --ao-length 2 --secondary roma --roma-k 8").is_empty());
     // `--bom` is of two methods.
-    assert!(named("--secondary df --bom raster").is_empty() && named("--bom raster").len() == 1);
+    assert!(named("--effects ao --secondary df --bom raster").is_empty() && named("--bom raster").len() == 1);
+    assert_eq!(named("--effects ao --secondary ao=roma --roma-shadow-k 4").len(), 1);
+    // The sun is traced unless its method is named.
+    let [line] = &named("--effects shadow --secondary roma")[..] else { panic!() };
+    assert!(line.contains("ao or diffuse") && line.contains("shadow=roma"), "{line}");
+    assert!(named("--effects shadow --secondary shadow=roma --roma-shadow-k 4").is_empty());
+    assert!(named("--effects ao,diffuse --secondary ao=roma").is_empty());
+    assert_eq!(named("--effects shadow,diffuse --secondary ao=auto,diffuse=roma"), Vec::<String>::new());
     assert!(named("").is_empty() && named("--quality exact").is_empty());
 }
 

@@ -166,9 +166,9 @@ fn lamps_and_maps_move_along() {
     let base = format!("{ALL} --adapter cpu --schedule chc --cache 50%");
     for options in [
         "",
-        "--secondary roma --roma-size 64",
-        "--secondary df --df-size 64",
-        "--secondary auto --auto-error off --roma-size 64",
+        "--secondary ao=roma,diffuse=roma,shadow=roma --roma-size 64",
+        "--secondary ao=df,shadow=df --df-size 64",
+        "--secondary ao=auto,shadow=auto --auto-error off --roma-size 64",
     ] {
         let options = format!("{base} {options}");
         let (found, truth) = (walked(&scenes, &options), still(&scenes, &options));

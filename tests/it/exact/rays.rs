@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-const ROMA: &str = "--secondary roma --roma-size 64 --roma-k 4 --cache 20%";
+const ROMA: &str = "--secondary ao=roma,diffuse=roma,shadow=roma --roma-size 64 --roma-k 4 --cache 20%";
 
 /// Effects of the sky, and of an environment in place of it.
 const EFFECTS: [&str; 2] = ["shadow,ao,diffuse,glossy --ao-rays 4 --ao-length 64", "shadow,environment,diffuse,glossy"];
@@ -77,11 +77,14 @@ fn every_ray_is_traced_or_answered_once() {
         ("--schedule auto --cache 20%", None),
         ("--schedule chc --cache 20% --fronts on", None),
         (ROMA, None),
-        ("--secondary roma --roma-size 64 --roma-k 4 --cache 100% --roma-unsnapped all", None),
-        ("--secondary df --cache 20% --df-size 32", None),
-        ("--secondary auto --roma-size 64 --cache 20% --auto-error off", None),
-        ("--secondary auto --roma-size 64 --cache 20% --auto-error 50", None),
-        ("--secondary auto --roma-size 64 --cache 20% --auto-one-in 4", None),
+        (
+            "--secondary ao=roma,diffuse=roma,shadow=roma --roma-size 64 --roma-k 4 --cache 100% --roma-unsnapped all",
+            None,
+        ),
+        ("--secondary ao=df,shadow=df --cache 20% --df-size 32", None),
+        ("--secondary ao=auto,shadow=auto --roma-size 64 --cache 20% --auto-error off", None),
+        ("--secondary ao=auto,shadow=auto --roma-size 64 --cache 20% --auto-error 50", None),
+        ("--secondary ao=auto,shadow=auto --roma-size 64 --cache 20% --auto-one-in 4", None),
         ("--cache 20%", Some(labels)),
         ("--schedule plain --cache 100%", Some(DvfUse { doubt: true, ..labels })),
         ("--cache 20% --spp 2", Some(DvfUse { paper: true, ..labels })),
@@ -111,7 +114,7 @@ fn every_ray_is_traced_or_answered_once() {
             let what = format!("{adapter}: {options} {how:?}");
             for record in &found {
                 // Rays from hits that maps found start elsewhere; the paper's rays to the environment are others.
-                let are_others = options.contains("secondary roma") && record.pass.starts_with("diffuse-")
+                let are_others = options.contains("ao=roma") && record.pass.starts_with("diffuse-")
                     || how.is_some_and(|how| how.paper) && record.pass == "environment";
                 let expected =
                     if are_others || options.contains("spp") { None } else { generated(how.is_some(), record) };
@@ -123,10 +126,10 @@ fn every_ray_is_traced_or_answered_once() {
             let ([of_ao, ao], [_, environment]) = (rays(&found, "ao"), rays(&found, "environment"));
             match () {
                 // What maps and fields answer is not traced at all; pilots and rays in doubt are.
-                _ if options.contains("secondary roma") || options.contains("secondary df") => {
+                _ if options.contains("ao=roma") || options.contains("ao=df") => {
                     assert!(of_ao == 0 && ao > 0, "{what}")
                 }
-                _ if options.contains("secondary auto") => assert!(of_ao > 0 && ao > 0, "{what}"),
+                _ if options.contains("ao=auto") => assert!(of_ao > 0 && ao > 0, "{what}"),
                 _ => assert!(ao == 0 && (environment > 0) == how.is_some(), "{what}"),
             }
             if let Some(one_in) = options.contains("one-in 4").then_some(4) {
@@ -154,7 +157,7 @@ fn counts_are_those_of_the_rays_themselves() {
     let scene = city(folder.path(), "20K", "512");
     let camera = CameraPath::read(&scene.with_extension("near.json")).expect("a path").frame(0, 1);
     for adapter in adapters() {
-        for secondary in ["exact", "roma", "df", "auto --auto-error off"] {
+        for secondary in ["exact", "shadow=roma", "shadow=df", "shadow=auto --auto-error off"] {
             let options = format!("--effects shadow --secondary {secondary} --cache 100%");
             let mut renderer = renderer(&scene, &adapter, &options);
             let records = renderer.frame(0, &camera).expect("a frame").records;
@@ -167,7 +170,7 @@ fn counts_are_those_of_the_rays_themselves() {
             let ended = all.clone().filter(|(ray, hit)| hit.t < ray.t_min).count() as u64;
             let expected = match secondary {
                 "exact" => [all.count() as u64, 0],
-                "roma" | "df" => [0, all.count() as u64],
+                "shadow=roma" | "shadow=df" => [0, all.count() as u64],
                 _ => [all.count() as u64 - ended, ended],
             };
             assert_eq!([traced, answered], expected, "{adapter}, {secondary}");

@@ -350,7 +350,7 @@ fn no_brick_is_loaded_for_its_rays() {
     let of = |options: &str| {
         walk_of(&scene, &folder.path().join("out"), &format!("--adapter cpu --cache 30% {options}"), "2")
     };
-    let (exact, roma) = (of("--secondary exact"), of("--secondary roma"));
+    let (exact, roma) = (of("--secondary exact"), of("--secondary ao=roma,shadow=roma"));
     for pass in ["shadow", "ao"] {
         for field in ["bricks_loaded", "bricks_needed", "bytes_bvh", "bytes_geometry", "queries", "load_batches"] {
             assert_eq!(sum(&roma, pass, field), 0.0, "{pass} {field}");
@@ -367,12 +367,39 @@ fn no_brick_is_loaded_for_its_rays() {
 }
 
 #[test]
+fn each_effect_has_a_method_of_its_own_and_the_sun_is_traced_unless_asked() {
+    let folder = folder();
+    let scene = city(folder.path(), "40K", "1K");
+    let of = |secondary: &str| {
+        let options = format!("--adapter cpu --cache 100% --df-size 64 --roma-size 64 --secondary {secondary}");
+        let records = walk_of(&scene, &folder.path().join("out"), &options, "2");
+        ["shadow", "ao"].map(|pass| ["rays_traced", "rays_answered"].map(|field| sum(&records, pass, field)))
+    };
+    let [[shadow, _], [ao, _]] = of("exact");
+    assert!(shadow > 1000.0 && ao > 1000.0);
+    for (secondary, is_answered) in [
+        ("roma", [false, true]),
+        ("df", [false, true]),
+        ("shadow=roma", [true, false]),
+        ("ao=df,shadow=roma", [true, true]),
+        ("ao=roma,shadow=df", [true, true]),
+        ("dvf", [false, false]),
+    ] {
+        let expected = [shadow, ao].map(|all| [all, 0.0]);
+        let expected = [0, 1].map(|i| if is_answered[i] { [0.0, expected[i][0]] } else { expected[i] });
+        assert_eq!(of(secondary), expected, "{secondary}");
+    }
+    let [[_, answered], [traced, freed]] = of("auto");
+    assert!(answered == 0.0 && traced > 0.0 && freed > 0.0 && traced + freed == ao);
+}
+
+#[test]
 fn it_is_the_same_whatever_the_threads_and_the_cache() {
     let folder = folder();
     let scene = city(folder.path(), "40K", "1K");
     let picture = |options: &str, threads: &str| {
         let output = folder.path().join("out");
-        let method = if options.contains("--secondary") { "" } else { "--secondary roma" };
+        let method = if options.contains("--secondary") { "" } else { "--secondary ao=roma,shadow=roma" };
         walk_of(&scene, &output, &format!("--adapter cpu {method} {options}"), threads);
         let all = frames(&output);
         std::fs::remove_dir_all(&output).expect("a folder");
@@ -383,11 +410,11 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     for (options, threads) in [("--cache 100%", "3"), ("--cache 20%", "2"), ("--cache 30% --schedule demand", "2")] {
         assert!(picture(options, threads) == one, "{options}, {threads} threads");
     }
-    let hybrid = picture("--cache 100% --secondary auto", "1");
-    assert!(hybrid != one && picture("--cache 20% --secondary auto --schedule demand", "3") == hybrid);
-    let corrected = picture("--cache 100% --secondary auto --auto-one-in 3", "1");
+    let hybrid = picture("--cache 100% --secondary ao=auto,shadow=auto", "1");
+    assert!(hybrid != one && picture("--cache 20% --secondary ao=auto,shadow=auto --schedule demand", "3") == hybrid);
+    let corrected = picture("--cache 100% --secondary ao=auto,shadow=auto --auto-one-in 3", "1");
     assert!(corrected != one && corrected != hybrid);
-    assert!(picture("--cache 20% --secondary auto --auto-one-in 3 --schedule demand", "3") == corrected);
+    assert!(picture("--cache 20% --secondary ao=auto,shadow=auto --auto-one-in 3 --schedule demand", "3") == corrected);
     for other in ["--seed 1", "--roma-k 8", "--roma-size 64", "--roma-samples 1", "--roma-unsnapped all"] {
         assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
     }
@@ -500,8 +527,8 @@ fn distance_fields_are_made_once_and_load_no_brick() {
     let of = |options: &str| {
         walk_of(&scene, &folder.path().join("out"), &format!("--adapter cpu --cache 30% {options}"), "2")
     };
-    let (exact, field, few) =
-        (of("--secondary exact"), of("--secondary df --df-size 64"), of("--secondary df --df-size 64 --df-steps 2"));
+    let df = "--secondary ao=df,shadow=df --df-size 64";
+    let (exact, field, few) = (of("--secondary exact"), of(df), of(&format!("{df} --df-steps 2")));
     for pass in ["shadow", "ao"] {
         for name in ["bricks_loaded", "bricks_needed", "bytes_bvh", "bytes_geometry", "queries", "load_batches"] {
             assert_eq!(sum(&field, pass, name), 0.0, "{pass} {name}");
@@ -526,7 +553,7 @@ fn distance_fields_are_the_same_whatever_the_threads_and_the_cache() {
     let scene = city(folder.path(), "40K", "1K");
     let picture = |options: &str, threads: &str| {
         let output = folder.path().join("out");
-        walk_of(&scene, &output, &format!("--adapter cpu --secondary df {options}"), threads);
+        walk_of(&scene, &output, &format!("--adapter cpu --secondary ao=df,shadow=df {options}"), threads);
         let all = frames(&output);
         std::fs::remove_dir_all(&output).expect("a folder");
         all

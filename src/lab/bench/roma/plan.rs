@@ -2,8 +2,8 @@
 
 use super::args::Settings as Scale;
 use crate::lab::bench::scenes::SceneId;
-use crate::secondary::Method;
 use crate::secondary::roma::{self, Unsnapped};
+use crate::secondary::{EffectMethods, Method};
 use crate::session::Settings;
 use crate::settings::{Effect, EffectList, Length, Turn, names};
 use std::fmt;
@@ -86,12 +86,12 @@ impl Way {
     /// `settings` for it.
     pub fn over(&self, settings: &Settings) -> Settings {
         let (roma, mut settings) = (&settings.roma, settings.clone());
-        settings.secondary = match self {
+        settings.secondary = EffectMethods::every(match self {
             Self::Exact => Method::Exact,
             Self::Roma { .. } => Method::Roma,
             Self::Sifted | Self::Corrected { .. } | Self::Bounded { .. } => Method::Auto,
             Self::Field { .. } => Method::Df,
-        };
+        });
         match *self {
             Self::Exact => {}
             Self::Roma { k, size, is_unsnapped } => {
