@@ -18,6 +18,7 @@ compile_error!("scene files are mapped whole, which takes a 64-bit address space
 
 pub mod attributes;
 mod corners;
+pub mod ending;
 mod error;
 mod file;
 pub mod layout;

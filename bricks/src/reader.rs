@@ -1,6 +1,7 @@
 //! Reads the parts of a scene file, each checked against its checksum and the rules of the format.
 
 use crate::attributes;
+use crate::ending;
 use crate::error::{Error, Flaw, Part};
 use crate::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, MAGIC, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
 use crate::layout::{MAX_PAYLOAD_BYTES, unread_kind};
@@ -188,12 +189,14 @@ impl Reader<'_> {
         debug_assert!(size_of::<T>() == entry.record_bytes as usize);
         let part = Part::Section(section);
         let mut records = Vec::new();
-        records.try_reserve_exact(entry.count as usize).map_err(|_| Error::Io {
-            path: self.path.to_owned(),
-            action: format!("hold {part} in memory, {} bytes; free some memory", entry.bytes),
-            part: Some(part),
-            source: io::ErrorKind::OutOfMemory.into(),
-        })?;
+        if !ending::reserve(&mut records, entry.count as usize) {
+            return Err(Error::Io {
+                path: self.path.to_owned(),
+                action: format!("hold {part} in memory, {} bytes; free some memory", entry.bytes),
+                part: Some(part),
+                source: io::ErrorKind::OutOfMemory.into(),
+            });
+        }
         records.resize(entry.count as usize, T::zeroed());
         self.bytes(part, entry.offset, bytemuck::cast_slice_mut(&mut records))?;
         self.corrupt(part, xxh3_64(bytemuck::cast_slice(&records)), entry.checksum)?;

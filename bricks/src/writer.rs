@@ -1,5 +1,6 @@
 //! Writes a scene file so that it appears whole or not at all.
 
+use crate::ending::Temporary;
 use crate::error::{Error, Flaw, Part};
 use crate::layout::DirectoryEntry;
 use crate::layout::{DIRECTORY_BYTES, Header, MAGIC, MAX_PAYLOAD_BYTES, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
@@ -29,6 +30,7 @@ pub struct Writer {
     file: BufWriter<NamedTempFile>,
     position: u64,
     spans: Vec<Span>,
+    _noted: Temporary,
 }
 
 impl Writer {
@@ -42,7 +44,7 @@ impl Writer {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let temporary = builder.tempfile_in(folder_of(&target)).map_err(|source| create_error(&path, source))?;
-        Partial { path, target, temporary }.start()
+        Partial::new(path, target, temporary).start()
     }
 
     /// Reserves the temporary file `.NAME.partial` for a file that will be called `path`, for this process alone. Its
@@ -64,7 +66,7 @@ impl Writer {
             // The process that held the lock may have renamed or removed the file meanwhile.
             if is_same(&file, &partial) {
                 let temporary = TempPath::try_from_path(&partial).map_err(|source| create_error(&path, source))?;
-                return Ok(Partial { path, target, temporary: NamedTempFile::from_parts(file, temporary) });
+                return Ok(Partial::new(path, target, NamedTempFile::from_parts(file, temporary)));
             }
         }
     }
@@ -79,7 +81,7 @@ impl Writer {
     /// Leaves the temporary file.
     pub fn keep(self) {
         // What is not flushed is not part of any checkpoint.
-        Partial { path: self.path, target: self.target, temporary: self.file.into_parts().0 }.keep();
+        Partial::new(self.path, self.target, self.file.into_parts().0).keep();
     }
 
     /// The path that the file will have.
@@ -221,9 +223,15 @@ pub struct Partial {
     path: PathBuf,
     target: PathBuf,
     temporary: NamedTempFile,
+    noted: Temporary,
 }
 
 impl Partial {
+    fn new(path: PathBuf, target: PathBuf, temporary: NamedTempFile) -> Self {
+        let noted = Temporary::note(temporary.path());
+        Self { path, target, temporary, noted }
+    }
+
     /// Leaves the file as it is.
     pub fn keep(self) {
         // It has a name already; that it stays is all that is asked for.
@@ -284,8 +292,9 @@ impl Partial {
     }
 
     fn writer(self, position: u64, spans: Vec<Span>) -> Writer {
-        let Self { path, target, temporary } = self;
-        Writer { path, target, file: BufWriter::with_capacity(BUFFER_BYTES, temporary), position, spans }
+        let Self { path, target, temporary, noted } = self;
+        let file = BufWriter::with_capacity(BUFFER_BYTES, temporary);
+        Writer { path, target, file, position, spans, _noted: noted }
     }
 }
 

@@ -1,6 +1,8 @@
 //! Files that appear complete or not at all, and the one file that grows by whole lines.
 
+use super::leftovers;
 use anyhow::{Context, Result};
+use bricks::ending::Temporary;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -66,6 +68,7 @@ fn folder_of(path: &Path) -> &Path {
 pub struct Replacement {
     out: BufWriter<NamedTempFile>,
     path: PathBuf,
+    noted: Temporary,
 }
 
 impl Replacement {
@@ -75,7 +78,8 @@ impl Replacement {
     /// The folder does not exist or cannot be written to, or the final name is that of a folder.
     pub fn create(path: &Path) -> Result<Self> {
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".brickwalk-").suffix(".tmp");
+        let prefix = leftovers::prefix();
+        builder.prefix(&prefix).suffix(leftovers::SUFFIX);
         #[cfg(unix)]
         {
             // Temporaries are private by default; the finished file has the permissions of any other new file.
@@ -83,8 +87,12 @@ impl Replacement {
             builder.permissions(std::fs::Permissions::from_mode(0o666));
         }
         anyhow::ensure!(!path.is_dir(), "{}: this is a folder; choose the name of a file", path.display());
+        leftovers::remove_from(folder_of(path));
         let temporary = builder.tempfile_in(folder_of(path)).with_context(|| cannot_write(path))?;
-        Ok(Self { out: BufWriter::with_capacity(1 << 20, temporary), path: path.into() })
+        // Where there are locks, other machines see by it that the file is in use.
+        let _ = temporary.as_file().try_lock();
+        let noted = Temporary::note(temporary.path());
+        Ok(Self { out: BufWriter::with_capacity(1 << 20, temporary), path: path.into(), noted })
     }
 
     /// Appends `bytes`.
@@ -100,9 +108,11 @@ impl Replacement {
     /// # Errors
     /// The disk is full, or the name has been taken by a folder.
     pub fn finish(self) -> Result<()> {
-        let context = || cannot_write(&self.path);
+        let path = &self.path;
+        let context = || cannot_write(path);
         let temporary = self.out.into_inner().map_err(std::io::IntoInnerError::into_error).with_context(context)?;
         temporary.persist(&self.path).map_err(|e| e.error).with_context(context)?;
+        drop(self.noted);
         Ok(())
     }
 }

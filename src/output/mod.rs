@@ -3,6 +3,7 @@
 
 pub mod atomic;
 pub mod exr;
+pub mod leftovers;
 pub mod npy;
 pub mod png;
 pub mod srgb;

@@ -4,6 +4,7 @@ use super::journal::Journal;
 use super::spill::Spill;
 use crate::build::error::BuildError;
 use crate::build::settings::BuildSettings;
+use bricks::ending::Temporary;
 use std::ffi::OsString;
 use std::fs;
 use std::io;
@@ -18,6 +19,7 @@ const JOURNAL: &str = "journal";
 pub(crate) struct Scratch {
     path: PathBuf,
     is_kept: bool,
+    _noted: Temporary,
 }
 
 /// The scratch folder for `output`.
@@ -56,7 +58,7 @@ pub(crate) fn earlier(path: &Path, resume: bool) -> Result<Option<(Scratch, Jour
                 return Err(BuildError::NotScratch { path: path.to_owned() });
             }
             if resume && is_journal {
-                let scratch = Scratch { path: path.to_owned(), is_kept: true };
+                let scratch = Scratch { path: path.to_owned(), is_kept: true, _noted: Temporary::note(path) };
                 return Ok(Some((scratch, Journal::open(path.join(JOURNAL))?)));
             }
         }
@@ -84,7 +86,7 @@ impl Scratch {
             action: "create",
             source,
         })?;
-        let scratch = Self { path, is_kept: false };
+        let scratch = Self { _noted: Temporary::note(&path), path, is_kept: false };
         let journal = Journal::create(scratch.path.join(JOURNAL))?;
         Ok((scratch, journal))
     }
