@@ -1,18 +1,19 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
+use super::cached;
 use super::options::args::WalkArgs;
+use super::watcher::Watcher;
 use crate::cli::output::{is_quiet, note, print, warn};
 use crate::counters::{COLUMNS, Column, Kind, Record};
-use crate::frame::{Accumulation, BATCH_SAMPLES};
 use crate::output::atomic;
-use crate::session::{Pictures, Session, Settings, Watch, summary};
+use crate::session::{Pictures, Session, Settings, summary};
 use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Result, bail};
 use brickwalk_convert::progress::Progress;
 use brickwalk_report::Field;
 use std::io::Write;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use tracing::info;
 
 /// Runs the command.
@@ -25,15 +26,15 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         return print(&settings.to_toml());
     }
     let (scene, output) = args.files()?;
-    walk(scene, output, &settings, args.json)
+    walk(&cached::scene(scene)?, output, &settings, args.json).map(drop)
 }
 
 /// Walks through `scene` and writes frames, records, summary and report to `output`; with `json` records are printed,
-/// too.
+/// too. Returns the records.
 ///
 /// # Errors
 /// As [`run`].
-pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Result<()> {
+pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Result<Vec<Record>> {
     let mut session = Session::open(scene, settings)?;
     warn(session.take_warnings());
     atomic::create_folder(&output.join("frames"))?;
@@ -43,7 +44,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
         let _ = std::fs::remove_file(output.join(stale));
     }
     let (progress, stop) = (Progress::new(), super::interrupt::flag());
-    session.prepare(&mut Watcher::new(&progress, stop))?;
+    session.prepare(&mut Watcher::new(&progress, stop, settings))?;
     progress.finish();
     warn(session.take_warnings());
     let mut pictures = Pictures::create(output, settings)?;
@@ -52,19 +53,12 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     let checkpoints = measures.then(|| atomic::JsonLines::create(&output.join("checkpoints.jsonl")));
     let mut checkpoints = checkpoints.transpose()?;
     let progress = Progress::new();
-    // A frame of many samples takes long: the samples are counted then.
-    let spp = settings.samples();
-    let counts_samples = spp > BATCH_SAMPLES;
-    match counts_samples {
-        true => progress.phase("samples", u64::from(settings.frames) * u64::from(spp)),
-        false => progress.phase("frames", settings.frames.into()),
-    }
+    let mut watcher = Watcher::new(&progress, stop, settings);
     let mut records: Vec<Record> = Vec::new();
     let mut finished = 0;
     while finished < settings.frames && !stop.load(Ordering::Relaxed) {
-        let preview = settings.progressive.then_some(&pictures);
-        let mut watcher = Watcher { preview, spp, counts_samples, ..Watcher::new(&progress, stop) };
-        let Some(frame) = session.frame_watched(finished, &mut watcher)? else { break };
+        let preview = settings.progressive.then(|| pictures.preview());
+        let Some(frame) = session.frame_watched(finished, watcher.of_frame(finished, preview))? else { break };
         warn(session.take_warnings());
         pictures.frame(&frame)?;
         if let Some(checkpoints) = &mut checkpoints {
@@ -79,7 +73,6 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
             records.push(record);
         }
         finished += 1;
-        progress.advance(u64::from(!counts_samples));
     }
     progress.finish();
     let (video, commands) = pictures.finish()?;
@@ -104,7 +97,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
         let pixels = counted(non_finite, "non-finite pixel");
         bail!("{pixels}; this is a bug in brickwalk, records.jsonl names the frames");
     }
-    Ok(())
+    Ok(records)
 }
 
 /// A frame in a line: how long it took, and of each effect the time, the schedule and what was loaded.
@@ -130,51 +123,6 @@ fn fields() -> Vec<Field> {
         adds_up: !matches!(column.kind, Kind::State | Kind::Max | Kind::Names),
     };
     written.map(of).collect()
-}
-
-/// Shows how far a frame or a field is, and stops it on Ctrl-C.
-struct Watcher<'a> {
-    progress: &'a Progress,
-    stop: &'a AtomicBool,
-    counts_samples: bool,
-    /// Samples of a frame.
-    spp: u32,
-    /// Where a frame is shown while it is made.
-    preview: Option<&'a Pictures>,
-    /// What progress was told of.
-    told: Option<u64>,
-}
-
-impl<'a> Watcher<'a> {
-    fn new(progress: &'a Progress, stop: &'a AtomicBool) -> Self {
-        Self { progress, stop, counts_samples: false, spp: 0, preview: None, told: None }
-    }
-
-    fn advance(&mut self, done: u64) {
-        self.progress.advance(done - self.told.unwrap_or(0));
-        self.told = Some(done);
-    }
-}
-
-impl Watch for Watcher<'_> {
-    fn samples(&mut self, finished: u32, sum: &Accumulation) -> bool {
-        if self.counts_samples {
-            self.advance(finished.into());
-        }
-        if let Some(pictures) = self.preview.filter(|_| finished < self.spp && finished.is_power_of_two()) {
-            // A preview that cannot be written is no reason to end the walk.
-            let _ = pictures.preview(&sum.mean());
-        }
-        finished == self.spp || !self.stop.load(Ordering::Relaxed)
-    }
-
-    fn field(&mut self, rays: u64, about: u64) -> bool {
-        if self.told.is_none() {
-            self.progress.phase("rays of the field", about);
-        }
-        self.advance(rays);
-        !self.stop.load(Ordering::Relaxed)
-    }
 }
 
 /// Says lines on standard output, or beside it where records go there.

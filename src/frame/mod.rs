@@ -28,7 +28,7 @@ pub use guides::{GuideReader, Guides, Seen};
 pub use light::Light;
 pub use moved::{InstanceMotion, Moved};
 pub use pass_record::FrameRecords;
-pub use render::{FrameOutput, Pixels, RenderError, Renderer};
+pub use render::{FrameOutput, FrameWatch, Pixels, RenderError, Renderer};
 pub use secondary::{Displaced, Methods, Plan, Secondary};
 pub use sky_model::SkyModel;
 pub use view::camera_view;

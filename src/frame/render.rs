@@ -20,6 +20,44 @@ pub enum RenderError {
     Interrupted,
 }
 
+/// Who watches a frame being made, and may stop it. `()` does neither.
+pub trait FrameWatch {
+    /// So many passes of the frame's about so many are done, over all samples; whether to go on.
+    fn passes(&mut self, _done: u32, _about: u32) -> bool {
+        true
+    }
+
+    /// So many samples are finished, and this is their sum: after every [`BATCH_SAMPLES`] and at the end; whether to go
+    /// on.
+    fn samples(&mut self, _finished: u32, _sum: &Accumulation) -> bool {
+        true
+    }
+}
+
+impl FrameWatch for () {}
+
+/// Counts the passes of a frame and tells who watches.
+struct Passes<'a> {
+    watch: &'a mut dyn FrameWatch,
+    done: u32,
+    about: u32,
+}
+
+impl<'a> Passes<'a> {
+    fn new(watch: &'a mut dyn FrameWatch, engine: &Engine) -> Self {
+        let effects = &engine.settings.effects;
+        let occlusion = effects.occlusion.map_or(0, |occlusion| occlusion.rays);
+        let a_sample = 2 + occlusion + effects.diffuse.unwrap_or(0) + u32::from(effects.glossy);
+        Self { watch, done: 0, about: engine.settings.samples.saturating_mul(a_sample) }
+    }
+
+    /// One more pass.
+    fn advance(&mut self) -> Result<(), RenderError> {
+        self.done += 1;
+        if self.watch.passes(self.done, self.about) { Ok(()) } else { Err(RenderError::Interrupted) }
+    }
+}
+
 /// What a frame shows, row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pixels {
@@ -87,11 +125,10 @@ impl Renderer {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn frame(&mut self, frame: u32, camera: &Camera) -> Result<FrameOutput, RenderError> {
-        self.frame_watched(frame, camera, &[], &mut |_, _| true)
+        self.frame_watched(frame, camera, &[], &mut ())
     }
 
-    /// [`Renderer::frame`]; `watch` is told the number of finished samples, and their sum, after every
-    /// [`BATCH_SAMPLES`], after as many as `checkpoints` name, and at the end, and says whether to go on.
+    /// [`Renderer::frame`], watched; the sum of samples is told after as many as `checkpoints` name, too.
     ///
     /// # Errors
     /// As those of [`Renderer::frame`], or `watch` said no.
@@ -100,9 +137,10 @@ impl Renderer {
         frame: u32,
         camera: &Camera,
         checkpoints: &[u32],
-        watch: &mut dyn FnMut(u32, &Accumulation) -> bool,
+        watch: &mut dyn FrameWatch,
     ) -> Result<FrameOutput, RenderError> {
         let Self { engine, methods } = self;
+        let mut passes = Passes::new(watch, engine);
         if let Some(captures) = &mut engine.captures {
             captures.clear();
         }
@@ -144,6 +182,7 @@ impl Renderer {
                     Shading { sun: !effects.shadow, sky, emission: true, miss: true, environment: false, gloss: false };
                 r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
+            passes.advance()?;
             if sample == 0 {
                 for method in methods.iter_mut() {
                     method.after_camera_rays(engine, &mut records, &view)?;
@@ -154,17 +193,21 @@ impl Renderer {
                 guides.lamps(&mut *engine.executor, sample)?;
             }
             light_environment(engine, methods, &mut records, "environment", Pass::Shadow)?;
+            passes.advance()?;
             let directions = |count: u32| sample * count..(sample + 1) * count;
             for index in directions(effects.occlusion.map_or(0, |occlusion| occlusion.rays)) {
                 records
                     .pass(engine, "ao", |r, stats| trace_and_add(r, methods, frame, Pass::Occlusion(index), stats))?;
+                passes.advance()?;
             }
             for index in directions(effects.diffuse.unwrap_or(0)) {
                 let names = ["diffuse", "diffuse-shadow", "diffuse-environment"];
                 bounce(engine, methods, &mut records, names, Pass::Diffuse(index))?;
+                passes.advance()?;
             }
             if effects.glossy {
                 bounce(engine, methods, &mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
+                passes.advance()?;
             }
             if sample == 0 && engine.settings.coverage {
                 output.coverage = engine.executor.read_hits(Pass::Primary)?.iter().map(|hit| hit.id != NONE).collect();
@@ -184,11 +227,11 @@ impl Renderer {
             let is_batch = finished.is_multiple_of(BATCH_SAMPLES) || finished == engine.settings.samples;
             let goes_on = if is_batch {
                 accumulation.add(&engine.executor.read_radiance()?);
-                watch(finished, &accumulation)
+                passes.watch.samples(finished, &accumulation)
             } else if checkpoints.contains(&finished) {
                 let mut so_far = accumulation.clone();
                 so_far.add(&engine.executor.read_radiance()?);
-                watch(finished, &so_far)
+                passes.watch.samples(finished, &so_far)
             } else {
                 true
             };

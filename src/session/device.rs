@@ -25,7 +25,9 @@ pub struct Choice {
 
 /// What `auto` takes of `candidates`.
 pub fn automatic(candidates: &[Candidate]) -> Choice {
-    let hardware = |c: &&(usize, &Candidate)| c.1.is_hardware() && c.1.flaw.is_none();
+    // OpenGL must be asked for by name.
+    let is_gl = |c: &Candidate| c.info.backend == wgpu::Backend::Gl;
+    let hardware = |c: &&(usize, &Candidate)| c.1.is_hardware() && c.1.flaw.is_none() && !is_gl(c.1);
     match candidates.iter().enumerate().filter(|c| hardware(&c)).min_by_key(|(_, c)| c.rank()) {
         Some((number, _)) => Choice { candidate: Some(number), why: "the best hardware GPU that has what is needed" },
         None if candidates.iter().any(Candidate::is_hardware) => {

@@ -9,7 +9,7 @@ use super::renderer::{finest_cell, lit_renderer};
 use super::trace::{self, Traced};
 use super::viewpoint;
 use crate::counters::Record;
-use crate::frame::{Accumulation, Captures, Engine, Light, Pixels, RenderError, Renderer};
+use crate::frame::{Accumulation, Captures, Engine, FrameWatch, Light, Pixels, RenderError, Renderer};
 use crate::output::npy::{Hit, Ray};
 use crate::output::{exr, png, srgb};
 use crate::picture::denoise::Resolve;
@@ -18,10 +18,10 @@ use crate::picture::tone_map::ToneMap;
 use crate::scene::Camera;
 use crate::scene::Picture;
 use crate::scene::path::CameraPath;
-use crate::secondary::Method;
 use crate::secondary::dvf::prepare::{Note, Walk, prepare};
 use crate::secondary::roma::LEAST_CELLS;
 use crate::secondary::roma::answer::Roma;
+use crate::secondary::{EffectMethods, Method};
 use crate::session::Settings;
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
@@ -30,12 +30,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Who watches long work, and may stop it. `()` does neither.
-pub trait Watch {
-    /// So many samples of the frame are finished, and this is their sum; whether to go on.
-    fn samples(&mut self, _finished: u32, _sum: &Accumulation) -> bool {
-        true
-    }
-
+pub trait Watch: FrameWatch {
     /// So many rays of a field of visibility have been traced, of about so many; whether to go on.
     fn field(&mut self, _rays: u64, _about: u64) -> bool {
         true
@@ -43,6 +38,24 @@ pub trait Watch {
 }
 
 impl Watch for () {}
+
+/// Measures the errors of a frame's checkpoints while somebody watches it.
+struct Metered<'a> {
+    watch: &'a mut dyn Watch,
+    meter: Option<ErrorMeter<'a>>,
+    failed: Option<anyhow::Error>,
+}
+
+impl FrameWatch for Metered<'_> {
+    fn passes(&mut self, done: u32, about: u32) -> bool {
+        self.watch.passes(done, about)
+    }
+
+    fn samples(&mut self, finished: u32, sum: &Accumulation) -> bool {
+        self.failed = self.meter.as_mut().and_then(|meter| meter.note(finished, sum).err());
+        self.failed.is_none() && self.watch.samples(finished, sum)
+    }
+}
 
 /// A rendered frame.
 #[derive(Clone, Debug)]
@@ -165,7 +178,7 @@ impl Session {
             renderer,
             lighting,
             resolve: Resolve::new(settings.denoise, settings.taa),
-            field: (settings.secondary != Method::Dvf).then_some(None),
+            field: (!settings.secondary.has(Method::Dvf)).then_some(None),
             stops: Vec::new(),
             meter: Meter::new(settings.exposure, settings.tone_map.white()),
             motion,
@@ -245,12 +258,9 @@ impl Session {
             self.first = Some((renderer.scene.clone(), renderer.light.clone()));
         }
         let meter = self.references.as_ref().map(|references| references.meter(number)).transpose()?;
-        let (mut meter, mut failed) = (meter.flatten(), None);
-        let checkpoints = &self.settings.checkpoints;
-        let output = renderer.frame_watched(number, camera, checkpoints, &mut |done, sum| {
-            failed = meter.as_mut().and_then(|meter| meter.note(done, sum).err());
-            failed.is_none() && watch.samples(done, sum)
-        });
+        let mut metered = Metered { watch, meter: meter.flatten(), failed: None };
+        let output = renderer.frame_watched(number, camera, &self.settings.checkpoints, &mut metered);
+        let Metered { meter, failed, .. } = metered;
         if let Some(error) = failed {
             return Err(error).with_context(name);
         }
@@ -260,7 +270,8 @@ impl Session {
         };
         let checkpoints = meter.map_or_else(Vec::new, ErrorMeter::finish);
         if is_first {
-            self.warnings.extend(short_rays(renderer).into_iter().chain(dark_lamps(renderer)));
+            let has_maps = self.settings.secondary.ao != Method::Exact;
+            self.warnings.extend(short_rays(renderer).filter(|_| has_maps).into_iter().chain(dark_lamps(renderer)));
         }
         if let Some(reference) = &mut self.reference {
             reference.frame(number, camera).with_context(name)?;
@@ -332,7 +343,7 @@ impl Session {
 fn check_occupancy(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()> {
     let resident = scene.resident();
     let has_occupancy = resident.bricks.is_empty() || !resident.occupancy.is_empty();
-    if !matches!(settings.secondary, Method::Exact | Method::Dvf) && !has_occupancy {
+    if settings.secondary.has_maps() && !has_occupancy {
         bail!(
             "{}: --secondary {} needs the occupancy of bricks; convert the scene again without --no-proxies",
             file.display(),
@@ -347,7 +358,7 @@ fn reference(scene: Arc<SceneFile>, file: &Path, settings: &Settings, light: Lig
     let settings = Settings {
         query_threshold: 0,
         requests_out: None,
-        secondary: Method::Exact,
+        secondary: EffectMethods::EXACT,
         interactive: None,
         measure_needed: false,
         aov: false,

@@ -1,6 +1,7 @@
 //! A scene on a device: file, executor, cache and schedule, as settings ask for them.
 
 use super::device::Device;
+use super::picture_bytes::PictureBytes;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::schedule::ExecutorError;
 use crate::schedule::cache::Cache;
@@ -111,6 +112,7 @@ impl Opened {
             }
         }
         let device = Device::open(&settings.adapter)?;
+        PictureBytes::check(settings, &device)?;
         let mut room = Room { page_bytes: device.page_bytes(), bytes: device.room() };
         let mut opened = loop {
             let made = Self::open_on(scene.clone(), path, settings, room, |needs| {

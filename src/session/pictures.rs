@@ -25,17 +25,36 @@ fn frames_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Writes the pictures of a walk, frame by frame.
-pub struct Pictures {
-    folder: PathBuf,
-    /// The frame in work, as it is so far.
-    preview: PathBuf,
+/// Shows the frame in work, as it is so far, in the place of what was shown before; exposed as the frame before.
+#[derive(Clone, Debug)]
+pub struct Preview {
+    file: PathBuf,
     size: (u32, u32),
-    aov: bool,
     exposure: Exposure,
     tone_map: ToneMap,
     /// The stops of the frame before.
     stops: Option<f64>,
+}
+
+impl Preview {
+    /// Writes what the samples of a frame come to so far.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, radiance: &[[f32; 3]]) -> Result<()> {
+        let stops = match (self.stops, self.exposure) {
+            (Some(stops), _) | (None, Exposure::Fixed(stops)) => stops,
+            (None, auto) => Meter::new(auto, self.tone_map.white()).stops(radiance, &[], 0.0),
+        };
+        png::write(&self.file, self.size.0, self.size.1, &developed(radiance, stops, self.tone_map))
+    }
+}
+
+/// Writes the pictures of a walk, frame by frame.
+pub struct Pictures {
+    folder: PathBuf,
+    aov: bool,
+    preview: Preview,
     video: Option<(PathBuf, u32, Video)>,
     /// The commands that make an mp4 of the video and of the PNGs.
     commands: Vec<String>,
@@ -60,30 +79,16 @@ impl Pictures {
             commands = vec![ffmpeg_of_video(file, size, &file.with_extension("mp4")), of_frames];
             video = Some((file.clone(), fps, Video::create(file, size.0, size.1, fps)?));
         }
-        Ok(Self {
-            folder,
-            preview: output.join("preview.png"),
-            size,
-            aov: settings.aov,
-            exposure: settings.exposure,
-            tone_map: settings.tone_map,
-            stops: None,
-            video,
-            commands,
-        })
+        let file = output.join("preview.png");
+        // Of a walk that was killed.
+        let _ = std::fs::remove_file(&file);
+        let preview = Preview { file, size, exposure: settings.exposure, tone_map: settings.tone_map, stops: None };
+        Ok(Self { folder, aov: settings.aov, preview, video, commands })
     }
 
-    /// Shows what the samples of a frame come to so far, in the place of what was shown before; exposed as the frame
-    /// before.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn preview(&self, radiance: &[[f32; 3]]) -> Result<()> {
-        let stops = match (self.stops, self.exposure) {
-            (Some(stops), _) | (None, Exposure::Fixed(stops)) => stops,
-            (None, auto) => Meter::new(auto, self.tone_map.white()).stops(radiance, &[], 0.0),
-        };
-        png::write(&self.preview, self.size.0, self.size.1, &developed(radiance, stops, self.tone_map))
+    /// What shows the next frame while it is made.
+    pub fn preview(&self) -> Preview {
+        self.preview.clone()
     }
 
     /// Writes a frame.
@@ -92,9 +97,10 @@ impl Pictures {
     /// A file cannot be written.
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
         let name = self.folder.join(format!("{:04}.png", frame.number));
-        self.stops = Some(frame.exposure_ev);
+        self.preview.stops = Some(frame.exposure_ev);
         let picture = frame.picture();
-        png::write(&name, self.size.0, self.size.1, &picture)?;
+        let (width, height) = self.preview.size;
+        png::write(&name, width, height, &picture)?;
         if self.aov {
             frame.write_exr(&name.with_extension("exr"))?;
         }
@@ -110,7 +116,7 @@ impl Pictures {
     /// The video cannot be written.
     pub fn finish(self) -> Result<(Value, Vec<String>)> {
         // There is one only where it was asked for.
-        let _ = std::fs::remove_file(&self.preview);
+        let _ = std::fs::remove_file(&self.preview.file);
         let Some((file, fps, video)) = self.video else { return Ok((Value::Null, Vec::new())) };
         video.finish()?;
         let note = json!({

@@ -34,7 +34,7 @@ mod resolve;
 mod taa;
 
 pub use demodulate::LEAST_ALBEDO;
-pub use layer::{Kind, Layer, LayerReport};
+pub use layer::{Kind, Layer, LayerReport, Past};
 pub use moments::Moments;
 pub use resolve::Resolve;
 pub use taa::Taa;

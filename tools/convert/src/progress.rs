@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -54,6 +54,19 @@ impl Progress {
         self.bar.set_style(style);
         self.bar.set_length(total);
         self.bar.set_message(name);
+    }
+
+    /// Names what is under way in the current phase.
+    pub fn name(&self, name: String) {
+        self.bar.set_message(name);
+    }
+
+    /// Prints a line on standard error, beside the bar.
+    pub fn say(&self, line: &str) {
+        self.bar.suspend(|| {
+            // Whoever closed standard error does not want to know.
+            let _ = writeln!(std::io::stderr(), "{line}");
+        });
     }
 
     /// Advances the current phase by `steps`.
