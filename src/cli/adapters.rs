@@ -3,7 +3,7 @@
 use super::options::args::AdaptersArgs;
 use crate::cli::output::{print, print_json};
 use crate::cpu;
-use crate::gpu::device::{Candidate, candidates};
+use crate::gpu::device::{Candidate, candidates_by_name};
 use crate::kernels::DeviceInfo;
 use crate::session::device::{Choice, automatic};
 use anyhow::Result;
@@ -18,7 +18,7 @@ const FORMAT: u32 = 1;
 /// # Errors
 /// Standard output is closed.
 pub fn run(args: &AdaptersArgs) -> Result<()> {
-    let candidates = candidates();
+    let candidates = candidates_by_name();
     let choice = automatic(&candidates);
     if args.json {
         return print_json(&as_json(&candidates, choice));

@@ -8,11 +8,11 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum DeviceError {
     /// No adapter, or none of the given name.
-    #[error("no Vulkan, Metal or DirectX 12 adapter{}; found: {found}; choose one of them, or install a driver (software Vulkan on Debian: apt-get install libvulkan1 mesa-vulkan-drivers), or render on the processor with --adapter cpu", .wanted.as_ref().map(|w| format!(" whose name contains {w:?}")).unwrap_or_default())]
+    #[error("no adapter{} can be used; {found}; render on the processor with --adapter cpu, or install a Vulkan driver (in software, on Debian: apt-get install libvulkan1 mesa-vulkan-drivers)", .wanted.as_ref().map(|w| format!(" whose name contains {w:?}")).unwrap_or_default())]
     NoAdapter {
         /// The name asked for.
         wanted: Option<String>,
-        /// Names of the adapters present.
+        /// The adapters present, those that cannot be used apart.
         found: String,
     },
     /// The driver refused.
@@ -24,7 +24,7 @@ pub enum DeviceError {
         reason: String,
     },
     /// The adapter lacks something without which nothing works.
-    #[error("adapter {adapter:?} allows {found} {what}, {needed} are needed; choose another with --adapter")]
+    #[error("adapter {adapter:?} allows {found} {what}, {needed} are needed; `brickwalk adapters` lists others")]
     Limit {
         /// Adapter name.
         adapter: String,
@@ -105,7 +105,7 @@ pub struct Candidate {
 impl Candidate {
     fn new(adapter: wgpu::Adapter) -> Self {
         let (info, limits) = (adapter.get_info(), adapter.limits());
-        let flaw = check_limits(&info, &limits).err().map(|error| error.to_string());
+        let flaw = missing(&limits).map(|(what, found, needed)| format!("{found} {what}, {needed} are needed"));
         Self { adapter: Some(adapter), info, limits, flaw }
     }
 
@@ -117,7 +117,13 @@ impl Candidate {
 
     /// The lower, the better.
     pub fn rank(&self) -> u32 {
-        rank(&self.info)
+        match self.info.device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Cpu => 3,
+            wgpu::DeviceType::Other => 4,
+        }
     }
 
     /// What it is, in words.
@@ -157,34 +163,48 @@ impl Candidate {
     }
 }
 
-/// The adapters of Vulkan, Metal and DirectX 12. OpenGL is a fallback that must be asked for by name.
+/// The adapters of Vulkan, Metal and DirectX 12.
 pub fn candidates() -> Vec<Candidate> {
     adapters(wgpu::Backends::PRIMARY).into_iter().map(Candidate::new).collect()
 }
 
-/// The lower, the better.
-fn rank(info: &wgpu::AdapterInfo) -> u32 {
-    match info.device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Cpu => 3,
-        wgpu::DeviceType::Other => 4,
-    }
+/// The same, or where there are none those of OpenGL: a fallback that must be asked for by name. Merely asking for it
+/// makes its libraries talk on standard error.
+pub fn candidates_by_name() -> Vec<Candidate> {
+    let found = candidates();
+    if found.is_empty() { adapters(wgpu::Backends::GL).into_iter().map(Candidate::new).collect() } else { found }
 }
 
-/// Refuses what lacks something without which nothing works.
-fn check_limits(info: &wgpu::AdapterInfo, limits: &wgpu::Limits) -> Result<(), DeviceError> {
-    let found = limits.max_storage_buffers_per_shader_stage;
-    if found < FIXED_STORAGE_BUFFERS + 4 {
-        return Err(DeviceError::Limit {
-            adapter: info.name.clone(),
-            what: "storage buffers a kernel",
-            found: found.into(),
-            needed: (FIXED_STORAGE_BUFFERS + 4).into(),
+/// The best of `candidates` that can be used, with `wanted` of those whose name contains it, in any case.
+///
+/// # Errors
+/// None of them can be: which can, and what others lack.
+fn choose(candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate, DeviceError> {
+    let names = |is_usable: bool| {
+        let all = candidates.iter().filter(|c| c.flaw.is_none() == is_usable);
+        let names = all.map(|c| match &c.flaw {
+            Some(flaw) => format!("{} ({flaw})", c.info.name),
+            None => c.info.name.clone(),
         });
+        let names = names.collect::<Vec<_>>().join(", ");
+        if names.is_empty() { "none".to_string() } else { names }
+    };
+    let mut found = format!("usable: {}", names(true));
+    if candidates.iter().any(|c| c.flaw.is_some()) {
+        found += &format!("; not usable: {}", names(false));
     }
-    Ok(())
+    let is_meant = |c: &Candidate| {
+        let has = |wanted: &str| c.info.name.to_lowercase().contains(&wanted.to_lowercase());
+        c.flaw.is_none() && wanted.is_none_or(has)
+    };
+    let best = candidates.into_iter().filter(is_meant).min_by_key(Candidate::rank);
+    best.ok_or_else(|| DeviceError::NoAdapter { wanted: wanted.map(str::to_string), found })
+}
+
+/// What limits are short of without which nothing works: its name, how much there is, how much is needed.
+fn missing(limits: &wgpu::Limits) -> Option<(&'static str, u64, u64)> {
+    let (found, needed) = (limits.max_storage_buffers_per_shader_stage, FIXED_STORAGE_BUFFERS + 4);
+    (found < needed).then(|| ("storage buffers a kernel", found.into(), needed.into()))
 }
 
 /// Bytes of the largest heap of an adapter's own memory; `None` where its backend does not tell.
@@ -209,28 +229,19 @@ fn page_bytes(limits: &wgpu::Limits) -> u64 {
 impl Gpu {
     /// Opens the adapter whose name contains `wanted` (any case), or by itself a discrete GPU, else an integrated one,
     /// else whatever there is. `BRICKWALK_UPLOAD=staged` forces the staging buffer where pages could be mapped.
+    ///
+    /// # Errors
+    /// There is none; it cannot be used, or gives no device.
     pub fn open(wanted: Option<&str>) -> Result<Self, DeviceError> {
-        // OpenGL is a fallback alone: merely asking for it makes its libraries talk on standard error.
-        let mut adapters = adapters(wgpu::Backends::PRIMARY);
-        if adapters.is_empty() {
-            adapters = self::adapters(wgpu::Backends::GL);
-        }
-        let found = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
-        if let Some(wanted) = wanted {
-            let wanted = wanted.to_lowercase();
-            adapters.retain(|a| a.get_info().name.to_lowercase().contains(&wanted));
-        }
-        let Some(adapter) = adapters.into_iter().min_by_key(|a| rank(&a.get_info())) else {
-            let found = if found.is_empty() { "none".to_string() } else { found };
-            return Err(DeviceError::NoAdapter { wanted: wanted.map(str::to_string), found });
-        };
-        Self::from_adapter(&adapter)
+        choose(candidates_by_name(), wanted)?.open()
     }
 
     fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, DeviceError> {
         let info = adapter.get_info();
         let limits = adapter.limits();
-        check_limits(&info, &limits)?;
+        if let Some((what, found, needed)) = missing(&limits) {
+            return Err(DeviceError::Limit { adapter: info.name, what, found, needed });
+        }
         let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
         let features = adapter.features() & wanted;
         let descriptor = wgpu::DeviceDescriptor {
@@ -280,5 +291,40 @@ impl Gpu {
         let pages = (self.limits.max_storage_buffers_per_shader_stage as usize).saturating_sub(taken);
         // Kernels that light bind lamps in place of the cache.
         if pages < LAMP_STORAGE_BUFFERS { 0 } else { pages.min(64) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgpu::DeviceType::{Cpu, DiscreteGpu};
+
+    fn named(name: &str, kind: wgpu::DeviceType, is_sound: bool) -> Candidate {
+        let mut candidate = Candidate::for_tests(kind, is_sound);
+        candidate.info.name = name.into();
+        candidate
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_not_proposed() {
+        let all =
+            || vec![named("llvmpipe", Cpu, false), named("Software", Cpu, true), named("GeForce", DiscreteGpu, true)];
+        let name = |wanted| choose(all(), wanted).map(|c| c.info.name);
+        assert_eq!(name(None).unwrap(), "GeForce");
+        assert_eq!(name(Some("soft")).unwrap(), "Software");
+        for wanted in ["nvidia", "llvm"] {
+            let says = name(Some(wanted)).unwrap_err().to_string();
+            assert!(says.contains("usable: Software, GeForce; not usable: llvmpipe (it is a test)"), "{says}");
+            assert!(says.contains(wanted) && says.contains("--adapter cpu"), "{says}");
+        }
+        let says = choose(vec![named("llvmpipe", Cpu, false)], None).err().unwrap().to_string();
+        assert!(says.contains("usable: none; not usable: llvmpipe"), "{says}");
+    }
+
+    #[test]
+    fn too_few_buffers_are_a_flaw() {
+        let limits = |n| wgpu::Limits { max_storage_buffers_per_shader_stage: n, ..wgpu::Limits::default() };
+        assert_eq!(missing(&limits(24)), None);
+        assert_eq!(missing(&limits(16)), Some(("storage buffers a kernel", 16, 24)));
     }
 }
