@@ -2,6 +2,9 @@
 
 use std::process::ExitCode;
 
+#[global_allocator]
+static ALLOCATOR: brickwalk::cli::memory::Allocator = brickwalk::cli::memory::Allocator;
+
 fn main() -> ExitCode {
     // Mesa's device-select layer only reorders adapters, which brickwalk does itself, and complains on standard error
     // where there is no desktop session. SAFETY: no other thread has been started yet.

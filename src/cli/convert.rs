@@ -2,11 +2,13 @@
 
 use super::interrupt;
 use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
-use crate::cli::output::{Usage, note, warn};
+use crate::cli::output::{Usage, note, one_line, warn};
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
-use brickwalk_convert::import::{EXTENSIONS, ImportSettings, Input, TILESET, import};
+use brickwalk_convert::import::{EXTENSIONS, ImportError, ImportSettings, Input, TILESET, import};
+use brickwalk_convert::progress::Progress;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tracing::info;
@@ -22,17 +24,76 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let start = Instant::now();
     let inputs = expand(&args.inputs.inputs)?;
     refuse_overwriting(&inputs, &args.output)?;
+    check_output(&args.output, &["bricks"], args.build.work.scratch.as_deref())?;
     let progress = interrupt::job();
     let threads = args.build.work.threads.map(|n| n as usize);
     let beside = || args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).map(Path::to_path_buf);
     let scratch = args.build.work.scratch.clone().or_else(beside);
     let movable = args.movable.clone();
-    let source = import(&inputs, &ImportSettings { threads, scratch, movable: movable.clone() }, &progress)?;
-    let settings =
+    let importing = ImportSettings { threads, scratch, movable: movable.clone() };
+    let building =
         BuildSettings { textures: args.textures, movable, ..mesh_settings(&args.mesh, build_settings(&args.build)) };
-    let summary = usage(build_source(&source, &settings, &args.output, &progress))?;
-    progress.finish();
-    summarise(&args.output, &summary, start)
+    let all = inputs.len();
+    let mut job = Job { inputs, importing, building, output: &args.output, progress, skipped: Vec::new() };
+    let summary = if args.skip_bad { job.without_bad() } else { job.run() }?;
+    job.progress.finish();
+    summarise(&args.output, &summary, start, &mut note)?;
+    match job.skipped.len() {
+        0 => Ok(()),
+        n => note(&format!("{}: {n} of {all} inputs skipped, which are bad\n", args.output.display())),
+    }
+}
+
+/// A conversion.
+struct Job<'a> {
+    inputs: Vec<Input>,
+    importing: ImportSettings,
+    building: BuildSettings,
+    output: &'a Path,
+    progress: Progress,
+    /// What was left out, and why.
+    skipped: Vec<String>,
+}
+
+impl Job<'_> {
+    fn run(&self) -> Result<BuildSummary> {
+        let source = import(&self.inputs, &self.importing, &self.progress)?;
+        usage(build_source(&source, &self.building, self.output, &self.progress))
+    }
+
+    /// The same without inputs that are bad, each of which is told with the reason.
+    fn without_bad(&mut self) -> Result<BuildSummary> {
+        // What shows as a file is opened is found of all at once; each of the others costs a conversion.
+        for input in std::mem::take(&mut self.inputs) {
+            match import(std::slice::from_ref(&input), &self.importing, &self.progress) {
+                Err(ImportError::Interrupted(stop)) => return Err(stop.into()),
+                Err(error) => self.skip(&error.into()),
+                Ok(_) => self.inputs.push(input),
+            }
+        }
+        loop {
+            if self.inputs.is_empty() {
+                let first = self.skipped.first().map_or("there is none", String::as_str);
+                bail!("all inputs are bad; the first: {first}");
+            }
+            let error = match self.run() {
+                Err(error) if !error.is::<Usage>() => error,
+                built => return built,
+            };
+            let (before, says) = (self.inputs.len(), error.to_string());
+            self.inputs.retain(|input| !says.starts_with(&format!("{}: ", input.path.display())));
+            if self.inputs.len() == before {
+                return Err(error);
+            }
+            self.skip(&error);
+        }
+    }
+
+    fn skip(&mut self, error: &anyhow::Error) {
+        let why = one_line(&super::chain(error));
+        warn([format!("skipped {why}")]);
+        self.skipped.push(why);
+    }
 }
 
 /// The settings of the builder for everything that writes a scene file.
@@ -75,16 +136,21 @@ pub fn usage(built: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
     })
 }
 
-/// Says on standard output what a written scene holds, on standard error what its conversion warned of.
+/// Says by `say` what a written scene holds, on standard error what its conversion warned of.
 ///
 /// # Errors
 /// The file cannot be opened, or standard output is closed.
-pub fn summarise(path: &Path, summary: &BuildSummary, start: Instant) -> Result<()> {
+pub fn summarise(
+    path: &Path,
+    summary: &BuildSummary,
+    start: Instant,
+    say: &mut dyn FnMut(&str) -> Result<()>,
+) -> Result<()> {
     let scene = bricks::SceneFile::open(path)?;
     let resident = scene.resident();
     warn(&resident.manifest.warnings);
     let (stored, instanced) = (resident.manifest.triangles_stored, resident.manifest.triangles_instanced);
-    note(&format!(
+    say(&format!(
         "{}: {}{}, {}, {}, {:.1} s\n",
         path.display(),
         counted(stored, "triangle"),
@@ -155,6 +221,31 @@ fn search(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
 /// It is one.
 pub fn refuse_folder(output: &Path) -> Result<()> {
     ensure!(!output.is_dir(), "{}: this is a folder; give -o the name of a file, as in scene.bricks", output.display());
+    Ok(())
+}
+
+/// Refuses an output whose name promises something else than what is written, which is of one of these `endings`, and
+/// folders that cannot be written to: before the work, and so that no input is blamed.
+///
+/// # Errors
+/// The name to give; the folder at fault.
+pub fn check_output(output: &Path, endings: &[&str], scratch: Option<&Path>) -> Result<()> {
+    refuse_folder(output)?;
+    let name = output.display();
+    let is_known = |ending: &OsStr| endings.iter().any(|known| ending.eq_ignore_ascii_case(known));
+    if !output.extension().is_some_and(is_known) {
+        let kinds = endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>().join(", ");
+        let right = output.with_extension(endings[0]);
+        return Err(Usage(format!("{name}: what is written is {kinds}; name it {}", right.display())).into());
+    }
+    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    for (option, folder) in [("-o", Some(folder)), ("--scratch", scratch)] {
+        let Some(folder) = folder else { continue };
+        // Unnamed: nothing of it is left, whatever happens.
+        tempfile::tempfile_in(folder).with_context(|| {
+            format!("{name}: cannot write to the folder {}; make it, or name another with {option}", folder.display())
+        })?;
+    }
     Ok(())
 }
 

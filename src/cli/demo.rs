@@ -3,10 +3,14 @@
 use super::options::args::{DemoArgs, SceneArgs, VerifyArgs};
 use super::{scene, verify, walk};
 use crate::cli::output::note;
+use crate::counters::Record;
 use crate::output::atomic;
 use crate::session::Settings;
 use crate::settings::Group;
+use crate::settings::sizes::{counted, human_bytes, human_count};
+use crate::stream::PayloadSource;
 use anyhow::Result;
+use bricks::SceneFile;
 
 /// Runs the command: what a user would type, each printed before it runs.
 ///
@@ -32,7 +36,24 @@ pub fn run(args: &DemoArgs) -> Result<()> {
         ..Settings::default()
     };
     step("walk through it out of core", &format!("walk {name} -o {output} {}", settings.options()))?;
-    walk::walk(&file, &args.output, &settings, false)
+    let records = walk::walk(&file, &args.output, &settings, false)?;
+    let scene = SceneFile::open(&file)?;
+    note(&format!("{}\n", shown(&records, PayloadSource::sizes(&scene).sum())))
+}
+
+/// What a walk through a scene of so many bytes showed.
+fn shown(records: &[Record], all_bytes: u64) -> String {
+    let sum = |of: fn(&Record) -> u64| records.iter().map(of).sum::<u64>();
+    let bytes = sum(|r| r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures);
+    let cache = records.first().map_or(0, |record| record.cache_bytes);
+    format!(
+        "The scene takes {}, its cache held {}: {} were loaded ({}), {} evicted to make room, and every pixel is exact.",
+        human_bytes(all_bytes),
+        human_bytes(cache),
+        counted(sum(|r| r.bricks_loaded), "payload"),
+        human_bytes(bytes),
+        human_count(sum(|r| r.bricks_evicted))
+    )
 }
 
 fn step(what: &str, command: &str) -> Result<()> {

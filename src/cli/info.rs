@@ -1,8 +1,8 @@
 //! `info`: what a `.bricks` file holds, and where a triangle comes from.
 
-use super::instances;
 use super::options::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
+use super::{cached, instances};
 use crate::cli::output::{print, print_json};
 use crate::settings::sizes::{human_bytes, human_count};
 use crate::stream::PayloadSource;
@@ -22,7 +22,7 @@ pub const FORMAT: u32 = 4;
 /// # Errors
 /// The file cannot be opened or is damaged, or no triangle has the id that was asked for.
 pub fn run(args: &InfoArgs) -> Result<()> {
-    let scene = SceneFile::open(&args.scene)?;
+    let scene = SceneFile::open(cached::scene(&args.scene)?)?;
     if let Some(id) = args.id {
         let origin = origin(&scene, id)?;
         return if args.json { print_json(&origin) } else { print(&origin.human()) };

@@ -4,6 +4,7 @@
 pub mod adapters;
 #[cfg(feature = "lab")]
 pub mod bench;
+pub mod cached;
 pub mod compare;
 pub mod convert;
 pub mod demo;
@@ -11,6 +12,7 @@ pub mod info;
 pub mod instances;
 pub mod interrupt;
 pub mod man;
+pub mod memory;
 pub mod options;
 pub mod output;
 pub mod quality;
@@ -20,6 +22,7 @@ pub mod scene;
 pub mod trace;
 pub mod verify;
 pub mod walk;
+pub mod watcher;
 
 use clap::{CommandFactory, Parser};
 use options::args::{Cli, Command};
@@ -36,6 +39,7 @@ const BAD_INPUT: u8 = 1;
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
+    memory::prepare();
     install_panic_hook();
     let words: Vec<_> = std::env::args_os().collect();
     if words.iter().any(|word| word == "--help-all") {
@@ -108,8 +112,8 @@ fn report(error: &anyhow::Error) -> ExitCode {
     if error.is::<Usage>() { ExitCode::from(2) } else { ExitCode::from(BAD_INPUT) }
 }
 
-/// The messages of an error and its causes, outermost first. Many error types repeat the message of their source; a
-/// cause that has already been said is left out.
+/// The messages of an error and its causes, outermost first. Many error types repeat the message of their source, or
+/// name the same file first; what has already been said is left out.
 fn chain(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain() {

@@ -1,6 +1,6 @@
 //! `scene`: generated scenes, and camera paths through them.
 
-use super::convert::{build_settings, refuse_folder, summarise, usage};
+use super::convert::{build_settings, check_output, summarise, usage};
 use super::interrupt;
 use super::options::args::{BuildArgs, SceneArgs};
 use super::options::scene_kind::SceneKind;
@@ -24,7 +24,7 @@ use std::time::Instant;
 pub fn run(args: &SceneArgs) -> Result<()> {
     let start = Instant::now();
     let progress = interrupt::job();
-    refuse_folder(&args.output)?;
+    check_output(&args.output, &["bricks", "glb", "gltf"], args.build.work.scratch.as_deref())?;
     if GltfForm::of(&args.output).is_some() {
         refuse_building(&args.build)?;
     }
@@ -34,7 +34,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     })??;
     progress.finish();
     match summary {
-        Written::Bricks(summary) => summarise(&args.output, &summary, start)?,
+        Written::Bricks(summary) => summarise(&args.output, &summary, start, &mut note)?,
         Written::Gltf { triangles } => note(&format!(
             "{}: {} with instances, {:.1} s\n",
             args.output.display(),

@@ -1,5 +1,6 @@
 //! `brickwalk trace`: closest hits, or occlusion, of given rays.
 
+use super::cached;
 use super::options::args::TraceArgs;
 use crate::cli::output::{print_json, warn};
 use crate::kernels::layout::NONE;
@@ -19,12 +20,13 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     for (row, ray) in rays.iter().enumerate() {
         check(ray).with_context(|| format!("{}: row {row}", args.rays.display()))?;
     }
-    let mut opened = Opened::open(open_scene(&args.scene)?, &args.scene, &settings)?;
+    let scene = &cached::scene(&args.scene)?;
+    let mut opened = Opened::open(open_scene(scene)?, scene, &settings)?;
     warn(std::mem::take(&mut opened.warnings));
     let progress = Progress::new();
     progress.phase("rays", rays.len() as u64);
     let traced = trace(&mut opened.traced(), &rays, args.any, &mut |rays| progress.advance(rays));
-    let (hits, stats) = traced.with_context(|| args.scene.display().to_string())?;
+    let (hits, stats) = traced.with_context(|| scene.display().to_string())?;
     progress.finish();
     if let Some(row) = hits.iter().position(|hit| hit.t.is_nan() || hit.u.is_nan() || hit.v.is_nan()) {
         bail!(

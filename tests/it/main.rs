@@ -13,6 +13,8 @@ mod command {
     mod command_line;
     mod crafted;
     mod defaults;
+    mod ends;
+    mod models;
     mod outputs;
     #[cfg(unix)]
     mod pages;

@@ -112,8 +112,8 @@ pub struct DemoArgs {
     /// Width and height of the frames in pixels, each 1 to 16384
     #[arg(long, value_name = "WxH", default_value = "640x360")]
     pub size: ImageSize,
-    /// Device memory for bricks: a size, or a share P% of all bricks
-    #[arg(long, value_name = "SIZE|P%", default_value = "25%")]
+    /// Device memory for bricks: a size, or a share P% of all bricks; what the path shows takes more than the default
+    #[arg(long, value_name = "SIZE|P%", default_value = "5%")]
     pub cache: CacheSize,
     /// Random seed of the city and of sampling
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -145,6 +145,9 @@ pub struct ConvertArgs {
     /// any characters, ? one. May be repeated [default: none; meshes used once become part of the world object]
     #[arg(long, help_heading = "Meshes", value_name = "NAME")]
     pub movable: Vec<String>,
+    /// Leave out inputs that are bad, and say which and why, instead of refusing all of them
+    #[arg(long)]
+    pub skip_bad: bool,
     /// What becomes of triangles and meshes.
     #[command(flatten)]
     pub mesh: MeshArgs,
@@ -268,8 +271,12 @@ impl SceneArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct InfoArgs {
-    /// The scene
-    #[arg(value_name = "S.bricks")]
+    /// The scene: a .bricks file, or a model
+    ///
+    /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
+    /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
+    /// brickwalk in the user's cache. `convert` has options for how a model is converted
+    #[arg(value_name = "S.bricks|MODEL")]
     pub scene: PathBuf,
     /// Print JSON
     #[arg(long)]
@@ -317,8 +324,12 @@ pub struct RepairArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct WalkArgs {
-    /// The scene
-    #[arg(value_name = "S.bricks", required_unless_present = "print_settings")]
+    /// The scene: a .bricks file, or a model
+    ///
+    /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
+    /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
+    /// brickwalk in the user's cache. `convert` has options for how a model is converted
+    #[arg(value_name = "S.bricks|MODEL", required_unless_present = "print_settings")]
     scene: Option<PathBuf>,
     /// Output folder for frames, records and report; created if missing
     #[arg(short, long, value_name = "DIR", required_unless_present = "print_settings")]
@@ -373,8 +384,12 @@ fn usage(error: SettingsError) -> anyhow::Error {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct TraceArgs {
-    /// The scene
-    #[arg(value_name = "S.bricks")]
+    /// The scene: a .bricks file, or a model
+    ///
+    /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
+    /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
+    /// brickwalk in the user's cache. `convert` has options for how a model is converted
+    #[arg(value_name = "S.bricks|MODEL")]
     pub scene: PathBuf,
     /// Rays: a NumPy array, float64 or float32, shape (N, 8) or (N, 6): origin xyz, direction xyz, t_min, t_max; world
     /// space

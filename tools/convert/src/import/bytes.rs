@@ -3,11 +3,13 @@
 //! Nothing is mapped and no file is read whole, so memory does not grow with the input.
 
 use crate::progress::Progress;
+use bricks::ending;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::SystemTime;
 use xxhash_rust::xxh3::Xxh3;
 
 /// Bytes that are read at once where a whole file is run through.
@@ -30,15 +32,6 @@ enum Store {
 }
 
 impl Bytes {
-    /// All of the regular file at `path`; devices and pipes, which may never end, are refused.
-    pub fn of_file(path: &Path) -> Result<Self, String> {
-        let metadata = std::fs::metadata(path).map_err(|e| e.to_string())?;
-        if !metadata.is_file() {
-            return Err("not a regular file".into());
-        }
-        Ok(Self { store: Store::Path(path.into()), offset: 0, length: metadata.len() })
-    }
-
     /// Number of bytes.
     pub fn len(&self) -> u64 {
         self.length
@@ -67,7 +60,9 @@ impl Bytes {
         let length = usize::try_from(self.length).map_err(|_| "is larger than memory".to_owned())?;
         let reader = self.open().map_err(|e| e.to_string())?;
         let mut bytes = Vec::new();
-        bytes.try_reserve_exact(length).map_err(|_| "is larger than memory".to_owned())?;
+        if !ending::reserve(&mut bytes, length) {
+            return Err("is larger than memory".into());
+        }
         bytes.resize(length, 0);
         reader.read_at(0, &mut bytes).map_err(|e| e.to_string())?;
         Ok(bytes)
@@ -185,12 +180,46 @@ pub(super) struct Spool {
     progress: Progress,
     file: OnceLock<Result<Arc<File>, String>>,
     length: AtomicU64,
+    looked_for: Mutex<Vec<FileState>>,
+}
+
+/// A file that an import looked for, as it was then.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileState {
+    /// Where.
+    pub path: PathBuf,
+    /// Bytes, and when they were changed last; `None`: it was not there.
+    pub found: Option<(u64, SystemTime)>,
+}
+
+impl FileState {
+    /// The file at `path` as it is now.
+    pub fn now(path: &Path) -> Self {
+        let found = std::fs::metadata(path).ok();
+        let found = found.and_then(|found| Some((found.len(), found.modified().ok()?)));
+        Self { path: path.into(), found }
+    }
 }
 
 impl Spool {
     /// A spool in `folder` for an import that ends early if `progress` says so.
     pub fn new(folder: Option<PathBuf>, progress: Progress) -> Self {
         Self { folder, progress, ..Self::default() }
+    }
+
+    /// All of the regular file at `path`; devices and pipes, which may never end, are refused.
+    pub fn file(&self, path: &Path) -> Result<Bytes, String> {
+        self.looked_for.lock().unwrap_or_else(PoisonError::into_inner).push(FileState::now(path));
+        let metadata = std::fs::metadata(path).map_err(|e| e.to_string())?;
+        if !metadata.is_file() {
+            return Err("not a regular file".into());
+        }
+        Ok(Bytes { store: Store::Path(path.into()), offset: 0, length: metadata.len() })
+    }
+
+    /// The files that were looked for so far.
+    pub fn looked_for(&self) -> Vec<FileState> {
+        self.looked_for.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The progress of the import.

@@ -1,6 +1,7 @@
 //! Several opened files as one source.
 
 use super::affine::{Affine, direction, multiply, point};
+use super::bytes::FileState;
 use super::opened::{Opened, Parts};
 use crate::source::{IDENTITY, Outline, Primitive, Source, SourceError, SourceTexture};
 use bricks::PunctualLight;
@@ -11,6 +12,7 @@ use std::borrow::Cow;
 pub struct Imported {
     outline: Outline,
     inputs: Vec<Input>,
+    files: Vec<FileState>,
 }
 
 /// An opened input, and how many meshes, materials and textures precede its own.
@@ -62,6 +64,16 @@ impl Imported {
         whole.has_animation |= part.has_animation;
         self.inputs.push(Input { parts, meshes, materials, textures });
         Ok(())
+    }
+
+    /// The files that were looked for, as they were then: if they are the same, so is the scene.
+    pub fn files(&self) -> &[FileState] {
+        &self.files
+    }
+
+    /// Notes the files that were looked for.
+    pub(super) fn set_files(&mut self, files: Vec<FileState>) {
+        self.files = files;
     }
 
     /// Notes a file that was read besides those of the inputs.

@@ -28,6 +28,7 @@ mod uri;
 mod vertices;
 mod warnings;
 
+pub use bytes::FileState;
 pub use error::ImportError;
 pub use imported::Imported;
 pub use load::load_all;
@@ -152,6 +153,7 @@ fn open_all(inputs: &[Input], settings: &ImportSettings, progress: &Progress) ->
         imported.append(opened, &[input.transform]).map_err(|problem| misplaced(path, problem))?;
         progress.advance(1);
     }
+    imported.set_files(spool.looked_for());
     progress.finish();
     Ok(imported)
 }

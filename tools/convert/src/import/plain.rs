@@ -1,7 +1,7 @@
 //! What the formats without a scene graph (OBJ, PLY, STL) have in common: one placement a mesh, plain materials, rows
 //! of numbers.
 
-use super::bytes::Bytes;
+use super::bytes::{Bytes, Spool};
 use super::error::{EXPORT_AGAIN, ImportError, show};
 use super::table::Table;
 use super::warnings::Warnings;
@@ -22,9 +22,9 @@ pub(super) struct Start {
 }
 
 /// Finds the file at `path`.
-pub(super) fn start(path: &Path) -> Result<Start, ImportError> {
+pub(super) fn start(path: &Path, spool: &Spool) -> Result<Start, ImportError> {
     let label = show(path);
-    let bytes = Bytes::of_file(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
+    let bytes = spool.file(path).map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
     let warnings = Warnings::new(label.clone());
     Ok(Start { label, bytes, warnings })
 }

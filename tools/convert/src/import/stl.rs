@@ -35,7 +35,7 @@ pub(super) fn open(
     spool: &Spool,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
-    let mut start = plain::start(path)?;
+    let mut start = plain::start(path, spool)?;
     let bytes = &start.bytes;
     let mut head = [0; HEADER_BYTES as usize];
     let n = bytes.len().min(HEADER_BYTES) as usize;

@@ -210,10 +210,10 @@ impl Found<'_> {
             uri::Target::Data(data) => Ok((self.spool.add(&data).map_err(Missing::Spool)?, true)),
             uri::Target::File(below) => {
                 let mut is_new = false;
-                let folder = &self.folder;
+                let (folder, spool) = (&self.folder, self.spool);
                 let found = self.files.entry(below).or_insert_with_key(|below| {
                     is_new = true;
-                    let bytes = Bytes::of_file(&folder.join(below));
+                    let bytes = spool.file(&folder.join(below));
                     bytes.map_err(|reason| format!("cannot read {}: {reason}", show(below)))
                 });
                 Ok((found.clone().map_err(Missing::File)?, is_new))

@@ -77,7 +77,9 @@ fn decode(file: &File, json: &Meshopt, total: &mut u64) -> Result<Vec<u8>, Probl
     let length = usize::try_from(length.ok_or_else(too_many)?).map_err(|_| too_many())?;
     let encoded = encoded.read().map_err(|what| Problem { what, remedy: EXPORT_AGAIN })?;
     let mut decoded = Vec::new();
-    decoded.try_reserve_exact(length).map_err(|_| too_many())?;
+    if !bricks::ending::reserve(&mut decoded, length) {
+        return Err(too_many());
+    }
     decoded.resize(length, 0u8);
     let (count, stride) = (count as usize, stride as usize);
     let out = decoded.as_mut_ptr().cast::<c_void>();

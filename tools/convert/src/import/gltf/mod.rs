@@ -85,7 +85,7 @@ pub(super) fn open(
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
     let unreadable = |reason| ImportError::Read { file: show(path), reason };
-    let bytes = Bytes::of_file(path).map_err(unreadable)?;
+    let bytes = spool.file(path).map_err(unreadable)?;
     open_within(path, [&bytes, &bytes], (scene, movable), &IDENTITY, spool, budget)
 }
 

@@ -72,7 +72,7 @@ pub(super) fn open(
     spool: &Spool,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
-    let mut start = plain::start(path)?;
+    let mut start = plain::start(path, spool)?;
     let label = start.label.clone();
     let stream = start.bytes.stream(spool).map_err(|e| unreadable(path, &e))?;
     let (parsed, stream) = parse::parse(path, stream, spool, &mut start.warnings, budget)?;
@@ -164,7 +164,7 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
             continue;
         };
         let mut material = definition.material;
-        let open = |file: &String| beside(folder, file).and_then(|path| Bytes::of_file(&path));
+        let open = |file: &String| beside(folder, file).and_then(|path| spool.file(&path));
         let mut add = |key: [Option<&mtl::Map>; 3], make: &dyn Fn() -> Texture| {
             *numbers.entry(key.map(|map| map.cloned())).or_insert_with(|| {
                 textures.push(make());
@@ -197,7 +197,7 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
 }
 
 fn read_library(folder: &Path, library: &str, spool: &Spool, hash: &mut Xxh3) -> Result<Vec<mtl::Definition>, String> {
-    let bytes = Bytes::of_file(&beside(folder, library)?)?;
+    let bytes = spool.file(&beside(folder, library)?)?;
     if bytes.len() > MAX_MATERIALS_BYTES {
         return Err("it is too large".into());
     }

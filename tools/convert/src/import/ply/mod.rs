@@ -43,7 +43,7 @@ pub(super) fn open(
     spool: &Spool,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
-    let mut start = plain::start(path)?;
+    let mut start = plain::start(path, spool)?;
     let label = start.label.clone();
     let mut stream = start.bytes.stream(spool).map_err(|e| unreadable(path, &e))?;
     let Header { encoding, elements } = header::read(&mut stream).map_err(|what| fault(path, "header", what))?;

@@ -183,7 +183,7 @@ impl Walk<'_> {
         }
         let path = self.folder.join(below);
         let unreadable = |reason: String| ImportError::Read { file: show(&path), reason };
-        let bytes = Bytes::of_file(&path).map_err(unreadable)?;
+        let bytes = self.spool.file(&path).map_err(unreadable)?;
         if bytes.len() > MAX_BYTES {
             return Err(unreadable(format!("{} bytes are too many for a file of tiles", bytes.len())));
         }

@@ -263,7 +263,7 @@ impl Walk<'_> {
         let (below, axis) = key;
         let path = self.folder.join(&below);
         let unreadable = |reason: String| ImportError::Read { file: show(&path), reason };
-        let bytes = Bytes::of_file(&path).map_err(unreadable)?;
+        let bytes = self.spool.file(&path).map_err(unreadable)?;
         let reader = bytes.open().map_err(|e| unreadable(e.to_string()))?;
         let mut magic = [0; 4];
         let read = reader.read_at(0, &mut magic[..bytes.len().min(4) as usize]);
@@ -323,7 +323,7 @@ impl Walk<'_> {
             return Ok(*model);
         }
         let path = self.folder.join(&key.0);
-        let bytes = Bytes::of_file(&path).map_err(|what| named(&what))?;
+        let bytes = self.spool.file(&path).map_err(|what| named(&what))?;
         let number = self.model(path, [bytes.clone(), bytes], axis.z_from_up());
         self.numbers.insert(key, (number, [IDENTITY].into()));
         Ok(number)
