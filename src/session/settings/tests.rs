@@ -20,7 +20,10 @@ fn defaults_are_the_documented_ones() {
     assert_eq!((s.rotation, s.denoise, s.taa), (Turn(36.0), false, false));
     let s = Settings::default();
     assert_eq!((s.effects.to_string().as_str(), s.spp, s.rotation), ("primary,shadow,ao", 4, Turn::FULL));
-    assert_eq!((s.exposure, s.tone_map, s.secondary), (Exposure::AUTO, ToneMap::AgX, Method::Exact));
+    assert_eq!(
+        (s.exposure, s.tone_map, s.secondary),
+        (Exposure::AUTO, ToneMap::AgX, crate::secondary::EffectMethods::EXACT)
+    );
     assert_eq!((s.environment, s.ao_length), (Some(Environment::Auto), Length::Auto));
 }
 
