@@ -59,16 +59,11 @@ newest=$(readelf -V "$program" | grep -o 'GLIBC_[0-9.]*' | sed 's/GLIBC_//' | so
 
 cp README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$place/"
 python3 tools/licences.py "$target" >"$place/THIRD-PARTY.txt"
-# Not every version has them.
-if "$program" completions --help >/dev/null 2>&1; then
-    mkdir "$place/completions"
-    for shell in bash zsh fish; do
-        "$program" completions "$shell" >"$place/completions/brickwalk.$shell"
-    done
-fi
-if "$program" man --help >/dev/null 2>&1; then
-    "$program" man -o "$place/man"
-fi
+mkdir "$place/completions"
+for shell in bash zsh fish; do
+    "$program" completions "$shell" >"$place/completions/brickwalk.$shell"
+done
+"$program" man "$place/man"
 
 # Equal commits make equal archives.
 time=$(git log -1 --format=%ct)

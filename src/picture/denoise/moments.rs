@@ -9,7 +9,7 @@ use crate::picture::color::squared;
 pub struct Moments {
     /// Weighted mean.
     pub mean: [f64; 3],
-    /// Weighted mean of squared distances from it ([`squared`]).
+    /// Weighted mean of squared distances from it (`squared`).
     pub spread: f64,
     /// Sum of the squares of the weights, which sum to 1: 1/n of n equal ones; 0 before the first value.
     pub squares: f64,
