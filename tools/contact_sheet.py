@@ -21,7 +21,7 @@ EFFECTS = "shadow,environment,diffuse,glossy"
 def lights(scenes):
     """Name, options."""
     high = ["--sun", "0.3,1,0.06"]
-    rows = [("sun and plain sky", high), ("physical sky", ["--environment", "sky", *high])]
+    rows = [("sun and plain sky", ["--environment", "none", *high]), ("physical sky", ["--environment", "sky", *high])]
     for name in ("venice_sunset_1k.hdr", "potsdamer_platz_1k.hdr", "city.exr", "studio.exr"):
         rows.append((name, ["--environment", str(scenes / "env" / name)]))
     return rows
@@ -32,9 +32,9 @@ def render(args, scene, name, options, view):
     folder = args.output / f"{name.split('.')[0].replace(' ', '-').replace(',', '')}-{view}"
     picture = folder / "frames" / "0000.png"
     if not picture.exists():
-        command = [args.brickwalk, "walk", scene, "-o", folder, "--path", f"paths/sponza_{view}.json", "--frames", "1", "--quality", "exact"]
-        command += ["--size", args.size, "--effects", EFFECTS, "--diffuse-rays", "8", "--rotation", "full", "--cache", "100%"]
-        command += ["--exposure", "auto", "--tone-map", "agx", "--spp", str(args.spp), *options] + (["--denoise"] if args.denoise else [])
+        command = [args.brickwalk, "walk", scene, "-o", folder, "--path", f"paths/sponza_{view}.json", "--frames", "1"]
+        command += ["--size", args.size, "--effects", EFFECTS, "--diffuse-rays", "8"]
+        command += ["--spp", str(args.spp), *options] + (["--denoise"] if args.denoise else [])
         subprocess.run([str(word) for word in command], check=True)
     return picture
 

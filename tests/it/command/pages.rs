@@ -33,13 +33,16 @@ fn commands(page: &str) -> Vec<String> {
     found
 }
 
-/// Runs a command by the shell, with this build's `brickwalk` and `python` before all others.
+/// Runs a command by the shell, with this build's `brickwalk` and `python` before all others; what it converts by the
+/// way stays in the folder.
 fn shell(command: &str, folder: &Path, python: &Path) -> Output {
     let program = Path::new(env!("CARGO_BIN_EXE_brickwalk")).parent().expect("a folder").to_owned();
     let others = std::env::var_os("PATH").unwrap_or_default();
     let path = [program, python.to_owned()].into_iter().chain(std::env::split_paths(&others));
     let path = std::env::join_paths(path).expect("folders");
-    Command::new("sh").args(["-c", command]).current_dir(folder).env("PATH", path).output().expect("a shell")
+    let mut shell = Command::new("sh");
+    shell.args(["-c", command]).current_dir(folder).env("PATH", path).env("BRICKWALK_CACHE_DIR", folder.join("cache"));
+    shell.output().expect("a shell")
 }
 
 /// A folder with a `python3` that has NumPy; without one the test is skipped.
