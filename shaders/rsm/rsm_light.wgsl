@@ -34,7 +34,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let met = seen_surfaces[index];
-    let words = lamp_words(index);
+    let words = lamp_words(index, 0u);
     let moved = vec3<f32>(unit(words.x), unit(words.y), unit(words.z)) - vec3<f32>(0.5);
     let p = barrier3(met.point + barrier3(barrier(MOVED * met.area) * moved));
     var light = vec3<f32>(0.0);

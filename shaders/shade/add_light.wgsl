@@ -35,8 +35,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             density = e.probability * squared * sqrt(squared) / shone;
         }
     } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
-        let drawn = environment_sample(lamp_words(index));
-        light = drawn_light(drawn) * max(dot(g.normal, d), 0.0) / PI;
+        let drawn = environment_sample(lamp_words(index, surfaces[index].emitter));
+        light = drawn_light(drawn) * max(dot(g.normal, d), 0.0) / (PI * surfaces[index].area);
         density = drawn_density(drawn);
     } else {
         light = sunlight(g.normal);

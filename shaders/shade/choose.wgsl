@@ -1,4 +1,4 @@
-// Draws one of the emitters by what they may send to a surface: down a tree of groups, by bounds of both halves (Conty
+// Draws a lamp for a surface: one of the emitters, or a direction to the environment. Emitters are drawn by what they may send to a surface: down a tree of groups, by bounds of both halves (Conty
 // Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018). Bounds are linear in
 // place of angles. Every operation is rounded as it stands, so that all pipelines draw the same.
 
@@ -8,8 +8,8 @@ const LEAST_SQUARED: f32 = 1.0e-12;
 const GREATEST_SUM: f32 = 1.0e30;
 
 struct Chosen {
-    emitter: u32,         // NONE: none sends anything
-    probability: f32,     // of being drawn here
+    emitter: u32,         // NONE: none sends anything; of directions the number of the candidate
+    probability: f32,     // of being drawn here; of directions over that by the environment alone, 0: none has light
 }
 
 fn sum_of_products(a: vec3<f32>, b: vec3<f32>) -> f32 {
@@ -115,4 +115,37 @@ fn choose_emitter(random: u32, p: vec3<f32>, n: vec3<f32>) -> Chosen {
         word = pcg(word);
     }
     return chosen;
+}
+
+// Directions to the environment from which one is drawn.
+const CANDIDATES: u32 = 4u;
+// What a grazing direction counts for beside one along the normal: the normal that is shaded may be another.
+const GRAZING: f32 = 0.2;
+
+// One of a few directions to the environment, by its light and the cosine at a surface that is turned to n (resampled
+// importance sampling: Talbot, Cline, Egbert, "Importance Resampling for Global Illumination", EGSR 2005): many of the
+// environment's own lie behind the surface.
+fn choose_direction(index: u32, n: vec3<f32>) -> Chosen {
+    var number = 0u;
+    var weight = 0.0;
+    var sum = 0.0;
+    for (var k = 0u; k < CANDIDATES; k++) {
+        let words = lamp_words(index, k);
+        let drawn = environment_sample(words);
+        let cosine = dot(n, drawn.direction);
+        // What lies behind is not looked up.
+        if !(cosine > 0.0) {
+            continue;
+        }
+        let own = luminance_of(drawn_light(drawn)) * mix(GRAZING, 1.0, cosine);
+        sum += own;
+        if unit(pcg(words.w)) * sum < own {
+            number = k;
+            weight = own;
+        }
+    }
+    if !(weight > 0.0) {
+        return Chosen(0u, 0.0);
+    }
+    return Chosen(number, f32(CANDIDATES) * weight / sum);
 }

@@ -60,7 +60,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         var t_max = T_INFINITE;
         if (params.flags & PARAM_EMITTER) != 0u {
             // The first two words draw the point.
-            chosen = choose_emitter(lamp_words(index).z, surface.point, surface.normal);
+            chosen = choose_emitter(lamp_words(index, 0u).z, surface.point, surface.normal);
             faces = chosen.emitter != NONE;
             if faces {
                 let e = emitters[chosen.emitter];
@@ -69,10 +69,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                 t_max = select(1.0 - SHORT_OF_LIGHT, T_INFINITE, (e.kind & EMITTER_KIND) == EMITTER_DISTANT);
             }
         } else if (params.flags & PARAM_ENVIRONMENT) != 0u {
-            let drawn = environment_sample(lamp_words(index));
-            ray.direction = drawn.direction;
-            // What lies behind is not looked up.
-            faces = dot(surface.normal, ray.direction) > 0.0 && any(drawn_light(drawn) > vec3<f32>(0.0));
+            chosen = choose_direction(index, surface.normal);
+            ray.direction = environment_sample(lamp_words(index, chosen.emitter)).direction;
+            faces = chosen.probability > 0.0;
         } else if params.sun_radius > 0.0 {
             let d = params.sun.xyz;
             let disc = disc_point(r) * params.sun_radius;

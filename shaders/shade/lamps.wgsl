@@ -25,14 +25,14 @@ fn unit(word: u32) -> f32 {
     return f32(word >> 8u) * 5.9604645e-8;
 }
 
-// Which random numbers the ray of a pixel takes to draw a lamp: those that start at hits of bounces take some of their
-// own in every direction of the bounce, whose number lies in the throughput's w.
-fn lamp_words(index: u32) -> vec4<u32> {
+// Which random numbers the ray of a pixel takes to draw candidate `number` for a lamp: those that start at hits of
+// bounces take some of their own in every direction of the bounce, whose number lies in the throughput's w.
+fn lamp_words(index: u32, number: u32) -> vec4<u32> {
     var pixel = index;
     if (params.flags & PARAM_BOUNCE) != 0u {
         pixel ^= pcg(u32(throughput[index].w) + 1u);
     }
-    return random4(pixel, params.stream, params.seed);
+    return random4(pixel, params.stream, params.seed ^ (number * GOLDEN));
 }
 
 // The angle of the point (x, y) from the x axis, -pi to pi: Abramowitz, Stegun, "Handbook of Mathematical Functions",

@@ -1,11 +1,13 @@
-//! Draws one of the emitters by what they may send to a surface: twin of `shaders/shade/choose.wgsl`.
+//! Draws a lamp for a surface: one of the emitters, or a direction to the environment. Twin of
+//! `shaders/shade/choose.wgsl`.
 
-use super::lamps::unit;
+use super::lamps::{drawn_light, environment_sample, lamp_words, unit};
+use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_DISTANT_GROUP, EMITTER_GROUP, EMITTER_KIND, EMITTER_PARALLELOGRAM, EMITTER_TRIANGLE,
     EMITTER_TWO_SIDED, Emitter, NONE,
 };
-use crate::kernels::vector::{Vec3, cross, dot, each, least, most};
+use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most};
 use crate::math::exact::{divide, square_root};
 use crate::math::sampling::pcg;
 
@@ -14,12 +16,17 @@ const LEAST_SQUARED: f32 = 1.0e-12;
 /// Sums of bounds above it tell nothing, and below its inverse there is no light.
 const GREATEST_SUM: f32 = 1.0e30;
 
-/// An emitter that was drawn.
+/// Directions to the environment from which one is drawn.
+const CANDIDATES: u32 = 4;
+/// What a grazing direction counts for beside one along the normal: the normal that is shaded may be another.
+const GRAZING: f32 = 0.2;
+
+/// What was drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Chosen {
-    /// Its number; [`NONE`] where none sends anything.
+    /// The emitter's number; [`NONE`] where none sends anything; of directions the number of the candidate.
     pub emitter: u32,
-    /// Of being drawn here.
+    /// Of being drawn here; of directions over that by the environment alone, 0 where none has light.
     pub probability: f32,
 }
 
@@ -112,4 +119,26 @@ pub fn choose_emitter(emitters: &[Emitter], count: u32, random: u32, p: Vec3, n:
         word = pcg(word);
     }
     chosen
+}
+
+/// One of a few directions to the environment, by its light and the cosine at a surface that is turned to n; see the
+/// kernel.
+pub fn choose_direction(bound: &Bound, index: usize, throughput: &[[f32; 4]], n: Vec3) -> Chosen {
+    let (mut number, mut weight, mut sum) = (0, 0.0, 0.0);
+    for k in 0..CANDIDATES {
+        let words = lamp_words(bound, index, k, throughput);
+        let drawn = environment_sample(bound, words);
+        let cosine = dot(n, drawn.direction);
+        // What lies behind is not looked up.
+        if cosine.is_nan() || cosine <= 0.0 {
+            continue;
+        }
+        let own = luminance_of(drawn_light(bound, &drawn)) * mix(GRAZING, 1.0, cosine);
+        sum += own;
+        if unit(pcg(words[3])) * sum < own {
+            (number, weight) = (k, own);
+        }
+    }
+    let probability = if weight > 0.0 { CANDIDATES as f32 * weight / sum } else { 0.0 };
+    Chosen { emitter: if weight > 0.0 { number } else { 0 }, probability }
 }

@@ -1,9 +1,9 @@
 //! Rays from the camera and from hits: twins of `shaders/shade/generate_primary.wgsl`, `generate_shadow.wgsl`,
 //! `generate_around.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
 
-use super::choose::{Chosen, choose_emitter};
+use super::choose::{Chosen, choose_direction, choose_emitter};
 use super::gloss::Gloss;
-use super::lamps::{drawn_light, environment_sample, lamp_words, shines};
+use super::lamps::{environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
@@ -105,7 +105,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
             let mut t_max = T_INFINITE;
             if bound.has(PARAM_EMITTER) {
                 // The first two words draw the point.
-                let random = lamp_words(bound, index, throughput)[2];
+                let random = lamp_words(bound, index, 0, throughput)[2];
                 let emitters = bound.lamps.emitters();
                 chosen = choose_emitter(emitters, p.emitter_count, random, surface.point, surface.normal);
                 faces = chosen.emitter != NONE;
@@ -116,10 +116,10 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
                     t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
                 }
             } else if bound.has(PARAM_ENVIRONMENT) {
-                let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
-                ray.direction = drawn.direction;
-                // What lies behind is not looked up.
-                faces = dot(surface.normal, ray.direction) > 0.0 && drawn_light(bound, &drawn).iter().any(|&c| c > 0.0);
+                chosen = choose_direction(bound, index, throughput, surface.normal);
+                let words = lamp_words(bound, index, chosen.emitter, throughput);
+                ray.direction = environment_sample(bound, words).direction;
+                faces = chosen.probability > 0.0;
             } else if p.sun_radius > 0.0 {
                 let disc = disc_point(r).map(|x| x * p.sun_radius);
                 let x = tangent(sun);

@@ -8,6 +8,9 @@ use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, normalize
 use crate::math::sampling::{pcg, random4};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
+/// The golden section of 2^32.
+const GOLDEN: u32 = 0x9e37_79b9;
+
 /// The high word of a product.
 fn multiply_high(a: u32, b: u32) -> u32 {
     ((u64::from(a) * u64::from(b)) >> 32) as u32
@@ -18,14 +21,14 @@ pub(crate) fn unit(word: u32) -> f32 {
     (word >> 8) as f32 / 16_777_216.0
 }
 
-/// Which random numbers the ray of a pixel takes to draw a lamp: those that start at hits of bounces take some of their
-/// own in every direction of the bounce, whose number lies in the throughput's w.
-pub fn lamp_words(bound: &Bound, index: usize, throughput: &[[f32; 4]]) -> [u32; 4] {
+/// Which random numbers the ray of a pixel takes to draw candidate `number` for a lamp: those that start at hits of
+/// bounces take some of their own in every direction of the bounce, whose number lies in the throughput's w.
+pub fn lamp_words(bound: &Bound, index: usize, number: u32, throughput: &[[f32; 4]]) -> [u32; 4] {
     let mut pixel = index as u32;
     if bound.has(PARAM_BOUNCE) {
         pixel ^= pcg((throughput[index][3] as u32).wrapping_add(1));
     }
-    random4(pixel, bound.params.stream, bound.params.seed)
+    random4(pixel, bound.params.stream, bound.params.seed ^ number.wrapping_mul(GOLDEN))
 }
 
 /// The angle of the point (x, y) from the x axis, -pi to pi: Abramowitz, Stegun, "Handbook of Mathematical Functions",

@@ -210,9 +210,10 @@ pub fn add_light(
             }
             each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / chosen.area)
         } else if bound.has(PARAM_ENVIRONMENT) {
-            let drawn = environment_sample(bound, lamp_words(bound, index, throughput));
+            let chosen = &own.surfaces[index];
+            let drawn = environment_sample(bound, lamp_words(bound, index, chosen.emitter, throughput));
             density = drawn_density(bound, &drawn);
-            drawn_light(bound, &drawn).map(|c| c * cosine / PI)
+            drawn_light(bound, &drawn).map(|c| c * cosine / (PI * chosen.area))
         } else {
             if bound.params.sun_radius > 0.0 {
                 density = sun_density(bound.params, d);

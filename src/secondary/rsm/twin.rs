@@ -134,7 +134,7 @@ pub fn rsm_light(
                 continue;
             }
             let met = &seen.surfaces[index];
-            let words = lamp_words(bound, index, throughput);
+            let words = lamp_words(bound, index, 0, throughput);
             let p = each(|k| met.point[k] + MOVED * met.area * (unit(words[k]) - 0.5));
             let light = reflected(bound, looked_up, p, met.normal, met.area);
             if light.iter().any(|&c| c != 0.0) {
