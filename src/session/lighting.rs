@@ -24,7 +24,7 @@ const MOST_SIZE: usize = 1 << 15;
 const MOST_TEXELS: usize = 1 << 27;
 
 /// Size of the image of the physical sky.
-const SKY_SIZE: [u32; 2] = [1024, 512];
+const SKY_SIZE: [u32; 2] = [512, 256];
 
 /// What lights a walk.
 #[derive(Clone, Debug)]

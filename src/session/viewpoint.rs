@@ -119,6 +119,9 @@ fn look_around(sight: &mut Sight, middle: DVec3, [min, max]: [DVec3; 2]) -> Opti
         let back = (1.0 - BEHIND) * opposite.min(longest);
         let start = eye - level(angle) * back;
         let mut free = seen.distance + back;
+        if place.best.is_some_and(|best| free <= best.free) {
+            continue;
+        }
         for turn in [-SPREAD, SPREAD] {
             free = free.min(sight.cast(start, level(angle + turn))?.distance);
         }
@@ -132,4 +135,86 @@ fn look_around(sight: &mut Sight, middle: DVec3, [min, max]: [DVec3; 2]) -> Opti
 /// A level direction.
 fn level(angle: f64) -> DVec3 {
     DVec3::new(angle.cos(), 0.0, angle.sin())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use brickwalk_convert::build::{BuildSettings, build};
+    use brickwalk_convert::progress::Progress;
+    use brickwalk_convert::source::Primitive;
+    use brickwalk_scenes::one_mesh;
+
+    /// Adds a box whose faces are seen from outside, or from within.
+    fn add_box(mesh: &mut Primitive, min: [f64; 3], max: [f64; 3], is_inward: bool) {
+        let first = mesh.positions.len() as u32;
+        mesh.positions
+            .extend((0..8).map(|i| [0, 1, 2].map(|axis| if i >> axis & 1 == 0 { min[axis] } else { max[axis] })));
+        for face in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+            let [a, b, c, d] = face.map(|corner: u32| first + corner);
+            mesh.indices.extend(if is_inward { [a, c, b, a, d, c] } else { [a, b, c, a, c, d] });
+        }
+    }
+
+    /// The path through boxes, each with its corners and whether it is seen from within.
+    fn path_of(boxes: &[([f64; 3], [f64; 3], bool)]) -> CameraPath {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("boxes.bricks");
+        let mut mesh = Primitive::default();
+        boxes.iter().for_each(|&(min, max, is_inward)| add_box(&mut mesh, min, max, is_inward));
+        build(one_mesh("boxes", mesh), &BuildSettings::default(), &file, &Progress::hidden()).expect("a scene");
+        path(&SceneFile::open(&file).expect("the scene"), Picture::default())
+    }
+
+    fn is_within(path: &CameraPath, min: [f64; 3], max: [f64; 3]) -> bool {
+        (0..9).all(|k| {
+            let at = path.frame(k, 9).position;
+            at.cmpgt(min.into()).all() && at.cmplt(max.into()).all()
+        })
+    }
+
+    #[test]
+    fn rooms_are_seen_from_within_along_their_longest_way() {
+        let (min, max) = ([-4.0, 0.0, -3.0], [11.0, 4.0, 3.0]);
+        let pillar = ([3.2, 0.0, -0.3], [3.8, 4.0, 0.3], false);
+        let through = path_of(&[(min, max, true), pillar]);
+        assert!(is_within(&through, min, max), "{through:?}");
+        for k in 0..9 {
+            let (_, _, forward) = through.frame(k, 9).frame();
+            assert!(forward.x.abs() > 0.9, "{forward}");
+        }
+        // The wall at the end stays away.
+        let last = through.frame(8, 9);
+        let ahead = if last.target.x > last.position.x { max[0] - last.position.x } else { last.position.x - min[0] };
+        assert!(ahead > 5.0, "{ahead}");
+    }
+
+    #[test]
+    fn all_else_is_seen_from_outside() {
+        let (min, max) = ([-4.0, 0.0, -3.0], [11.0, 4.0, 3.0]);
+        // A closed block; a room for dolls; a court between blocks.
+        assert!(!is_within(&path_of(&[(min, max, false)]), min, max));
+        let small = |at: [f64; 3]| at.map(|x| 0.01 * x);
+        assert!(!is_within(&path_of(&[(small(min), small(max), true)]), small(min), small(max)));
+        let court = [
+            ([0.0, 0.0, 0.0], [12.0, 5.0, 3.0], false),
+            ([0.0, 0.0, 9.0], [12.0, 5.0, 12.0], false),
+            ([0.0, 0.0, 3.0], [3.0, 5.0, 9.0], false),
+            ([9.0, 0.0, 3.0], [12.0, 5.0, 9.0], false),
+        ];
+        assert!(!is_within(&path_of(&court), [0.0; 3], [12.0; 3]));
+    }
+
+    #[test]
+    fn a_wide_ground_is_not_framed() {
+        let mut boxes = vec![([-500.0, -0.1, -500.0], [500.0, 0.0, 500.0], false)];
+        let house = |i: u32| {
+            let at = [f64::from(i % 40), f64::from(i / 40)].map(|x| 0.5 * x);
+            ([at[0], 0.0, at[1]], [at[0] + 0.4, 1.0, at[1] + 0.4], false)
+        };
+        boxes.extend((0..4000).map(house));
+        let around = path_of(&boxes);
+        let distance = (around.frame(0, 1).position - DVec3::new(10.0, 0.5, 25.0)).length();
+        assert!(distance < 200.0, "{distance}");
+    }
 }

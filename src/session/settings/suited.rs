@@ -1,7 +1,7 @@
 //! What settings leave to the scene.
 
 use super::Settings;
-use crate::settings::{Environment, Length};
+use crate::settings::{EffectList, Environment, Length};
 use bricks::Manifest;
 use glam::DVec3;
 
@@ -17,6 +17,8 @@ impl Settings {
             if manifest.has_own_light {
                 suited.sun_intensity.get_or_insert(0.0);
                 suited.sky_intensity = 0.0;
+                // Where no sky shines, what lamps do not reach is lit by what they do reach.
+                suited.effects.diffuse |= self.effects == EffectList::LIT;
             }
         }
         suited
@@ -64,9 +66,12 @@ mod tests {
         let room = Manifest { has_own_light: true, ..of([4.0; 3]) };
         let lit = Settings::default().suited(&room);
         assert_eq!((lit.environment.clone(), lit.sun_intensity(), lit.sky_intensity), (None, 0.0, 0.0));
+        assert!(
+            lit.effects.diffuse && !Settings::from_options("--effects shadow").unwrap().suited(&room).effects.diffuse
+        );
         let outside = Settings::default().suited(&of([4.0; 3]));
         assert_eq!(outside.environment, Some(Environment::Sky));
-        assert!(outside.sun_intensity() > 0.0 && outside.sky_intensity > 0.0);
+        assert!(outside.sun_intensity() > 0.0 && outside.sky_intensity > 0.0 && !outside.effects.diffuse);
         // What is asked for stays.
         for options in ["--quality exact", "--environment sky", "--sun-intensity 3"] {
             let asked = Settings::from_options(options).unwrap().suited(&room);
