@@ -110,19 +110,6 @@ fn words(file: &SceneFile, payload: Payload) -> Result<Vec<u32>, DecodeError> {
     Ok(words)
 }
 
-/// The triangles of brick `index` in the units of its object, vertices in their stored order, which is that of the
-/// source but for a rotation.
-///
-/// # Errors
-/// The brick is damaged or cannot be read; a vertex is not on the lattice.
-pub fn brick_triangles(file: &SceneFile, index: u32) -> Result<Vec<[[f64; 3]; 3]>, DecodeError> {
-    let objects = &file.resident().objects;
-    let object = &objects[objects.partition_point(|object| object.first_brick + object.brick_count <= index)];
-    let step = f64::from(object.step_log2).exp2();
-    let triangles = brick(file, object, index)?;
-    Ok(triangles.into_iter().map(|triangle| triangle.vertices.map(|v| v.map(|x| x as f64 * step))).collect())
-}
-
 fn brick(file: &SceneFile, object: &Object, index: u32) -> Result<Vec<TruthTriangle>, DecodeError> {
     let brick = &file.resident().bricks[index as usize];
     let geometry = words(file, Payload::Geometry(index))?;

@@ -25,7 +25,7 @@ mod file_tests;
 #[cfg(test)]
 mod tests;
 
-pub use decode::{DecodeError, TruthObject, TruthTriangle, brick_triangles};
+pub use decode::{DecodeError, TruthObject, TruthTriangle};
 pub use instance::TruthInstance;
 pub use judge::{Excuse, Fault, Tally, Verdict, judge, judge_any};
 pub use ray::TruthRay;

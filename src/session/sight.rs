@@ -2,8 +2,7 @@
 //!
 //! In f64, brick by brick along the ray. Good for hundreds of rays; triangles of few bricks are kept.
 
-use crate::reference::brick_triangles;
-use bricks::SceneFile;
+use bricks::{Corners, Payload, SceneFile};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 
@@ -118,8 +117,16 @@ impl<'a> Sight<'a> {
             if self.triangles.len() >= MOST_BRICKS {
                 return None;
             }
-            let triangles = brick_triangles(self.file, brick).ok()?;
-            let triangles = triangles.into_iter().map(|triangle| triangle.map(DVec3::from_array)).collect();
+            let (resident, payload) = (self.file.resident(), Payload::Geometry(brick));
+            let record = &resident.bricks[brick as usize];
+            let object = &resident.objects[record.object as usize];
+            let [step, unit] = [object.step_log2, object.unit_log2].map(|log2| f64::from(log2).exp2());
+            let mut bytes = vec![0; self.file.loaded_bytes(payload) as usize];
+            self.file.copy(payload, &mut bytes).ok()?;
+            let corners = Corners::new(record, &bytes);
+            let at =
+                |p: [f64; 3]| DVec3::from_array(record.origin.map(|x| x as f64)) * step + DVec3::from_array(p) * unit;
+            let triangles = (0..record.triangle_count).map(|triangle| corners.of(triangle).map(at)).collect();
             self.triangles.insert(brick, triangles);
         }
         self.triangles.get(&brick).map(Vec::as_slice)
