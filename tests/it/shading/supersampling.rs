@@ -35,14 +35,14 @@ fn bumps() -> SourceTexture {
     }
 }
 
-/// White, of `side` texels each way.
-fn white(side: u32) -> SourceTexture {
+/// Metal of a roughness of 0.35, of `side` texels each way.
+fn metal(side: u32) -> SourceTexture {
     SourceTexture {
-        name: "white".into(),
+        name: "metal".into(),
         width: side,
         height: side,
         wrap: 0,
-        rgba: vec![255; 4 * (side * side) as usize],
+        rgba: [255, 89, 255, 255].repeat((side * side) as usize),
     }
 }
 
@@ -108,7 +108,7 @@ fn many_samples_show_what_a_larger_picture_does() {
     let folder = common::folder();
     let [plain, bumpy] = [NONE, 0].map(|normal_texture| {
         let material = Material { normal_texture, ..Material::DIFFUSE };
-        floor(folder.path(), &format!("{normal_texture}.bricks"), material, white(1))
+        floor(folder.path(), &format!("{normal_texture}.bricks"), material, metal(1))
     });
     let samples = (FACTOR * FACTOR) as u32;
     let [off_plain, off_bumpy] = [&plain, &bumpy].map(|scene| off(&picture(scene, SIZE, samples), &truth(scene)));
@@ -126,14 +126,14 @@ fn roughness_stands_for_bumps_that_are_averaged() {
     let folder = common::folder();
     let material = Material {
         metallic: 1.0,
-        roughness: 0.35,
+        roughness: 1.0,
         normal_texture: 0,
         metallic_roughness_texture: 1,
         ..Material::DIFFUSE
     };
     // One of the same size as the bumps, and one of another, which can stand for nothing.
     let [paired, alone] = [256, 1].map(|side| {
-        let scene = floor(folder.path(), &format!("{side}.bricks"), material, white(side));
+        let scene = floor(folder.path(), &format!("{side}.bricks"), material, metal(side));
         off(&picture(&scene, SIZE, 1), &truth(&scene))
     });
     println!("mean and pixels off: {paired:?} with roughness that stands for bumps, {alone:?} without");

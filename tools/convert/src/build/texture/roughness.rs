@@ -7,7 +7,7 @@
 //!
 //! *Practice.* Normals are stored as unit vectors, so the levels of the roughness texture beside them carry the spread.
 //! That needs one roughness texture for one normal texture, of the same size, looked up alike; others are left as they
-//! are. The finest level is kept.
+//! are. The finest level is kept. A factor below 1 bounds what the texture can say.
 
 use bricks::{METALLIC_ROUGHNESS, Material, NONE, NORMAL};
 use std::collections::{BTreeMap, BTreeSet};
