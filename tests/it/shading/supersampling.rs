@@ -137,5 +137,5 @@ fn roughness_stands_for_bumps_that_are_averaged() {
         off(&picture(&scene, SIZE, 1), &truth(&scene))
     });
     println!("mean and pixels off: {paired:?} with roughness that stands for bumps, {alone:?} without");
-    assert!(paired[1] < 0.6 * alone[1], "{paired:?} of {alone:?}");
+    assert!(paired[1] < 0.75 * alone[1], "{paired:?} of {alone:?}");
 }
