@@ -51,7 +51,7 @@ pub fn around(boxes: &[[DVec3; 2]], picture: Picture) -> CameraPath {
     let [mut min, mut max] = whole(&boxes).unwrap_or([DVec3::ZERO; 2]);
     let centre = min + (max - min) * 0.5;
     // A size that moves the camera by more than the rounding of its coordinates.
-    let least = (centre.abs().max_element() * 1e-6).max(f64::MIN_POSITIVE * 1e6);
+    let least = (centre.abs().max_element() * 1e-10).max(f64::MIN_POSITIVE * 1e6);
     if (max - min).max_element() < least {
         let half = DVec3::splat(0.5 * least.max(1.0));
         (min, max) = (centre - half, centre + half);
