@@ -64,8 +64,8 @@ impl ToneMap {
     pub fn white(self) -> f32 {
         match self {
             Self::None => 0.95,
-            Self::AgX => 4.0,
-            Self::Aces => 2.0,
+            Self::AgX => 3.0,
+            Self::Aces => 1.5,
             Self::Reinhard => 1.0,
         }
     }

@@ -181,7 +181,7 @@ mod tests {
                     let [width, height] = seen(&camera, &boxes, aspect);
                     let most = width[0].max(height[0]);
                     // Between keyframes the spline is near the arc.
-                    let slack = if k % 2 == 0 { 1e-6 } else { 0.02 };
+                    let slack = if k % 2 == 0 { 1e-6 } else { 0.04 };
                     assert!((most - FILL).abs() < slack, "{boxes:?}, {aspect}: {most} in frame {k}");
                     assert!(width[0].max(height[0]) <= FILL + slack);
                     let tight = usize::from(height[0] > width[0]);

@@ -166,11 +166,11 @@ settings! {
         /// --fronts on: multi-queries, tighter-bounds, lazy-requery, pull-up. docs/methods/chc.md says what each does.
         without: Vec<Optimisation> = Vec::new(), "--without LIST", Rule::Any, "", Schedule, Expert;
 
-        /// How secondary rays are answered: exact, roma, auto, df, dvf, or EFFECT=METHOD with commas between them, as
-        /// in ao=roma,environment=dvf. `exact`: all are traced. `roma`: those of `ao` and `diffuse` by occupancy maps,
-        /// with a bias of a few cells and without a brick loaded. `auto`: those of `ao` that the maps find free are not
-        /// traced. `df`: those of `ao` by distance fields, a baseline. `dvf`: those to the environment by a field of
-        /// visibility, made on the first walk. Rays of `shadow` are traced unless asked: shadow=roma, auto or df.
+        /// How secondary rays are answered: exact, roma, auto, df, dvf, or by effect: ao=roma,environment=dvf. `exact`:
+        /// all are traced. `roma`: those of `ao` and `diffuse` by occupancy maps, with a bias of a few cells and
+        /// without a brick loaded. `auto`: those of `ao` that the maps find free are not traced. `df`: those of `ao` by
+        /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
+        /// walk. Rays of `shadow` are traced unless asked: shadow=roma, auto or df.
         secondary: EffectMethods = EffectMethods::EXACT, "--secondary METHOD", Rule::Any, "", Methods, Common;
 
         /// Measure the error of frames after so many samples per pixel, as 1,4,16,64. `--reference` is what they are

@@ -52,7 +52,7 @@ mod tests {
         };
         assert!((length([10.0, 5.0, 10.0]) - 1.0).abs() < 1e-12);
         // A larger city of the same houses; a sheet; a cube.
-        assert_eq!(length([500.0, 60.0, 500.0]), length([900.0, 60.0, 800.0]));
+        assert_eq!(length([500.0, 60.0, 500.0]), length([900.0, 60.0, 700.0]));
         assert!((length([3.0, 0.0, 4.0]) - 0.05).abs() < 1e-12);
         assert!((length([1.0; 3]) - 0.1 * 3f64.sqrt()).abs() < 1e-12);
         // Without triangles, and of a single point.

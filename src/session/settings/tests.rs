@@ -73,6 +73,7 @@ fn others() -> Settings {
             "1,2,3",
             "0,0,0,1,0,0,0,0,1",
             "64x48",
+            "roma",
             "a \"b\\c",
         ];
         let text = candidates.into_iter().chain(field.names.iter().copied()).rev();
