@@ -31,14 +31,17 @@ impl<'a> BrickView<'a> {
     pub fn new(brick: &Brick, bytes: &'a [u8], table: &'a [[u32; 4]]) -> Self {
         let layout = GeometryLayout::of(brick);
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
-        let of = if table.is_empty() { &[] } else { part(layout.opacity_of, layout.opacities) };
         Self {
             nodes: bytemuck::cast_slice(part(0, layout.vertices)),
             vertices: bytemuck::cast_slice(part(layout.vertices, layout.ids)),
             ids: bytemuck::cast_slice(part(layout.ids, layout.indices)),
             indices: Indices::new(brick, part(layout.indices, layout.opacity_of)),
             opacity: OpacityView {
-                of: bytemuck::cast_slice(of),
+                of: if table.is_empty() {
+                    &[]
+                } else {
+                    bytemuck::cast_slice(part(layout.opacity_of, layout.opacities))
+                },
                 triangles: bytemuck::cast_slice(part(layout.opacities, layout.bytes)),
                 table,
             },

@@ -331,8 +331,9 @@ impl<'a> Nearby<'a> {
     fn nothing_certain_before(&self, t: f64, named: Option<usize>) -> Result<(), Fault> {
         let counts = |c: &&Candidate| Some(c.index) != named && !c.may_pass && self.is_before(&c.at, t);
         let before: Vec<&Candidate> = self.candidates.iter().filter(counts).collect();
-        if let Some(candidate) = before.iter().find(|c| c.at.certainly_met()) {
-            return Err(Fault::Missed { id: self.id(candidate.index) });
+        let met = before.iter().filter(|c| c.at.certainly_met());
+        if let Some(nearest) = met.min_by(|a, b| a.at.t_low.total_cmp(&b.at.t_low)) {
+            return Err(Fault::Missed { id: self.id(nearest.index) });
         }
         let instance = |c: &Candidate| self.truth.placed[c.index].instance;
         // A patch has a triangle that may be met.

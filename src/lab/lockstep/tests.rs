@@ -17,7 +17,7 @@ use crate::kernels::lamps::{Emitter, Lamps, Shape};
 use crate::kernels::layout::{MET, NONE, Params, Ray};
 use crate::kernels::table::KERNELS;
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
-use crate::scene::framing::path_from_bounds;
+use crate::scene::{CameraPath, Keyframe};
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 use crate::schedule::fronts::Fronts;
@@ -272,6 +272,30 @@ fn lockstep(
     Lockstep::new(on_gpu.unwrap(), on_cpu.unwrap(), BOUND, findings.clone())
 }
 
+/// A flight over what is flat, or a quarter turn around it.
+fn path(min: DVec3, max: DVec3) -> CameraPath {
+    let (centre, size) = (min.midpoint(max), max - min);
+    let views = if size.y < 0.25 * size.z {
+        let above = size.y + 0.15 * size.x;
+        let from = centre.with_y(min.y + above) - DVec3::new(0.5 * size.x, 0.0, 0.3 * size.z);
+        let to = centre.with_y(min.y + 0.6 * above + 0.4 * size.y) - DVec3::new(0.15 * size.x, 0.0, 0.1 * size.z);
+        vec![(from, centre), (to, centre + DVec3::X * 0.1 * size.x)]
+    } else {
+        let away = |k: u32| {
+            let angle = (30.0 + 22.5 * f64::from(k)).to_radians();
+            DVec3::new(angle.cos(), 0.0, angle.sin()) * 1.1 * size.length() + DVec3::Y * (size.y / 3.0)
+        };
+        (0..5).map(|k| (centre + away(k), centre)).collect()
+    };
+    let step = 10.0 / (views.len() - 1) as f64;
+    let key = |(k, (position, target)): (usize, &(DVec3, DVec3))| Keyframe {
+        time: k as f64 * step,
+        position: position.to_array(),
+        target: target.to_array(),
+    };
+    CameraPath::new(60.0, [0.0, 1.0, 0.0], views.iter().enumerate().map(key).collect(), "a path".as_ref()).unwrap()
+}
+
 /// Renders two frames in lockstep.
 fn render(
     device: &(Gpu, Arc<Kernels>),
@@ -338,7 +362,7 @@ fn render(
     if let Some(settings) = variant.field.map(field) {
         renderer.methods.set(Df::new(settings, EffectMethods::every(Method::Df), Source::default()));
     }
-    let path = path_from_bounds(manifest.min, manifest.max);
+    let path = path(DVec3::from(manifest.min), DVec3::from(manifest.max));
     if let Some(settings) = &variant.dvf {
         let made = renderer
             .make_dvf(settings, &Region::scene(scene.resident()), DvfTracing::over(4), &mut |_, _| true)
