@@ -12,7 +12,7 @@ mod tests;
 use crate::cpu::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernels::dispatch::dispatches;
-use crate::kernels::layout::{DvfGrid, GBuffer, Hit, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList};
+use crate::kernels::layout::{DvfGrid, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList};
 use crate::kernels::table::Family;
 use crate::kernels::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
@@ -240,8 +240,17 @@ impl Lockstep {
         let traced = |i: &usize| rays[*i].t_min <= rays[*i].t_max;
         let of_traced = |all: &[Hit]| -> Vec<Hit> { (0..all.len()).filter(traced).map(|i| all[i]).collect() };
         findings.words("hits", context, &of_traced(&hits.0), &of_traced(&hits.1));
-        let of_traced = |all: &[Surface]| -> Vec<Surface> { (0..all.len()).filter(traced).map(|i| all[i]).collect() };
-        findings.words("surfaces", context, &of_traced(&surfaces.0), &of_traced(&surfaces.1));
+        // By what probability a direction was drawn follows from directions, which are near to equal.
+        let of_traced = |all: &[Surface]| -> (Vec<Surface>, Vec<f32>) {
+            let parts = |i: usize| match hits.0[i].id {
+                NONE => (Surface { area: 0.0, ..all[i] }, all[i].area),
+                _ => (all[i], 0.0),
+            };
+            (0..all.len()).filter(traced).map(parts).unzip()
+        };
+        let (of_gpu, of_cpu) = (of_traced(&surfaces.0), of_traced(&surfaces.1));
+        findings.words("surfaces", context, &of_gpu.0, &of_cpu.0);
+        findings.numbers("probabilities", context, self.bound, &of_gpu.1, &of_cpu.1);
         let has_lists =
             |step: &Step| matches!(step, Step::Lists | Step::ShortLists | Step::SortByNumber | Step::SortNodesNear);
         if steps.iter().any(has_lists) {
