@@ -11,6 +11,7 @@ use super::{interrupt, verify};
 use crate::cli::output::{Usage, note};
 use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use bricks::ending::Temporary;
 use bricks::layout::PAGE_BYTES;
 use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};
 use brickwalk_convert::build::{BuildError, BuildSettings, TextureEncoding, build_source};
@@ -48,6 +49,7 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     // Until the end, so that no other process repairs it.
     let _reserved = reserve(&args.scene, &target)?;
     let scratch = scratch_folder(args.work.scratch.as_deref(), &target)?;
+    let _noted = Temporary::note(scratch.path());
     let rebuilt = rebuild(args, &scene, scratch.path(), &progress)?;
     for &payload in &damaged {
         check(&scene, &rebuilt, payload)?;

@@ -20,10 +20,12 @@ pub struct PictureBytes {
 
 /// Of the sums of a frame's samples in f64, of what is read back and of their mean.
 const SUMS: u64 = 32 + 16 + 12;
+/// Of depth, normal, id and albedo.
+const AOVS: u64 = 32;
 /// Of the layers of an EXR, as values, by channel and compressed.
 const AOV_LAYERS: u64 = 3 * 44;
 /// Of the light of lamps, of parts of light and of pictures between the levels of a filter.
-const FILTER: u64 = 16 + 24 + 2 * 64;
+const FILTER: u64 = 16 + 24 + 2 * 160;
 
 impl PictureBytes {
     /// Those of a pixel.
@@ -37,9 +39,9 @@ impl PictureBytes {
         let guides = if settings.denoise || settings.taa { 2 * size_of::<Seen>() as u64 } else { 0 };
         let filter = if settings.denoise { 2 * size_of::<Past>() as u64 + FILTER } else { 0 };
         let read = if settings.aov || guides > 0 { set + shading } else { 0 };
-        let layers = if settings.aov { AOV_LAYERS } else { 0 };
+        let (aovs, layers) = if settings.aov { (AOVS, AOV_LAYERS) } else { (0, 0) };
         let sessions = if settings.measure_error { 2 } else { 1 };
-        Self { device: sessions * device, host: sessions * SUMS + guides + filter.max(read) + layers }
+        Self { device: sessions * device, host: sessions * SUMS + guides + aovs + filter.max(read).max(layers) }
     }
 
     /// Refuses a size of pictures for which there is too little memory.
