@@ -136,7 +136,7 @@ fn repairs_are_alone_and_clean_up_after_those_that_were_killed() {
     let damaged = damage(&scene, &DAMAGED);
     let running = bricks::Writer::reserve(folder.path().join("g.bricks.repair")).expect("a lock");
     let (status, said) = repair(&scene, "--from DIR/g.obj");
-    assert!(status == Some(1) && said.contains("another process is repairing it"), "{status:?} {said}");
+    assert!(status == Some(1) && said.contains("another process is repairing this file"), "{status:?} {said}");
     assert!(std::fs::read(&scene).expect("the scene") == damaged);
     // As a process that is killed: its files stay, its lock goes.
     running.keep();
