@@ -340,7 +340,7 @@ fn what_is_resident_when_an_effect_ends_is_no_balance_of_its_own() {
     let folder = common::folder();
     let scene = common::city(folder.path(), "40K", "512");
     let path = CameraPath::read(&scene.with_extension("near.json")).expect("a path");
-    let mut renderer = open(&scene, "--cache 6% --effects diffuse --diffuse-rays 2 --rotation full");
+    let mut renderer = open(&scene, "--cache 6% --effects shadow,diffuse --diffuse-rays 2 --rotation full");
     // Geometry and attributes of each.
     let payloads = 2 * renderer.scene.resident().bricks.len() as u64;
     let mut unbalanced = 0;
