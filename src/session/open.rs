@@ -148,6 +148,8 @@ impl Session {
         let references = References::open(settings)?;
         let scene = open_scene(file)?;
         check_occupancy(&scene, file, settings)?;
+        // What a scene suits was not chosen.
+        let without_effect = settings.without_effect();
         let settings = &settings.suited(&scene.resident().manifest);
         let mut path = match &settings.path {
             Some(file) => CameraPath::read(file)?,
@@ -164,7 +166,7 @@ impl Session {
         let motion = motion.transpose()?;
         let opened = Opened::open(scene.clone(), file, settings)?;
         let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned();
-        let mut warnings: Vec<String> = settings.without_effect().into_iter().chain(warnings).collect();
+        let mut warnings: Vec<String> = without_effect.into_iter().chain(warnings).collect();
         if settings.frames > 1 && references.as_ref().is_some_and(|references| !references.is_of_all()) {
             warnings.push("--reference is a file: it is the reference of frame 0; name a folder to measure all".into());
         }
