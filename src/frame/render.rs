@@ -298,9 +298,9 @@ fn bounce(
     }
 }
 
-/// Lights the hits that the passes `of_lamp` start from by sun and emitters, with shadows if they are on. The sun without
-/// shadows has been added before. Light without shadows counts for the first of the effects, rays to lamps for the
-/// second.
+/// Lights the hits that the passes `of_lamp` start from by sun and emitters, with shadows if they are on. The sun
+/// without shadows has been added before. Light without shadows counts for the first of the effects, rays to lamps for
+/// the second.
 fn light(
     engine: &mut Engine,
     methods: &mut Methods,

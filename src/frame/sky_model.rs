@@ -175,8 +175,8 @@ impl SkyModel {
         map(|k| second[k] / (1.0 - share[k]))
     }
 
-    /// What the ground at the end of a ray sends along it, lit by a sun of this irradiance outside of the atmosphere and
-    /// by a sky of this irradiance.
+    /// What the ground at the end of a ray sends along it, lit by a sun of this irradiance outside of the atmosphere
+    /// and by a sky of this irradiance.
     fn ground(&self, ray: &Gathered, sun_irradiance: f64, sky: Color) -> Color {
         if !ray.reaches_ground {
             return [0.0; 3];
@@ -237,8 +237,9 @@ impl SkyModel {
         self.transmittance.get(GROUND + VIEWER, cosine)
     }
 
-    /// The sky, `sky_scale` times as bright, and the ground, which this sky and a sun of `sun_irradiance` outside of the
-    /// atmosphere light; the sun is at a unit direction, +Y is up. Where both scales are the same, this is the model's.
+    /// The sky, `sky_scale` times as bright, and the ground, which this sky and a sun of `sun_irradiance` outside of
+    /// the atmosphere light; the sun is at a unit direction, +Y is up. Where both scales are the same, this is the
+    /// model's.
     pub fn image(
         &self,
         sun: [f64; 3],

@@ -16,7 +16,8 @@ fn jitter(sample: u32) -> [f32; 2] {
     r2(sample)
 }
 
-/// The view of `camera` for one sample of a picture of `width` x `height` pixels, as if it were the only one of a pixel.
+/// The view of `camera` for one sample of a picture of `width` x `height` pixels, as if it were the only one of a
+/// pixel.
 pub fn camera_view(
     resident: &Resident,
     camera: &Camera,

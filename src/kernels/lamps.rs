@@ -39,8 +39,8 @@ pub struct Lamps {
 }
 
 impl Lamps {
-    /// Of `emitters`, one of which is drawn for every ray, in a scene of this radius in world units. Those without light
-    /// are left out.
+    /// Of `emitters`, one of which is drawn for every ray, in a scene of this radius in world units. Those without
+    /// light are left out.
     pub fn new(environment: Option<Environment>, mut emitters: Vec<Emitter>, radius: f64) -> Self {
         // What powers that overflow light is counted as not finite.
         let power = |emitter: &Emitter| emitter.power(radius).min(1e300);

@@ -34,8 +34,8 @@ const USUAL_STOPS: f64 = 8.0;
 pub enum Exposure {
     /// So many stops (EV): radiance is multiplied by 2 to the power of it.
     Fixed(f64),
-    /// What brings the log-average luminance of what a frame hits half a stop above middle grey and keeps most of it from white; from
-    /// frame to frame it adapts, by the times of the path, so that it depends on the frames alone.
+    /// What brings the log-average luminance of what a frame hits half a stop above middle grey and keeps most of it
+    /// from white; from frame to frame it adapts, by the times of the path, so that it depends on the frames alone.
     Auto {
         /// Stops that it does not go below.
         least: f64,
@@ -77,9 +77,9 @@ impl Value for Exposure {
     }
 }
 
-/// The stops that bring the log-average luminance of the pixels of `radiance` that count above middle grey, or less where
-/// these would show more of them brighter than `white` than may be; `None` if they are all black. Where none counts, all
-/// do. Pixels that are not finite do not count.
+/// The stops that bring the log-average luminance of the pixels of `radiance` that count above middle grey, or less
+/// where these would show more of them brighter than `white` than may be; `None` if they are all black. Where none
+/// counts, all do. Pixels that are not finite do not count.
 fn metered(radiance: &[[f32; 3]], counts: &[bool], white: f64) -> Option<f64> {
     let is_finite = |color: &[f32; 3]| color.iter().all(|c| c.is_finite());
     let counted: Vec<[f32; 3]> = radiance

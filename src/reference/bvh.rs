@@ -129,8 +129,8 @@ impl Bvh {
     }
 }
 
-/// Orders `items` so that those of the first half lie before the others on the axis where they are widest apart; returns
-/// where that half ends.
+/// Orders `items` so that those of the first half lie before the others on the axis where they are widest apart;
+/// returns where that half ends.
 fn split(items: &mut [u32], bounds: &[Bounds]) -> usize {
     let center = |i: u32| bounds[i as usize].center();
     let all = items.iter().fold(Bounds::EMPTY, |all, &i| all.join(&Bounds::of(&[center(i)])));

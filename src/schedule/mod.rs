@@ -40,8 +40,8 @@ pub use tracer::Tracer;
 
 use crate::settings::Schedule;
 
-/// Traces the rays of a pass by a schedule, after the steps in `first` have made them. Rays that `auto` has not measured
-/// go by `demand`.
+/// Traces the rays of a pass by a schedule, after the steps in `first` have made them. Rays that `auto` has not
+/// measured go by `demand`.
 ///
 /// # Errors
 /// A brick that cannot be read, or the device's.

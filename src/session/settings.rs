@@ -64,8 +64,8 @@ settings! {
         /// Every triangle stops every ray, whatever its alpha.
         opaque: bool = false, "--opaque", Rule::Any, "", Effects, Expert;
         /// Greatest random turn of the directions of `ao` and `diffuse` about the normal, or full. A small one keeps
-        /// rays of neighbouring pixels alike, and shows ghosts of edges. --denoise and --taa give every pixel directions
-        /// of its own instead.
+        /// rays of neighbouring pixels alike, and shows ghosts of edges. --denoise and --taa give every pixel
+        /// directions of its own instead.
         rotation: Turn = Turn::FULL, "--rotation DEG|full", Rule::Real(0.0, 360.0), "degrees", Effects, Expert;
 
         /// Direction towards the sun, world space, any length.
@@ -78,9 +78,9 @@ settings! {
         sky_intensity: f64 = 0.35, "--sky-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
         /// What surrounds the scene: an image (.hdr, .exr), sky, auto, or none. An image is linear, +Y up, its middle
         /// along -Z and its right along +X. `sky` is a physical sky with the sun of --sun, over a ground that both
-        /// light. `auto` is `sky`, but black and without a sun around generated scenes that have their own light, to which
-        /// it adds `diffuse` where effects are the default. `none` is a sky of one colour. With `--effects environment`
-        /// it lights with shadows, else by its spherical harmonics, or by `diffuse`.
+        /// light. `auto` is `sky`, but black and without a sun around generated scenes that have their own light, to
+        /// which it adds `diffuse` where effects are the default. `none` is a sky of one colour. With `--effects
+        /// environment` it lights with shadows, else by its spherical harmonics, or by `diffuse`.
         environment: Option<Environment> = Some(Environment::Auto), "--environment FILE|NAME", Rule::Any, "", Light, Common;
         /// Turn of the environment's image about +Y, counter-clockwise seen from above.
         environment_rotation: f64 = 0.0, "--environment-rotation DEG", Rule::Real(-360.0, 360.0), "degrees", Light, Usual;

@@ -1,8 +1,8 @@
 //! The camera path of a scene for which none was given: around it, or through a room where it is one.
 //!
 //! A scene is a room if it is as large as one and rays from places within its bounds meet surfaces nearly everywhere,
-//! some above them, and meet them from the front: from within a closed object one sees its back. Then the camera looks where the free way is
-//! longest and stands as far back on this way as it may.
+//! some above them, and meet them from the front: from within a closed object one sees its back. Then the camera looks
+//! where the free way is longest and stands as far back on this way as it may.
 
 use super::sight::Sight;
 use crate::scene::CameraPath;

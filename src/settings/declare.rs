@@ -17,8 +17,9 @@
 /// }
 /// ```
 ///
-/// `#[cfg(..)]` after its description leaves a setting or a table out of a build. A setting has a type, which is a [`Value`](super::Value), a default, its form on the command line, a rule, a unit, a
-/// heading and a level. The structure, its default, [`Group`] and serde's traits follow.
+/// `#[cfg(..)]` after its description leaves a setting or a table out of a build. A setting has a type, which is a
+/// [`Value`](super::Value), a default, its form on the command line, a rule, a unit, a heading and a level. The
+/// structure, its default, [`Group`] and serde's traits follow.
 macro_rules! settings {
     (
         $(#[doc = $doc:literal])*

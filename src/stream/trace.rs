@@ -268,7 +268,8 @@ impl ReplayResult {
         if self.requests == 0 { 1.0 } else { self.hits as f64 / self.requests as f64 }
     }
 
-    /// Loads of what had been loaded before, in whatever pass. Not `bricks_reloaded` of records, which is within a pass.
+    /// Loads of what had been loaded before, in whatever pass. Not `bricks_reloaded` of records, which is within a
+    /// pass.
     pub fn loaded_again(&self) -> u64 {
         self.loads - self.distinct
     }

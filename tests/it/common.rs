@@ -109,7 +109,8 @@ pub fn sheet(text: &mut String, count: &mut usize, corner: DVec3, edges: [DVec3;
     *count += row * (squares[1] + 1);
 }
 
-/// Settings that options of the command line stand for, beside those of `--quality exact`; the adapter is that of the environment unless they name one.
+/// Settings that options of the command line stand for, beside those of `--quality exact`; the adapter is that of the
+/// environment unless they name one.
 pub fn settings(options: &str) -> Settings {
     let mut settings = Settings::exact();
     if let Ok(adapter) = std::env::var("BRICKWALK_ADAPTER") {

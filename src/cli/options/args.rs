@@ -141,8 +141,8 @@ pub struct ConvertArgs {
     /// (RGBA8, 4 bytes per texel)
     #[arg(long, help_heading = "Textures", value_name = "ENCODING", value_parser = textures(), default_value = "bc7")]
     pub textures: TextureEncoding,
-    /// Keep the meshes of nodes called NAME, and of nodes below them, as instances that walk --motion can move; * matches
-    /// any characters, ? one. May be repeated [default: none; meshes used once become part of the world object]
+    /// Keep the meshes of nodes called NAME, and of nodes below them, as instances that walk --motion can move; *
+    /// matches any characters, ? one. May be repeated [default: none; meshes used once become part of the world object]
     #[arg(long, help_heading = "Meshes", value_name = "NAME")]
     pub movable: Vec<String>,
     /// Leave out inputs that are bad, and say which and why, instead of refusing all of them

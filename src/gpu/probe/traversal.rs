@@ -136,8 +136,8 @@ impl Traced {
     }
 }
 
-/// Everything is the same; of any hits, the same rays have some, and hits of the same triangle are the same: which of its
-/// triangles a ray meets is open.
+/// Everything is the same; of any hits, the same rays have some, and hits of the same triangle are the same: which of
+/// its triangles a ray meets is open.
 fn alike(a: &Traced, b: &Traced, any: bool, rays: &[Ray]) -> Check {
     let mut check = Check::new(a.name, b.name);
     for (i, ray) in rays.iter().enumerate() {

@@ -9,10 +9,11 @@
 //! *What is changed.* The light of sun and emitters and what the other effects add are two layers, each with a history
 //! of its own ([`Layer`]): edges of shadows, which have little noise, are not mixed with the noise of occlusion, of an
 //! environment and of bounces. Distances and variances of light are those of all channels, not of luminance, by which
-//! directions to an environment are drawn. The variance is Welford's, weighted (West 1979), and it is that of the mean, which falls as samples come
-//! in, so that the filter narrows. The long average gives way to the short one as far as their difference over a
-//! neighbourhood is more than chance; differences in pairs leave out what the signal itself does there. Fireflies are
-//! cut at what their neighbours allow, and the energy cut off is reported. Light that comes by a bounce may be
+//! directions to an environment are drawn. The variance is Welford's, weighted (West 1979), and it is that of the mean,
+//! which falls as samples come in, so that the filter narrows. The long average gives way to the short one as far as
+//! their difference over a neighbourhood is more than chance; differences in pairs leave out what the signal itself
+//! does there. Fireflies are cut at what their neighbours allow, and the energy cut off is reported. Light that comes
+//! by a bounce may be
 //! *sparse*: most samples of a pixel find none. So its variance is that of the samples of a neighbourhood, where they
 //! are too few to tell it geometry alone weights neighbours, and a bright sample is no firefly if there was another
 //! around it in the last frames.

@@ -2,9 +2,9 @@
 
 use crate::picture::color::squared;
 
-/// Mean and variance of a stream of colours in which a new value weighs α: Welford's recurrence as West has it for weights
-/// ("Updating Mean and Variance Estimates", CACM 1979). No difference of large numbers is taken, so that a spread far
-/// below the mean stays right.
+/// Mean and variance of a stream of colours in which a new value weighs α: Welford's recurrence as West has it for
+/// weights ("Updating Mean and Variance Estimates", CACM 1979). No difference of large numbers is taken, so that a
+/// spread far below the mean stays right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
     /// Weighted mean.

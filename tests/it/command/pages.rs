@@ -134,7 +134,8 @@ fn pages() -> Vec<PathBuf> {
 
 /// Why a command is not understood, if it is not.
 fn misunderstood(command: &str) -> Option<String> {
-    // The shell splits it, so that quotes and comments mean what they do there; it writes no file and runs nothing else.
+    // The shell splits it, so that quotes and comments mean what they do there; it writes no file and runs nothing
+    // else.
     let own = command.split(['>', '|', ';', '&']).next().expect("a part");
     let split = Command::new("sh").args(["-fc", &format!("printf '%s\\n' {own}")]).output().expect("a shell");
     let words = String::from_utf8(split.stdout).expect("UTF-8");

@@ -245,8 +245,8 @@ fn a_still_view_converges_and_a_cut_begins_anew() {
     assert!(going_on != fresh, "histories are not used");
 }
 
-/// A small warm sun in a sky that is blue on one side and green on the other: directions are drawn by luminance, so that
-/// most samples that find light differ in colour alone.
+/// A small warm sun in a sky that is blue on one side and green on the other: directions are drawn by luminance, so
+/// that most samples that find light differ in colour alone.
 fn coloured_sky() -> Lamps {
     let image = Equirectangular::of(128, 64, |d| match DVec3::from_array(d) {
         d if d.dot(DVec3::new(0.4, 0.8, 0.45).normalize()) > 0.999 => [600.0, 400.0, 200.0],

@@ -56,8 +56,8 @@ pub fn frame_ticks(from: f64, to: f64) -> Vec<f64> {
     (0..=count).map(|k| (first + f64::from(k)) * step).collect()
 }
 
-/// Labels of a logarithmic axis that holds `from` to `to`, both above zero: powers of ten, with 2 and 5 between them where
-/// these are few, and not more than seven.
+/// Labels of a logarithmic axis that holds `from` to `to`, both above zero: powers of ten, with 2 and 5 between them
+/// where these are few, and not more than seven.
 pub fn log_ticks(from: f64, to: f64) -> Vec<f64> {
     let (first, last) = (from.log10().floor() as i32, to.log10().ceil() as i32);
     let decades = (last - first).max(1);

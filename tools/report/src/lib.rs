@@ -34,8 +34,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Writes `dir/report.html` from `dir/records.jsonl`, `dir/summary.json` and `dir/frames/*.png`, and the records as
-/// `dir/records.csv`; where there is `dir/checkpoints.jsonl`, `dir/checkpoints.csv` as well. `fields` says what fields of
-/// records mean.
+/// `dir/records.csv`; where there is `dir/checkpoints.jsonl`, `dir/checkpoints.csv` as well. `fields` says what fields
+/// of records mean.
 ///
 /// The page appears complete or not at all: it is written under a temporary name in `dir`, then renamed, and an older
 /// report is replaced. A walk without a finished frame gives a page that says so.
