@@ -12,11 +12,12 @@ fn array(path: &Path, descr: &str, shape: &str, data: &[u8]) {
     std::fs::write(path, [b"\x93NUMPY\x01\x00", &length[..], dict.as_bytes(), data].concat()).expect("an array");
 }
 
-/// Header and data of an array.
+/// Header and data of an array. Python allows a comma after the last of a list, and some writers write one.
 fn read(path: &Path) -> (String, Vec<u8>) {
     let bytes = std::fs::read(path).expect("an array");
     let data = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    (String::from_utf8_lossy(&bytes[10..data]).into_owned(), bytes[data..].to_vec())
+    let header = String::from_utf8_lossy(&bytes[10..data]).replace(", ]", "]").replace(", )", ",)");
+    (header, bytes[data..].to_vec())
 }
 
 /// A square in the plane z = 2, seen from above counter-clockwise.
@@ -63,8 +64,8 @@ fn rays_may_have_any_shape_and_lack_intervals() {
     for (descr, shape, data, shaped) in [
         ("<f8", "(6, 6)", doubles(6), "(6,)"),
         ("<f4", "(6, 8)", singles(8), "(6,)"),
-        ("<f4", "(2, 3, 6)", singles(6), "(2, 3)"),
-        ("<f8", "(3, 1, 2, 8)", doubles(8), "(3, 1, 2)"),
+        ("<f4", "(2, 3, 6)", singles(6), "(2, 3,)"),
+        ("<f8", "(3, 1, 2, 8)", doubles(8), "(3, 1, 2,)"),
     ] {
         array(&rays, descr, shape, &data);
         let (header, found) = trace(folder, &scene, &[]);
