@@ -335,10 +335,10 @@ pub struct WalkArgs {
     #[arg(short, long, value_name = "DIR", required_unless_present = "print_settings")]
     output: Option<PathBuf>,
     /// Read settings from a file (TOML); options on the command line override it [default: none]
-    #[arg(long = "settings", value_name = "F.toml")]
+    #[arg(long = "settings", value_name = "F.toml", hide_short_help = true)]
     file: Option<PathBuf>,
     /// Print the settings as a TOML file and exit
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub print_settings: bool,
     /// Print records on standard output, too, one JSON object per line
     #[arg(long, hide_short_help = true)]
