@@ -4,17 +4,17 @@
 struct Emitter {
     corner: vec3<f32>,    // a corner, or where the light is; of groups their middle
     kind: u32,            // EMITTER_*, with EMITTER_TWO_SIDED
-    // an edge that starts at the corner; of spots and distant lights the unit vector along the light; of groups the axis
-    // of their normals
+    // an edge that starts at the corner; of spots and distant lights the unit vector along the light; of groups the
+    // axis of their normals
     u: vec3<f32>,
     probability: f32,     // its share of the power of all
     // the other edge: it shines to the side of cross(u, v); of spots: scale and offset of the cosine, x and y; of
-    // spots and points z: 1 / range, 0 without one; of groups x: radius, y: distance of normals from the axis, z: how far
-    // lamps lie behind the middle along their normals
+    // spots and points z: 1 / range, 0 without one; of groups x: radius, y: distance of normals from the axis, z: how
+    // far lamps lie behind the middle along their normals
     v: vec3<f32>,
     first: u32,           // of groups: the entry of one half
-    // of surfaces; of points and spots radiant intensity, of distant lights irradiance; of groups x: luminance that they
-    // send, by area
+    // of surfaces; of points and spots radiant intensity, of distant lights irradiance; of groups x: luminance that
+    // they send, by area
     radiance: vec3<f32>,
     second: u32,          // of groups: the entry of the other half
 }

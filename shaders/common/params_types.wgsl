@@ -20,7 +20,7 @@ struct Params {           // What every kernel is told.
     origin: vec4<f32>,    // camera position in the frame, device units
     base: vec4<f32>,      // direction of pixel coordinate (0, 0)
     step_x: vec4<f32>,    // change of direction per pixel in x
-    step_y: vec4<f32>,    // change of direction per pixel in y; w: angle of the part of a pixel that a sample stands for, radians
+    step_y: vec4<f32>,    // change of direction per pixel in y; w: angle that a sample stands for, radians
     sun: vec4<f32>,       // unit vector to the sun; w: cosine-weighted irradiance scale
     sun_color: vec4<f32>, // irradiance of a surface that faces the sun
     sky_color: vec4<f32>, // of the zenith

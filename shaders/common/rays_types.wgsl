@@ -19,8 +19,8 @@ struct Surface {          // Where a hit lies, for the rays that start from it.
     leaf: u32,            // leaf of the hit, NONE without one
     normal: vec3<f32>,    // geometric unit normal toward the ray's side, world space
     triangle: u32,        // triangle within the brick
-    // twice the triangle's area in the world, device units; of rays to lamps without a hit by what probability theirs was
-    // drawn (Chosen)
+    // twice the triangle's area in the world, device units; of rays to lamps without a hit by what probability theirs
+    // was drawn (Chosen)
     area: f32,
     source: u32,          // id of the triangle that the ray starts from, which it does not meet; NONE: of none
     pending: u32,         // 0: the ray has asked from the root, for nothing: it wants nothing else in its pass

@@ -1,6 +1,7 @@
-// Draws a lamp for a surface: one of the emitters, or a direction to the environment. Emitters are drawn by what they may send to a surface: down a tree of groups, by bounds of both halves (Conty
-// Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018). Bounds are linear in
-// place of angles. Every operation is rounded as it stands, so that all pipelines draw the same.
+// Draws a lamp for a surface: one of the emitters, or a direction to the environment. Emitters are drawn by what they
+// may send to a surface: down a tree of groups, by bounds of both halves (Conty Estevez, Kulla, "Importance Sampling of
+// Many Lights with Adaptive Tree Splitting", HPG 2018). Bounds are linear in place of angles. Every operation is
+// rounded as it stands, so that all pipelines draw the same.
 
 // Squared distances below it count as it.
 const LEAST_SQUARED: f32 = 1.0e-12;

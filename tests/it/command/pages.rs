@@ -7,8 +7,8 @@ use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Most seconds of processor time of a command that is not marked with `(minutes)`: a minute on two cores that are three
-/// quarters busy. What else runs does not count.
+/// Most seconds of processor time of a command that is not marked with `(minutes)`: a minute on two cores that are
+/// three quarters busy. What else runs does not count.
 const MOST_SECONDS: f64 = 90.0;
 
 fn root() -> PathBuf {
