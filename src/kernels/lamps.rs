@@ -126,9 +126,9 @@ impl LampTables {
         &self.emitters
     }
 
-    /// One of them by its number.
+    /// One of them by its number; the last for what is no number of one, as on devices.
     pub fn emitter(&self, number: u32) -> &layout::Emitter {
-        &self.emitters[number as usize]
+        &self.emitters[(number as usize).min(self.emitters.len() - 1)]
     }
 
     /// Moves the emitters to `frame`, if they are not there yet.

@@ -1,6 +1,6 @@
 //! The fixed rays of the probe.
 
-use super::twin::Twin;
+use super::twin::{Twin, closest};
 use crate::kernels::layout::{Ray, T_INFINITE};
 use crate::math::random::Rng;
 
@@ -60,7 +60,14 @@ pub fn rays(twin: &Twin, unit: f64) -> Vec<Ray> {
                 let scale = [1.0, 0.125, 0.37][rng.below(3) as usize];
                 direction = direction.map(|x| x * scale);
             }
-            Ray { origin, t_min: range.0, direction, t_max: range.1 }
+            let mut ray = Ray { origin, t_min: range.0, direction, t_max: range.1 };
+            if range.1 == 1.0 && range.0 == 0.0 {
+                // Up to what it meets and no further: the interval is closed.
+                ray.t_max = T_INFINITE;
+                let met = twin.hits(&ray);
+                ray.t_max = if met.is_empty() { 1.0 } else { closest(&ray, &met).t };
+            }
+            ray
         })
         .collect()
 }
