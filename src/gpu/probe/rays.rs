@@ -22,7 +22,7 @@ pub fn rays(twin: &Twin, unit: f64) -> Vec<Ray> {
     let size = (3.0 / unit) as f32;
     (0..RAYS)
         .map(|i| {
-            let [a, b, c] = triangles[rng.below(triangles.len() as u64) as usize];
+            let [a, b, c] = triangles[(rng.bits() >> 32) as usize % triangles.len()];
             let s = 0.5 + 0.5 * rng.signed();
             let t = (0.5 + 0.5 * rng.signed()) * (1.0 - s);
             let between = |s: f32, t: f32| each(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]));
@@ -57,7 +57,7 @@ pub fn rays(twin: &Twin, unit: f64) -> Vec<Ray> {
                 direction = each(|k| if k == i % 3 { 1.0 } else { 0.0 });
             }
             if range == (0.0, T_INFINITE) {
-                let scale = [1.0, 0.125, 0.37][rng.below(3) as usize];
+                let scale = [1.0, 0.125, 0.37][(rng.bits() >> 32) as usize % 3];
                 direction = direction.map(|x| x * scale);
             }
             let mut ray = Ray { origin, t_min: range.0, direction, t_max: range.1 };
