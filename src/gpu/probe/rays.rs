@@ -1,6 +1,6 @@
 //! The fixed rays of the probe.
 
-use super::twin::{Twin, closest};
+use super::twin::Twin;
 use crate::kernels::layout::{Ray, T_INFINITE};
 use crate::math::random::Rng;
 
@@ -60,14 +60,7 @@ pub fn rays(twin: &Twin, unit: f64) -> Vec<Ray> {
                 let scale = [1.0, 0.125, 0.37][(rng.bits() >> 32) as usize % 3];
                 direction = direction.map(|x| x * scale);
             }
-            let mut ray = Ray { origin, t_min: range.0, direction, t_max: range.1 };
-            if range.1 == 1.0 && range.0 == 0.0 {
-                // Up to what it meets and no further: the interval is closed.
-                ray.t_max = T_INFINITE;
-                let met = twin.hits(&ray);
-                ray.t_max = if met.is_empty() { 1.0 } else { closest(&ray, &met).t };
-            }
-            ray
+            Ray { origin, t_min: range.0, direction, t_max: range.1 }
         })
         .collect()
 }
