@@ -202,6 +202,10 @@ pub fn add_light(
             // Of areas one point, drawn evenly over them: radiance * cos * cos' * area / distance^2 / pi. The direction
             // leads from the surface to the point.
             let chosen = &own.surfaces[index];
+            // Rays that others made may lead to none of the emitters.
+            if chosen.emitter == NONE {
+                return None;
+            }
             let e = bound.lamps.emitter(chosen.emitter);
             let squared = dot(d, d);
             let shone = shines(e, d);
