@@ -156,8 +156,9 @@ fn rays_that_are_not_answered_are_those_without_a_field() {
     println!("{wrong:?}: pixels of {pixels} that differ, and rays answered");
     assert!(wrong[0].1 > 1000 && wrong[0].0 <= pixels / 20, "{wrong:?} of {pixels} pixels differ");
     // Few points answer few rays: one more that differs is within what chance does.
-    let [many, few] = [(wrong[0].0 as u64, wrong[0].1), (wrong[1].0 as u64 + 1, wrong[1].1)];
-    assert!(many.0 * few.1 <= few.0 * many.1, "{wrong:?}: fewer points answer better");
+    let [(of_many, many_answered), (of_few, few_answered)] = [wrong[0], wrong[1]];
+    let falls = of_many as u64 * few_answered <= (of_few as u64 + 1) * many_answered;
+    assert!(falls, "{wrong:?}: fewer points answer better");
     let (differ, ..) = compared(&mut renderer, Some((&flipped(&many), MASKS)), &camera);
     assert!(differ > pixels / 10, "{differ} pixels differ by a field that is wrong");
     // Hits of bounces ask, too.
