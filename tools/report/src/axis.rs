@@ -63,10 +63,12 @@ pub fn log_ticks(from: f64, to: f64) -> Vec<f64> {
     let decades = (last - first).max(1);
     let parts: &[f64] = if decades <= 2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
     let step = (decades as usize).div_ceil(6);
-    let powers = (first..=first + decades).step_by(step);
+    // Up to the first power that is no less than the last: steps may pass it.
+    let top = first + ((decades as usize).div_ceil(step) * step) as i32;
+    let powers = (first..=top).step_by(step);
     let all = powers.flat_map(|power| parts.iter().map(move |part| part * 10f64.powi(power)));
     // One label below and one above what is shown.
-    let all: Vec<f64> = all.take_while(|tick| *tick <= 10f64.powi(first + decades) * 1.001).collect();
+    let all: Vec<f64> = all.take_while(|tick| *tick <= 10f64.powi(top) * 1.001).collect();
     let start = all.iter().rposition(|tick| *tick <= from * 1.001).unwrap_or(0);
     let end = all.iter().position(|tick| *tick >= to * 0.999).unwrap_or(all.len() - 1);
     all[start..=end.max(start + 1).min(all.len() - 1)].to_vec()

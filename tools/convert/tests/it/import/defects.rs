@@ -335,7 +335,7 @@ fn other_kinds_of_files_are_refused_before_anything_is_read() {
     let paths = ["/missing/test.gltf", "/missing/test.gl.objx"].map(|path| std::path::Path::new(path).into());
     assert!(error_text(import_all(&paths)).contains("test.gl.objx"));
     let error = error_text(import_one(std::path::Path::new("/missing/test.gltf")));
-    assert!(error.contains("/missing/test.gltf: cannot be read"), "{error}");
+    assert!(error.contains("/missing/test.gltf: cannot read the file"), "{error}");
 }
 
 #[test]

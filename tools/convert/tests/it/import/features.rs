@@ -33,10 +33,12 @@ fn a_triangle_arrives_whole() {
     assert_eq!(scene.placements.len(), 1);
     assert_eq!(scene.placements[0].world_from_mesh, IDENTITY);
     assert_eq!((scene.meshes[0].name.as_str(), scene.placements[0].name.as_str()), ("0", "0"));
-    // The default material of the specification.
-    assert_eq!(scene.materials.len(), 1);
+    // Without material and without colours of vertices it is grey; the default of the specification is beside it.
+    assert_eq!(scene.materials.len(), 2);
     let material = scene.materials[triangle.material as usize];
-    assert_eq!((material.base_color, material.metallic, material.roughness), ([1.0; 4], 1.0, 1.0));
+    assert_eq!(material.base_color, bricks::Material::GREY.base_color);
+    let default = scene.materials[0];
+    assert_eq!((default.base_color, default.metallic, default.roughness), ([1.0; 4], 1.0, 1.0));
     assert_eq!(material.base_color_texture, bricks::NONE);
     assert!(scene.warnings.is_empty() && !scene.has_animation, "{:?}", scene.warnings);
 }
@@ -485,9 +487,9 @@ fn several_files_are_concatenated() {
     let uses: Vec<_> = scene.placements.iter().map(|p| (p.mesh, p.source)).collect();
     assert_eq!(uses, [(0, 0), (1, 1), (2, 2)]);
     let materials: Vec<_> = scene.meshes.iter().map(|m| m.primitives[0].material).collect();
-    assert_eq!(materials, [0, 1, 2]);
+    assert_eq!(materials, [0, 2, 3]);
     let textures: Vec<_> = scene.materials.iter().map(|m| m.base_color_texture).collect();
-    assert_eq!(textures, [0, bricks::NONE, 1]);
+    assert_eq!(textures, [0, bricks::NONE, bricks::NONE, 1]);
     assert_eq!(scene.textures.len(), 2);
 }
 

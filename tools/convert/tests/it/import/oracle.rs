@@ -24,8 +24,11 @@ fn read(path: &Path) -> Vec<Option<Primitive>> {
             Some(indices) => indices.into_u32().collect(),
             None => (0..positions.len() as u32).collect(),
         };
+        // Behind those of the file come the default one, and grey for what has no colours of vertices either.
+        let bare = || gltf.materials().len() + usize::from(reader.read_colors(0).is_none());
+        let material = primitive.material().index().unwrap_or_else(bare);
         primitives.push((primitive.mode() == gltf::mesh::Mode::Triangles).then(|| Primitive {
-            material: primitive.material().index().unwrap_or(gltf.materials().len()) as u32,
+            material: material as u32,
             positions,
             normals: reader.read_normals().map(Iterator::collect),
             uvs: reader.read_tex_coords(0).map(|uvs| uvs.into_f32().collect()),
