@@ -119,23 +119,3 @@ fn many_samples_show_what_a_larger_picture_does() {
     let coarse = off(&picture(&bumpy, SIZE, 1), &truth(&bumpy));
     assert!(coarse[0].abs() > 0.02, "one sample is {coarse:?} off");
 }
-
-/// Of a metal with bumps a coarse level shows about what the fine one does: the roughness beside it stands for them.
-#[test]
-fn roughness_stands_for_bumps_that_are_averaged() {
-    let folder = common::folder();
-    let material = Material {
-        metallic: 1.0,
-        roughness: 1.0,
-        normal_texture: 0,
-        metallic_roughness_texture: 1,
-        ..Material::DIFFUSE
-    };
-    // One of the same size as the bumps, and one of another, which can stand for nothing.
-    let [paired, alone] = [256, 1].map(|side| {
-        let scene = floor(folder.path(), &format!("{side}.bricks"), material, metal(side));
-        off(&picture(&scene, SIZE, 1), &truth(&scene))
-    });
-    println!("mean and pixels off: {paired:?} with roughness that stands for bumps, {alone:?} without");
-    assert!(paired[1] < 0.75 * alone[1], "{paired:?} of {alone:?}");
-}

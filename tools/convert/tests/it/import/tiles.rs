@@ -321,9 +321,9 @@ fn what_is_not_read_is_named() {
     axis["asset"]["gltfUpAxis"] = json!("up");
     assert!(error(axis).contains("gltfUpAxis is \"UP\""));
     let missing = import_one(Path::new("/nonexistent/tileset.json")).unwrap_err();
-    assert!(missing.contains("/nonexistent/tileset.json: cannot be read"), "{missing}");
+    assert!(missing.contains("/nonexistent/tileset.json: cannot read the file"), "{missing}");
     let gone = error(tileset(json!({"content": {"uri": "a.json"}})));
-    assert!(gone.contains("a.json: cannot be read"), "{gone}");
+    assert!(gone.contains("a.json: cannot read the file"), "{gone}");
 }
 
 #[test]
