@@ -17,12 +17,12 @@ const SIZE: [usize; 2] = [48, 32];
 /// Pixels of the large one for each of the small one, each way.
 const FACTOR: usize = 8;
 
-/// Bumps of all directions, a texel each, up to some 50 degrees.
-fn bumps() -> SourceTexture {
+/// Bumps of all directions, a texel each; of a `height` of 1 up to some 50 degrees.
+fn bumps(height: f64) -> SourceTexture {
     let side = 256u32;
     let hash = |x: u32| (x.wrapping_mul(0x9E37_79B9) ^ (x >> 7)).wrapping_mul(0x85EB_CA6B) >> 24;
     let texel = |i: u32| {
-        let [x, y] = [hash(2 * i), hash(2 * i + 1)].map(|h| 0.75 * (f64::from(h) / 127.5 - 1.0));
+        let [x, y] = [hash(2 * i), hash(2 * i + 1)].map(|h| 0.75 * height * (f64::from(h) / 127.5 - 1.0));
         let n = DVec3::new(x, y, 0.8).normalize() * 127.5 + 127.5;
         [n.x.round() as u8, n.y.round() as u8, n.z.round() as u8, 255]
     };
@@ -35,19 +35,19 @@ fn bumps() -> SourceTexture {
     }
 }
 
-/// Metal of a roughness of 0.35, of `side` texels each way.
-fn metal(side: u32) -> SourceTexture {
+/// Metal of a roughness in 1/255, of `side` texels each way.
+fn metal(side: u32, roughness: u8) -> SourceTexture {
     SourceTexture {
         name: "metal".into(),
         width: side,
         height: side,
         wrap: 0,
-        rgba: [255, 89, 255, 255].repeat((side * side) as usize),
+        rgba: [255, roughness, 255, 255].repeat((side * side) as usize),
     }
 }
 
-/// A floor that recedes to its far end, of a material whose textures are bumps and `roughness`.
-fn floor(folder: &Path, name: &str, material: Material, roughness: SourceTexture) -> PathBuf {
+/// A floor that recedes to its far end, of a material whose textures are `bumps` and `roughness`.
+fn floor(folder: &Path, name: &str, material: Material, textures: [SourceTexture; 2]) -> PathBuf {
     let primitive = Primitive {
         positions: vec![[-8.0, 0.0, -8.0], [-8.0, 0.0, 8.0], [8.0, 0.0, 8.0], [8.0, 0.0, -8.0]],
         normals: Some(vec![[0.0, 1.0, 0.0]; 4]),
@@ -60,7 +60,7 @@ fn floor(folder: &Path, name: &str, material: Material, roughness: SourceTexture
         meshes: vec![Mesh { name: "floor".into(), primitives: vec![primitive] }],
         placements: vec![Placement { world_from_mesh: IDENTITY, ..Placement::default() }],
         materials: vec![Material { flags: MATERIAL_DOUBLE_SIDED, ..material }],
-        textures: vec![bumps(), roughness],
+        textures: textures.into(),
         sources: vec![bricks::Source { name: "t".into(), bytes: 0, hash: "2d06800538d394c2".into() }],
         ..SourceScene::default()
     };
@@ -69,13 +69,21 @@ fn floor(folder: &Path, name: &str, material: Material, roughness: SourceTexture
     path
 }
 
+/// Where the camera stands, and the sun.
+type View = ([f64; 3], &'static str);
+
+/// Low above the floor, under a low sun.
+const LOW: View = ([0.0, 2.5, 9.0], "0.7,0.4,0.6");
+/// High above it, under a high sun.
+const HIGH: View = ([0.0, 9.0, 7.0], "0.2,1,-0.5");
+
 /// The red radiance of a picture by the sun alone.
-fn picture(scene: &Path, [width, height]: [usize; 2], samples: u32) -> Vec<f64> {
-    let options = "--adapter cpu --cache 100% --frames 1 --effects primary --sky-intensity 0 --sun 0.7,0.4,0.6";
-    let settings = common::settings(&format!("--size {width}x{height} --spp {samples} {options}"));
+fn picture(scene: &Path, (eye, sun): View, [width, height]: [usize; 2], samples: u32) -> Vec<f64> {
+    let options = "--adapter cpu --cache 100% --frames 1 --effects primary --sky-intensity 0 --sun";
+    let settings = common::settings(&format!("--size {width}x{height} --spp {samples} {options} {sun}"));
     let opened = Opened::open(open_scene(scene).expect("the scene"), scene, &settings).expect("a session");
     let camera = Camera {
-        position: DVec3::new(0.0, 2.5, 9.0),
+        position: DVec3::from_array(eye),
         target: DVec3::new(0.0, 0.0, 2.0),
         up: DVec3::Y,
         fov_y: 40f64.to_radians(),
@@ -93,8 +101,8 @@ fn off(found: &[f64], truth: &[f64]) -> [f64; 2] {
 }
 
 /// What a small picture of many samples is to show, from a large one.
-fn truth(scene: &Path) -> Vec<f64> {
-    let large = picture(scene, SIZE.map(|s| s * FACTOR), 1);
+fn truth(scene: &Path, view: View) -> Vec<f64> {
+    let large = picture(scene, view, SIZE.map(|s| s * FACTOR), 1);
     let block = |i: usize| {
         let (x, y) = (i % SIZE[0] * FACTOR, i / SIZE[0] * FACTOR);
         let texel = |k: usize| large[(y + k / FACTOR) * SIZE[0] * FACTOR + x + k % FACTOR];
@@ -108,14 +116,42 @@ fn many_samples_show_what_a_larger_picture_does() {
     let folder = common::folder();
     let [plain, bumpy] = [NONE, 0].map(|normal_texture| {
         let material = Material { normal_texture, ..Material::DIFFUSE };
-        floor(folder.path(), &format!("{normal_texture}.bricks"), material, metal(1))
+        floor(folder.path(), &format!("{normal_texture}.bricks"), material, [bumps(1.0), metal(1, 89)])
     });
     let samples = (FACTOR * FACTOR) as u32;
-    let [off_plain, off_bumpy] = [&plain, &bumpy].map(|scene| off(&picture(scene, SIZE, samples), &truth(scene)));
+    let of = |scene| off(&picture(scene, LOW, SIZE, samples), &truth(scene, LOW));
+    let [off_plain, off_bumpy] = [&plain, &bumpy].map(|scene| of(scene));
     println!("mean and pixels off: {off_plain:?} without bumps, {off_bumpy:?} with them");
     assert!(off_bumpy[0].abs() < 0.01, "{off_bumpy:?}");
     assert!(off_bumpy[1] < off_plain[1] + 0.03, "{off_bumpy:?} with bumps, {off_plain:?} without");
     // Control: levels as wide as pixels show.
-    let coarse = off(&picture(&bumpy, SIZE, 1), &truth(&bumpy));
+    let coarse = off(&picture(&bumpy, LOW, SIZE, 1), &truth(&bumpy, LOW));
     assert!(coarse[0].abs() > 0.02, "one sample is {coarse:?} off");
+}
+
+/// In highlights of a metal with bumps a coarse level shows about what the fine one does: the roughness beside it
+/// stands for them. `docs/results/textures.md` has other bumps and views.
+#[test]
+fn roughness_stands_for_bumps_that_are_averaged() {
+    let folder = common::folder();
+    let material = Material {
+        metallic: 1.0,
+        roughness: 1.0,
+        normal_texture: 0,
+        metallic_roughness_texture: 1,
+        ..Material::DIFFUSE
+    };
+    for (height, roughness) in [(0.25, 50), (0.25, 89), (0.5, 89), (0.5, 150)] {
+        // One of the same size as the bumps, and one of another, which can stand for nothing.
+        let scenes = [256, 1].map(|side| {
+            let textures = [bumps(height), metal(side, roughness)];
+            floor(folder.path(), &format!("{side}.bricks"), material, textures)
+        });
+        let truth = truth(&scenes[1], HIGH);
+        for samples in [1, 16] {
+            let [paired, alone] = scenes.each_ref().map(|scene| off(&picture(scene, HIGH, SIZE, samples), &truth)[1]);
+            println!("height {height}, roughness {roughness}, {samples} samples: {paired:.3} of {alone:.3}");
+            assert!(paired < 0.6 * alone, "pixels are {paired} off, {alone} where nothing stands for bumps");
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Mip chains of textures, averaged by what their texels mean, cut into tiles.
 
+use super::roughness::{Bumps, bumps};
 use crate::build::disk::journal::{WordReader, Words};
 use crate::build::error::BuildError;
 use crate::build::settings::TextureEncoding;
@@ -86,12 +87,16 @@ pub(crate) fn write(
     let mut stored =
         Textures { new_of_old: vec![NONE; place(names.len() as u32, Content::Color)], ..Textures::default() };
     stored.warnings.clone_from(warnings);
-    let used = used(materials);
+    let (used, bumps) = (used(materials), bumps(materials));
     progress.phase("textures", used.len() as u64);
     for some in used.chunks(at_once) {
         progress.check()?;
         let read = |&(index, content): &(u32, Content)| {
-            source.texture(index as usize).map(|texture| encode(&texture, content, encoding))
+            // What cannot be read has no bumps; it is warned of in its own place.
+            let bumps = bumps.get(&index).filter(|_| content == Content::Data);
+            let bumps = bumps.and_then(|bumps| Some((*bumps, source.texture(bumps.normals as usize).ok()?)));
+            let bumps = bumps.as_ref().map(|(bumps, normals)| (*bumps, &**normals));
+            source.texture(index as usize).map(|texture| encode(&texture, content, encoding, bumps))
         };
         let encoded: Vec<_> = some.par_iter().with_max_len(1).map(read).collect();
         for (&(index, content), texture) in some.iter().zip(encoded) {
@@ -214,7 +219,8 @@ pub(super) fn sound_wrap(texture: &SourceTexture) -> u32 {
     if is_known { texture.wrap } else { WRAP_REPEAT | WRAP_REPEAT << 16 }
 }
 
-/// Makes the mip chain of a texture and encodes it.
+/// Makes the mip chain of a texture and encodes it; coarser levels of roughness stand for `bumps` of a normal texture,
+/// if that has the same size.
 ///
 /// As blocks, normals are BC5: unit vectors without the sign of z. See `docs/results/textures.md` for the angles
 /// that it costs.
@@ -222,6 +228,7 @@ pub(crate) fn encode(
     source: &SourceTexture,
     content: Content,
     encoding: TextureEncoding,
+    bumps: Option<(Bumps, &SourceTexture)>,
 ) -> Result<EncodedTexture, BuildError> {
     let (width, height) = (source.width, source.height);
     let rule = |ok: bool, what: &str, found: String, expected: String| {
@@ -257,11 +264,25 @@ pub(crate) fn encode(
         texels.clear();
         content.encode(&level, &mut texels);
     }
+    let is_alike =
+        |normals: &SourceTexture| (normals.width, normals.height) == (width, height) && normals.rgba.len() == bytes;
+    let of_one_size = bumps.filter(|(_, normals)| is_alike(normals));
+    let mut bumps = of_one_size.map(|(bumps, normals)| {
+        let texels = Content::Normals.decode(&normals.rgba).into_iter().map(|texel| bumps.unit(texel)).collect();
+        (bumps, Image { width: width as usize, height: height as usize, texels })
+    });
     for number in 0..levels {
         if number > 0 {
             level = level.halve();
             texels.clear();
-            content.encode(&level, &mut texels);
+            if let Some((bumps, means)) = &mut bumps {
+                *means = means.halve();
+                let mut widened = Image { texels: level.texels.clone(), ..level };
+                widened.texels.iter_mut().zip(&means.texels).for_each(|(texel, mean)| bumps.widen(texel, mean));
+                content.encode(&widened, &mut texels);
+            } else {
+                content.encode(&level, &mut texels);
+            }
         }
         let size = record.size(number);
         if number < record.tail_level() {
@@ -462,7 +483,7 @@ mod tests {
     fn means_are_those_of_linear_light_for_odd_sizes_too() {
         for (width, height) in [(1, 1), (2, 2), (5, 3), (7, 1), (1, 6), (13, 11), (64, 3)] {
             let source = texture(width, height, |x, y| [(x * 19 % 256) as u8, (y * 83 % 256) as u8, 255, 128]);
-            let encoded = encode(&source, Content::Color, TextureEncoding::Raw).unwrap();
+            let encoded = encode(&source, Content::Color, TextureEncoding::Raw, None).unwrap();
             assert_eq!(encoded.record.levels, width.max(height).ilog2() + 1);
             assert_eq!(encoded.tail.len() as u64, encoded.record.tail_bytes());
             let linear = Content::Color.decode(&source.rgba);
@@ -473,7 +494,7 @@ mod tests {
         }
         // Half black, half white is lighter than the mean of the codes.
         let encoded =
-            encode(&texture(2, 1, |x, _| [(x * 255) as u8; 4]), Content::Color, TextureEncoding::Raw).unwrap();
+            encode(&texture(2, 1, |x, _| [(x * 255) as u8; 4]), Content::Color, TextureEncoding::Raw, None).unwrap();
         let level_1 = encoded.record.tail_offset(1) as usize;
         assert_eq!(encoded.tail[level_1..level_1 + 4], [188, 188, 188, 128]);
     }
@@ -481,7 +502,7 @@ mod tests {
     #[test]
     fn numbers_and_directions_are_averaged_as_such() {
         let level_1 = |content, texel: fn(u32) -> [u8; 4]| {
-            let encoded = encode(&texture(2, 1, |x, _| texel(x)), content, TextureEncoding::Raw).unwrap();
+            let encoded = encode(&texture(2, 1, |x, _| texel(x)), content, TextureEncoding::Raw, None).unwrap();
             assert_eq!(encoded.record.flags, 0);
             let at = encoded.record.tail_offset(1) as usize;
             <[u8; 4]>::try_from(&encoded.tail[at..at + 4]).unwrap()
@@ -618,7 +639,7 @@ mod tests {
         // Directions of other lengths, one of them with z below zero.
         let v = [[255, 128, 255], [191, 128, 191], [218, 218, 37], [128, 128, 128]];
         let source = texture(16, 4, |x, _| [v[x as usize / 4][0], v[x as usize / 4][1], v[x as usize / 4][2], 9]);
-        let encoded = encode(&source, Content::Normals, TextureEncoding::Bc7).unwrap();
+        let encoded = encode(&source, Content::Normals, TextureEncoding::Bc7, None).unwrap();
         assert_eq!((encoded.record.encoding, encoded.record.flags), (TEXTURE_BC5, 0));
         assert_eq!(encoded.tail.len() as u64, encoded.record.tail_bytes());
         let found = decoded(&encoded.tail[..64], 16, CompressionVariant::BC5);
@@ -629,15 +650,18 @@ mod tests {
         }
         // Of other contents nothing is BC5.
         for content in [Content::Color, Content::Data] {
-            assert_eq!(encode(&source, content, TextureEncoding::Bc7).unwrap().record.encoding, TEXTURE_BC7);
+            assert_eq!(encode(&source, content, TextureEncoding::Bc7, None).unwrap().record.encoding, TEXTURE_BC7);
         }
     }
 
     #[test]
     fn wrong_lengths_are_errors() {
         let mut source = texture(3, 3, |_, _| [0; 4]);
-        assert!(encode(&source, Content::Color, TextureEncoding::Raw).is_ok());
+        assert!(encode(&source, Content::Color, TextureEncoding::Raw, None).is_ok());
         source.rgba.pop();
-        assert!(matches!(encode(&source, Content::Color, TextureEncoding::Raw), Err(BuildError::Inconsistent { .. })));
+        assert!(matches!(
+            encode(&source, Content::Color, TextureEncoding::Raw, None),
+            Err(BuildError::Inconsistent { .. })
+        ));
     }
 }

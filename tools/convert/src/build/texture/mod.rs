@@ -1,4 +1,6 @@
-//! What is stored of textures: `mips` makes their levels and cuts them into tiles, `opacity` makes maps of their alpha.
+//! What is stored of textures: `mips` makes their levels and cuts them into tiles, `roughness` widens what stands for
+//! bumps, `opacity` makes maps of alpha.
 
 pub(super) mod mips;
 pub(super) mod opacity;
+mod roughness;
