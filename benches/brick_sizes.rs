@@ -135,14 +135,15 @@ fn measure(
     let _ = writeln!(text, "# Brick sizes: {kind}, {} triangles\n", head["scene"]["triangles"]);
     let _ = writeln!(
         text,
-        "Adapter {}, commit {}, {}, {} frames, primary rays, cache 20 %. Loads and queries are of the whole walk; \"needed\" is what \
-         rays enter before their hits. Where two bricks do not fit into the cache they are those of a walk in core. Times are ms a frame on the device, the median of {} walks (least to most).\n",
+        "Adapter {}, commit {}, {}, {} frames, primary rays, cache 20 %. Loads and queries are of the whole walk; \
+         \"needed\" is what rays enter before their hits. Where two bricks do not fit into the cache they are those of \
+         a walk in core. Times are ms a frame on the device, the median of {} walks (least to most).\n",
         head["adapter"]["name"], head["commit"], options.size, options.frames, options.repeat
     );
     let _ = writeln!(
         text,
-        "| most triangles | bricks | queries | round trips, most a frame | payloads | MB loaded first | MB loaded after | MB needed first | \
-         ms out of core | ms in core, chc | ms in core, plain |\n\
+        "| most triangles | bricks | queries | round trips, most a frame | payloads | MB loaded first | \
+         MB loaded after | MB needed first | ms out of core | ms in core, chc | ms in core, plain |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     );
     for cut in cuts {

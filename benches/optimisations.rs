@@ -125,7 +125,8 @@ fn main() {
 fn measure(options: &Options, scene: &Path, output: &Path, variant: &mut Variant) {
     let Options { frames, size, tile, cache, effects, .. } = options;
     let words = format!(
-        "--frames {frames} --size {size} --tile {tile} --cache {cache} --effects {effects} --ao-rays 1 --diffuse-rays 1 {}",
+        "--frames {frames} --size {size} --tile {tile} --cache {cache} --effects {effects} --ao-rays 1 \
+         --diffuse-rays 1 {}",
         variant.words
     );
     common::walk(scene, &scene.with_extension("near.json"), output, &words);
@@ -142,8 +143,8 @@ fn report(options: &Options, head: &Value, groups: &[Vec<Variant>]) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "# Optimisations, city of {} triangles, {}, {} frames of the near path\n\nAdapter {} ({}), commit {}, {} bricks of \
-         {:.1} MB, cache {}, tile {} px, effects {}, one ray each. {} interleaved repetitions.\n",
+        "# Optimisations, city of {} triangles, {}, {} frames of the near path\n\nAdapter {} ({}), commit {}, {} \
+         bricks of {:.1} MB, cache {}, tile {} px, effects {}, one ray each. {} interleaved repetitions.\n",
         options.triangles,
         options.size,
         options.frames,
@@ -174,8 +175,8 @@ fn report(options: &Options, head: &Value, groups: &[Vec<Variant>]) -> String {
     let _ = writeln!(text, "\n## Queries, bytes of geometry moved, round trips: all frames\n");
     let _ = writeln!(
         text,
-        "| options | queries | MB, first frame, primary | MB, first frame, all | MB, later frames | pairs intersected | round \
-         trips |\n| --- | --- | --- | --- | --- | --- | --- |"
+        "| options | queries | MB, first frame, primary | MB, first frame, all | MB, later frames | \
+         pairs intersected | round trips |\n| --- | --- | --- | --- | --- | --- | --- |"
     );
     for variant in groups.iter().flatten() {
         let all = || variant.rows.iter().flatten();

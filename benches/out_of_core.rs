@@ -102,8 +102,8 @@ fn out_of_core(folder: &Path, text: &mut String) {
     let cache = number(&records(folder, "primary")[0], "cache_bytes");
     let _ = writeln!(
         text,
-        "\nPeak memory {:.0} MB of the process (mapped file pages {:.0} MB apart), of which the cache {:.0} MB, the host cache \
-         at most 1024 MiB.\n",
+        "\nPeak memory {:.0} MB of the process (mapped file pages {:.0} MB apart), of which the cache {:.0} MB, the \
+         host cache at most 1024 MiB.\n",
         number(memory, "peak_bytes") * 1e-6,
         number(memory, "mapped_bytes") * 1e-6,
         cache * 1e-6

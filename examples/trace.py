@@ -41,7 +41,8 @@ def write_png(path, grey):
     rows = b"".join(b"\0" + row.tobytes() for row in grey)
     head = struct.pack(">IIBBBBB", grey.shape[1], grey.shape[0], 8, 0, 0, 0, 0)
     with open(path, "wb") as file:
-        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+        chunks = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+        file.write(b"\x89PNG\r\n\x1a\n" + chunks)
 
 
 def main():

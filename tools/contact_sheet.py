@@ -4,8 +4,8 @@
     pip install pillow
     tools/contact_sheet.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR [--spp 64]
 
-Rows are lights, columns the views of paths/sponza_1.json to sponza_5.json. Every picture is kept in DIR and not made twice; the sheet is
-DIR/sheet.jpg. Every picture is exposed by itself; with `--denoise` pictures are filtered.
+Rows are lights, columns the views of paths/sponza_1.json to sponza_5.json. Every picture is kept in DIR and not made
+twice; the sheet is DIR/sheet.jpg. Every picture is exposed by itself; with `--denoise` pictures are filtered.
 """
 
 import argparse
@@ -42,7 +42,9 @@ def render(args, scene, name, options, view):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=pathlib.Path, required=True, help="folder with sponza/ and env/")
-    parser.add_argument("--brickwalk", type=pathlib.Path, default="target/release/brickwalk", help="the program (default: %(default)s)")
+    parser.add_argument(
+        "--brickwalk", type=pathlib.Path, default="target/release/brickwalk", help="the program (default: %(default)s)"
+    )
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder of all pictures")
     parser.add_argument("--spp", type=int, default=64, help="samples a pixel (default: %(default)s)")
     parser.add_argument("--size", default="320x180", help="pixels of a picture (default: %(default)s)")
@@ -51,7 +53,8 @@ def main():
     args.output.mkdir(parents=True, exist_ok=True)
     scene = args.output / "sponza.bricks"
     if not scene.exists():
-        subprocess.run([str(args.brickwalk), "convert", str(args.scenes / "sponza" / "Sponza.gltf"), "-o", str(scene)], check=True)
+        model = args.scenes / "sponza" / "Sponza.gltf"
+        subprocess.run([str(args.brickwalk), "convert", str(model), "-o", str(scene)], check=True)
     width, height = map(int, args.size.split("x"))
     rows = lights(args.scenes)
     label = 18

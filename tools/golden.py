@@ -39,7 +39,15 @@ COUNTERS = """
 TRACE_COUNTERS = "rays hits round_trips bricks_loaded bytes_bvh bytes_geometry bytes_attributes".split()
 
 # What every walk has unless its case says otherwise.
-DEFAULTS = {"--frames": "2", "--size": "96x64", "--tile": "16", "--cache": "25%", "--seed": "1", "--aov": None, "--quality": "exact"}
+DEFAULTS = {
+    "--frames": "2",
+    "--size": "96x64",
+    "--tile": "16",
+    "--cache": "25%",
+    "--seed": "1",
+    "--aov": None,
+    "--quality": "exact",
+}
 COLUMNS = ("frames", "aovs", "counters", "rays", "answered", "files")
 NONE = "-"
 

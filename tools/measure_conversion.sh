@@ -45,8 +45,8 @@ row() {
         count=$("$brickwalk" info out.bricks --json | sed -n 's/.*"triangles_stored": \([0-9]*\).*/\1/p')
         awk -v n="$count" -v w="$wall" -v u="$user" -v s="$system" -v p="$peak" -v r="$read_s" -v l="$load" \
             -v name="$file" -v options="${options:-in memory}" -v phases="$(sed -n '2s/^[^:]*: //p' said.txt)" 'BEGIN {
-                printf "| %s %s | %.2fM | %.1f | %.2f | %.1f | %.2f | %.0f | %.1f | %s | %s |\n", name, options, n / 1e6, w,
-                    n / w / 1e6, u + s, n / (u + s) / 1e6, p / 1024, r, l, phases }' >"$key.tmp"
+                printf "| %s %s | %.2fM | %.1f | %.2f | %.1f | %.2f | %.0f | %.1f | %s | %s |\n", name, options,
+                    n / 1e6, w, n / w / 1e6, u + s, n / (u + s) / 1e6, p / 1024, r, l, phases }' >"$key.tmp"
         mv "$key.tmp" "$key"
         rm -f out.bricks
     fi
@@ -61,7 +61,8 @@ echo
 commit=$(git -C "$root" log -1 --format=%h --abbrev=12 -- tools/convert bricks)
 echo "Converter of commit $commit, $(date +%F), $(nproc) cores, no adapter needed."
 echo
-echo "| input, options | triangles | wall s | M triangles/s | processor s | M triangles/processor s | peak MiB | reading alone s | load before | phases |"
+echo "| input, options | triangles | wall s | M triangles/s | processor s | M triangles/processor s | peak MiB" \
+    "| reading alone s | load before | phases |"
 echo "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 row "city-$triangles.glb" ""
 row "city-$triangles.glb" "--fast"

@@ -4,18 +4,19 @@
     pip install mitsuba numpy
     tools/mitsuba.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR
 
-The scene is Sponza with a colour a material and neither textures nor normals, so that both shade the same surfaces. Cases: the
-sun alone, an environment alone, ambient occlusion, sun and environment with one bounce; three views of paths/. Pictures are kept in
-DIR and not made twice; Mitsuba's are kept 64 samples after 64 samples. A run that was interrupted is gone on with by the same command. One
-DIR is for one build of brickwalk: a new one needs a new DIR, or one without the folders CASE-VIEW-SPP.
+The scene is Sponza with a colour a material and neither textures nor normals, so that both shade the same surfaces.
+Cases: the sun alone, an environment alone, ambient occlusion, sun and environment with one bounce; three views of
+paths/. Pictures are kept in DIR and not made twice; Mitsuba's are kept after every 64 samples. The same command goes on
+with a run that was interrupted. One DIR is for one build of brickwalk: a new build needs a new DIR, or one without the
+folders CASE-VIEW-SPP.
 
-The table says, picture by picture: the relative difference of the means, and one standard error of Mitsuba's mean; that of the
-channel that differs most; of the mean of the worst tile of 20 x 20 pixels; of pixels on the average; HDR-FLIP (`brickwalk compare`); the
-seconds of processor time that each took. Tiles, pixels and FLIP have the noise of both pictures in them. The exit status is 1 where means differ by more
-than 1 %, and with --control where they do not.
+A row of the table is a picture: the relative difference of the means, with one standard error of Mitsuba's; that of the
+channel that differs most; of the mean of the worst tile of 20 x 20 pixels; of pixels on the average; HDR-FLIP
+(`brickwalk compare`); the seconds of processor time that each took. Tiles, pixels and FLIP have the noise of both
+pictures in them. The exit status is 1 where means differ by more than 1 %, and with --control where they do not.
 
-The variant llvm_ad_rgb is 10 to 30 times as fast as scalar_rgb. It needs a libLLVM.so, which the system finds or DRJIT_LIBLLVM_PATH names: 15
-and 16 fail ("Cannot select"), 19.1 (Debian's libllvm19) works.
+The variant llvm_ad_rgb is 10 to 30 times as fast as scalar_rgb. It needs a libLLVM.so, which the system finds or
+DRJIT_LIBLLVM_PATH names: 15 and 16 fail ("Cannot select"), 19.1 (Debian's libllvm19) works.
 """
 
 import argparse
@@ -59,7 +60,10 @@ def colour(index):
 
 
 def diffuse_sponza(scenes, out):
-    """Sponza's geometry with a colour a material, as a glTF file in `out`. Without its factor of 0 a surface would be glossy as glass is."""
+    """Sponza's geometry with a colour a material, as a glTF file in `out`.
+
+    Without its factor of 0 a surface would be glossy as glass is.
+    """
     source = scenes / "sponza"
     document = json.loads((source / "Sponza.gltf").read_text())
     for key in ("textures", "images", "samplers", "extensionsUsed", "extensionsRequired"):
@@ -67,7 +71,11 @@ def diffuse_sponza(scenes, out):
     document["materials"] = [
         {
             "doubleSided": True,
-            "pbrMetallicRoughness": {"baseColorFactor": colour(i) + [1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0},
+            "pbrMetallicRoughness": {
+                "baseColorFactor": colour(i) + [1.0],
+                "metallicFactor": 0.0,
+                "roughnessFactor": 1.0,
+            },
             "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
         }
         for i in range(len(document["materials"]))
@@ -211,7 +219,10 @@ def complete(path, write):
 
 
 def theirs(make_reference, case, view, environment, spp, base):
-    """The mean picture of `spp` samples, the means of its batches, and seconds; goes on from what `base`.npz holds, and keeps it there."""
+    """The mean picture of `spp` samples, the means of its batches, and seconds.
+
+    Goes on from what `base`.npz holds, and keeps it there.
+    """
     kept = base.with_name(f"{base.name}.npz")
     pictures, total, means, seconds = None, np.zeros((SIZE[1], SIZE[0], 3)), [], 0.0
     if kept.exists():
@@ -236,7 +247,8 @@ def theirs(make_reference, case, view, environment, spp, base):
 LIGHT = {
     "sun": ["--effects", "shadow", "--sky-intensity", "0", "--sun-angle", "0", "--sun-intensity", str(SUN_INTENSITY)],
     "environment": ["--effects", "shadow,environment", "--sun-intensity", "0"],
-    "ao": ["--effects", "ao", "--sun-intensity", "0", "--ao-rays", "1", "--ao-length", str(AO_LENGTH), "--rotation", "full"],
+    "ao": ["--effects", "ao", "--sun-intensity", "0", "--ao-rays", "1", "--ao-length", str(AO_LENGTH)]
+    + ["--rotation", "full"],
     "bounce": ["--effects", "shadow,environment,diffuse", "--sun-angle", "0", "--sun-intensity", str(SUN_INTENSITY)]
     + ["--diffuse-rays", "1", "--rotation", "full"],
 }
@@ -252,8 +264,8 @@ def ours(binary, bricks, case, view, environment, white, spp, folder):
     """The picture of `brickwalk walk`, and the seconds that it took; made if `folder` has none."""
     picture, took = folder / "frames" / "0000.exr", folder / "seconds"
     if not took.exists():
-        words = [binary, "walk", bricks, "-o", folder, "--path", view, "--frames", "1", "--size", f"{SIZE[0]}x{SIZE[1]}"]
-        words += ["--quality", "exact"]
+        words = [binary, "walk", bricks, "-o", folder, "--path", view, "--frames", "1"]
+        words += ["--size", f"{SIZE[0]}x{SIZE[1]}", "--quality", "exact"]
         words += ["--spp", str(spp), "--aov", "--cache", "100%", *LIGHT[case]]
         if case in ("environment", "bounce"):
             words += ["--environment", environment]
@@ -271,7 +283,7 @@ def read(mitsuba, path):
 
 
 def row(options, mine, reference, means):
-    """The columns of the table from the picture files of this program and of Mitsuba, and the difference that is bounded."""
+    """The columns of the table from the pictures of this program and of Mitsuba, and the difference that is bounded."""
     import mitsuba
 
     a, b = (read(mitsuba, path) for path in (mine, reference))
@@ -285,7 +297,12 @@ def row(options, mine, reference, means):
     channels = a.mean(axis=(0, 1)) / b.mean(axis=(0, 1)) - 1
     channel = channels[np.abs(channels).argmax()]
     error = means.std(ddof=1) / len(means) ** 0.5 / means.mean() if len(means) > 1 else float("nan")
-    columns = [f"{100 * mean:+.2f} ± {100 * error:.2f} %", f"{100 * channel:+.2f} %", f"{100 * worst:.1f} %", f"{100 * pixels:.1f} %"]
+    columns = [
+        f"{100 * mean:+.2f} ± {100 * error:.2f} %",
+        f"{100 * channel:+.2f} %",
+        f"{100 * worst:.1f} %",
+        f"{100 * pixels:.1f} %",
+    ]
     return [*columns, f"{flip:.4f}"], mean
 
 
@@ -293,20 +310,32 @@ def parse():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--scenes", type=pathlib.Path, required=True, help="folder with sponza/ and env/")
     arguments.add_argument(
-        "--brickwalk", type=pathlib.Path, default=pathlib.Path("target/release/brickwalk"), help="default target/release/brickwalk"
+        "--brickwalk",
+        type=pathlib.Path,
+        default=pathlib.Path("target/release/brickwalk"),
+        help="default target/release/brickwalk",
     )
-    arguments.add_argument("--paths", type=pathlib.Path, default=pathlib.Path("paths"), help="folder of the views (default paths)")
-    arguments.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder for pictures, made if missing")
+    arguments.add_argument(
+        "--paths", type=pathlib.Path, default=pathlib.Path("paths"), help="folder of the views (default paths)"
+    )
+    arguments.add_argument(
+        "-o", "--output", type=pathlib.Path, required=True, help="folder for pictures, made if missing"
+    )
     arguments.add_argument("--spp", type=int, default=1024, help="samples a pixel of this program (default 1024)")
-    arguments.add_argument("--reference-spp", type=int, help="samples a pixel of Mitsuba, a multiple of 64 (default as --spp)")
+    arguments.add_argument(
+        "--reference-spp", type=int, help="samples a pixel of Mitsuba, a multiple of 64 (default as --spp)"
+    )
     arguments.add_argument("--cases", default="sun,environment,ao,bounce", help="of these (default all)")
     arguments.add_argument("--views", default="1,3,5", help="numbers of paths/sponza_N.json (default 1,3,5)")
-    arguments.add_argument("--variant", choices=["scalar_rgb", "llvm_ad_rgb"], default="scalar_rgb", help="of Mitsuba (default scalar_rgb)")
+    arguments.add_argument(
+        "--variant", choices=["scalar_rgb", "llvm_ad_rgb"], default="scalar_rgb", help="of Mitsuba (default scalar_rgb)"
+    )
     control = "; ".join(f"{name}: {what} (cases {', '.join(cases)})" for name, (what, cases) in CONTROLS.items())
     arguments.add_argument(
         "--control",
         choices=list(CONTROLS),
-        help=f"tell Mitsuba something wrong, which all means must show. {control.replace('%', '%%')} (default: nothing)",
+        help="tell Mitsuba something wrong, which all means must show. "
+        f"{control.replace('%', '%%')} (default: nothing)",
     )
     options = arguments.parse_args()
     options.reference_spp = options.reference_spp or options.spp
@@ -342,12 +371,13 @@ def main():
     for case in options.cases:
         for view in options.views:
             path = options.paths / f"sponza_{view}.json"
-            mine, seconds = ours(
-                options.brickwalk, bricks, case, path, environment, white, options.spp, out / f"{case}-{view}-{options.spp}"
-            )
+            folder = out / f"{case}-{view}-{options.spp}"
+            mine, seconds = ours(options.brickwalk, bricks, case, path, environment, white, options.spp, folder)
             name = "-".join(filter(None, ["mitsuba", options.variant, options.control, case, view]))
             keyframes = json.loads(path.read_text())
-            picture, means, reference_seconds = theirs(make_reference, case, keyframes, environment, options.reference_spp, out / name)
+            picture, means, reference_seconds = theirs(
+                make_reference, case, keyframes, environment, options.reference_spp, out / name
+            )
             reference = out / f"{name}.exr"
             mitsuba.Bitmap(picture.astype(np.float32)).write(str(reference))
             columns, mean = row(options, mine, reference, means)
@@ -355,7 +385,8 @@ def main():
             columns = [case, view, *columns, f"{seconds:.0f}", f"{reference_seconds:.0f}"]
             print(f"| {' | '.join(columns)} |", flush=True)
     count = len(options.cases) * len(options.views)
-    print(f"{count - failed} of {count} means differ by {'more than' if options.control else 'at most'} 1 %", file=sys.stderr)
+    by = "more than" if options.control else "at most"
+    print(f"{count - failed} of {count} means differ by {by} 1 %", file=sys.stderr)
     return 1 if failed else 0
 
 

@@ -59,8 +59,8 @@ have_numpy() {
 
 install_packages() {
     if ! have apt-get; then
-        fail "missing: $*. Install a C++ compiler, the Vulkan loader and a Vulkan driver (Fedora: gcc-c++ vulkan-loader" \
-            "mesa-vulkan-drivers; Arch: gcc vulkan-icd-loader vulkan-swrast), then run this again"
+        fail "missing: $*. Install a C++ compiler, the Vulkan loader and a Vulkan driver (Fedora: gcc-c++" \
+            "vulkan-loader mesa-vulkan-drivers; Arch: gcc vulkan-icd-loader vulkan-swrast), then run this again"
     fi
     local -a root=()
     if [ "$(id -u)" -ne 0 ]; then
@@ -68,8 +68,10 @@ install_packages() {
         root=(sudo)
     fi
     echo "${0##*/}: installing $*" >&2
-    ${root[@]+"${root[@]}"} apt-get update -qq >&2 || fail "apt-get update failed; check the network, then run this again"
-    ${root[@]+"${root[@]}"} env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >&2 ||
+    ${root[@]+"${root[@]}"} apt-get update -qq >&2 ||
+        fail "apt-get update failed; check the network, then run this again"
+    ${root[@]+"${root[@]}"} env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y -qq --no-install-recommends "$@" >&2 ||
         fail "apt-get install $* failed; install them, then run this again"
 }
 

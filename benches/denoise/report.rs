@@ -12,7 +12,8 @@ pub fn text(options: &Options, display: &Display, walk: &Walk, changes: &[Change
     let steady = || frames - options.steady..frames;
     let _ = writeln!(
         text,
-        "`{}` from {} s at {} frames a second, {}, `{}`, {} diffuse rays a pixel; references of {} samples with {} diffuse rays each; {:+.2} EV, tone map {}.\n",
+        "`{}` from {} s at {} frames a second, {}, `{}`, {} diffuse rays a pixel; references of {} samples with {} \
+         diffuse rays each; {:+.2} EV, tone map {}.\n",
         options.path.file_name().unwrap_or_default().display(),
         options.start,
         options.fps,
@@ -62,7 +63,8 @@ pub fn text(options: &Options, display: &Display, walk: &Walk, changes: &[Change
     let moved = average(steady().map(|k| flicker([&still, &still], [&walk.truth[&(k - 1)], &walk.truth[&k]])));
     let _ = writeln!(
         text,
-        "References: RMSE about {noise:.4}; FLIP between the halves of their samples {between:.4}; mean change from frame to frame {moved:.4}.\n"
+        "References: RMSE about {noise:.4}; FLIP between the halves of their samples {between:.4}; mean change from \
+         frame to frame {moved:.4}.\n"
     );
     let _ = writeln!(text, "| error after | pixels | way | at once | 4th frame | 10th frame | steady | ratio |");
     let _ = writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- |");

@@ -1,5 +1,6 @@
-// Traces dumped rays through dumped triangles with Embree 4, as `cargo bench --bench peer` asks on standard input: a line
-// "ROBUST SET" is answered by the processor seconds of rtcIntersect1, 4, 8 and 16 (of set 1: rtcOccluded) and the number of hits.
+// Traces dumped rays through dumped triangles with Embree 4, as `cargo bench --bench peer` asks on standard input. The
+// answer to a line "ROBUST SET" is the processor seconds of rtcIntersect1, 4, 8 and 16 (of set 1: rtcOccluded), and the
+// number of hits.
 //
 // The declarations are those of Embree's embree4/rtcore.h, so that a wheel without headers is enough.
 #include <algorithm>
@@ -86,7 +87,9 @@ template <int N> static double trace(void *scene, const std::vector<Ray> &rays, 
     return seconds() - start;
 }
 
-template <class T> static bool read(FILE *file, T *to, size_t count) { return fread(to, sizeof(T), count, file) == count; }
+template <class T> static bool read(FILE *file, T *to, size_t count) {
+    return fread(to, sizeof(T), count, file) == count;
+}
 
 // Squares of 8 x 8, in each squares of 4 x 4: neighbours go together.
 static std::vector<Ray> by_squares(const std::vector<Ray> &in, unsigned width, unsigned height) {

@@ -14,7 +14,11 @@ fn mirrored(row: u32) -> u32 {
 
 // One thread a mask.
 @compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
     let mask = (group.y * groups.x + group.x) * 64u + lane;
     if mask >= 2u * dvf.size.x * dvf.size.y * dvf.size.z {
         return;

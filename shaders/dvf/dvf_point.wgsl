@@ -49,7 +49,8 @@ fn start_of(point: u32, is_behind: bool) -> DvfStart {
     if max(m.x, max(m.y, m.z)) == 0.0 {
         return found;
     }
-    let start = surface_point(t.a, t.b, t.c, weights.x, weights.y, weights.z, 1.0, scaled(select(back, -back, is_behind)).x);
+    let direction = scaled(select(back, -back, is_behind)).x;
+    let start = surface_point(t.a, t.b, t.c, weights.x, weights.y, weights.z, 1.0, direction);
     found.origin = offset_origin(start);
     found.cell = dvf_cell(found.origin);
     found.n = start.n;

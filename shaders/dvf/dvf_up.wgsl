@@ -10,7 +10,11 @@ var<workgroup> sums: array<vec2<u32>, 256>;
 
 // One thread two elements.
 @compute @workgroup_size(256)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
     let block = group.y * groups.x + group.x;
     let first = block * DVF_WALK + 2u * lane;
     sums[lane] = plus(element_of(first), element_of(first + 1u));

@@ -23,7 +23,8 @@ fn boxes(@builtin(global_invocation_id) id: vec3<u32>) {
     let direction = bitcast<vec4<f32>>(cases[at + 6u]);
     let offset = bitcast<vec3<f32>>(cases[at + 7u].xyz);
     let ray = framed_ray(origin.xyz, direction.xyz, origin.w);
-    let entered = node_hits(ray, cases[at], cases[at + 2u], cases[at + 3u], cases[at + 4u], offset, vec3<f32>(0.0), 0.0, direction.w);
+    let entered = node_hits(ray, cases[at], cases[at + 2u], cases[at + 3u], cases[at + 4u],
+                            offset, vec3<f32>(0.0), 0.0, direction.w);
     results[9u * id.x] = entered.mask;
     for (var i = 0u; i < 8u; i++) {
         results[9u * id.x + 1u + i] = bitcast<u32>(entered.near[i >> 2u][i & 3u]);

@@ -37,10 +37,12 @@ fn axis_range(lo: f32, hi: f32, o0: f32, o1: f32, d0: f32, d1: f32) -> vec2<f32>
 }
 
 fn tile_meets_box(tile: TileBounds, box_min: vec3<f32>, box_max: vec3<f32>, slack: f32) -> IntervalHit {
-    let reach = max(abs(box_min - tile.origin_max), max(abs(box_max - tile.origin_min), max(abs(box_min - tile.origin_min), abs(box_max - tile.origin_max))));
+    let ends = max(abs(box_min - tile.origin_min), abs(box_max - tile.origin_max));
+    let reach = max(abs(box_min - tile.origin_max), max(abs(box_max - tile.origin_min), ends));
     let m = max(reach.x, max(reach.y, reach.z));
     let o = max(abs(tile.origin_min), abs(tile.origin_max));
-    let delta = vec3<f32>(64.0 * INTERVAL_UNIT * m + slack * (m + max(o.x, max(o.y, o.z)))) + 8.0 * INTERVAL_UNIT * max(abs(box_min), abs(box_max));
+    let delta = vec3<f32>(64.0 * INTERVAL_UNIT * m + slack * (m + max(o.x, max(o.y, o.z))))
+        + 8.0 * INTERVAL_UNIT * max(abs(box_min), abs(box_max));
     let lo = box_min - delta;
     let hi = box_max + delta;
     let x = axis_range(lo.x, hi.x, tile.origin_min.x, tile.origin_max.x, tile.direction_min.x, tile.direction_max.x);

@@ -10,7 +10,11 @@
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+fn main(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
     let work = work_of(WORK_CHOSEN, workgroup.x + workgroup.y * workgroups.x);
     let index = ray_of(work, local);
     if index == NONE {
@@ -51,7 +55,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
         let brick = leaves[leaf].brick;
         let at = 5u * brick;
         let n1 = roots[at + 1u];
-        let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, limit);
+        let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u],
+                                r.offset_high, r.offset_low, 0.0, limit);
         var near = T_INFINITE;
         var any = false;
         for (var i = 0u; i < 8u; i++) {

@@ -20,7 +20,18 @@ struct Entered {
     hits: NodeHits,
 }
 
-fn entered(ray: FramedRay, n0: vec4<u32>, n1: vec4<u32>, n2: vec4<u32>, n3: vec4<u32>, n4: vec4<u32>, high: vec3<f32>, low: vec3<f32>, pad: f32, t_max: f32) -> Entered {
+fn entered(
+    ray: FramedRay,
+    n0: vec4<u32>,
+    n1: vec4<u32>,
+    n2: vec4<u32>,
+    n3: vec4<u32>,
+    n4: vec4<u32>,
+    high: vec3<f32>,
+    low: vec3<f32>,
+    pad: f32,
+    t_max: f32,
+) -> Entered {
     var e = Entered(0u, node_hits(ray, n0, n2, n3, n4, high, low, pad, t_max));
     for (var i = 0u; i < 8u; i++) {
         let what = (select(n1.z, n1.w, i >= 4u) >> (8u * (i & 3u))) & 255u;
@@ -33,7 +44,11 @@ fn entered(ray: FramedRay, n0: vec4<u32>, n1: vec4<u32>, n2: vec4<u32>, n3: vec4
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+fn main(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
     let work = rooted_or_all(OF_TILES, workgroup.x + workgroup.y * workgroups.x);
     let index = ray_of(work, local);
     if index == NONE {
@@ -69,7 +84,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
         let at = 5u * stack[depth].leaf;
         let n0 = top8[at];
         let n1 = top8[at + 1u];
-        let e = entered(world, n0, n1, top8[at + 2u], top8[at + 3u], top8[at + 4u], vec3<f32>(0.0), vec3<f32>(0.0), params.instance_pad, limit);
+        let e = entered(world, n0, n1, top8[at + 2u], top8[at + 3u], top8[at + 4u],
+                        vec3<f32>(0.0), vec3<f32>(0.0), params.instance_pad, limit);
         var bits = e.bits;
         let inner = n0.w >> 24u;
         while bits != 0u {
@@ -92,13 +108,14 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
             }
             let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
             let brick = leaves[leaf].brick;
-            if (slots[brick].state & params.select_mask) != params.select_want || (!PAIRS && is_culled(work.tile, leaf)) {
+            let is_selected = (slots[brick].state & params.select_mask) == params.select_want;
+            if !is_selected || (!PAIRS && is_culled(work.tile, leaf)) {
                 continue;
             }
             enter_leaf(&r, world, leaf);
             let root = 5u * brick;
-            let own = entered(r.ray, roots[root], roots[root + 1u], roots[root + 2u], roots[root + 3u], roots[root + 4u],
-                              r.offset_high, r.offset_low, 0.0, limit);
+            let own = entered(r.ray, roots[root], roots[root + 1u], roots[root + 2u], roots[root + 3u],
+                              roots[root + 4u], r.offset_high, r.offset_low, 0.0, limit);
             if own.bits == 0u {
                 continue;
             }

@@ -16,7 +16,8 @@ fn enters(ray: FramedRay, node: u32, t_max: f32) -> bool {
     let reach = max(abs(lo - ray.origin), abs(hi - ray.origin));
     let m = max(reach.x, max(reach.y, reach.z));
     let o = abs(ray.origin);
-    let delta = vec3<f32>(64.0 * UNIT * m + params.instance_pad * (m + max(o.x, max(o.y, o.z)))) + 8.0 * UNIT * max(abs(lo), abs(hi));
+    let delta = vec3<f32>(64.0 * UNIT * m + params.instance_pad * (m + max(o.x, max(o.y, o.z))))
+        + 8.0 * UNIT * max(abs(lo), abs(hi));
     let a = (lo - delta - ray.origin) * ray.frame.inv;
     let b = (hi + delta - ray.origin) * ray.frame.inv;
     let near = min(a, b);
@@ -43,7 +44,8 @@ fn look(world: FramedRay, index: u32, t_max: f32) -> u32 {
     var r: BrickRay;
     enter_leaf(&r, world, node.left);
     let at = 5u * leaves[node.left].brick;
-    let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u], r.offset_high, r.offset_low, 0.0, t_max).mask;
+    let entered = node_hits(r.ray, roots[at], roots[at + 2u], roots[at + 3u], roots[at + 4u],
+                            r.offset_high, r.offset_low, 0.0, t_max).mask;
     return OWN | select(0u, SEEN, traversal_mask(entered, roots[at + 1u], 0u) != 0u);
 }
 
@@ -89,7 +91,11 @@ fn ask(pair: Pair, lane: u32, each: bool) {
 
 // One workgroup a query; each thread tests every 64th ray of its tile.
 @compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
     let index = group.x + group.y * groups.x;
     var pair = Pair();
     if index < params.pair_count {

@@ -12,7 +12,11 @@ var<workgroup> traced: array<u32, 64>;
 
 // One workgroup a tile: each thread bounds every 64th ray, then the workgroup reduces.
 @compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
     let tile = group.x + group.y * groups.x;
     let x0 = (tile % params.tiles_x) * params.tile;
     let y0 = (tile / params.tiles_x) * params.tile;
@@ -56,7 +60,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
         }
     }
     if lane == 0u && tile < params.tiles {
-        tile_bounds[tile] = TileBounds(origin_min[0], range[0].x, origin_max[0], range[0].y, direction_min[0], traced[0], direction_max[0], 0u);
+        tile_bounds[tile] = TileBounds(origin_min[0], range[0].x, origin_max[0], range[0].y,
+                                       direction_min[0], traced[0], direction_max[0], 0u);
         atomicAdd(&counters[COUNTER_RAYS_TRACED], traced[0]);
     }
 }

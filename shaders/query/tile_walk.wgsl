@@ -51,7 +51,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                     culled += u32(!l.hit) + u32(!r.hit);
                     if l.hit && r.hit {
                         // Nearer first; when both hold the tile's origins, the one whose box centre is nearer.
-                        let swap = r.near < l.near || (r.near == l.near && centre_distance(bounds, n.right) < centre_distance(bounds, n.left));
+                        let swap = r.near < l.near || (r.near == l.near
+                            && centre_distance(bounds, n.right) < centre_distance(bounds, n.left));
                         if depth == WALK_STACK {
                             atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
                             break;

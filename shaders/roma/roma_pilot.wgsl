@@ -19,7 +19,8 @@ fn is_pilot(index: u32) -> bool {
         return false;
     }
     if own.part == ROMA_CORRECT {
-        let word = random4(block_of(index, 64u), ~(params.stream - params.sample), params.seed).z + params.direction / n * GOLDEN;
+        let drawn = random4(block_of(index, 64u), ~(params.stream - params.sample), params.seed).z;
+        let word = drawn + params.direction / n * GOLDEN;
         return params.direction % n == u32(barrier(f32(word >> 8u) * 5.9604645e-8 * f32(n))); // rounded, never up to n
     }
     let first = u32(random2(block_of(index, 8u), ~params.stream, params.seed).x * f32(n));

@@ -37,7 +37,8 @@ fn met(column: u32, at: f32, speed: f32, range: vec2<f32>) -> f32 {
 // The part of a range between whose first and last cell the middles lie: half a cell less at the ends that are the
 // ray's own, so that on the average over the places of maps it is as long as it is. `speed` in cells a unit of t.
 fn trimmed(range: vec2<f32>, speed: vec3<f32>, ends: vec2<bool>) -> vec2<f32> {
-    let squares = barrier(barrier(barrier(speed.x * speed.x) + barrier(speed.y * speed.y)) + barrier(speed.z * speed.z));
+    let squares = barrier(barrier(barrier(speed.x * speed.x) + barrier(speed.y * speed.y))
+        + barrier(speed.z * speed.z));
     let half = divide(0.5, square_root(squares));
     return select(range, vec2<f32>(barrier(range.x + half), barrier(range.y - half)), ends);
 }
@@ -120,8 +121,10 @@ fn answer(index: u32, ray: Ray, taken: Taken, begin: f32, is_sifted: bool) -> An
     let side = f32(own.cells);
     let margin = margin_of(index);
     let start_level = start_level_of(ray.origin, normal, margin);
-    let rise = barrier(barrier(barrier(direction.x * normal.x) + barrier(direction.y * normal.y)) + barrier(direction.z * normal.z));
-    let squares = barrier(barrier(barrier(direction.x * direction.x) + barrier(direction.y * direction.y)) + barrier(direction.z * direction.z));
+    let rise = barrier(barrier(barrier(direction.x * normal.x) + barrier(direction.y * normal.y))
+        + barrier(direction.z * normal.z));
+    let squares = barrier(barrier(barrier(direction.x * direction.x) + barrier(direction.y * direction.y))
+        + barrier(direction.z * direction.z));
     var t = max(ray.t_min, begin);
     var is_capped = false;
     for (var l = start_level; l < own.levels; l++) {
@@ -146,7 +149,8 @@ fn answer(index: u32, ray: Ray, taken: Taken, begin: f32, is_sifted: bool) -> An
             let found = through(map, cell, cells, select(trimmed(range, cells, ends), range, is_sifted), taken.steps);
             is_capped = is_capped || found.is_capped;
             if found.t >= 0.0 {
-                return Answer(found.t, barrier3(start + barrier3(found.t * direction)), direction, level.lift, is_capped, true);
+                let point = barrier3(start + barrier3(found.t * direction));
+                return Answer(found.t, point, direction, level.lift, is_capped, true);
             }
             t = range.y;
             if t >= end {

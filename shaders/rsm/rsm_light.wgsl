@@ -62,7 +62,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let n = texel.normal;
         let turned = barrier(barrier(n.x * met.normal.x) + barrier(n.y * met.normal.y)) + barrier(n.z * met.normal.z);
         let apart = abs(depth - texel.depth);
-        if texel.depth >= 0.0 && turned > 0.0 && apart <= IN_DEPTH * met.area && barrier(apart * texel.facing) <= ACROSS * met.area {
+        if texel.depth >= 0.0 && turned > 0.0 && apart <= IN_DEPTH * met.area
+            && barrier(apart * texel.facing) <= ACROSS * met.area {
             light += texel.flux;
         }
     }

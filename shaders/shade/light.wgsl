@@ -4,7 +4,8 @@ const PI: f32 = 3.14159265;
 
 fn sky(d: vec3<f32>) -> vec3<f32> {
     let up = normalize(d).y;
-    let horizon = mix(params.sky_color.rgb, vec3<f32>(dot(params.sky_color.rgb, vec3<f32>(0.2126, 0.7152, 0.0722))), 0.65) * 1.3;
+    let grey = vec3<f32>(dot(params.sky_color.rgb, vec3<f32>(0.2126, 0.7152, 0.0722)));
+    let horizon = mix(params.sky_color.rgb, grey, 0.65) * 1.3;
     if up < 0.0 {
         return mix(horizon, params.ground_color.rgb, clamp(-up * 8.0, 0.0, 1.0));
     }

@@ -124,7 +124,11 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let base = material.base_color * color;
     // Source vertex (i + rotation) mod 3 was stored as vertex i.
-    let source = array<f32, 3>(weights[(3u - rotation) % 3u], weights[(4u - rotation) % 3u], weights[(5u - rotation) % 3u]);
+    let source = array<f32, 3>(
+        weights[(3u - rotation) % 3u],
+        weights[(4u - rotation) % 3u],
+        weights[(5u - rotation) % 3u],
+    );
     var g: GBuffer;
     g.albedo = base.rgb;
     g.state = GBUFFER_READ;

@@ -20,7 +20,8 @@ fn block_of_tile(tile: u32, workgroup: u32) -> Work {
 // Index of the ray of thread `local`; NONE without work and beyond the picture.
 fn ray_of(work: Work, local: vec3<u32>) -> u32 {
     let ray = work.ray + local.xy;
-    return select(ray.y * params.width + ray.x, NONE, work.tile == NONE || ray.x >= params.width || ray.y >= params.height);
+    let is_outside = work.tile == NONE || ray.x >= params.width || ray.y >= params.height;
+    return select(ray.y * params.width + ray.x, NONE, is_outside);
 }
 
 // What a workgroup has to do of the work over all tiles.

@@ -35,7 +35,8 @@ fn vertex(r: ptr<function, BrickRay>, index: u32) -> vec3<f32> {
     }
     let i = (*r).vertices + 6u * index;
     let high = bitcast<vec3<f32>>(vec3<u32>(cache_word(page, i), cache_word(page, i + 1u), cache_word(page, i + 2u)));
-    let low = bitcast<vec3<f32>>(vec3<u32>(cache_word(page, i + 3u), cache_word(page, i + 4u), cache_word(page, i + 5u)));
+    let low_bits = vec3<u32>(cache_word(page, i + 3u), cache_word(page, i + 4u), cache_word(page, i + 5u));
+    let low = bitcast<vec3<f32>>(low_bits);
     return barrier3(barrier3(high + (*r).offset_high) + barrier3(low + (*r).offset_low));
 }
 
@@ -80,7 +81,8 @@ fn test_triangle(r: ptr<function, BrickRay>, best: ptr<function, Best>, triangle
 fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>, ray: u32) {
     let instance = leaves[best.leaf].instance;
     let index = triangle_indices(r, best.triangle);
-    let s = surface_point(vertex(r, index.x), vertex(r, index.y), vertex(r, index.z), best.u, best.v, best.w, best.det, (*r).ray.direction);
+    let s = surface_point(vertex(r, index.x), vertex(r, index.y), vertex(r, index.z),
+                          best.u, best.v, best.w, best.det, (*r).ray.direction);
     hits[ray] = Hit(best.t, best.id, divide(best.v, best.det), divide(best.w, best.det));
     var point = offset_origin(s);
     var normal = s.n;
@@ -96,9 +98,13 @@ fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>,
         normal = vec3<f32>(divide(n.x, stretch), divide(n.y, stretch), divide(n.z, stretch));
         // Area vectors go by the cofactor matrix, det * inverse transpose.
         area = barrier(barrier(area * stretch) * m.volume);
-        let p = vec3<f32>(row_point(m.world_from_object[0], point), row_point(m.world_from_object[1], point), row_point(m.world_from_object[2], point));
+        let to = m.world_from_object;
+        let p = vec3<f32>(row_point(to[0], point), row_point(to[1], point), row_point(to[2], point));
         // The rounding of the transforms there and back (numerics.md, "Instances"), along the normal.
-        let reach = max(max(abs(p.x), max(abs(p.y), abs(p.z))), max(abs(m.world_from_object[0].w), max(abs(m.world_from_object[1].w), abs(m.world_from_object[2].w))));
+        let reach = max(
+            max(abs(p.x), max(abs(p.y), abs(p.z))),
+            max(abs(to[0].w), max(abs(to[1].w), abs(to[2].w))),
+        );
         let error = 16.0 * UNIT * m.scale * reach;
         // A zero component moves away from where the ray points.
         let sign = bitcast<vec3<u32>>(select(normal, -world_direction, normal == vec3<f32>(0.0))) >> vec3<u32>(31u);

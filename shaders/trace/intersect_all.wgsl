@@ -20,7 +20,8 @@ override OF_TILES: bool = false;
 fn top_group(ray: FramedRay, node: u32, t_max: f32) -> vec2<u32> {
     let at = 5u * node;
     let n1 = top8[at + 1u];
-    let entered = node_hits(ray, top8[at], top8[at + 2u], top8[at + 3u], top8[at + 4u], vec3<f32>(0.0), vec3<f32>(0.0), params.instance_pad, t_max).mask;
+    let entered = node_hits(ray, top8[at], top8[at + 2u], top8[at + 3u], top8[at + 4u],
+                            vec3<f32>(0.0), vec3<f32>(0.0), params.instance_pad, t_max).mask;
     nodes_visited += 1u;
     var bits = 0u;
     for (var i = 0u; i < 8u; i++) {
@@ -34,7 +35,11 @@ fn top_group(ray: FramedRay, node: u32, t_max: f32) -> vec2<u32> {
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+fn main(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
     let work = rooted_or_all(OF_TILES, workgroup.x + workgroup.y * workgroups.x);
     let index = ray_of(work, local);
     if index == NONE {
@@ -97,7 +102,8 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
                 group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
             } else {
                 let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
-                let is_selected = !SELECT || (slots[leaves[leaf].brick].state & params.select_mask) == params.select_want;
+                let is_selected =
+                    !SELECT || (slots[leaves[leaf].brick].state & params.select_mask) == params.select_want;
                 if !is_selected || (SELECT && OF_TILES && is_culled(work.tile, leaf)) {
                     group = vec2<u32>(0u);
                     continue;

@@ -35,7 +35,8 @@ fn enter_box(ray: FramedRay, low: vec3<f32>, high: vec3<f32>, offset_low: vec3<f
     let reach = max(abs(w0), abs(w1));
     let m = max(reach.x, max(reach.y, reach.z));
     let o = abs(ray.origin);
-    let delta = vec3<f32>(64.0 * UNIT * m + slack * (m + max(o.x, max(o.y, o.z)))) + 8.0 * UNIT * max(abs(low), abs(high)) + 2.0 * UNIT * abs(offset_low);
+    let delta = vec3<f32>(64.0 * UNIT * m + slack * (m + max(o.x, max(o.y, o.z))))
+        + 8.0 * UNIT * max(abs(low), abs(high)) + 2.0 * UNIT * abs(offset_low);
     let a = (w0 - delta) * ray.frame.inv;
     let b = (w1 + delta) * ray.frame.inv;
     let tn = min(a, b);
@@ -60,7 +61,11 @@ fn pop(walk: ptr<function, Walk>) -> u32 {
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+fn main(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
     let work = work_of_all(workgroup.x + workgroup.y * workgroups.x);
     let index = ray_of(work, local);
     if index == NONE {
@@ -88,13 +93,17 @@ fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wo
                 let a = binary_node(root.x, root.y + at);
                 let b = binary_node(root.x, root.y + at + 1u);
                 children = vec2<u32>(a.what, b.what);
-                left = enter_box(r.ray, (a.min + r.offset_high) + r.offset_low, (a.max + r.offset_high) + r.offset_low, r.offset_low, 0.0, best.t);
-                right = enter_box(r.ray, (b.min + r.offset_high) + r.offset_low, (b.max + r.offset_high) + r.offset_low, r.offset_low, 0.0, best.t);
+                left = enter_box(r.ray, (a.min + r.offset_high) + r.offset_low,
+                                 (a.max + r.offset_high) + r.offset_low, r.offset_low, 0.0, best.t);
+                right = enter_box(r.ray, (b.min + r.offset_high) + r.offset_low,
+                                  (b.max + r.offset_high) + r.offset_low, r.offset_low, 0.0, best.t);
             } else {
                 let node = top2[at];
                 children = vec2<u32>(top_reference(node.left), top_reference(node.right));
-                left = enter_box(world, top2[node.left].min, top2[node.left].max, vec3<f32>(0.0), params.instance_pad, best.t);
-                right = enter_box(world, top2[node.right].min, top2[node.right].max, vec3<f32>(0.0), params.instance_pad, best.t);
+                left = enter_box(world, top2[node.left].min, top2[node.left].max,
+                                 vec3<f32>(0.0), params.instance_pad, best.t);
+                right = enter_box(world, top2[node.right].min, top2[node.right].max,
+                                  vec3<f32>(0.0), params.instance_pad, best.t);
             }
             nodes_visited += 1u;
             if left.entered && right.entered {

@@ -12,7 +12,11 @@
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
 @compute @workgroup_size(8, 8)
-fn main(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+fn main(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
     let work = work_of(WORK_CHOSEN, workgroup.x + workgroup.y * workgroups.x);
     let index = ray_of(work, local);
     if index == NONE {

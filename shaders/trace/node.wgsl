@@ -29,7 +29,17 @@ struct NodeHits {
 
 // Words of a node: [0] origin xyz, exponents and inner mask; [1] child base, triangle base, meta; [2..5] lo x y z, hi x
 // y z. `offset` turns node space into the ray's; `slack` adds to the padding in units of 2^-24 of the largest distance.
-fn node_hits(ray: FramedRay, n0: vec4<u32>, n2: vec4<u32>, n3: vec4<u32>, n4: vec4<u32>, offset_high: vec3<f32>, offset_low: vec3<f32>, slack: f32, t_max: f32) -> NodeHits {
+fn node_hits(
+    ray: FramedRay,
+    n0: vec4<u32>,
+    n2: vec4<u32>,
+    n3: vec4<u32>,
+    n4: vec4<u32>,
+    offset_high: vec3<f32>,
+    offset_low: vec3<f32>,
+    slack: f32,
+    t_max: f32,
+) -> NodeHits {
     let p = bitcast<vec3<f32>>(n0.xyz);
     let s = bitcast<vec3<f32>>((vec3<u32>(n0.w, n0.w >> 8u, n0.w >> 16u) & vec3<u32>(255u)) << vec3<u32>(23u));
     let pc = (p + offset_high) + offset_low;
@@ -38,7 +48,8 @@ fn node_hits(ray: FramedRay, n0: vec4<u32>, n2: vec4<u32>, n3: vec4<u32>, n4: ve
     let m = max(reach.x, max(reach.y, reach.z));
     let o = abs(ray.origin);
     // The last term covers the roundings of a wide brick's offset and is below the others for near bricks.
-    let delta = vec3<f32>(64.0 * UNIT * m + slack * (m + max(o.x, max(o.y, o.z)))) + 4.0 * UNIT * abs(pc) + 2.0 * UNIT * abs(offset_low);
+    let delta = vec3<f32>(64.0 * UNIT * m + slack * (m + max(o.x, max(o.y, o.z))))
+        + 4.0 * UNIT * abs(pc) + 2.0 * UNIT * abs(offset_low);
     let inverse = ray.frame.inv;
     let negative = inverse < vec3<f32>(0.0);
     let scale = s * inverse;

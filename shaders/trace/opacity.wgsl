@@ -91,7 +91,9 @@ fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) ->
     } else {
         let uv = bitcast<vec4<f32>>(first);
         let last = bitcast<vec2<f32>>(second.xy);
-        alpha = barrier(alpha * opacity_lookup(m, weighted_sum(weights, uv.x, uv.z, last.x), weighted_sum(weights, uv.y, uv.w, last.y)));
+        let u = weighted_sum(weights, uv.x, uv.z, last.x);
+        let v = weighted_sum(weights, uv.y, uv.w, last.y);
+        alpha = barrier(alpha * opacity_lookup(m, u, v));
     }
     if m.blends != 0u {
         return alpha <= barrier(ALPHA_ONE * drawn((*r).ray, id));

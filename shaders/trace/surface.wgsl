@@ -39,7 +39,16 @@ fn weighted(weights: vec3<f32>, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> vec
 
 // a, b, c relative to the frame's reference point (not to the ray), u, v, w, det of the hit, d the ray's direction in
 // that frame.
-fn surface_point(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, u: f32, v: f32, w: f32, det: f32, d: vec3<f32>) -> SurfacePoint {
+fn surface_point(
+    a: vec3<f32>,
+    b: vec3<f32>,
+    c: vec3<f32>,
+    u: f32,
+    v: f32,
+    w: f32,
+    det: f32,
+    d: vec3<f32>,
+) -> SurfacePoint {
     let ab = barrier3(b - a);
     let bc = barrier3(c - b);
     let ca = barrier3(a - c);
@@ -78,7 +87,8 @@ fn surface_point(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, u: f32, v: f32, w: f3
     let near = weighted(weights, abs(a), abs(b), abs(c));
     let m = abs(n);
     let across = barrier(barrier(barrier(m.x * near.x) + barrier(m.y * near.y)) + barrier(m.z * near.z));
-    return SurfacePoint(weighted(weights, a, b, c), barrier(OFFSET_ULPS * across), n, below.x | below.y << 1u | below.z << 2u, area);
+    let down = below.x | below.y << 1u | below.z << 2u;
+    return SurfacePoint(weighted(weights, a, b, c), barrier(OFFSET_ULPS * across), n, down, area);
 }
 
 // p + step, at least one ulp from p toward the side of `down`.

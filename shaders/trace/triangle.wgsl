@@ -46,7 +46,8 @@ fn ray_frame(d: vec3<f32>) -> RayFrame {
     let sy = barrier(s.y * iz);
     var inv = vec3<f32>(slab_inverse(d.x), slab_inverse(d.y), slab_inverse(d.z));
     inv = select(inv, vec3<f32>(iz), vec3<u32>(0u, 1u, 2u) == vec3<u32>(kz));
-    return RayFrame(kx, ky, kz, select(sx, 0.0, abs(sx) < LEAST_SHEAR), select(sy, 0.0, abs(sy) < LEAST_SHEAR), iz, inv);
+    return RayFrame(kx, ky, kz,
+                    select(sx, 0.0, abs(sx) < LEAST_SHEAR), select(sy, 0.0, abs(sy) < LEAST_SHEAR), iz, inv);
 }
 
 // u, v, w weight a, b, c and are not divided by det = u + v + w; all have the sign of det or are 0. A triangle that is

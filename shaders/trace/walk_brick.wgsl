@@ -31,8 +31,8 @@ fn open_node(r: ptr<function, BrickRay>, t_max: f32, index: u32) -> OpenedNode {
     let page = (*r).page;
     let n1 = cache_vec4(page, at + 1u);
     let n0 = cache_vec4(page, at);
-    let entered = node_hits((*r).ray, n0, cache_vec4(page, at + 2u), cache_vec4(page, at + 3u), cache_vec4(page, at + 4u),
-                            (*r).offset_high, (*r).offset_low, 0.0, t_max).mask;
+    let entered = node_hits((*r).ray, n0, cache_vec4(page, at + 2u), cache_vec4(page, at + 3u),
+                            cache_vec4(page, at + 4u), (*r).offset_high, (*r).offset_low, 0.0, t_max).mask;
     let mask = traversal_mask(entered, n1, (*r).ray.flip);
     nodes_visited += 1u;
     if index == 0u && mask != 0u {

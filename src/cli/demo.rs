@@ -47,7 +47,8 @@ fn shown(records: &[Record], all_bytes: u64) -> String {
     let bytes = sum(|r| r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures);
     let cache = records.first().map_or(0, |record| record.cache_bytes);
     format!(
-        "The scene takes {}, its cache held {}: {} were loaded ({}), {} evicted to make room, and every pixel is exact.",
+        "The scene takes {}, its cache held {}: {} were loaded ({}), {} evicted to make room, and every \
+         pixel is exact.",
         human_bytes(all_bytes),
         human_bytes(cache),
         counted(sum(|r| r.bricks_loaded), "payload"),

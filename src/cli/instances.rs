@@ -54,7 +54,9 @@ pub fn origin(manifest: &Manifest, id: u32) -> Option<&Provenance> {
 /// The same, a line each.
 pub fn human(rows: &[Row]) -> String {
     if rows.is_empty() {
-        return "no instances: every mesh is part of the world object; convert with --movable NAME to keep a node's meshes apart\n".into();
+        return "no instances: every mesh is part of the world object; convert with --movable NAME to keep a node's \
+                meshes apart\n"
+            .into();
     }
     let mut text = String::new();
     for row in rows {

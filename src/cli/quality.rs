@@ -154,8 +154,8 @@ impl PerTriangle {
     /// A row for people.
     pub fn human(&self) -> String {
         format!(
-            "{:.1} B for traversal (nodes {:.1}, indices {:.1}, ids {:.1}, vertices {:.1}), {:.1} B of proxies, {:.1} B \
-             of the file without textures, {:.1} B with; {:.2} vertices",
+            "{:.1} B for traversal (nodes {:.1}, indices {:.1}, ids {:.1}, vertices {:.1}), {:.1} B of proxies, \
+             {:.1} B of the file without textures, {:.1} B with; {:.2} vertices",
             self.traversal,
             self.nodes,
             self.indices,

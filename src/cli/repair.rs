@@ -179,8 +179,8 @@ fn same_sources(scene: &SceneFile, given: &[bricks::Source]) -> Result<()> {
         let same_name = made_from.bytes > 0 || given.name == made_from.name;
         ensure!(
             same_name && (given.bytes, &given.hash) == (made_from.bytes, &made_from.hash),
-            "{name}: input {} has changed: found {} bytes with checksum {}, expected {} of {} bytes with checksum {}; give \
-             the original file",
+            "{name}: input {} has changed: found {} bytes with checksum {}, expected {} of {} bytes with checksum {}; \
+             give the original file",
             given.name,
             given.bytes,
             given.hash,

@@ -171,7 +171,8 @@ fn as_text(trace: &Trace, rungs: &[Rung], skipped: &[u64]) -> String {
             );
         }
     }
-    out += "\nLoaded again: what the walk had loaded before, in any pass. `bricks_reloaded` in records counts within a pass.\n";
+    out += "\nLoaded again: what the walk had loaded before, in any pass. `bricks_reloaded` in records counts within \
+            a pass.\n";
     if !skipped.is_empty() {
         let least = Residency::least_budget(&trace.sizes);
         let sizes: Vec<String> = skipped.iter().map(|&bytes| cache(bytes)).collect();

@@ -9,8 +9,8 @@ const HEAD: &str = "\
 Generated from [the table of counters](../src/counters/table.rs). `BRICKWALK_WRITE=1 cargo test --lib counters` writes
 this page anew.
 
-A walk appends a line, a JSON object, for each frame and effect. `report.html` and the totals of `summary.json` are made of
-these lines.
+A walk appends a line, a JSON object, for each frame and effect. `report.html` and the totals of `summary.json` are made
+of these lines.
 
 *Adds up as* says how values of several passes of an effect become one:
 

@@ -83,7 +83,8 @@ impl Pages<'_> {
         if nodes.len() > most {
             let bytes = size_of_val(nodes);
             return Err(ExecutorError::Device(format!(
-                "cannot bind {bytes} bytes, the binary nodes of one brick; convert the scene with fewer --brick-triangles"
+                "cannot bind {bytes} bytes, the binary nodes of one brick; convert the scene with fewer \
+                 --brick-triangles"
             )));
         }
         if self.filling.len() + nodes.len() > most {
@@ -128,8 +129,8 @@ impl Pages<'_> {
         }
         if self.count > self.most {
             return Err(ExecutorError::Device(format!(
-                "binds at most {} pages of {} bytes beside the cache, and the binary nodes of this scene take {} bytes in {} \
-                 pages; use --schedule plain",
+                "binds at most {} pages of {} bytes beside the cache, and the binary nodes of this scene take {} bytes \
+                 in {} pages; use --schedule plain",
                 self.most,
                 self.gpu.page_bytes(),
                 self.bytes,

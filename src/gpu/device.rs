@@ -8,7 +8,11 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum DeviceError {
     /// No adapter, or none of the given name.
-    #[error("no adapter{} can be used; {found}; render on the processor with --adapter cpu, or install a Vulkan driver (in software, on Debian: apt-get install libvulkan1 mesa-vulkan-drivers)", .wanted.as_ref().map(|w| format!(" whose name contains {w:?}")).unwrap_or_default())]
+    #[error(
+        "no adapter{} can be used; {found}; render on the processor with --adapter cpu, or install a Vulkan driver (in \
+         software, on Debian: apt-get install libvulkan1 mesa-vulkan-drivers)",
+        .wanted.as_ref().map(|w| format!(" whose name contains {w:?}")).unwrap_or_default()
+    )]
     NoAdapter {
         /// The name asked for.
         wanted: Option<String>,

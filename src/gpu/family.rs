@@ -44,7 +44,8 @@ impl FamilyBuffers {
         let most = gpu.limits.max_storage_buffers_per_shader_stage as usize;
         if most < needed {
             return Err(ExecutorError::Device(format!(
-                "{:?} binds {most} buffers a kernel, those of {} need {needed}; use --secondary exact, or another --adapter",
+                "{:?} binds {most} buffers a kernel, those of {} need {needed}; use --secondary exact, or another \
+                 --adapter",
                 gpu.info.name, family.what
             )));
         }

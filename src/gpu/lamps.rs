@@ -46,7 +46,8 @@ impl LampBuffers {
         let bytes = (emitters * size_of::<layout::Emitter>()).max(size_of_val(texels)) as u64;
         if bytes > most {
             let text = format!(
-                "{:?} holds at most {} lights and an environment of {} texels; leave emission out, or choose another --adapter",
+                "{:?} holds at most {} lights and an environment of {} texels; leave emission out, or choose another \
+                 --adapter",
                 gpu.info.name,
                 most / (2 * size_of::<layout::Emitter>()) as u64,
                 most / 16

@@ -88,7 +88,8 @@ pub fn read_rays(path: &Path) -> Result<Rays> {
     let data = rows.and_then(|rows| rows.checked_mul(row_bytes));
     ensure!(
         data.and_then(|bytes| bytes.checked_add(header_bytes)) == Some(length),
-        "{name}: found {length} bytes, but the header promises rays of {row_bytes} bytes in shape {shape:?}; write it again"
+        "{name}: found {length} bytes, but the header promises rays of {row_bytes} bytes in shape {shape:?}; write it \
+         again"
     );
     // As many as the file has bytes for.
     let mut rays = Vec::with_capacity(usize::try_from(rows.unwrap_or(0)).context("too many rays for this machine")?);

@@ -98,7 +98,8 @@ pub fn ffmpeg_of_frames(folder: &Path, (width, height): (u32, u32), fps: u32, to
     // In a pattern a percent sign is written twice.
     let folder = folder.display().to_string().replace('%', "%%");
     format!(
-        "ffmpeg -framerate {fps} -i {} -vf '{pad}scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,{NAMED}' {encoding} {}",
+        "ffmpeg -framerate {fps} -i {} -vf '{pad}scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,{NAMED}' \
+         {encoding} {}",
         quoted(&Path::new(&folder).join("%04d.png")),
         quoted(to)
     )

@@ -302,7 +302,8 @@ fn instances_of(resident: &Resident, target: &Target) -> Result<Vec<u32>, String
             names[MOST_NAMES] = "…";
         }
         return Err(format!(
-            "the scene has no such node; those that can be moved are {}, brickwalk info --instances lists them; other nodes need convert --movable",
+            "the scene has no such node; those that can be moved are {}, brickwalk info --instances lists them; other \
+             nodes need convert --movable",
             names.join(", ")
         ));
     }

@@ -38,7 +38,8 @@ fn errors_name_the_file_the_thing_and_the_remedy() {
 fn keyframes_are_met_and_ways_between_them_are_those_of_camera_paths() {
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let mover = mover(&format!(
-        r#"{{"time": 1, "translation": [0,0,0]}}, {{"time": 2, "translation": [1,0,0], "rotation": [0,{half},0,{half}]}},
+        r#"{{"time": 1, "translation": [0,0,0]}},
+           {{"time": 2, "translation": [1,0,0], "rotation": [0,{half},0,{half}]}},
            {{"time": 4, "translation": [1,2,0], "rotation": [0,1,0,0], "scale": 4}}"#
     ));
     for (time, translation, scale) in
@@ -49,7 +50,8 @@ fn keyframes_are_met_and_ways_between_them_are_those_of_camera_paths() {
     }
     let path = crate::scene::CameraPath::parse(
         r#"{"keyframes": [{"time": 1, "position": [0,0,0], "target": [0,0,9]},
-            {"time": 2, "position": [1,0,0], "target": [1,0,9]}, {"time": 4, "position": [1,2,0], "target": [1,2,9]}]}"#,
+            {"time": 2, "position": [1,0,0], "target": [1,0,9]},
+            {"time": 4, "position": [1,2,0], "target": [1,2,9]}]}"#,
         Path::new("p.json"),
     )
     .unwrap();

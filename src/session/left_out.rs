@@ -150,7 +150,12 @@ pub fn measure(
     let medians: Vec<f64> = times.iter_mut().map(median).collect();
     let mut measured = vec![Map::new(); all.len()];
     for (&i, &with) in kept.iter().zip(&medians[1..]) {
-        let values = json!({ "ms_frame": medians[0], "ms_frame_kept": with, "ms_saved": with - medians[0], "repetitions": REPETITIONS });
+        let values = json!({
+            "ms_frame": medians[0],
+            "ms_frame_kept": with,
+            "ms_saved": with - medians[0],
+            "repetitions": REPETITIONS,
+        });
         measured[i].extend(values.as_object().cloned().into_iter().flatten());
     }
     Ok(measured)

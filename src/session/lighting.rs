@@ -117,8 +117,8 @@ pub fn lighting(settings: &Settings, file: &SceneFile, path: &Path) -> Result<Li
         match found {
             Ok(triangles) => sources.shining = triangles,
             Err(count) => warnings.push(format!(
-                "{}: {count} triangles emit light, of which at most {MOST_TRIANGLES} can be lamps; their light comes by --effects \
-                 diffuse alone",
+                "{}: {count} triangles emit light, of which at most {MOST_TRIANGLES} can be lamps; their light comes \
+                 by --effects diffuse alone",
                 path.display()
             )),
         }

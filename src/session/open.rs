@@ -389,8 +389,8 @@ fn short_rays(renderer: &Renderer) -> Option<String> {
     let length = renderer.settings.effects.occlusion.map_or(f64::INFINITY, |occlusion| occlusion.length);
     let cell = finest_cell(&renderer.methods).filter(|cell| length < LEAST_CELLS * cell)?;
     Some(format!(
-        "--ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has here: \
-         ao is coarse; make it longer, or use --secondary exact"
+        "--ao-length {length} is less than {LEAST_CELLS} cells of {cell}, the least that the scene's occupancy has \
+         here: ao is coarse; make it longer, or use --secondary exact"
     ))
 }
 
@@ -400,8 +400,8 @@ fn dark_lamps(renderer: &Renderer) -> Vec<String> {
     let [others, areas] = roma.rsm.left_out();
     let others = (others > 0).then(|| {
         format!(
-            "{others} weaker point, spot and distant lights have no map: what they light does not light other surfaces; \
-             raise --rsm-lamps"
+            "{others} weaker point, spot and distant lights have no map: what they light does not light other \
+             surfaces; raise --rsm-lamps"
         )
     });
     let areas = (areas > 0).then(|| {

@@ -161,8 +161,8 @@ impl Opened {
         let policy = settings.evict;
         let residency = Residency::new(&sizes, budget, page_bytes, policy).map_err(|error| match error {
             ResidencyError::CacheTooSmall { what, needed, given } => anyhow!(
-                "{name}: a cache of {given} bytes is too small: {what} need {needed} bytes; give --cache {} or more, or \
-                 convert the scene with fewer --brick-triangles",
+                "{name}: a cache of {given} bytes is too small: {what} need {needed} bytes; give --cache {} or more, \
+                 or convert the scene with fewer --brick-triangles",
                 option_bytes(needed)
             ),
             other => anyhow!(other).context(format!("{name}: --cache")),

@@ -44,7 +44,8 @@ settings! {
         /// Width and height of a frame, each 1 to 16384.
         size: ImageSize = ImageSize { width: 1280, height: 720 }, "--size WxH", Rule::Any, "pixels", Camera, Common;
         /// Vertical field of view. [default: the path's]
-        fov: Option<f64> = None, "--fov DEG", Rule::Real(MIN_FOV_Y_DEGREES, MAX_FOV_Y_DEGREES), "degrees", Camera, Usual;
+        fov: Option<f64> = None, "--fov DEG", Rule::Real(MIN_FOV_Y_DEGREES, MAX_FOV_Y_DEGREES), "degrees",
+            Camera, Usual;
         /// Motion of instances (JSON); docs/using.md has the form. What moves is an instance: see `info --instances`
         /// and `convert --movable`. [default: nothing moves]
         motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
@@ -81,9 +82,11 @@ settings! {
         /// light. `auto` is `sky`, but black and without a sun around generated scenes that have their own light, to
         /// which it adds `diffuse` where effects are the default. `none` is a sky of one colour. With `--effects
         /// environment` it lights with shadows, else by its spherical harmonics, or by `diffuse`.
-        environment: Option<Environment> = Some(Environment::Auto), "--environment FILE|NAME", Rule::Any, "", Light, Common;
+        environment: Option<Environment> = Some(Environment::Auto), "--environment FILE|NAME", Rule::Any, "",
+            Light, Common;
         /// Turn of the environment's image about +Y, counter-clockwise seen from above.
-        environment_rotation: f64 = 0.0, "--environment-rotation DEG", Rule::Real(-360.0, 360.0), "degrees", Light, Usual;
+        environment_rotation: f64 = 0.0, "--environment-rotation DEG", Rule::Real(-360.0, 360.0), "degrees",
+            Light, Usual;
         /// Factor of the environment's radiance.
         environment_intensity: f64 = 1.0, "--environment-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
         /// Factor of the lights in the scene file. 1 candela is taken as 1 W/sr, 1 lux as 1 W/m2.
@@ -106,7 +109,8 @@ settings! {
         /// `auto` brings the log-average luminance of what a frame hits half a stop above middle grey, keeps 98 % of it
         /// from white, and adapts along the path; it stays within 8 stops of 0, or from MIN to MAX. EXR keeps the
         /// radiance.
-        exposure: Exposure = Exposure::AUTO, "--exposure EV|auto|auto:MIN,MAX", Rule::Real(-32.0, 32.0), "stops", Quality, Usual;
+        exposure: Exposure = Exposure::AUTO, "--exposure EV|auto|auto:MIN,MAX", Rule::Real(-32.0, 32.0), "stops",
+            Quality, Usual;
         /// How PNGs and video show what is brighter than a display: none, agx, aces, reinhard. `none` cuts off at 1;
         /// `agx` is AgX, base look; `aces` is Hill's fit of the ACES transforms; `reinhard` works on luminance, 4 is
         /// white. EXR keeps the radiance.
@@ -176,7 +180,8 @@ settings! {
         /// Measure the error of frames after so many samples per pixel, as 1,4,16,64. `--reference` is what they are
         /// measured against; `checkpoints.jsonl` and the report have RMSE, relMSE, bias and FLIP over samples and over
         /// seconds. `--spp` is at least the greatest of them. Not together with --denoise and --taa.
-        checkpoints: Vec<u32> = Vec::new(), "--checkpoints LIST", Rule::Whole(1, 1_000_000), "samples", Measurement, Usual;
+        checkpoints: Vec<u32> = Vec::new(), "--checkpoints LIST", Rule::Whole(1, 1_000_000), "samples",
+            Measurement, Usual;
         /// Reference for --checkpoints: an EXR for frame 0, or a folder with one for each frame. In a folder they are
         /// called 0000.exr, 0001.exr and so on, as `walk --aov` writes them. [default: none]
         reference: Option<PathBuf> = None, "--reference FILE.exr|DIR", Rule::Any, "", Measurement, Usual;
@@ -215,7 +220,8 @@ impl Settings {
     /// Which one to leave out.
     pub fn check(&self) -> Result<(), SettingsError> {
         if self.taa && self.aov {
-            let text = "--aov and --taa exclude each other: AOVs are sampled at pixel centres, which --taa jitters; leave one out";
+            let text = "--aov and --taa exclude each other: AOVs are sampled at pixel centres, which --taa jitters; \
+                        leave one out";
             return Err(SettingsError::Conflict(text.into()));
         }
         if let Some(file) = self.video.as_ref().filter(|file| file.extension().is_none_or(|ending| ending != "y4m")) {

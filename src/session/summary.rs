@@ -63,7 +63,10 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "secondary": s.secondary.to_string(),
             "roma": reports.remove("roma"),
             "df": reports.remove("df"),
-            "dvf": field.as_ref().and_then(Option::as_ref).map(|note| note.report(renderer, &s.dvf, s.motion.is_some(), records)),
+            "dvf": field
+                .as_ref()
+                .and_then(Option::as_ref)
+                .map(|note| note.report(renderer, &s.dvf, s.motion.is_some(), records)),
             "rsm": reports.remove("rsm"),
             "spp": s.samples(),
             "seed": s.seed,
@@ -74,17 +77,21 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "environment": s.environment.as_ref().map(ToString::to_string),
             "environment_rotation_degrees": s.environment_rotation,
             "environment_intensity": s.environment_intensity,
-            "rect_light": s.rect_light.map(|light| [light.corner, light.edges[0], light.edges[1]].map(|v| v.to_array())),
+            "rect_light": s
+                .rect_light
+                .map(|light| [light.corner, light.edges[0], light.edges[1]].map(|v| v.to_array())),
         },
         "options": s,
         "lamps": {
             "emitters": renderer.light.lamps.emitters().len(),
-            "environment": renderer.light.lamps.environment.as_ref().zip(lighting.environment).map(|(map, notes)| json!({
-                "width": map.width,
-                "height": map.height,
-                "bad_texels": notes.bad_texels,
-                "energy_change": notes.energy_change,
-            })),
+            "environment": renderer.light.lamps.environment.as_ref().zip(lighting.environment).map(|(map, notes)| {
+                json!({
+                    "width": map.width,
+                    "height": map.height,
+                    "bad_texels": notes.bad_texels,
+                    "energy_change": notes.energy_change,
+                })
+            }),
         },
         "frames": stops.len(),
         "pictures": {

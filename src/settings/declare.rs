@@ -27,7 +27,8 @@ macro_rules! settings {
             $(
                 $(#[doc = $help:literal])+
                 $(#[cfg($on:meta)])?
-                $field:ident: $type:ty = $default:expr, $usage:literal, $rule:expr, $unit:literal, $heading:ident, $level:ident;
+                $field:ident: $type:ty = $default:expr, $usage:literal, $rule:expr, $unit:literal,
+                    $heading:ident, $level:ident;
             )*
         }
         $(tables { $($(#[doc = $about:literal])+ $(#[cfg($with:meta)])? $table:ident: $group:ty,)* })?
@@ -88,7 +89,9 @@ macro_rules! settings {
 
             fn get(&self, key: &str) -> Option<$crate::settings::Plain> {
                 match key.split_once('.') {
-                    $($($(#[cfg($with)])? Some((stringify!($table), key)) => $crate::settings::Group::get(&self.$table, key),)*)?
+                    $($($(#[cfg($with)])? Some((stringify!($table), key)) => {
+                        $crate::settings::Group::get(&self.$table, key)
+                    })*)?
                     Some(_) => None,
                     None => match key {
                         $($(#[cfg($on)])? stringify!($field) => Some($crate::settings::Value::plain(&self.$field)),)*
@@ -109,7 +112,9 @@ macro_rules! settings {
                             let value = $crate::settings::Value::read(text, $rule, $unit);
                             self.$field = value.map_err(|why| $crate::settings::SettingsError::wrong(key, why))?;
                             let presets = $crate::settings::Value::presets(&self.$field).iter();
-                            return presets.copied().try_for_each(|(key, text)| $crate::settings::Group::set(self, key, text));
+                            return presets
+                                .copied()
+                                .try_for_each(|(key, text)| $crate::settings::Group::set(self, key, text));
                         })*
                         _ => {}
                     },

@@ -18,8 +18,8 @@ const NOWHERE: u64 = u64::MAX;
 pub enum ResidencyError {
     /// The budget does not hold the two largest bricks, or the tiles of a texture lookup.
     #[error(
-        "a cache of {given} bytes is too small: {what} need {needed} bytes; give it at least that, or convert the scene with \
-         smaller bricks"
+        "a cache of {given} bytes is too small: {what} need {needed} bytes; give it at least that, or convert the \
+         scene with smaller bricks"
     )]
     CacheTooSmall {
         /// What needs so much: "the two largest bricks" or "the tiles of a texture lookup".
@@ -31,8 +31,8 @@ pub enum ResidencyError {
     },
     /// A page does not hold the largest item.
     #[error(
-        "{item} has {needed} bytes, more than a page of the cache ({given} bytes, at most one storage binding); convert \
-         the scene with smaller bricks"
+        "{item} has {needed} bytes, more than a page of the cache ({given} bytes, at most one storage binding); \
+         convert the scene with smaller bricks"
     )]
     PageTooSmall {
         /// The largest item.

@@ -207,7 +207,13 @@ pub struct WorkArgs {
     #[arg(long, value_name = "N", value_parser = ranged::<1, 1024>)]
     pub threads: Option<u32>,
     /// log2 of the lattice step that positions are rounded to, in world units [default: from brick sizes]
-    #[arg(long, help_heading = "Bricks", value_name = "LOG2", allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-126..=96))]
+    #[arg(
+        long,
+        help_heading = "Bricks",
+        value_name = "LOG2",
+        allow_hyphen_values = true,
+        value_parser = clap::value_parser!(i32).range(-126..=96)
+    )]
     pub lattice: Option<i32>,
     /// Memory limit; what does not fit goes to scratch files, about 250 bytes per triangle. The result is the same
     /// [default: a quarter of the machine's memory]
@@ -437,10 +443,10 @@ impl TraceArgs {
 }
 
 /// What the columns of `replay` are.
-const REPLAY: &str = "A request is one use of a payload (geometry or attributes of a brick) by a pass; a load is a request that \
-     misses the cache; loaded again is what an earlier load had brought, in any pass. Every cache begins empty. \
-     belady-greedy evicts what is used again last: a bound that knows the future and ignores pages. Sizes below the two \
-     largest bricks are skipped.";
+const REPLAY: &str = "A request is one use of a payload (geometry or attributes of a brick) by a pass; a load is a \
+     request that misses the cache; loaded again is what an earlier load had brought, in any pass. Every cache begins \
+     empty. belady-greedy evicts what is used again last: a bound that knows the future and ignores pages. Sizes below \
+     the two largest bricks are skipped.";
 
 /// Options of `replay`.
 #[derive(Clone, Debug, Args)]

@@ -41,14 +41,14 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
         let inputs = Arg::new("inputs").value_name("INPUT").num_args(1..).value_parser(value_parser!(PathBuf));
         let inputs = match AFTER_FROM {
             false => inputs.required(true).help(
-                "Scene files (.gltf, .glb, .obj, .ply, .stl, tileset.json of 3D Tiles) or folders of them; triangle ids are \
-                 numbered in this order. --transform, --scene, --up and --unit apply to the input before them, or to all \
-                 inputs if they come first",
+                "Scene files (.gltf, .glb, .obj, .ply, .stl, tileset.json of 3D Tiles) or folders of them; triangle \
+                 ids are numbered in this order. --transform, --scene, --up and --unit apply to the input before them, \
+                 or to all inputs if they come first",
             ),
             // It is listed last.
             true => inputs.long("from").action(ArgAction::Append).display_order(999).help(
-                "The inputs of the conversion in the same order, with their --transform, --scene, --up and --unit; give \
-                 its other options, too [default: generate the scene again, if it was generated]",
+                "The inputs of the conversion in the same order, with their --transform, --scene, --up and --unit; \
+                 give its other options, too [default: generate the scene again, if it was generated]",
             ),
         };
         command
@@ -57,9 +57,9 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
                 "transform",
                 "STEPS|MATRIX",
                 ValueParser::new(parse_transform),
-                "Placement of the input: steps in order (translate X Y Z, scale S or scale X Y Z, rotate x|y|z DEGREES; \
-                 metres, Y up), as in \"scale 0.5 rotate y 90 translate 10 0 -5\"; or a matrix, 12 or 16 numbers row by \
-                 row [default: identity]",
+                "Placement of the input: steps in order (translate X Y Z, scale S or scale X Y Z, rotate x|y|z \
+                 DEGREES; metres, Y up), as in \"scale 0.5 rotate y 90 translate 10 0 -5\"; or a matrix, 12 or 16 \
+                 numbers row by row [default: identity]",
             ))
             .arg(option(
                 "scene",

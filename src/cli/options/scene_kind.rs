@@ -33,7 +33,8 @@ pub fn scene_help() -> String {
         // Writing to a string does not fail.
         let _ = writeln!(text, "  {:<16} {:>8}  {}", kind.name(), kind.default_triangles(), kind.about());
     }
-    text + "By default slivers, scale-mix and far-origin have their own --lattice, and all but duplicates and series have 64\n\
+    text + "By default slivers, scale-mix and far-origin have their own --lattice, and all but duplicates and \
+            series have 64\n\
             triangles per brick. glTF stores positions as f32, in which slivers are less thin.\n\n"
         + UNITS
 }

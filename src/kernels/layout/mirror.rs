@@ -36,7 +36,8 @@ pub fn mirrors(files: &[(&str, String)], module: &Module) -> Result<String, Stri
                 let fields = fields(name, members, *span, &docs, module).map_err(|e| format!("shaders/{file}: {e}"))?;
                 let _ = writeln!(
                     out,
-                    "{}#[repr(C)]\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\n\
+                    "{}#[repr(C)]\n\
+                     #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\n\
                      pub struct {name} {{\n{fields}}}\nconst _: () = assert!(size_of::<{name}>() == {span});",
                     docs.written(name, "")
                 );

@@ -39,7 +39,8 @@ settings! {
         /// Walks of each device, beside one that brings in what frames need. [default: 5; with --quick 1]
         repeat: Option<u32> = None, "--repeat N", REPETITIONS, "", Measurement, Common;
         /// What is traced, as `walk --effects` has it.
-        effects: EffectList = EffectList::of(&[Effect::Ao, Effect::Diffuse]), "--effects LIST", Rule::Any, "", Effects, Common;
+        effects: EffectList = EffectList::of(&[Effect::Ao, Effect::Diffuse]), "--effects LIST", Rule::Any, "",
+            Effects, Common;
         /// Occlusion and diffuse rays per pixel.
         rays: u32 = 1, "--rays N", REPETITIONS, "", Effects, Common;
         /// Device bytes for bricks, as `walk --cache` has it.

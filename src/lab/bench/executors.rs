@@ -196,8 +196,8 @@ fn differences(sides: &[Side]) -> String {
     let line = |side: &Side| {
         let d = &side.differences;
         format!(
-            "- {} beside {}: {} of {} pixels show another triangle; where it is the same, depths differ by at most {} ulps; \
-             radiance differs by an RMSE of {}.\n",
+            "- {} beside {}: {} of {} pixels show another triangle; where it is the same, depths differ by at most {} \
+             ulps; radiance differs by an RMSE of {}.\n",
             side.info.name,
             first.info.name,
             human_count(d.ids),
@@ -242,7 +242,8 @@ fn write(args: &ExecutorsArgs, settings: &Settings, sides: &[Side], notes: &[Str
     });
     write_json(&args.output, "executors", &json)?;
     let mut text = format!(
-        "# The same frames on every device\n\nCity of {} triangles, {}, cache {}, schedule {}, {} frames, {} repetitions.\n\n",
+        "# The same frames on every device\n\nCity of {} triangles, {}, cache {}, schedule {}, {} frames, {} \
+         repetitions.\n\n",
         human_count(settings.triangles[0]),
         settings.size,
         args.cache,

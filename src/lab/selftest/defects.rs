@@ -90,8 +90,8 @@ impl Defect {
             Self::MollerTrumbore => &[("fn intersect_triangle(", MOLLER_TRUMBORE)],
             Self::RelativePadding => &[
                 (
-                    "let delta = vec3<f32>(64.0 * UNIT * m + slack * (m + max(o.x, max(o.y, o.z)))) + 4.0 * UNIT * abs(pc) \
-                     + 2.0 * UNIT * abs(offset_low);",
+                    "let delta = vec3<f32>(64.0 * UNIT * m + slack * (m + max(o.x, max(o.y, o.z))))\n        \
+                     + 4.0 * UNIT * abs(pc) + 2.0 * UNIT * abs(offset_low);",
                     "let delta = vec3<f32>(0.0);",
                 ),
                 ("tn <= tf);", "tn <= tf * 1.0000004);"),
@@ -119,8 +119,9 @@ impl Defect {
                 "select(inverse, 0x7f800000u, (bits & ~SIGN) == 0u));",
             )],
             Self::TileRemainder => &[(
-                "ray.x >= params.width || ray.y >= params.height);",
-                "ray.x >= params.width / params.tile * params.tile || ray.y >= params.height / params.tile * params.tile);",
+                "ray.x >= params.width || ray.y >= params.height;",
+                "ray.x >= params.width / params.tile * params.tile \
+                 || ray.y >= params.height / params.tile * params.tile;",
             )],
             Self::NoInset => &[("weights = max(weights, min(least, vec3<f32>(0x1.555554p-2)));", "")],
             Self::WorldF32 | Self::EarlyEviction | Self::LostQuery => &[],

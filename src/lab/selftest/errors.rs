@@ -248,10 +248,11 @@ pub fn run(args: &SelftestArgs, folder: &std::path::Path, console: Console) -> R
     console.show(&format!("{} and report.html beside it\n", folder.join("errors.md").display()))
 }
 
-const READING: &str = "A closed bumpy sphere of 320 triangles, radius 1 m or as said, on a lattice of 2^-14 of its radius, against exact \
-    predicates in f64. False misses: of rays from inside at vertices and points of edges, all of which meet the closed mesh. Wrong \
-    triangle, and bits of distance lost (log2(1 + relative error / 2^-24), the middle one, and the worst): of rays at insides of triangles. \
-    False hits: of rays that pass by at 10^-6 to 10^-2 of the radius, all of which miss.";
+const READING: &str = "A closed bumpy sphere of 320 triangles, radius 1 m or as said, on a lattice of 2^-14 of its \
+    radius, against exact predicates in f64. False misses: of rays from inside at vertices and points of edges, all of \
+    which meet the closed mesh. Wrong triangle, and bits of distance lost (log2(1 + relative error / 2^-24), the \
+    middle one, and the worst): of rays at insides of triangles. False hits: of rays that pass by at 10^-6 to 10^-2 of \
+    the radius, all of which miss.";
 
 fn table(sweep: &Sweep) -> Table {
     let columns = ["place", "arithmetic", "bits lost", "worst", "wrong triangle", "false misses", "false hits"];

@@ -200,8 +200,8 @@ fn as_text(report: &Report) -> String {
         .map_or("unknown".into(), |(low, high)| if low == high { low.to_string() } else { format!("{low} to {high}") });
     let _ = writeln!(
         text,
-        "contracts multiply-add: {}; flushes denormals: {}; keeps bits of NaN: {}; max and min of NaN and a number: {nan_in_max_min}; \
-         subgroup: {lanes}\n",
+        "contracts multiply-add: {}; flushes denormals: {}; keeps bits of NaN: {}; max and min of NaN and a number: \
+         {nan_in_max_min}; subgroup: {lanes}\n",
         yes(contracts),
         yes(flushes_denormals),
         yes(keeps_nan_bits)

@@ -147,8 +147,9 @@ fn rays_agree_with_cells_and_with_triangles() {
         }
     }
     println!(
-        "sphere tracing, 64³, {of} rays: {agree} as cells say, {agree_few} with 16 look-ups, {agree_aside} in another map; \
-         {agree_truth} as triangles say; {capped} capped ({capped_few} of 16); {lookups} look-ups; of {hits} hits {far} more than 3 cells away"
+        "sphere tracing, 64³, {of} rays: {agree} as cells say, {agree_few} with 16 look-ups, {agree_aside} in another \
+         map; {agree_truth} as triangles say; {capped} capped ({capped_few} of 16); {lookups} look-ups; of {hits} hits \
+         {far} more than 3 cells away"
     );
     assert!(agree * 100 > of * 98 && far * 50 < hits && agree_aside * 10 < of * 9);
 }

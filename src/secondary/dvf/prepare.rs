@@ -54,14 +54,16 @@ pub fn prepare(
 ) -> Result<Option<Note>> {
     if !renderer.draws_environment() {
         warnings.push(
-            "--secondary dvf answers rays to an environment alone, and there are none; give --environment and --effects environment"
+            "--secondary dvf answers rays to an environment alone, and there are none; give --environment and \
+             --effects environment"
                 .into(),
         );
         return Ok(None);
     }
     if options.how().paper && renderer.settings.effects.diffuse.is_some() {
         bail!(
-            "--dvf-mode paper goes without diffuse in --effects, which would bring the environment's light again; use --dvf-mode same-sample"
+            "--dvf-mode paper goes without diffuse in --effects, which would bring the environment's light again; use \
+             --dvf-mode same-sample"
         );
     }
     let making = options.settings();

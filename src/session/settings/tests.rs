@@ -111,7 +111,8 @@ fn what_is_printed_is_read_again() {
 fn files_are_natural_to_write() {
     let settings = Settings::from_toml(
         "effects = [\"primary\", \"ao\"]\nsun = [-1, 2, 3.5]\nsize = \"64x48\"\ncache = \"12M\"\nrotation = \"full\"\n\
-         exposure = -1.5\nfronts = true\nwithout = []\nhost_cache = \"2G\"\n[dvf]\ncells = 40\n[roma]\nerror = \"off\"\n",
+         exposure = -1.5\nfronts = true\nwithout = []\nhost_cache = \"2G\"\n[dvf]\ncells = 40\n\
+         [roma]\nerror = \"off\"\n",
     );
     let expected = Settings {
         effects: EffectList::of(&[Effect::Ao]),

@@ -31,7 +31,10 @@ fn lines_round_trip() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
         lines[0],
-        r#"{"format":4,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"passes":2,"sizes":[[1024,512],[2048,0]],"tiles":[256,64]}"#
+        concat!(
+            r#"{"format":4,"policy":"lru","budget_bytes":65536,"page_bytes":4096,"passes":2,"#,
+            r#""sizes":[[1024,512],[2048,0]],"tiles":[256,64]}"#
+        )
     );
     assert_eq!(lines[1], r#"{"frame":0,"pass":"primary","requests":["g1","a0","t1"],"batches":[1]}"#);
     assert_eq!(lines.len(), 3);

@@ -6,8 +6,8 @@ use std::ffi::OsStr;
 use std::path::Path;
 
 /// Noise, and nothing that filters it.
-const NOISY: &str = "--frames 2 --size 48x27 --adapter cpu --schedule chc --effects primary,ao --ao-rays 1 --ao-length 20 \
-                     --rotation full --aov --exposure 0";
+const NOISY: &str = "--frames 2 --size 48x27 --adapter cpu --schedule chc --effects primary,ao --ao-rays 1 \
+                     --ao-length 20 --rotation full --aov --exposure 0";
 
 fn rows(out: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(out.join("checkpoints.jsonl")).expect("checkpoints");

@@ -140,10 +140,11 @@ fn records_and_summary_hold_every_field_and_agree() {
     assert_eq!(printed, lines, "--json prints the records");
     let records: Vec<serde_json::Value> = lines.lines().map(|l| serde_json::from_str(l).expect("a record")).collect();
     assert_eq!(records.len(), 6, "one row per frame and pass");
-    let fields = "frame pass rays rays_traced rays_answered ms ms_phase1 ms_phase2 ms_phase3 ms_stream mrays_per_s queries queries_visible \
-        queries_interval_culled multi_queries multi_queries_failed pairs_visible pairs_invisible pulled_up \
-        pairs_intersected round_trips bricks_needed bricks_hit bricks_loaded bricks_reloaded bricks_evicted bytes_bvh \
-        bytes_geometry bytes_attributes bytes_textures cache_bytes cache_used_bytes unresolved_pixels non_finite";
+    let fields = "frame pass rays rays_traced rays_answered ms ms_phase1 ms_phase2 ms_phase3 ms_stream mrays_per_s \
+        queries queries_visible queries_interval_culled multi_queries multi_queries_failed pairs_visible \
+        pairs_invisible pulled_up pairs_intersected round_trips bricks_needed bricks_hit bricks_loaded bricks_reloaded \
+        bricks_evicted bytes_bvh bytes_geometry bytes_attributes bytes_textures cache_bytes cache_used_bytes \
+        unresolved_pixels non_finite";
     for record in &records {
         for field in fields.split_whitespace() {
             assert!(!record[field].is_null(), "{field} is missing in {record}");

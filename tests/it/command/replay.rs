@@ -148,7 +148,10 @@ fn a_trace_that_is_not_whole_is_refused() {
 
     let good = std::fs::read(whole).expect("a trace");
     let last_line = good[..good.len() - 1].iter().rposition(|&byte| byte == b'\n').expect("two lines") + 1;
-    let huge = br#"{"format":4,"policy":"lru","budget_bytes":18446744073709551600,"page_bytes":16,"passes":0,"sizes":[[18446744073709551600,16]],"tiles":[]}"#;
+    let huge = concat!(
+        r#"{"format":4,"policy":"lru","budget_bytes":18446744073709551600,"page_bytes":16,"passes":0,"#,
+        r#""sizes":[[18446744073709551600,16]],"tiles":[]}"#
+    );
     let file = folder.path().join("bad.jsonl");
     let name = file.to_str().expect("UTF-8");
     for bad in [
@@ -161,7 +164,7 @@ fn a_trace_that_is_not_whole_is_refused() {
         // Cut between two lines.
         &good[..last_line],
         &[&good[..], b"{}"].concat(),
-        huge,
+        huge.as_bytes(),
         &std::fs::read(scene).expect("a scene"),
     ] {
         std::fs::write(&file, bad).expect("a file");

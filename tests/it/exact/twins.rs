@@ -104,7 +104,8 @@ fn generated_scenes_look_the_same() {
         format!("{near} --schedule chc --cache 20% --fronts on --tile 16 --measure-needed"),
         format!("{near} --schedule chc --cache 20% --query-threshold 20 --tile 16"),
         format!(
-            "{near} --effects shadow,diffuse --diffuse-rays 2 --rotation full --secondary diffuse=roma,shadow=roma --schedule chc --cache 20%"
+            "{near} --effects shadow,diffuse --diffuse-rays 2 --rotation full --secondary diffuse=roma,shadow=roma \
+             --schedule chc --cache 20%"
         ),
         format!("{near} --schedule plain-bvh2 --cache 100% --spp 2"),
     ];

@@ -54,7 +54,8 @@ fn radiance(scene: &Path, options: &str) -> [f64; 2] {
     std::fs::write(&path, text).expect("a camera path");
     let output = scene.with_extension("walk");
     let options = format!(
-        "--adapter cpu --frames 1 --size 16x16 --aov --cache 100% --sun-intensity 0 --sky-intensity 0 --effects shadow --path {} {options}",
+        "--adapter cpu --frames 1 --size 16x16 --aov --cache 100% --sun-intensity 0 --sky-intensity 0 --effects shadow \
+         --path {} {options}",
         path.display()
     );
     common::walk(scene, &output, &options);

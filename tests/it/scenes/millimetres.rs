@@ -72,8 +72,8 @@ fn ply(path: &Path, is_binary: bool) {
     let (points, faces) = (world(), triangles());
     let encoding = if is_binary { "binary_little_endian" } else { "ascii" };
     let mut bytes = format!(
-        "ply\nformat {encoding} 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nelement \
-         face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        "ply\nformat {encoding} 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
         points.len(),
         faces.len()
     )

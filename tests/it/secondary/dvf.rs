@@ -215,7 +215,8 @@ fn fields_are_kept_beside_their_scene() {
     let walk = |name: &str, options: &str| {
         let output = folder.path().join(name);
         let words = format!(
-            "walk {} -o {} --frames 1 --size 48x32 --tile 16 --adapter cpu --aov --effects environment --environment {} --secondary dvf --dvf-points 2000 --dvf-rays 8 {options}",
+            "walk {} -o {} --frames 1 --size 48x32 --tile 16 --adapter cpu --aov --effects environment --environment \
+             {} --secondary dvf --dvf-points 2000 --dvf-rays 8 {options}",
             scene.display(),
             output.display(),
             even.display()

@@ -123,7 +123,8 @@ fn renewed_cells_are_those_of_a_field_made_from_scratch() {
             let news =
                 renewed.iter().filter(|&&cell| bits(&before, cell).1 == UNKNOWN && bits(field, cell).1 != UNKNOWN);
             println!(
-                "{} cells renewed by {rays} rays: {ours} differ from scratch, {still_differs} of the field as it was, {unknown} others; {} were unknown",
+                "{} cells renewed by {rays} rays: {ours} differ from scratch, {still_differs} of the field as it was, \
+                 {unknown} others; {} were unknown",
                 renewed.len(),
                 news.clone().count()
             );

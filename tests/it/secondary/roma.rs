@@ -95,7 +95,8 @@ fn occlusion_before_a_wall_is_that_of_the_closed_form_but_for_cells() {
         let expected = truth(d, HEIGHT);
         let [exact, roma, unsnapped] = [&exact, &roma, &unsnapped].map(|pixels| mean(pixels, d));
         println!(
-            "{d} m before the wall: closed form {expected:.4}, exact {exact:.4}, roma {roma:.4}, unsnapped {unsnapped:.4}"
+            "{d} m before the wall: closed form {expected:.4}, exact {exact:.4}, roma {roma:.4}, unsnapped \
+             {unsnapped:.4}"
         );
         assert!((exact - expected).abs() < 0.02, "{exact} instead of {expected}");
         // Cells mark what is up to one of theirs aside, maps see them up to one of their own, 1.75 as long, aside, and
@@ -179,8 +180,8 @@ fn low_walls_occlude_by_the_cosine() {
     let [expected, darkest, brightest] = expected.map(|sum| sum / f64::from(pixels));
     let [drawn, unsnapped, nearest] = free.map(|free| free as f64 / asked as f64);
     println!(
-        "closed form {expected:.4}, {darkest:.4} to {brightest:.4} with cells: drawn by the cosine {drawn:.4}, rays as they are {unsnapped:.4}, \
-         the map of the ray's stratum {nearest:.4}"
+        "closed form {expected:.4}, {darkest:.4} to {brightest:.4} with cells: drawn by the cosine {drawn:.4}, rays as \
+         they are {unsnapped:.4}, the map of the ray's stratum {nearest:.4}"
     );
     assert!(drawn > darkest && drawn < brightest, "{drawn} is not in {darkest} to {brightest}");
     // Rays that keep their direction meet the same cells, but for those beside the one column that snapped ones look

@@ -19,7 +19,8 @@ fn converted(folder: &Path, name: &str, materials: &str, quads: &[([[f32; 3]; 4]
         let (least, greatest) =
             ([0, 1, 2].map(|k| bound(corners, k, f32::min)), [0, 1, 2].map(|k| bound(corners, k, f32::max)));
         accessors.push(format!(
-            r#"{{"bufferView": {i}, "componentType": 5126, "count": 6, "type": "VEC3", "min": {least:?}, "max": {greatest:?}}}"#
+            r#"{{"bufferView": {i}, "componentType": 5126, "count": 6, "type": "VEC3",
+            "min": {least:?}, "max": {greatest:?}}}"#
         ));
         primitives.push(format!(r#"{{"attributes": {{"POSITION": {i}}}, "material": {material}}}"#));
     }
@@ -48,7 +49,8 @@ fn bound(corners: &[[f32; 3]; 4], k: usize, of: fn(f32, f32) -> f32) -> f32 {
 /// A white material.
 fn white(metallic: f64, roughness: f64, coat: f64) -> String {
     format!(
-        r#"{{"doubleSided": true, "pbrMetallicRoughness": {{"metallicFactor": {metallic}, "roughnessFactor": {roughness}}},
+        r#"{{"doubleSided": true,
+        "pbrMetallicRoughness": {{"metallicFactor": {metallic}, "roughnessFactor": {roughness}}},
         "extensions": {{"KHR_materials_clearcoat": {{"clearcoatFactor": {coat}, "clearcoatRoughnessFactor": 0.2}}}}}}"#
     )
 }
@@ -56,7 +58,8 @@ fn white(metallic: f64, roughness: f64, coat: f64) -> String {
 /// A material that shines and reflects nothing.
 fn glow(radiance: f64) -> String {
     format!(
-        r#"{{"doubleSided": true, "emissiveFactor": [1,1,1], "pbrMetallicRoughness": {{"baseColorFactor": [0,0,0,1], "metallicFactor": 1}},
+        r#"{{"doubleSided": true, "emissiveFactor": [1,1,1],
+        "pbrMetallicRoughness": {{"baseColorFactor": [0,0,0,1], "metallicFactor": 1}},
         "extensions": {{"KHR_materials_emissive_strength": {{"emissiveStrength": {radiance}}}}}}}"#
     )
 }
@@ -64,7 +67,8 @@ fn glow(radiance: f64) -> String {
 fn path(folder: &Path, name: &str, fov: f64, position: [f64; 3], target: [f64; 3]) -> String {
     let file = folder.join(format!("{name}.json"));
     let text = format!(
-        r#"{{"fov_y_degrees": {fov}, "up": [0.1,1,0.2], "keyframes": [{{"time": 0, "position": {position:?}, "target": {target:?}}}]}}"#
+        r#"{{"fov_y_degrees": {fov}, "up": [0.1,1,0.2],
+        "keyframes": [{{"time": 0, "position": {position:?}, "target": {target:?}}}]}}"#
     );
     std::fs::write(&file, text).expect("a camera path");
     file.display().to_string()

@@ -18,7 +18,8 @@ use std::sync::Arc;
 fn down_on(folder: &Path, x: f64) -> String {
     let path = folder.join("down.json");
     let text = format!(
-        r#"{{"fov_y_degrees": 1, "up": [0,0,1], "keyframes": [{{"time": 0, "position": [{x},3,0], "target": [{x},0,0]}}]}}"#
+        r#"{{"fov_y_degrees": 1, "up": [0,0,1],
+        "keyframes": [{{"time": 0, "position": [{x},3,0], "target": [{x},0,0]}}]}}"#
     );
     std::fs::write(&path, text).expect("a camera path");
     path.display().to_string()
@@ -93,7 +94,8 @@ fn a_closed_emissive_box_gathers_one_bounce() {
         &format!("{BOX}usemtl glow\n{SIDES}"),
     );
     let path = folder.join("inside.json");
-    let text = r#"{"fov_y_degrees": 90, "up": [0,1,0], "keyframes": [{"time": 0, "position": [0.1,0.2,0.3], "target": [0.7,-0.1,1]}]}"#;
+    let text = r#"{"fov_y_degrees": 90, "up": [0,1,0],
+        "keyframes": [{"time": 0, "position": [0.1,0.2,0.3], "target": [0.7,-0.1,1]}]}"#;
     std::fs::write(&path, text).expect("a camera path");
     let path = path.display().to_string();
     let dark = "--sun-intensity 0 --sky-intensity 0 --effects";

@@ -127,7 +127,8 @@ impl Checkpoints {
         html! {
             div.wide { table {
                 thead { tr {
-                    th { "Frame" } th { "Samples" } th { "Seconds" } th { "RMSE" } th { "relMSE" } th { "bias" } th { "FLIP" }
+                    th { "Frame" } th { "Samples" } th { "Seconds" }
+                    th { "RMSE" } th { "relMSE" } th { "bias" } th { "FLIP" }
                 } }
                 tbody { @for row in &self.rows { tr {
                     th scope="row" { (row.frame) } td { (format::count(row.samples as f64)) }
@@ -167,7 +168,7 @@ fn plot(
     }
     let chart =
         Chart { title: title.into(), unit: Unit::Count, across: Across::Log(across), series, marks: Vec::new() };
-    let reading = "Lower is better. RMSE of an unbiased estimate falls as 1/√N (dashed grey), relMSE as 1/N; a curve that \
-                   levels off shows a bias.";
+    let reading = "Lower is better. RMSE of an unbiased estimate falls as 1/√N (dashed grey), relMSE as 1/N; a curve \
+                   that levels off shows a bias.";
     page::drawn(&chart, title, reading, None, |values| values.last().map(|last| format::number(*last))).map(Some)
 }

@@ -92,8 +92,10 @@ pub fn render(name: &str, replay: &Value) -> Result<String, ReportError> {
     let main = html! {
         section {
             h2 { "Against the size of the cache" }
-            p.reading { "Every cache begins empty. belady-greedy knows the future (it evicts what is used again last): a bound for "
-                "the others." }
+            p.reading {
+                "Every cache begins empty. belady-greedy knows the future (it evicts what is used again last): a "
+                "bound for the others."
+            }
             div.plots { @for plot in plots.into_iter().flatten() { (plot) } }
         }
         section {

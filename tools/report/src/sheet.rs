@@ -158,11 +158,15 @@ impl Table {
             @if !self.caption.is_empty() { p.reading { (self.caption) } }
             div.wide { table.sheet {
                 thead { tr {
-                    @for (k, column) in self.columns.iter().enumerate() { th class=[self.is_of_words(k).then_some("name")] { (column) } }
+                    @for (k, column) in self.columns.iter().enumerate() {
+                        th class=[self.is_of_words(k).then_some("name")] { (column) }
+                    }
                 } }
                 tbody {
                     @for row in &self.rows { tr {
-                        @for value in row { td class=[matches!(value, Value::Text(_)).then_some("name")] { (value.show()) } }
+                        @for value in row {
+                            td class=[matches!(value, Value::Text(_)).then_some("name")] { (value.show()) }
+                        }
                     } }
                 }
             } }

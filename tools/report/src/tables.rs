@@ -61,8 +61,8 @@ pub fn schedules(walk: &Walk) -> Option<Markup> {
         html! {
             h3 { "Schedules" }
             p.reading {
-                "With auto, a pass now and then tries a schedule that was slower before; such frames stand out in plots. "
-                "A pass with several schedules has directions, lamps or samples that were traced by either."
+                "With auto, a pass now and then tries a schedule that was slower before; such frames stand out in "
+                "plots. A pass with several schedules has directions, lamps or samples that were traced by either."
             }
             div.wide { table {
                 thead { tr {
@@ -186,7 +186,8 @@ pub fn per_frame(walk: &Walk) -> Markup {
     html! {
         div.wide { table {
             thead { tr {
-                th { "Frame" } th.text { "Pass" } th.text { "Schedule" } th { "Rays traced" } th { "answered" } th { "Mray/s" } th { "ms" }
+                th { "Frame" } th.text { "Pass" } th.text { "Schedule" }
+                th { "Rays traced" } th { "answered" } th { "Mray/s" } th { "ms" }
                 th { "Queries" } th { "MiB moved" } th { "of it BVH" } th { "geometry" }
                 th { "Loaded" } th { "Evicted" }
             } }

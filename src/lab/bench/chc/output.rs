@@ -16,9 +16,9 @@ use std::fmt::Write;
 use std::path::Path;
 
 const TITLE: &str = "The experiments of CHC+RT";
-const READING: &str = "Ratios compare medians over repetitions of the mean frame; what is compared takes turns in one process. The \
-                       paper: Mattausch et al. 2015, an NVIDIA Titan, 1920 x 1080, 20 secondary rays per pixel; its scenes resemble ours \
-                       in size and kind, not the same.";
+const READING: &str = "Ratios compare medians over repetitions of the mean frame; what is compared takes turns in one \
+                       process. The paper: Mattausch et al. 2015, an NVIDIA Titan, 1920 x 1080, 20 secondary rays per \
+                       pixel; its scenes resemble ours in size and kind, not the same.";
 
 /// Writes the results; returns what to print.
 ///

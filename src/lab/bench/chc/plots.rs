@@ -13,8 +13,8 @@ pub fn frame_times(measured: &Measured) -> Vec<Graph> {
     let graph = |scene: SceneId, effect: Effect| {
         let line =
             |variant: &Variant| (variant.to_string(), in_core(measured, scene, View::Near, effect, variant, WALL));
-        let reading = "Wall time of the pass, frame by frame, the median of the walks. In the paper CHC+RT stays below a traversal \
-                       from the root, the more so where much is hidden.";
+        let reading = "Wall time of the pass, frame by frame, the median of the walks. In the paper CHC+RT stays below \
+                       a traversal from the root, the more so where much is hidden.";
         let title = format!("Figure 7: {effect} rays, {scene}, near");
         plot(title, reading, "frame", Unit::Milliseconds, IN_CORE.iter().map(line).collect())
     };
@@ -57,8 +57,8 @@ pub fn phases(measured: &Measured) -> Vec<Graph> {
         };
         Graph {
             title: format!("Figure 8: {effect} rays by {variant}"),
-            reading: "Device time of each phase and wall time of loading, ms a frame. In the paper phase 1 dominates in core, and the \
-                      share of phase 3 grows out of core."
+            reading: "Device time of each phase and wall time of loading, ms a frame. In the paper phase 1 dominates \
+                      in core, and the share of phase 3 grows out of core."
                 .into(),
             shape: GraphShape::Bars {
                 unit: Unit::Milliseconds,
@@ -91,8 +91,8 @@ pub fn tiles(measured: &Measured, (width, height): (u32, u32), tile: u32) -> Vec
     vec![
         plot(
             "Figure 5: bricks a tile".into(),
-            "Bricks that are intersected with a tile's primary rays, the mean of all tiles, city. The paper shows up to 24 \
-             subtrees a batch, more of them the farther away.",
+            "Bricks that are intersected with a tile's primary rays, the mean of all tiles, city. The paper shows up \
+             to 24 subtrees a batch, more of them the farther away.",
             "frame",
             Unit::Count,
             View::ALL.iter().map(along).collect(),

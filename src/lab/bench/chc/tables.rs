@@ -78,9 +78,9 @@ fn of_paper<T>(pass: &Pass, value: impl Fn(PaperScene) -> Option<T>) -> Option<T
     paper::scene(pass.case.scene).and_then(value)
 }
 
-const TABLE2: &str = "In core. Medians of milliseconds per frame and pass: wall time, as in the paper, and device time of the three phases. \
-                      A speed-up above 1 is faster. The paper's is over a binary tree traversed from its root: compare it with ours over \
-                      plain-bvh2.";
+const TABLE2: &str = "In core. Medians of milliseconds per frame and pass: wall time, as in the paper, and device time \
+                      of the three phases. A speed-up above 1 is faster. The paper's is over a binary tree traversed \
+                      from its root: compare it with ours over plain-bvh2.";
 
 fn table2<'a>() -> [Column<Pass<'a>>; 11] {
     /// The paper's numbers do not concern the baselines.
@@ -105,8 +105,8 @@ fn table2<'a>() -> [Column<Pass<'a>>; 11] {
     ]
 }
 
-const TABLE3: &str = "Out of core, with the paper's share of the cache. Per frame, without the first frames. Far ÷ near is a ratio of wall times. \
-                      The paper's MB include attributes.";
+const TABLE3: &str = "Out of core, with the paper's share of the cache. Per frame, without the first frames. Far ÷ \
+                      near is a ratio of wall times. The paper's MB include attributes.";
 
 fn table3<'a>() -> [Column<Pass<'a>>; 16] {
     fn traffic(pass: &Pass, which: usize) -> Value {
@@ -144,9 +144,10 @@ fn table3<'a>() -> [Column<Pass<'a>>; 16] {
     ]
 }
 
-const TABLE4: &str = "Aggressive culling of diffuse rays out of core: bricks that at most so many rays of a tile of 200 x 200 pixels could see are \
-                      skipped. A speed-up above 1 is faster. Errors are in levels of 255 against threshold 0, over five frames that begin \
-                      with an empty cache; the paper states a mean of 9.04 for 20 pixels in one picture.";
+const TABLE4: &str = "Aggressive culling of diffuse rays out of core: bricks that at most so many rays of a tile of \
+                      200 x 200 pixels could see are skipped. A speed-up above 1 is faster. Errors are in levels of \
+                      255 against threshold 0, over five frames that begin with an empty cache; the paper states a \
+                      mean of 9.04 for 20 pixels in one picture.";
 
 fn table4<'a>() -> [Column<Pass<'a>>; 8] {
     [
@@ -168,7 +169,8 @@ fn table4<'a>() -> [Column<Pass<'a>>; 8] {
     ]
 }
 
-const TABLE5: &str = "Random turn of a pixel's rays about the normal, up to so many degrees; in core, near. Slowdowns are over no turn; above 1 is slower.";
+const TABLE5: &str = "Random turn of a pixel's rays about the normal, up to so many degrees; in core, near. Slowdowns \
+    are over no turn; above 1 is slower.";
 
 fn table5<'a>() -> [Column<Pass<'a>>; 9] {
     fn slower(pass: &Pass, metric: Metric) -> Value {
@@ -206,8 +208,8 @@ fn figure5<'a>() -> [Column<Pass<'a>>; 7] {
     ]
 }
 
-const TARGETS: &str = "BVH and triangles, near. Cold: moved ÷ needed in the first frame, which begins with an empty cache. Steady: moved ÷ missing in \
-                       all others. 1 is optimal.";
+const TARGETS: &str = "BVH and triangles, near. Cold: moved ÷ needed in the first frame, which begins with an empty \
+                       cache. Steady: moved ÷ missing in all others. 1 is optimal.";
 
 fn targets<'a>() -> [Column<Pass<'a>>; 8] {
     /// Of the first frame, or of the others.
@@ -230,8 +232,8 @@ fn targets<'a>() -> [Column<Pass<'a>>; 8] {
     ]
 }
 
-const SCALE: &str = "Time of the larger scene ÷ time of the smaller one, not interleaved. Both in core, or out of core ÷ in core, as in the \
-                     paper.";
+const SCALE: &str = "Time of the larger scene ÷ time of the smaller one, not interleaved. Both in core, or out of core \
+                     ÷ in core, as in the paper.";
 
 /// What the size of a scene costs: ratios between scenes, which no walks interleave.
 fn scale(measured: &Measured) -> Table {

@@ -10,18 +10,22 @@ use anyhow::Result;
 use brickwalk_report::{Graph, Section, Table, Value};
 
 const TITLE: &str = "The experiments of discrete visibility fields";
-const READING: &str = "Fewer rays: rays to the environment without a field ÷ those traced with it. Both trace the same rays, so errors are \
-                       those of the field alone; in the paper's mode rays differ, too. Faster: time of these rays without a field ÷ time with \
-                       it, medians over turns; above 1 is faster. Errors are in linear radiance, FLIP at 67 pixels per degree. Paper: Günay and \
-                       Akyüz 2025, Sponza, 128 rays per pixel, an RTX 4060.";
-const MAKING: &str = "Making ÷ exact: time to make the field ÷ time of the rays of a picture without one. Making and picture ÷ exact: a picture \
-                      with a field made for it ÷ one without. Shares of making: areas and sums are the paper's compute shaders 1 to 3, points and \
-                      rays shader 4, labels shader 5. The paper's tables 3 and 4 are not compared with rays: they imply 2e12 rays per second.";
-const FLICKERING: &str = "Change of pictures with a field from frame to frame, over pixels whose rays all have the same answers in both frames. \
-                          Noise: difference of two exact pictures with other rays. A pixel jumps if it changes by more than 99 of 100 pixels \
-                          differ by noise. Anew: the field is made in every frame, as in the paper; otherwise it is that of the first frame and \
-                          knows what has moved. Renewed: cells are made anew, with --dvf-renew rays per frame. Rays of fields: those spent on \
-                          making cells anew, in all frames. FLIP is against exact pictures with the same rays, the mean of all frames.";
+const READING: &str = "Fewer rays: rays to the environment without a field ÷ those traced with it. Both trace the same \
+                       rays, so errors are those of the field alone; in the paper's mode rays differ, too. Faster: \
+                       time of these rays without a field ÷ time with it, medians over turns; above 1 is faster. \
+                       Errors are in linear radiance, FLIP at 67 pixels per degree. Paper: Günay and Akyüz 2025, \
+                       Sponza, 128 rays per pixel, an RTX 4060.";
+const MAKING: &str = "Making ÷ exact: time to make the field ÷ time of the rays of a picture without one. Making and \
+                      picture ÷ exact: a picture with a field made for it ÷ one without. Shares of making: areas and \
+                      sums are the paper's compute shaders 1 to 3, points and rays shader 4, labels shader 5. The \
+                      paper's tables 3 and 4 are not compared with rays: they imply 2e12 rays per second.";
+const FLICKERING: &str = "Change of pictures with a field from frame to frame, over pixels whose rays all have the \
+                          same answers in both frames. Noise: difference of two exact pictures with other rays. A \
+                          pixel jumps if it changes by more than 99 of 100 pixels differ by noise. Anew: the field is \
+                          made in every frame, as in the paper; otherwise it is that of the first frame and knows what \
+                          has moved. Renewed: cells are made anew, with --dvf-renew rays per frame. Rays of fields: \
+                          those spent on making cells anew, in all frames. FLIP is against exact pictures with the \
+                          same rays, the mean of all frames.";
 
 /// What the paper has of Sponza: options, then RMSE and FLIP. Figure 13 has 80K and 400K points of 77 cells, figure 14
 /// 10M points.

@@ -94,7 +94,8 @@ mod tests {
         println!("columns through a plane without a bit, percent; of 1, 2 and 4 samples a step");
         for (name, [equal, widest, finer]) in [("raster", raster), ("conservative", conservative)] {
             println!(
-                "{name:>12}: map as wide as the cells' {equal:.3?}, as its diagonal {widest:.3?}, as twice that {finer:.3?}"
+                "{name:>12}: map as wide as the cells' {equal:.3?}, as its diagonal {widest:.3?}, as twice that \
+                 {finer:.3?}"
             );
         }
         let is_near = |found: f64, before: f64| (before / 1.5..=before * 1.5).contains(&found);

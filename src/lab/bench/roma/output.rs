@@ -11,9 +11,10 @@ use brickwalk_report::{Graph, Section, Table, Unit, Value};
 use std::path::Path;
 
 const TITLE: &str = "The experiments of ROMA";
-const READING: &str = "Times are medians over turns of one frame; all ways take turns in one process. Errors are in linear radiance: bias \
-                       and RMSE relative to the exact picture's mean, FLIP at 67 pixels per degree. The noise of the exact picture is its \
-                       difference from another one with as many samples. Paper: Zeng et al. 2023, 1920 x 1080, one ray per pixel.";
+const READING: &str = "Times are medians over turns of one frame; all ways take turns in one process. Errors are in \
+                       linear radiance: bias and RMSE relative to the exact picture's mean, FLIP at 67 pixels per \
+                       degree. The noise of the exact picture is its difference from another one with as many samples. \
+                       Paper: Zeng et al. 2023, 1920 x 1080, one ray per pixel.";
 
 /// What the paper's table 2 has, ms: generation and tracing, by resolution and number of directions.
 const PAPER: [(u32, u32, f64, f64); 6] = [
@@ -152,9 +153,9 @@ fn paper(way: Way) -> Option<[f64; 2]> {
     }
 }
 
-const SPEED: &str = "Device time to make the maps or the distance field of a frame (generation) and to answer its rays (tracing); of exact \
-                     rays, wall time of the pass. exact ÷ and df ÷ are speed-ups: above 1 ROMA is faster. df is a distance field with as \
-                     many cells.";
+const SPEED: &str = "Device time to make the maps or the distance field of a frame (generation) and to answer its rays \
+                     (tracing); of exact rays, wall time of the pass. exact ÷ and df ÷ are speed-ups: above 1 ROMA is \
+                     faster. df is a distance field with as many cells.";
 
 fn speed<'a>() -> [Column<Measurement<'a>>; 14] {
     [
@@ -175,12 +176,13 @@ fn speed<'a>() -> [Column<Measurement<'a>>; 14] {
     ]
 }
 
-const ERRORS: &str = "Errors against exact pictures: converged, and with one sample per pixel. Times are those of tracing, without making \
-                      maps; bricks are those that the pass loaded. FLIP ÷ df: over that of a distance field with as many cells, which \
-                      takes as much memory with K = 4; in the paper it is below 1 for ambient occlusion in every scene. Figure 5: errors \
-                      are means over six frames along the path, and the field has 128 cells. Cells: length of rays, in cells of bricks; \
-                      maps know nothing of rays shorter than three, and `--secondary auto` traces them. Whole: all of the effect, with \
-                      making maps.";
+const ERRORS: &str = "Errors against exact pictures: converged, and with one sample per pixel. Times are those of \
+                      tracing, without making maps; bricks are those that the pass loaded. FLIP ÷ df: over that of a \
+                      distance field with as many cells, which takes as much memory with K = 4; in the paper it is \
+                      below 1 for ambient occlusion in every scene. Figure 5: errors are means over six frames along \
+                      the path, and the field has 128 cells. Cells: length of rays, in cells of bricks; maps know \
+                      nothing of rays shorter than three, and `--secondary auto` traces them. Whole: all of the \
+                      effect, with making maps.";
 
 fn errors<'a>(stage: Stage) -> Vec<Column<Measurement<'a>>> {
     /// What the paper has of soft shadows.
@@ -234,9 +236,9 @@ fn exact_as(way: Way, name: &str) -> String {
     if way == Way::Exact { name.into() } else { way.to_string() }
 }
 
-const SEAMS: &str = "Occlusion near a side of the cube of a map, beyond which cells are twice as large. Cells are 128ths of that side; \
-                     distances are the middles of bins two cells wide. Differences from the exact picture and their magnitudes, relative \
-                     to its mean there, over six frames along the path.";
+const SEAMS: &str = "Occlusion near a side of the cube of a map, beyond which cells are twice as large. Cells are \
+                     128ths of that side; distances are the middles of bins two cells wide. Differences from the exact \
+                     picture and their magnitudes, relative to its mean there, over six frames along the path.";
 
 /// Errors by the distance from a seam.
 fn seams_table<'a>(lines: impl Iterator<Item = Measurement<'a>>) -> Table {
@@ -256,8 +258,9 @@ fn seams_table<'a>(lines: impl Iterator<Item = Measurement<'a>>) -> Table {
     table("seams", SEAMS, bins, &columns)
 }
 
-const LEAKING: &str = "Columns of turned maps that cross a random plane without a set bit: of the paper's base maps, rasterised from three \
-                       sides, and of conservative ones. Rays of ao have the last width with two look-ups, all others with four.";
+const LEAKING: &str = "Columns of turned maps that cross a random plane without a set bit: of the paper's base maps, \
+                       rasterised from three sides, and of conservative ones. Rays of ao have the last width with two \
+                       look-ups, all others with four.";
 
 /// Shares of columns that pass through a plane, beside those measured before (spec §2).
 fn leaks_table(rows: &Rows) -> Table {
@@ -313,8 +316,8 @@ fn error_over_distance(job: &Job, rows: &Rows) -> Graph {
     plot(
         format!("Error over the distance from a seam, {}", job.scene),
         &format!(
-            "Mean magnitude of differences from the exact picture, per cent, over cells from {reach} inside of a map to as many \
-             outside; its side is at {reach}."
+            "Mean magnitude of differences from the exact picture, per cent, over cells from {reach} inside of a map \
+             to as many outside; its side is at {reach}."
         ),
         "cells",
         Unit::Percent,

@@ -333,7 +333,9 @@ fn trees_that_cannot_be_are_refused() {
     // 8^15 tiles of a file of a hundred bytes.
     assert!(error(&set("availableLevels", json!(16))).contains("more than 4194304 tiles"));
     // A tileset as the content of a tile would multiply them.
-    write(folder.path(), "with.json", br#"{"tileAvailability": {"constant": 1}, "contentAvailability": [{"constant": 1}], "childSubtreeAvailability": {"constant": 0}}"#);
+    let with = br#"{"tileAvailability": {"constant": 1}, "contentAvailability": [{"constant": 1}],
+        "childSubtreeAvailability": {"constant": 0}}"#;
+    write(folder.path(), "with.json", with);
     write_json(folder.path(), "other.json", &tileset(json!({})));
     let found = error(&|root| {
         root["content"]["uri"] = json!("other.json");
@@ -376,8 +378,9 @@ fn subtrees_are_checked() {
     let mut version = whole;
     version[4] = 3;
     assert!(error(&version).contains("version 3 is not 1"));
-    assert!(error(br#"{"tileAvailability": {"bitstream": 0}, "buffers": [{}], "bufferViews": [{"buffer": 0, "byteLength": 3}],
-        "childSubtreeAvailability": {"constant": 0}}"#).contains("has neither URI nor binary chunk"));
+    let without = br#"{"tileAvailability": {"bitstream": 0}, "buffers": [{}],
+        "bufferViews": [{"buffer": 0, "byteLength": 3}], "childSubtreeAvailability": {"constant": 0}}"#;
+    assert!(error(without).contains("has neither URI nor binary chunk"));
 }
 
 proptest! {

@@ -178,7 +178,8 @@ proptest! {
     ) {
         let binary: Vec<u8> = [1.0f32; 24].iter().flat_map(|x| x.to_le_bytes()).collect();
         let features = json!({"INSTANCES_LENGTH": 2, "POSITION": {"byteOffset": 0}, "EAST_NORTH_UP": true,
-            "SCALE": {"byteOffset": 24}, "NORMAL_UP_OCT32P": {"byteOffset": 32}, "NORMAL_RIGHT_OCT32P": {"byteOffset": 40}});
+            "SCALE": {"byteOffset": 24}, "NORMAL_UP_OCT32P": {"byteOffset": 32},
+            "NORMAL_RIGHT_OCT32P": {"byteOffset": 40}});
         let mut bytes = i3dm(&features, &binary, 1, &model(1.0));
         let head = bytes.len() - model(1.0).len();
         for (at, value) in &edits {
