@@ -7,6 +7,7 @@ mod exercise;
 mod format;
 mod golden;
 mod malformed;
+mod malformed_payloads;
 mod occupancy;
 mod random;
 mod surfaces;
