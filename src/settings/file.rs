@@ -83,7 +83,8 @@ fn fill<G: Group>(group: &mut G, held: BTreeMap<String, Held>) -> Result<(), Set
 pub fn read_toml<G: Group>(group: &mut G, text: &str) -> Result<(), SettingsError> {
     // One line, as all errors are.
     let line = |error: toml::de::Error| {
-        let at = error.span().map_or(1, |span| text[..span.start].lines().count().max(1));
+        let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+        let at = before.lines().count().max(1);
         SettingsError::Syntax(format!("line {at}: {}", error.message().replace('\n', ", ")))
     };
     fill(group, toml::from_str(text).map_err(line)?)

@@ -134,6 +134,12 @@ pub enum BuildError {
     /// Worker threads could not be started.
     #[error("cannot start worker threads: {0}; try fewer with --threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The thread that reads scratch files ahead could not be started.
+    #[error(
+        "cannot start the thread that reads scratch files: {0}; stop other programs, or raise the limit of threads \
+         (ulimit -u)"
+    )]
+    ReadAhead(std::io::Error),
     /// A part of the source could not be read.
     #[error(transparent)]
     Source(#[from] crate::source::SourceError),

@@ -212,13 +212,14 @@ impl Bounded<'_> {
             // The other end goes with this closure, so that the thread ends after an error too.
             let (sender, receiver) = sync_channel(0);
             let rest = files.into_iter().zip(&ranges).skip(done);
-            scope.spawn(move || {
+            let read_ahead = move || {
                 for (file, range) in rest {
                     if sender.send((range, Loaded::load(&file).map(|loaded| (file, loaded)))).is_err() {
                         break;
                     }
                 }
-            });
+            };
+            std::thread::Builder::new().spawn_scoped(scope, read_ahead).map_err(BuildError::ReadAhead)?;
             for (range, loaded) in receiver {
                 let (file, loaded) = loaded?;
                 let (first, first_occupancy) = (bricks.records.len(), bricks.occupancy.len());
