@@ -41,7 +41,7 @@ pub const MAX_TRIANGLE_IDS: u64 = u32::MAX as u64 - 1;
 /// Most texels of a texture each way. Level 0 is then 1 GiB, all levels less than [`crate::layout::MAX_PAYLOAD_BYTES`].
 pub const MAX_TEXTURE_SIZE: u32 = 1 << 14;
 
-/// Brick origins and frame reference points are multiples of this many lattice steps (numerics.md, "Positions").
+/// Brick origins and frame reference points are multiples of this many lattice steps (docs/methods/exact.md).
 pub const ORIGIN_STEPS: i64 = 1 << 20;
 
 /// Largest magnitude, in lattice steps, of a vertex coordinate relative to the origin of a *near* brick.

@@ -57,8 +57,8 @@ fn triangle_indices(r: ptr<function, BrickRay>, triangle: u32) -> vec3<u32> {
 }
 
 // Tests one triangle and keeps the nearer hit; at equal distance the lower global id, so that no order shows.
-// The triangle that the ray starts from is never met (numerics.md, "Secondary rays"). Returns whether it is the best so
-// far.
+// The triangle that the ray starts from is never met (docs/methods/exact.md, "Secondary rays"). Returns whether it is
+// the best so far.
 fn test_triangle(r: ptr<function, BrickRay>, best: ptr<function, Best>, triangle: u32) -> bool {
     let index = triangle_indices(r, triangle);
     let a = barrier3(vertex(r, index.x) - (*r).ray.origin);
@@ -100,7 +100,7 @@ fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>,
         area = barrier(barrier(area * stretch) * m.volume);
         let to = m.world_from_object;
         let p = vec3<f32>(row_point(to[0], point), row_point(to[1], point), row_point(to[2], point));
-        // The rounding of the transforms there and back (numerics.md, "Instances"), along the normal.
+        // The rounding of the transforms there and back (src/kernels/frame.rs), along the normal.
         let reach = max(
             max(abs(p.x), max(abs(p.y), abs(p.z))),
             max(abs(to[0].w), max(abs(to[1].w), abs(to[2].w))),

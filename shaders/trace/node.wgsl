@@ -1,4 +1,4 @@
-// The padded test of a ray against the eight child boxes of a wide node (numerics.md, "Boxes").
+// The padded test of a ray against the eight child boxes of a wide node (docs/methods/exact.md, "Boxes").
 
 // A ray with all that traversal derives from it once, in the world's frame or an instance's.
 struct FramedRay {

@@ -1,8 +1,8 @@
 //! The resident part of a scene relative to the reference point of a frame, as kernels see it.
 //!
-//! Positions follow numerics.md: the reference point R is a lattice point on multiples of 2²⁰ steps near the camera,
-//! each instance has its own on its object's lattice, and a brick's offset d = O − R is exact in one f32 (near) or two
-//! (wide).
+//! The reference point R is a lattice point on multiples of 2²⁰ steps near the camera, each instance has its own on its
+//! object's lattice, and a brick's offset d = O − R is exact in one f32 (near) or two (wide): docs/methods/exact.md,
+//! "Positions".
 
 use super::layout;
 use bricks::{BRICK_WIDE, Brick, ORIGIN_STEPS, Resident, WIDE_HIGH_STEPS};
@@ -164,8 +164,8 @@ impl Placed {
             record.flags |= layout::INSTANCE_STRETCHED;
         }
         record.volume = forward.determinant().abs() as f32;
-        // numerics.md, "Instances": 3.5 u κ on the direction and 3.7 u κ (|o| + |c|) on the origin; c, seen from the
-        // world, is bounded by |t| and the scene's own extent, which the kernel's reach holds. 32 leaves a wide margin.
+        // Measured: 3.5 u κ on the direction and 3.7 u κ (|o| + |c|) on the origin; c, seen from the world, is bounded
+        // by |t| and the scene's own extent, which the kernel's reach holds. 32 leaves a wide margin.
         let pad = (32.0 * f64::from(f32::EPSILON) / 2.0 * ratio) as f32;
         Self { record, reference, scale, pad }
     }

@@ -4,13 +4,13 @@
 //! from these by powers of two, which round nothing. Bounds are to first order in u, times 1 + 2⁻¹⁶, which holds what
 //! is left: each term of higher order is below 8 u times one that is counted.
 //!
-//! # What the kernel computes (numerics.md)
+//! # What the kernel computes
 //!
 //! 1. *Vertices.* v = fl(p − R), whatever the form of the brick, then a = fl(v − o). Per component the error is
 //!    at most u·abs(v) + u·abs(a). The ray of an instance is transformed first, o′ = fl(M o + c′) and d′ = fl(M d),
 //!    with M = A⁻¹ and c′ = M (R − T) − R′ in f64, rounded to f32. M and three products and two sums of which take
 //!    part: d′ is off by at most δd = 4u·abs(M)·abs(d) per component; o′, with one more sum and the rounding of c′, by
-//!    δo = 5u·abs(M)·abs(o) + 2u·abs(c′), which adds to a. (These are worst cases of what numerics.md measured as
+//!    δo = 5u·abs(M)·abs(o) + 2u·abs(c′), which adds to a. (These are worst cases of what was measured as
 //!    3.5 u κ and 3.7 u κ (abs(o) + abs(c)) in world space.) What f64 itself rounds for the instance is added too.
 //! 2. *Shear.* x = fl(a_x − fl(S·a_z)), S = fl(d_x · iz), iz = fl(1 / d_z), along the axis z of the largest component
 //!    of d. S is off by δS = (δd_x + abs(S)·δd_z) / (abs(d_z) − δd_z) + 2u·abs(S), and x by

@@ -106,8 +106,8 @@ settings! {
         /// Seed of random sampling.
         seed: u64 = 0, "--seed N", Rule::Any, "", Quality, Usual;
         /// Exposure of PNGs and video in stops (EV), or auto. Radiance is multiplied by 2^EV before the tone map.
-        /// `auto` brings the log-average luminance of what a frame hits half a stop above middle grey, keeps 98 % of it
-        /// from white, and adapts along the path; it stays within 8 stops of 0, or from MIN to MAX. EXR keeps the
+        /// `auto` brings the log-average luminance of what a frame hits half a stop above middle grey. It keeps 98 % of
+        /// it from white and adapts along the path. It stays within 8 stops of 0, or from MIN to MAX. EXR keeps the
         /// radiance.
         exposure: Exposure = Exposure::AUTO, "--exposure EV|auto|auto:MIN,MAX", Rule::Real(-32.0, 32.0), "stops",
             Quality, Usual;

@@ -93,7 +93,7 @@ impl BrickRay<'_> {
             area = barrier(barrier(area * stretch) * instance.volume);
             let m = &instance.world_from_object;
             let p = rows_point(m, point);
-            // The rounding of the transforms there and back (numerics.md, "Instances"), along the normal.
+            // The rounding of the transforms there and back (src/kernels/frame.rs), along the normal.
             let reach = most3(p.map(f32::abs)).max(most3(each(|k| m[k][3].abs())));
             let delta = 16.0 * UNIT * instance.scale * reach;
             // A zero component moves away from where the ray points.

@@ -2,7 +2,7 @@
 //!
 //! **No false miss.** The rays start strictly inside of a closed mesh and have no end, so every one of them meets it:
 //! the count of misses needs no reference. It is 0 because the test decides with exact signs on one planar map of the
-//! mesh (numerics.md).
+//! mesh (docs/methods/exact.md, "Triangles").
 //!
 //! **Hits** are judged by [`crate::reference`]: the same id and a t within the interval that its bounds derive from γₙ
 //! = n u / (1 − n u), u = 2⁻²⁴; a difference is excused only where f32 could not have told.

@@ -74,7 +74,7 @@ pub fn leaving_rays(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     sky_in_a_box(lab, checks)
 }
 
-/// Between two walls (K + 4) u abs(p) apart and more, K = 32, a ray that leaves one meets the other (numerics.md).
+/// Between two walls (K + 4) u abs(p) apart and more, K = 32, a ray that leaves one meets the other.
 fn thin_gap(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     // Two steps of 2^-20 at 0.4 from the reference point, where 36 u abs(p) is 0.9 of one.
     let (h, x) = (1.0 / 1_048_576.0, 419_430.0 / 1_048_576.0);

@@ -14,7 +14,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Of distances: f32 roundings of a ray and of what it meets, numerics.md, with a wide margin.
+/// Of distances: f32 roundings of a ray and of what it meets (src/reference/bounds.rs), with a wide margin.
 const ROUNDING: f64 = 1.0 / (1u32 << 19) as f64;
 
 /// Gives the `hits` of rays their distances and normals in f64. The geometry of every brick that was hit is read once

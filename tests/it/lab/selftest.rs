@@ -20,7 +20,7 @@ fn failed(report: &Report) -> Vec<u32> {
     report.rows.iter().filter(|row| row.status == Status::Fail).map(|row| row.case).collect()
 }
 
-/// The case that a defect must fail: numerics.md, "Tests that catch each mistake".
+/// The case that a defect must fail.
 fn case_of(defect: Defect) -> u32 {
     match defect {
         Defect::WorldF32 | Defect::MollerTrumbore | Defect::NoBarriers => 20,

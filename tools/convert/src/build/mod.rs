@@ -1,10 +1,10 @@
 //! Cuts a scene into bricks and writes the scene file.
 //!
-//! The order of the work is what makes images independent of how a scene is cut (numerics.md, "Positions"): triangles
-//! are numbered in the order of the source (`input`), a partition that ignores all settings gives the sizes from which
-//! each object's lattice follows (`cut`), every position is rounded to it once (`triangles`), and only then are bricks
-//! encoded (`encode`). Trees take their topology from floating-point builders, but their boxes are exact integers
-//! (`tree`). Everything is the same for any number of threads.
+//! The order of the work is what makes images independent of how a scene is cut (docs/methods/exact.md, "Positions"):
+//! triangles are numbered in the order of the source (`input`), a partition that ignores all settings gives the sizes
+//! from which each object's lattice follows (`cut`), every position is rounded to it once (`triangles`), and only then
+//! are bricks encoded (`encode`). Trees take their topology from floating-point builders, but their boxes are exact
+//! integers (`tree`). Everything is the same for any number of threads.
 //!
 //! A scene that does not fit in memory goes through the same steps by way of the disk (`bounded`, `disk`): its items
 //! are split there until they fit, then its triangles are brought together by bricks. What depends on sets of triangles

@@ -1,4 +1,4 @@
-//! Quantises the boxes of a wide node on the lattice, outward, in integers (numerics.md, "Boxes").
+//! Quantises the boxes of a wide node on the lattice, outward, in integers (docs/methods/exact.md, "Boxes").
 
 #[cfg(test)]
 use super::binary::Box3;

@@ -1,4 +1,4 @@
-//! The lattice of an object: which step, which device unit, and rounding to it (numerics.md, "Positions").
+//! The lattice of an object: which step, which device unit, and rounding to it (docs/methods/exact.md, "Positions").
 //!
 //! The step follows from sizes alone, so a scene that is moved keeps it. It is coarsened only where it has to be: for
 //! the range of the arithmetic ([`REACH_STEPS`], [`DIAGONAL_STEPS_LOG2`]), and then the conversion says so.
