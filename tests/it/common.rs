@@ -142,6 +142,53 @@ pub fn walk(scene: &Path, output: &Path, options: &str) -> String {
     succeed(words.into_iter().chain(options.split_whitespace().map(std::ffi::OsStr::new)))
 }
 
+/// Walks as [`walk`] does, on so many threads, and gives the records.
+pub fn walk_on_threads(scene: &Path, output: &Path, options: &str, threads: &str) -> Vec<Value> {
+    let status = Command::new(env!("CARGO_BIN_EXE_brickwalk"))
+        .env("RAYON_NUM_THREADS", threads)
+        .args(["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()])
+        .args("--quality exact".split(' ').chain(options.split_whitespace()))
+        .status();
+    assert!(status.expect("the command starts").success(), "{options}");
+    records(output)
+}
+
+/// The records of a walk.
+pub fn records(output: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
+    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
+}
+
+/// The sum of a field over the records of a pass.
+pub fn sum(records: &[Value], pass: &str, field: &str) -> f64 {
+    records.iter().filter(|r| r["pass"] == pass).map(|r| r[field].as_f64().expect("a number")).sum()
+}
+
+/// The JSON in a file.
+pub fn json(file: &Path) -> Value {
+    let bytes = std::fs::read(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    serde_json::from_slice(&bytes).expect("JSON")
+}
+
+/// The names of what is in a folder, sorted.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").file_name());
+    let mut names: Vec<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Waits until another process has made a file.
+#[cfg(unix)]
+pub fn wait_for(file: &Path) {
+    use std::time::{Duration, Instant};
+    let start = Instant::now();
+    while !file.exists() {
+        assert!(start.elapsed() < Duration::from_secs(120), "{} does not appear", file.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
 /// Every frame of a walk, PNG and EXR, by name.
 pub fn frames(output: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<_> = std::fs::read_dir(output.join("frames"))

@@ -1,7 +1,7 @@
 //! How commands end where there is too little: memory, space, time; and what killed ones leave.
 #![cfg(unix)]
 
-use crate::common::{brickwalk, city, folder, skip, succeed, walk};
+use crate::common::{brickwalk, city, folder, names, skip, succeed, wait_for, walk};
 use brickwalk::session::picture_bytes::PictureBytes;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -13,13 +13,6 @@ fn limited(limit: &str, line: &str) -> (Option<i32>, String) {
     let script = format!("ulimit {limit}; exec {} {line}", env!("CARGO_BIN_EXE_brickwalk"));
     let output = Command::new("sh").args(["-c", &script]).output().expect("a shell");
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("a folder").flatten();
-    let mut names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
 }
 
 /// A picture that memory does not hold is refused before anything is made, with the size that it does hold.
@@ -121,11 +114,7 @@ fn the_next_walk_removes_what_a_killed_one_left() {
         .stderr(Stdio::null())
         .spawn()
         .expect("the command starts");
-    let start = Instant::now();
-    while !out.join("frames/0001.png").exists() {
-        assert!(start.elapsed() < Duration::from_secs(120), "no frame appears");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_for(&out.join("frames/0001.png"));
     child.kill().expect("it runs");
     child.wait().expect("an end");
     let temporary = |name: &String| name.ends_with(".tmp");

@@ -92,8 +92,8 @@ fn a_video_holds_the_frames() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_walk_leaves_a_video_of_what_it_finished() {
+    use crate::common::wait_for;
     use std::process::{Command, Stdio};
-    use std::time::{Duration, Instant};
     let folder = folder();
     let scene = city(folder.path(), "30K", "1K");
     let (out, video) = (folder.path().join("out"), folder.path().join("a.y4m"));
@@ -111,11 +111,7 @@ fn an_interrupted_walk_leaves_a_video_of_what_it_finished() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the command starts");
-    let start = Instant::now();
-    while !out.join("frames/0001.png").exists() {
-        assert!(start.elapsed() < Duration::from_secs(120), "no frame appears");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_for(&out.join("frames/0001.png"));
     assert!(!video.exists(), "it has its name only when it is whole");
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
     assert!(killed.success());

@@ -1,16 +1,9 @@
 //! Caches much smaller than what a pass works on: every frame is finished, in as many fillings of the cache as it
 //! takes, and the records say how many.
 
-use crate::common::{folder, frames, polished_city, walk};
-use serde_json::Value;
-use std::path::Path;
+use crate::common::{folder, frames, polished_city, records, walk};
 
 const EFFECTS: &str = "--effects primary,shadow,ao,diffuse,glossy --ao-rays 2 --diffuse-rays 2 --ao-length 5";
-
-fn records(output: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
-}
 
 #[test]
 fn every_frame_is_finished_by_a_cache_of_two_bricks() {

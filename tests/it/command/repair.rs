@@ -1,6 +1,6 @@
 //! Damaged scene files that are rebuilt from what they were converted from.
 
-use crate::common::{brickwalk, city, folder, succeed};
+use crate::common::{brickwalk, city, folder, names, succeed};
 use bricks::{Payload, SceneFile};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -44,13 +44,6 @@ fn damage(path: &Path, payloads: &[Payload]) -> Vec<u8> {
     bytes[(first.offset + first.bytes) as usize] ^= 1;
     std::fs::write(path, &bytes).expect("the damaged file");
     bytes
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("the folder");
-    let mut names: Vec<_> = entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
 }
 
 /// Runs `repair` on `scene`; its status and its output or its one line.

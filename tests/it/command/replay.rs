@@ -1,7 +1,7 @@
 //! Replay through the command line: a replay of the recorded requests in the recorded cache does what the walk's own
 //! records say.
 
-use crate::common::{brickwalk, city, folder, succeed, walk};
+use crate::common::{brickwalk, city, folder, records, succeed, walk};
 use serde_json::Value;
 use std::path::Path;
 
@@ -11,9 +11,7 @@ fn near(scene: &Path) -> String {
 
 /// The sum of a field over all records of a walk.
 fn total(output: &Path, field: &str) -> u64 {
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    let value = |line: &str| serde_json::from_str::<Value>(line).expect("a record")[field].as_u64().expect("a count");
-    text.lines().map(value).sum()
+    records(output).iter().map(|record| record[field].as_u64().expect("a count")).sum()
 }
 
 fn replayed(trace: &Path, options: &[&str]) -> Value {

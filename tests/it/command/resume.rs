@@ -1,6 +1,6 @@
 //! Conversions that are killed, continued, or out of disk space.
 
-use crate::common::{brickwalk, folder};
+use crate::common::{self, brickwalk, folder};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -18,11 +18,9 @@ fn command(output: &Path) -> Command {
 }
 
 fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").file_name());
-    let mut names: Vec<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
+    let mut names = common::names(folder);
     // The camera paths come after the scene file; a kill may leave a temporary file of theirs.
     names.retain(|name| !name.ends_with(".json") && !name.ends_with(".json.tmp"));
-    names.sort();
     names
 }
 

@@ -1,6 +1,7 @@
 //! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that
 //! appear complete or not at all.
 
+use crate::common::names;
 use brickwalk::reference::Truth;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -38,13 +39,6 @@ fn refused(folder: &Path, line: &str) -> String {
     assert!(text.starts_with("brickwalk: ") && text.lines().count() == 1 && text.ends_with('\n'), "{line}: {text:?}");
     assert!(!text.contains("internal error"), "{text}");
     text
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What commands say of themselves: help, how much is said, completions, man pages.
 
-use crate::common::{brickwalk, city, folder, succeed};
+use crate::common::{brickwalk, city, folder, records, succeed};
 use std::path::Path;
 use std::process::Output;
 
@@ -54,11 +54,8 @@ fn verbose_says_what_is_decided() {
     }
     assert!(told.lines().all(|line| line.starts_with("brickwalk: ")), "{told}");
     // Records name the schedule, too.
-    let records = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
-    let mut schedules = records.lines().map(|line| {
-        let record: serde_json::Value = serde_json::from_str(line).expect("JSON");
-        record["schedule"].as_str().expect("a schedule").to_owned()
-    });
+    let records = records(&out);
+    let mut schedules = records.iter().map(|record| record["schedule"].as_str().expect("a schedule"));
     assert!(schedules.all(|names| names.split('+').all(|name| ["chc", "demand", "plain"].contains(&name))));
 }
 

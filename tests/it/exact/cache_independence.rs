@@ -1,7 +1,7 @@
 //! The invariant that everything hangs on: pixels, ids and depths do not depend on schedule, cache size, eviction,
 //! fronts, tile size, threads or run; ids and depths not on brick size.
 
-use crate::common::{self, city, folder, frames, polished_city, walk};
+use crate::common::{self, city, folder, frames, polished_city, records, walk};
 use std::path::Path;
 
 const VIEW: &str = "--frames 3 --size 104x72 --aov";
@@ -133,15 +133,12 @@ fn ten_runs_are_one() {
 
 /// The records without their times.
 fn counters(output: &Path) -> Vec<serde_json::Value> {
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    text.lines()
-        .map(|line| {
-            let mut record: serde_json::Value = serde_json::from_str(line).expect("a record");
-            let object = record.as_object_mut().expect("an object");
-            object.retain(|key, _| !key.starts_with("ms") && key != "mrays_per_s");
-            record
-        })
-        .collect()
+    let mut all = records(output);
+    for record in &mut all {
+        let object = record.as_object_mut().expect("an object");
+        object.retain(|key, _| !key.starts_with("ms") && key != "mrays_per_s");
+    }
+    all
 }
 
 #[test]

@@ -1,14 +1,9 @@
 //! What `--query-threshold` costs, as `--measure-error` records it: nothing at 0; else what a comparison of the
 //! pictures of two walks finds; and the walk itself is as without the measurement.
 
-use crate::common::{folder, frames, polished_city, walk};
+use crate::common::{folder, frames, polished_city, records, walk};
 use serde_json::Value;
 use std::path::Path;
-
-fn records(output: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
-}
 
 /// Radiance and ids of a frame.
 fn picture(output: &Path, frame: usize) -> (Vec<[f64; 3]>, Vec<u32>) {

@@ -2,7 +2,10 @@
 //! few pixels, the same bricks loaded by the same queries; and it does so whatever the number of its threads, and where
 //! there is no driver.
 
-use crate::common::{brickwalk, city, folder, frames, polished, polished_city, shared_scenes, software, succeed, walk};
+use crate::common::{
+    brickwalk, city, folder, frames, polished, polished_city, records, shared_scenes, software, succeed, walk,
+    walk_on_threads,
+};
 use exr::prelude::{FlatSamples, read_all_flat_layers_from_file};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -32,15 +35,12 @@ fn differing(a: &Path, b: &Path) -> (usize, usize) {
 }
 
 /// The records without times, and without what says how lists have grown on a device.
-fn counters(output: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    let record = |line: &str| {
-        let mut record: Value = serde_json::from_str(line).expect("a record");
+fn counters(mut records: Vec<Value>) -> Vec<Value> {
+    for record in &mut records {
         let object = record.as_object_mut().expect("an object");
         object.retain(|key, _| !key.starts_with("ms") && key != "mrays_per_s" && key != "round_trips");
-        record
-    };
-    text.lines().map(record).collect()
+    }
+    records
 }
 
 /// Compares two walks; `what` names them.
@@ -65,7 +65,7 @@ fn compare(what: &str, cpu: &Path, vulkan: &Path) {
     }
     assert!(hits >= 15, "{what}: only {hits} hits; the view shows nothing");
     let primary = |output: &Path| -> Vec<Value> {
-        counters(output).into_iter().filter(|record| record["pass"] == "primary").collect()
+        counters(records(output)).into_iter().filter(|record| record["pass"] == "primary").collect()
     };
     assert_eq!(primary(cpu), primary(vulkan), "{what}: records of camera rays");
 }
@@ -177,14 +177,9 @@ fn the_number_of_threads_does_not_show() {
     let run = |threads: &str, options: &str| {
         let output = folder.path().join(format!("threads-{threads}"));
         let path = scene.with_extension("near.json");
-        let options = format!("--quality exact {VIEW} {EFFECTS} {options} --adapter cpu --path {}", path.display());
-        let status = Command::new(env!("CARGO_BIN_EXE_brickwalk"))
-            .env("RAYON_NUM_THREADS", threads)
-            .args(["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()])
-            .args(options.split_whitespace())
-            .status();
-        assert!(status.expect("the command starts").success(), "{options}");
-        (frames(&output), counters(&output))
+        let options = format!("{VIEW} {EFFECTS} {options} --adapter cpu --path {}", path.display());
+        let records = walk_on_threads(&scene, &output, &options, threads);
+        (frames(&output), counters(records))
     };
     for options in ["--schedule chc --cache 20%", "--schedule demand --cache 10%"] {
         let one = run("1", options);

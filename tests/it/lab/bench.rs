@@ -1,7 +1,7 @@
 //! `bench chc` and `bench roma` as a user runs them, on tiny scenes: their files agree with each other and with what
 //! was measured, and a run that was bounded is gone on with.
 
-use crate::common::{brickwalk, folder, succeed};
+use crate::common::{brickwalk, folder, json, succeed};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -14,8 +14,9 @@ fn words<'a>(output: &'a Path, options: &'a str) -> Vec<&'a std::ffi::OsStr> {
     first.into_iter().chain(rest).collect()
 }
 
-fn json(folder: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(folder.join("chc.json")).expect("chc.json")).expect("JSON")
+/// What `bench chc` found.
+fn found(folder: &Path) -> Value {
+    json(&folder.join("chc.json"))
 }
 
 fn cases(folder: &Path) -> Vec<(String, u64)> {
@@ -48,7 +49,7 @@ fn files_agree_and_a_bounded_run_is_gone_on_with() {
     // Nothing fits into no time; the files are there all the same.
     succeed(words(&output, &format!("{options} --minutes 0")));
     assert_eq!(cases(&output), []);
-    assert_eq!(json(&output)["walks"], 0);
+    assert_eq!(found(&output)["walks"], 0);
     succeed(words(&output, "--repeat 1 --stages targets --only pipes"));
     assert!(cases(&output).len() == 6 && cases(&output).iter().all(|(name, _)| name.contains("pipes")));
     succeed(words(&output, "--repeat 1 --stages targets"));
@@ -75,7 +76,7 @@ fn files_agree_and_a_bounded_run_is_gone_on_with() {
 
 /// JSON, CSV, Markdown and HTML hold the same numbers, which follow from the cells, beside the paper's.
 fn agree(output: &Path) {
-    let json = json(output);
+    let json = found(output);
     let table2 = table(&json, "table2");
     let csv = std::fs::read_to_string(output.join("table2.csv")).unwrap();
     let rows = table2["rows"].as_array().unwrap();
@@ -201,9 +202,7 @@ fn occupancy_maps_are_measured_beside_exact_rays() {
         let rest = tiny.split_whitespace().chain(options.split_whitespace()).map(std::ffi::OsStr::new);
         succeed(first.into_iter().chain(rest))
     };
-    let results = || -> Value {
-        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON")
-    };
+    let results = || json(&output.join("roma.json"));
     run("--stages out-of-core --minutes 0");
     assert_eq!(results()["measured"], 0);
     run("--stages out-of-core");
@@ -233,8 +232,7 @@ fn maps_and_bricks_together_are_measured() {
     let output = folder.path().join("out");
     let tiny = "bench roma --triangles 10K --size 32x18 --samples 2 --repeat 1 --adapter cpu --stages handover -o";
     succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
-    let json: Value =
-        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON");
+    let json = json(&output.join("roma.json"));
     // Exact rays, maps, four corrections, all in doubt and three bounds, of two lengths.
     assert_eq!(json["measured"], 20);
     let own = table(&json, "handover");
@@ -256,8 +254,7 @@ fn seams_and_leaks_of_occupancy_maps_are_measured() {
     let output = folder.path().join("out");
     let tiny = "bench roma --triangles 10K --size 64x36 --samples 16 --repeat 1 --adapter cpu --stages seams,leaks -o";
     succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
-    let json: Value =
-        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON");
+    let json = json(&output.join("roma.json"));
     // Exact rays, maps and a field, of two scenes; base maps of two kinds.
     assert_eq!(json["measured"], 8);
     let leaks = table(&json, "leaks")["rows"].as_array().unwrap();
@@ -286,8 +283,7 @@ fn distance_fields_are_measured_beside_occupancy_maps() {
     let output = folder.path().join("out");
     let tiny = "bench roma --triangles 10K --size 32x18 --samples 4 --repeat 1 --adapter cpu --stages shadows -o";
     succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
-    let json: Value =
-        serde_json::from_slice(&std::fs::read(output.join("roma.json")).expect("roma.json")).expect("JSON");
+    let json = json(&output.join("roma.json"));
     // Exact rays, four kinds of maps and a field, of two lights.
     assert_eq!(json["measured"], 12);
     let own = table(&json, "shadows");

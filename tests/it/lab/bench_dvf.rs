@@ -1,7 +1,7 @@
 //! `bench dvf` as a user runs it, on a tiny Cornell box: its files agree with each other, what is measured is not
 //! measured again, and pictures of what moves flicker in the paper's mode alone.
 
-use crate::common::{folder, succeed};
+use crate::common::{folder, json, succeed};
 use serde_json::Value;
 use std::path::Path;
 
@@ -13,7 +13,7 @@ fn run(output: &Path, options: &str) -> String {
 }
 
 fn results(output: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(output.join("dvf.json")).expect("dvf.json")).expect("JSON")
+    json(&output.join("dvf.json"))
 }
 
 fn table<'a>(json: &'a Value, name: &str) -> &'a Value {

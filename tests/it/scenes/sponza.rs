@@ -1,6 +1,6 @@
 //! Real input: Sponza is converted, checked, streamed through a small cache, and looks the same however it is streamed.
 
-use crate::common::{brickwalk, folder, frames, shared_scenes, succeed, walk};
+use crate::common::{brickwalk, folder, frames, records, shared_scenes, succeed, walk};
 
 #[test]
 fn sponza_converts_streams_and_verifies() {
@@ -21,12 +21,7 @@ fn sponza_converts_streams_and_verifies() {
     walk(&scene, &all, &format!("{view} --cache 100% --schedule plain"));
     let picture = frames(&small);
     assert!(picture == frames(&all), "a cache of 2 MiB shows what a resident scene shows");
-    let records = std::fs::read_to_string(small.join("records.jsonl")).expect("records");
-    let evicted: u64 = records
-        .lines()
-        .filter_map(|l| serde_json::from_str::<serde_json::Value>(l).ok())
-        .filter_map(|r| r["bricks_evicted"].as_u64())
-        .sum();
+    let evicted: u64 = records(&small).iter().filter_map(|r| r["bricks_evicted"].as_u64()).sum();
     assert!(evicted > 0, "2 MiB make it stream");
     // Through a cache smaller than its textures: close enough to see tiles of many, it shows the same in core.
     let tiles: u64 = bricks::SceneFile::open(&scene).expect("the scene").resident().tiles.iter().map(|t| t.bytes).sum();
@@ -36,9 +31,7 @@ fn sponza_converts_streams_and_verifies() {
     let [few, whole] = [&least[..], "100%"].map(|cache| {
         let output = folder.path().join(format!("close-{cache}"));
         walk(&scene, &output, &format!("{close} --cache {cache}"));
-        let records = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-        let of = |l: &str| serde_json::from_str::<serde_json::Value>(l).ok()?["bytes_textures"].as_u64();
-        (frames(&output), records.lines().filter_map(of).sum::<u64>())
+        (frames(&output), records(&output).iter().filter_map(|r| r["bytes_textures"].as_u64()).sum::<u64>())
     });
     assert!(few.0 == whole.0, "the least cache shows what a resident scene shows");
     assert!(few.1 > whole.1 && whole.1 > 0, "tiles are streamed: {} bytes, {} in core", few.1, whole.1);

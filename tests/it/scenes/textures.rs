@@ -1,7 +1,7 @@
 //! Textures out of core: pictures do not depend on which tiles fit into the cache, records count what is loaded, damage
 //! is named.
 
-use crate::common::{brickwalk, folder, frames, succeed, walk};
+use crate::common::{brickwalk, folder, frames, records, succeed, walk};
 use bricks::{Payload, SceneFile};
 use serde_json::Value;
 use std::fmt::Write;
@@ -45,11 +45,6 @@ fn convert(input: &Path, name: &str, options: &str) -> PathBuf {
 
 fn info(scene: &Path) -> Value {
     serde_json::from_str(&succeed(["info".as_ref(), scene.as_os_str(), "--json".as_ref()])).expect("JSON")
-}
-
-fn records(output: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
 }
 
 fn total(records: &[Value], field: &str) -> u64 {

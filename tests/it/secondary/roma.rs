@@ -1,7 +1,7 @@
 //! `walk --secondary roma` and `--secondary df`, the baseline: pictures against closed forms, what it loads and
 //! records, that it is the same again and again.
 
-use crate::common::{self, city, converted, folder, frames, sheet};
+use crate::common::{self, city, converted, folder, frames, sheet, sum, walk_on_threads};
 use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::kernels::layout::NONE;
 use brickwalk::reference::Truth;
@@ -15,7 +15,6 @@ use brickwalk::session::open_scene;
 use glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 const SIZE: usize = 48;
 
@@ -329,19 +328,7 @@ const VIEW: &str = "--frames 2 --size 64x48 --tile 16 --effects shadow,ao --ao-r
 
 fn walk_of(scene: &Path, output: &Path, options: &str, threads: &str) -> Vec<Value> {
     let path = scene.with_extension("near.json");
-    let options = format!("--quality exact {VIEW} {options} --path {}", path.display());
-    let status = Command::new(env!("CARGO_BIN_EXE_brickwalk"))
-        .env("RAYON_NUM_THREADS", threads)
-        .args(["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), output.as_os_str()])
-        .args(options.split_whitespace())
-        .status();
-    assert!(status.expect("the command starts").success(), "{options}");
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
-}
-
-fn sum(records: &[Value], pass: &str, field: &str) -> f64 {
-    records.iter().filter(|r| r["pass"] == pass).map(|r| r[field].as_f64().expect("a number")).sum()
+    walk_on_threads(scene, output, &format!("{VIEW} {options} --path {}", path.display()), threads)
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Diffuse light by `walk --secondary roma`, whose hits reflective shadow maps light: against closed forms and exact
 //! rays, what it loads, that it is the same again and again.
 
-use crate::common::{self, city, converted, folder, sheet};
+use crate::common::{self, city, converted, folder, sheet, sum};
 use brickwalk::frame::{FrameOutput, Renderer};
 use brickwalk::kernels::lamps::{Emitter, Lamps, Shape};
 use brickwalk::scene::Camera;
@@ -190,12 +190,7 @@ fn points_and_spots_light_a_room_as_exact_rays_do_but_for_cells() {
 fn records(scene: &Path, output: &Path, options: &str) -> Vec<Value> {
     let path = scene.with_extension("near.json");
     common::walk(scene, output, &format!("--adapter cpu --size 64x48 --tile 16 --path {} {options}", path.display()));
-    let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
-    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
-}
-
-fn sum(records: &[Value], pass: &str, field: &str) -> f64 {
-    records.iter().filter(|r| r["pass"] == pass).map(|r| r[field].as_f64().expect("a number")).sum()
+    common::records(output)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The generated city as a whole: counts, determinism, the fixed centre, sound geometry, and the way through it.
 
-use crate::common::{clearance, position, same_mesh, triangles};
+use crate::common::{clearance, filled, position, same_mesh, triangles};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source, SourceScene};
 use brickwalk_scenes::{CameraPath, Error, Kind, Scene, Settings, generate, write_paths};
@@ -185,21 +185,10 @@ fn the_path_above_sees_the_whole_city() {
     let points: Vec<DVec3> =
         blocks.flat_map(|m| &m.primitives).flat_map(|p| &p.positions).map(|p| DVec3::from_array(*p)).collect();
     let roofs = points.iter().map(|p| p.y).fold(0.0, f64::max);
-    let slope = (0.5 * path.fov_y_degrees).to_radians().tan();
-    let mut widest = 0f64;
     for k in &path.keyframes {
-        let (eye, target) = (DVec3::from_array(k.position), DVec3::from_array(k.target));
-        assert!(eye.y > roofs, "{} above {roofs}", eye.y);
-        let forward = (target - eye).normalize();
-        let right = forward.cross(DVec3::Y).normalize();
-        let up = right.cross(forward);
-        for p in &points {
-            let d = *p - eye;
-            let (x, y) = (d.dot(right) / d.dot(forward) / slope, d.dot(up) / d.dot(forward) / slope);
-            assert!(d.dot(forward) > 0.0 && x.abs() <= 4.0 / 3.0 && y.abs() <= 1.0, "{p} is at {x} {y}");
-            widest = widest.max(0.75 * x.abs()).max(y.abs());
-        }
+        assert!(k.position[1] > roofs, "{} above {roofs}", k.position[1]);
     }
+    let widest = filled(&path, &points, "city");
     assert!(widest > 0.85, "the city fills the picture to {widest} only");
 }
 

@@ -31,6 +31,26 @@ pub fn triangles(scene: &SourceScene) -> impl Iterator<Item = [DVec3; 3]> {
     })
 }
 
+/// How much of a picture of 4 by 3 points fill at the most, as a share of its width or height, whichever is more.
+/// Checks that all of them are within it in every keyframe. `what` names them.
+pub fn filled(path: &CameraPath, points: &[DVec3], what: &str) -> f64 {
+    let slope = (0.5 * path.fov_y_degrees).to_radians().tan();
+    let mut widest = 0.0f64;
+    for k in 0..path.keyframes.len() {
+        let eye = position(path, k);
+        let forward = (DVec3::from_array(path.keyframes[k].target) - eye).normalize();
+        let right = forward.cross(DVec3::Y).normalize();
+        let up = right.cross(forward);
+        for p in points {
+            let d = *p - eye;
+            let (x, y) = (d.dot(right) / d.dot(forward) / slope, d.dot(up) / d.dot(forward) / slope);
+            assert!(d.dot(forward) > 0.0 && x.abs() <= 4.0 / 3.0 && y.abs() <= 1.0, "{what}: {p} is at {x} {y}");
+            widest = widest.max(0.75 * x.abs()).max(y.abs());
+        }
+    }
+    widest
+}
+
 /// Distance from a point to a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
 pub fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let (ab, ac, ap) = (b - a, c - a, p - a);

@@ -1,7 +1,7 @@
 //! What holds for generated scenes of every kind: counts, parts, determinism, sound geometry, and the ways through
 //! them.
 
-use crate::common::{clearance, position, same_mesh, triangles};
+use crate::common::{clearance, filled, position, same_mesh, triangles};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source};
 use brickwalk_scenes::{Kind, Scene, Settings, generate};
@@ -210,25 +210,12 @@ fn far_paths_see_everything() {
     for kind in Kind::ALL {
         let scene = scene(kind, 500_000, 1);
         let path = scene.far_path();
-        let slope = (0.5 * path.fov_y_degrees).to_radians().tan();
         let mut points: Vec<DVec3> = triangles(&scene.whole()).map(|t| t[0]).collect();
         if kind != Kind::Terrain {
             // The land around is meant to reach out of the picture.
             points.retain(|p| p.y > 0.5);
         }
-        let mut widest = 0.0f64;
-        for k in 0..path.keyframes.len() {
-            let eye = position(&path, k);
-            let forward = (DVec3::from_array(path.keyframes[k].target) - eye).normalize();
-            let right = forward.cross(DVec3::Y).normalize();
-            let up = right.cross(forward);
-            for p in &points {
-                let d = *p - eye;
-                let (x, y) = (d.dot(right) / d.dot(forward) / slope, d.dot(up) / d.dot(forward) / slope);
-                assert!(d.dot(forward) > 0.0 && x.abs() <= 4.0 / 3.0 && y.abs() <= 1.0, "{kind}: {p} is at {x} {y}");
-                widest = widest.max(0.75 * x.abs()).max(y.abs());
-            }
-        }
+        let widest = filled(&path, &points, &kind.to_string());
         assert!(widest > 0.7, "{kind} fills the picture to {widest} only");
     }
 }
