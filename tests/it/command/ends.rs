@@ -4,7 +4,6 @@
 use crate::common::{brickwalk, city, folder, names, skip, succeed, wait_for, walk};
 use brickwalk::session::picture_bytes::PictureBytes;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
