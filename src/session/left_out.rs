@@ -32,54 +32,27 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let fits = renderer.cache.residency.budget_bytes() >= renderer.cache.sizes.sum();
-    let all: [(bool, LeftOut); 7] = [
-        (
-            fits,
-            LeftOut {
-                what: "queries for missing bricks",
-                why: "the cache holds every brick and tile",
-                keep: Some(|keep| keep.queries = true),
-            },
-        ),
-        (
-            !manifest.has_textures,
-            LeftOut {
-                what: "texture lookups",
-                why: "no material has a texture",
-                keep: Some(|keep| keep.textures = true),
-            },
-        ),
+    let all: [(bool, &str, &str, Option<fn(&mut Keep)>); 7] = [
+        (fits, "queries for missing bricks", "the cache holds every brick and tile", Some(|keep| keep.queries = true)),
+        (!manifest.has_textures, "texture lookups", "no material has a texture", Some(|keep| keep.textures = true)),
         (
             !opacity::is_needed(resident),
-            LeftOut {
-                what: "alpha tests in traversal",
-                why: "no ray passes through a triangle",
-                keep: Some(|keep| keep.opacity = true),
-            },
+            "alpha tests in traversal",
+            "no ray passes through a triangle",
+            Some(|keep| keep.opacity = true),
         ),
         (
             !reflectance::is_needed(resident),
-            LeftOut {
-                what: "reflections other than diffuse ones",
-                why: "every surface is Lambertian",
-                keep: Some(|keep| keep.gloss = true),
-            },
+            "reflections other than diffuse ones",
+            "every surface is Lambertian",
+            Some(|keep| keep.gloss = true),
         ),
-        (
-            !manifest.has_instances,
-            LeftOut { what: "instance transforms", why: "everything is baked into the world", keep: None },
-        ),
-        (
-            has_short_rays,
-            LeftOut {
-                what: "occupancy maps for ao",
-                why: "its rays are shorter than three cells of bricks",
-                keep: None,
-            },
-        ),
-        (!manifest.has_wide_bricks, LeftOut { what: "two-part vertices", why: "every brick is near", keep: None }),
+        (!manifest.has_instances, "instance transforms", "everything is baked into the world", None),
+        (has_short_rays, "occupancy maps for ao", "its rays are shorter than three cells of bricks", None),
+        (!manifest.has_wide_bricks, "two-part vertices", "every brick is near", None),
     ];
-    all.into_iter().filter(|(is_left_out, _)| *is_left_out).map(|(_, one)| one).collect()
+    let all = all.into_iter().filter(|(is_left_out, ..)| *is_left_out);
+    all.map(|(_, what, why, keep)| LeftOut { what, why, keep }).collect()
 }
 
 /// Whether maps would have spared rays of ao that are too short for it.
