@@ -2,8 +2,7 @@
 
 use bricks::ending::{Temporary, can_fail};
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::fmt::{self, Write as _};
-use std::io::Write as _;
+use std::io::Write;
 use std::sync::atomic::{AtomicBool, AtomicPtr, Ordering};
 
 /// The system's allocator. Where it has no more and the one who asks cannot do without, the process ends.
@@ -57,15 +56,17 @@ fn end(bytes: usize) -> ! {
         // SAFETY: it was allocated with this layout, and is given back once.
         unsafe { System.dealloc(reserved, RESERVE) };
     }
-    let mut line = Line::default();
-    // What does not fit is cut off.
+    // On the stack; what does not fit is cut off.
+    let mut text = [0; 256];
+    let mut rest = &mut text[..];
     let _ = writeln!(
-        line,
+        rest,
         "brickwalk: out of memory: {:.1} MiB more are needed; give a smaller --size, --cache or --memory, fewer \
          --threads, or raise the limit of memory (ulimit -v)",
         bytes as f64 / f64::from(1 << 20)
     );
-    let _ = std::io::stderr().write_all(&line.text[..line.length]);
+    let length = 256 - rest.len();
+    let _ = std::io::stderr().write_all(&text[..length]);
     Temporary::remove_all();
     exit()
 }
@@ -79,27 +80,6 @@ fn exit() -> ! {
     }
     #[cfg(not(unix))]
     std::process::exit(1)
-}
-
-/// A line on the stack.
-struct Line {
-    text: [u8; 256],
-    length: usize,
-}
-
-impl Default for Line {
-    fn default() -> Self {
-        Self { text: [0; 256], length: 0 }
-    }
-}
-
-impl fmt::Write for Line {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        let count = text.len().min(self.text.len() - self.length);
-        self.text[self.length..][..count].copy_from_slice(&text.as_bytes()[..count]);
-        self.length += count;
-        Ok(())
-    }
 }
 
 /// Sets memory aside for the end, and has files that grow beyond a limit (`ulimit -f`) fail as a full disk does, in
