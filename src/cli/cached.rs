@@ -95,7 +95,7 @@ pub fn scene(path: &Path) -> Result<PathBuf> {
     std::fs::create_dir_all(folder).with_context(|| {
         format!("{}: cannot make this folder for converted models; name another in {FOLDER_VARIABLE}", folder.display())
     })?;
-    let lock = Lock::take(&file.with_extension("lock"), path)?;
+    let lock = lock(&file.with_extension("lock"), path)?;
     if is_current(&file) {
         say(&format!("{}: converted before, as {}", path.display(), file.display()));
     } else {
@@ -146,29 +146,19 @@ fn say(line: &str) {
     }
 }
 
-/// The right to convert a model, which other processes wait for.
-struct Lock(File);
-
-impl Lock {
-    fn take(path: &Path, model: &Path) -> Result<Self> {
-        let file = File::options().create(true).truncate(false).write(true).open(path);
-        let file = file.with_context(|| {
-            format!("{}: cannot write to this folder; name another in {FOLDER_VARIABLE}", path.display())
-        })?;
-        if let Err(std::fs::TryLockError::WouldBlock) = file.try_lock() {
-            say(&format!("{}: another process converts it; waiting", model.display()));
-            // Some file systems have no locks: then the scene is written twice, each time whole.
-            let _ = file.lock();
-        }
-        Ok(Self(file))
+/// The right to convert a model, which other processes wait for until the file is closed. It stays: whoever waits has
+/// it open.
+fn lock(path: &Path, model: &Path) -> Result<File> {
+    let file = File::options().create(true).truncate(false).write(true).open(path);
+    let file = file.with_context(|| {
+        format!("{}: cannot write to this folder; name another in {FOLDER_VARIABLE}", path.display())
+    })?;
+    if let Err(std::fs::TryLockError::WouldBlock) = file.try_lock() {
+        say(&format!("{}: another process converts it; waiting", model.display()));
+        // Some file systems have no locks: then the scene is written twice, each time whole.
+        let _ = file.lock();
     }
-}
-
-impl Drop for Lock {
-    fn drop(&mut self) {
-        // The file stays: whoever waits has it open.
-        let _ = self.0.unlock();
-    }
+    Ok(file)
 }
 
 #[cfg(test)]
