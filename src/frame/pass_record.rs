@@ -16,6 +16,11 @@ struct EffectRecord {
     stats: Counters,
 }
 
+/// What is done as a part of an effect, and counts for it.
+pub trait Work: FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError> {}
+
+impl<W: FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>> Work for W {}
+
 impl FrameRecords {
     /// Of nothing yet.
     pub fn new(frame: u32) -> Self {
@@ -31,12 +36,7 @@ impl FrameRecords {
     ///
     /// # Errors
     /// The work's.
-    pub fn pass(
-        &mut self,
-        engine: &mut Engine,
-        name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
-    ) -> Result<(), ExecutorError> {
+    pub fn pass(&mut self, engine: &mut Engine, name: &'static str, work: impl Work) -> Result<(), ExecutorError> {
         engine.cache.begin_pass(name, self.frame);
         self.more(engine, name, work)
     }
@@ -45,12 +45,7 @@ impl FrameRecords {
     ///
     /// # Errors
     /// The work's.
-    pub fn work(
-        &mut self,
-        engine: &mut Engine,
-        name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
-    ) -> Result<(), ExecutorError> {
+    pub fn work(&mut self, engine: &mut Engine, name: &'static str, work: impl Work) -> Result<(), ExecutorError> {
         engine.cache.begin_pass(name, self.frame);
         self.count(engine, name, work)
     }
@@ -59,12 +54,7 @@ impl FrameRecords {
     ///
     /// # Errors
     /// The work's.
-    pub fn more(
-        &mut self,
-        engine: &mut Engine,
-        name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
-    ) -> Result<(), ExecutorError> {
+    pub fn more(&mut self, engine: &mut Engine, name: &'static str, work: impl Work) -> Result<(), ExecutorError> {
         self.count(engine, name, work)?;
         match &mut engine.captures {
             Some(captures) => captures.note(&mut *engine.executor, name),
@@ -73,12 +63,7 @@ impl FrameRecords {
     }
 
     /// Does `work` and counts it for the effect `name`.
-    fn count(
-        &mut self,
-        engine: &mut Engine,
-        name: &'static str,
-        work: impl FnOnce(&mut Engine, &mut Counters) -> Result<(), ExecutorError>,
-    ) -> Result<(), ExecutorError> {
+    fn count(&mut self, engine: &mut Engine, name: &'static str, work: impl Work) -> Result<(), ExecutorError> {
         let resident = |engine: &Engine| engine.cache.residency.resident().count() as u64;
         let index = self.effects.iter().position(|effect| effect.name == name).unwrap_or_else(|| {
             let stats = Counters { bricks_resident_start: resident(engine), ..Counters::default() };
