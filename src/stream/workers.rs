@@ -228,15 +228,9 @@ impl Workers {
 
 /// The text of a panic.
 fn panic_text(panic: Box<dyn Any + Send>) -> String {
-    match panic.downcast::<String>() {
-        Ok(text) => *text,
-        Err(panic) => match panic.downcast::<&'static str>() {
-            Ok(text) => (*text).to_owned(),
-            Err(panic) => {
-                // Dropping what somebody panicked with may panic again and would end the thread.
-                std::mem::forget(panic);
-                "no text".to_owned()
-            }
-        },
-    }
+    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+    let text = text.unwrap_or("no text").to_owned();
+    // Dropping what somebody panicked with may panic again and would end the thread.
+    std::mem::forget(panic);
+    text
 }
