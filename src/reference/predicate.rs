@@ -5,6 +5,7 @@
 //! opposite signs and not all are zero; then D = U + V + W is not zero either, and t = N / D with N = a·(b×c).
 
 use super::ray::TruthRay;
+use glam::DVec3;
 use num_bigint::BigInt;
 use num_traits::ToPrimitive;
 use std::cmp::Ordering;
@@ -28,23 +29,14 @@ pub(super) struct Crossing {
 }
 
 /// A vertex relative to the ray's origin, and a bound of the magnitudes that went into it.
-fn relative(ray: &TruthRay, vertex: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-    let from_reference: [f64; 3] = std::array::from_fn(|k| vertex[k] - ray.reference[k]);
-    let value = std::array::from_fn(|k| from_reference[k] - ray.origin[k]);
-    (value, std::array::from_fn(|k| from_reference[k].abs() + ray.origin[k].abs()))
-}
-
-fn cross_f64(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+fn relative(ray: &TruthRay, vertex: [f64; 3]) -> (DVec3, DVec3) {
+    let (from_reference, origin) = (DVec3::from(vertex) - DVec3::from(ray.reference), DVec3::from(ray.origin));
+    (from_reference - origin, from_reference.abs() + origin.abs())
 }
 
 /// a × b with every subtraction an addition.
-fn permanent(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]]
-}
-
-fn dot_f64(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn permanent(a: DVec3, b: DVec3) -> DVec3 {
+    DVec3::new(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x)
 }
 
 /// A vector of whole numbers.
@@ -115,11 +107,10 @@ impl Exact {
 /// Where the line of `ray` meets the closed triangle, whatever t; `None` if it does not, or lies in its plane.
 pub(super) fn crossing(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
     let [(a, ma), (b, mb), (c, mc)] = triangle.map(|vertex| relative(ray, vertex));
-    let d = ray.direction;
-    let md = d.map(f64::abs);
-    let normals = [cross_f64(b, c), cross_f64(c, a), cross_f64(a, b)];
-    let edges = normals.map(|n| dot_f64(d, n));
-    let errors = [(mb, mc), (mc, ma), (ma, mb)].map(|(p, q)| TRIPLE_ERROR * dot_f64(md, permanent(p, q)));
+    let d = DVec3::from(ray.direction);
+    let normals = [b.cross(c), c.cross(a), a.cross(b)];
+    let edges = normals.map(|n| d.dot(n));
+    let errors = [(mb, mc), (mc, ma), (ma, mb)].map(|(p, q)| TRIPLE_ERROR * d.abs().dot(permanent(p, q)));
 
     // Two edges certain to have opposite signs: a miss, by far the most frequent case.
     let certain = |k: usize, sign: f64| edges[k] * sign > errors[k];
@@ -128,8 +119,8 @@ pub(super) fn crossing(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Option<Crossi
     }
     let all_certain = (0..3).all(|k| edges[k].abs() > errors[k]);
     let determinant = edges[0] + edges[1] + edges[2];
-    let numerator = dot_f64(a, normals[0]);
-    let numerator_error = TRIPLE_ERROR * dot_f64(ma, permanent(mb, mc));
+    let numerator = a.dot(normals[0]);
+    let numerator_error = TRIPLE_ERROR * ma.dot(permanent(mb, mc));
     let determinant_error = errors[0] + errors[1] + errors[2] + 2.0 * ROUNDING * determinant.abs();
     let relative_error = numerator_error / numerator.abs() + determinant_error / determinant.abs() + 2.0 * ROUNDING;
     if all_certain && relative_error < 1e-12 {

@@ -45,9 +45,9 @@ fn exact(cells: u32) -> Settings {
 /// that they reach into by as much.
 fn brute(like: &Bom, triangles: &[[[f64; 3]; 3]], tolerance: f64) -> Bom {
     let mut map = Bom::new(like.cells(), like.cell_log2, like.first);
+    let first = DVec3::from(like.first.map(|x| x as f64));
     for triangle in triangles {
-        let local = triangle.map(|p| std::array::from_fn(|k| p[k] / like.side() - like.first[k] as f64));
-        touched(&mut map, &local, tolerance);
+        touched(&mut map, triangle.map(|p| DVec3::from(p) / like.side() - first), tolerance);
     }
     map
 }
