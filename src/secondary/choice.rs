@@ -1,6 +1,7 @@
 //! The methods by name, and which of them answers the secondary rays of which effect.
 
 use crate::settings::removed::unknown;
+use crate::settings::value::value_of_text;
 use crate::settings::{Plain, Rule, Value, names};
 use std::fmt;
 use std::str::FromStr;
@@ -136,15 +137,7 @@ impl fmt::Display for EffectMethods {
     }
 }
 
-impl Value for EffectMethods {
-    fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
-        text.parse()
-    }
-
-    fn plain(&self) -> Plain {
-        Plain::Text(self.to_string())
-    }
-}
+value_of_text!(EffectMethods; false);
 
 #[cfg(test)]
 mod tests {
