@@ -66,7 +66,7 @@ pub struct Room {
 }
 
 /// Whether the device is what an error is about.
-fn is_of_device(error: &anyhow::Error) -> bool {
+pub fn is_of_device(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| matches!(cause.downcast_ref(), Some(ExecutorError::Device(_))))
 }
 

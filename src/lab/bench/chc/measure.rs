@@ -10,11 +10,10 @@ use crate::lab::bench::scenes::{self, Place, empty_cache};
 use crate::lab::console::Console;
 use crate::output::srgb;
 use crate::scene::path::CameraPath;
-use crate::schedule::ExecutorError;
 use crate::schedule::auto::Auto;
 use crate::schedule::fronts::Fronts;
 use crate::session::Settings as WalkSettings;
-use crate::session::opened::scaled_threshold;
+use crate::session::opened::{is_of_device, scaled_threshold};
 use crate::session::renderer::render_settings;
 use crate::settings::{Adapter, CacheSize, EffectList, Turn};
 use crate::stream::Item;
@@ -83,14 +82,14 @@ impl<'a> Bench<'a> {
         let mut opened = open(if wants_binary { PLAIN_BVH2 } else { case.variant });
         if let Err(error) = &opened
             && wants_binary
-            && of_device(error)
+            && is_of_device(error)
         {
             binary = Err(format!("{error:#}"));
             opened = open(PLAIN);
         }
         let renderer = match opened {
             Ok(renderer) => renderer,
-            Err(error) if of_device(&error) => return Err(DoesNotFit(format!("{error:#}")).into()),
+            Err(error) if is_of_device(&error) => return Err(DoesNotFit(format!("{error:#}")).into()),
             Err(error) => return Err(error),
         };
         let mut bench = Self { renderer, settings, place, adapter, binary };
@@ -209,11 +208,6 @@ fn note(passes: &mut Passes, record: &Record) -> Result<()> {
         fields.entry(name.to_string()).or_default().push((value * 1e3).round() * 1e-3);
     }
     Ok(())
-}
-
-/// Whether the device is what an error is about.
-fn of_device(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| matches!(cause.downcast_ref(), Some(ExecutorError::Device(_))))
 }
 
 /// The settings of a walk.
