@@ -136,7 +136,7 @@ fn mie_phase(c: f64) -> f64 {
 
 impl SkyModel {
     /// Computes the tables.
-    pub fn new() -> Self {
+    pub fn computed() -> Self {
         let transmittance = Table::new(256, 64, |r, mu| {
             let (length, reaches_ground) = end(r, mu);
             if reaches_ground {
@@ -285,12 +285,6 @@ impl SkyModel {
     }
 }
 
-impl Default for SkyModel {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -307,7 +301,7 @@ mod tests {
     /// Looking down one sees what the ground reflects of the light that there is, and no more.
     #[test]
     fn the_ground_shows_the_light_that_falls_on_it() {
-        let (model, sun) = (SkyModel::new(), [0.0, 0.8, -0.6]);
+        let (model, sun) = (SkyModel::computed(), [0.0, 0.8, -0.6]);
         for scales in [[1.0, 1.0], [2.0, 5.0], [0.0, 1.0], [3.0, 0.0]] {
             let image = model.image(sun, scales, [16, 256]);
             let sky = SkyModel::irradiance(&image);
@@ -330,7 +324,7 @@ mod tests {
 
     #[test]
     fn the_sky_is_blue_by_day_red_at_dusk_and_finite_at_night() {
-        let model = SkyModel::new();
+        let model = SkyModel::computed();
         let at = |elevation: f64| {
             let (up, level) = elevation.to_radians().sin_cos();
             model.image([0.0, up, -level], [1.0; 2], [64, 32])
@@ -358,7 +352,8 @@ mod tests {
         }
         assert!(before < 1e-6, "{before}");
         // Light of all orders is more than light of one.
-        let once = SkyModel { multiple: Table { columns: 2, rows: 2, values: vec![[0.0; 3]; 4] }, ..SkyModel::new() };
+        let once =
+            SkyModel { multiple: Table { columns: 2, rows: 2, values: vec![[0.0; 3]; 4] }, ..SkyModel::computed() };
         let single = SkyModel::irradiance(&once.image([0.0, 0.5, -0.866], [1.0; 2], [64, 32]))[2];
         let all = SkyModel::irradiance(&model.image([0.0, 0.5, -0.866], [1.0; 2], [64, 32]))[2];
         assert!((1.05..2.5).contains(&(all / single)), "{}", all / single);

@@ -156,7 +156,7 @@ fn punctual(light: &PunctualLight, scale: f64) -> Emitter {
 /// The sky of the sun of `light`, which takes the colour that the air leaves it, over a ground that both light. At an
 /// elevation of 45 degrees both are as bright as those that they replace.
 fn physical_sky(light: &mut Light, sun_intensity: f64, sky_intensity: f64) -> Equirectangular {
-    let model = SkyModel::new();
+    let model = SkyModel::computed();
     let luminance = |c: [f64; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
     let [usual_sun, usual_sky] = Light::usual_luminance();
     let half = std::f64::consts::FRAC_1_SQRT_2;
