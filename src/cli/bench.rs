@@ -7,7 +7,7 @@ use crate::cli::output::{Usage, print};
 use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
 use crate::lab::bench::dvf::args::DvfBenchArgs;
 use crate::lab::bench::roma::args::RomaBenchArgs;
-use crate::lab::bench::{self, Experiment};
+use crate::lab::bench::{chc, dvf, executors, roma};
 use crate::lab::console::Console;
 use crate::lab::selftest;
 use crate::lab::selftest::args::SelftestArgs;
@@ -84,21 +84,23 @@ struct MeasuredScenes {
 /// # Errors
 /// Those of the experiment.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let experiment = match &args.experiments {
-        Experiments::Chc(own) => Experiment::Chc(ChcArgs { output: own.output.clone(), ..own.options.over(None)? }),
-        Experiments::Executors(own) => {
-            Experiment::Executors(ExecutorsArgs { output: own.output.clone(), ..own.options.over(None)? })
+    let console = console();
+    let done = match &args.experiments {
+        Experiments::Chc(Measured { output, options }) => {
+            chc::run(&ChcArgs { output: output.clone(), ..options.over(None)? }, console)
         }
-        Experiments::Roma(own) => {
-            Experiment::Roma(RomaBenchArgs { output: own.output.clone(), ..own.options.over(None)? })
+        Experiments::Executors(Measured { output, options }) => {
+            executors::run(&ExecutorsArgs { output: output.clone(), ..options.over(None)? }, console)
         }
-        Experiments::Dvf(MeasuredScenes { scenes, measured: own }) => Experiment::Dvf(DvfBenchArgs {
-            scenes: Lines(scenes.clone()),
-            output: own.output.clone(),
-            ..own.options.over(None)?
-        }),
+        Experiments::Roma(Measured { output, options }) => {
+            roma::run(&RomaBenchArgs { output: output.clone(), ..options.over(None)? }, console)
+        }
+        Experiments::Dvf(MeasuredScenes { scenes, measured: Measured { output, options } }) => {
+            let (scenes, output) = (Lines(scenes.clone()), output.clone());
+            dvf::run(&DvfBenchArgs { scenes, output, ..options.over(None)? }, console)
+        }
     };
-    bench::run(&experiment, console()).map_err(in_words)
+    done.map_err(in_words)
 }
 
 /// What the laboratory talks to: standard output, and Ctrl-C.
