@@ -36,11 +36,6 @@ fn zone(row: u32, height: u32) -> f64 {
     2.0 * PI * (at(row) - at(row + 1))
 }
 
-fn luminance(c: [f32; 3]) -> f64 {
-    let [r, g, b] = c.map(f64::from);
-    0.2126 * r + 0.7152 * g + 0.0722 * b
-}
-
 impl Equirectangular {
     /// Of `radiance` by unit direction, taken at the centres of the texels.
     pub fn of(width: u32, height: u32, radiance: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
@@ -158,11 +153,16 @@ fn terms([x, y, z]: [f64; 3]) -> [f64; 9] {
     [1.0, y, z, x, x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y]
 }
 
+/// Luminance of linear Rec. 709 radiance.
+pub fn luminance(c: [f64; 3]) -> f64 {
+    0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
+}
+
 /// The texels with the densities by which they are drawn, and their table. A texel's weight is the luminance that
 /// lookups between texel centres have over it on average: wherever such a lookup finds light, directions are drawn.
 fn drawn(image: &Equirectangular) -> (Vec<[f32; 4]>, Vec<[u32; 2]>) {
     let (width, height) = (image.width as usize, image.height as usize);
-    let light: Vec<f64> = image.texels.iter().map(|texel| luminance(*texel)).collect();
+    let light: Vec<f64> = image.texels.iter().map(|texel| luminance(texel.map(f64::from))).collect();
     // Means of tents over the cells beside and around their peaks.
     let blend = |before: f64, at: f64, after: f64| 0.125 * (before + after) + 0.75 * at;
     let across: Vec<f64> = (0..width * height)

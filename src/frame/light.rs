@@ -1,6 +1,6 @@
 //! Sun, sky and the lamps beside them.
 
-use super::environment::Equirectangular;
+use super::environment::{Equirectangular, luminance};
 use crate::kernels::Lamps;
 use glam::DVec3;
 use std::sync::Arc;
@@ -56,8 +56,4 @@ impl Light {
             if up < 0.0 { mix(horizon, ground, (-up * 8.0).min(1.0)) } else { mix(horizon, sky, up.sqrt()) }
         })
     }
-}
-
-fn luminance(c: [f64; 3]) -> f64 {
-    0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
 }

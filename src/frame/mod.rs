@@ -23,7 +23,7 @@ pub use capture::{Captures, EffectError};
 pub use effects::{Effects, Occlusion};
 pub use emissive::{MOST_TRIANGLES, ShiningTriangles, emissive_triangles};
 pub use engine::{Engine, RenderSettings, Schedule};
-pub use environment::{EnvironmentNotes, Equirectangular, environment};
+pub use environment::{EnvironmentNotes, Equirectangular, environment, luminance};
 pub use guides::{GuideReader, Guides, Seen};
 pub use light::Light;
 pub use moved::{InstanceMotion, Moved};

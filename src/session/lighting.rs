@@ -2,7 +2,7 @@
 
 use crate::frame::{
     EnvironmentNotes, Equirectangular, Light, MOST_TRIANGLES, ShiningTriangles, SkyModel, emissive_triangles,
-    environment,
+    environment, luminance,
 };
 use crate::kernels::Lamps;
 use crate::kernels::lamps::{Emitter, Shape};
@@ -157,7 +157,6 @@ fn punctual(light: &PunctualLight, scale: f64) -> Emitter {
 /// elevation of 45 degrees both are as bright as those that they replace.
 fn physical_sky(light: &mut Light, sun_intensity: f64, sky_intensity: f64) -> Equirectangular {
     let model = SkyModel::computed();
-    let luminance = |c: [f64; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
     let [usual_sun, usual_sky] = Light::usual_luminance();
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let reference = SkyModel::irradiance(&model.image([0.0, half, -half], [1.0; 2], [128, 64]));
