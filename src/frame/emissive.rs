@@ -3,8 +3,7 @@
 use super::triangles::{Triangles, placed, triangles, words};
 use crate::kernels::lamps::{Emitter, Shape};
 use bricks::{
-    AttributeLayout, INSTANCE_MIRRORED, Instance, MATERIAL_DOUBLE_SIDED, Object, Payload, Resident, SURFACE_MATERIAL,
-    SceneFile,
+    AttributeLayout, INSTANCE_MIRRORED, Instance, MATERIAL_DOUBLE_SIDED, Payload, Resident, SURFACE_MATERIAL, SceneFile,
 };
 use glam::DVec3;
 
@@ -42,7 +41,7 @@ pub fn emissive_triangles(file: &SceneFile, most: u64) -> Result<Result<ShiningT
         let shines = |brick: &u32| resident.bricks[*brick as usize].mean_emission.iter().any(|&c| c > 0.0);
         let mut triangles: Vec<Shining> = Vec::new();
         for brick in bricks.filter(shines) {
-            append(file, object, brick, &mut triangles)?;
+            append(file, brick, &mut triangles)?;
         }
         // Parts of a triangle that was split are the whole one.
         triangles.sort_by_key(|triangle| triangle.local_id);
@@ -89,11 +88,11 @@ fn emitter(resident: &Resident, triangle: &Shining, place: &Instance) -> Emitter
 }
 
 /// Appends the triangles of a brick that shine.
-fn append(file: &SceneFile, object: &Object, index: u32, out: &mut Vec<Shining>) -> Result<(), bricks::Error> {
+fn append(file: &SceneFile, index: u32, out: &mut Vec<Shining>) -> Result<(), bricks::Error> {
     let brick = &file.resident().bricks[index as usize];
     let attributes = words(file, Payload::Attributes(index))?;
     let surfaces = &attributes[AttributeLayout::of(brick).surfaces as usize / 4..];
-    let Triangles { corners, local_ids } = triangles(file, object, index)?;
+    let Triangles { corners, local_ids } = triangles(file, index)?;
     for ((vertices, local_id), surface) in corners.into_iter().zip(local_ids).zip(surfaces) {
         let material = surface & SURFACE_MATERIAL;
         if file.resident().materials[material as usize].emission.iter().any(|&c| c > 0.0) {

@@ -2,20 +2,15 @@
 
 use super::moved::stands_elsewhere;
 use super::{Displaced, Renderer};
+use crate::scene::placement::{affine, leaf_box};
 use bricks::{PlaceError, Resident, SceneFile};
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use std::sync::Arc;
-
-fn affine(m: &[f64; 12]) -> DAffine3 {
-    let column = |k: usize| DVec3::new(m[k], m[4 + k], m[8 + k]);
-    DAffine3::from_cols(column(0), column(1), column(2), column(3))
-}
 
 /// The boxes of the bricks of instances, world units; `instances` ascend.
 fn boxes(resident: &Resident, instances: &[u32]) -> Vec<[DVec3; 2]> {
-    let step = f64::from(resident.objects[0].step_log2).exp2();
     let leaves = resident.leaves.iter().filter(|leaf| instances.binary_search(&leaf.instance).is_ok());
-    leaves.map(|leaf| resident.leaf_box(leaf).map(|p| DVec3::from_array(p.map(|x| x as f64)) * step)).collect()
+    leaves.map(|leaf| leaf_box(resident, leaf)).collect()
 }
 
 impl Renderer {

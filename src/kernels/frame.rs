@@ -5,8 +5,9 @@
 //! "Positions".
 
 use super::layout;
+use crate::scene::placement::affine;
 use bricks::{BRICK_WIDE, Brick, ORIGIN_STEPS, Resident, WIDE_HIGH_STEPS};
-use glam::{DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// 2^e for any e that f64 holds.
 fn exp2(e: i32) -> f64 {
@@ -131,10 +132,7 @@ impl Placed {
             }
             return Self { record, reference: frame.reference, scale, pad: 0.0 };
         }
-        let m = &instance.world_from_object;
-        let linear =
-            DMat3::from_cols(DVec3::new(m[0], m[4], m[8]), DVec3::new(m[1], m[5], m[9]), DVec3::new(m[2], m[6], m[10]));
-        let translation = DVec3::new(m[3], m[7], m[11]);
+        let DAffine3 { matrix3: linear, translation } = affine(&instance.world_from_object);
         let inverse = linear.inverse();
         let object_unit = exp2(object.unit_log2);
         let step = exp2(object.step_log2);

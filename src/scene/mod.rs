@@ -4,6 +4,7 @@ pub mod camera;
 pub mod framing;
 pub mod motion;
 pub mod path;
+pub mod placement;
 mod projection;
 
 pub use camera::{Camera, RayBasis};

@@ -7,6 +7,7 @@
 //! it rests there.
 
 use super::path::spline;
+use super::placement::{affine, leaf_box};
 use bricks::{Instance, Resident};
 use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
@@ -315,11 +316,8 @@ const NOTHING: &str = "everything in the scene is baked into the world; convert 
 
 /// The middle of the bounds of instances; the origin of instances without triangles.
 fn middle(resident: &Resident, instances: &[u32]) -> DVec3 {
-    let step = f64::from(resident.objects[0].step_log2).exp2();
-    let corner = |p: [i64; 3]| DVec3::from_array(p.map(|x| x as f64)) * step;
     let leaves = resident.leaves.iter().filter(|leaf| instances.binary_search(&leaf.instance).is_ok());
-    let bounds = leaves.map(|leaf| resident.leaf_box(leaf).map(corner));
-    let all = bounds.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    let all = leaves.map(|leaf| leaf_box(resident, leaf)).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     all.map_or(DVec3::ZERO, |[min, max]| 0.5 * (min + max))
 }
 
@@ -350,12 +348,10 @@ impl Pose {
     /// What takes an instance, by world_from_object where the scene has it, to where it is; about `pivot`. No motion
     /// leaves it as it is, bit for bit.
     pub fn place(&self, world_from_object: &[f64; 12], pivot: DVec3) -> [f64; 12] {
-        let m = world_from_object;
+        let before = affine(world_from_object);
         let turn = DMat3::from_quat(self.rotation) * self.scale;
-        let linear =
-            DMat3::from_cols(DVec3::new(m[0], m[4], m[8]), DVec3::new(m[1], m[5], m[9]), DVec3::new(m[2], m[6], m[10]));
-        let linear = turn * linear;
-        let at = turn * DVec3::new(m[3], m[7], m[11]) + (pivot - turn * pivot) + self.translation;
+        let linear = turn * before.matrix3;
+        let at = turn * before.translation + (pivot - turn * pivot) + self.translation;
         let mut placed = Instance::IDENTITY;
         for row in 0..3 {
             for column in 0..3 {

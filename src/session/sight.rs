@@ -2,7 +2,9 @@
 //!
 //! In f64, brick by brick along the ray. Good for hundreds of rays; triangles of few bricks are kept.
 
-use bricks::{Corners, Payload, SceneFile};
+use crate::frame::triangles::triangles;
+use crate::scene::placement::{affine, leaf_box};
+use bricks::SceneFile;
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 
@@ -46,12 +48,9 @@ impl<'a> Sight<'a> {
         if resident.leaves.len() > MOST_LEAVES {
             return None;
         }
-        let step = f64::from(resident.objects.first()?.step_log2).exp2();
         let place = |leaf: &bricks::Leaf| {
-            let [min, max] = resident.leaf_box(leaf).map(|p| DVec3::from_array(p.map(|x| x as f64)) * step);
-            let m = resident.instances[leaf.instance as usize].world_from_object;
-            let column = |k: usize| DVec3::new(m[k], m[4 + k], m[8 + k]);
-            let world_from_object = DAffine3::from_cols(column(0), column(1), column(2), column(3));
+            let [min, max] = leaf_box(resident, leaf);
+            let world_from_object = affine(&resident.instances[leaf.instance as usize].world_from_object);
             Place { min, max, brick: leaf.brick, object_from_world: world_from_object.inverse() }
         };
         Some(Self { file, places: resident.leaves.iter().map(place).collect(), triangles: HashMap::new() })
@@ -117,17 +116,7 @@ impl<'a> Sight<'a> {
             if self.triangles.len() >= MOST_BRICKS {
                 return None;
             }
-            let (resident, payload) = (self.file.resident(), Payload::Geometry(brick));
-            let record = &resident.bricks[brick as usize];
-            let object = &resident.objects[record.object as usize];
-            let [step, unit] = [object.step_log2, object.unit_log2].map(|log2| f64::from(log2).exp2());
-            let mut bytes = vec![0; self.file.loaded_bytes(payload) as usize];
-            self.file.copy(payload, &mut bytes).ok()?;
-            let corners = Corners::new(record, &bytes);
-            let at =
-                |p: [f64; 3]| DVec3::from_array(record.origin.map(|x| x as f64)) * step + DVec3::from_array(p) * unit;
-            let triangles = (0..record.triangle_count).map(|triangle| corners.of(triangle).map(at)).collect();
-            self.triangles.insert(brick, triangles);
+            self.triangles.insert(brick, triangles(self.file, brick).ok()?.corners);
         }
         self.triangles.get(&brick).map(Vec::as_slice)
     }

@@ -4,6 +4,7 @@ use crate::frame::triangles;
 use crate::frame::triangles::{Triangles, placed};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::DvfTriangle;
+use crate::scene::placement::world_box;
 use bricks::{Leaf, Resident, SceneFile, TOP_LEAF};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -90,13 +91,11 @@ pub fn groups_of_moved(still: &[Group], now: &Resident, region: &Region, displac
 
 /// The groups of those leaves of a region of which `counts` is true.
 fn groups_of(resident: &Resident, region: &Region, counts: &dyn Fn(&Leaf) -> bool) -> Vec<Group> {
-    let step = f64::from(resident.objects.first().map_or(0, |world| world.step_log2)).exp2();
-    let corner = |p: &[i64; 3]| DVec3::from_array(p.map(|x| x as f64 * step));
     let bounds = [resident.manifest.min, resident.manifest.max].map(DVec3::from_array);
     let extent = (bounds[1] - bounds[0]).max(DVec3::splat(f64::MIN_POSITIVE));
     let mut found: Vec<(u64, u32, [DVec3; 2])> = Vec::new();
     for node in resident.top2.iter().filter(|node| node.right == TOP_LEAF) {
-        let (min, max) = (corner(&node.min), corner(&node.max));
+        let [min, max] = world_box(resident, [node.min, node.max]);
         let leaf = &resident.leaves[node.left as usize];
         let is_of_region = region.bricks.as_ref().is_none_or(|bricks| bricks.contains(&leaf.brick));
         if is_of_region && region.meets(min, max) && counts(leaf) {
@@ -137,8 +136,7 @@ pub fn triangles(
     let mut out = Vec::new();
     for (leaf, _) in &group.leaves {
         let instance = &resident.instances[leaf.instance as usize];
-        let object = &resident.objects[instance.object as usize];
-        let Triangles { corners, local_ids } = triangles::triangles(file, object, leaf.brick)?;
+        let Triangles { corners, local_ids } = triangles::triangles(file, leaf.brick)?;
         for (corners, id) in corners.iter().zip(&local_ids) {
             let [a, b, c] = placed(instance, corners);
             let bounds = [a.min(b).min(c), a.max(b).max(c)];

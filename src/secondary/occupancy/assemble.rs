@@ -6,6 +6,7 @@ use super::place::{Cells, Place};
 use super::plan::{Settings, maps};
 use super::region::Region;
 use super::{Bom, Cascades};
+use crate::scene::placement::world_box;
 use bricks::{Occupancy, OccupancyMap, RESIDENT_LEVEL, Resident, SceneFile, TOP_LEAF, TopNode2};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -176,10 +177,8 @@ impl Assembler {
     /// nearest stay held.
     fn order(&self, resident: &Resident, levels: &mut [Level], camera: DVec3) -> Vec<u32> {
         let mut wanted: HashMap<u32, f64> = HashMap::new();
-        let step = f64::from(resident.objects[0].step_log2).exp2();
         for job in levels.iter().flat_map(|level| &level.jobs).filter(|job| job.is_wanted) {
-            let [min, max] =
-                self.placed.boxes[job.leaf as usize].map(|corner| DVec3::from_array(corner.map(|x| x as f64)) * step);
+            let [min, max] = world_box(resident, self.placed.boxes[job.leaf as usize]);
             let distance = camera.distance_squared(camera.max(min).min(max));
             let nearest = wanted.entry(resident.leaves[job.leaf as usize].brick).or_insert(f64::INFINITY);
             *nearest = nearest.min(distance);

@@ -2,8 +2,9 @@
 
 use super::Bom;
 use super::region::Region;
+use crate::scene::placement::affine;
 use bricks::{Brick, INSTANCE_IDENTITY, Instance, Object};
-use glam::{DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// By how much of their size and place turned boxes grow, for roundings.
 const MARGIN: f64 = 1e-9;
@@ -35,9 +36,7 @@ pub fn region(map: &Bom, instance: &Instance, [low, high]: [DVec3; 2]) -> Option
     let [low, high] = if instance.flags & INSTANCE_IDENTITY != 0 {
         [low, high]
     } else {
-        let m = &instance.world_from_object;
-        let linear = DMat3::from_cols_array(&[m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]]);
-        let translation = DVec3::new(m[3], m[7], m[11]);
+        let DAffine3 { matrix3: linear, translation } = affine(&instance.world_from_object);
         let size = DMat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
         let middle = linear * ((low + high) / 2.0) + translation;
         let half = size * ((high - low) / 2.0);

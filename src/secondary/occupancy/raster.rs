@@ -2,7 +2,7 @@
 //! random (Zeng et al., ROMA, §4.1 and §4.3). Thinner than those that bricks carry, and with holes.
 
 use super::{Bom, BomError, Cascades, Voxelisation, voxelise};
-use crate::frame::triangles::{Triangles, placed, triangles};
+use crate::frame::triangles::{placed, triangles};
 use crate::math::sampling::random4;
 use bricks::{Leaf, SceneFile};
 use glam::DVec3;
@@ -30,18 +30,9 @@ impl Raster {
         if count > MOST_TRIANGLES {
             return Err(BomError::TooManyTriangles { path: file.path().into(), count, most: MOST_TRIANGLES });
         }
-        let of_object = |object: &bricks::Object| object.first_brick..object.first_brick + object.brick_count;
-        let all: Vec<(u32, &bricks::Object)> =
-            resident.objects.iter().flat_map(|object| of_object(object).map(move |brick| (brick, object))).collect();
-        let read: Vec<(u32, Triangles)> = all
-            .into_par_iter()
-            .map(|(brick, object)| Ok((brick, triangles(file, object, brick)?)))
-            .collect::<Result<_, bricks::Error>>()?;
-        let mut bricks = vec![Vec::new(); resident.bricks.len()];
-        for (brick, Triangles { corners, .. }) in read {
-            bricks[brick as usize] = corners;
-        }
-        Ok(Self { bricks })
+        let bricks = (0..resident.bricks.len() as u32).into_par_iter();
+        let corners = bricks.map(|brick| triangles(file, brick).map(|read| read.corners));
+        Ok(Self { bricks: corners.collect::<Result<_, bricks::Error>>()? })
     }
 
     /// Maps where those of `like` lie, of a sample of a seed.
