@@ -3,6 +3,7 @@
 use super::interrupt;
 use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
 use crate::cli::output::{Usage, note, one_line, warn};
+use crate::output::atomic;
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
@@ -238,8 +239,7 @@ pub fn check_output(output: &Path, endings: &[&str], scratch: Option<&Path>) -> 
         let right = output.with_extension(endings[0]);
         return Err(Usage(format!("{name}: what is written is {kinds}; name it {}", right.display())).into());
     }
-    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    for (option, folder) in [("-o", Some(folder)), ("--scratch", scratch)] {
+    for (option, folder) in [("-o", Some(atomic::folder_of(output))), ("--scratch", scratch)] {
         let Some(folder) = folder else { continue };
         // Unnamed: nothing of it is left, whatever happens.
         tempfile::tempfile_in(folder).with_context(|| {

@@ -3,6 +3,7 @@
 use super::device::Device;
 use super::picture_bytes::PictureBytes;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
+use crate::output::atomic;
 use crate::schedule::ExecutorError;
 use crate::schedule::cache::Cache;
 use crate::session::Settings;
@@ -106,8 +107,7 @@ impl Opened {
     pub fn open_keeping(scene: Arc<SceneFile>, path: &Path, settings: &Settings, keep: Keep) -> Result<Self> {
         if let Some(file) = &settings.requests_out {
             // Said before the work rather than after it.
-            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
-            if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
+            if !atomic::folder_of(file).is_dir() || file.is_dir() {
                 bail!("{}: --requests-out needs a file in a folder that exists", file.display());
             }
         }
