@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod framing;
+mod keyframes;
 pub mod motion;
 pub mod path;
 pub mod placement;
@@ -9,5 +10,6 @@ mod projection;
 
 pub use camera::{Camera, RayBasis};
 pub use framing::{Picture, path_from_bounds};
-pub use path::{CameraPath, Keyframe, PathError};
+pub use keyframes::KeyframesError;
+pub use path::{CameraPath, Keyframe};
 pub use projection::Projection;

@@ -6,6 +6,7 @@
 //! Curves", SIGGRAPH 1985), scales grow by equal factors in equal times. Before the first keyframe and after the last
 //! it rests there.
 
+use super::keyframes::{self, KeyframesError};
 use super::path::spline;
 use super::placement::{affine, leaf_box};
 use bricks::{Instance, Resident};
@@ -13,44 +14,15 @@ use glam::{DMat3, DQuat, DVec3};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
+
+/// What messages call a file.
+const KIND: &str = "motion";
 
 /// Scales that a keyframe may have.
 const SCALES: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
 /// Most names that a message lists.
 const MOST_NAMES: usize = 16;
-
-/// Why a motion was refused.
-#[derive(Debug, Error)]
-pub enum MotionError {
-    /// The file cannot be read.
-    #[error("{}: cannot read the motion: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file is no JSON object of the expected form.
-    #[error("{}: not a motion: {source}", file.display())]
-    Json {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong, with line and column.
-        source: serde_json::Error,
-    },
-    /// A mover is wrong.
-    #[error("{}: {mover}: {what}", file.display())]
-    Mover {
-        /// The file.
-        file: PathBuf,
-        /// Which: its node, its instance or its place in the list.
-        mover: String,
-        /// What is wrong and what to do.
-        what: String,
-    },
-}
 
 /// What is moved.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -177,19 +149,18 @@ impl Motion {
     ///
     /// # Errors
     /// The file cannot be read, is not JSON of the documented form, or a mover is wrong.
-    pub fn read(file: &Path) -> Result<Self, MotionError> {
-        let text = std::fs::read_to_string(file).map_err(|source| MotionError::Read { file: file.into(), source })?;
-        Self::parse(&text, file)
+    pub fn read(file: &Path) -> Result<Self, KeyframesError> {
+        Self::parse(&keyframes::read(file, KIND)?, file)
     }
 
     /// Parses the text of a motion file; `file` names it in errors.
     ///
     /// # Errors
     /// As of [`Self::read`].
-    pub fn parse(text: &str, file: &Path) -> Result<Self, MotionError> {
-        let raw: Raw = serde_json::from_str(text).map_err(|source| MotionError::Json { file: file.into(), source })?;
+    pub fn parse(text: &str, file: &Path) -> Result<Self, KeyframesError> {
+        let raw: Raw = keyframes::parse(text, file, KIND)?;
         let movers = raw.instances.into_iter().enumerate().map(|(number, value)| {
-            let refuse = |mover: String, what: String| MotionError::Mover { file: file.into(), mover, what };
+            let refuse = |mover: String, what: String| KeyframesError::new(file, format!("{mover}: {what}"));
             let place = format!("entry {number} of its instances");
             let raw: RawMover = serde_json::from_value(value).map_err(|error| {
                 let what = format!("{error}; it needs node (a name) or instance (a number), and keyframes");
@@ -205,7 +176,7 @@ impl Motion {
             if pivot.is_some_and(|pivot| !pivot.is_finite()) {
                 return Err(refuse("its pivot must be three finite numbers".into()));
             }
-            let mut keyframes: Vec<Pose> = Vec::with_capacity(raw.keyframes.len());
+            let mut poses: Vec<Pose> = Vec::with_capacity(raw.keyframes.len());
             for (k, value) in raw.keyframes.into_iter().enumerate() {
                 let raw: RawPose = serde_json::from_value(value).map_err(|error| {
                     refuse(format!(
@@ -213,16 +184,14 @@ impl Motion {
                     ))
                 })?;
                 let pose = raw.pose().map_err(|what| refuse(format!("keyframe {k}: {what}")))?;
-                if let Some(before) = keyframes.last().map(|pose| pose.time).filter(|before| pose.time <= *before) {
-                    let what = format!("its time {} is not after {before}; sort the keyframes by time", pose.time);
-                    return Err(refuse(format!("keyframe {k}: {what}")));
-                }
-                keyframes.push(pose);
+                let before = poses.last().map(|pose| pose.time);
+                keyframes::check_after(before, pose.time).map_err(|what| refuse(format!("keyframe {k}: {what}")))?;
+                poses.push(pose);
             }
-            if keyframes.is_empty() {
+            if poses.is_empty() {
                 return Err(refuse("it has no keyframes; add at least one".into()));
             }
-            Ok(Mover { target, pivot, keyframes })
+            Ok(Mover { target, pivot, keyframes: poses })
         });
         Ok(Self { file: file.into(), movers: movers.collect::<Result<_, _>>()? })
     }
@@ -231,14 +200,11 @@ impl Motion {
     ///
     /// # Errors
     /// A node or an instance that the scene does not have, or has in its baked world; one that two movers name.
-    pub fn bind(&self, resident: &Resident) -> Result<Movers, MotionError> {
+    pub fn bind(&self, resident: &Resident) -> Result<Movers, KeyframesError> {
         let mut of_whom: BTreeMap<u32, &Target> = BTreeMap::new();
         let mut bound = Vec::with_capacity(self.movers.len());
         for mover in &self.movers {
-            let refuse = |what: String| {
-                let (file, mover) = (self.file.clone(), mover.target.to_string());
-                MotionError::Mover { file, mover, what }
-            };
+            let refuse = |what: String| KeyframesError::new(&self.file, format!("{}: {what}", mover.target));
             let instances = instances_of(resident, &mover.target).map_err(refuse)?;
             for &instance in &instances {
                 if let Some(other) = of_whom.insert(instance, &mover.target) {

@@ -2,7 +2,7 @@
 
 use crate::scene::motion::*;
 
-fn parse(text: &str) -> Result<Motion, MotionError> {
+fn parse(text: &str) -> Result<Motion, KeyframesError> {
     Motion::parse(text, Path::new("m.json"))
 }
 

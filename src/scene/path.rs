@@ -6,10 +6,13 @@
 //! at constant speed.
 
 use super::camera::{Camera, CameraError, check_fov_y_degrees};
+use super::keyframes::{self, KeyframesError};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-use thiserror::Error;
+use std::path::Path;
+
+/// What messages call it.
+const KIND: &str = "camera path";
 
 /// A camera path. Valid by construction: at least one keyframe, times strictly ascending, every keyframe a camera.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,45 +34,6 @@ pub struct Keyframe {
     pub position: [f64; 3],
     /// What the camera looks at, world units.
     pub target: [f64; 3],
-}
-
-/// Why a camera path was refused.
-#[derive(Debug, Error)]
-pub enum PathError {
-    /// The file cannot be read.
-    #[error("{}: cannot read the camera path: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file is no JSON object of the expected form.
-    #[error("{}: not a camera path: {source}", file.display())]
-    Json {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong, with line and column.
-        source: serde_json::Error,
-    },
-    /// A value of the whole path is wrong.
-    #[error("{}: {what}", file.display())]
-    Path {
-        /// The file, or what made the path.
-        file: PathBuf,
-        /// What is wrong and what to do.
-        what: String,
-    },
-    /// A keyframe is wrong.
-    #[error("{}: keyframe {keyframe}: {what}", file.display())]
-    Keyframe {
-        /// The file, or what made the path.
-        file: PathBuf,
-        /// Its number, from 0.
-        keyframe: usize,
-        /// What is wrong and what to do.
-        what: String,
-    },
 }
 
 /// The file as serde sees it; keyframes stay values so that an error can name the one it is in.
@@ -95,9 +59,8 @@ impl CameraPath {
     ///
     /// # Errors
     /// The file cannot be read, is not JSON of the documented form, or breaks a rule of [`Self::new`].
-    pub fn read(file: &Path) -> Result<Self, PathError> {
-        let text = std::fs::read_to_string(file).map_err(|source| PathError::Read { file: file.into(), source })?;
-        Self::parse(&text, file)
+    pub fn read(file: &Path) -> Result<Self, KeyframesError> {
+        Self::parse(&keyframes::read(file, KIND)?, file)
     }
 
     /// Parses the text of a path file; `file` names it in errors. `fov_y_degrees` (60) and `up` ([0, 1, 0]) may be
@@ -105,17 +68,16 @@ impl CameraPath {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn parse(text: &str, file: &Path) -> Result<Self, PathError> {
-        let raw: Raw = serde_json::from_str(text).map_err(|source| PathError::Json { file: file.into(), source })?;
+    pub fn parse(text: &str, file: &Path) -> Result<Self, KeyframesError> {
+        let raw: Raw = keyframes::parse(text, file, KIND)?;
         let keyframes = raw
             .keyframes
             .into_iter()
             .enumerate()
             .map(|(keyframe, value)| {
-                serde_json::from_value(value).map_err(|error| PathError::Keyframe {
-                    file: file.into(),
-                    keyframe,
-                    what: format!("{error}; it needs time, position [x, y, z] and target [x, y, z]"),
+                serde_json::from_value(value).map_err(|error| {
+                    let needs = "it needs time, position [x, y, z] and target [x, y, z]";
+                    KeyframesError::new(file, format!("keyframe {keyframe}: {error}; {needs}"))
                 })
             })
             .collect::<Result<Vec<Keyframe>, _>>()?;
@@ -127,23 +89,25 @@ impl CameraPath {
     /// # Errors
     /// No keyframe, a non-finite value, times that do not ascend strictly, a position equal to its target, a zero up
     /// vector, a field of view out of range.
-    pub fn new(fov_y_degrees: f64, up: [f64; 3], keyframes: Vec<Keyframe>, name: &Path) -> Result<Self, PathError> {
-        let whole = |what: String| PathError::Path { file: name.into(), what };
+    pub fn new(
+        fov_y_degrees: f64,
+        up: [f64; 3],
+        keyframes: Vec<Keyframe>,
+        name: &Path,
+    ) -> Result<Self, KeyframesError> {
+        let whole = |what: String| KeyframesError::new(name, what);
         check_fov_y_degrees(fov_y_degrees).map_err(|e| whole(e.to_string()))?;
         if keyframes.is_empty() {
             return Err(whole("it has no keyframes; add at least one".into()));
         }
         let path = Self { fov_y_degrees, up, keyframes };
         for (keyframe, k) in path.keyframes.iter().enumerate() {
-            let refuse = |what: String| PathError::Keyframe { file: name.into(), keyframe, what };
+            let refuse = |what: String| whole(format!("keyframe {keyframe}: {what}"));
             if !k.time.is_finite() {
                 return Err(refuse("time is not finite".into()));
             }
-            if let Some(before) = keyframe.checked_sub(1).map(|i| path.keyframes[i].time)
-                && k.time <= before
-            {
-                return Err(refuse(format!("its time {} is not after {before}; sort the keyframes by time", k.time)));
-            }
+            let before = keyframe.checked_sub(1).map(|i| path.keyframes[i].time);
+            keyframes::check_after(before, k.time).map_err(refuse)?;
             path.camera_of(k.position.into(), k.target.into()).check().map_err(|e| match e {
                 CameraError::NoUp | CameraError::NotFinite("up") => whole(e.to_string()),
                 e => refuse(e.to_string()),
