@@ -17,10 +17,11 @@ pub mod executor;
 pub use executor::CpuExecutor;
 
 use crate::kernels::DeviceInfo;
+use crate::kernels::simd::isa::Best;
 
 /// Rays that are tested together at most.
 pub fn lanes() -> u32 {
-    crate::kernels::simd::isa::Best::detect().lanes()
+    Best::detect().describe().1
 }
 
 /// What summaries say of the processor.
@@ -28,11 +29,7 @@ pub fn device_info() -> DeviceInfo {
     DeviceInfo {
         name: "cpu".into(),
         driver: "brickwalk".into(),
-        driver_info: format!(
-            "{} threads, {}",
-            rayon::current_num_threads(),
-            crate::kernels::simd::isa::Best::detect().name()
-        ),
+        driver_info: format!("{} threads, {}", rayon::current_num_threads(), Best::detect().describe().0),
         backend: "cpu".into(),
         upload: "in place",
         timestamps: true,

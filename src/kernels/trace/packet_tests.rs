@@ -129,7 +129,7 @@ fn rays_that_go_together_find_and_count_what_each_does_alone() {
             assert!(hits > 200, "{name}: only {hits} hits");
             for isa in Best::all() {
                 let together = stage.trace(isa, &rays, 64, flags);
-                let context = format!("{name} rays, flags {flags}, {}", isa.name());
+                let context = format!("{name} rays, flags {flags}, {}", isa.describe().0);
                 for (i, ray) in rays.iter().enumerate() {
                     assert_eq!(together.0[i], alone.0[i], "{context}: hit of ray {i}: {ray:?}");
                     assert_eq!(together.1[i], alone.1[i], "{context}: surface of ray {i}: {ray:?}");

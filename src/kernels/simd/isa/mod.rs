@@ -228,29 +228,16 @@ impl Best {
         all
     }
 
-    /// Numbers in a vector.
-    pub fn lanes(self) -> u32 {
+    /// Its name, and how many numbers are in a vector.
+    pub fn describe(self) -> (&'static str, u32) {
         match self {
-            Self::Scalar(_) => 1,
+            Self::Scalar(_) => ("scalar", 1),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => 8,
+            Self::Avx2(_) => ("AVX2", 8),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => 16,
+            Self::Avx512(_) => ("AVX-512", 16),
             #[cfg(target_arch = "aarch64")]
-            Self::Neon(_) => 8,
-        }
-    }
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Scalar(_) => "scalar",
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => "AVX2",
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => "AVX-512",
-            #[cfg(target_arch = "aarch64")]
-            Self::Neon(_) => "NEON",
+            Self::Neon(_) => ("NEON", 8),
         }
     }
 }
