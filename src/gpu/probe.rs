@@ -8,9 +8,10 @@
 
 use super::device::Gpu;
 use super::groups::numbered;
+use super::kernels;
 use super::rays::storage;
 use super::readback::read;
-use super::wgsl::{self, Pages};
+use super::wgsl::Pages;
 use crate::math::exact;
 use crate::schedule::ExecutorError;
 use cases::{ArithmeticCase, TriangleCase};
@@ -80,16 +81,7 @@ pub fn run(gpu: &Gpu) -> ProbeReport {
 
 /// The text of `shaders/probe/probe.wgsl` with what it includes.
 pub fn source() -> String {
-    let file = |name: &str| match name {
-        "probe/probe.wgsl" => Some(include_str!("../../shaders/probe/probe.wgsl").to_string()),
-        "common/exact.wgsl" => Some(include_str!("../../shaders/common/exact.wgsl").to_string()),
-        "trace/triangle.wgsl" => Some(include_str!("../../shaders/trace/triangle.wgsl").to_string()),
-        "trace/surface.wgsl" => Some(include_str!("../../shaders/trace/surface.wgsl").to_string()),
-        _ => None,
-    };
-    // All files are embedded, so that assembly cannot fail.
-    wgsl::assemble("probe/probe.wgsl", Pages { cache: 1, texels: 1, opacity: false, gloss: false }, &file)
-        .unwrap_or_default()
+    kernels::source("probe/probe", Pages { cache: 1, texels: 1, opacity: false, gloss: false })
 }
 
 /// [`run`] with another text of the kernels.

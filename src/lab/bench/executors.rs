@@ -6,7 +6,7 @@
 use super::args::{ExecutorsArgs, Settings};
 use super::results::{Column, table, write_json};
 use super::scenes::{self, SceneId, Scenes, View};
-use super::store::device;
+use super::store::{device, median};
 use crate::frame::{Pixels, Renderer};
 use crate::gpu::device::candidates;
 use crate::kernels::DeviceInfo;
@@ -73,7 +73,7 @@ impl Side {
     fn medians(&self, pass: &str) -> Option<(f64, f64)> {
         let (_, all) = self.passes.iter().find(|(name, _)| *name == pass)?;
         let (rays, ms) = all.iter().map(|&(rays, ms)| (rays as f64, ms)).unzip();
-        Some((median(rays), median(ms)))
+        median(rays).zip(median(ms))
     }
 }
 
@@ -163,12 +163,6 @@ fn open(args: &ExecutorsArgs, settings: &Settings, scene: &Path, adapter: &Adapt
     let renderer = scenes::open(scene, &own)?;
     let info = renderer.executor.device();
     Ok(Side { renderer, info, passes: Vec::new(), differences: Differences::default() })
-}
-
-/// The median, of an even number of values the upper one.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// The table of all devices and passes.
