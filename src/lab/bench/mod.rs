@@ -9,7 +9,7 @@ pub mod args;
 pub mod chc;
 pub mod dvf;
 pub mod executors;
-mod results;
+pub(super) mod results;
 pub mod roma;
 mod runner;
 mod scenes;

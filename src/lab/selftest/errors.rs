@@ -11,12 +11,13 @@
 //! and D has no part in it.
 
 use super::args::SelftestArgs;
+use crate::lab::bench::results::plot;
 use crate::lab::console::Console;
 use crate::math::exact::{intersect_triangle, ray_frame};
 use crate::output::atomic;
 use crate::reference::{Truth, TruthInstance, TruthObject, TruthRay, TruthTriangle};
 use anyhow::Result;
-use brickwalk_report::{Graph, GraphShape, Section, Sheet, Table, Unit, Value, write_sheet};
+use brickwalk_report::{Graph, Section, Sheet, Table, Unit, Value, write_sheet};
 use brickwalk_scenes::{Rng, Stiff, stiff};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -279,12 +280,7 @@ fn plots(sweep: &Sweep) -> Vec<Graph> {
         let line = |(k, who): (usize, &Contender)| {
             (who.name.to_string(), sweep.rows.iter().map(|(x, _, found)| (*x, of(&found[k]))).collect())
         };
-        let lines = CONTENDERS.iter().enumerate().map(line).collect();
-        Graph {
-            title: title.into(),
-            reading: String::new(),
-            shape: GraphShape::Lines { across: sweep.across, unit, lines },
-        }
+        plot(title.into(), "", sweep.across, unit, CONTENDERS.iter().enumerate().map(line).collect())
     };
     vec![
         graph("Bits of distance lost, of 24", Unit::Count, |wrong| wrong.bits),

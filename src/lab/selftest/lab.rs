@@ -173,11 +173,9 @@ impl Lab {
 
     fn executor(&mut self, needs: Needs) -> Result<Box<dyn FrameExecutor>> {
         let Needs { scene, host, threads, page_sizes, setup } = needs;
+        let workers = Workers::new(scene.clone(), host, threads)?;
         let executor: Box<dyn FrameExecutor> = match &self.device {
-            Device::Cpu => {
-                let workers = Workers::new(scene.clone(), host, threads)?;
-                Box::new(CpuExecutor::new(scene.clone(), workers, setup)?)
-            }
+            Device::Cpu => Box::new(CpuExecutor::new(scene.clone(), workers, setup)?),
             Device::Gpu(gpu) => {
                 // One set of pipelines serves all scenes with so many pages.
                 let pages = Pages { cache: page_sizes.len().max(1), texels: 1, opacity: false, gloss: false };
@@ -190,7 +188,6 @@ impl Lab {
                 if !self.kernels.iter().any(|known| known.pages == pages) {
                     self.kernels.push(kernels.clone());
                 }
-                let workers = Workers::new(scene.clone(), host, threads)?;
                 let gpu = gpu.as_ref().clone();
                 Box::new(GpuExecutor::with_kernels(gpu, kernels, scene.clone(), workers, page_sizes, setup)?)
             }
