@@ -8,7 +8,10 @@ use crate::settings::sizes::{human_bytes, human_count};
 use crate::stream::PayloadSource;
 use crate::stream::Residency;
 use anyhow::{Context, Result};
-use bricks::{BRICK_WIDE, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, PunctualLight, SceneFile, Texture};
+use bricks::{
+    BRICK_WIDE, Brick, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, NEAR_STEPS, ORIGIN_STEPS, PunctualLight,
+    Resident, SceneFile, Texture,
+};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
@@ -16,6 +19,9 @@ use std::fmt::Write;
 
 /// Raised when a field of the JSON changes its meaning.
 pub const FORMAT: u32 = 4;
+
+/// Farthest that a conversion lets a vertex be from the origin, steps.
+const REACH_STEPS: i64 = 1 << 44;
 
 /// Runs `info`.
 ///
@@ -33,6 +39,22 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     }
     let info = Info::of(&scene, args.deep)?;
     if args.json { print_json(&info) } else { print(&info.human()) }
+}
+
+/// log2 of the finest step of the world's lattice, world units, at which none of its bricks is wide; that which it has
+/// if one is.
+fn finest_lattice(resident: &Resident) -> i32 {
+    let step_log2 = resident.objects.first().map_or(0, |world| world.step_log2);
+    let bricks = || resident.bricks.iter().filter(|brick| brick.object == 0);
+    if bricks().any(|brick| brick.flags & BRICK_WIDE != 0) {
+        return step_log2;
+    }
+    let extent = |brick: &Brick| (0..3).map(|k| brick.max[k] - brick.min[k]).max().unwrap_or(0);
+    let reach = |brick: &Brick| brick.min.iter().chain(&brick.max).map(|x| x.abs()).max().unwrap_or(0);
+    let (most, far) = bricks().fold((0, 0), |(most, far), brick| (most.max(extent(brick)), far.max(reach(brick))));
+    // An origin lies up to ORIGIN_STEPS below the least vertex.
+    let holds = |finer: &i32| (most << finer) + ORIGIN_STEPS <= NEAR_STEPS && far << finer <= REACH_STEPS;
+    step_log2 - (1..=24).take_while(holds).last().unwrap_or(0)
 }
 
 /// A statement about a scene for reports: what rendering leaves out, or what it cannot show, and why.
@@ -89,7 +111,7 @@ impl<'a> Info<'a> {
         // The world object always exists.
         let world = r.objects.first();
         let sizes = PayloadSource::sizes(scene);
-        let facts: [(&str, Value); 51] = [
+        let facts: [(&str, Value); 52] = [
             ("format", FORMAT.into()),
             ("file", scene.path().display().to_string().into()),
             ("file_bytes", scene.file_bytes().into()),
@@ -128,6 +150,8 @@ impl<'a> Info<'a> {
             ("least_cache_bytes", Residency::least_budget(&sizes).into()),
             // Step of the world's lattice, world units.
             ("lattice_step", world.map_or(0.0, |o| 2f64.powi(o.step_log2)).into()),
+            // What `convert --lattice` may be given at least, so that no brick of these is wide.
+            ("finest_lattice_log2", finest_lattice(r).into()),
             // World units of one unit of length on the device.
             ("device_unit", world.map_or(0.0, |o| 2f64.powi(o.unit_log2)).into()),
             ("top_level_leaves", r.leaves.len().into()),
@@ -222,7 +246,11 @@ impl<'a> Info<'a> {
         let what = if is_of_bricks { "two largest bricks" } else { "tiles of a lookup" };
         row("least cache", format!("{} (the {what})", bytes("least_cache_bytes")));
         let (step, unit) = (real("lattice_step"), real("device_unit"));
-        row("lattice", format!("step 2^{} ({step:e}), device unit {unit}, world units", step.log2()));
+        let mut lattice = format!("step 2^{} ({step:e}), device unit {unit}, world units", step.log2());
+        if real("finest_lattice_log2") < step.log2() {
+            lattice += &format!("; convert --lattice {} rounds finest without wide bricks", real("finest_lattice_log2"));
+        }
+        row("lattice", lattice);
         let [leaves, binary, wide] = ["top_level_leaves", "top_level_nodes_binary", "top_level_nodes_wide"].map(number);
         row("top level", format!("{leaves} leaves, {binary} binary nodes, {wide} wide nodes"));
         for (name, value) in self.trees.human() {

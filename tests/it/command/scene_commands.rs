@@ -300,3 +300,29 @@ fn a_reader_that_goes_away_is_no_error() {
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(0), ""));
 }
+
+/// The finest step that `info` names is one at which no brick is wide; far finer ones make some wide.
+#[test]
+fn the_finest_lattice_without_wide_bricks_is_named() {
+    let folder = folder();
+    let input = folder.path().join("hill.obj");
+    let point = |i: u32| format!("v {} {} {}\n", i % 60, (i * 7 % 13) as f64 * 0.3, i / 60);
+    let square = |i: u32| format!("f {} {} {} {}\n", i + 1, i + 2, i + 62, i + 61);
+    let squares = (0..59 * 60).filter(|i| i % 60 < 59).map(square);
+    std::fs::write(&input, (0..3600).map(point).chain(squares).collect::<String>()).expect("a model");
+    let facts = |lattice: Option<i64>| {
+        let scene = folder.path().join("hill.bricks");
+        let words = ["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()];
+        let step = lattice.map(|step| format!("--lattice={step}"));
+        succeed(words.into_iter().chain(step.iter().map(std::ffi::OsStr::new)));
+        let text = succeed(["info".as_ref(), scene.as_os_str()]);
+        let json = succeed(["info".as_ref(), scene.as_os_str(), "--json".as_ref()]);
+        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        (text, json["wide_bricks"].as_u64().expect("a count"), json["finest_lattice_log2"].as_i64().expect("a step"))
+    };
+    let (text, wide, finest) = facts(None);
+    assert!(wide == 0 && text.contains(&format!("convert --lattice {finest} rounds finest")), "{text}");
+    let (text, wide, again) = facts(Some(finest));
+    assert!(wide == 0 && again == finest && !text.contains("rounds finest"), "{text}");
+    assert!(facts(Some(finest - 2)).1 > 0, "the comparison can fail");
+}
