@@ -248,7 +248,8 @@ impl<'a> Info<'a> {
         let (step, unit) = (real("lattice_step"), real("device_unit"));
         let mut lattice = format!("step 2^{} ({step:e}), device unit {unit}, world units", step.log2());
         if real("finest_lattice_log2") < step.log2() {
-            lattice += &format!("; convert --lattice {} rounds finest without wide bricks", real("finest_lattice_log2"));
+            lattice +=
+                &format!("; convert --lattice {} rounds finest without wide bricks", real("finest_lattice_log2"));
         }
         row("lattice", lattice);
         let [leaves, binary, wide] = ["top_level_leaves", "top_level_nodes_binary", "top_level_nodes_wide"].map(number);
