@@ -1,7 +1,7 @@
 //! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that
 //! appear complete or not at all.
 
-use crate::common::names;
+use crate::common::{folder, names, succeed};
 use brickwalk::reference::Truth;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
