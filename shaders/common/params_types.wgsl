@@ -3,7 +3,7 @@
 struct Params {           // What every kernel is told.
     zero: u32,            // 0; what barrier() ors in, unknown to the compiler
     width: u32,           // rays per row
-    height: u32,          // rows
+    height: u32,          // rows, of a picture or of a band of it
     tile: u32,            // edge of a tile in rays
     tiles_x: u32,         // tiles per row
     tiles: u32,           // number of tiles
@@ -42,9 +42,9 @@ struct Params {           // What every kernel is told.
     // density of points of emitters by power: of an area of 1, by the luminance of its radiance
     emitter_density: f32,
     diffuse_count: f32,   // diffuse rays of a hit; 0 where they bring nothing of the environment that rays to it bring
+    first_row: u32,       // of the picture, that the first row of rays belongs to
+    picture_rows: u32,    // rows of the picture; camera rays of rows beyond them are not traced
     padding0: u32,
-    padding1: u32,
-    padding2: u32,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     // what a white surface reflects of the environment, by terms of its normal (light.wgsl)
     ambient: array<vec4<f32>, 9>,

@@ -23,7 +23,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let g = gbuffer[index];
         let s = gloss_of(g, -seen_rays[index].direction);
         if is_glossy(s) {
-            ray.direction = gloss_direction(s, random4(index, params.stream, params.seed));
+            ray.direction = gloss_direction(s, random4(pixel_of(index), params.stream, params.seed));
             density = density_of(s, ray.direction);
             if density > 0.0 && dot(surface.normal, ray.direction) > 0.0 {
                 ray.t_min = 0.0;

@@ -15,10 +15,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     let index = global.y * params.width + global.x;
     let x = barrier(f32(global.x) + params.jitter.x);
-    let y = barrier(f32(global.y) + params.jitter.y);
+    let row = params.first_row + global.y;
+    let y = barrier(f32(row) + params.jitter.y);
     let d = vec3<f32>(along(params.base.x, x, params.step_x.x, y, params.step_y.x),
                       along(params.base.y, x, params.step_x.y, y, params.step_y.y),
                       along(params.base.z, x, params.step_x.z, y, params.step_y.z));
-    rays[index] = Ray(params.origin.xyz, 0.0, d, T_INFINITE);
-    start_hit(index, T_INFINITE, NONE);
+    // The last band of a picture may reach beyond it.
+    let is_inside = row < params.picture_rows;
+    let t_max = select(0.0, T_INFINITE, is_inside);
+    rays[index] = Ray(params.origin.xyz, select(1.0, 0.0, is_inside), d, t_max);
+    start_hit(index, t_max, NONE);
 }

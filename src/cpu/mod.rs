@@ -36,12 +36,24 @@ pub fn device_info() -> DeviceInfo {
     }
 }
 
-/// Bytes of memory that can be had without swapping, also of the control group that the process runs in; `None` where
-/// the system does not tell.
+/// Bytes of memory that can be had without swapping, also of the control group that the process runs in and of the
+/// address space that it may use (`ulimit -v`); `None` where the system does not tell.
 pub fn available_memory() -> Option<u64> {
     let mut system = sysinfo::System::new();
     system.refresh_memory();
-    free_memory(&system)
+    [free_memory(&system), free_addresses()].into_iter().flatten().min()
+}
+
+/// What of the address space of a process is free, where that is limited; Linux tells.
+fn free_addresses() -> Option<u64> {
+    let number = |file: &str, name: &str| -> Option<u64> {
+        let text = std::fs::read_to_string(file).ok()?;
+        let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+        line.split_whitespace().next()?.parse().ok()
+    };
+    let limit = number("/proc/self/limits", "Max address space")?;
+    let used = number("/proc/self/status", "VmSize:")? * 1024;
+    Some(limit.saturating_sub(used))
 }
 
 /// What of a system's memory is free; sysinfo knows a control group only where it knows the machine.

@@ -9,6 +9,7 @@ use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{self, ExecutorError, Pass, Shading, Step, Tracer, Tracing};
 use bricks::SceneFile;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -55,6 +56,9 @@ pub struct Engine {
     pub light: Light,
     /// Picture size in pixels.
     pub size: (u32, u32),
+    /// Rows that are rendered at a time, which the executor has room for: those of the picture, or of a band of it,
+    /// whole tiles.
+    pub band_rows: u32,
     /// Edge of a tile in pixels.
     pub tile: u32,
     /// The temporal fronts, when they are on.
@@ -69,6 +73,17 @@ pub struct Engine {
 }
 
 impl Engine {
+    /// The rows of the bands that pictures are rendered in, from the top; one band has them all.
+    pub fn bands(&self) -> impl ExactSizeIterator<Item = Range<u32>> + use<> {
+        let (height, rows) = (self.size.1, self.band_rows);
+        (0..height.div_ceil(rows)).map(move |band| band * rows..((band + 1) * rows).min(height))
+    }
+
+    /// Rays that are traced at a time.
+    pub fn rays(&self) -> usize {
+        self.size.0 as usize * self.band_rows as usize
+    }
+
     /// Whether rays lead to the environment.
     pub fn draws_environment(&self) -> bool {
         self.settings.effects.environment && self.light.lamps.environment.is_some()

@@ -2,6 +2,7 @@
 //! the sum of the samples.
 
 mod accumulate;
+mod bands;
 mod capture;
 mod effects;
 mod emissive;

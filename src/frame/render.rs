@@ -1,5 +1,6 @@
 //! The frame loop.
 
+use super::bands::Joint;
 use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, camera_view};
 use crate::counters::{Counters, Record};
 use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
@@ -28,7 +29,7 @@ pub trait FrameWatch {
     }
 
     /// So many samples are finished, and this is their sum: after every [`BATCH_SAMPLES`] and at the end; whether to go
-    /// on.
+    /// on. Not of frames that are rendered in bands.
     fn samples(&mut self, _finished: u32, _sum: &Accumulation) -> bool {
         true
     }
@@ -48,7 +49,8 @@ impl<'a> Passes<'a> {
         let effects = &engine.settings.effects;
         let occlusion = effects.occlusion.map_or(0, |occlusion| occlusion.rays);
         let a_sample = 2 + occlusion + effects.diffuse.unwrap_or(0) + u32::from(effects.glossy);
-        Self { watch, done: 0, about: engine.settings.samples.saturating_mul(a_sample) }
+        let samples = engine.settings.samples.saturating_mul(engine.bands().len() as u32);
+        Self { watch, done: 0, about: samples.saturating_mul(a_sample) }
     }
 
     /// One more pass.
@@ -147,9 +149,48 @@ impl Renderer {
         engine.cache.begin_frame(engine.settings.tile_bytes);
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
-        let effects = engine.settings.effects;
-        let mut accumulation = Accumulation::default();
         engine.executor.set_lamps(&engine.light.lamps)?;
+        let width = engine.size.0 as usize;
+        let picture = width * engine.size.1 as usize;
+        for rows in engine.bands() {
+            let joint = Joint { band: width * rows.len(), picture };
+            let band = Band { frame, camera, first_row: rows.start, checkpoints };
+            output.append(band.render(engine, methods, &mut records, &mut passes)?, joint);
+        }
+        output.records = records.finish(engine);
+        engine.moved = Moved::default();
+        // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
+        if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {
+            primary.non_finite += output.pixels.not_finite();
+        }
+        Ok(output)
+    }
+}
+
+/// Rows of a frame that are rendered at a time, all samples of them: the frame, or a band of it.
+struct Band<'a> {
+    frame: u32,
+    camera: &'a Camera,
+    first_row: u32,
+    /// Samples after which the sum is told, too.
+    checkpoints: &'a [u32],
+}
+
+impl Band<'_> {
+    /// What they show.
+    fn render(
+        &self,
+        engine: &mut Engine,
+        methods: &mut Methods,
+        records: &mut FrameRecords,
+        passes: &mut Passes,
+    ) -> Result<FrameOutput, RenderError> {
+        let &Self { frame, camera, first_row, checkpoints } = self;
+        let effects = engine.settings.effects;
+        let mut output = FrameOutput::default();
+        let mut accumulation = Accumulation::default();
+        // Nobody is told the sums of a part of the picture.
+        let is_told = engine.bands().len() == 1;
         let mut guides = engine.settings.guides.then(|| GuideReader::new(camera, engine.size, &engine.moved));
         for sample in 0..engine.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
@@ -160,6 +201,7 @@ impl Renderer {
             let seed = engine.settings.seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9));
             let mut view =
                 camera_view(engine.scene.resident(), camera, &engine.light, &effects, engine.size, sample, seed);
+            view.params.first_row = first_row;
             view.directions.scatter = engine.settings.guides;
             // Each sample stands for its share of the pixel: textures are looked up by that.
             view.params.step_y[3] /= (engine.settings.samples as f32).sqrt();
@@ -171,7 +213,7 @@ impl Renderer {
             methods.iter_mut().for_each(|method| method.begin(camera, &view));
             if sample == 0 {
                 for method in methods.iter_mut() {
-                    method.before_camera_rays(engine, &mut records, &view)?;
+                    method.before_camera_rays(engine, records, &view)?;
                 }
             }
             records.pass(engine, "primary", |r, stats| {
@@ -185,14 +227,14 @@ impl Renderer {
             passes.advance()?;
             if sample == 0 {
                 for method in methods.iter_mut() {
-                    method.after_camera_rays(engine, &mut records, &view)?;
+                    method.after_camera_rays(engine, records, &view)?;
                 }
             }
-            light(engine, methods, &mut records, ["primary", "shadow"], Pass::Shadow)?;
+            light(engine, methods, records, ["primary", "shadow"], Pass::Shadow)?;
             if let Some(guides) = &mut guides {
                 guides.lamps(&mut *engine.executor, sample)?;
             }
-            light_environment(engine, methods, &mut records, "environment", Pass::Shadow)?;
+            light_environment(engine, methods, records, "environment", Pass::Shadow)?;
             passes.advance()?;
             let directions = |count: u32| sample * count..(sample + 1) * count;
             for index in directions(effects.occlusion.map_or(0, |occlusion| occlusion.rays)) {
@@ -202,11 +244,11 @@ impl Renderer {
             }
             for index in directions(effects.diffuse.unwrap_or(0)) {
                 let names = ["diffuse", "diffuse-shadow", "diffuse-environment"];
-                bounce(engine, methods, &mut records, names, Pass::Diffuse(index))?;
+                bounce(engine, methods, records, names, Pass::Diffuse(index))?;
                 passes.advance()?;
             }
             if effects.glossy {
-                bounce(engine, methods, &mut records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
+                bounce(engine, methods, records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
                 passes.advance()?;
             }
             if sample == 0 && engine.settings.coverage {
@@ -227,8 +269,8 @@ impl Renderer {
             let is_batch = finished.is_multiple_of(BATCH_SAMPLES) || finished == engine.settings.samples;
             let goes_on = if is_batch {
                 accumulation.add(&engine.executor.read_radiance()?);
-                passes.watch.samples(finished, &accumulation)
-            } else if checkpoints.contains(&finished) {
+                !is_told || passes.watch.samples(finished, &accumulation)
+            } else if is_told && checkpoints.contains(&finished) {
                 let mut so_far = accumulation.clone();
                 so_far.add(&engine.executor.read_radiance()?);
                 passes.watch.samples(finished, &so_far)
@@ -241,12 +283,6 @@ impl Renderer {
         }
         output.pixels.radiance = accumulation.mean();
         output.guides = guides.map(GuideReader::finish);
-        output.records = records.finish(engine);
-        engine.moved = Moved::default();
-        // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
-        if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {
-            primary.non_finite += output.pixels.not_finite();
-        }
         Ok(output)
     }
 }

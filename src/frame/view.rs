@@ -16,8 +16,8 @@ fn jitter(sample: u32) -> [f32; 2] {
     r2(sample)
 }
 
-/// The view of `camera` for one sample of a picture of `width` x `height` pixels, as if it were the only one of a
-/// pixel.
+/// The view of `camera` for one sample of a picture of `width` x `height` pixels, from its first row on, as if it were
+/// the only one of a pixel.
 pub fn camera_view(
     resident: &Resident,
     camera: &Camera,
@@ -49,6 +49,7 @@ pub fn camera_view(
         emitter_density: (light.lamps.density_of_surfaces() * frame.unit * frame.unit) as f32,
         sample,
         seed,
+        picture_rows: height,
         ..Params::default()
     };
     if let Some(environment) = &light.lamps.environment {

@@ -211,6 +211,11 @@ fn missing(limits: &wgpu::Limits) -> Option<(&'static str, u64, u64)> {
     (found < needed).then(|| ("storage buffers a kernel", found.into(), needed.into()))
 }
 
+/// Whether an adapter's memory is the host's: integrated and software adapters.
+pub fn is_host_memory(info: &wgpu::AdapterInfo) -> bool {
+    matches!(info.device_type, wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu)
+}
+
 /// Bytes of the largest heap of an adapter's own memory; `None` where its backend does not tell.
 fn local_memory(adapter: &wgpu::Adapter) -> Option<u64> {
     const DEVICE_LOCAL: u32 = 1;
@@ -257,9 +262,8 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| DeviceError::NoDevice { adapter: info.name.clone(), reason: e.to_string() })?;
-        let host_memory = matches!(info.device_type, wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu);
         let forced = std::env::var("BRICKWALK_UPLOAD").is_ok_and(|v| v == "staged");
-        let mapped = host_memory && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) && !forced;
+        let mapped = is_host_memory(&info) && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) && !forced;
         let upload = if mapped { UploadPath::Mapped } else { UploadPath::Staged };
         let timestamps = features.contains(wgpu::Features::TIMESTAMP_QUERY);
         Ok(Self { device, queue, info, limits, timestamps, upload, local_memory: local_memory(adapter) })

@@ -111,7 +111,7 @@ impl GpuExecutor {
         let most = most_rays(&gpu);
         let extent = setup.extent;
         if extent.rays() as u64 > most {
-            let text = format!("{:?} holds pictures of at most {most} pixels; ask for a smaller --size", gpu.info.name);
+            let text = format!("{:?} holds {most} pixels at a time; ask for a smaller --size or --tile", gpu.info.name);
             return Err(ExecutorError::Device(text));
         }
         let bricks = scene.resident().bricks.len();

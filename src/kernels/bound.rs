@@ -171,6 +171,13 @@ impl<'a> Bound<'a> {
         self.params.flags & flag != 0
     }
 
+    /// The pixel of the picture that a ray belongs to: random numbers are drawn by it, not by the ray's place in a
+    /// band.
+    #[inline(always)]
+    pub fn pixel_of(&self, index: usize) -> u32 {
+        self.params.first_row.wrapping_mul(self.params.width).wrapping_add(index as u32)
+    }
+
     /// What a method's kernel is told, as its WGSL declares it.
     #[inline(always)]
     pub fn own<T: bytemuck::Pod>(&self) -> &'a T {

@@ -2,9 +2,10 @@
 
 use crate::cpu;
 use crate::cpu::CpuExecutor;
-use crate::gpu::device::{Candidate, Gpu, candidates};
+use crate::gpu::device::{Candidate, Gpu, candidates, is_host_memory};
 use crate::gpu::executor::GpuExecutor;
 use crate::gpu::probe;
+use crate::gpu::rays::most_rays;
 use crate::kernels::{DeviceInfo, FrameExecutor, Setup};
 use crate::settings::Adapter;
 use crate::stream::{HostCache, Workers};
@@ -94,6 +95,30 @@ impl Device {
         match self {
             Self::Cpu => cpu::available_memory().map_or(USUAL_ROOM, |bytes| bytes / 2),
             Self::Gpu(gpu) => gpu.local_memory.map_or(USUAL_ROOM, |bytes| bytes / 4 * 3),
+        }
+    }
+
+    /// Bytes of its own memory, or of the memory that it takes of the host's; `None` where nobody tells.
+    pub fn local_memory(&self) -> Option<u64> {
+        match self {
+            Self::Cpu => cpu::available_memory(),
+            Self::Gpu(gpu) => gpu.local_memory,
+        }
+    }
+
+    /// Whether its memory is the host's.
+    pub fn is_host_memory(&self) -> bool {
+        match self {
+            Self::Cpu => true,
+            Self::Gpu(gpu) => is_host_memory(&gpu.info),
+        }
+    }
+
+    /// Most rays that it holds at a time.
+    pub fn most_rays(&self) -> u64 {
+        match self {
+            Self::Cpu => u64::from(u32::MAX),
+            Self::Gpu(gpu) => most_rays(gpu),
         }
     }
 

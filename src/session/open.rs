@@ -302,16 +302,11 @@ impl Session {
         for (number, ray) in rays.iter().enumerate() {
             trace::check(ray).with_context(|| format!("ray {number}"))?;
         }
-        let Engine { scene, executor, cache, settings, size, .. } = &mut self.renderer.engine;
+        let most = self.renderer.rays();
+        let Engine { scene, executor, cache, settings, .. } = &mut self.renderer.engine;
         // What frames may leave out given rays must find.
         let threshold = std::mem::take(&mut executor.tuning().threshold);
-        let mut traced = Traced {
-            scene,
-            executor: &mut **executor,
-            cache,
-            schedule: settings.schedule,
-            most: (size.0 * size.1) as usize,
-        };
+        let mut traced = Traced { scene, executor: &mut **executor, cache, schedule: settings.schedule, most };
         let found = trace::trace(&mut traced, rays, any, &mut |_| ());
         self.renderer.executor.tuning().threshold = threshold;
         let (hits, _) = found.with_context(|| self.file.display().to_string())?;

@@ -1,7 +1,7 @@
 //! A scene on a device: file, executor, cache and schedule, as settings ask for them.
 
+use super::bands::Bands;
 use super::device::Device;
-use super::picture_bytes::PictureBytes;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::output::atomic;
 use crate::schedule::ExecutorError;
@@ -26,7 +26,7 @@ pub struct Opened {
     pub cache: Cache,
     /// The schedule in force.
     pub schedule: Schedule,
-    /// Rays of a dispatch, and their tiles.
+    /// Rays of a dispatch, those of a band or of the picture, and their tiles.
     pub extent: Extent,
     /// What a person should know, a line each.
     pub warnings: Vec<String>,
@@ -64,6 +64,8 @@ pub struct Room {
     pub page_bytes: u64,
     /// Bytes of a cache that is made without being asked how large.
     pub bytes: u64,
+    /// Rows of a picture that are rendered at a time.
+    pub rows: u32,
 }
 
 /// Whether the device is what an error is about.
@@ -112,8 +114,9 @@ impl Opened {
             }
         }
         let device = Device::open(&settings.adapter)?;
-        PictureBytes::check(settings, &device)?;
-        let mut room = Room { page_bytes: device.page_bytes(), bytes: device.room() };
+        let Bands { rows, room, why } = Bands::of(settings, &device)?;
+        let bytes = room.map_or(device.room(), |left| left.min(device.room()));
+        let mut room = Room { page_bytes: device.page_bytes(), bytes, rows };
         let mut opened = loop {
             let made = Self::open_on(scene.clone(), path, settings, room, |needs| {
                 let setup = Setup { keep, ..needs.setup };
@@ -129,6 +132,7 @@ impl Opened {
             }
         };
         opened.cache.states.keep_asking(keep.queries);
+        opened.warnings.extend(why);
         Ok(opened)
     }
 
@@ -140,11 +144,11 @@ impl Opened {
         scene: Arc<SceneFile>,
         path: &Path,
         settings: &Settings,
-        Room { page_bytes, bytes: room }: Room,
+        Room { page_bytes, bytes: room, rows }: Room,
         make: impl FnOnce(Needs) -> Result<Box<dyn FrameExecutor>>,
     ) -> Result<Self> {
         let name = path.display();
-        let extent = Extent { width: settings.size.width, height: settings.size.height, tile: settings.tile };
+        let extent = Extent { width: settings.size.width, height: rows, tile: settings.tile };
         let sizes = scene.sizes();
         let for_all = Residency::budget_for_all(&sizes, page_bytes);
         let budget = cache_budget(settings.cache, &sizes, page_bytes, room);
@@ -194,6 +198,10 @@ impl Opened {
             human_bytes(settings.host_cache)
         );
         info!("schedule: {schedule}");
+        if rows < settings.size.height {
+            let bands = settings.size.height.div_ceil(rows);
+            info!("pictures: {} of {rows} rows", counted(bands.into(), "band"));
+        }
         let host = HostCache::new(settings.host_cache);
         let threads = settings.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };

@@ -40,7 +40,8 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         cache,
         settings: render,
         light,
-        size: (extent.width, extent.height),
+        size: (settings.size.width, settings.size.height),
+        band_rows: extent.height,
         tile: extent.tile,
         #[cfg(feature = "lab")]
         fronts: settings.fronts.then(Fronts::default),

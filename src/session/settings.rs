@@ -159,6 +159,9 @@ settings! {
         schedule: Schedule = Schedule::Auto, "--schedule NAME", Rule::Any, "", Schedule, Usual;
         /// Width and height of a screen tile.
         tile: u32 = 64, "--tile PIXELS", Rule::PowerOfTwo(8, 512), "pixels", Schedule, Expert;
+        /// Bands of tiles that a frame is rendered in, one after the other, at least. Each takes memory for its own rays
+        /// alone. Where a picture is larger than memory allows there are as many as it needs. Pictures are the same.
+        bands: u32 = 1, "--bands N", Rule::Whole(1, 2048), "", Schedule, Expert;
         /// Keep query pairs of tiles and nodes from frame to frame (schedule chc).
         #[cfg(feature = "lab")]
         fronts: bool = false, "--fronts on|off", Rule::Any, "", Schedule, Expert;
@@ -242,6 +245,12 @@ impl Settings {
                 return Err(SettingsError::Conflict(text.into()));
             }
         }
+        if let Some(option) = self.needs_whole_pictures().filter(|_| self.bands > 1) {
+            return Err(SettingsError::Conflict(format!(
+                "--bands {}: {option} needs the whole picture at once; leave one of them out",
+                self.bands
+            )));
+        }
         let is_chc = matches!(self.schedule, Schedule::Chc | Schedule::Auto);
         let is_plain = self.schedule.is_plain();
         for which in &self.without {
@@ -314,6 +323,20 @@ impl Settings {
         };
         let (chosen, of) = (self.secondary, of.join(" or "));
         is_idle.then(|| format!("--secondary {chosen} has no effect without --effects {of}{hint}"))
+    }
+
+    /// The first option of those chosen that needs the whole picture at once: what it keeps, bounds or shows is that of
+    /// all pixels, so that pictures are not rendered in bands.
+    pub fn needs_whole_pictures(&self) -> Option<&'static str> {
+        let needs = [
+            (self.secondary != EffectMethods::EXACT, "--secondary"),
+            (self.has_fronts(), "--fronts on"),
+            (self.interactive.is_some(), "--interactive"),
+            (!self.checkpoints.is_empty(), "--checkpoints"),
+            (self.progressive, "--progressive"),
+            (self.measure_error, "--measure-error"),
+        ];
+        needs.into_iter().find(|(is_on, _)| *is_on).map(|(_, option)| option)
     }
 
     /// Whether `chc` keeps query pairs from frame to frame.

@@ -94,6 +94,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             }),
         },
         "frames": stops.len(),
+        "bands": renderer.bands().len(),
         "pictures": {
             "exposure": s.exposure.plain(),
             "exposure_ev": stops,

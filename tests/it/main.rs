@@ -27,8 +27,10 @@ mod command {
     mod words;
 }
 
-/// Hits and records against truth; equal bits whatever the cache, the schedule, the executor and the motion.
+/// Hits and records against truth; equal bits whatever the cache, the schedule, the executor, the bands and
+/// the motion.
 mod exact {
+    mod bands;
     mod cache_independence;
     mod exactness;
     mod given_rays;

@@ -54,11 +54,13 @@ fn along(base: f32, x: f32, step_x: f32, y: f32, step_y: f32) -> f32 {
 pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
     let p = bound.params;
     for_each_new(own, |index| {
-        let (column, row) = (index as u32 % p.width, index as u32 / p.width);
+        let (column, row) = (index as u32 % p.width, p.first_row + index as u32 / p.width);
         let x = barrier(column as f32 + p.jitter[0]);
         let y = barrier(row as f32 + p.jitter[1]);
         let direction = each(|k| along(p.base[k], x, p.step_x[k], y, p.step_y[k]));
-        (Ray { origin: xyz(p.origin), t_min: 0.0, direction, t_max: T_INFINITE }, NONE, Chosen::default())
+        // The last band of a picture may reach beyond it.
+        let (t_min, t_max) = if row < p.picture_rows { (0.0, T_INFINITE) } else { (1.0, 0.0) };
+        (Ray { origin: xyz(p.origin), t_min, direction, t_max }, NONE, Chosen::default())
     });
 }
 
@@ -100,7 +102,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
         let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
         let mut chosen = Chosen::default();
         if surface.leaf != NONE {
-            let r = random2(index as u32, p.stream, p.seed);
+            let r = random2(bound.pixel_of(index), p.stream, p.seed);
             let mut faces = true;
             let mut t_max = T_INFINITE;
             if bound.has(PARAM_EMITTER) {
@@ -140,7 +142,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
 fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
     let p = bound.params;
     let mut a = p.around;
-    let r = random2(index as u32, p.stream, p.seed);
+    let r = random2(bound.pixel_of(index), p.stream, p.seed);
     let angle = a[3] * r[0];
     let (c, s) = (angle.cos(), angle.sin());
     let x = tangent(normal);
@@ -221,7 +223,7 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
         if !s.is_glossy() {
             return none(surface.point);
         }
-        let direction = s.direction(random4(index as u32, p.stream, p.seed));
+        let direction = s.direction(random4(bound.pixel_of(index), p.stream, p.seed));
         if s.density(direction) > 0.0 {
             leaving(surface, direction, T_INFINITE)
         } else {

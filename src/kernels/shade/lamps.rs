@@ -24,7 +24,7 @@ pub(crate) fn unit(word: u32) -> f32 {
 /// Which random numbers the ray of a pixel takes to draw candidate `number` for a lamp: those that start at hits of
 /// bounces take some of their own in every direction of the bounce, whose number lies in the throughput's w.
 pub fn lamp_words(bound: &Bound, index: usize, number: u32, throughput: &[[f32; 4]]) -> [u32; 4] {
-    let mut pixel = index as u32;
+    let mut pixel = bound.pixel_of(index);
     if bound.has(PARAM_BOUNCE) {
         pixel ^= pcg((throughput[index][3] as u32).wrapping_add(1));
     }

@@ -171,6 +171,8 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
 /// One way to render.
 struct Variant {
     schedule: Schedule,
+    /// Rows of a band, whole tiles, or all rows.
+    rows: u32,
     everything_fits: bool,
     fronts: bool,
     threshold: u32,
@@ -191,6 +193,7 @@ struct Variant {
 
 const VARIANT: Variant = Variant {
     schedule: Schedule::Chc,
+    rows: EXTENT.height,
     everything_fits: false,
     fronts: false,
     threshold: 0,
@@ -255,10 +258,11 @@ fn lockstep(
     (gpu, kernels): &(Gpu, Arc<Kernels>),
     scene: &Arc<SceneFile>,
     pages: &[u64],
-    threshold: u32,
+    &Variant { rows: height, threshold, .. }: &Variant,
     findings: &Arc<Mutex<Findings>>,
 ) -> Lockstep {
-    let setup = Setup { extent: EXTENT, threshold, count: true, opaque: false, keep: Keep::default() };
+    let extent = Extent { height, ..EXTENT };
+    let setup = Setup { extent, threshold, count: true, opaque: false, keep: Keep::default() };
     let host = || HostCache::new(1 << 20);
     let on_gpu = GpuExecutor::with_kernels(
         gpu.clone(),
@@ -314,7 +318,7 @@ fn render(
     let budget = if variant.everything_fits { Residency::budget_for_all(&sizes, page_bytes) } else { least };
     let residency = residency(budget).unwrap();
     let pages: Vec<u64> = residency.page_sizes().collect();
-    let mut executor = lockstep(device, scene, &pages, variant.threshold, findings);
+    let mut executor = lockstep(device, scene, &pages, variant, findings);
     if let Some(defect) = defect {
         executor = executor.with_defect(defect);
     }
@@ -347,6 +351,7 @@ fn render(
         },
         light,
         size: (EXTENT.width, EXTENT.height),
+        band_rows: variant.rows,
         tile: EXTENT.tile,
         fronts: variant.fronts.then(Fronts::default),
         auto: Auto::default(),
@@ -407,6 +412,8 @@ fn twins_agree_with_their_kernels() {
     use Optimisation::*;
     let variants = [
         Variant { schedule: Schedule::Plain, everything_fits: true, ..VARIANT },
+        // The last rows of the last band lie below the picture.
+        Variant { rows: 16, ..VARIANT },
         Variant { schedule: Schedule::PlainBinary, everything_fits: true, ..VARIANT },
         Variant { everything_fits: true, ..VARIANT },
         VARIANT,
@@ -449,7 +456,7 @@ fn twins_agree_with_their_kernels() {
     for (scene, variants) in [
         (Arc::new(probe::scene().unwrap()), &variants[..]),
         (textured(false), &variants[..]),
-        (textured(true), &variants[2..10]),
+        (textured(true), &variants[2..11]),
     ] {
         let has_occupancy = !scene.resident().occupancy.is_empty();
         for (i, variant) in variants
@@ -569,7 +576,7 @@ fn rays_are_sifted_by_maps_alone() {
     let boms = base_maps(32, None);
     for levels in [0, 2] {
         let findings = Arc::new(Mutex::new(Findings::default()));
-        let mut executor = lockstep(&device, &scene, &pages, 0, &findings);
+        let mut executor = lockstep(&device, &scene, &pages, &VARIANT, &findings);
         executor.begin_frame(&View { frame: FRAME, params: Params::default(), directions: Directions::default() });
         let maps = RomaMaps::new(&boms, levels, &FRAME, roma, (0, 0));
         maps.give(&mut executor, &boms).unwrap();
@@ -589,7 +596,7 @@ fn distance_fields_of_all_sizes_are_those_of_their_twins() {
     for (cells, every) in [(32, None), (32, Some(32_768)), (32, Some(20)), (64, Some(50)), (96, Some(100))] {
         for defect in [None, Some(Defect::Fields)] {
             let findings = Arc::new(Mutex::new(Findings::default()));
-            let mut executor = lockstep(&device, &scene, &pages, 0, &findings);
+            let mut executor = lockstep(&device, &scene, &pages, &VARIANT, &findings);
             if let Some(defect) = defect {
                 executor = executor.with_defect(defect);
             }

@@ -167,7 +167,8 @@ impl Lab {
     }
 
     fn opened(&mut self, file: Arc<SceneFile>, path: &Path, settings: &Settings) -> Result<Opened> {
-        let room = Room { page_bytes: self.device.page_bytes(), bytes: self.device.room() };
+        let rows = settings.size.height;
+        let room = Room { page_bytes: self.device.page_bytes(), bytes: self.device.room(), rows };
         Opened::open_on(file, path, settings, room, |needs| self.executor(needs))
     }
 

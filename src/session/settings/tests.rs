@@ -178,6 +178,20 @@ fn settings_that_do_not_go_together_are_refused() {
     {
         assert_eq!(of(schedule, without), Ok(()));
     }
+    for options in [
+        "--secondary ao=roma",
+        "--fronts on",
+        "--interactive 1M",
+        "--checkpoints 1 --reference a.exr",
+        "--progressive",
+        "--measure-error",
+    ] {
+        let of = |more: &str| why(Settings::from_options(&format!("{options} {more}")).unwrap());
+        let option = options.split(' ').next().unwrap();
+        assert!(of("--bands 2").unwrap_err().contains(&format!("--bands 2: {option}")), "{options}");
+        assert_eq!(of("--bands 1"), Ok(()), "{options}");
+    }
+    assert_eq!(why(Settings { bands: 9, denoise: true, taa: true, ..Settings::default() }), Ok(()));
     let on = Settings { without: vec![crate::schedule::Optimisation::Requery], ..Settings::default() }.optimisations();
     assert!(!on.requery && on.nearest_first);
 }

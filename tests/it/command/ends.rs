@@ -22,8 +22,8 @@ fn a_picture_too_large_for_the_memory_is_refused_at_once() {
     let out = folder.path().join("out");
     let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), out.as_os_str()];
     let options = "--frames 1 --size 16384x16384 --adapter cpu --aov --effects shadow,diffuse,glossy";
-    let PictureBytes { device, host } = PictureBytes::of(&crate::common::settings(options));
-    if brickwalk::cpu::available_memory().is_none_or(|bytes| bytes >= (device + host) << 28) {
+    let PictureBytes { joined, .. } = PictureBytes::of(&crate::common::settings(options));
+    if brickwalk::cpu::available_memory().is_none_or(|bytes| bytes >= joined << 28) {
         return skip("the memory of this machine holds the picture");
     }
     let start = Instant::now();
@@ -34,13 +34,36 @@ fn a_picture_too_large_for_the_memory_is_refused_at_once() {
     assert!(start.elapsed() < Duration::from_secs(20) && !out.exists());
 }
 
+/// A picture that memory does not hold at once is rendered in bands, which is said; it is the same picture.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_picture_too_large_for_the_memory_is_rendered_in_bands() {
+    let folder = folder();
+    let scene = city(folder.path(), "10K", "4K");
+    let picture = |limit: &str, name: &str| {
+        let out = folder.path().join(name);
+        let line = "--frames 1 --size 2600x2400 --adapter cpu --effects primary --quality exact";
+        let (status, text) = limited(limit, &format!("walk {} -o {} {line}", scene.display(), out.display()));
+        assert_eq!(status, Some(0), "{text}");
+        (text, std::fs::read(out.join("frames/0000.png")).expect("a frame"))
+    };
+    // Kibibytes; the picture takes twice as much.
+    let (text, banded) = picture("-v 1200000", "banded");
+    assert!(text.contains("--size 2600x2400: rendered in ") && text.contains("bytes a pixel, and "), "{text}");
+    let (text, whole) = picture("-v unlimited", "whole");
+    assert!(!text.contains("bands"), "control: {text}");
+    assert!(banded == whole);
+}
+
 /// What a picture is said to take is what it takes.
 #[test]
 fn pictures_take_as_much_memory_as_is_said() {
     let folder = folder();
     let scene = city(folder.path(), "10K", "4K");
     let out = folder.path().join("out");
-    for options in ["--effects shadow", "--effects shadow --aov", "--effects diffuse --diffuse-rays 1", "--denoise"] {
+    let bands = ["--effects shadow --bands 100", "--effects shadow --aov --bands 100"];
+    let whole = ["--effects shadow", "--effects shadow --aov", "--effects diffuse --diffuse-rays 1", "--denoise"];
+    for options in bands.into_iter().chain(whole) {
         let peak = |edge: u64| {
             let size = format!("--frames 2 --size {edge}x{edge} --adapter cpu --cache 100%");
             walk(&scene, &out, &format!("{size} {options}"));
@@ -50,8 +73,10 @@ fn pictures_take_as_much_memory_as_is_said() {
         };
         let (small, large) = (512, 1536);
         let found = (peak(large) - peak(small)) as f64 / (large * large - small * small) as f64;
-        let PictureBytes { device, host } = PictureBytes::of(&crate::common::settings(options));
-        let said = (device + host) as f64;
+        let PictureBytes { device, host, band, joined } = PictureBytes::of(&crate::common::settings(options));
+        // Bands of one row of tiles.
+        let of_band = 64.0 * (device + band) as f64 / (large + small) as f64;
+        let said = if options.contains("--bands") { joined as f64 + of_band } else { (device + host) as f64 };
         println!("{options}: {found:.0} bytes a pixel, said {said}");
         // Never much less than is needed; rounding of allocators and rays in flight are the rest.
         assert!((0.75..1.1).contains(&(found / said)), "{options}: {found:.0} of {said}");

@@ -1,0 +1,70 @@
+//! Pictures that are rendered in bands of rows, one after the other, and joined on the host.
+//!
+//! A band is whole tiles high and as wide as the picture: its tiles are those of the picture, its camera rays and random
+//! numbers are those of the pixels. So what is joined is, bit for bit, what is rendered at once. Rows of the last band
+//! that lie below the picture have no rays.
+
+use super::FrameOutput;
+
+/// Where a band lies in its picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// Pixels of the band that the picture has.
+    pub band: usize,
+    /// Pixels of the picture.
+    pub picture: usize,
+}
+
+impl Joint {
+    /// Adds the values of a band's pixels to those above them. What was not asked for has no values.
+    fn join<T>(self, above: &mut Vec<T>, mut values: Vec<T>) {
+        values.truncate(self.band);
+        if above.is_empty() && values.len() == self.picture {
+            *above = values;
+        } else if !values.is_empty() {
+            // No more than is needed: these are the largest things on the host.
+            above.reserve_exact(self.picture - above.len());
+            above.append(&mut values);
+        }
+    }
+}
+
+impl FrameOutput {
+    /// Adds what a band shows below what there is.
+    pub(super) fn append(&mut self, band: Self, joint: Joint) {
+        let Self { pixels, coverage, guides, .. } = band;
+        joint.join(&mut self.pixels.radiance, pixels.radiance);
+        joint.join(&mut self.pixels.depth, pixels.depth);
+        joint.join(&mut self.pixels.normal, pixels.normal);
+        joint.join(&mut self.pixels.id, pixels.id);
+        joint.join(&mut self.pixels.albedo, pixels.albedo);
+        joint.join(&mut self.coverage, coverage);
+        if let Some(mut guides) = guides {
+            let (seen, direct) = (std::mem::take(&mut guides.seen), std::mem::take(&mut guides.direct));
+            let all = self.guides.get_or_insert(guides);
+            joint.join(&mut all.seen, seen);
+            joint.join(&mut all.direct, direct);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Pixels;
+
+    #[test]
+    fn rows_below_the_picture_are_left_out() {
+        let band = |value: f32| {
+            let pixels = Pixels { radiance: vec![[value; 3]; 4], ..Pixels::default() };
+            FrameOutput { pixels, coverage: vec![value > 0.0; 4], ..FrameOutput::default() }
+        };
+        let mut all = FrameOutput::default();
+        all.append(band(1.0), Joint { band: 4, picture: 6 });
+        all.append(band(0.0), Joint { band: 2, picture: 6 });
+        assert_eq!(all.pixels.radiance, [[1.0; 3], [1.0; 3], [1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]]);
+        assert_eq!(all.coverage, [true, true, true, true, false, false]);
+        assert!(all.pixels.depth.is_empty() && all.guides.is_none());
+        assert_eq!(all.pixels.radiance.capacity(), 6);
+    }
+}
