@@ -1,8 +1,8 @@
 //! Pictures that are rendered in bands of rows, one after the other, and joined on the host.
 //!
-//! A band is whole tiles high and as wide as the picture: its tiles are those of the picture, its camera rays and random
-//! numbers are those of the pixels. So what is joined is, bit for bit, what is rendered at once. Rows of the last band
-//! that lie below the picture have no rays.
+//! A band is whole tiles high and as wide as the picture: its tiles are those of the picture, its camera rays and
+//! random numbers are those of the pixels. So what is joined is, bit for bit, what is rendered at once. Rows of the
+//! last band that lie below the picture have no rays.
 
 use super::FrameOutput;
 

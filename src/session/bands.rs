@@ -76,8 +76,8 @@ impl Bands {
     /// As many as `settings` ask for, or as the memory of `device` and of the host need.
     ///
     /// # Errors
-    /// The picture is too large for a band, or to be joined, or for what needs all of it at once: how much it takes, how
-    /// much there is, and the largest size that it is enough for.
+    /// The picture is too large for a band, or to be joined, or for what needs all of it at once: how much it takes,
+    /// how much there is, and the largest size that it is enough for.
     pub fn of(settings: &Settings, device: &Device) -> Result<Self> {
         Self::within(settings, &Pool::of(settings, device), device.most_rays())
     }

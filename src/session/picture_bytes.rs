@@ -16,8 +16,8 @@ pub struct PictureBytes {
     pub host: u64,
     /// On the host, of a pixel of the band that is rendered: sums of samples, what is read back.
     pub band: u64,
-    /// On the host at most, of a pixel of a picture that is joined of bands: what the bands showed, and the same while a
-    /// frame is finished.
+    /// On the host at most, of a pixel of a picture that is joined of bands: what the bands showed, and the same while
+    /// a frame is finished.
     pub joined: u64,
 }
 

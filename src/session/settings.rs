@@ -159,8 +159,9 @@ settings! {
         schedule: Schedule = Schedule::Auto, "--schedule NAME", Rule::Any, "", Schedule, Usual;
         /// Width and height of a screen tile.
         tile: u32 = 64, "--tile PIXELS", Rule::PowerOfTwo(8, 512), "pixels", Schedule, Expert;
-        /// Bands of tiles that a frame is rendered in, one after the other, at least. Each takes memory for its own rays
-        /// alone. Where a picture is larger than memory allows there are as many as it needs. Pictures are the same.
+        /// Bands of tiles that a frame is rendered in, one after the other, at least. Each takes memory for its own
+        /// rays alone. Where a picture is larger than memory allows there are as many as it needs. Pictures are the
+        /// same.
         bands: u32 = 1, "--bands N", Rule::Whole(1, 2048), "", Schedule, Expert;
         /// Keep query pairs of tiles and nodes from frame to frame (schedule chc).
         #[cfg(feature = "lab")]

@@ -1,5 +1,5 @@
-//! A picture that is rendered in bands is the picture that is rendered at once, byte by byte, and its records say as much
-//! as those of one band do.
+//! A picture that is rendered in bands is the picture that is rendered at once, byte by byte, and its records say as
+//! much as those of one band do.
 
 use crate::common::{self, adapters, city, folder, frames, polished_city, settings, walk};
 use brickwalk::session::{Ray, Session};

@@ -158,7 +158,8 @@ fn counts_are_those_of_the_rays_themselves() {
     let camera = CameraPath::read(&scene.with_extension("near.json")).expect("a path").frame(0, 1);
     for adapter in adapters() {
         for secondary in ["exact", "shadow=roma", "shadow=df", "shadow=auto --auto-error off"] {
-            let options = format!("--effects shadow --secondary {secondary} --cache 100%");
+            let cells = "--roma-size 64 --df-size 32";
+            let options = format!("--effects shadow --secondary {secondary} --cache 100% {cells}");
             let mut renderer = renderer(&scene, &adapter, &options);
             let records = renderer.frame(0, &camera).expect("a frame").records;
             let [traced, answered] = rays(&records, "shadow");

@@ -388,7 +388,8 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     let picture = |options: &str, threads: &str| {
         let output = folder.path().join("out");
         let method = if options.contains("--secondary") { "" } else { "--secondary ao=roma,shadow=roma" };
-        walk_of(&scene, &output, &format!("--adapter cpu {method} {options}"), threads);
+        let cells = if options.contains("--roma-size") { "" } else { "--roma-size 64" };
+        walk_of(&scene, &output, &format!("--adapter cpu {method} {cells} {options}"), threads);
         let all = frames(&output);
         std::fs::remove_dir_all(&output).expect("a folder");
         all
@@ -403,7 +404,7 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     let corrected = picture("--cache 100% --secondary ao=auto,shadow=auto --auto-one-in 3", "1");
     assert!(corrected != one && corrected != hybrid);
     assert!(picture("--cache 20% --secondary ao=auto,shadow=auto --auto-one-in 3 --schedule demand", "3") == corrected);
-    for other in ["--seed 1", "--roma-k 8", "--roma-size 64", "--roma-samples 1", "--roma-unsnapped all"] {
+    for other in ["--seed 1", "--roma-k 8", "--roma-size 32", "--roma-samples 1", "--roma-unsnapped all"] {
         assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
     }
 }
