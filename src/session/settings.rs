@@ -139,7 +139,7 @@ settings! {
         /// what is available on the processor.
         cache: CacheSize = CacheSize::Auto, "--cache SIZE|P%|auto", Rule::Any, "", Cache, Common;
         /// Host memory for verified bricks; 0 keeps none.
-        host_cache: u64 = 1 << 30, "--host-cache SIZE", Rule::Bytes(0), "bytes", Cache, Usual;
+        host_cache: u64 = 1 << 30, "--host-cache SIZE", Rule::Bytes(0), "bytes", Cache, Expert;
         /// Bytes of texture tiles that a frame loads at most. Tiles that most hits ask for come first; a coarser level
         /// that is resident stands for the others, and `unresolved_pixels` counts such hits. While the camera rests,
         /// frames become exact. Bricks are waited for. [default: off, tiles are waited for as well]
@@ -148,9 +148,9 @@ settings! {
         /// cache; `second-chance`: the next one not used since its last turn; `lru`: the one not used for longest.
         evict: Policy = Policy::RoundRobin, "--evict NAME", Rule::Any, "", Cache, Expert;
         /// Threads that read bricks and check them. [default: one per core, at most 4]
-        workers: Option<u32> = None, "--workers|--hash-threads N", Rule::Whole(1, 1024), "", Cache, Usual;
+        workers: Option<u32> = None, "--workers|--hash-threads N", Rule::Whole(1, 1024), "", Cache, Expert;
         /// Write the trace of brick requests to a file, for `replay`. [default: none]
-        requests_out: Option<PathBuf> = None, "--requests-out F", Rule::Any, "", Cache, Usual;
+        requests_out: Option<PathBuf> = None, "--requests-out F", Rule::Any, "", Cache, Expert;
 
         /// How bricks to intersect are found: chc, demand, plain, auto; pictures are the same. `chc`: tiles against the
         /// top level, loading what rays need. `demand`: one traversal per ray over what is resident, loading what rays
