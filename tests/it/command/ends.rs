@@ -61,7 +61,7 @@ fn pictures_take_as_much_memory_as_is_said() {
     let folder = folder();
     let scene = city(folder.path(), "10K", "4K");
     let out = folder.path().join("out");
-    let bands = ["--effects shadow --bands 100", "--effects shadow --aov --bands 100"];
+    let bands = ["--effects shadow --exposure auto --bands 100", "--denoise --bands 100"];
     let whole = ["--effects shadow", "--effects shadow --aov", "--effects diffuse --diffuse-rays 1", "--denoise"];
     for options in bands.into_iter().chain(whole) {
         let peak = |edge: u64| {
