@@ -81,7 +81,12 @@ fn records_of_bands_add_up() {
             assert_eq!(banded.len(), whole.len());
             for (one, many) in whole.iter().zip(&banded) {
                 let name = format!("{schedule}, {count} bands: {one} and {many}");
-                for field in ["frame", "pass", "rays", "rays_traced", "bricks_hit", "bricks_needed"] {
+                for field in ["frame", "pass", "rays", "rays_traced"] {
+                    assert!(one[field] == many[field], "{field} of {name}");
+                }
+                // Any hit may be another where other bricks are there already.
+                let is_closest = one["pass"] == "primary" || one["pass"] == "diffuse";
+                for field in ["bricks_hit", "bricks_needed"].into_iter().filter(|_| is_closest) {
                     assert!(one[field] == many[field], "{field} of {name}");
                 }
                 assert_eq!(number(many, "rays"), number(many, "rays_traced") + number(many, "rays_answered"), "{name}");
