@@ -65,14 +65,14 @@ fn records_of_bands_add_up() {
     let scene = city(folder.path(), "40K", "512");
     let run = |count: u32, options: &str| -> Vec<Value> {
         let output = folder.path().join("out");
-        let effects = "--effects shadow,ao,diffuse --ao-rays 1 --ao-length 4 --diffuse-rays 1 --spp 2 --adapter cpu";
-        walk(&scene, &output, &format!("{} {effects} --bands {count} {options}", near(&scene)));
+        walk(&scene, &output, &format!("{} --spp 2 --adapter cpu --bands {count} {options}", near(&scene)));
         let text = std::fs::read_to_string(output.join("records.jsonl")).expect("records");
         text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
     };
     let number = |record: &Value, field: &str| record[field].as_u64().expect(field);
     for schedule in ["chc", "demand"] {
-        let options = format!("--schedule {schedule} --cache 100% --measure-needed");
+        let effects = "--effects shadow,ao,diffuse --ao-rays 1 --ao-length 4 --diffuse-rays 1";
+        let options = format!("{effects} --schedule {schedule} --cache 100% --measure-needed");
         let whole = run(1, &options);
         assert_eq!(whole.len(), 2 * 5, "two frames of primary, shadow, ao, diffuse and its shadows");
         let mut more = 0;
