@@ -17,13 +17,16 @@ use std::time::Instant;
 /// Times that a frame is rendered with and without each thing.
 const REPETITIONS: usize = 5;
 
+/// How a thing that is left out is kept.
+type Keeper = fn(&mut Keep);
+
 /// Something that is left out.
 #[derive(Clone, Copy, Debug)]
 pub struct LeftOut {
     what: &'static str,
     why: &'static str,
     /// What keeps it, where it can be kept.
-    keep: Option<fn(&mut Keep)>,
+    keep: Option<Keeper>,
 }
 
 /// What `renderer` leaves out.
@@ -32,7 +35,7 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let fits = renderer.cache.residency.budget_bytes() >= renderer.cache.sizes.sum();
-    let all: [(bool, &str, &str, Option<fn(&mut Keep)>); 7] = [
+    let all: [(bool, &str, &str, Option<Keeper>); 7] = [
         (fits, "queries for missing bricks", "the cache holds every brick and tile", Some(|keep| keep.queries = true)),
         (!manifest.has_textures, "texture lookups", "no material has a texture", Some(|keep| keep.textures = true)),
         (
