@@ -152,7 +152,7 @@ const DIFFUSE: &[Effect] = &[Effect::Diffuse];
 /// What is traced of random turns.
 pub const SECONDARY: &[Effect] = &[Effect::Ao, Effect::Diffuse];
 
-/// [`EFFECTS`], each in a walk of its own: rays of one would load, or evict, what those of another need.
+/// `EFFECTS`, each in a walk of its own: rays of one would load, or evict, what those of another need.
 pub fn apart() -> impl Iterator<Item = &'static [Effect]> {
     EFFECTS.chunks(1)
 }
