@@ -14,6 +14,8 @@ const MOST_BRICKS: usize = 256;
 const GROUND: f64 = 0.9;
 /// What is smaller than this share of the whole stands on a ground.
 const SMALL: f64 = 0.5;
+/// What is higher than this share of its width is no ground.
+const FLAT: f64 = 0.2;
 /// Leaves that are looked through at most.
 const MOST_LEAVES: usize = 1 << 16;
 
@@ -75,8 +77,13 @@ impl<'a> Sight<'a> {
             let whole = boxes.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
             whole.map_or(0.0, |[min, max]| (max - min).length())
         };
-        // Parts of one object are not left out of its picture.
-        let stands_on_ground = span(&boxes[..dense]) < SMALL * span(&boxes);
+        let is_flat = |[min, max]: &[DVec3; 2]| {
+            let size = *max - *min;
+            size.y <= FLAT * size.x.max(size.z)
+        };
+        // Parts of one object are not left out of its picture, coarse ones neither.
+        let stands_on_ground =
+            span(&boxes[..dense]) < SMALL * span(&boxes) && boxes[dense..].iter().all(is_flat);
         if stands_on_ground { boxes[..dense].to_vec() } else { boxes }
     }
 

@@ -63,6 +63,12 @@ struct Place {
     has_roof: bool,
 }
 
+impl Place {
+    fn is_enclosed(&self) -> bool {
+        f64::from(self.hits) >= ENCLOSED * f64::from(self.rays)
+    }
+}
+
 /// The longest free way within the bounds, if they are those of a room.
 fn room(sight: &mut Sight, min: DVec3, max: DVec3) -> Option<Way> {
     let size = max - min;
@@ -76,8 +82,9 @@ fn room(sight: &mut Sight, min: DVec3, max: DVec3) -> Option<Way> {
         let share = |k: u32| f64::from(k + 1) / f64::from(SIDE + 1);
         let middle = min + size * DVec3::new(share(index % SIDE), 0.4, share(index / SIDE));
         let place = look_around(sight, middle, [min, max])?;
-        // Within a pillar or a chest one sees backs.
-        places.extend((2 * place.fronts > place.hits).then_some(place));
+        // Within a pillar or a chest one sees backs all around.
+        let is_within = place.is_enclosed() && 2 * place.fronts <= place.hits;
+        places.extend((!is_within).then_some(place));
     }
     let sum = |of: fn(&Place) -> u32| f64::from(places.iter().map(of).sum::<u32>());
     let (rays, hits) = (sum(|place| place.rays), sum(|place| place.hits));
@@ -203,6 +210,32 @@ mod tests {
             ([9.0, 0.0, 3.0], [12.0, 5.0, 9.0], false),
         ];
         assert!(!is_within(&path_of(&court), [0.0; 3], [12.0; 3]));
+        // A block that is turned inside out, as mirrors do, on a wide floor.
+        let block = ([0.0, 0.0, -1.5], [8.0, 4.0, 1.5], true);
+        let floor = ([-4.0, -0.1, -3.0], [11.0, 0.0, 3.0], false);
+        assert!(!is_within(&path_of(&[block, floor]), min, max));
+    }
+
+    /// Blocks of few triangles among others of many belong to what is shown; they are no ground.
+    #[test]
+    fn coarse_parts_are_framed_too() {
+        let mut boxes: Vec<_> = (0..30)
+            .map(|i| {
+                let at = [f64::from(i % 6), f64::from(i / 6)].map(|x| 100.0 * x);
+                ([at[0], 0.0, at[1]], [at[0] + 60.0, 120.0, at[1] + 60.0], false)
+            })
+            .collect();
+        boxes.extend((0..4000).map(|i: u32| {
+            let at = [f64::from(i % 40), f64::from(i / 40)].map(|x| 0.5 * x);
+            ([at[0] + 62.0, 0.0, at[1]], [at[0] + 62.4, 1.0, at[1] + 0.4], false)
+        }));
+        let path = path_of(&boxes);
+        for k in 0..9 {
+            let camera = path.frame(k, 9);
+            let (_, _, forward) = camera.frame();
+            let depth = (DVec3::new(280.0, 60.0, 230.0) - camera.position).dot(forward);
+            assert!(depth > 400.0, "{depth}");
+        }
     }
 
     #[test]
