@@ -63,25 +63,45 @@ pub fn jump_flood(map: &Bom) -> Vec<u32> {
 
 /// The cells of one x: of their own nearest and those of the 26 neighbours `step` away, the nearest to them.
 fn flood_plane(nearest: &[u32], cells: u32, x: u32, step: u32, out: &mut [u32]) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: AVX2 has been detected.
+        return unsafe { flood_plane_avx2(nearest, cells, x, step, out) };
+    }
+    flood_rows(nearest, cells, x, step, out);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn flood_plane_avx2(nearest: &[u32], cells: u32, x: u32, step: u32, out: &mut [u32]) {
+    flood_rows(nearest, cells, x, step, out);
+}
+
+/// [`flood_plane`] row by row, for whatever vectors the caller's instructions have.
+#[inline(always)]
+fn flood_rows(nearest: &[u32], cells: u32, x: u32, step: u32, out: &mut [u32]) {
     let around =
         |at: u32| [at.checked_sub(step), Some(at), Some(at + step).filter(|&at| at < cells)].into_iter().flatten();
     let (row, step) = (cells as usize, step as usize);
-    // Squared distances, and below them the cells, whose order decides between equal ones.
-    let mut best = vec![u64::MAX; row];
+    // Squared distances of the best so far; of equal ones the lower cell is it. Signed: vectors compare no others.
+    let mut best = vec![i32::MAX; row];
     for (y, out) in (0..cells).zip(out.chunks_mut(row)) {
-        best.fill(u64::MAX);
+        best.fill(i32::MAX);
+        out.fill(NO_SEED);
         for first in around(x).flat_map(|nx| around(y).map(move |ny| ((nx * cells + ny) * cells) as usize)) {
             let given = &nearest[first..first + row];
             let mut ask = |low: usize, seeds: &[u32]| {
-                for (z, (best, &seed)) in (low as u32..).zip(best[low..].iter_mut().zip(seeds)) {
-                    let found = u64::from(squared([x, y, z], seed)) << 32 | u64::from(seed);
-                    *best = (*best).min(if seed == NO_SEED { u64::MAX } else { found });
+                let own = best[low..].iter_mut().zip(&mut out[low..]);
+                for (z, ((best, out), &seed)) in (low as u32..).zip(own.zip(seeds)) {
+                    let found = if seed == NO_SEED { i32::MAX } else { squared([x, y, z], seed) as i32 };
+                    let is_nearer = (found < *best) | ((found == *best) & ((seed as i32) < *out as i32));
+                    (*best, *out) = if is_nearer { (found, seed) } else { (*best, *out) };
                 }
             };
             ask(0, given);
             ask(step, &given[..row - step]);
             ask(0, &given[step..]);
         }
-        out.iter_mut().zip(&best).for_each(|(out, best)| *out = *best as u32);
     }
 }
+

@@ -71,7 +71,7 @@ fn pictures_take_as_much_memory_as_is_said() {
             let summary: serde_json::Value = serde_json::from_slice(&summary).expect("JSON");
             summary["memory"]["peak_bytes"].as_u64().expect("on Linux")
         };
-        let (small, large) = (512, 1536);
+        let (small, large) = (512, 1280);
         let found = (peak(large) - peak(small)) as f64 / (large * large - small * small) as f64;
         let PictureBytes { device, host, band, joined } = PictureBytes::of(&crate::common::settings(options));
         // Bands of one row of tiles.

@@ -252,7 +252,7 @@ fn maps_and_bricks_together_are_measured() {
 fn seams_and_leaks_of_occupancy_maps_are_measured() {
     let folder = folder();
     let output = folder.path().join("out");
-    let tiny = "bench roma --triangles 10K --size 64x36 --samples 16 --repeat 1 --adapter cpu --stages seams,leaks -o";
+    let tiny = "bench roma --triangles 10K --size 64x36 --samples 6 --repeat 1 --adapter cpu --stages seams,leaks -o";
     succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
     let json = json(&output.join("roma.json"));
     // Exact rays, maps and a field, of two scenes; base maps of two kinds.
@@ -281,7 +281,7 @@ fn seams_and_leaks_of_occupancy_maps_are_measured() {
 fn distance_fields_are_measured_beside_occupancy_maps() {
     let folder = folder();
     let output = folder.path().join("out");
-    let tiny = "bench roma --triangles 10K --size 32x18 --samples 4 --repeat 1 --adapter cpu --stages shadows -o";
+    let tiny = "bench roma --triangles 10K --size 32x18 --samples 2 --repeat 1 --adapter cpu --stages shadows -o";
     succeed(tiny.split_whitespace().map(std::ffi::OsStr::new).chain([output.as_os_str()]));
     let json = json(&output.join("roma.json"));
     // Exact rays, four kinds of maps and a field, of two lights.
