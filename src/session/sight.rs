@@ -82,8 +82,7 @@ impl<'a> Sight<'a> {
             size.y <= FLAT * size.x.max(size.z)
         };
         // Parts of one object are not left out of its picture, coarse ones neither.
-        let stands_on_ground =
-            span(&boxes[..dense]) < SMALL * span(&boxes) && boxes[dense..].iter().all(is_flat);
+        let stands_on_ground = span(&boxes[..dense]) < SMALL * span(&boxes) && boxes[dense..].iter().all(is_flat);
         if stands_on_ground { boxes[..dense].to_vec() } else { boxes }
     }
 

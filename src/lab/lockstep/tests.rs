@@ -408,7 +408,6 @@ fn render(
 
 #[test]
 fn twins_agree_with_their_kernels() {
-    let Some(device) = device() else { return };
     use Optimisation::*;
     let variants = [
         Variant { schedule: Schedule::Plain, everything_fits: true, ..VARIANT },
@@ -452,12 +451,10 @@ fn twins_agree_with_their_kernels() {
     // Whatever methods there are, with few cells.
     let usual = Method::ALL.iter().map(|&method| Variant { method, ..VARIANT }).filter(|v| v.method != Method::Exact);
     let variants: Vec<Variant> = variants.into_iter().chain(usual).collect();
-    let findings = Arc::new(Mutex::new(Findings::default()));
-    for (scene, variants) in [
-        (Arc::new(probe::scene().unwrap()), &variants[..]),
-        (textured(false), &variants[..]),
-        (textured(true), &variants[2..11]),
-    ] {
+    // With a device of their own, scenes are rendered at the same time.
+    let check = |scene: Arc<SceneFile>, variants: &[Variant]| {
+        let device = device()?;
+        let findings = Arc::new(Mutex::new(Findings::default()));
         let has_occupancy = !scene.resident().occupancy.is_empty();
         for (i, variant) in variants
             .iter()
@@ -468,8 +465,24 @@ fn twins_agree_with_their_kernels() {
             let found = findings.lock().unwrap();
             assert_eq!(found.differences, Vec::<String>::new(), "variant {i} of {}", scene.path().display());
         }
+        Some(std::mem::take(&mut *findings.lock().unwrap()))
+    };
+    let mut found = Findings::default();
+    let scenes = [
+        (Arc::new(probe::scene().unwrap()), &variants[..]),
+        (textured(false), &variants[..]),
+        (textured(true), &variants[2..11]),
+    ];
+    let each = std::thread::scope(|scope| {
+        let threads = scenes.map(|(scene, variants)| scope.spawn(|| check(scene, variants)));
+        threads.map(|thread| thread.join().unwrap())
+    });
+    for own in each {
+        let Some(own) = own else { return };
+        found.kernels.extend(own.kernels);
+        own.compared.into_iter().for_each(|(what, count)| *found.compared.entry(what).or_default() += count);
+        found.greatest = found.greatest.max(own.greatest);
     }
-    let found = findings.lock().unwrap();
     println!("greatest difference {:e}; compared {:?}", found.greatest, found.compared);
     let families = FAMILIES.iter().flat_map(|family| family.kernels);
     let all = KERNELS.iter().chain(families).map(|kernel| kernel.name);

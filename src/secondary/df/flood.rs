@@ -104,4 +104,3 @@ fn flood_rows(nearest: &[u32], cells: u32, x: u32, step: u32, out: &mut [u32]) {
         }
     }
 }
-

@@ -32,7 +32,8 @@ fn frames_are_byte_identical_whatever_the_number_of_bands() {
         format!("{lit} --aov --denoise --schedule plain --cache 100%"),
         format!("{sky} --aov --schedule demand --cache 20%"),
         format!("{sky} --denoise --taa --schedule auto --cache 20%"),
-        "--effects ao --ao-rays 1 --ao-length 4 --aov --spp 70 --schedule chc --cache 5% --query-threshold 20".to_string(),
+        "--effects ao --ao-rays 1 --ao-length 4 --aov --spp 70 --schedule chc --cache 5% --query-threshold 20"
+            .to_string(),
     ];
     for name in adapters() {
         let adapter = name.split_whitespace().next().expect("a name");

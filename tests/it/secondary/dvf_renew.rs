@@ -143,32 +143,28 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     let scene = boxes(folder.path());
     let settings =
         DvfSettings { points: 8_000, rays: 64, cells: Cells::Longest(14), octahedral: 16, ..DvfSettings::default() };
-    // By exact rays; by a field that is told; one that may be renewed by no ray; by some.
-    let mut all = [(); 4].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 640"));
+    // By a field that is told; one that may be renewed by no ray; by some.
+    let mut all = [(); 3].map(|()| renderer(&scene, "--size 96x72 --cache 100% --spp 640"));
     let budget = 60_000;
-    let renewal = renewal(&mut all[1], &settings, budget);
-    all[1].methods.set(Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default()));
-    all[2].methods.set(dvf(&Renewal { rays: 0, ..renewal.clone() }));
-    all[3].methods.set(dvf(&renewal));
+    let renewal = renewal(&mut all[0], &settings, budget);
+    all[0].methods.set(Dvf::new(Arc::new(renewal.kept.finished(true)), DvfUse::default()));
+    all[1].methods.set(dvf(&Renewal { rays: 0, ..renewal.clone() }));
+    all[2].methods.set(dvf(&renewal));
     let stills: Vec<_> = all.iter().map(|renderer| renderer.scene.clone()).collect();
-    let (mut wrong, mut left, mut spent) = ([0; 2], [0; 2], 0);
+    let (mut left, mut spent) = ([0; 2], 0);
     for step in 0..2 {
         for (renderer, still) in all.iter_mut().zip(&stills) {
             renderer.place(still, &[(1, matrix(still, step))]).expect("a place");
         }
-        let [exact, told, nothing, renewed] = all.each_mut().map(|r| r.frame(step, &camera()).expect("a frame"));
+        let [told, nothing, renewed] = all.each_mut().map(|r| r.frame(step, &camera()).expect("a frame"));
         assert!(told.pixels == nothing.pixels && record(&nothing, "dvf").is_none());
         let rays = |output: &FrameOutput| record(output, "environment").map_or(0, |record| record.rays_traced);
         assert_eq!(rays(&told), rays(&nothing));
         let own = record(&renewed, "dvf").expect("a record");
         assert!(own.rays() <= budget && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
         (left[0], left[1], spent) = (left[0] + rays(&told), left[1] + rays(&renewed), spent + own.rays());
-        let differ = |a: &FrameOutput, b: &FrameOutput| {
-            a.pixels.radiance.iter().zip(&b.pixels.radiance).filter(|(a, b)| a != b).count()
-        };
-        wrong = [wrong[0] + differ(&exact, &told), wrong[1] + differ(&exact, &renewed)];
     }
-    println!("{left:?} rays are left, {spent} spent; of {} pixels {wrong:?} differ", 2 * 96 * 72);
+    println!("{left:?} rays are left, {spent} spent");
     // What is renewed pays within its frame.
     assert!(left[1] + spent < left[0], "{left:?} {spent}");
     // At rest, frame by frame more is renewed; where what it takes does not matter, until nothing is left.
@@ -194,10 +190,10 @@ fn fewer_rays_are_left_and_no_more_are_spent_than_there_are() {
     assert!(last > 0 && 2 * last < first, "{last} of {first}");
     assert_eq!(rest(3, u32::MAX).1, 0);
     // Of few rays all are spent but for less than a cell takes.
-    all[2].methods.set(dvf(&Renewal { rays: 3000, frames: u32::MAX, ..renewal.clone() }));
-    all[2].place(&stills[2], &[(1, matrix(&stills[2], 2))]).expect("a place");
+    resting.methods.set(dvf(&Renewal { rays: 3000, frames: u32::MAX, ..renewal.clone() }));
+    resting.place(&still, &[(1, matrix(&still, 2))]).expect("a place");
     for frame in 0..3 {
-        let output = all[2].frame(frame, &camera()).expect("a frame");
+        let output = resting.frame(frame, &camera()).expect("a frame");
         let own = record(&output, "dvf").expect("a record");
         assert!((1000..=3000).contains(&own.rays()) && own.cells_renewed > 0 && own.cells_left > 0, "{own:?}");
     }
