@@ -108,7 +108,7 @@ pub fn build_settings(args: &BuildArgs) -> BuildSettings {
 pub fn work_settings(args: &WorkArgs) -> BuildSettings {
     BuildSettings {
         threads: args.threads.map(|n| n as usize),
-        lattice_log2: args.lattice,
+        lattice: args.lattice,
         memory_bytes: args.memory,
         fast: args.fast,
         scratch: args.scratch.clone(),

@@ -14,7 +14,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::ending::Temporary;
 use bricks::layout::PAGE_BYTES;
 use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};
-use brickwalk_convert::build::{BuildError, BuildSettings, TextureEncoding, build_source};
+use brickwalk_convert::build::{BuildError, BuildSettings, LatticeStep, TextureEncoding, build_source};
 use brickwalk_convert::import::{ImportSettings, import};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{InMemory, Source};
@@ -106,10 +106,10 @@ fn rebuild(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Prog
     let manifest = &scene.resident().manifest;
     let source = source(args, scene, scratch, progress)?;
     same_sources(scene, &source.outline().sources)?;
-    let of_case = || stiff_scene(manifest).and_then(|(kind, ..)| kind.lattice_log2());
+    let of_case = || stiff_scene(manifest).and_then(|(kind, ..)| kind.lattice_log2()).map(LatticeStep::Log2);
     let settings = BuildSettings {
         brick_triangles: manifest.brick_triangles,
-        lattice_log2: args.work.lattice.or_else(of_case),
+        lattice: args.work.lattice.or_else(of_case),
         proxies: manifest.has_proxies,
         movable: manifest.movable.clone(),
         textures: match scene.resident().textures.first() {

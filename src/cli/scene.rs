@@ -7,7 +7,7 @@ use super::options::scene_kind::SceneKind;
 use crate::cli::output::{Usage, note};
 use crate::settings::sizes::counted;
 use anyhow::{Context, Result};
-use brickwalk_convert::build::{BuildSettings, BuildSummary, build_source};
+use brickwalk_convert::build::{BuildSettings, BuildSummary, LatticeStep, build_source};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{InMemory, Source};
 use brickwalk_scenes::{
@@ -95,7 +95,7 @@ fn made_stiff(args: &SceneArgs, progress: &Progress) -> Result<(Vec<PathBuf>, Wr
     let path = far_path(&scene);
     let usual = build_settings(&args.build);
     let settings = BuildSettings {
-        lattice_log2: usual.lattice_log2.or(case.lattice_log2()),
+        lattice: usual.lattice.or(case.lattice_log2().map(LatticeStep::Log2)),
         brick_triangles: args.build.brick_triangles.or(case.brick_triangles()).unwrap_or(usual.brick_triangles),
         ..usual
     };

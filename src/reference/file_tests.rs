@@ -3,7 +3,7 @@
 
 use crate::reference::*;
 use bricks::SceneFile;
-use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::build::{BuildSettings, LatticeStep, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, Placement, Primitive, SourceScene};
 
@@ -68,7 +68,7 @@ fn convert(brick_triangles: u32) -> (tempfile::TempDir, SceneFile) {
     let settings = BuildSettings {
         brick_triangles,
         threads: Some(1),
-        lattice_log2: Some(-16),
+        lattice: Some(LatticeStep::Log2(-16)),
         instance_min_triangles: 1,
         ..BuildSettings::default()
     };

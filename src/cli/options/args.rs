@@ -11,7 +11,7 @@ use crate::cli::output::{Usage, Verbosity};
 use crate::session::Settings;
 use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
 use crate::settings::{Adapter, CacheSize, ImageSize, SettingsError};
-use brickwalk_convert::build::TextureEncoding;
+use brickwalk_convert::build::{LatticeStep, TextureEncoding};
 use brickwalk_scenes::Stiff;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
@@ -154,6 +154,13 @@ pub struct ConvertArgs {
 }
 
 /// Reads how textures are stored.
+/// Reads `finest` or a whole number.
+fn lattice_step(text: &str) -> Result<LatticeStep, String> {
+    let step = if text == "finest" { Some(LatticeStep::Finest) } else { text.parse().ok().map(LatticeStep::Log2) };
+    step.filter(|step| !matches!(step, LatticeStep::Log2(log2) if !(-126..=96).contains(log2)))
+        .ok_or_else(|| "give finest, or a whole number from -126 to 96".into())
+}
+
 fn textures() -> impl TypedValueParser<Value = TextureEncoding> {
     let [blocks, texels] =
         [("bc7", "Blocks"), ("raw", "Texels")].map(|(name, help)| PossibleValue::new(name).help(help));
@@ -206,15 +213,16 @@ pub struct WorkArgs {
     /// Threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = ranged::<1, 1024>)]
     pub threads: Option<u32>,
-    /// log2 of the lattice step that positions are rounded to, in world units [default: from brick sizes]
+    /// log2 of the lattice step that positions are rounded to, in world units, -126 to 96; or finest: the finest at
+    /// which vertices take no more room, up to 16 times finer than the default [default: from brick sizes]
     #[arg(
         long,
         help_heading = "Bricks",
         value_name = "LOG2",
         allow_hyphen_values = true,
-        value_parser = clap::value_parser!(i32).range(-126..=96)
+        value_parser = lattice_step
     )]
-    pub lattice: Option<i32>,
+    pub lattice: Option<LatticeStep>,
     /// Memory limit; what does not fit goes to scratch files, about 250 bytes per triangle. The result is the same
     /// [default: a quarter of the machine's memory]
     #[arg(long, value_name = "SIZE", value_parser = size_bytes)]

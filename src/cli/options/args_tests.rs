@@ -3,6 +3,7 @@ use crate::cli::output::Usage;
 use crate::schedule::Optimisation;
 use crate::settings::{Direction, EffectList, Level, Schedule};
 use crate::stream::Policy;
+use brickwalk_convert::build::LatticeStep;
 use brickwalk_scenes::Kind;
 use clap::CommandFactory;
 use clap::error::ErrorKind;
@@ -179,6 +180,7 @@ fn other_commands_check_too() {
         ("convert a.gltf -o s.bricks --brick-triangles 0", "from 1"),
         ("convert a.gltf -o s.bricks --memory 0", "at least 1"),
         ("convert a.gltf -o s.bricks --lattice 999", "999"),
+        ("convert a.gltf -o s.bricks --lattice fine", "finest"),
         ("scene ruins -o s.bricks", "the kinds are: city"),
         ("scene castle -o s.bricks", "castle"),
         ("scene city -o s.bricks --triangles 0", "at least 1"),
@@ -219,7 +221,10 @@ fn options_of_other_commands_arrive() {
         panic!()
     };
     assert_eq!(c.inputs.inputs.len(), 2);
-    assert_eq!((c.build.brick_triangles, c.build.work.threads, c.build.work.lattice), (Some(4000), Some(2), Some(-12)));
+    assert_eq!(
+        (c.build.brick_triangles, c.build.work.threads, c.build.work.lattice),
+        (Some(4000), Some(2), Some(LatticeStep::Log2(-12)))
+    );
     assert!(c.mesh.drop_non_finite);
     let Command::Scene(s) = parse("scene city -o s.bricks --triangles 200K --seed 7").unwrap() else { panic!() };
     assert_eq!((s.kind, s.triangles, s.seed), (SceneKind::Generated(Kind::City), Some(200_000), 7));

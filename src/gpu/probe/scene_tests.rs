@@ -4,7 +4,7 @@
 use crate::kernels::layout::{BRICK_INDEX32, BRICK_WIDE};
 use crate::math::random::Rng;
 use bricks::SceneFile;
-use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::build::{BuildSettings, LatticeStep, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene};
 
@@ -134,7 +134,7 @@ fn the_scene_is_what_the_converter_makes() {
         // Pipelines traverse; they never read a proxy.
         proxies: false,
         // Fine enough for the ground to lie beyond 2^24 steps.
-        lattice_log2: Some(-20),
+        lattice: Some(LatticeStep::Log2(-20)),
         ..BuildSettings::default()
     };
     build(source(), &settings, &path, &Progress::hidden()).unwrap();

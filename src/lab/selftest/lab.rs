@@ -23,7 +23,7 @@ use crate::settings::{Adapter, CacheSize, Effect, EffectList, ImageSize, Schedul
 use crate::stream::Workers;
 use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
-use brickwalk_convert::build::{BuildSettings, BuildSummary, build};
+use brickwalk_convert::build::{BuildSettings, BuildSummary, LatticeStep, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Primitive, SourceScene};
 use brickwalk_scenes::{Rng, one_mesh};
@@ -369,6 +369,6 @@ pub fn misses(hits: &[Hit]) -> u64 {
 
 /// Settings of the builder with bricks of so many triangles and, unless it is 0, a lattice of 2^`lattice`.
 pub fn settings(brick_triangles: u32, lattice: i32) -> BuildSettings {
-    let lattice_log2 = (lattice != 0).then_some(lattice);
-    BuildSettings { brick_triangles, lattice_log2, memory_bytes: Some(1 << 30), ..BuildSettings::default() }
+    let lattice = (lattice != 0).then_some(LatticeStep::Log2(lattice));
+    BuildSettings { brick_triangles, lattice, memory_bytes: Some(1 << 30), ..BuildSettings::default() }
 }

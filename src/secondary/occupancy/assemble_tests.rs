@@ -4,7 +4,7 @@ use super::voxelise::touched;
 use super::{Assembler, Bom, BomError, Cascades, Settings, assemble};
 use crate::reference::Truth;
 use bricks::{Resident, SceneFile};
-use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::build::{BuildSettings, LatticeStep, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Primitive, SourceScene};
 use brickwalk_scenes::{Rng, SoupKind, one_mesh, rotated_instances, soup};
@@ -19,8 +19,12 @@ fn file(source: SourceScene, brick_triangles: u32) -> Arc<SceneFile> {
 fn file_on(source: SourceScene, brick_triangles: u32, lattice_log2: Option<i32>) -> Arc<SceneFile> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bricks");
-    let settings =
-        BuildSettings { brick_triangles, lattice_log2, memory_bytes: Some(1 << 30), ..BuildSettings::default() };
+    let settings = BuildSettings {
+        brick_triangles,
+        lattice: lattice_log2.map(LatticeStep::Log2),
+        memory_bytes: Some(1 << 30),
+        ..BuildSettings::default()
+    };
     build(source, &settings, &path, &Progress::hidden()).unwrap();
     Arc::new(SceneFile::open(&path).unwrap())
 }

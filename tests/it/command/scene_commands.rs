@@ -310,7 +310,7 @@ fn the_finest_lattice_without_wide_bricks_is_named() {
     let square = |i: u32| format!("f {} {} {} {}\n", i + 1, i + 2, i + 62, i + 61);
     let squares = (0..59 * 60).filter(|i| i % 60 < 59).map(square);
     std::fs::write(&input, (0..3600).map(point).chain(squares).collect::<String>()).expect("a model");
-    let facts = |lattice: Option<i64>| {
+    let facts = |lattice: Option<String>| {
         let scene = folder.path().join("hill.bricks");
         let words = ["convert".as_ref(), input.as_os_str(), "-o".as_ref(), scene.as_os_str()];
         let step = lattice.map(|step| format!("--lattice={step}"));
@@ -322,7 +322,10 @@ fn the_finest_lattice_without_wide_bricks_is_named() {
     };
     let (text, wide, finest) = facts(None);
     assert!(wide == 0 && text.contains(&format!("convert --lattice {finest} rounds finest")), "{text}");
-    let (text, wide, again) = facts(Some(finest));
-    assert!(wide == 0 && again == finest && !text.contains("rounds finest"), "{text}");
-    assert!(facts(Some(finest - 2)).1 > 0, "the comparison can fail");
+    for lattice in [finest.to_string(), "finest".into()] {
+        let (text, wide, again) = facts(Some(lattice));
+        assert!(wide == 0 && again == finest && !text.contains("rounds finest"), "{text}");
+        assert!(text.contains(&format!("step 2^{finest} ")), "{text}");
+    }
+    assert!(facts(Some((finest - 2).to_string())).1 > 0, "the comparison can fail");
 }

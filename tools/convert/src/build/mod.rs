@@ -37,7 +37,7 @@ mod tree;
 mod triangles;
 
 pub use error::BuildError;
-pub use settings::{BuildSettings, BuildSummary, TextureEncoding};
+pub use settings::{BuildSettings, BuildSummary, LatticeStep, TextureEncoding};
 pub use tree::wide::ITEM_COST as TRIANGLE_COST;
 
 use crate::progress::Progress;

@@ -17,6 +17,15 @@ pub enum TextureEncoding {
     Raw,
 }
 
+/// A lattice step that does not follow from the median size of an object's parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LatticeStep {
+    /// Of each object the finest at which none of its parts of 16,384 triangles takes wide vertices.
+    Finest,
+    /// log2 of the step in scene units, -126 to 96.
+    Log2(i32),
+}
+
 /// How to build.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BuildSettings {
@@ -24,8 +33,8 @@ pub struct BuildSettings {
     pub brick_triangles: u32,
     /// Worker threads, at least 1; `None`: one a core. Changes nothing but the time.
     pub threads: Option<usize>,
-    /// log2 of the lattice step in scene units, -126 to 96; `None`: from the sizes of each object.
-    pub lattice_log2: Option<i32>,
+    /// The lattice step; `None`: from the median size of each object's parts.
+    pub lattice: Option<LatticeStep>,
     /// Leaves out triangles with a vertex that is not finite; otherwise such a vertex is an error.
     pub drop_non_finite: bool,
     /// Least triangles of a mesh that is placed more than once and stored once.
@@ -57,7 +66,7 @@ impl Default for BuildSettings {
         Self {
             brick_triangles: 16384,
             threads: None,
-            lattice_log2: None,
+            lattice: None,
             drop_non_finite: false,
             instance_min_triangles: 1000,
             bake_budget_triangles: 4_000_000,
@@ -82,7 +91,7 @@ impl BuildSettings {
         rule((1..=LARGEST_BRICK).contains(&bricks), "--brick-triangles", bricks.to_string(), "1 to 1048576")?;
         let threads = self.threads.unwrap_or(1);
         rule((1..=4096).contains(&threads), "--threads", threads.to_string(), "1 to 4096")?;
-        let lattice = self.lattice_log2.unwrap_or(0);
+        let lattice = if let Some(LatticeStep::Log2(step)) = self.lattice { step } else { 0 };
         rule((-126..=96).contains(&lattice), "--lattice", lattice.to_string(), "-126 to 96")
     }
 }

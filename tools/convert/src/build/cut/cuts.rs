@@ -99,7 +99,7 @@ pub(crate) fn choose(
     settings: &BuildSettings,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Lattice>, BuildError> {
-    let requested = settings.lattice_log2;
+    let requested = settings.lattice;
     let mut lattices = Vec::with_capacity(cuts.len());
     for cut in &cuts[1..] {
         lattices.push(cut.extents.lattice(requested, warnings)?);

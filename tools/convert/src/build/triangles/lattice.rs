@@ -4,6 +4,8 @@
 //! the range of the arithmetic ([`REACH_STEPS`], [`DIAGONAL_STEPS_LOG2`]), and then the conversion says so.
 
 use crate::build::error::BuildError;
+use crate::build::settings::LatticeStep;
+use bricks::{NEAR_STEPS, ORIGIN_STEPS};
 
 /// Largest magnitude of a lattice coordinate of a vertex, in steps. Every vertex is then within `2^45` of every other;
 /// with a reference point near the camera the offset of a brick stays within the `2^44` steps in which it is an exact
@@ -97,15 +99,27 @@ impl Extents {
         Some(*chunks.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
 
-    /// Chooses the lattice. `requested` overrides the step and is an error if it is too fine; the step that follows
-    /// from the sizes is coarsened where it must be, which is said in `warnings`.
-    pub fn lattice(&self, requested: Option<i32>, warnings: &mut Vec<String>) -> Result<Lattice, BuildError> {
+    /// log2 of the finest step at which no part is wide.
+    fn finest(&self) -> i32 {
+        let most = self.chunks.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        // An origin lies up to ORIGIN_STEPS below the least vertex; rounding adds a step.
+        ceil_log2(most / (NEAR_STEPS - ORIGIN_STEPS - 1) as f64)
+    }
+
+    /// Chooses the lattice. A step that `wanted` names is an error if it is too fine; the step that follows from the
+    /// sizes is coarsened where it must be, which is said in `warnings`.
+    pub fn lattice(&self, wanted: Option<LatticeStep>, warnings: &mut Vec<String>) -> Result<Lattice, BuildError> {
+        let requested = if let Some(LatticeStep::Log2(step)) = wanted { Some(step) } else { None };
         if self.min[0] > self.max[0] {
             return Ok(Lattice { step_log2: requested.unwrap_or(-EXTENT_STEPS_LOG2), unit_log2: 0 });
         }
         let natural = self.median().map_or(-EXTENT_STEPS_LOG2, |median| {
             ceil_log2(median.max(f64::MIN_POSITIVE)).saturating_sub(EXTENT_STEPS_LOG2)
         });
+        let natural = match wanted {
+            Some(LatticeStep::Finest) => natural.min(self.finest()),
+            _ => natural,
+        };
         let mut step_log2 = requested.unwrap_or(natural.max(LEAST_STEP_LOG2));
         while !self.fits(step_log2) {
             step_log2 += 1;
@@ -218,10 +232,10 @@ mod tests {
         assert_eq!(warnings.len(), 2);
         assert!(lattice.steps(1e9) <= REACH_STEPS);
         assert!(matches!(
-            far.lattice(Some(-20), &mut warnings),
+            far.lattice(Some(LatticeStep::Log2(-20)), &mut warnings),
             Err(BuildError::LatticeTooFine { least, .. }) if least == lattice.step_log2
         ));
-        assert_eq!(far.lattice(Some(lattice.step_log2), &mut warnings).unwrap(), lattice);
+        assert_eq!(far.lattice(Some(LatticeStep::Log2(lattice.step_log2)), &mut warnings).unwrap(), lattice);
 
         let unit = extents(&[1.0], [1e7; 3], [1e7 + 1.0; 3]);
         assert_eq!(unit.lattice(None, &mut warnings).unwrap().step_log2, -20, "ten thousand kilometres are in range");

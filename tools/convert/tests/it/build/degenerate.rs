@@ -4,7 +4,7 @@ use super::decode::decode;
 use super::scenes::*;
 use super::structure::check;
 use bricks::{BRICK_WIDE, MAX_BRICK_HEIGHT};
-use brickwalk_convert::build::BuildSettings;
+use brickwalk_convert::build::{BuildSettings, LatticeStep};
 
 #[test]
 fn a_huge_triangle_beside_tiny_ones_makes_wide_bricks() {
@@ -16,7 +16,11 @@ fn a_huge_triangle_beside_tiny_ones_makes_wide_bricks() {
     }
     // Far enough from the huge one's middle that both ends of a brick's range are in use.
     let scene = decode(
-        &built(&plain(vec![soup(&triangles)]), &BuildSettings { lattice_log2: Some(-20), ..settings(100) }).path(),
+        &built(
+            &plain(vec![soup(&triangles)]),
+            &BuildSettings { lattice: Some(LatticeStep::Log2(-20)), ..settings(100) },
+        )
+        .path(),
     );
     check(&scene);
     let wide = scene.bricks.iter().filter(|brick| brick.record.flags & BRICK_WIDE != 0).count();
@@ -81,7 +85,7 @@ fn triangles_without_area_are_dropped_and_keep_their_number() {
     assert_eq!(scene.resident.manifest.dropped_zero_area, 3);
     assert_eq!(scene.resident.manifest.triangle_ids, 6);
     assert_eq!(scene.resident.manifest.warnings.len(), 1);
-    let fine = BuildSettings { lattice_log2: Some(-40), ..settings(2) };
+    let fine = BuildSettings { lattice: Some(LatticeStep::Log2(-40)), ..settings(2) };
     let scene = decode(&built(&plain(vec![soup(&[good, thin])]), &fine).path());
     assert_eq!(scene.triangles(0).len(), 2, "on a finer lattice it has area");
 }

@@ -3,7 +3,7 @@
 use super::decode::decode;
 use super::scenes::*;
 use super::structure::check;
-use brickwalk_convert::build::{BuildError, BuildSettings};
+use brickwalk_convert::build::{BuildError, BuildSettings, LatticeStep};
 use brickwalk_convert::source::{IDENTITY, SourceScene};
 
 fn error(scene: &SourceScene, settings: &BuildSettings) -> BuildError {
@@ -75,10 +75,12 @@ fn scales_from_1e_minus_12_to_1e12_build() {
 #[test]
 fn lattices_that_are_too_fine_are_refused() {
     let scene = plain(vec![sheet(10, 1000.0)]);
-    let settings = BuildSettings { lattice_log2: Some(-40), ..settings(100) };
+    let settings = BuildSettings { lattice: Some(LatticeStep::Log2(-40)), ..settings(100) };
     let BuildError::LatticeTooFine { least, .. } = error(&scene, &settings) else { panic!("another error") };
-    assert!(try_build(&scene, &BuildSettings { lattice_log2: Some(least), ..settings.clone() }).is_ok());
-    assert!(try_build(&scene, &BuildSettings { lattice_log2: Some(least - 1), ..settings.clone() }).is_err());
+    assert!(try_build(&scene, &BuildSettings { lattice: Some(LatticeStep::Log2(least)), ..settings.clone() }).is_ok());
+    assert!(
+        try_build(&scene, &BuildSettings { lattice: Some(LatticeStep::Log2(least - 1)), ..settings.clone() }).is_err()
+    );
 }
 
 #[test]
@@ -118,7 +120,7 @@ fn settings_outside_their_range_are_refused() {
         BuildSettings { brick_triangles: 0, ..good.clone() },
         BuildSettings { brick_triangles: (1 << 20) + 1, ..good.clone() },
         BuildSettings { threads: Some(0), ..good.clone() },
-        BuildSettings { lattice_log2: Some(-200), ..good.clone() },
+        BuildSettings { lattice: Some(LatticeStep::Log2(-200)), ..good.clone() },
     ] {
         assert!(matches!(error(&scene, &bad), BuildError::Setting { .. }), "{bad:?}");
     }

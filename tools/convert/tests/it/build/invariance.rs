@@ -4,7 +4,7 @@
 use super::decode::decode;
 use super::scenes::*;
 use super::structure::check;
-use brickwalk_convert::build::BuildSettings;
+use brickwalk_convert::build::{BuildSettings, LatticeStep};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, SourceScene};
 
@@ -45,7 +45,7 @@ fn ids_and_positions_do_not_depend_on_bricks() {
         assert_eq!(lattice(&small), lattice(&large));
         let triangles = small.triangles(object);
         assert!(triangles == large.triangles(object));
-        let other = build(BuildSettings { lattice_log2: Some(lattice(&small).0 + 3), ..settings(256) });
+        let other = build(BuildSettings { lattice: Some(LatticeStep::Log2(lattice(&small).0 + 3)), ..settings(256) });
         assert!(triangles != other.triangles(object), "another lattice has other positions");
     }
 }

@@ -4,7 +4,7 @@ use super::bounded::Computed;
 use super::decode::{Decoded, DecodedBrick, decode};
 use super::scenes::*;
 use bricks::{OCCUPANCY_LEVELS, OccupancyMap, Payload, SceneFile, Section, Span, verify_file};
-use brickwalk_convert::build::{BuildSettings, build_source};
+use brickwalk_convert::build::{BuildSettings, LatticeStep, build_source};
 use brickwalk_convert::progress::Progress;
 use std::path::Path;
 
@@ -62,7 +62,7 @@ fn points_of_triangles_are_in_their_maps() {
     let mut random = Random(3);
     let soup: Vec<_> = (0..3000).map(|_| [(); 3].map(|()| random.point(1000.0))).collect();
     for (lattice_log2, wide) in [(-30, true), (4, false)] {
-        let settings = BuildSettings { lattice_log2: Some(lattice_log2), ..settings(300) };
+        let settings = BuildSettings { lattice: Some(LatticeStep::Log2(lattice_log2)), ..settings(300) };
         let built = built(&plain(vec![super::scenes::soup(&soup)]), &settings);
         check(&built.path());
         assert_eq!(built.summary.wide_bricks > 0, wide);
