@@ -18,4 +18,4 @@ fi
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu"
 exec cargo test --release --lib --target aarch64-unknown-linux-gnu --manifest-path "$root/Cargo.toml" "$@" \
-    -- cpu::isa cpu::wide cpu::packet
+    -- kernels::simd kernels::trace::packet

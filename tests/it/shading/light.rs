@@ -3,10 +3,14 @@
 //! single bright texel.
 
 use crate::common;
+use bricks::{MATERIAL_DOUBLE_SIDED, Material};
 use brickwalk::kernels::lamps::{Emitter, Lamps, Shape};
 use brickwalk::scene::path::CameraPath;
 use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::session::renderer::renderer;
+use brickwalk_convert::build::{BuildSettings, build};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{Mesh, Placement, Primitive, SourceScene};
 use exr::prelude::*;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -199,6 +203,45 @@ fn surfaces_that_emit_light_others_by_lamberts_formula() {
     for both in [shed(triangle(b, c, true)), shed(triangle(c, b, true))] {
         assert!((both / truth - 1.0).abs() < 0.03, "{both}, not {truth}");
     }
+}
+
+/// A mirror turns triangles over; their front stays their front (glTF 2.0, section 3.7.4).
+#[test]
+fn mirrored_lamps_shine_to_their_front() {
+    let square = |half: f64| Primitive {
+        positions: [[-half, 0.0, -half], [-half, 0.0, half], [half, 0.0, half], [half, 0.0, -half]].to_vec(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Primitive::default()
+    };
+    let placed = |name: &str, mesh: u32, y: f64, scale_y: f64| Placement {
+        name: name.into(),
+        under: Vec::new(),
+        mesh,
+        source: 0,
+        world_from_mesh: [1.0, 0.0, 0.0, 0.0, 0.0, scale_y, 0.0, y, 0.0, 0.0, 1.0, 0.0],
+    };
+    let of = |name: &str, scale_y: f64| {
+        let floor = Mesh { name: "floor".into(), primitives: vec![square(200.0)] };
+        let lamp = Mesh { name: "lamp".into(), primitives: vec![Primitive { material: 1, ..square(0.5) }] };
+        let white = Material { base_color: [1.0; 4], flags: MATERIAL_DOUBLE_SIDED, ..Material::GREY };
+        let glow = Material { emission: [10.0; 3], flags: 0, ..Material::GREY };
+        // Its front, at +Y, looks away from the floor unless it is turned over.
+        let source = SourceScene {
+            meshes: vec![floor, lamp],
+            placements: vec![placed("floor", 0, 0.0, 1.0), placed("lamp", 1, 4.0, scale_y)],
+            materials: vec![white, glow],
+            ..brickwalk_scenes::one_mesh("lamp", Primitive::default())
+        };
+        let folder = common::folder();
+        let scene = folder.path().join(format!("{name}.bricks"));
+        build(source, &BuildSettings::default(), &scene, &Progress::hidden()).expect("a scene");
+        let dark = "--sun-intensity 0 --sky-intensity 0 --effects shadow --spp 64";
+        mean(&render(&scene, &down_on(folder.path(), 0.0), dark))
+    };
+    let corners = [[-0.5, 4.0, -0.5], [0.5, 4.0, -0.5], [0.5, 4.0, 0.5], [-0.5, 4.0, 0.5]].map(DVec3::from_array);
+    let (truth, found) = (polygon(10.0, &corners), of("turned", -1.0));
+    assert!((found / truth - 1.0).abs() < 0.03, "{found}, not {truth}");
+    assert_eq!(of("as it is", 1.0), 0.0, "control: it shines to one side alone");
 }
 
 #[test]

@@ -83,6 +83,13 @@ pub struct MeshOutline {
     pub name: String,
     /// Its parts in the order of its triangles.
     pub parts: Vec<PartOutline>,
+    /// Whether some of its triangles emit light from their front alone.
+    pub shines_to_front: bool,
+}
+
+/// Whether triangles of a material emit light from their front alone.
+pub(crate) fn shines_to_front(material: &bricks::Material) -> bool {
+    material.flags & bricks::MATERIAL_DOUBLE_SIDED == 0 && material.emission.iter().any(|&c| c > 0.0)
 }
 
 impl MeshOutline {
@@ -113,9 +120,11 @@ impl From<SourceScene> for InMemory {
     fn from(scene: SourceScene) -> Self {
         let part =
             |(primitive, p): (u32, &Primitive)| PartOutline { primitive, triangles: (p.indices.len() / 3) as u32 };
+        let shines = |p: &Primitive| scene.materials.get(p.material as usize).is_some_and(shines_to_front);
         let mesh = |mesh: &Mesh| MeshOutline {
             name: mesh.name.clone(),
             parts: (0u32..).zip(&mesh.primitives).map(part).collect(),
+            shines_to_front: mesh.primitives.iter().any(shines),
         };
         let outline = Outline {
             meshes: scene.meshes.iter().map(mesh).collect(),

@@ -179,7 +179,7 @@ impl Draft {
                 left -= triangles;
             }
         }
-        self.outline.meshes.push(MeshOutline { name, parts });
+        self.outline.meshes.push(MeshOutline { name, parts, shines_to_front: false });
         self.outline.meshes.len() as u32 - 1
     }
 

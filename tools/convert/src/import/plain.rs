@@ -81,7 +81,7 @@ pub(super) fn parts(primitive: u32, triangles: u64) -> impl Iterator<Item = Part
 
 /// A mesh of one primitive.
 pub(super) fn one_primitive(name: String, triangles: u64) -> MeshOutline {
-    MeshOutline { name, parts: parts(0, triangles).collect() }
+    MeshOutline { name, parts: parts(0, triangles).collect(), shines_to_front: false }
 }
 
 /// The first triangle of part `part` of a mesh of one primitive, and the one behind its last.

@@ -251,15 +251,20 @@ fn choose_instanced(
     settings: &BuildSettings,
 ) -> Vec<bool> {
     let mut uses = vec![0u64; scene.meshes.len()];
-    for (placement, invertible) in scene.placements.iter().zip(invertible) {
-        uses[placement.mesh as usize] += u64::from(*invertible);
+    // A mirror turns triangles over. What depends on their front is told so by an instance.
+    let mut is_lamp_turned = vec![false; scene.meshes.len()];
+    for (placement, _) in scene.placements.iter().zip(invertible).filter(|(_, invertible)| **invertible) {
+        let mesh = placement.mesh as usize;
+        uses[mesh] += 1;
+        is_lamp_turned[mesh] |=
+            scene.meshes[mesh].shines_to_front && Affine(placement.world_from_mesh).determinant() < 0.0;
     }
     let mut budget = settings.bake_budget_triangles;
     uses.iter()
         .zip(counts)
-        .zip(movable)
-        .map(|((&uses, &count), &is_movable)| {
-            if is_movable && count > 0 {
+        .zip(movable.iter().zip(&is_lamp_turned))
+        .map(|((&uses, &count), (&is_movable, &is_lamp_turned))| {
+            if (is_movable || is_lamp_turned) && count > 0 {
                 return true;
             }
             if uses < 2 || count == 0 {

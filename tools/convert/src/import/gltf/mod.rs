@@ -37,6 +37,7 @@ use super::repairs::Repairs;
 use super::warnings::Warnings;
 use crate::source::{
     IDENTITY, MeshOutline, Outline, PART_TRIANGLES, PartOutline, Placement, Primitive, SourceError, SourceTexture,
+    shines_to_front,
 };
 use file::{File, Problem};
 use materials::Texture;
@@ -138,8 +139,9 @@ pub(super) fn open_within(
         display_name(image, document.images[image].0.as_ref().ok().and_then(|image| image.more.name.as_deref()))
     };
     let textures: Vec<_> = textures.into_iter().map(|texture| (image_name(&texture), texture)).collect();
+    let outlines = meshes.iter().zip(numbers_used(&numbers)).map(|(mesh, m)| mesh.outline(document, m, &materials));
     let outline = Outline {
-        meshes: meshes.iter().zip(numbers_used(&numbers)).map(|(mesh, m)| mesh.outline(document, m)).collect(),
+        meshes: outlines.collect(),
         placements: place(&file, &uses, &numbers)?,
         materials,
         textures: textures.iter().map(|(name, _)| name.clone()).collect(),
@@ -204,14 +206,18 @@ impl Parts for Gltf {
 }
 
 impl Mesh {
-    fn outline(&self, document: &document::Document, number: usize) -> MeshOutline {
+    fn outline(&self, document: &document::Document, number: usize, materials: &[bricks::Material]) -> MeshOutline {
         let part = |&(primitive, first): &(u32, u64)| {
             let triangles = self.primitives[primitive as usize].triangles() - first;
             // In range: at most `PART_TRIANGLES`.
             PartOutline { primitive, triangles: triangles.min(PART_TRIANGLES.into()) as u32 }
         };
         let name = display_name(number, document.meshes[number].name.as_deref());
-        MeshOutline { name, parts: self.parts.iter().map(part).collect() }
+        // The default material does not shine.
+        let shines =
+            |primitive: &Checked| primitive.material().and_then(|m| materials.get(m)).is_some_and(shines_to_front);
+        let shines_to_front = self.primitives.iter().any(shines);
+        MeshOutline { name, parts: self.parts.iter().map(part).collect(), shines_to_front }
     }
 
     /// A part: its primitive with that one's number, and its first triangle and the one behind its last.

@@ -89,7 +89,7 @@ pub(super) fn open(
         if last != Some(run.object) {
             let name = &parsed.objects[run.object as usize];
             let name = if name.is_empty() { plain::stem(path) } else { name.clone() };
-            meshes.push(MeshOutline { name, parts: Vec::new() });
+            meshes.push(MeshOutline { name, ..MeshOutline::default() });
             parts.push(Vec::new());
             last = Some(run.object);
         }

@@ -27,6 +27,7 @@ impl Computed {
                 .step_by(PART as usize)
                 .map(|first| PartOutline { primitive: 0, triangles: PART.min(triangles - first) })
                 .collect(),
+            shines_to_front: false,
         };
         let empty = scene(Vec::new(), Vec::new());
         let mut outline = Outline { materials: empty.materials, sources: empty.sources, ..Outline::default() };
