@@ -1,4 +1,4 @@
-// What the kernels of distance fields share (src/visibility/distance_field): bindings of group 2, and where things lie
+// What the kernels of distance fields share (src/secondary/df): bindings of group 2, and where things lie
 // in them. Cell (x, y, z) of a cube of n on each axis is element (x n + y) n + z.
 
 #include "occupancy/types.wgsl"

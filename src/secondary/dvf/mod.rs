@@ -16,7 +16,7 @@
 //! id rather than its vertices' numbers, which repeat in simple scenes.
 //!
 //! *Practice.* [`mask`] has the masks, [`shape`] the grid, [`field`] a whole field and what is said of it, [`mod@file`]
-//! its file, [`Fresh`] what of it is made anew when something has moved. Kernels: `shaders/dvf_*.wgsl`.
+//! its file, [`Fresh`] what of it is made anew when something has moved. Kernels: `shaders/dvf/`.
 
 mod answer;
 mod areas;
