@@ -8,7 +8,7 @@ pub(crate) trait Key: Copy + Eq {
 
 /// Multiplies and folds: one step of the hash of a sequence of words.
 pub(super) fn mix(state: u64, word: u64) -> u64 {
-    let product = u128::from(state ^ word) * 0x9e37_79b9_7f4a_7c15_f39c_c060_5ced_c835_u128;
+    let product = u128::from(state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15_f39c_c060_5ced_c835);
     (product as u64) ^ (product >> 64) as u64
 }
 
