@@ -11,7 +11,7 @@ settings! {
         /// Folder for the results: roma.json, roma.md, report.html, a CSV a table, and rows.jsonl, which grows with
         /// every job. Started again with the same folder and settings, the bench goes on where it stopped.
         output: PathBuf = PathBuf::new(), "--output DIR", Rule::Any, "", Output, Common;
-        /// Small scenes, small pictures, few samples. It takes about 3 minutes on two cores without a GPU.
+        /// Small scenes, small pictures, few samples. It takes about 5 minutes on two cores without a GPU.
         quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
         /// Triangles of the city, and of the plant of pipes. [default: 12M; with --quick 100K]
         triangles: Option<u64> = None, "--triangles N", bench::TRIANGLES, "", Quality, Common;
