@@ -32,6 +32,9 @@ impl Part {
     /// What to do when it is damaged.
     fn remedy(&self) -> &'static str {
         match self {
+            Part::Payload(Payload::Displacement(_)) | Part::PaddingAfterPayload(Payload::Displacement(_)) => {
+                "bake displacement fields again with `brickwalk bake-displacement`, or copy the file again"
+            }
             Part::Payload(_) | Part::PaddingAfterPayload(_) => {
                 "run `brickwalk repair`, copy the file again, or convert again"
             }

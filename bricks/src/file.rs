@@ -97,10 +97,11 @@ impl SceneFile {
             tiles: reader.section(&directory, Section::Tiles)?,
             lights: reader.section(&directory, Section::Lights)?,
             occupancy: reader.section(&directory, Section::Occupancy)?,
+            displacement: reader.section(&directory, Section::Displacement)?,
         };
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;
         validate::spans(&resident, header.directory_offset).map_err(|flaw| reader.invalid(flaw))?;
-        let resident_bytes = header.directory_bytes + directory.iter().map(|entry| entry.bytes).sum::<u64>();
+        let resident_bytes = header.directory_bytes + directory.section_bytes();
         let validated = Arc::new(Validated::none(&resident));
         let (file_bytes, checksum) = (header.file_bytes, header.checksum);
         Ok(SceneFile { path, file, source, file_bytes, resident_bytes, checksum, resident, validated })
@@ -158,7 +159,7 @@ impl SceneFile {
     ///
     /// # Panics
     ///
-    /// If the scene has no such brick, texture or tile, as indexing the resident part would.
+    /// If the scene has no such brick, texture, tile, map or field, as indexing the resident part would.
     pub fn span(&self, payload: Payload) -> Span {
         match payload {
             Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry,
@@ -167,6 +168,7 @@ impl SceneFile {
             Payload::Opacity(map) => self.resident.opacity_maps[map as usize].texels,
             Payload::Texture(texture) => self.resident.textures[texture as usize].tail,
             Payload::Tile(tile) => self.resident.tiles[tile as usize],
+            Payload::Displacement(field) => self.resident.displacement[field as usize].span,
         }
     }
 
@@ -178,6 +180,7 @@ impl SceneFile {
     pub fn loaded_bytes(&self, payload: Payload) -> u64 {
         match payload {
             Payload::Attributes(brick) => AttributeLayout::of(&self.resident.bricks[brick as usize]).bytes,
+            Payload::Displacement(field) => self.resident.displacement[field as usize].loaded_bytes(),
             _ => self.span(payload).bytes,
         }
     }
@@ -197,6 +200,9 @@ impl SceneFile {
         match payload {
             Payload::Attributes(brick) => DECODING.with_borrow_mut(|buffers| {
                 reader.attributes(payload, span, &self.resident.bricks[brick as usize], buffers, out)
+            })?,
+            Payload::Displacement(field) => DECODING.with_borrow_mut(|buffers| {
+                reader.displacement(payload, &self.resident.displacement[field as usize], buffers, out)
             })?,
             _ => reader.payload(payload, span, out)?,
         }
@@ -222,6 +228,17 @@ impl SceneFile {
             let flaw = Flaw::packed(Part::Payload(payload), error);
             Reader { path: &self.path, source: &*self.source }.invalid(flaw)
         })
+    }
+
+    /// The samples of a displacement field as they are loaded, checked as [`Self::copy`] does.
+    ///
+    /// # Errors
+    /// As of [`Self::copy`]; there is no such field.
+    pub fn displacement(&self, field: u32) -> Result<Vec<u8>, Error> {
+        let payload = Payload::Displacement(field);
+        let record = self.resident.displacement.get(field as usize).ok_or_else(|| self.no_such(payload))?;
+        let mut loaded = vec![0; record.loaded_bytes() as usize];
+        self.copy(payload, &mut loaded).map(|()| loaded)
     }
 
     /// Copies a payload to `out` as it is stored and checks its checksum alone.
@@ -260,13 +277,15 @@ impl SceneFile {
             Payload::Texture(_) => format!("one of {} textures", self.resident.textures.len()),
             Payload::Opacity(_) => format!("one of {} opacity maps", self.resident.opacity_maps.len()),
             Payload::Tile(_) => format!("one of {} tiles", self.resident.tiles.len()),
+            Payload::Displacement(_) => format!("one of {} displacement fields", self.resident.displacement.len()),
         };
         Error::Request { path: self.path.clone(), payload, found: payload.to_string(), expected }
     }
 }
 
 thread_local! {
-    /// What [`SceneFile::copy`] decodes with; it grows to the longest attributes that the thread meets, and stays.
+    /// What [`SceneFile::copy`] decodes with; it grows to the longest attributes or displacement field that the thread
+    /// meets, and stays.
     static DECODING: RefCell<Decoding> = RefCell::default();
 }
 
@@ -278,6 +297,7 @@ struct Validated {
     textures: Box<[AtomicBool]>,
     opacity: Box<[AtomicBool]>,
     tiles: Box<[AtomicBool]>,
+    displacement: Box<[AtomicBool]>,
 }
 
 impl Validated {
@@ -291,6 +311,7 @@ impl Validated {
             textures: none(textures),
             opacity: none(resident.opacity_maps.len()),
             tiles: none(resident.tiles.len()),
+            displacement: none(resident.displacement.len()),
         }
     }
 
@@ -303,6 +324,7 @@ impl Validated {
             Payload::Texture(texture) => &self.textures[texture as usize],
             Payload::Opacity(map) => &self.opacity[map as usize],
             Payload::Tile(tile) => &self.tiles[tile as usize],
+            Payload::Displacement(field) => &self.displacement[field as usize],
         }
     }
 }

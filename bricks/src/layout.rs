@@ -4,6 +4,7 @@
 //! header page, payloads (each on a multiple of [`PAGE_BYTES`]), directory (on a multiple of [`PAGE_BYTES`]), sections
 //! in the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
 
+use crate::displacement::DisplacementField;
 use crate::occupancy::Occupancy;
 use crate::records::{
     Brick, Instance, Leaf, Material, Object, OpacityMap, PunctualLight, Span, Texture, TopNode2, TopNode8,
@@ -90,8 +91,6 @@ pub struct DirectoryEntry {
 
 /// Kind kept for directional visibility fields. Not in files of this version.
 pub const KIND_VISIBILITY_FIELDS: u32 = 17;
-/// Kind kept for displacement fields. Not in files of this version.
-pub const KIND_DISPLACEMENT_FIELDS: u32 = 18;
 /// Kind kept for levels of detail. Not in files of this version.
 pub const KIND_LEVELS_OF_DETAIL: u32 = 19;
 
@@ -99,13 +98,12 @@ pub const KIND_LEVELS_OF_DETAIL: u32 = 19;
 pub(crate) fn unread_kind(kind: u32) -> &'static str {
     match kind {
         KIND_VISIBILITY_FIELDS => "kept for visibility fields",
-        KIND_DISPLACEMENT_FIELDS => "kept for displacement fields",
         KIND_LEVELS_OF_DETAIL => "kept for levels of detail",
         _ => "unknown",
     }
 }
 
-/// A section of the resident part. Every file has each exactly once, in this order.
+/// A section of the resident part. Every file has each once, in this order, but for optional ones without records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum Section {
@@ -135,11 +133,13 @@ pub enum Section {
     Lights = 12,
     /// [`Occupancy`] of the bricks, in their order, or nothing.
     Occupancy = 16,
+    /// [`DisplacementField`]s; optional.
+    Displacement = 18,
 }
 
 impl Section {
     /// All sections in the order of the file.
-    pub const ALL: [Section; 13] = [
+    pub const ALL: [Section; 14] = [
         Section::Manifest,
         Section::Objects,
         Section::Instances,
@@ -153,17 +153,34 @@ impl Section {
         Section::OpacityMaps,
         Section::Lights,
         Section::Occupancy,
+        Section::Displacement,
     ];
+
+    /// Sections that every file has.
+    const REQUIRED: usize = {
+        let (mut required, mut index) = (0, 0);
+        while index < Self::ALL.len() {
+            required += !Self::ALL[index].is_optional() as usize;
+            index += 1;
+        }
+        required
+    };
 
     /// The section's number in the directory.
     pub fn kind(self) -> u32 {
         self as u32
     }
 
-    /// The section's place in [`Self::ALL`] and in the directory.
+    /// Whether a file without records of the section has no entry of it in the directory.
+    pub const fn is_optional(self) -> bool {
+        matches!(self, Section::Displacement)
+    }
+
+    /// The section's place in [`Self::ALL`], and in the directory of a file that has all before it.
     pub fn index(self) -> usize {
         match self {
-            Section::Occupancy => Section::ALL.len() - 1,
+            Section::Occupancy => 12,
+            Section::Displacement => 13,
             numbered_from_one => numbered_from_one as usize - 1,
         }
     }
@@ -184,6 +201,7 @@ impl Section {
             Section::Tiles => size_of::<Span>(),
             Section::Lights => size_of::<PunctualLight>(),
             Section::Occupancy => size_of::<Occupancy>(),
+            Section::Displacement => size_of::<DisplacementField>(),
         };
         bytes as u32
     }
@@ -204,6 +222,7 @@ impl Section {
             Section::Tiles => "tiles",
             Section::Lights => "lights",
             Section::Occupancy => "occupancy",
+            Section::Displacement => "displacement",
         }
     }
 }
@@ -214,5 +233,11 @@ impl fmt::Display for Section {
     }
 }
 
-/// Length of the directory.
-pub const DIRECTORY_BYTES: u64 = (Section::ALL.len() * size_of::<DirectoryEntry>()) as u64;
+/// Length of an entry of the directory.
+pub const ENTRY_BYTES: u64 = size_of::<DirectoryEntry>() as u64;
+
+/// Length of the directory of a file without optional sections. Each of these makes it longer by [`ENTRY_BYTES`].
+pub const MIN_DIRECTORY_BYTES: u64 = Section::REQUIRED as u64 * ENTRY_BYTES;
+
+/// Length of the directory of a file with all sections.
+pub const MAX_DIRECTORY_BYTES: u64 = Section::ALL.len() as u64 * ENTRY_BYTES;

@@ -6,7 +6,8 @@
 //! * [`SceneFile::open`] checks the header, the directory and every section of the resident part (checksums, then
 //!   [`validate::resident`]). Its cost does not depend on the payloads.
 //! * [`SceneFile::copy`] checks a payload while it is copied out: its checksum, then every index in it. Geometry and
-//!   texels are used as they lie in the file, attributes are decoded ([`attributes`]).
+//!   texels are used as they lie in the file, attributes are decoded ([`attributes`]), displacement fields unpacked
+//!   ([`pack`]).
 //! * [`verify_file`] reads every byte of the file, padding included, and lists all that is wrong.
 //!
 //! Numbers on disk are little-endian and of fixed width; offsets and lengths are `u64`.
@@ -18,6 +19,7 @@ compile_error!("scene files are mapped whole, which takes a 64-bit address space
 
 pub mod attributes;
 mod corners;
+mod displacement;
 pub mod ending;
 mod error;
 mod file;
@@ -37,6 +39,7 @@ mod verify;
 mod writer;
 
 pub use corners::Corners;
+pub use displacement::*;
 pub use error::{Error, Flaw, Part};
 pub use file::{Access, SceneFile};
 pub use layout::Section;

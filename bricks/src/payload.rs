@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-/// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`], tile or
-/// [`crate::OpacityMap`].
+/// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`], tile,
+/// [`crate::OpacityMap`] or [`crate::DisplacementField`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Payload {
     /// What traversal of a brick reads, laid out as [`crate::GeometryLayout`] says.
@@ -19,6 +19,9 @@ pub enum Payload {
     Opacity(u32),
     /// A tile of a level of a texture, by its number in the file; see [`crate::Resident::tile_of`].
     Tile(u32),
+    /// The samples of a [`crate::DisplacementField`], loaded as it says, stored packed ([`crate::pack`]). They lie
+    /// behind all other payloads.
+    Displacement(u32),
 }
 
 impl fmt::Display for Payload {
@@ -30,6 +33,7 @@ impl fmt::Display for Payload {
             Payload::Texture(texture) => write!(f, "texture {texture}"),
             Payload::Opacity(map) => write!(f, "opacity map {map}"),
             Payload::Tile(tile) => write!(f, "tile {tile}"),
+            Payload::Displacement(field) => write!(f, "displacement field {field}"),
         }
     }
 }

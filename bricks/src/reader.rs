@@ -1,15 +1,17 @@
 //! Reads the parts of a scene file, each checked against its checksum and the rules of the format.
 
 use crate::attributes;
+use crate::displacement::DisplacementField;
 use crate::ending;
 use crate::error::{Error, Flaw, Part};
-use crate::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, MAGIC, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
-use crate::layout::{MAX_PAYLOAD_BYTES, unread_kind};
+use crate::layout::{DirectoryEntry, Header, MAGIC, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
+use crate::layout::{ENTRY_BYTES, MAX_DIRECTORY_BYTES, MAX_PAYLOAD_BYTES, MIN_DIRECTORY_BYTES, unread_kind};
 use crate::manifest::Manifest;
+use crate::pack;
 use crate::payload::Payload;
 use crate::records::{Brick, Span};
 use crate::source::Source;
-use bytemuck::Pod;
+use bytemuck::{Pod, Zeroable};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -44,8 +46,25 @@ fn open_error(path: &Path, source: io::Error) -> Error {
     }
 }
 
-/// The entries of all sections in order.
-pub(crate) type Directory = [DirectoryEntry; Section::ALL.len()];
+/// The entries of the sections that a file has, in order.
+pub(crate) struct Directory(Vec<(Section, DirectoryEntry)>);
+
+impl Directory {
+    /// The sections with their entries.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &(Section, DirectoryEntry)> {
+        self.0.iter()
+    }
+
+    /// Bytes of all sections.
+    pub(crate) fn section_bytes(&self) -> u64 {
+        self.iter().map(|(_, entry)| entry.bytes).sum()
+    }
+
+    /// The entry of a section; none of an optional one that the file does not have.
+    fn entry(&self, section: Section) -> Option<&DirectoryEntry> {
+        self.iter().find(|(own, _)| *own == section).map(|(_, entry)| entry)
+    }
+}
 
 /// Buffers for decoding, which only ever grow, so that a load neither allocates nor clears memory but for the first.
 #[derive(Default)]
@@ -116,41 +135,48 @@ impl Reader<'_> {
         if header.file_bytes != length {
             return Err(Error::Length { path: self.path.to_owned(), found: length, expected: header.file_bytes });
         }
-        let directory = header.directory_offset;
+        let (directory, bytes) = (header.directory_offset, header.directory_bytes);
         rule(
-            header.directory_bytes == DIRECTORY_BYTES,
-            header.directory_bytes,
-            format!("a directory of {DIRECTORY_BYTES} bytes"),
+            (MIN_DIRECTORY_BYTES..=MAX_DIRECTORY_BYTES).contains(&bytes) && bytes.is_multiple_of(ENTRY_BYTES),
+            bytes,
+            format!(
+                "a directory of {MIN_DIRECTORY_BYTES} to {MAX_DIRECTORY_BYTES} bytes in entries of {ENTRY_BYTES} bytes"
+            ),
         )?;
         rule(
             directory >= PAGE_BYTES
                 && directory.is_multiple_of(PAGE_BYTES)
-                && directory.checked_add(DIRECTORY_BYTES).is_some_and(|end| end <= length),
+                && directory.checked_add(bytes).is_some_and(|end| end <= length),
             directory,
             format!("a directory on a multiple of {PAGE_BYTES} that ends within the file's {length} bytes"),
         )?;
         Ok(header)
     }
 
-    /// Reads the directory that `header`, found right, points to. Its entries are the sections in their order and tile
-    /// the rest of the file.
+    /// Reads the directory that `header`, found right, points to. Its entries are the sections in their order, optional
+    /// ones only with records, and tile the rest of the file.
     pub(crate) fn directory(&self, header: &Header) -> Result<Directory, Error> {
-        let mut directory: Directory = bytemuck::Zeroable::zeroed();
-        self.bytes(Part::Directory, header.directory_offset, bytemuck::bytes_of_mut(&mut directory))?;
-        self.corrupt(Part::Directory, xxh3_64(bytemuck::bytes_of(&directory)), header.directory_checksum)?;
+        let mut entries = vec![DirectoryEntry::zeroed(); (header.directory_bytes / ENTRY_BYTES) as usize];
+        self.bytes(Part::Directory, header.directory_offset, bytemuck::cast_slice_mut(&mut entries))?;
+        self.corrupt(Part::Directory, xxh3_64(bytemuck::cast_slice(&entries)), header.directory_checksum)?;
         let rule = |ok: bool, found: String, expected: String| {
             if ok { Ok(()) } else { Err(self.invalid(Flaw { part: Part::Directory, found, expected })) }
         };
+        let mut directory = Vec::with_capacity(entries.len());
+        let mut entries = entries.into_iter().peekable();
         // Below the file's length, so that rounding up cannot overflow unless the file is impossibly long.
         let mut end = header.directory_offset + header.directory_bytes;
-        for (entry, section) in directory.iter().zip(Section::ALL) {
-            if entry.kind != section.kind() {
-                let kind = entry.kind;
-                let known = Section::ALL.iter().find(|section| section.kind() == kind);
-                let name = known.map_or(unread_kind(kind), |section| section.name());
-                let expected = format!("kind {} ({section})", section.kind());
-                rule(false, format!("an entry of kind {kind} ({name})"), expected)?;
-            }
+        for section in Section::ALL {
+            let Some(entry) = entries.next_if(|entry| entry.kind == section.kind()) else {
+                let expected = || format!("kind {} ({section})", section.kind());
+                rule(section.is_optional(), entry_name(entries.peek()), expected())?;
+                continue;
+            };
+            rule(
+                entry.count > 0 || !section.is_optional(),
+                format!("an entry of section {section} without records"),
+                "records, or no entry".to_owned(),
+            )?;
             rule(
                 entry.record_bytes == section.record_bytes(),
                 format!("records of {} bytes in section {section}", entry.record_bytes),
@@ -174,18 +200,21 @@ impl Reader<'_> {
                 format!("section {section} of {bytes} bytes at byte {}", entry.offset),
                 format!("a section that ends within the file's {} bytes", header.file_bytes),
             )?;
+            directory.push((section, entry));
         }
+        rule(entries.peek().is_none(), entry_name(entries.peek()), "the end of the directory".to_owned())?;
         rule(
             end == header.file_bytes,
             format!("the last section ending at byte {end}"),
             format!("the end of the file at byte {}", header.file_bytes),
         )?;
-        Ok(directory)
+        Ok(Directory(directory))
     }
 
-    /// Reads the records of a section. `directory` was found right, so the length is less than the file's.
+    /// Reads the records of a section; none of an optional one that the file does not have. `directory` was found right,
+    /// so the length is less than the file's.
     pub(crate) fn section<T: Pod>(&self, directory: &Directory, section: Section) -> Result<Vec<T>, Error> {
-        let entry = &directory[section.index()];
+        let Some(entry) = directory.entry(section) else { return Ok(Vec::new()) };
         debug_assert!(size_of::<T>() == entry.record_bytes as usize);
         let part = Part::Section(section);
         let mut records = Vec::new();
@@ -223,6 +252,16 @@ impl Reader<'_> {
         self.corrupt(part, xxh3_64(out), span.checksum)
     }
 
+    /// Copies a payload to `stored`, which grows to its length, as [`Self::payload`].
+    fn stored<'a>(&self, payload: Payload, span: Span, stored: &'a mut Vec<u8>) -> Result<&'a [u8], Error> {
+        let length = span.bytes as usize;
+        if stored.len() < length {
+            stored.resize(length, 0);
+        }
+        self.payload(payload, span, &mut stored[..length])?;
+        Ok(&stored[..length])
+    }
+
     /// Decodes the attributes of `brick` to `out`, [`crate::AttributeLayout::bytes`] long, from a copy whose checksum
     /// was compared.
     pub(crate) fn attributes(
@@ -234,13 +273,28 @@ impl Reader<'_> {
         out: &mut [u8],
     ) -> Result<(), Error> {
         let Decoding { stored, columns } = buffers;
-        let length = span.bytes as usize;
-        if stored.len() < length {
-            stored.resize(length, 0);
-        }
-        let stored = &mut stored[..length];
-        self.payload(payload, span, stored)?;
+        let stored = self.stored(payload, span, stored)?;
         let decoded = attributes::decode(brick, stored, columns, out);
         decoded.map_err(|error| self.invalid(Flaw::packed(Part::Payload(payload), error)))
     }
+
+    /// Unpacks the samples of `field` to `out`, [`DisplacementField::loaded_bytes`] long, from a copy whose checksum was
+    /// compared.
+    pub(crate) fn displacement(
+        &self,
+        payload: Payload,
+        field: &DisplacementField,
+        buffers: &mut Decoding,
+        out: &mut [u8],
+    ) -> Result<(), Error> {
+        let stored = self.stored(payload, field.span, &mut buffers.stored)?;
+        pack::unpack(stored, out).map_err(|error| self.invalid(Flaw::packed(Part::Payload(payload), error)))
+    }
+}
+
+/// What a message calls an entry of the directory.
+fn entry_name(entry: Option<&DirectoryEntry>) -> String {
+    let Some(DirectoryEntry { kind, .. }) = entry else { return "the end of the directory".to_owned() };
+    let known = Section::ALL.iter().find(|section| section.kind() == *kind);
+    format!("an entry of kind {kind} ({})", known.map_or(unread_kind(*kind), |section| section.name()))
 }

@@ -1,6 +1,7 @@
 //! The part of a scene that is always in memory.
 
-use crate::layout::Section;
+use crate::displacement::DisplacementField;
+use crate::layout::{ENTRY_BYTES, Section};
 use crate::manifest::Manifest;
 use crate::occupancy::Occupancy;
 use crate::payload::Payload;
@@ -43,6 +44,8 @@ pub struct Resident {
     pub lights: Vec<PunctualLight>,
     /// The occupancy of each brick, or nothing: then the scene has no proxies.
     pub occupancy: Vec<Occupancy>,
+    /// Displacement fields, ascending by object and brick.
+    pub displacement: Vec<DisplacementField>,
 }
 
 impl Resident {
@@ -62,7 +65,18 @@ impl Resident {
             Section::Tiles => self.tiles.len(),
             Section::Lights => self.lights.len(),
             Section::Occupancy => self.occupancy.len(),
+            Section::Displacement => self.displacement.len(),
         }
+    }
+
+    /// The sections that its file has, in their order: all but optional ones without records.
+    pub fn sections(&self) -> impl Iterator<Item = Section> + '_ {
+        Section::ALL.into_iter().filter(|&section| !section.is_optional() || self.count(section) > 0)
+    }
+
+    /// Length of the directory of its file.
+    pub fn directory_bytes(&self) -> u64 {
+        self.sections().count() as u64 * ENTRY_BYTES
     }
 
     /// Bytes of all opacity maps.
@@ -76,7 +90,7 @@ impl Resident {
         spans.map(|span| span.bytes).sum::<u64>() + self.opacity_bytes()
     }
 
-    /// Where a payload lies, or `None` if there is no such brick, texture, tile or map, or no proxies.
+    /// Where a payload lies, or `None` if there is no such brick, texture, tile, map or field, or no proxies.
     pub fn span(&self, payload: Payload) -> Option<Span> {
         match payload {
             Payload::Geometry(brick) => self.bricks.get(brick as usize).map(|brick| brick.geometry),
@@ -88,20 +102,22 @@ impl Resident {
             Payload::Opacity(map) => self.opacity_maps.get(map as usize).map(|map| map.texels),
             Payload::Texture(texture) => self.textures.get(texture as usize).map(|texture| texture.tail),
             Payload::Tile(tile) => self.tiles.get(tile as usize).copied(),
+            Payload::Displacement(field) => self.displacement.get(field as usize).map(|field| field.span),
         }
     }
 
     /// Length of a payload as it is loaded by [`crate::SceneFile::copy`], or `None` if there is no such payload. It
-    /// is that of its span but for attributes, which are encoded in the file.
+    /// is that of its span but for attributes and displacement fields, which are encoded in the file.
     pub fn loaded_bytes(&self, payload: Payload) -> Option<u64> {
         match payload {
             Payload::Attributes(brick) => self.bricks.get(brick as usize).map(|brick| AttributeLayout::of(brick).bytes),
+            Payload::Displacement(field) => self.displacement.get(field as usize).map(DisplacementField::loaded_bytes),
             _ => self.span(payload).map(|span| span.bytes),
         }
     }
 
     /// Every payload with its span: the bricks' geometry, attributes and, if any, proxies in order of bricks, then the
-    /// textures' tails, then the tiles, then the opacity maps.
+    /// textures' tails, then the tiles, then the opacity maps, then the displacement fields.
     pub fn payloads(&self) -> impl Iterator<Item = (Payload, Span)> + '_ {
         let bricks = (0u32..).zip(&self.bricks);
         let bricks = bricks.flat_map(|(index, brick)| {
@@ -113,7 +129,8 @@ impl Resident {
         let tails = textures.map(|(index, texture)| (Payload::Texture(index), texture.tail));
         let tiles = (0u32..).zip(&self.tiles).map(|(index, span)| (Payload::Tile(index), *span));
         let maps = (0u32..).zip(&self.opacity_maps).map(|(index, map)| (Payload::Opacity(index), map.texels));
-        bricks.chain(tails).chain(tiles).chain(maps)
+        let fields = (0u32..).zip(&self.displacement).map(|(index, field)| (Payload::Displacement(index), field.span));
+        bricks.chain(tails).chain(tiles).chain(maps).chain(fields)
     }
 
     /// The texture of a tile, and where the tile is in it; `None` if there is no such tile.
@@ -126,7 +143,7 @@ impl Resident {
     }
 
     /// The texture, by its name in the source, that a payload is part of, and which part, in words; `None` if it is of
-    /// a brick.
+    /// none.
     pub fn texture_of(&self, payload: Payload) -> Option<String> {
         let named = |texture: u32| {
             let name = self.manifest.texture_names.get(texture as usize).map_or("", String::as_str);
@@ -138,7 +155,11 @@ impl Resident {
                 let (texture, TilePlace { level, x, y }) = self.tile_of(tile)?;
                 Some(format!("column {x}, row {y} of level {level} of {}", named(texture)))
             }
-            Payload::Geometry(_) | Payload::Attributes(_) | Payload::Proxies(_) | Payload::Opacity(_) => None,
+            Payload::Geometry(_)
+            | Payload::Attributes(_)
+            | Payload::Proxies(_)
+            | Payload::Opacity(_)
+            | Payload::Displacement(_) => None,
         }
     }
 }

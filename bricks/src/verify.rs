@@ -38,7 +38,7 @@ impl VerifyReport {
 /// ([`validate::contents`]), and that all padding is zero. A flip of any byte is found and named.
 ///
 /// What depends on a damaged part cannot be checked: behind a damaged header or directory nothing; if a section is
-/// damaged, the other sections, and the checksums of the payloads that the sections of bricks, textures and tiles name.
+/// damaged, the other sections, and the checksums of the payloads that the others name.
 ///
 /// Payloads are read by the threads of the current rayon pool, each with buffers as long as its longest payload; the
 /// problems come in the order of the file all the same.
@@ -127,7 +127,8 @@ impl Verifier<'_> {
         let tiles: Option<Vec<Span>> = self.section(directory, Section::Tiles);
         let lights = self.section(directory, Section::Lights);
         let occupancy = self.section(directory, Section::Occupancy);
-        self.advance(directory.iter().map(|entry| entry.bytes).sum());
+        let displacement = self.section(directory, Section::Displacement);
+        self.advance(directory.section_bytes());
 
         let whole = manifest.is_some()
             && objects.is_some()
@@ -141,7 +142,8 @@ impl Verifier<'_> {
             && opacity_maps.is_some()
             && tiles.is_some()
             && lights.is_some()
-            && occupancy.is_some();
+            && occupancy.is_some()
+            && displacement.is_some();
         let resident = Resident {
             manifest: manifest.unwrap_or_default(),
             objects: objects.unwrap_or_default(),
@@ -156,6 +158,7 @@ impl Verifier<'_> {
             tiles: tiles.unwrap_or_default(),
             lights: lights.unwrap_or_default(),
             occupancy: occupancy.unwrap_or_default(),
+            displacement: displacement.unwrap_or_default(),
         };
         let valid = whole && self.keep_flaw(validate::resident(&resident));
         let tiled = whole && self.keep_flaw(validate::spans(&resident, header.directory_offset));
@@ -215,9 +218,9 @@ impl Verifier<'_> {
     fn section_padding(&mut self, header: &Header, directory: &Directory) {
         let mut part = Part::PaddingAfterDirectory;
         let mut end = header.directory_offset + header.directory_bytes;
-        for (entry, section) in directory.iter().zip(Section::ALL) {
+        for (section, entry) in directory.iter() {
             self.padding(part, end, entry.offset);
-            part = Part::PaddingAfterSection(section);
+            part = Part::PaddingAfterSection(*section);
             end = entry.offset + entry.bytes;
         }
     }
@@ -251,6 +254,11 @@ fn check_payload(
             let brick = &resident.bricks[brick as usize];
             buffer.resize(AttributeLayout::of(brick).bytes as usize, 0);
             reader.attributes(payload, span, brick, decoding, buffer)?;
+        }
+        Payload::Displacement(field) if valid => {
+            let field = &resident.displacement[field as usize];
+            buffer.resize(field.loaded_bytes() as usize, 0);
+            reader.displacement(payload, field, decoding, buffer)?;
         }
         _ => {
             buffer.resize(span.bytes as usize, 0);

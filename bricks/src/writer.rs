@@ -2,8 +2,7 @@
 
 use crate::ending::Temporary;
 use crate::error::{Error, Flaw, Part};
-use crate::layout::DirectoryEntry;
-use crate::layout::{DIRECTORY_BYTES, Header, MAGIC, MAX_PAYLOAD_BYTES, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
+use crate::layout::{DirectoryEntry, Header, MAGIC, MAX_PAYLOAD_BYTES, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
 use crate::records::Span;
 use crate::resident::Resident;
 use crate::validate;
@@ -90,8 +89,8 @@ impl Writer {
     }
 
     /// Writes a payload at the next multiple of [`PAGE_BYTES`] and returns where it lies. `bytes` must be a multiple of
-    /// 16 long, not empty, and at most [`MAX_PAYLOAD_BYTES`]. Every payload that is written must be that of a brick, a
-    /// texture or a tile of the resident part given to [`Self::finish`].
+    /// 16 long, not empty, and at most [`MAX_PAYLOAD_BYTES`]. Every payload that is written must be one of the resident
+    /// part given to [`Self::finish`], those of displacement fields after all others.
     pub fn write(&mut self, bytes: &[u8]) -> Result<Span, Error> {
         let length = bytes.len() as u64;
         if length == 0 || !length.is_multiple_of(16) || length > MAX_PAYLOAD_BYTES {
@@ -118,10 +117,11 @@ impl Writer {
         self.align(PAGE_BYTES)?;
         let directory_offset = self.position;
         validate::spans(resident, directory_offset).map_err(|flaw| Error::Invalid { path: self.path.clone(), flaw })?;
-        let mut end = directory_offset + DIRECTORY_BYTES;
+        let directory_bytes = resident.directory_bytes();
+        let mut end = directory_offset + directory_bytes;
         let mut directory = Vec::with_capacity(Section::ALL.len());
         let mut sections = Vec::with_capacity(Section::ALL.len());
-        for section in Section::ALL {
+        for section in resident.sections() {
             let bytes =
                 section_bytes(resident, section).map_err(|source| self.error("write the manifest", source.into()))?;
             let offset = end.next_multiple_of(SECTION_ALIGN);
@@ -148,7 +148,7 @@ impl Writer {
             page_bytes: PAGE_BYTES as u32,
             file_bytes: self.position,
             directory_offset,
-            directory_bytes: DIRECTORY_BYTES,
+            directory_bytes,
             directory_checksum: xxh3_64(directory),
             checksum: 0,
         };
@@ -188,7 +188,7 @@ impl Writer {
             Some(index) => Err(Flaw {
                 part: Part::Section(Section::Bricks),
                 found: format!(
-                    "no brick, texture or tile with the payload written at byte {}",
+                    "no brick, texture, tile, map or field with the payload written at byte {}",
                     self.spans[index].offset
                 ),
                 expected: "every written payload in use".to_owned(),
@@ -349,6 +349,7 @@ fn section_bytes(resident: &Resident, section: Section) -> serde_json::Result<Co
         Section::Tiles => bytemuck::cast_slice(&resident.tiles),
         Section::Lights => bytemuck::cast_slice(&resident.lights),
         Section::Occupancy => bytemuck::cast_slice(&resident.occupancy),
+        Section::Displacement => bytemuck::cast_slice(&resident.displacement),
     }))
 }
 

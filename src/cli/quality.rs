@@ -3,7 +3,7 @@
 
 use crate::settings::sizes::{human_bytes, human_count};
 use anyhow::Result;
-use bricks::layout::{DIRECTORY_BYTES, PAGE_BYTES};
+use bricks::layout::PAGE_BYTES;
 use bricks::{AttributeLayout, Brick, GeometryLayout, Node, Payload, Resident, SceneFile, Section};
 use brickwalk_convert::build::TRIANGLE_COST;
 use rayon::prelude::*;
@@ -33,6 +33,9 @@ pub struct Sections {
     pub proxies: u64,
     /// Texels.
     pub textures: u64,
+    /// Displacement fields, as they are packed. Not listed where there are none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub displacement: u64,
     /// The directory of the resident part.
     pub directory: u64,
     /// The sections of the resident part by name.
@@ -45,7 +48,7 @@ impl Sections {
     /// Sizes of `scene`.
     pub fn of(scene: &SceneFile) -> Self {
         let resident = scene.resident();
-        let mut sizes = Self { header: PAGE_BYTES, directory: DIRECTORY_BYTES, ..Self::default() };
+        let mut sizes = Self { header: PAGE_BYTES, directory: resident.directory_bytes(), ..Self::default() };
         for brick in &resident.bricks {
             let geometry = GeometryLayout::of(brick);
             sizes.nodes += geometry.vertices;
@@ -56,11 +59,12 @@ impl Sections {
             sizes.proxies += brick.proxies.bytes;
         }
         sizes.textures = resident.texture_bytes();
+        sizes.displacement = resident.displacement.iter().map(|field| field.span.bytes).sum();
         let bytes = |section: Section| resident.count(section) as u64 * u64::from(section.record_bytes());
-        sizes.resident = Section::ALL.into_iter().map(|section| (section.name(), bytes(section))).collect();
+        sizes.resident = resident.sections().map(|section| (section.name(), bytes(section))).collect();
         let records: u64 = sizes.resident.values().sum();
         // It has no records; it is what the others leave of the resident part.
-        sizes.resident.insert(Section::Manifest.name(), scene.resident_bytes() - DIRECTORY_BYTES - records);
+        sizes.resident.insert(Section::Manifest.name(), scene.resident_bytes() - sizes.directory - records);
         sizes.padding = scene.file_bytes() - sizes.sum();
         sizes
     }
@@ -72,7 +76,8 @@ impl Sections {
 
     fn sum(&self) -> u64 {
         let resident = self.directory + self.resident.values().sum::<u64>();
-        self.header + self.geometry() + self.attributes + self.proxies + self.textures + resident + self.padding
+        let of_bricks = self.geometry() + self.attributes + self.proxies;
+        self.header + of_bricks + self.textures + self.displacement + resident + self.padding
     }
 
     /// Rows for people.
@@ -84,15 +89,22 @@ impl Sections {
         };
         let geometry =
             [("nodes", self.nodes), ("vertices", self.vertices), ("ids", self.ids), ("indices", self.indices)];
-        let others = [
+        let mut others = vec![
             ("attributes", self.attributes),
             ("proxies", self.proxies),
             ("textures", self.textures),
             ("padding", self.padding),
         ];
+        if self.displacement > 0 {
+            others.insert(3, ("displacement", self.displacement));
+        }
         let resident: Vec<(&str, u64)> = self.resident.iter().map(|(name, bytes)| (*name, *bytes)).collect();
         [format!("geometry: {}", list(&geometry)), list(&others), format!("resident: {}", list(&resident))]
     }
+}
+
+fn is_zero(bytes: &u64) -> bool {
+    *bytes == 0
 }
 
 /// Bytes of what shading reads, textures apart, as it is loaded.

@@ -77,7 +77,7 @@ fn damaged_bricks(report: &VerifyReport) -> Vec<u32> {
             Part::Record(Section::Bricks, brick) => Some(brick),
             Part::Payload(payload) | Part::PaddingAfterPayload(payload) => match payload {
                 Payload::Geometry(brick) | Payload::Attributes(brick) | Payload::Proxies(brick) => Some(brick),
-                Payload::Texture(_) | Payload::Tile(_) | Payload::Opacity(_) => None,
+                Payload::Texture(_) | Payload::Tile(_) | Payload::Opacity(_) | Payload::Displacement(_) => None,
             },
             _ => None,
         })

@@ -26,7 +26,7 @@ pub fn contents(resident: &Resident, payload: Payload, bytes: &[u8], map: Option
             let texture = resident.tile_of(tile).map(|(texture, _)| &resident.textures[texture as usize]);
             return texture.map_or(Ok(()), |texture| blocks(payload, texture, bytes));
         }
-        Payload::Attributes(_) | Payload::Proxies(_) | Payload::Opacity(_) => return Ok(()),
+        Payload::Attributes(_) | Payload::Proxies(_) | Payload::Opacity(_) | Payload::Displacement(_) => return Ok(()),
     };
     let brick = &resident.bricks[index as usize];
     let object = &resident.objects[brick.object as usize];

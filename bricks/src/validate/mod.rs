@@ -4,12 +4,13 @@
 //!   trees are trees over exactly the leaves, nothing is infinite or not a number.
 //! * [`payload`]: the bytes of one payload, as it is loaded, against the resident part: every index in it, and that the
 //!   nodes of a brick are a tree no higher than the brick says.
-//! * [`spans`]: payloads fill the file up to the directory and do not overlap.
+//! * [`spans`]: payloads fill the file up to the directory and do not overlap, displacement fields last.
 //! * [`contents`]: what is slower to check and cannot make an index wrong: vertices on the lattice within their bounds
 //!   and in occupied cells, every triangle in exactly one leaf. `verify` does it.
 
 mod brick;
 mod contents;
+mod displacement;
 mod node;
 mod occupancy;
 mod payload;
@@ -43,6 +44,7 @@ pub fn resident(resident: &Resident) -> Result<(), Flaw> {
         brick::record(index, record)?;
     }
     occupancy::records(resident)?;
+    displacement::records(resident)?;
     scene::leaves(resident)?;
     top::binary(&resident.top2, resident.leaves.len())?;
     top::wide(&resident.top8, resident.leaves.len())?;
@@ -51,12 +53,19 @@ pub fn resident(resident: &Resident) -> Result<(), Flaw> {
 
 /// Checks that the payloads fill the file from the header page to `payload_end`, the directory's offset: each starts at
 /// the first multiple of [`PAGE_BYTES`] after the one before. So none overlap, and every byte of the file belongs to
-/// something that is checked.
+/// something that is checked. Displacement fields lie behind all others, which stay where they are when fields change.
 pub fn spans(resident: &Resident, payload_end: u64) -> Result<(), Flaw> {
     let mut payloads: Vec<(Payload, Span)> = resident.payloads().collect();
     payloads.sort_unstable_by_key(|(payload, span)| (span.offset, *payload));
     let mut end = Some(PAGE_BYTES);
+    let mut last_field = None;
     for &(payload, span) in &payloads {
+        if let Payload::Displacement(_) = payload {
+            last_field = Some(payload);
+        }
+        rule(last_field.is_none_or(|field| field == payload), Part::Payload(payload), || {
+            (format!("it behind {}", last_field.unwrap_or(payload)), "it before all displacement fields")
+        })?;
         let expected = end.and_then(|end| end.checked_next_multiple_of(PAGE_BYTES));
         rule(Some(span.offset) == expected, Part::Payload(payload), || {
             let expected = expected.unwrap_or(u64::MAX);

@@ -4,8 +4,8 @@
 //! maximum per array of indices or coordinates, which compilers vectorise.
 
 use super::node::NodeView;
-use super::occupancy;
 use super::rule::rule;
+use super::{displacement, occupancy};
 use crate::error::{Flaw, Part};
 use crate::payload::Payload;
 use crate::records::{
@@ -22,7 +22,8 @@ const MAGNITUDE: u32 = 0x7fff_ffff;
 /// Checks the bytes of a payload, as it is loaded, against the resident part, which satisfies [`super::resident`]:
 /// every index that traversal or shading follows lies in its array, nodes form a tree no higher than the brick says
 /// with children after their parents, node 0 is the brick's root, padding is zero; boxes and vertices are finite, and
-/// vertices within reach of the brick's origin; of an occupancy map that all levels agree. `bytes` needs no alignment.
+/// vertices within reach of the brick's origin; of an occupancy map that all levels agree; of a displacement field that
+/// nothing is behind the samples. `bytes` needs no alignment.
 pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<(), Flaw> {
     let part = Part::Payload(payload);
     let length = resident.loaded_bytes(payload);
@@ -39,6 +40,7 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
             attributes(part, &resident.bricks[index as usize], resident.materials.len() as u32, bytes)
         }
         Payload::Proxies(index) => occupancy::map(resident, index, bytes),
+        Payload::Displacement(index) => displacement::loaded(resident, index, bytes),
         // Whatever the bytes are, they are texels.
         Payload::Texture(_) | Payload::Tile(_) => Ok(()),
         Payload::Opacity(index) => {
@@ -168,7 +170,7 @@ fn indices(part: Part, brick: &Brick, vertices: u32, bytes: &[u8], offset: u64) 
 }
 
 /// Checks that `bytes[start..end]` is zero.
-fn padding(part: Part, bytes: &[u8], start: u64, end: u64) -> Result<(), Flaw> {
+pub(super) fn padding(part: Part, bytes: &[u8], start: u64, end: u64) -> Result<(), Flaw> {
     let at = bytes[start as usize..end as usize].iter().position(|&byte| byte != 0);
     rule(at.is_none(), part, || {
         let at = start + at.unwrap_or(0) as u64;

@@ -1,6 +1,6 @@
 //! A small scene with everything that the format has, and a way to spoil files while their checksums stay right.
 
-use bricks::layout::{DirectoryEntry, Header, PAGE_BYTES};
+use bricks::layout::{DirectoryEntry, ENTRY_BYTES, Header, PAGE_BYTES};
 use bricks::*;
 use bytemuck::Pod;
 use std::collections::BTreeMap;
@@ -401,6 +401,41 @@ pub fn scene() -> Scene {
     Scene { resident, payloads }
 }
 
+/// The small scene with displacement fields: of a brick and of the object that it is of, and bits of another object.
+pub fn scene_with_fields() -> Scene {
+    let Scene { mut resident, mut payloads } = scene();
+    let field = |object, brick, rings, directions, bits| DisplacementField {
+        object,
+        brick,
+        rings,
+        directions,
+        bits,
+        executor: if bits == DISPLACEMENT_HITS { DISPLACEMENT_BY_GPU } else { DISPLACEMENT_BY_CPU },
+        center: [3072.0, -0.25, 1e-3],
+        radius: 60.5,
+        mean: 0.375,
+        span: Span::default(),
+    };
+    resident.displacement = vec![
+        field(0, 1, 1, 3, DISPLACEMENT_DISTANCES),
+        field(0, NONE, 3, 2, DISPLACEMENT_DISTANCES),
+        field(1, NONE, 1, 3, DISPLACEMENT_HITS),
+    ];
+    for (index, field) in (0..).zip(&resident.displacement) {
+        let mut numbers = Numbers(u64::from(index) + 9);
+        // Distances of all values, and runs of rays that hit nothing.
+        let mut sample = |at: u64| if at / 20 % 2 == 1 { DISPLACEMENT_MISS } else { numbers.next(256) as u8 };
+        let mut bytes: Vec<u8> = (0..field.sample_bytes()).map(&mut sample).collect();
+        if field.bits == DISPLACEMENT_HITS {
+            // 90 samples: two bits of the last byte.
+            *bytes.last_mut().unwrap() &= 3;
+        }
+        bytes.resize(field.loaded_bytes() as usize, 0);
+        payloads.insert(Payload::Displacement(index), bytes);
+    }
+    Scene { resident, payloads }
+}
+
 /// Both trees over the four leaves.
 fn top_level(resident: &mut Resident) {
     let leaves: Vec<Triangle> = resident.leaves.iter().map(|leaf| world_bounds(resident, leaf)).collect();
@@ -442,6 +477,7 @@ impl Scene {
         let bytes = &self.payloads[&payload];
         match payload {
             Payload::Attributes(brick) => attributes::encode(&self.resident.bricks[brick as usize], bytes),
+            Payload::Displacement(_) => pack::pack(bytes),
             _ => bytes.clone(),
         }
     }
@@ -457,6 +493,7 @@ impl Scene {
                 Payload::Opacity(map) => self.resident.opacity_maps[map as usize].texels = span,
                 Payload::Texture(texture) => self.resident.textures[texture as usize].tail = span,
                 Payload::Tile(tile) => self.resident.tiles[tile as usize] = span,
+                Payload::Displacement(field) => self.resident.displacement[field as usize].span = span,
             }
         }
     }
@@ -471,9 +508,17 @@ impl Scene {
 
 /// A folder for the files of one test, and the small scene in it.
 pub fn written() -> (tempfile::TempDir, PathBuf, Scene) {
+    in_folder(scene())
+}
+
+/// As [`written`], with displacement fields.
+pub fn written_with_fields() -> (tempfile::TempDir, PathBuf, Scene) {
+    in_folder(scene_with_fields())
+}
+
+fn in_folder(mut scene: Scene) -> (tempfile::TempDir, PathBuf, Scene) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.bricks");
-    let mut scene = scene();
     scene.write(&path);
     (folder, path, scene)
 }
@@ -492,7 +537,14 @@ impl Image {
         bytemuck::pod_read_unaligned(&self.bytes[..size_of::<Header>()])
     }
 
+    /// The sections that the file has.
+    pub fn sections(&self) -> Vec<Section> {
+        let entries = self.header().directory_bytes / ENTRY_BYTES;
+        Section::ALL.into_iter().take(entries as usize).collect()
+    }
+
     fn entry_at(&self, section: Section) -> usize {
+        assert!(self.sections().contains(&section), "the file has no section {section}");
         self.header().directory_offset as usize + section.index() * size_of::<DirectoryEntry>()
     }
 
@@ -523,6 +575,17 @@ impl Image {
         self.seal_directory();
     }
 
+    /// Bytes of all sections.
+    pub fn sections_bytes(&self) -> u64 {
+        self.sections().into_iter().map(|section| self.entry(section).bytes).sum()
+    }
+
+    /// Gives the directory another length; its checksum and that of the header are right afterwards.
+    pub fn resize_directory(&mut self, bytes: u64) {
+        self.edit_header(|header| header.directory_bytes = bytes);
+        self.seal_directory();
+    }
+
     /// Changes the header; its checksum is right afterwards.
     pub fn edit_header(&mut self, edit: impl FnOnce(&mut Header)) {
         let mut header = self.header();
@@ -537,6 +600,7 @@ impl Image {
             Payload::Texture(index) => (Section::Textures, index),
             Payload::Opacity(index) => (Section::OpacityMaps, index),
             Payload::Tile(index) => (Section::Tiles, index),
+            Payload::Displacement(index) => (Section::Displacement, index),
         };
         let bytes = &mut self.bytes.clone();
         let update = |span: &mut Span| {
@@ -563,6 +627,12 @@ impl Image {
                 self.bytes.copy_from_slice(bytes);
                 self.edit(section, index, |span| *span = record);
             }
+            Section::Displacement => {
+                let mut record = self.record::<DisplacementField>(section, index);
+                update(&mut record.span);
+                self.bytes.copy_from_slice(bytes);
+                self.edit(section, index, |field| *field = record);
+            }
             Section::OpacityMaps => {
                 let mut record = self.record::<OpacityMap>(section, index);
                 update(&mut record.texels);
@@ -584,7 +654,7 @@ impl Image {
 
     /// Makes the checksums of the sections, the directory and the header right.
     pub fn seal(&mut self) {
-        for section in Section::ALL {
+        for section in self.sections() {
             let checksum = xxh3_64(self.section(section));
             let at = self.entry_at(section) + std::mem::offset_of!(DirectoryEntry, checksum);
             self.bytes[at..at + 8].copy_from_slice(&checksum.to_le_bytes());

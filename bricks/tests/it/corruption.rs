@@ -1,7 +1,7 @@
 //! Damage of every kind is found and named, and never anything worse.
 
-use crate::common::{self, Image, Scene, written};
-use bricks::layout::{DIRECTORY_BYTES, PAGE_BYTES};
+use crate::common::{self, Image, Scene, written, written_with_fields};
+use bricks::layout::PAGE_BYTES;
 use bricks::{Access, Error, Part, Payload, SceneFile, Section, verify_file};
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
@@ -22,11 +22,11 @@ fn owners(image: &Image, scene: &Scene) -> Vec<Part> {
         fill(span.offset, end, Part::Payload(payload));
         fill(end, end.next_multiple_of(PAGE_BYTES), Part::PaddingAfterPayload(payload));
     }
-    let start = header.directory_offset;
-    let entries = Section::ALL.map(|section| image.entry(section));
-    fill(start, start + DIRECTORY_BYTES, Part::Directory);
-    fill(start + DIRECTORY_BYTES, entries[0].offset, Part::PaddingAfterDirectory);
-    for (index, section) in Section::ALL.into_iter().enumerate() {
+    let (start, end) = (header.directory_offset, header.directory_offset + header.directory_bytes);
+    let entries: Vec<_> = image.sections().into_iter().map(|section| image.entry(section)).collect();
+    fill(start, end, Part::Directory);
+    fill(end, entries[0].offset, Part::PaddingAfterDirectory);
+    for (index, section) in image.sections().into_iter().enumerate() {
         let end = entries[index].offset + entries[index].bytes;
         fill(entries[index].offset, end, Part::Section(section));
         if let Some(next) = entries.get(index + 1) {
@@ -67,20 +67,25 @@ fn found(path: &Path, part: Part, at: usize) {
     }
 }
 
+/// Flips a bit of every byte from `start` on, each bit in its turn; the parts that they belong to.
+fn flip(path: &Path, scene: &Scene, start: usize) -> Vec<Part> {
+    let image = Image::read(path);
+    let owners = owners(&image, scene);
+    assert_eq!(common::problems(path), "");
+    let file = File::options().write(true).open(path).unwrap();
+    for (at, (&byte, &part)) in image.bytes.iter().zip(&owners).enumerate().skip(start) {
+        write_at(&file, &[byte ^ 1 << (at % 8)], at);
+        found(path, part, at);
+        write_at(&file, &[byte], at);
+    }
+    assert_eq!(common::problems(path), "");
+    owners.into_iter().skip(start).collect()
+}
+
 #[test]
 fn every_byte() {
     let (_folder, path, scene) = written();
-    let image = Image::read(&path);
-    let owners = owners(&image, &scene);
-    assert_eq!(common::problems(&path), "");
-    let file = File::options().write(true).open(&path).unwrap();
-    for (at, (&byte, &part)) in image.bytes.iter().zip(&owners).enumerate() {
-        // Every bit has its turn.
-        write_at(&file, &[byte ^ 1 << (at % 8)], at);
-        found(&path, part, at);
-        write_at(&file, &[byte], at);
-    }
-    assert_eq!(common::problems(&path), "");
+    let owners = flip(&path, &scene, 0);
     let padding = owners.iter().filter(|part| matches!(part, Part::PaddingAfterPayload(_))).count();
     assert!(
         padding > 1000 && owners.iter().any(|part| matches!(part, Part::PaddingAfterSection(_))),
@@ -88,21 +93,44 @@ fn every_byte() {
     );
 }
 
+/// What a file with displacement fields has besides: their payloads, a longer directory, a section more.
+#[test]
+fn every_byte_from_the_first_displacement_field_on() {
+    let (_folder, path, scene) = written_with_fields();
+    let owners = flip(&path, &scene, scene.resident.displacement[0].span.offset as usize);
+    for part in [
+        Part::Payload(Payload::Displacement(0)),
+        Part::Payload(Payload::Displacement(2)),
+        Part::PaddingAfterPayload(Payload::Displacement(2)),
+        Part::Directory,
+        Part::PaddingAfterSection(Section::Occupancy),
+    ] {
+        assert!(owners.contains(&part), "{part} is not covered");
+    }
+    assert_eq!(owners.last(), Some(&Part::Section(Section::Displacement)));
+}
+
 #[test]
 fn every_value_of_every_byte_of_header_fields_and_directory() {
-    let (_folder, path, _) = written();
-    let image = Image::read(&path);
+    for (_folder, path, _) in [written(), written_with_fields()] {
+        every_value(&path);
+    }
+}
+
+fn every_value(path: &Path) {
+    let image = Image::read(path);
     let directory = image.header().directory_offset as usize;
-    let file = File::options().write(true).open(&path).unwrap();
-    for at in (0..64).chain(directory..directory + DIRECTORY_BYTES as usize) {
+    let end = directory + image.header().directory_bytes as usize;
+    let file = File::options().write(true).open(path).unwrap();
+    for at in (0..64).chain(directory..end) {
         for flip in 1..=255 {
             write_at(&file, &[image.bytes[at] ^ flip], at);
-            let part = SceneFile::open_with(&path, Access::Read).unwrap_err().part();
+            let part = SceneFile::open_with(path, Access::Read).unwrap_err().part();
             assert_eq!(part, Some(if at < directory { Part::Header } else { Part::Directory }), "byte {at}");
         }
         write_at(&file, &image.bytes[at..=at], at);
     }
-    assert_eq!(common::problems(&path), "");
+    assert_eq!(common::problems(path), "");
 }
 
 #[test]
@@ -154,17 +182,22 @@ fn a_damaged_brick_does_not_hinder_others() {
 
 #[test]
 fn truncated_or_extended() {
-    let (_folder, path, _) = written();
-    let image = Image::read(&path);
+    for (_folder, path, _) in [written(), written_with_fields()] {
+        cut_anywhere(&path);
+    }
+}
+
+fn cut_anywhere(path: &Path) {
+    let image = Image::read(path);
     let length = image.bytes.len();
     let near = [1, 7, 8, 11, 12, 55, 56, 57, 4095, 4096, 4097, length - 1];
     let lengths = near.into_iter().chain((0..length).step_by(509)).chain([length + 1, length + 4096]);
     for cut in lengths {
         let mut bytes = image.bytes.clone();
         bytes.resize(cut, 0);
-        fs::write(&path, &bytes).unwrap();
+        fs::write(path, &bytes).unwrap();
         for access in [Access::Map, Access::Read] {
-            match SceneFile::open_with(&path, access).unwrap_err() {
+            match SceneFile::open_with(path, access).unwrap_err() {
                 Error::Length { found, expected, .. } => {
                     assert_eq!(found, cut as u64);
                     assert_eq!(expected, if cut < 4096 { 4096 } else { length as u64 });
@@ -173,10 +206,10 @@ fn truncated_or_extended() {
                 error => panic!("{cut} bytes: {error}"),
             }
         }
-        assert_eq!(verify_file(&path, &mut |_, _| {}).unwrap().problems.len(), 1);
+        assert_eq!(verify_file(path, &mut |_, _| {}).unwrap().problems.len(), 1);
     }
-    fs::write(&path, &image.bytes).unwrap();
-    assert_eq!(common::problems(&path), "");
+    fs::write(path, &image.bytes).unwrap();
+    assert_eq!(common::problems(path), "");
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Reads everything in a scene file of any bytes. The fuzz target and the tests share it.
 
-use bricks::layout::{DIRECTORY_BYTES, DirectoryEntry, Header, PAGE_BYTES};
+use bricks::layout::{DirectoryEntry, ENTRY_BYTES, Header, MAX_DIRECTORY_BYTES, MIN_DIRECTORY_BYTES, PAGE_BYTES};
 use bricks::{
-    BRICK_INDEX32, Brick, GeometryLayout, MAX_BRICK_HEIGHT, Node, OCCUPANCY_LEVELS, OccupancyMap, OpacityMap, Payload,
-    Resident, SceneFile, Section, Span, Texture, validate,
+    BRICK_INDEX32, Brick, DISPLACEMENT_HITS, DisplacementField, GeometryLayout, MAX_BRICK_HEIGHT, Node,
+    OCCUPANCY_LEVELS, OccupancyMap, OpacityMap, Payload, Resident, SceneFile, Section, Span, Texture, pack, validate,
 };
 use bytemuck::Pod;
 use std::ops::Range;
@@ -28,8 +28,9 @@ pub fn exercise(bytes: &[u8]) -> (bool, usize) {
     for (payload, span) in file.resident().payloads() {
         assert!(span.bytes <= bytes.len() as u64, "a payload longer than the file");
         // A triangle has at least 10 bytes of geometry and, when decoded, at most 106 of attributes, or 16 and 112.
+        let most = if let Payload::Displacement(_) = payload { pack::MAX_RATIO } else { 11 };
         let length = file.loaded_bytes(payload);
-        assert!(length <= 11 * bytes.len() as u64, "{payload}: {length} bytes out of {}", bytes.len());
+        assert!(length <= most * bytes.len() as u64, "{payload}: {length} bytes out of {}", bytes.len());
         let mut out = vec![0; length as usize];
         if file.copy(payload, &mut out).is_ok() {
             copied += 1;
@@ -44,11 +45,23 @@ pub fn exercise(bytes: &[u8]) -> (bool, usize) {
     (true, copied)
 }
 
-/// Follows every index of a geometry payload without any check, as a kernel does, and unpacks proxies.
+/// Follows every index of a geometry payload without any check, as a kernel does, unpacks proxies, and looks up samples
+/// of a displacement field.
 pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
     if let Payload::Proxies(_) = payload {
         let map = OccupancyMap::unpack(bytes).expect("what was copied is a map");
         assert!(map.is_occupied(OCCUPANCY_LEVELS - 1, [0; 3]), "some cell is occupied");
+    }
+    if let Payload::Displacement(index) = payload {
+        let field = &resident.displacement[index as usize];
+        assert!(field.object < resident.objects.len() as u32);
+        assert!(field.of_brick().is_none_or(|brick| resident.bricks[brick as usize].object == field.object));
+        let last = field.positions() * u64::from(field.directions).pow(2) - 1;
+        let (byte, end) = match field.bits {
+            DISPLACEMENT_HITS => (last / 8, u32::from(bytes[last as usize / 8]) >> (last % 8 + 1)),
+            _ => (last, 0),
+        };
+        assert!(end == 0 && bytes[byte as usize + 1..].iter().all(|&byte| byte == 0), "nothing behind the samples");
     }
     let Payload::Geometry(index) = payload else { return };
     let brick = &resident.bricks[index as usize];
@@ -93,7 +106,8 @@ pub fn seal(bytes: &mut [u8]) {
         return;
     }
     let directory = header.directory_offset;
-    for (index, section) in (0u64..).zip(Section::ALL) {
+    let directory_bytes = header.directory_bytes.clamp(MIN_DIRECTORY_BYTES, MAX_DIRECTORY_BYTES);
+    for (index, section) in (0..directory_bytes / ENTRY_BYTES).zip(Section::ALL) {
         let at = directory.saturating_add(index * size_of::<DirectoryEntry>() as u64);
         let Some(mut entry) = read::<DirectoryEntry>(bytes, at) else { return };
         match section {
@@ -105,6 +119,7 @@ pub fn seal(bytes: &mut [u8]) {
             Section::OpacityMaps => records::<OpacityMap>(bytes, &entry, |map| vec![&mut map.texels]),
             Section::Textures => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.tail]),
             Section::Tiles => records::<Span>(bytes, &entry, |span| vec![span]),
+            Section::Displacement => records::<DisplacementField>(bytes, &entry, |field| vec![&mut field.span]),
             _ => {}
         }
         if let Some(section) = range(bytes, entry.offset, entry.bytes) {
@@ -112,7 +127,7 @@ pub fn seal(bytes: &mut [u8]) {
             write(bytes, at, &entry);
         }
     }
-    if let Some(directory) = range(bytes, directory, DIRECTORY_BYTES) {
+    if let Some(directory) = range(bytes, directory, directory_bytes) {
         header.directory_checksum = xxh3_64(&bytes[directory]);
     }
     header.file_bytes = bytes.len() as u64;

@@ -125,6 +125,7 @@ fn structs() -> BTreeMap<String, Table> {
         }),
         table!(OpacityMap { width, height, wrap, _reserved, texels }),
         table!(OpacityTriangle { uv, material, alphas }),
+        table!(DisplacementField { object, brick, rings, directions, bits, executor, center, radius, mean, span }),
         table!(Texture { width, height, levels, wrap, encoding, flags, first_tile, tile_count, tail }),
         table!(Node { origin, exponent, inner_mask, child_base, triangle_base, meta, lo, hi }),
         table!(Occupancy { cell_log2, _reserved, origin, bits }),
@@ -167,6 +168,7 @@ fn sections_are_those_of_the_page() {
         assert_eq!(row[1], section.kind().to_string());
         assert_eq!(row[2], section.record_bytes().to_string());
         assert_eq!(Section::ALL[section.index()], section);
+        assert_eq!(row[3].starts_with("optional: "), section.is_optional());
     }
 }
 
@@ -179,12 +181,22 @@ fn numbers_are_those_of_the_page() {
         format!("`{}`", magic.join(" ")),
         format!("| `version` | 8 | 4 | {VERSION} |"),
         format!("| `page_bytes` | 12 | 4 | {PAGE_BYTES} |"),
-        format!("| `directory_bytes` | 32 | 8 | {DIRECTORY_BYTES} |"),
-        format!("{PAGE_BYTES}\nbytes for payloads and the directory, {SECTION_ALIGN} for sections"),
         format!(
-            "{KIND_VISIBILITY_FIELDS} visibility fields, {KIND_DISPLACEMENT_FIELDS} displacement fields, \
-             {KIND_LEVELS_OF_DETAIL} levels of detail"
+            "| `directory_bytes` | 32 | 8 | {MIN_DIRECTORY_BYTES}, or {MAX_DIRECTORY_BYTES} with displacement fields |"
         ),
+        format!(
+            "{} entries, or {} with displacement fields",
+            MIN_DIRECTORY_BYTES / ENTRY_BYTES,
+            MAX_DIRECTORY_BYTES / ENTRY_BYTES
+        ),
+        format!("{PAGE_BYTES}\nbytes for payloads and the directory, {SECTION_ALIGN} for sections"),
+        format!("{KIND_VISIBILITY_FIELDS} visibility fields, {KIND_LEVELS_OF_DETAIL} levels of detail"),
+        format!("m, of a hemisphere, 1 to {MAX_DISPLACEMENT_RINGS} |"),
+        format!("square of directions, {MIN_DISPLACEMENT_DIRECTIONS} to {MAX_DISPLACEMENT_DIRECTIONS} |"),
+        format!("{DISPLACEMENT_DISTANCES} distances, {DISPLACEMENT_HITS} hits |"),
+        format!("{DISPLACEMENT_BY_CPU} traced on the processor, {DISPLACEMENT_BY_GPU} on a GPU |"),
+        format!("{DISPLACEMENT_MISS} if it hits nothing"),
+        format!("at least a {}th of their unpacked", pack::MAX_RATIO),
         format!("1 to {MAX_TEXTURE_SIZE} texels"),
         format!("at most {MAX_TOP_EXPONENT} |"),
         format!("levels of nodes, 1 to {MAX_BRICK_HEIGHT} |"),
@@ -225,5 +237,11 @@ fn payloads_are_those_of_the_page() {
     assert_eq!((TILE_TEXELS, BLOCK_TEXELS), (128, 4));
     assert_eq!((TEXTURE_RGBA8, TEXTURE_BC7, TEXTURE_BC5, TEXTURE_SRGB), (0, 1, 2, 1));
     assert_eq!((BASE_COLOR, NORMAL, METALLIC_ROUGHNESS, OCCLUSION, EMISSIVE), (0, 1, 2, 3, 4));
+    let (rings, directions) = (5, 7);
+    for (bits, bytes) in [(DISPLACEMENT_DISTANCES, 122 * 49), (DISPLACEMENT_HITS, (122 * 49u64).div_ceil(8))] {
+        let field = DisplacementField { rings, directions, bits, ..bytemuck::Zeroable::zeroed() };
+        assert_eq!(field.positions(), 2 * (2 * 25 + 2 * 5 + 1));
+        assert_eq!(field.loaded_bytes(), pad(bytes));
+    }
     assert_eq!((LIGHT_POINT, LIGHT_SPOT, LIGHT_DISTANT, BRICK_DETAIL), (0, 1, 2, 8));
 }

@@ -1,19 +1,28 @@
 //! The format does not change by accident: today's writer makes the very bytes of the committed file, and today's
 //! reader reads them. `BRICKS_REGENERATE_GOLDEN=1` writes the file anew; do so only with a new format version.
 
-use crate::common;
+use crate::common::{Scene, written, written_with_fields};
 use bricks::{SceneFile, verify_file};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 #[test]
 fn golden_file_of_version_4() {
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/version-4.bricks");
-    let (_folder, path, scene) = common::written();
+    is_golden("version-4.bricks", written());
+}
+
+#[test]
+fn golden_file_with_displacement_fields() {
+    is_golden("version-4-displacement.bricks", written_with_fields());
+}
+
+fn is_golden(name: &str, (_folder, path, scene): (TempDir, PathBuf, Scene)) {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
     if std::env::var_os("BRICKS_REGENERATE_GOLDEN").is_some() {
         std::fs::copy(&path, &golden).unwrap();
     }
     let bytes = std::fs::read(&golden).unwrap();
-    assert!(bytes.len() < 96 << 10);
+    assert!(bytes.len() < 112 << 10);
     assert!(bytes == std::fs::read(&path).unwrap(), "the writer's bytes are not those of {}", golden.display());
 
     let file = SceneFile::open(&golden).unwrap();

@@ -3,6 +3,7 @@
 mod access;
 mod common;
 mod corruption;
+mod displacement;
 mod exercise;
 mod format;
 mod golden;

@@ -413,7 +413,9 @@ fn headers() {
     file_refused("pages of 4096 bytes", |image| image.edit_header(|h| h.page_bytes = 8192));
     file_refused("too long", |image| image.edit_header(|h| h.file_bytes -= 1));
     file_refused("too short", |image| image.edit_header(|h| h.file_bytes = u64::MAX));
-    file_refused("a directory of", |image| image.edit_header(|h| h.directory_bytes += 40));
+    for bytes in [0, 480, 519, 521, 540, 600, u64::MAX] {
+        file_refused("a directory of 520 to 560 bytes", |image| image.edit_header(|h| h.directory_bytes = bytes));
+    }
     for offset in [0, 4097, 1 << 40, u64::MAX - 4095] {
         file_refused("the header is not valid", |image| image.edit_header(|h| h.directory_offset = offset));
     }

@@ -1,6 +1,6 @@
 //! Whatever the bytes of a file, reading it ends in an error or in data that obeys the format; never in a panic.
 
-use crate::common::{Image, written};
+use crate::common::{Image, written, written_with_fields};
 use crate::exercise::{exercise, seal, traverse};
 use bricks::*;
 use proptest::prelude::*;
@@ -33,6 +33,12 @@ fn whole() -> &'static [u8] {
     BYTES.get_or_init(|| std::fs::read(written().1).unwrap_or_default())
 }
 
+/// Those of the small scene with displacement fields, which has a section more.
+fn whole_with_fields() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| std::fs::read(written_with_fields().1).unwrap_or_default())
+}
+
 /// Reads the bytes from memory and from a file: with the same result.
 fn read_bytes(bytes: &[u8]) -> (bool, usize) {
     let (opened, copied) = exercise(bytes);
@@ -61,8 +67,11 @@ proptest! {
     }
 
     #[test]
-    fn damage(edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20)) {
-        let mut bytes = whole().to_vec();
+    fn damage(
+        fields in any::<bool>(),
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
+    ) {
+        let mut bytes = if fields { whole_with_fields() } else { whole() }.to_vec();
         for (at, value) in edits {
             *at.get_mut(&mut bytes) = value;
         }
@@ -70,16 +79,16 @@ proptest! {
     }
 
     #[test]
-    fn header_with_right_checksum(at in 2usize..12, value in word()) {
-        let mut image = Image { bytes: whole().to_vec() };
+    fn header_with_right_checksum(fields in any::<bool>(), at in 2usize..12, value in word()) {
+        let mut image = Image { bytes: if fields { whole_with_fields() } else { whole() }.to_vec() };
         image.bytes[at * 4..at * 4 + 4].copy_from_slice(&value.to_le_bytes());
         image.edit_header(|_| {});
         read_bytes(&image.bytes);
     }
 
     #[test]
-    fn directory_with_right_checksum(section in 0usize..9, at in 0usize..10, value in word()) {
-        let mut image = Image { bytes: whole().to_vec() };
+    fn directory_with_right_checksum(section in 0..Section::ALL.len(), at in 0usize..10, value in word()) {
+        let mut image = Image { bytes: whole_with_fields().to_vec() };
         image.edit_entry(Section::ALL[section], |entry| {
             let bytes = bytemuck::bytes_of_mut(entry);
             bytes[at * 4..at * 4 + 4].copy_from_slice(&value.to_le_bytes());
@@ -89,10 +98,10 @@ proptest! {
 
     #[test]
     fn records_with_right_checksums(
-        section in 1usize..9,
+        section in 1..Section::ALL.len(),
         edits in prop::collection::vec((any::<prop::sample::Index>(), word(), any::<bool>()), 1..3),
     ) {
-        let mut image = Image { bytes: whole().to_vec() };
+        let mut image = Image { bytes: whole_with_fields().to_vec() };
         let bytes = image.section(Section::ALL[section]);
         for (at, value, byte) in edits {
             if byte {
@@ -108,15 +117,16 @@ proptest! {
 
     #[test]
     fn payloads_with_right_checksums(
-        payload in 0usize..10,
+        payload in 0usize..12,
         edits in prop::collection::vec((any::<prop::sample::Index>(), word(), any::<bool>()), 1..3),
     ) {
         let payloads = [
             Payload::Geometry(0), Payload::Geometry(1), Payload::Geometry(2), Payload::Attributes(0),
             Payload::Attributes(1), Payload::Attributes(2), Payload::Texture(0),
-            Payload::Texture(1), Payload::Tile(1), Payload::Opacity(0),
+            Payload::Texture(1), Payload::Tile(1), Payload::Opacity(0), Payload::Displacement(1),
+            Payload::Displacement(2),
         ];
-        let mut image = Image { bytes: whole().to_vec() };
+        let mut image = Image { bytes: whole_with_fields().to_vec() };
         image.edit_payload(payloads[payload], |bytes| {
             for (at, value, byte) in edits {
                 if byte {
@@ -137,13 +147,14 @@ proptest! {
     /// Words anywhere, bytes cut out, repeated and inserted, and all checksums made right: what the fuzz target tries.
     #[test]
     fn any_change_with_right_checksums(
+        fields in any::<bool>(),
         words in prop::collection::vec((any::<prop::sample::Index>(), word()), 0..4),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
         moved in prop::option::weighted(
             0.3, (any::<prop::sample::Index>(), any::<prop::sample::Index>(), 0usize..4096)
         ),
     ) {
-        let mut bytes = whole().to_vec();
+        let mut bytes = if fields { whole_with_fields() } else { whole() }.to_vec();
         for (at, value) in words {
             let at = at.index(bytes.len() / 4) * 4;
             bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -164,8 +175,11 @@ proptest! {
 
     /// Words in the resident part, which is smaller than the payloads and decides more.
     #[test]
-    fn any_record_with_right_checksums(words in prop::collection::vec((any::<prop::sample::Index>(), word()), 1..4)) {
-        let mut bytes = whole().to_vec();
+    fn any_record_with_right_checksums(
+        fields in any::<bool>(),
+        words in prop::collection::vec((any::<prop::sample::Index>(), word()), 1..4),
+    ) {
+        let mut bytes = if fields { whole_with_fields() } else { whole() }.to_vec();
         let resident = Image { bytes: bytes.clone() }.header().directory_offset as usize / 4;
         for (at, value) in words {
             let at = (resident + at.index(bytes.len() / 4 - resident)) * 4;
@@ -176,13 +190,43 @@ proptest! {
     }
 }
 
+/// Words in the records of displacement fields, which are few, and in their payloads.
+#[test]
+fn any_word_of_displacement_fields() {
+    let values = [0, 1, 2, 8, 64, 65, 255, 256, 1 << 31, u32::MAX - 1, u32::MAX];
+    let whole = whole_with_fields();
+    let image = Image { bytes: whole.to_vec() };
+    let section = image.entry(Section::Displacement);
+    let file = SceneFile::from_bytes("whole", whole).unwrap();
+    let spans = file.resident().displacement.iter().map(|field| (field.span.offset, field.span.bytes));
+    let mut opened = 0;
+    for (offset, length) in spans.chain([(section.offset, section.bytes)]) {
+        for at in (offset..offset + length).step_by(4) {
+            for value in values {
+                let mut bytes = whole.to_vec();
+                bytes[at as usize..at as usize + 4].copy_from_slice(&value.to_le_bytes());
+                seal(&mut bytes);
+                opened += usize::from(exercise(&bytes).0);
+            }
+        }
+    }
+    assert!(opened > 100, "{opened} files are right but for the payload");
+}
+
 #[test]
 fn the_whole_scene_is_read() {
     assert_eq!(read_bytes(whole()), (true, 14));
+    assert_eq!(read_bytes(whole_with_fields()), (true, 17));
+    for whole in [whole(), whole_with_fields()] {
+        sealing_is_right(whole);
+    }
+}
+
+fn sealing_is_right(whole: &[u8]) {
     // Sealing a file that is right changes nothing; one with a wrong checksum is read again.
-    let mut sealed = whole().to_vec();
+    let mut sealed = whole.to_vec();
     seal(&mut sealed);
-    assert!(sealed == whole());
+    assert!(sealed == whole);
     sealed[100] ^= 1;
     sealed[8192] ^= 1;
     assert_eq!(exercise(&sealed), (false, 0));

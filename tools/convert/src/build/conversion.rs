@@ -273,6 +273,7 @@ impl Conversion<'_> {
             tiles: textures.tiles,
             lights: self.outline.lights.clone(),
             occupancy,
+            displacement: Vec::new(),
         };
         let dropped = Dropped::count(&resident, &cuts, &rounded_away);
         dropped.warn(&mut warnings);
