@@ -2,7 +2,9 @@
 
 use crate::ending::Temporary;
 use crate::error::{Error, Flaw, Part};
+use crate::file::SceneFile;
 use crate::layout::{DirectoryEntry, Header, MAGIC, MAX_PAYLOAD_BYTES, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
+use crate::payload::Payload;
 use crate::records::Span;
 use crate::resident::Resident;
 use crate::validate;
@@ -249,6 +251,29 @@ impl Partial {
         let mut writer = self.writer(0, Vec::new());
         emptied.map_err(|source| writer.write_error(source))?;
         writer.append(&[0; PAGE_BYTES as usize])?;
+        Ok(writer)
+    }
+
+    /// Starts with all payloads of `scene` but those of its displacement fields, which lie behind the others. They come
+    /// to lie where they lay, so the records of `scene` go on to be right; fields may follow. Checksums are compared in
+    /// the copies; `progress` is called with the length of each.
+    ///
+    /// # Errors
+    /// A payload of `scene` cannot be read or is damaged, or the file cannot be written.
+    pub fn start_from(self, scene: &SceneFile, progress: &mut dyn FnMut(u64)) -> Result<Writer, Error> {
+        let payloads = scene.resident().payloads();
+        let mut kept: Vec<_> = payloads.filter(|(payload, _)| !matches!(payload, Payload::Displacement(_))).collect();
+        kept.sort_unstable_by_key(|(_, span)| span.offset);
+        let mut writer = self.start()?;
+        let mut bytes = Vec::new();
+        for (payload, span) in kept {
+            bytes.resize(span.bytes as usize, 0);
+            scene.copy_stored(payload, &mut bytes)?;
+            // The payloads of an open file follow each other as those of a writer do.
+            let written = writer.write(&bytes)?;
+            debug_assert_eq!(written, span);
+            progress(span.bytes);
+        }
         Ok(writer)
     }
 

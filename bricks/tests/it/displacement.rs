@@ -1,7 +1,7 @@
 //! Displacement fields in files: written, read, refused when they break a rule, left out, put in the place of others.
 
-use crate::common::{self, Image, scene_with_fields, written, written_with_fields};
-use bricks::layout::{KIND_LEVELS_OF_DETAIL, KIND_VISIBILITY_FIELDS};
+use crate::common::{self, Image, Scene, scene_with_fields, written, written_with_fields};
+use bricks::layout::{KIND_LEVELS_OF_DETAIL, KIND_VISIBILITY_FIELDS, PAGE_BYTES};
 use bricks::*;
 use std::fs;
 use std::path::Path;
@@ -336,4 +336,107 @@ fn a_file_that_ends_in_a_field() {
     let report = file.verify(&mut |_, _| {}).unwrap();
     assert!(matches!(report.problems[..], [Error::Length { .. }]), "{:?}", report.problems);
     assert!(matches!(SceneFile::open(&path), Err(Error::Length { .. })));
+}
+
+/// Begins `path` anew from the scene in it, with these fields.
+fn baked(path: &Path, fields: &[(DisplacementField, Vec<u8>)]) -> (Resident, u64) {
+    let old = SceneFile::open(path).unwrap();
+    let mut copied = 0;
+    let mut writer = Writer::reserve(path).unwrap().start_from(&old, &mut |bytes| copied += bytes).unwrap();
+    let mut resident = old.resident().clone();
+    resident.displacement = fields
+        .iter()
+        .map(|(field, bytes)| DisplacementField { span: writer.write(&pack::pack(bytes)).unwrap(), ..*field })
+        .collect();
+    writer.finish(&resident).unwrap();
+    (resident, copied)
+}
+
+/// The fields of a scene with their samples.
+fn fields(scene: &Scene) -> Vec<(DisplacementField, Vec<u8>)> {
+    let samples = (0..).map(|index| scene.payloads[&Payload::Displacement(index)].clone());
+    scene.resident.displacement.iter().copied().zip(samples).collect()
+}
+
+#[test]
+fn fields_are_put_in_the_place_of_others() {
+    let (folder, path, plain) = written();
+    let without = fs::read(&path).unwrap();
+    let scene = scene_with_fields();
+    let payload_bytes: u64 = plain.resident.payloads().map(|(_, span)| span.bytes).sum();
+
+    let (resident, copied) = baked(&path, &fields(&scene));
+    assert_eq!(copied, payload_bytes);
+    let (_other, expected, _) = written_with_fields();
+    assert!(fs::read(&path).unwrap() == fs::read(expected).unwrap(), "as if written at once");
+    assert_eq!(*SceneFile::open(&path).unwrap().resident(), resident);
+
+    // Others in their place: those that were there are gone.
+    let mut other = fields(&scene).split_off(1);
+    other[0].1[..200].fill(77);
+    let (resident, copied) = baked(&path, &other);
+    assert_eq!((resident.displacement.len(), copied), (2, payload_bytes));
+    let file = SceneFile::open(&path).unwrap();
+    assert_eq!(common::problems(&path), "");
+    assert_eq!(file.displacement(0).unwrap(), other[0].1);
+    assert_eq!(file.displacement(1).unwrap(), other[1].1);
+    for (payload, expected) in &plain.payloads {
+        let mut out = vec![0; expected.len()];
+        file.copy(*payload, &mut out).unwrap();
+        assert_eq!(out, *expected, "{payload}");
+        assert_eq!(Some(file.span(*payload)), plain.resident.span(*payload));
+    }
+
+    // None: the file is what it was before there were any.
+    baked(&path, &[]);
+    assert!(fs::read(&path).unwrap() == without);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_scene_without_bricks_can_have_a_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.bricks");
+    common::empty().write(&path);
+    let mut field = fields(&scene_with_fields()).remove(1);
+    field.1[..200].fill(DISPLACEMENT_MISS);
+    baked(&path, &[field]);
+    assert_eq!(common::problems(&path), "");
+    let span = SceneFile::open(&path).unwrap().span(Payload::Displacement(0));
+    assert_eq!(span.offset, PAGE_BYTES);
+}
+
+#[test]
+fn damaged_payloads_are_not_copied() {
+    let (folder, path, scene) = written_with_fields();
+    let whole = fs::read(&path).unwrap();
+    let spoil = |payload: Payload| {
+        let mut bytes = whole.clone();
+        bytes[scene.resident.span(payload).unwrap().offset as usize] ^= 1;
+        fs::write(&path, &bytes).unwrap();
+        let old = SceneFile::open(&path).unwrap();
+        let writer = Writer::reserve(&path).unwrap().start_from(&old, &mut |_| {}).map(drop);
+        assert!(fs::read(&path).unwrap() == bytes, "the old file stays");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left behind");
+        writer
+    };
+    for payload in [Payload::Geometry(0), Payload::Attributes(2), Payload::Proxies(1), Payload::Tile(1)] {
+        let error = spoil(payload).unwrap_err();
+        assert!(matches!(error.cause(), Error::Corrupt { .. }), "{error}");
+        assert_eq!(error.part(), Some(Part::Payload(payload)));
+    }
+    // Fields are not copied, so damaged ones are no hindrance.
+    spoil(Payload::Displacement(0)).unwrap();
+}
+
+/// The resident part that is given decides: fields whose payloads were not written are refused.
+#[test]
+fn old_fields_do_not_go_on() {
+    let (_folder, path, _) = written_with_fields();
+    let old = SceneFile::open(&path).unwrap();
+    let writer = Writer::reserve(&path).unwrap().start_from(&old, &mut |_| {}).unwrap();
+    let error = writer.finish(old.resident()).unwrap_err();
+    assert!(error.to_string().contains("displacement field 0"), "{error}");
+    assert!(error.to_string().contains("a span that the writer returned"), "{error}");
+    assert_eq!(common::problems(&path), "");
 }
