@@ -4,17 +4,17 @@ use super::options::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
 use super::{cached, instances};
 use crate::cli::output::{print, print_json};
-use crate::settings::sizes::{human_bytes, human_count};
+use crate::settings::sizes::{counted, human_bytes, human_count};
 use crate::stream::PayloadSource;
 use crate::stream::Residency;
 use anyhow::{Context, Result};
 use bricks::{
-    BRICK_WIDE, Brick, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, NEAR_STEPS, ORIGIN_STEPS, PunctualLight,
-    Resident, SceneFile, Texture,
+    BRICK_WIDE, Brick, DisplacementField, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, NEAR_STEPS, ORIGIN_STEPS,
+    PunctualLight, Resident, SceneFile, Texture,
 };
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Raised when a field of the JSON changes its meaning.
@@ -93,6 +93,9 @@ struct Info<'a> {
     facts: Map<String, Value>,
     /// Lights without extent.
     lights: Vec<Light>,
+    /// Displacement fields, where there are some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    displacement: Option<Displacement>,
     left_out: Vec<LeftOut>,
     warnings: &'a [String],
     /// Bytes of the file by what they hold.
@@ -182,6 +185,7 @@ impl<'a> Info<'a> {
             scene,
             facts: facts.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
             lights: r.lights.iter().map(Light::of).collect(),
+            displacement: Displacement::of(&r.displacement),
             left_out: left_out(m),
             warnings: &m.warnings,
             per_triangle: PerTriangle::of(r, &sections, scene.file_bytes()),
@@ -272,6 +276,9 @@ impl<'a> Info<'a> {
         if let Some(more) = self.lights.len().checked_sub(MOST_LIGHTS).filter(|more| *more > 0) {
             row("light", format!("and {} more", human_count(more as u64)));
         }
+        for (name, value) in self.displacement.iter().flat_map(Displacement::human) {
+            row(name, value);
+        }
         for LeftOut { what, why } in &self.left_out {
             row("left out", format!("{what}: {why}"));
         }
@@ -331,6 +338,79 @@ impl Light {
             }
             _ => format!("{kind}, {color:?} cd at {position:?}{range}"),
         }
+    }
+}
+
+/// The displacement fields of a scene.
+#[derive(Debug, PartialEq, Serialize)]
+struct Displacement {
+    fields: u64,
+    /// Objects with a field of the whole of them.
+    objects: u64,
+    /// Bricks with a field of their own.
+    bricks: u64,
+    /// As they lie in the file.
+    bytes: u64,
+    /// As they are loaded.
+    loaded_bytes: u64,
+    /// How the fields are sampled, each way once.
+    sampled: Vec<Sampled>,
+}
+
+/// How displacement fields are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+struct Sampled {
+    rings: u32,
+    /// On the sphere.
+    positions: u64,
+    /// Of each position.
+    directions: u64,
+    /// Of a sample.
+    bits: u32,
+    /// Fields that are sampled so.
+    fields: u64,
+}
+
+impl Displacement {
+    /// Nothing of no fields.
+    fn of(records: &[DisplacementField]) -> Option<Self> {
+        let mut counts = BTreeMap::<_, u64>::new();
+        for field in records {
+            let directions = u64::from(field.directions) * u64::from(field.directions);
+            *counts.entry((field.rings, field.positions(), directions, field.bits)).or_default() += 1;
+        }
+        let sampled = counts.into_iter().map(|((rings, positions, directions, bits), fields)| Sampled {
+            rings,
+            positions,
+            directions,
+            bits,
+            fields,
+        });
+        let bricks = records.iter().filter_map(DisplacementField::of_brick).count() as u64;
+        let fields = records.len() as u64;
+        (fields > 0).then(|| Self {
+            fields,
+            objects: fields - bricks,
+            bricks,
+            bytes: records.iter().map(|field| field.span.bytes).sum(),
+            loaded_bytes: records.iter().map(DisplacementField::loaded_bytes).sum(),
+            sampled: sampled.collect(),
+        })
+    }
+
+    /// Rows for people.
+    fn human(&self) -> Vec<(&'static str, String)> {
+        let (objects, bricks) = (counted(self.objects, "object"), counted(self.bricks, "brick"));
+        let (loaded, stored) = (human_bytes(self.loaded_bytes), human_bytes(self.bytes));
+        let all = counted(self.fields, "field");
+        let mut rows =
+            vec![("displacement", format!("{all} of {objects} and {bricks}, {loaded} loaded, {stored} stored"))];
+        rows.extend(self.sampled.iter().map(|sampled| {
+            let Sampled { positions, directions, bits, fields, .. } = sampled;
+            let (fields, bits) = (counted(*fields, "field"), counted((*bits).into(), "bit"));
+            ("", format!("{fields} of {positions} positions x {directions} directions, {bits} a sample"))
+        }));
+        rows
     }
 }
 
@@ -420,6 +500,42 @@ mod tests {
         for part in ["triangle 12:", "a.gltf", "node right", "mesh mesh", "primitive 10", "triangle 2 of it"] {
             assert!(text.contains(part), "{text}");
         }
+    }
+
+    #[test]
+    fn displacement_fields_are_counted() {
+        let field = |brick, rings, directions, bits| DisplacementField {
+            brick,
+            rings,
+            directions,
+            bits,
+            span: bricks::Span { offset: 4096, bytes: 32, checksum: 0 },
+            ..bytemuck::Zeroable::zeroed()
+        };
+        assert_eq!(Displacement::of(&[]), None);
+        let fields = [field(3, 16, 4, 8), field(4, 16, 4, 8), field(bricks::NONE, 8, 4, 1)];
+        let found = Displacement::of(&fields).unwrap();
+        let sampled = |rings, positions, bits, fields| Sampled { rings, positions, directions: 16, bits, fields };
+        assert_eq!(
+            found,
+            Displacement {
+                fields: 3,
+                objects: 1,
+                bricks: 2,
+                bytes: 96,
+                loaded_bytes: 2 * 1090 * 16 + 592,
+                sampled: vec![sampled(8, 290, 1, 1), sampled(16, 1090, 8, 2)],
+            }
+        );
+        let rows: Vec<String> = found.human().into_iter().map(|(name, value)| format!("{name}: {value}")).collect();
+        assert_eq!(
+            rows,
+            [
+                "displacement: 3 fields of 1 object and 2 bricks, 34.6 KiB loaded, 96 B stored",
+                ": 1 field of 290 positions x 16 directions, 1 bit a sample",
+                ": 2 fields of 1090 positions x 16 directions, 8 bits a sample",
+            ]
+        );
     }
 
     #[test]

@@ -1,5 +1,9 @@
 //! What the integration tests share: the command as a user runs it, scenes made once, folders that vanish.
 
+use bricks::pack::pack;
+use bricks::{
+    DISPLACEMENT_BY_CPU, DISPLACEMENT_DISTANCES, DISPLACEMENT_HITS, DisplacementField, NONE, SceneFile, Span, Writer,
+};
 use brickwalk::Settings;
 use brickwalk::frame::{Equirectangular, Renderer, environment};
 use brickwalk::kernels::Lamps;
@@ -62,6 +66,33 @@ pub fn city(folder: &Path, triangles: &str, brick_triangles: &str) -> PathBuf {
     let words = ["scene", "city", "--triangles", triangles, "--brick-triangles", brick_triangles, "-o"];
     succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
     scene
+}
+
+/// Adds displacement fields of any samples to a scene: of the first brick of the world, and of the whole world.
+pub fn add_fields(path: &Path) {
+    let scene = SceneFile::open(path).expect("the scene");
+    let mut resident = scene.resident().clone();
+    let reserved = Writer::reserve(path).expect("a temporary file");
+    let mut writer = reserved.start_from(&scene, &mut |_| {}).expect("a copy of the payloads");
+    let field = |brick, rings, bits| DisplacementField {
+        object: 0,
+        brick,
+        rings,
+        directions: 4,
+        bits,
+        executor: DISPLACEMENT_BY_CPU,
+        center: [0.5; 3],
+        radius: 9.0,
+        mean: 0.25,
+        span: Span::default(),
+    };
+    for field in [field(0, 8, DISPLACEMENT_HITS), field(NONE, 16, DISPLACEMENT_DISTANCES)] {
+        let mut samples: Vec<u8> = (0..field.sample_bytes()).map(|at| (at * at / 7) as u8).collect();
+        samples.resize(field.loaded_bytes() as usize, 0);
+        let span = writer.write(&pack(&samples)).expect("room on the disk");
+        resident.displacement.push(DisplacementField { span, ..field });
+    }
+    writer.finish(&resident).expect("a scene with fields");
 }
 
 /// A source with every surface half of smooth metal, so that rays of `--effects glossy` leave all of them.

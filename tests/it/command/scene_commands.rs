@@ -1,7 +1,7 @@
 //! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that
 //! appear complete or not at all.
 
-use crate::common::{folder, names, succeed};
+use crate::common::{add_fields, folder, names, succeed};
 use brickwalk::reference::Truth;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -77,6 +77,22 @@ fn a_generated_scene_is_described_and_verified() {
     assert!(cost("triangles") > 0.0 && cost("cost") > cost("nodes"));
 
     let ids = info["triangle_ids"].as_u64().unwrap();
+    assert!(info.get("displacement").is_none() && info["sections"].get("displacement").is_none());
+    assert!(!done(folder, "info city.bricks").contains("displacement"));
+    let with_fields = folder.join("fields.bricks");
+    std::fs::copy(folder.join("city.bricks"), &with_fields).unwrap();
+    add_fields(&with_fields);
+    let fields: serde_json::Value = serde_json::from_str(&done(folder, "info fields.bricks --json")).unwrap();
+    let list = &fields["displacement"];
+    assert_eq!((&list["fields"], &list["objects"], &list["bricks"]), (&2.into(), &1.into(), &1.into()));
+    assert_eq!(list["loaded_bytes"], 592 + 1090 * 16);
+    assert_eq!(list["sampled"][1]["positions"], 1090);
+    assert_eq!(fields["sections"]["displacement"], list["bytes"]);
+    assert_eq!(sum(&fields["sections"]), fields["file_bytes"].as_u64().unwrap());
+    let text = done(folder, "info fields.bricks");
+    assert!(text.contains("2 fields of 1 object and 1 brick, 17.6 KiB loaded, "), "{text}");
+    assert!(text.contains("1 field of 1090 positions x 16 directions, 8 bits a sample"), "{text}");
+    assert!(done(folder, "verify fields.bricks").contains("OK"));
     let origin: serde_json::Value =
         serde_json::from_str(&done(folder, &format!("info city.bricks --json --id {}", ids - 1))).unwrap();
     assert_eq!(origin["id"], ids - 1);
