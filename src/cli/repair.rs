@@ -30,13 +30,17 @@ use xxhash_rust::xxh3::xxh3_64;
 ///
 /// # Errors
 /// More than bricks and textures is damaged, the inputs or options are not those of the conversion (nothing is changed
-/// then), or the file cannot be written.
+/// then), or the file cannot be written. Damaged displacement fields are an error after the rest is repaired.
 pub fn run(args: &RepairArgs) -> Result<()> {
     let name = args.scene.display();
     let scene = SceneFile::open(&args.scene)?;
     let progress = interrupt::job();
     let damaged = damaged_payloads(&verify::watched(&progress, |progress| scene.verify(progress))?)?;
+    // The conversion makes no fields.
+    let (fields, damaged): (BTreeSet<Payload>, BTreeSet<Payload>) =
+        damaged.into_iter().partition(|payload| matches!(payload, Payload::Displacement(_)));
     if damaged.is_empty() {
+        no_damaged_fields(&scene, &fields)?;
         return note(&format!("{name}: OK, nothing to repair\n"));
     }
     // Before the long work, so that a file that cannot be written is found at once.
@@ -60,7 +64,20 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     }
     file.sync_all().with_context(|| format!("{name}: cannot sync this file to the disk; repair it again"))?;
     let parts: Vec<String> = damaged.iter().map(Payload::to_string).collect();
-    note(&format!("{name}: repaired {} ({})\n", parts.join(", "), human_bytes(bytes)))
+    note(&format!("{name}: repaired {} ({})\n", parts.join(", "), human_bytes(bytes)))?;
+    no_damaged_fields(&scene, &fields)
+}
+
+/// Refuses damaged displacement fields, by name.
+fn no_damaged_fields(scene: &SceneFile, fields: &BTreeSet<Payload>) -> Result<()> {
+    let names: Vec<String> = fields.iter().map(Payload::to_string).collect();
+    ensure!(
+        fields.is_empty(),
+        "{}: damaged: {}; displacement fields cannot be repaired; bake them again with brickwalk bake-displacement",
+        scene.path().display(),
+        names.join(", ")
+    );
+    Ok(())
 }
 
 /// Reserves the repair of the scene for this process, by a file beside it that goes with the last process.
@@ -89,7 +106,7 @@ fn scratch_folder(asked: Option<&Path>, target: &Path) -> Result<TempDir> {
     tempfile::Builder::new().prefix(&name).rand_bytes(0).tempdir_in(folder).with_context(context)
 }
 
-/// The payloads with problems that writing them again solves: geometry, attributes, proxies, textures.
+/// The payloads with problems that writing them again solves: of bricks, textures, displacement fields.
 fn damaged_payloads(report: &VerifyReport) -> Result<BTreeSet<Payload>> {
     let payload = |problem: &Error| match (problem.cause(), problem.part()) {
         (

@@ -1,6 +1,6 @@
 //! Damaged scene files that are rebuilt from what they were converted from.
 
-use crate::common::{brickwalk, city, folder, names, succeed};
+use crate::common::{add_fields, brickwalk, city, folder, names, succeed};
 use bricks::{Payload, SceneFile};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -118,6 +118,35 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
     let (status, said) = repair(&scene, "--from DIR/g.obj");
     assert!(status == Some(1) && said.contains("convert again"), "{status:?} {said}");
     assert!(std::fs::read(&scene).expect("the scene") == bytes);
+}
+
+#[test]
+fn a_scene_with_displacement_fields_is_repaired_but_for_these() {
+    let folder = folder();
+    let scene = ground(folder.path());
+    add_fields(&scene);
+    let whole = std::fs::read(&scene).expect("the scene");
+    assert_ne!(damage(&scene, &DAMAGED), whole);
+    let (status, said) = repair(&scene, "--from DIR/g.obj");
+    assert_eq!(status, Some(0), "{said}");
+    assert!(std::fs::read(&scene).expect("the scene") == whole);
+
+    let remedy = "; bake them again with brickwalk bake-displacement\n";
+    let fields = [Payload::Displacement(1)];
+    let damaged = damage(&scene, &fields);
+    // Inputs are of no use, and not needed.
+    for options in ["", "--from DIR/g.obj"] {
+        let (status, said) = repair(&scene, options);
+        assert!(status == Some(1) && said.contains("damaged: displacement field 1;"), "{status:?} {said}");
+        assert!(said.ends_with(remedy) && said.lines().count() == 1, "{said}");
+        assert!(std::fs::read(&scene).expect("the scene") == damaged);
+    }
+
+    // What else is damaged is repaired all the same.
+    damage(&scene, &[Payload::Geometry(2)]);
+    let (status, said) = repair(&scene, "--from DIR/g.obj");
+    assert!(status == Some(1) && said.ends_with(remedy), "{status:?} {said}");
+    assert!(std::fs::read(&scene).expect("the scene") == damaged);
 }
 
 /// What a repair leaves that was killed, and one at the same time.
