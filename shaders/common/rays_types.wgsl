@@ -102,6 +102,7 @@ const COUNTER_RAYS_CAPPED: u32 = 19u;
 const COUNTER_UNRESOLVED: u32 = 20u;
 const COUNTER_RAYS_ANSWERED: u32 = 21u;
 const COUNTER_PILOTS: u32 = 22u;    // rays sifted and yet traced; then those wrongly free, wrongly met by HANDOVERS
+const COUNTER_RAYS_SHORTENED: u32 = 30u; // rays of which a part is answered and the rest traced
 const WORK_CHOSEN: u32 = 32u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 36u;      // the same over tiles whose rays walk from the root
 const MET: u32 = 0xfffffffeu;         // id of a hit that a method of secondary visibility gives, which is no triangle

@@ -1,6 +1,7 @@
 // Ray-aligned occupancy maps (Zeng et al., ROMA): bindings of group 2, cells of a column in words of 32 bits (depth t
 // at bit 31 - t % 32 of word t / 32), strata of directions. Twins: src/secondary/roma/bits.rs and directions.rs.
 
+#include "common/angles.wgsl"
 #include "occupancy/types.wgsl"
 #include "roma/types.wgsl"
 
@@ -13,8 +14,6 @@
 @group(2) @binding(2) var<storage, read> boms: array<u32>;
 // Of all maps, row by row, the words of a column together.
 @group(2) @binding(3) var<storage, read_write> columns: array<u32>;
-
-const TAN_8: f32 = 0.41421356; // tan(pi / 8)
 
 fn linear(row: vec4<f32>, v: vec3<f32>) -> f32 {
     return barrier(barrier(barrier(row.x * v.x) + barrier(row.y * v.y)) + barrier(row.z * v.z));
@@ -58,22 +57,6 @@ fn first_cell(first: u32, start: f32, end: f32, is_forward: bool) -> f32 {
         }
     }
     return -1.0;
-}
-
-// Arc tangent of 0 to 1, in units of pi / 4 (Moshier, Cephes, atanf).
-fn eighth_turns(x: f32) -> f32 {
-    let is_steep = x > TAN_8;
-    var y = x;
-    if is_steep {
-        y = divide(x - 1.0, x + 1.0);
-    }
-    let z = barrier(y * y);
-    var p = barrier(8.0537445e-2 * z) - 1.3877686e-1;
-    p = barrier(p * z) + 1.9977711e-1;
-    p = barrier(p * z) - 3.333295e-1;
-    let angle = barrier(barrier(p * barrier(z * y)) + y);
-    let turns = barrier(1.2732395 * angle);
-    return select(turns, 1.0 + turns, is_steep);
 }
 
 // Where in the unit square a direction of the upper hemisphere lies, |z| its height: the inverse of the concentric map

@@ -1,9 +1,10 @@
 //! `convert`: scenes of common formats into one `.bricks` file.
 
-use super::interrupt;
 use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
+use super::{bake_displacement, interrupt};
 use crate::cli::output::{Usage, note, one_line, warn};
 use crate::output::atomic;
+use crate::settings::Adapter;
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
@@ -39,6 +40,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let summary = if args.skip_bad { job.without_bad() } else { job.run() }?;
     job.progress.finish();
     summarise(&args.output, &summary, start, &mut note)?;
+    with_fields(&args.build, &args.output)?;
     match job.skipped.len() {
         0 => Ok(()),
         n => note(&format!("{}: {n} of {all} inputs skipped, which are bad\n", args.output.display())),
@@ -135,6 +137,18 @@ pub fn usage(built: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
         BuildError::Setting { .. } => Usage(error.to_string()).into(),
         error => error.into(),
     })
+}
+
+/// Gives a scene file that was just written displacement fields, if they are asked for.
+///
+/// # Errors
+/// As of [`bake_displacement::add`].
+pub fn with_fields(args: &BuildArgs, scene: &Path) -> Result<()> {
+    if !args.displacement {
+        return Ok(());
+    }
+    let memory = args.work.memory.unwrap_or(bake_displacement::MEMORY);
+    bake_displacement::add(scene, scene, &bake_displacement::MAKING, memory, &Adapter::Auto)
 }
 
 /// Says by `say` what a written scene holds, on standard error what its conversion warned of.

@@ -2,6 +2,7 @@
 //! line on standard error), 2 wrong usage.
 
 pub mod adapters;
+pub mod bake_displacement;
 #[cfg(feature = "lab")]
 pub mod bench;
 pub mod cached;
@@ -77,6 +78,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Repair(args) => repair::run(args),
+        Command::BakeDisplacement(args) => bake_displacement::run(args),
         Command::Walk(args) => walk::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Replay(args) => replay::run(args),

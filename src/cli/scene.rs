@@ -1,6 +1,6 @@
 //! `scene`: generated scenes, and camera paths through them.
 
-use super::convert::{build_settings, check_output, summarise, usage};
+use super::convert::{build_settings, check_output, summarise, usage, with_fields};
 use super::interrupt;
 use super::options::args::{BuildArgs, SceneArgs};
 use super::options::scene_kind::SceneKind;
@@ -34,7 +34,10 @@ pub fn run(args: &SceneArgs) -> Result<()> {
     })??;
     progress.finish();
     match summary {
-        Written::Bricks(summary) => summarise(&args.output, &summary, start, &mut note)?,
+        Written::Bricks(summary) => {
+            summarise(&args.output, &summary, start, &mut note)?;
+            with_fields(&args.build, &args.output)?;
+        }
         Written::Gltf { triangles } => note(&format!(
             "{}: {} with instances, {:.1} s\n",
             args.output.display(),
@@ -131,6 +134,7 @@ fn refuse_building(args: &BuildArgs) -> Result<()> {
         ("--resume", args.resume),
         ("--fast", args.work.fast),
         ("--no-proxies", args.no_proxies),
+        ("--displacement", args.displacement),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => Err(Usage(format!("{option}: only for .bricks files; leave it out for glTF")).into()),

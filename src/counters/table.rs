@@ -12,8 +12,11 @@ counters! {
     rays: u64 ["rays"] = |c| c.rays_traced + c.rays_answered;
     /// Rays that were traced through bricks, if only a part of their way.
     rays_traced: u64 ["rays"] sum from COUNTER_RAYS_TRACED;
-    /// Rays that a method answered without tracing them: occupancy maps, distance fields, a field of visibility.
+    /// Rays that a method answered without tracing them: occupancy maps, distance fields, a field of visibility,
+    /// displacement fields.
     rays_answered: u64 ["rays"] sum from COUNTER_RAYS_ANSWERED, only "with `--secondary`";
+    /// Of the rays traced, those that displacement fields answered from some distance on.
+    rays_shortened: u64 ["rays"] sum from COUNTER_RAYS_SHORTENED, only "with `--secondary displacement`";
     /// Cells of the field of visibility that were made anew for what moves.
     cells_renewed: u64 ["cells"] sum, only "in the pass `dvf`";
     /// Cells that primary hits lie in and that were not made anew although that would save rays: directions toward what

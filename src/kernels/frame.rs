@@ -187,7 +187,7 @@ impl Placed {
 
 /// Whether a matrix scales directions differently, by more than rounding: then the inverse transpose of a sum of
 /// normals is not along the sum of theirs.
-fn is_stretched(linear: &DMat3) -> bool {
+pub fn is_stretched(linear: &DMat3) -> bool {
     let squares = linear.transpose() * *linear;
     let size = (squares.x_axis.x + squares.y_axis.y + squares.z_axis.z) / 3.0;
     let off = (squares - DMat3::from_diagonal(DVec3::splat(size))).to_cols_array();

@@ -1,6 +1,7 @@
 //! Arithmetic that the rest builds on: the exact ray-triangle test, sampling patterns, encodings of directions.
 
 pub mod alias;
+pub mod angles;
 pub mod blue_noise;
 pub mod exact;
 pub mod octahedral;

@@ -17,6 +17,7 @@ mod demand;
 mod executor;
 #[cfg(feature = "lab")]
 pub mod fronts;
+pub mod listed;
 #[cfg(feature = "lab")]
 mod multi_query;
 pub mod optimisations;

@@ -20,7 +20,9 @@ names! {
         Df = "df",
         /// By fields of visibility, those to the environment.
         Dvf = "dvf",
-    } later &["displacement"]
+        /// By displacement fields, those that these can answer.
+        Displacement = "displacement",
+    }
 }
 
 /// How the secondary rays of each effect are answered. Read from a method, for the effects that it suits, or from
@@ -69,7 +71,7 @@ impl EffectMethods {
 
     /// Whether maps of what is occupied answer rays of some effect.
     pub fn has_maps(self) -> bool {
-        self.list().iter().any(|(_, method)| !matches!(method, Method::Exact | Method::Dvf))
+        self.list().iter().any(|(_, method)| !matches!(method, Method::Exact | Method::Dvf | Method::Displacement))
     }
 
     /// Effects and their methods.
@@ -91,7 +93,7 @@ impl EffectMethods {
 /// Whether a method can answer the rays of an effect.
 fn can_answer(method: Method, effect: &str) -> bool {
     match method.name() {
-        "exact" => true,
+        "exact" | "displacement" => true,
         "roma" => effect != "environment",
         "dvf" => effect == "environment",
         _ => matches!(effect, "ao" | "shadow"),
@@ -145,9 +147,17 @@ mod tests {
 
     #[test]
     fn choices_are_read_and_written_alike() {
-        for text in
-            ["exact", "roma", "auto", "df", "dvf", "ao=roma", "shadow=df", "ao=roma,shadow=auto,environment=dvf"]
-        {
+        for text in [
+            "exact",
+            "roma",
+            "auto",
+            "df",
+            "dvf",
+            "displacement",
+            "ao=roma",
+            "shadow=df",
+            "ao=roma,shadow=auto,environment=dvf",
+        ] {
             assert_eq!(text.parse::<EffectMethods>().unwrap().to_string(), text);
         }
         let read = |text: &str| text.parse::<EffectMethods>().unwrap();
@@ -171,12 +181,11 @@ mod tests {
     fn what_no_method_answers_is_refused() {
         for (text, says) in [
             ("glow=roma", "known: ao, diffuse, shadow, environment"),
-            ("ao=dvf", "dvf does not answer rays of ao; known: exact, roma, auto, df"),
-            ("environment=roma", "known: exact, dvf"),
-            ("diffuse=auto", "known: exact, roma"),
+            ("ao=dvf", "dvf does not answer rays of ao; known: exact, roma, auto, df, displacement"),
+            ("environment=roma", "known: exact, dvf, displacement"),
+            ("diffuse=auto", "known: exact, roma, displacement"),
             ("ao=luck", "known: exact"),
             ("ao=roma,df", "EFFECT=df"),
-            ("displacement", "not in this version"),
         ] {
             let error = text.parse::<EffectMethods>().unwrap_err();
             assert!(error.contains(says), "{text}: {error}");

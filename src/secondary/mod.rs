@@ -3,6 +3,7 @@
 mod choice;
 #[cfg(feature = "lab")]
 pub mod df;
+pub mod displacement;
 pub mod dvf;
 pub mod occupancy;
 pub mod roma;
@@ -16,6 +17,7 @@ pub use choice::{EffectMethods, Method};
 pub static FAMILIES: &[&Family] = &[
     #[cfg(feature = "lab")]
     &df::kernels::FAMILY,
+    &displacement::kernels::FAMILY,
     &dvf::kernels::FAMILY,
     &roma::kernels::FAMILY,
     &rsm::kernels::FAMILY,

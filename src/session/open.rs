@@ -147,7 +147,7 @@ impl Session {
         settings.check()?;
         let references = References::open(settings)?;
         let scene = open_scene(file)?;
-        check_occupancy(&scene, file, settings)?;
+        check_data(&scene, file, settings)?;
         // What a scene suits was not chosen.
         let without_effect = settings.without_effect();
         let settings = &settings.suited(&scene.resident().manifest);
@@ -337,12 +337,20 @@ impl Session {
 }
 
 /// Refuses a scene without what methods need.
-fn check_occupancy(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()> {
+fn check_data(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()> {
     let resident = scene.resident();
     let has_occupancy = resident.bricks.is_empty() || !resident.occupancy.is_empty();
     if settings.secondary.has_maps() && !has_occupancy {
         bail!(
             "{}: --secondary {} needs the occupancy of bricks; convert the scene again without --no-proxies",
+            file.display(),
+            settings.secondary
+        );
+    }
+    if settings.secondary.has(Method::Displacement) && resident.displacement.is_empty() && !resident.bricks.is_empty() {
+        bail!(
+            "{0}: --secondary {1} needs displacement fields, and the scene has none; make them with \
+             `brickwalk bake-displacement {0}`",
             file.display(),
             settings.secondary
         );

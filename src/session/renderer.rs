@@ -11,10 +11,12 @@ use crate::schedule::fronts::Fronts;
 use crate::secondary::Method;
 #[cfg(feature = "lab")]
 use crate::secondary::df::answer::Df;
+use crate::secondary::displacement::{Displacement, Library};
 use crate::secondary::roma::answer::Roma;
 use crate::session::Settings;
 use crate::settings::{Length, Schedule};
 use anyhow::Result;
+use bricks::Resident;
 use std::path::Path;
 
 /// The renderer of the scene that `opened` has, the file `path`.
@@ -34,6 +36,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
     if render.effects.has_bounces() {
         executor.allow_bounces();
     }
+    let methods = methods(settings, scene.resident());
     let engine = Engine {
         scene,
         executor,
@@ -49,11 +52,11 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         captures: None,
         moved: Moved::default(),
     };
-    Renderer { engine, methods: methods(settings) }
+    Renderer { engine, methods }
 }
 
-/// The methods that answer secondary rays; a field of visibility is made or read later.
-pub fn methods(settings: &Settings) -> Methods {
+/// The methods that answer secondary rays of a scene; a field of visibility is made or read later.
+pub fn methods(settings: &Settings, resident: &Resident) -> Methods {
     let mut methods = Methods::default();
     let (roma, chosen) = (&settings.roma, settings.secondary);
     if chosen.has(Method::Roma) || chosen.has(Method::Auto) {
@@ -62,6 +65,9 @@ pub fn methods(settings: &Settings) -> Methods {
     #[cfg(feature = "lab")]
     if chosen.has(Method::Df) {
         methods.set(Df::new(settings.df.clone(), chosen, roma.bom));
+    }
+    if chosen.has(Method::Displacement) {
+        methods.set(Displacement::new(settings.displacement.clone(), chosen, Library::of(resident)));
     }
     methods
 }

@@ -7,7 +7,7 @@ use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
 use crate::schedule::{Optimisation, Optimisations, PartOf};
 #[cfg(feature = "lab")]
 use crate::secondary::df;
-use crate::secondary::{EffectMethods, Method, dvf, roma, rsm};
+use crate::secondary::{EffectMethods, Method, displacement, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
     Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Length, Policy, Rectangle, Rule,
@@ -174,11 +174,12 @@ settings! {
         /// --fronts on: multi-queries, tighter-bounds, lazy-requery, pull-up. docs/methods/chc.md says what each does.
         without: Vec<Optimisation> = Vec::new(), "--without LIST", Rule::Any, "", Schedule, Expert;
 
-        /// How secondary rays are answered: exact, roma, auto, df, dvf, or by effect: ao=roma,environment=dvf. `exact`:
+        /// How secondary rays are answered: exact, roma, auto, df, dvf, displacement, or by effect: ao=roma. `exact`:
         /// all are traced. `roma`: those of `ao` and `diffuse` by occupancy maps, with a bias of a few cells and
         /// without a brick loaded. `auto`: those of `ao` that the maps find free are not traced. `df`: those of `ao` by
         /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
-        /// walk. Rays of `shadow` are traced unless asked: shadow=roma, auto or df.
+        /// walk. `displacement`: by what `bake-displacement` has put into the scene file, mostly rays against bricks that
+        /// are not resident. Rays of `shadow` are traced unless asked: shadow=roma.
         secondary: EffectMethods = EffectMethods::EXACT, "--secondary METHOD", Rule::Any, "", Methods, Common;
 
         /// Measure the error of frames after so many samples per pixel, as 1,4,16,64. `--reference` is what they are
@@ -214,6 +215,8 @@ settings! {
         df: df::Options,
         /// Fields of visibility.
         dvf: dvf::Options,
+        /// Displacement fields.
+        displacement: displacement::Options,
     }
 }
 
@@ -276,7 +279,7 @@ impl Settings {
         let maps = chosen.has(Method::Roma) || chosen.has(Method::Auto);
         let fields = chosen.list().iter().any(|(_, method)| method.name() == "df");
         let lit = self.environment.is_some();
-        let needs: [(&str, bool, &str); 22] = [
+        let needs: [(&str, bool, &str); 23] = [
             ("ao_rays", effects.ao, "--effects ao"),
             ("ao_length", effects.ao, "--effects ao"),
             ("diffuse_rays", effects.diffuse, "--effects diffuse"),
@@ -298,6 +301,7 @@ impl Settings {
             ("df.", fields, "--secondary df"),
             ("dvf.renew", chosen.has(Method::Dvf) && self.motion.is_some(), "--secondary dvf and --motion"),
             ("dvf.", chosen.has(Method::Dvf), "--secondary dvf"),
+            ("displacement.", chosen.has(Method::Displacement), "--secondary displacement"),
             ("fronts", matches!(self.schedule, Schedule::Chc | Schedule::Auto), "--schedule chc"),
         ];
         let idle = |entry: Entry| {

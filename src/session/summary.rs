@@ -63,6 +63,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "secondary": s.secondary.to_string(),
             "roma": reports.remove("roma"),
             "df": reports.remove("df"),
+            "displacement": reports.remove("displacement"),
             "dvf": field
                 .as_ref()
                 .and_then(Option::as_ref)

@@ -5,6 +5,7 @@ use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
 use super::scene_kind::{SceneKind, scene_help};
 use super::units::UNITS;
+use crate::cli::bake_displacement::Subjects;
 #[cfg(feature = "lab")]
 use crate::cli::bench::{BenchArgs, TestArgs};
 use crate::cli::output::{Usage, Verbosity};
@@ -47,6 +48,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Rebuild damaged bricks and textures of a .bricks file from its inputs
     Repair(RepairArgs),
+    /// Make displacement fields for --secondary displacement, into the scene file
+    BakeDisplacement(BakeDisplacementArgs),
     /// Render frames along a camera path, with records and a report
     Walk(Box<WalkArgs>),
     /// Find the closest hits of given rays
@@ -153,7 +156,6 @@ pub struct ConvertArgs {
     pub mesh: MeshArgs,
 }
 
-/// Reads how textures are stored.
 /// Reads `finest` or a whole number.
 fn lattice_step(text: &str) -> Result<LatticeStep, String> {
     let step = if text == "finest" { Some(LatticeStep::Finest) } else { text.parse().ok().map(LatticeStep::Log2) };
@@ -161,6 +163,7 @@ fn lattice_step(text: &str) -> Result<LatticeStep, String> {
         .ok_or_else(|| "give finest, or a whole number from -126 to 96".into())
 }
 
+/// Reads how textures are stored.
 fn textures() -> impl TypedValueParser<Value = TextureEncoding> {
     let [blocks, texels] =
         [("bc7", "Blocks"), ("raw", "Texels")].map(|(name, help)| PossibleValue::new(name).help(help));
@@ -198,6 +201,9 @@ pub struct BuildArgs {
     /// Write no occupancy maps; --secondary roma, auto and df need them
     #[arg(long)]
     pub no_proxies: bool,
+    /// Make displacement fields as well, as bake-displacement does without options
+    #[arg(long)]
+    pub displacement: bool,
     /// Continue an interrupted conversion with the same inputs and options
     #[arg(long, help_heading = "Conversion")]
     pub resume: bool,
@@ -275,7 +281,7 @@ impl SceneArgs {
     /// Those of a city of so many triangles, else the defaults.
     pub fn city(output: PathBuf, triangles: u64, seed: u64) -> Self {
         let work = WorkArgs { threads: None, lattice: None, memory: None, scratch: None, fast: false };
-        let build = BuildArgs { brick_triangles: None, no_proxies: false, resume: false, work };
+        let build = BuildArgs { brick_triangles: None, no_proxies: false, displacement: false, resume: false, work };
         let (kind, triangles) = (SceneKind::Generated(brickwalk_scenes::Kind::City), Some(triangles));
         Self { kind, case: None, output, triangles, seed, instanced: false, copies: 1, build }
     }
@@ -332,6 +338,47 @@ pub struct RepairArgs {
     /// What becomes of triangles and meshes.
     #[command(flatten)]
     pub mesh: MeshArgs,
+}
+
+/// Options of `bake-displacement`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct BakeDisplacementArgs {
+    /// The scene; it is written anew with its fields, those that it has are replaced. An interrupted run goes on where
+    /// it stopped
+    #[arg(value_name = "S.bricks")]
+    pub scene: PathBuf,
+    /// The file to write [default: the scene]
+    #[arg(short, long, value_name = "S.bricks")]
+    pub output: Option<PathBuf>,
+    /// What gets fields: objects that are placed more than once, bricks of the others, or all
+    #[arg(long, value_name = "WHAT", default_value = "all")]
+    pub of: Subjects,
+    /// Positions on the sphere of an object: 290, 1090, 4226 or 16642; fields of bricks have as many samples as fit into
+    /// an eighth of their geometry
+    #[arg(long, value_name = "N", default_value_t = 4226, value_parser = one_of::<290, 1090, 4226, 16642>)]
+    pub positions: u32,
+    /// Directions of a position of an object, on each axis of their square: 32, 64, 128 or 256
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = one_of::<32, 64, 128, 256>)]
+    pub directions: u32,
+    /// Bits of a sample: 8 (where a ray meets something) or 1 (whether it does)
+    #[arg(long, value_name = "BITS", default_value_t = 8, value_parser = one_of::<1, 1, 8, 8>)]
+    pub bits: u32,
+    /// Memory limit [default: 1 GiB]
+    #[arg(long, value_name = "SIZE", value_parser = size_bytes)]
+    pub memory: Option<u64>,
+    /// What traces: auto (a hardware GPU if there is one, else the processor), cpu, or the graphics adapter whose name
+    /// contains NAME
+    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
+    pub adapter: Adapter,
+}
+
+/// Reads one of four numbers.
+fn one_of<const A: u32, const B: u32, const C: u32, const D: u32>(text: &str) -> Result<u32, String> {
+    let mut all = vec![A, B, C, D];
+    all.dedup();
+    let known = all.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+    text.parse().ok().filter(|number| all.contains(number)).ok_or_else(|| format!("it must be one of {known}"))
 }
 
 /// Options of `walk`.

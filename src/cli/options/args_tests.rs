@@ -134,7 +134,6 @@ fn wrong_values_are_usage_errors_that_say_what_is_right() {
         ("--schedule fastest", "known: chc, demand, plain, plain-bvh2, auto"),
         ("--effects glitter", "no 'glitter'"),
         ("--effects=", "known: primary, shadow"),
-        ("--secondary displacement", "displacement is not in this version; it has: exact, roma, auto, df, dvf"),
         ("--dvf-cells 0", "it must be from 1 to 512, or auto"),
         ("--dvf-octahedral 12", "it must be one of 8, 16, 32"),
         ("--roma-k 5", "one of 4, 8"),

@@ -7,6 +7,7 @@
 
 pub mod args;
 pub mod chc;
+pub mod displacement;
 pub mod dvf;
 pub mod executors;
 pub(super) mod results;

@@ -360,7 +360,8 @@ fn render(
     };
     let mut usual = Settings { secondary: EffectMethods::every(variant.method), ..Settings::exact() };
     (usual.roma.size, usual.rsm.size, usual.df.size) = (32, 64, 32);
-    let mut renderer = Renderer { engine, methods: methods(&usual) };
+    let methods = methods(&usual, engine.scene.resident());
+    let mut renderer = Renderer { engine, methods };
     if let Some(settings) = variant.roma.map(roma) {
         renderer.methods.set(Roma::new(settings, Source::default()));
     }

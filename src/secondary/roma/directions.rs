@@ -5,24 +5,9 @@
 //! stratum of a direction follows from the inverse of the map; that part is the twin of `shaders/roma/roma.wgsl`,
 //! rounded operation by operation.
 
+use crate::math::angles::eighth_turns;
 use crate::math::exact::{divide, square_root};
 use crate::math::sampling::{random4, uniform_hemisphere};
-
-/// tan(π / 8).
-const TAN_8: f32 = 0.414_213_56;
-
-/// Arc tangent of 0 to 1, in units of π / 4, within 2⁻²² (Moshier, Cephes, `atanf`).
-fn eighth_turns(x: f32) -> f32 {
-    let is_steep = x > TAN_8;
-    let y = if is_steep { divide(x - 1.0, x + 1.0) } else { x };
-    let z = y * y;
-    let mut p = 8.053_744_5e-2 * z - 1.387_768_6e-1;
-    p = p * z + 1.997_771_1e-1;
-    p = p * z - 3.333_295e-1;
-    let angle = p * (z * y) + y;
-    let turns = 1.273_239_5 * angle;
-    if is_steep { 1.0 + turns } else { turns }
-}
 
 /// Where in the unit square a direction of the upper hemisphere lies, |z| its height: the inverse of the concentric map
 /// and of z = 1 - r². It needs no unit length.

@@ -89,7 +89,7 @@ impl<'a> View<'a> {
         renderer.settings = render_settings(&own, Schedule::Chc);
         let warm = renderer.methods.remove::<Roma>();
         // A distance field stays as long as the camera does: its making is measured.
-        renderer.methods = methods(&own);
+        renderer.methods = methods(&own, renderer.scene.resident());
         if let (Some(roma), Some(warm)) = (renderer.methods.get_mut::<Roma>(), warm) {
             roma.keep(warm, self.job.is_cold);
         }

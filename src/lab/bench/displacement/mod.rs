@@ -1,0 +1,3 @@
+//! `brickwalk bench displacement`.
+
+pub mod corner;
