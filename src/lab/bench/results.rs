@@ -145,5 +145,14 @@ pub fn plot(title: String, reading: &str, across: &'static str, unit: Unit, mut 
     for (_, points) in &mut lines {
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
-    Graph { title, reading: reading.into(), shape: GraphShape::Lines { across, unit, lines } }
+    Graph { title, reading: reading.into(), shape: GraphShape::Lines { across, unit, is_log: false, lines } }
+}
+
+/// [`plot`] with logarithmic axes.
+pub fn log_plot(title: String, reading: &str, across: &'static str, unit: Unit, lines: Vec<Line>) -> Graph {
+    let mut graph = plot(title, reading, across, unit, lines);
+    if let GraphShape::Lines { is_log, .. } = &mut graph.shape {
+        *is_log = true;
+    }
+    graph
 }

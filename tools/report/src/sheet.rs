@@ -197,6 +197,8 @@ pub enum GraphShape {
         across: &'static str,
         /// What runs upward.
         unit: Unit,
+        /// Whether both axes are logarithmic; points with a coordinate of 0 are then left out.
+        is_log: bool,
         /// Names and points, by ascending first coordinate, not negative.
         lines: Vec<Line>,
     },
@@ -242,7 +244,7 @@ fn section(section: &Section) -> Result<Markup, ReportError> {
 /// A drawn plot; `None` where there is nothing above zero.
 fn graph(graph: &Graph) -> Result<Option<Markup>, ReportError> {
     match &graph.shape {
-        GraphShape::Lines { across, unit, lines } => {
+        GraphShape::Lines { across, unit, is_log, lines } => {
             let series = |(k, (name, points)): (usize, &Line)| Series {
                 name: name.clone(),
                 points: points.clone(),
@@ -256,7 +258,7 @@ fn graph(graph: &Graph) -> Result<Option<Markup>, ReportError> {
             }
             let chart = Chart {
                 title: graph.title.clone(),
-                across: Across::Named(across),
+                across: if *is_log { Across::Log(across) } else { Across::Named(across) },
                 unit: *unit,
                 series,
                 marks: Vec::new(),
