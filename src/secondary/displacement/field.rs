@@ -60,9 +60,10 @@ pub struct FieldView<'a> {
     pub shape: Shape,
     /// Its positions.
     pub table: &'a [DisplacementPosition],
-    /// Four codes of 8 bits a word, or 32 bits, the first lowest.
+    /// Four codes of 8 bits a word, or 32 of one bit, the first lowest.
     pub codes: &'a [u32],
-    /// Bits of a sample, 8 or 1.
+    /// Bits of a sample, 8 or 1. On the processor also 32, which the kernel does not know: shares as f32, below 0 of a
+    /// ray that meets nothing, so that a bench can say what 8 bits lose.
     pub bits: u32,
     /// Of 1 bit: how far along the chord what is met lies.
     pub mean: f32,
@@ -70,8 +71,11 @@ pub struct FieldView<'a> {
 
 impl FieldView<'_> {
     /// Share of the chord at which a stored ray meets something; below 0: it meets nothing.
-    fn stored(&self, position: u32, square: u32) -> f32 {
+    pub fn stored(&self, position: u32, square: u32) -> f32 {
         let index = position * self.shape.squares() + square;
+        if self.bits == 32 {
+            return f32::from_bits(self.codes[index as usize]);
+        }
         if self.bits == 1 {
             let is_met = self.codes[(index >> 5) as usize] >> (index & 31) & 1 != 0;
             return if is_met { self.mean } else { -1.0 };
