@@ -5,9 +5,10 @@ use super::options::group_args::{GroupArgs, Of, View};
 use super::options::units::UNITS;
 use crate::cli::output::{Usage, print};
 use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
+use crate::lab::bench::displacement::args::DisplacementBenchArgs;
 use crate::lab::bench::dvf::args::DvfBenchArgs;
 use crate::lab::bench::roma::args::RomaBenchArgs;
-use crate::lab::bench::{chc, dvf, executors, roma};
+use crate::lab::bench::{chc, displacement, dvf, executors, roma};
 use crate::lab::console::Console;
 use crate::lab::selftest;
 use crate::lab::selftest::args::SelftestArgs;
@@ -39,6 +40,9 @@ enum Experiments {
     /// The experiments of the paper of discrete visibility fields: rays to the environment that are left to be traced,
     /// and errors
     Dvf(MeasuredScenes),
+    /// The experiments of the paper of displacement fields: errors of light in a corner, and times of a ray by the
+    /// triangles of the object
+    Displacement(Measured<DisplacementBenchArgs>),
 }
 
 /// The settings of an experiment, less those that are no options.
@@ -98,6 +102,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         Experiments::Dvf(MeasuredScenes { scenes, measured: Measured { output, options } }) => {
             let (scenes, output) = (Lines(scenes.clone()), output.clone());
             dvf::run(&DvfBenchArgs { scenes, output, ..options.over(None)? }, console)
+        }
+        Experiments::Displacement(Measured { output, options }) => {
+            displacement::run(&DisplacementBenchArgs { output: output.clone(), ..options.over(None)? }, console)
         }
     };
     done.map_err(in_words)

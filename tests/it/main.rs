@@ -84,6 +84,7 @@ mod secondary {
 /// Bench, selftest and switchable optimisations.
 mod lab {
     mod bench;
+    mod bench_displacement;
     mod bench_dvf;
     mod optimisations;
     mod selftest;

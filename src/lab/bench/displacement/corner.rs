@@ -1,14 +1,21 @@
-//! A model over a corner: three walls of 33 x 33 vertices, 256 rays each (figures 5 to 7 of the paper).
+//! A model over a corner: three walls of 33 x 33 vertices, 256 rays each (figures 4 to 8 of the paper).
+//!
+//! The paper does not say how large the corner is, nor how far from the model. Walls of [`SIDE`] radii, [`AWAY`] from
+//! the middle, with light that falls off over twice the radius ([`REACH`]) give its errors for its model.
 
 use crate::math::sampling::{cosine_hemisphere, hammersley, random2};
-use crate::secondary::displacement::{Ball, Chord, FieldView};
+use crate::secondary::displacement::{Ball, Chord};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Vertices of a wall on each axis.
 pub const VERTICES: u32 = 33;
-/// Rays of a vertex.
-pub const RAYS: u32 = 256;
+/// Edge of a wall, in radii of the model's sphere.
+pub const SIDE: f64 = 3.0;
+/// From the middle of the model's sphere to each wall, in radii.
+pub const AWAY: f64 = 1.0;
+/// Distance beyond which nothing is occluded, in radii.
+pub const REACH: f32 = 2.0;
 
 /// A ray of a vertex.
 #[derive(Clone, Copy, Debug)]
@@ -17,38 +24,42 @@ pub struct CornerRay {
     pub origin: DVec3,
     /// A unit vector.
     pub direction: DVec3,
+    /// Where it starts, from the middle of the model's sphere in radii.
+    pub start: Vec3,
+    /// `direction` in f32.
+    pub way: Vec3,
 }
 
-/// The rays of all vertices of a corner whose walls are `side` long and `away` from the middle of the model's sphere,
-/// both in radii of it: those of a vertex one after another, distributed by the cosine.
-pub fn rays(ball: &Ball, side: f64, away: f64) -> Vec<CornerRay> {
+/// The rays of all vertices of a corner, `rays` each: those of a vertex one after another, distributed by the cosine.
+pub fn rays(ball: &Ball, rays: u32) -> Vec<CornerRay> {
     let vertices = 3 * VERTICES * VERTICES;
     let of_vertex = |vertex: u32| {
         let (wall, at) = (vertex / (VERTICES * VERTICES), vertex % (VERTICES * VERTICES));
-        let along = |x: u32| side * f64::from(x) / f64::from(VERTICES - 1);
+        let along = |x: u32| SIDE * f64::from(x) / f64::from(VERTICES - 1);
         let place = [0.0, along(at % VERTICES), along(at / VERTICES)];
         let turned = |v: [f64; 3]| DVec3::from_array(std::array::from_fn(|k| v[(k + wall as usize) % 3]));
         let frame = DMat3::from_cols(turned([0.0, 1.0, 0.0]), turned([0.0, 0.0, 1.0]), turned([1.0, 0.0, 0.0]));
-        let origin = ball.center + ball.radius * (turned(place) - away);
+        let start = turned(place) - AWAY;
+        let origin = ball.center + ball.radius * start;
         let moved = random2(vertex, 0, 7);
-        (0..RAYS).map(move |ray| {
-            let point = hammersley(ray, RAYS);
+        (0..rays).map(move |ray| {
+            let point = hammersley(ray, rays);
             let square = std::array::from_fn(|k| (point[k] + moved[k]).fract());
             let local = cosine_hemisphere(square).map(f64::from);
-            CornerRay { origin, direction: (frame * DVec3::from_array(local)).normalize() }
+            let direction = (frame * DVec3::from_array(local)).normalize();
+            CornerRay { origin, direction, start: start.as_vec3(), way: direction.as_vec3() }
         })
     };
     (0..vertices).flat_map(of_vertex).collect()
 }
 
-/// Distances at which rays meet something by a field, in radii of its sphere, infinite where they meet nothing; `exact`
-/// are those of rays that it does not know.
-pub fn by_field(field: &FieldView, ball: &Ball, rays: &[CornerRay], exact: &[f32], look: u32) -> Vec<f32> {
+/// Distances at which rays meet something by a field, in radii of its sphere, infinite where they meet nothing: `share`
+/// says where along the chord, below 0 where it is free. `exact` are the distances of rays that a field does not know.
+pub fn by_field(share: impl Fn(&Chord) -> f32 + Sync, rays: &[CornerRay], exact: &[f32]) -> Vec<f32> {
     let one = |(ray, &exact): (&CornerRay, &f32)| {
-        let origin: Vec3 = ((ray.origin - ball.center) / ball.radius).as_vec3();
-        let chord = Chord::of(origin.to_array(), ray.direction.as_vec3().to_array());
+        let chord = Chord::of(ray.start.to_array(), ray.way.to_array());
         let Some(chord) = chord.filter(|chord| chord.at + chord.half > 0.0) else { return f32::INFINITY };
-        let share = field.share(&chord, look);
+        let share = share(&chord);
         if share < 0.0 {
             return f32::INFINITY;
         }
@@ -59,18 +70,19 @@ pub fn by_field(field: &FieldView, ball: &Ball, rays: &[CornerRay], exact: &[f32
     rays.par_iter().zip(exact).map(one).collect()
 }
 
-/// Grey levels of vertices, 0 to 255: the mean over their rays of the distance at which they meet something, of
-/// `reach` at most, as a share of that; without a reach of those that go free.
-pub fn levels(distances: &[f32], reach: f32) -> Vec<f64> {
-    let light = |&distance: &f32| {
-        if reach.is_finite() {
-            f64::from((distance / reach).min(1.0))
-        } else {
-            f64::from(u8::from(distance.is_infinite()))
-        }
-    };
-    let mean = |rays: &[f32]| rays.iter().map(light).sum::<f64>() / rays.len() as f64;
-    distances.chunks(RAYS as usize).map(|rays| 255.0 * mean(rays)).collect()
+/// The share of rays that go through the sphere.
+pub fn inside(rays: &[CornerRay]) -> f64 {
+    let chord = |ray: &&CornerRay| Chord::of(ray.start.to_array(), ray.way.to_array());
+    let is_in = |ray: &&CornerRay| chord(ray).is_some_and(|chord| chord.at + chord.half > 0.0);
+    rays.iter().filter(is_in).count() as f64 / rays.len().max(1) as f64
+}
+
+/// Grey levels of vertices, 0 to 255, each of so many rays: the mean of the distances at which they meet something, of
+/// [`REACH`] at most, as a share of that.
+pub fn levels(distances: &[f32], rays: u32) -> Vec<f64> {
+    let light = |&distance: &f32| f64::from((distance / REACH).min(1.0));
+    let mean = |own: &[f32]| own.iter().map(light).sum::<f64>() / own.len() as f64;
+    distances.chunks(rays as usize).map(|own| 255.0 * mean(own)).collect()
 }
 
 /// The root of the mean square of differences, and their mean.
@@ -83,102 +95,54 @@ pub fn rms(one: &[f64], other: &[f64]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::counters::Counters;
-    use crate::kernels::frame::Frame;
-    use crate::kernels::layout;
-    use crate::secondary::displacement::{Bench, Job, Shape, Subject, bake::bake, code_of};
-    use crate::session::Settings;
-    use crate::session::opened::{Opened, open_scene};
-    use crate::session::trace::{for_rays, trace_device};
-    use crate::settings::Adapter;
-    use brickwalk_convert::build::{BuildSettings, build_source};
-    use brickwalk_convert::import::{ImportSettings, import};
-    use brickwalk_convert::progress::Progress;
-    use std::path::PathBuf;
 
     #[test]
-    #[ignore]
-    fn experiment() {
-        let scenes = PathBuf::from(std::env::var("BRICKWALK_SCENES").unwrap());
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("bunny.bricks");
-        let progress = Progress::hidden();
-        let source = import(&[scenes.join("scans/bunny.ply").into()], &ImportSettings::default(), &progress).unwrap();
-        build_source(&source, &BuildSettings::default(), &file, &progress).unwrap();
-        let settings = for_rays(&Settings { adapter: Adapter::Cpu, ..Settings::exact() });
-        let scene = open_scene(&file).unwrap();
-        let mut opened = Opened::open(scene.clone(), &file, &settings).unwrap();
-        let subject = Subject { object: 0, brick: None };
-        let ball = subject.ball(&scene).unwrap();
-        eprintln!("{ball:?} {} bricks", scene.resident().bricks.len());
-        for (side, away) in [(4.0, 1.25), (3.0, 1.0), (2.0, 1.0)] {
-            eprintln!("side {side} away {away}");
-            let all = rays(&ball, side, away);
-            let mut exact = Vec::new();
-            let start = std::time::Instant::now();
-            {
-                let mut traced = opened.traced();
-                let frame = Frame::near(scene.resident(), ball.center);
-                for chunk in all.chunks(traced.most) {
-                    let rays: Vec<layout::Ray> = chunk
-                        .iter()
-                        .map(|ray| layout::Ray {
-                            origin: frame.point(ray.origin),
-                            t_min: 0.0,
-                            direction: ray.direction.as_vec3().to_array(),
-                            t_max: layout::T_INFINITE,
-                        })
-                        .collect();
-                    let hits = trace_device(&mut traced, &frame, &rays, false, &mut Counters::default()).unwrap();
-                    exact.extend(hits.iter().take(chunk.len()).map(|hit| {
-                        if hit.id == layout::NONE {
-                            f32::INFINITY
-                        } else {
-                            (f64::from(hit.t) * frame.unit / ball.radius) as f32
-                        }
-                    }));
-                }
-            }
-            eprintln!(
-                "exact {:.3} s; free {:.3}",
-                start.elapsed().as_secs_f64(),
-                exact.iter().filter(|x| x.is_infinite()).count() as f64 / exact.len() as f64
-            );
-            for rings in [8, 16, 32] {
-                for directions in [32, 128] {
-                    let shape = Shape { rings, directions };
-                    let start = std::time::Instant::now();
-                    let mut codes = vec![0u32; shape.samples().div_ceil(4) as usize];
-                    let mut bench = Bench {
-                        scene: &scene,
-                        executor: &mut *opened.executor,
-                        cache: &mut opened.cache,
-                        most: opened.extent.rays(),
-                        tile: 1024,
-                    };
-                    bake(&mut bench, &[Job { subject, ball, shape }], None, &mut |_, first, shares| {
-                        for (i, &share) in (first..).zip(shares) {
-                            codes[(i / 4) as usize] |=
-                                u32::from(code_of((share >= 0.0).then_some(share))) << (8 * (i % 4));
-                        }
-                        true
-                    })
-                    .unwrap();
-                    let baked = start.elapsed().as_secs_f64();
-                    let table = shape.table();
-                    let field = FieldView { shape, table: &table, codes: &codes, bits: 8, mean: 0.5 };
-                    let mut line = format!("{rings} {directions} bake {baked:.2} s:");
-                    for look in [0, 8, 11, 27] {
-                        let found = by_field(&field, &ball, &all, &exact, look);
-                        line += &format!(" | {look}:");
-                        for reach in [1.0, 1.5, 2.0, 3.0, 6.0, f32::INFINITY] {
-                            let (rms, mean) = rms(&levels(&found, reach), &levels(&exact, reach));
-                            line += &format!(" {rms:.3}/{mean:+.2}");
-                        }
-                    }
-                    eprintln!("{line}");
-                }
-            }
+    fn levels_and_their_errors_are_those_by_hand() {
+        // Half way, beyond reach, free, at once: 0.5, 1, 1 and 0 of 255.
+        let own = levels(&[1.0, 7.0, f32::INFINITY, 0.0], 2);
+        assert_eq!(own, [255.0 * 0.75, 255.0 * 0.5]);
+        assert_eq!(levels(&[2.0; 6], 3), [255.0; 2]);
+        assert_eq!(rms(&[3.0, 1.0], &[0.0, 5.0]), (f64::sqrt(12.5), -0.5));
+        assert_eq!(rms(&own, &own), (0.0, 0.0));
+        assert_eq!(rms(&[], &[]), (0.0, 0.0));
+    }
+
+    #[test]
+    fn rays_leave_walls_into_the_corner() {
+        let ball = Ball { center: DVec3::new(5.0, -2.0, 1.0), radius: 2.0 };
+        let all = rays(&ball, 4);
+        assert_eq!(all.len(), 3 * 33 * 33 * 4);
+        for (number, ray) in all.iter().enumerate() {
+            let wall = number / (33 * 33 * 4);
+            // Wall number k has one of the axes as its normal, of which it is a radius away.
+            let along = ray.origin - (ball.center - ball.radius);
+            let on = (0..3).filter(|&k| along[k].abs() < 1e-12).count();
+            assert!(on >= 1 && along.min_element() > -1e-12 && along.max_element() < 6.0 + 1e-12, "{along}");
+            let normal = (3 - wall) % 3;
+            assert!(along[normal].abs() < 1e-12 && ray.direction[normal] >= 0.0, "{wall} {along} {}", ray.direction);
+            assert!((ray.direction.length() - 1.0).abs() < 1e-12);
         }
+        let inside = inside(&all);
+        assert!(inside > 0.2 && inside < 0.9, "{inside}");
+    }
+
+    #[test]
+    fn distances_are_those_along_the_ray() {
+        let ball = Ball { center: DVec3::ZERO, radius: 1.0 };
+        let mut ray = rays(&ball, 1)[0];
+        (ray.start, ray.way) = (Vec3::new(-3.0, 0.0, 0.0), Vec3::X);
+        let asked = |share: f32, exact: f32| by_field(|_| share, &[ray], &[exact])[0];
+        // The chord is from 2 to 4.
+        assert_eq!([asked(0.0, 9.0), asked(0.25, 9.0), asked(1.0, 9.0)], [2.0, 2.5, 4.0]);
+        assert_eq!(asked(-1.0, 9.0), f32::INFINITY);
+        // Inside, half of the chord is behind.
+        ray.start = Vec3::ZERO;
+        let asked = |share: f32| by_field(|_| share, &[ray], &[9.0])[0];
+        assert_eq!([asked(0.25), asked(0.75), asked(-1.0)], [9.0, 0.5, f32::INFINITY]);
+        // Past the sphere, and away from it.
+        ray.start = Vec3::new(-3.0, 1.5, 0.0);
+        assert_eq!(by_field(|_| 0.5, &[ray], &[9.0]), [f32::INFINITY]);
+        ray.start = Vec3::new(3.0, 0.0, 0.0);
+        assert_eq!(by_field(|_| 0.5, &[ray], &[9.0]), [f32::INFINITY]);
     }
 }

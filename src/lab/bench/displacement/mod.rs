@@ -1,3 +1,270 @@
-//! `brickwalk bench displacement`.
+//! `brickwalk bench displacement`: the experiments of Gaitatzes et al. 2008 with a model over a corner: how far light by
+//! fields is from that by exact rays, and how long a ray takes by them and by tracing it.
+//!
+//! Samples that several ways share are made once. Each finished measurement is a line of `rows.jsonl`, from which alone
+//! tables, plots, verdicts and pages are made.
 
+pub mod args;
 pub mod corner;
+mod mapping;
+mod model;
+mod output;
+mod paper;
+mod plan;
+mod samples;
+mod verdicts;
+
+use super::args::wanted;
+use super::runner::Runner;
+use super::store::{Header, Row, Rows, Values, median};
+use crate::kernels::vector::Vec3;
+use crate::lab::console::Console;
+use crate::output::atomic;
+use crate::secondary::displacement::Chord;
+use crate::secondary::displacement::shape::{frame, position_of};
+use anyhow::Result;
+use args::DisplacementBenchArgs;
+use corner::{by_field, inside, levels, rms};
+use glam::DVec3;
+use mapping::Mapping;
+use model::Model;
+use plan::{Job, Look, Stage, Way};
+use samples::Samples;
+use serde_json::json;
+use std::path::Path;
+use std::time::Instant;
+
+/// Raised when a value changes its meaning.
+const FORMAT: u32 = 1;
+
+/// Runs the command.
+///
+/// # Errors
+/// The folder holds other measurements or cannot be written; the model cannot be read; the device's.
+pub fn run(args: &DisplacementBenchArgs, console: Console) -> Result<()> {
+    let (settings, console) = (args.settings(), console.within(args.minutes));
+    atomic::create_folder(&args.output)?;
+    let models = args.output.join("models");
+    let (name, file) = model::place(args.model.as_deref(), args.triangles, &models, console)?;
+    let (scene, subject) = model::open(&file)?;
+    let ball = subject.ball(&scene)?;
+    let own = json!({
+        "model": name,
+        "triangles": scene.resident().manifest.triangle_ids,
+        "center": ball.center.to_array(),
+        "radius": ball.radius,
+        "rays": args.rays,
+        "repetitions": args.repeat,
+    });
+    let mut rows = Rows::open(args.output.join("rows.jsonl"), Header::new(FORMAT, &args.adapter, own)?, false)?;
+    let mut runner = Runner::new(console);
+    let stages = wanted(Stage::ALL, &args.stages);
+    let mut jobs = plan::jobs(&settings);
+    jobs.retain(|job| stages.contains(&job.stage));
+    let mut open: Option<(Option<u64>, Model)> = None;
+    let keys = |job: &Job| job.ways.iter().map(|&way| job.key(way)).collect();
+    runner.measure(&mut rows, &jobs, keys, |job| {
+        let model = match open.take().filter(|(object, _)| *object == job.triangles) {
+            Some((_, model)) => model,
+            None => opened(args, job, &file, &models, console)?,
+        };
+        let (_, model) = open.insert((job.triangles, model));
+        measure(job, args, model, console)
+    })?;
+    let planned = jobs.iter().map(|job| job.ways.len()).sum();
+    let text = output::write(args, &settings, &rows, planned)?;
+    runner.end(&args.output, &text)
+}
+
+/// The model of a job: that of the file, or an object of figure 8.
+fn opened(args: &DisplacementBenchArgs, job: &Job, file: &Path, models: &Path, console: Console) -> Result<Model> {
+    let file = match job.triangles {
+        Some(triangles) => model::made(triangles, models, console)?.1,
+        None => file.to_path_buf(),
+    };
+    Model::open(&file, &args.adapter, args.rays)
+}
+
+/// Everything that is measured of the ways of a job.
+fn measure(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Console) -> Result<Vec<Row>> {
+    match job.stage {
+        Stage::Figure6 | Stage::Figure4 => held(job, args, model, console),
+        Stage::Figure5 => mapped(job, args, model, console),
+        Stage::Figure8 => timed(job, args, model, console),
+    }
+}
+
+/// Errors of grey levels by distances.
+fn errors(model: &Model, args: &DisplacementBenchArgs, found: &[f32]) -> Values {
+    let (rms, bias) = rms(&levels(found, args.rays), &levels(&model.exact, args.rays));
+    Values::from([("rms".into(), rms), ("bias".into(), bias)])
+}
+
+/// Errors and times by samples of so many bits as the ways of the job have.
+fn held(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Console) -> Result<Vec<Row>> {
+    let of = |way: Way| match way {
+        Way::Held(bits, look) => (bits, look),
+        Way::Asked(look) => (8, look),
+        Way::Mapped(..) | Way::Timed => (8, Look::Paper),
+    };
+    let mut all: Vec<(u32, Samples)> = Vec::new();
+    for &way in &job.ways {
+        let (bits, _) = of(way);
+        if all.iter().all(|(held, _)| *held != bits) {
+            all.push((bits, Samples::new(job.shape, bits)));
+        }
+    }
+    let seconds = model.bake(job.shape, None, console, &mut |first, shares| {
+        all.iter_mut().for_each(|(_, samples)| samples.take(first, shares));
+    })?;
+    let ways: Vec<(Way, &Samples, Look)> = job
+        .ways
+        .iter()
+        .filter_map(|&way| {
+            let (bits, look) = of(way);
+            all.iter().find(|(held, _)| *held == bits).map(|(_, samples)| (way, samples, look))
+        })
+        .collect();
+    let mut found = vec![Vec::new(); ways.len()];
+    let mut times = vec![Vec::new(); ways.len()];
+    for turn in 0..=args.repeat {
+        for (k, (_, samples, look)) in ways.iter().enumerate() {
+            console.go_on()?;
+            let start = Instant::now();
+            let field = samples.view();
+            let distances = by_field(|chord| field.share(chord, look.bits()), &model.rays, &model.exact);
+            // What the first turn brings into the caches is not counted.
+            if turn > 0 {
+                times[k].push(1e3 * start.elapsed().as_secs_f64());
+            }
+            found[k] = distances;
+        }
+    }
+    let row = |((way, samples, _), (found, times)): (&(Way, &Samples, Look), (Vec<f32>, Vec<f64>))| {
+        let mut values = errors(model, args, &found);
+        values.insert("bake_s".into(), seconds);
+        values.insert("samples".into(), job.shape.samples() as f64);
+        values.insert("bytes".into(), samples.bytes() as f64);
+        values.insert("rays".into(), model.rays.len() as f64);
+        values.extend(median(times).map(|ms| ("query_ms".into(), ms)));
+        Row { key: job.key(*way), values }
+    };
+    Ok(ways.iter().zip(found.into_iter().zip(times)).map(row).collect())
+}
+
+/// Errors by ways to map directions to a square.
+fn mapped(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Console) -> Result<Vec<Row>> {
+    let shape = job.shape;
+    let place = |number: u32| {
+        let at = shape.position(number);
+        (at, frame(at))
+    };
+    let places: Vec<(DVec3, [DVec3; 3])> = (0..shape.positions()).map(place).collect();
+    let mut rows = Vec::new();
+    for &mapping in Mapping::ALL {
+        let mut samples = Samples::new(shape, 8);
+        let take = &mut |first, shares: &[f32]| samples.take(first, shares);
+        let seconds = model.bake(shape, Some(&move |number| mapping.direction(shape, number)), console, take)?;
+        let used = (0..shape.squares()).filter(|&number| mapping.is_used(shape, number)).count();
+        for look in [Look::Paper, Look::Aimed] {
+            let share = |chord: &Chord| {
+                let position = position_of(shape.rings, chord.entry());
+                let (at, frame) = &places[position as usize];
+                let way = if look == Look::Aimed { wide(chord.middle) - at } else { wide(chord.direction) };
+                samples.of(position, mapping.number(shape, in_frame(frame, way)))
+            };
+            let mut values = errors(model, args, &by_field(share, &model.rays, &model.exact));
+            values.insert("used".into(), used as f64 / f64::from(shape.squares()));
+            values.insert("bake_s".into(), seconds);
+            rows.push(Row { key: job.key(Way::Mapped(mapping, look)), values });
+        }
+    }
+    Ok(rows)
+}
+
+fn wide(v: Vec3) -> DVec3 {
+    DVec3::from_array(v.map(f64::from))
+}
+
+/// A direction in a frame, its z not below 0.
+fn in_frame([x, y, z]: &[DVec3; 3], way: DVec3) -> DVec3 {
+    DVec3::new(x.dot(way), y.dot(way), z.dot(way).max(0.0))
+}
+
+/// What answers the rays of figure 8: names of their times.
+const QUERIES: [&str; 4] = ["ns_paper", "ns_aimed", "ns_closest", "ns_any"];
+
+/// Times of a ray by a field and by tracing it, in turns.
+fn timed(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Console) -> Result<Vec<Row>> {
+    let mut samples = Samples::new(job.shape, 8);
+    let seconds = model.bake(job.shape, None, console, &mut |first, shares| samples.take(first, shares))?;
+    let mut times = vec![Vec::new(); QUERIES.len()];
+    let mut values = Values::new();
+    for turn in 0..=args.repeat {
+        for (k, name) in QUERIES.into_iter().enumerate() {
+            console.go_on()?;
+            let start = Instant::now();
+            let by = |look: Look| {
+                let field = samples.view();
+                by_field(|chord| field.share(chord, look.bits()), &model.rays, &model.exact)
+            };
+            let found = match name {
+                "ns_paper" => Some(by(Look::Paper)),
+                "ns_aimed" => Some(by(Look::Aimed)),
+                _ => {
+                    model.trace(name == "ns_any")?;
+                    None
+                }
+            };
+            // What the first turn brings into the caches is not counted.
+            if turn > 0 {
+                times[k].push(1e9 * start.elapsed().as_secs_f64() / model.rays.len().max(1) as f64);
+            } else if let Some(found) = found {
+                let errors = errors(model, args, &found);
+                values.extend(errors.into_iter().map(|(what, x)| (name.replace("ns", &what), x)));
+            }
+        }
+    }
+    values.extend(QUERIES.into_iter().zip(times).filter_map(|(name, times)| Some((name.into(), median(times)?))));
+    let own = [
+        ("triangles", model.triangles() as f64),
+        ("bricks", model.bricks() as f64),
+        ("rays", model.rays.len() as f64),
+        ("inside", inside(&model.rays)),
+        ("bake_s", seconds),
+    ];
+    values.extend(own.map(|(name, x)| (name.into(), x)));
+    Ok(job.ways.iter().map(|&way| Row { key: job.key(way), values: values.clone() }).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::secondary::displacement::Shape;
+    use brickwalk_scenes::Rng;
+
+    /// The bench's own look-up is that of fields, and another mapping's is not.
+    #[test]
+    fn concentric_look_ups_are_those_of_fields() {
+        let shape = Shape { rings: 4, directions: 16 };
+        let mut samples = Samples::new(shape, 32);
+        let numbers: Vec<f32> = (0..shape.samples()).map(|at| at as f32 / shape.samples() as f32).collect();
+        samples.take(0, &numbers);
+        let mut rng = Rng::new(11, &[5]);
+        let (mut same, mut other) = (0, 0);
+        let count = 2000;
+        for _ in 0..count {
+            let mut any = || DVec3::from_array([(); 3].map(|()| rng.range(-1.0, 1.0)));
+            let (origin, aim) = (3.0 * any().normalize(), 0.7 * any().normalize());
+            let way = (aim - origin).normalize().as_vec3().to_array();
+            let chord = Chord::of(origin.as_vec3().to_array(), way).expect("it hits the sphere");
+            let position = position_of(shape.rings, chord.entry());
+            let local = in_frame(&frame(shape.position(position)), wide(way));
+            let field = samples.view().share(&chord, Look::Paper.bits());
+            same += u32::from(samples.of(position, Mapping::Concentric.number(shape, local)) == field);
+            other += u32::from(samples.of(position, Mapping::Uniform.number(shape, local)) == field);
+        }
+        // On an edge between squares f32 and f64 may differ.
+        assert!(same >= count - 2 && other < count / 10, "{same} {other}");
+    }
+}
