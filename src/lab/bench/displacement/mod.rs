@@ -31,6 +31,7 @@ use model::Model;
 use plan::{Job, Look, Stage, Way};
 use samples::Samples;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -100,56 +101,61 @@ fn errors(model: &Model, args: &DisplacementBenchArgs, found: &[f32]) -> Values 
     Values::from([("rms".into(), rms), ("bias".into(), bias)])
 }
 
+/// A way to ask samples that are held, as it is measured.
+struct Held<'a> {
+    way: Way,
+    look: Look,
+    samples: &'a Samples,
+    /// By the last turn.
+    distances: Vec<f32>,
+    /// Milliseconds of every turn but the first.
+    ms: Vec<f64>,
+}
+
 /// Errors and times by samples of so many bits as the ways of the job have.
 fn held(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Console) -> Result<Vec<Row>> {
-    let of = |way: Way| match way {
-        Way::Held(bits, look) => (bits, look),
-        Way::Asked(look) => (8, look),
-        Way::Mapped(..) | Way::Timed => (8, Look::Paper),
-    };
-    let mut all: Vec<(u32, Samples)> = Vec::new();
-    for &way in &job.ways {
-        let (bits, _) = of(way);
-        if all.iter().all(|(held, _)| *held != bits) {
-            all.push((bits, Samples::new(job.shape, bits)));
-        }
+    let mut samples: BTreeMap<u32, Samples> = BTreeMap::new();
+    for way in &job.ways {
+        samples.entry(way.bits()).or_insert_with(|| Samples::new(job.shape, way.bits()));
     }
     let seconds = model.bake(job.shape, None, console, &mut |first, shares| {
-        all.iter_mut().for_each(|(_, samples)| samples.take(first, shares));
+        samples.values_mut().for_each(|samples| samples.take(first, shares));
     })?;
-    let ways: Vec<(Way, &Samples, Look)> = job
-        .ways
-        .iter()
-        .filter_map(|&way| {
-            let (bits, look) = of(way);
-            all.iter().find(|(held, _)| *held == bits).map(|(_, samples)| (way, samples, look))
-        })
-        .collect();
-    let mut found = vec![Vec::new(); ways.len()];
-    let mut times = vec![Vec::new(); ways.len()];
+    let of = |&way: &Way| {
+        let samples = samples.get(&way.bits())?;
+        Some(Held { way, look: way.look(), samples, distances: Vec::new(), ms: Vec::new() })
+    };
+    let mut all: Vec<Held> = job.ways.iter().filter_map(of).collect();
     for turn in 0..=args.repeat {
-        for (k, (_, samples, look)) in ways.iter().enumerate() {
+        for own in &mut all {
             console.go_on()?;
             let start = Instant::now();
-            let field = samples.view();
-            let distances = by_field(|chord| field.share(chord, look.bits()), &model.rays, &model.exact);
+            own.distances = by_samples(own.samples, own.look, model);
             // What the first turn brings into the caches is not counted.
             if turn > 0 {
-                times[k].push(1e3 * start.elapsed().as_secs_f64());
+                own.ms.push(1e3 * start.elapsed().as_secs_f64());
             }
-            found[k] = distances;
         }
     }
-    let row = |((way, samples, _), (found, times)): (&(Way, &Samples, Look), (Vec<f32>, Vec<f64>))| {
-        let mut values = errors(model, args, &found);
-        values.insert("bake_s".into(), seconds);
-        values.insert("samples".into(), job.shape.samples() as f64);
-        values.insert("bytes".into(), samples.bytes() as f64);
-        values.insert("rays".into(), model.rays.len() as f64);
-        values.extend(median(times).map(|ms| ("query_ms".into(), ms)));
-        Row { key: job.key(*way), values }
+    let row = |own: Held| {
+        let mut values = errors(model, args, &own.distances);
+        let beside = [
+            ("bake_s", seconds),
+            ("samples", job.shape.samples() as f64),
+            ("bytes", own.samples.bytes() as f64),
+            ("rays", model.rays.len() as f64),
+        ];
+        values.extend(beside.map(|(name, x)| (name.into(), x)));
+        values.extend(median(own.ms).map(|ms| ("query_ms".into(), ms)));
+        Row { key: job.key(own.way), values }
     };
-    Ok(ways.iter().zip(found.into_iter().zip(times)).map(row).collect())
+    Ok(all.into_iter().map(row).collect())
+}
+
+/// Distances of the corner's rays by samples.
+fn by_samples(samples: &Samples, look: Look, model: &Model) -> Vec<f32> {
+    let field = samples.view();
+    by_field(|chord| field.share(chord, look.bits()), &model.rays, &model.exact)
 }
 
 /// Errors by ways to map directions to a square.
@@ -204,13 +210,9 @@ fn timed(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Co
         for (k, name) in QUERIES.into_iter().enumerate() {
             console.go_on()?;
             let start = Instant::now();
-            let by = |look: Look| {
-                let field = samples.view();
-                by_field(|chord| field.share(chord, look.bits()), &model.rays, &model.exact)
-            };
             let found = match name {
-                "ns_paper" => Some(by(Look::Paper)),
-                "ns_aimed" => Some(by(Look::Aimed)),
+                "ns_paper" => Some(by_samples(&samples, Look::Paper, model)),
+                "ns_aimed" => Some(by_samples(&samples, Look::Aimed, model)),
                 _ => {
                     model.trace(name == "ns_any")?;
                     None

@@ -1,11 +1,35 @@
 //! What the paper has (Gaitatzes, Chrysanthou, Papaioannou 2008).
 
-/// Figure 6: positions, then RMS in grey levels of 32², 64², 128² and 256² directions, seconds of making them, and
-/// seconds of light.
-const FIGURE6: [(u32, [f64; 4], [f64; 4], [f64; 4]); 3] = [
-    (290, [2.8207, 2.4118, 2.3153, 2.2914], [3.96, 14.60, 54.42, 213.75], [0.09462, 0.09584, 0.09809, 0.10159]),
-    (1090, [1.0653, 1.0318, 1.0294, 1.02871], [14.06, 51.23, 193.25, 772.0], [0.09870, 0.10219, 0.10785, 0.11516]),
-    (4226, [0.6772, 0.6315, 0.6209, 0.6185], [54.79, 204.27, 925.05, 3039.72], [0.10826, 0.11118, 0.11504, 0.12190]),
+/// A row of figure 6: of 32², 64², 128² and 256² directions.
+struct Row {
+    positions: u32,
+    /// Grey levels.
+    rms: [f64; 4],
+    /// Seconds of making samples.
+    bake_s: [f64; 4],
+    /// Seconds of light.
+    light_s: [f64; 4],
+}
+
+const FIGURE6: [Row; 3] = [
+    Row {
+        positions: 290,
+        rms: [2.8207, 2.4118, 2.3153, 2.2914],
+        bake_s: [3.96, 14.60, 54.42, 213.75],
+        light_s: [0.09462, 0.09584, 0.09809, 0.10159],
+    },
+    Row {
+        positions: 1090,
+        rms: [1.0653, 1.0318, 1.0294, 1.02871],
+        bake_s: [14.06, 51.23, 193.25, 772.0],
+        light_s: [0.09870, 0.10219, 0.10785, 0.11516],
+    },
+    Row {
+        positions: 4226,
+        rms: [0.6772, 0.6315, 0.6209, 0.6185],
+        bake_s: [54.79, 204.27, 925.05, 3039.72],
+        light_s: [0.10826, 0.11118, 0.11504, 0.12190],
+    },
 ];
 
 /// What figure 6 has of samples.
@@ -22,8 +46,8 @@ pub struct Paper {
 /// Of so many positions and directions on each axis.
 pub fn figure6(positions: u32, directions: u32) -> Option<Paper> {
     let column = [32, 64, 128, 256].iter().position(|&n| n == directions)?;
-    let row = FIGURE6.iter().find(|row| row.0 == positions)?;
-    Some(Paper { rms: row.1[column], bake_s: row.2[column], query_ms: 1e3 * row.3[column] })
+    let row = FIGURE6.iter().find(|row| row.positions == positions)?;
+    Some(Paper { rms: row.rms[column], bake_s: row.bake_s[column], query_ms: 1e3 * row.light_s[column] })
 }
 
 /// Figure 7: RMS of 1 bit, 4226 x 64².

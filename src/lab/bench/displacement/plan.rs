@@ -60,6 +60,21 @@ pub enum Way {
 /// Bits of samples.
 pub const BITS: [u32; 3] = [32, 8, 1];
 
+impl Way {
+    /// Bits of a sample.
+    pub fn bits(self) -> u32 {
+        if let Self::Held(bits, _) = self { bits } else { 8 }
+    }
+
+    /// How samples are asked; of all ways in turns, as in the paper.
+    pub fn look(self) -> Look {
+        match self {
+            Self::Asked(look) | Self::Held(_, look) | Self::Mapped(_, look) => look,
+            Self::Timed => Look::Paper,
+        }
+    }
+}
+
 impl fmt::Display for Way {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

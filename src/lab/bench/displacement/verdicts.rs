@@ -160,7 +160,12 @@ fn over_mappings_by(look: Look, all: &Measured) -> Option<Verdict> {
     let ratio = rms(Mapping::Uniform)? / rms(Mapping::Concentric)?;
     let n = job.shape.directions;
     let claim = format!("RMS of uniform directions ({look}, {n}²) over that of concentric ones");
-    Some(Verdict::new(claim, Value::Of(ratio, '×'), "above 1×", ratio > 1.0))
+    let found = Value::Of(ratio, '×');
+    // The paper says so of its own way.
+    Some(match look {
+        Look::Paper => Verdict::new(claim, found, "above 1×", ratio > 1.0),
+        _ => Verdict { claim, found, target: "", is_met: None },
+    })
 }
 
 fn over_triangles(all: &Measured) -> Vec<Verdict> {
@@ -244,7 +249,7 @@ mod tests {
         // Control: errors that fall with directions alone, far from the paper's.
         let others = of(|_, directions| 300.0 / directions, 5.0);
         let missed = others.iter().filter(|verdict| verdict.is_met == Some(false)).count();
-        assert_eq!(missed, 5, "{:?}", sentences(&others));
+        assert_eq!(missed, 4, "{:?}", sentences(&others));
         assert!(sentences(&others).iter().any(|text| text.ends_with("at every number of triangles")));
     }
 
