@@ -138,8 +138,8 @@ impl FieldView<'_> {
     }
 
     /// Share of the chord at which a ray meets something; below 0: it meets nothing. With [`DISPLACEMENT_AIMED`] the
-    /// stored ray is the one that meets the asked one in the middle of its chord, else the one in the same direction, as
-    /// in the paper.
+    /// stored ray is the one that meets the asked one in the middle of its chord, else the one in the same direction,
+    /// as in the paper.
     pub fn share(&self, chord: &Chord, look: u32) -> f32 {
         let entry = chord.entry();
         if look & DISPLACEMENT_AIMED == 0 {

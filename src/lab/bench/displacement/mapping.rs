@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn any_direction_gets_one_that_is_used_and_near() {
         let shape = SHAPES[2];
-        // The widest squares: of the disc at the rim by one edge and a half of height, of angles an edge of 5.6 degrees.
+        // Squares of the disc are widest at the rim, where they reach far down; those of angles are 5.6 degrees long.
         for (mapping, most) in [(Mapping::Concentric, 0.3), (Mapping::Uniform, 0.06), (Mapping::Rejection, 0.36)] {
             for number in 0..4 * shape.squares() {
                 let fine = Shape { directions: 128, ..shape };

@@ -1,5 +1,5 @@
-//! `brickwalk bench displacement`: the experiments of Gaitatzes et al. 2008 with a model over a corner: how far light by
-//! fields is from that by exact rays, and how long a ray takes by them and by tracing it.
+//! `brickwalk bench displacement`: the experiments of Gaitatzes et al. 2008 with a model over a corner: how far light
+//! by fields is from that by exact rays, and how long a ray takes by them and by tracing it.
 //!
 //! Samples that several ways share are made once. Each finished measurement is a line of `rows.jsonl`, from which alone
 //! tables, plots, verdicts and pages are made.

@@ -177,7 +177,7 @@ fn figure5<'a>() -> Vec<Column<Line<'a>>> {
 
 const FIGURE8: &str = "A bumpy sphere, cut ever finer. All ways take turns in one run on the same rays, all bricks \
                        resident. Fields are asked on the processor. Tracing is the whole of it: rays handed to the \
-                       executor, traversal, hits read back. exact ÷ are speed-ups: above 1 the field is faster.";
+                       executor, traversal, hits read back. ÷ aimed are speed-ups: above 1 the field is faster.";
 
 fn figure8<'a>() -> Vec<Column<Line<'a>>> {
     /// A time over that of fields, aimed.
@@ -210,8 +210,7 @@ fn of_paper() -> Table {
         ("casting, ns a ray", |model| (1e9 * model.3 / model.2).into()),
         ("casting ÷ field", |model| Value::Of(model.3 / model.4, '×')),
     ];
-    let caption = "The paper's figure 8, 4226 x 32², on a Pentium 4. Its casting of rays takes a thousand times as long \
-                   as ours.";
+    let caption = "The paper's figure 8, 4226 x 32², on a Pentium 4, beside a casting of rays of its own.";
     table("figure8-paper", caption, &paper::FIGURE8, &columns)
 }
 
