@@ -62,37 +62,23 @@ pub fn run(args: &DisplacementBenchArgs, console: Console) -> Result<()> {
     let stages = wanted(Stage::ALL, &args.stages);
     let mut jobs = plan::jobs(&settings);
     jobs.retain(|job| stages.contains(&job.stage));
-    let mut open: Option<(Option<u64>, Model)> = None;
+    let mut open: Option<Model> = None;
     let keys = |job: &Job| job.ways.iter().map(|&way| job.key(way)).collect();
     runner.measure(&mut rows, &jobs, keys, |job| {
-        let model = match open.take().filter(|(object, _)| *object == job.triangles) {
-            Some((_, model)) => model,
-            None => opened(args, job, &file, &models, console)?,
+        if job.stage == Stage::Figure8 {
+            open = None;
+            return timed(job, args, &models, console);
+        }
+        let model = match open.take() {
+            Some(model) => model,
+            None => Model::open(&file, &args.adapter, args.rays)?,
         };
-        let (_, model) = open.insert((job.triangles, model));
-        measure(job, args, model, console)
+        let model = open.insert(model);
+        if job.stage == Stage::Figure5 { mapped(job, args, model, console) } else { held(job, args, model, console) }
     })?;
     let planned = jobs.iter().map(|job| job.ways.len()).sum();
     let text = output::write(args, &settings, &rows, planned)?;
     runner.end(&args.output, &text)
-}
-
-/// The model of a job: that of the file, or an object of figure 8.
-fn opened(args: &DisplacementBenchArgs, job: &Job, file: &Path, models: &Path, console: Console) -> Result<Model> {
-    let file = match job.triangles {
-        Some(triangles) => model::made(triangles, models, console)?.1,
-        None => file.to_path_buf(),
-    };
-    Model::open(&file, &args.adapter, args.rays)
-}
-
-/// Everything that is measured of the ways of a job.
-fn measure(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Console) -> Result<Vec<Row>> {
-    match job.stage {
-        Stage::Figure6 | Stage::Figure4 => held(job, args, model, console),
-        Stage::Figure5 => mapped(job, args, model, console),
-        Stage::Figure8 => timed(job, args, model, console),
-    }
 }
 
 /// Errors of grey levels by distances.
@@ -200,43 +186,74 @@ fn in_frame([x, y, z]: &[DVec3; 3], way: DVec3) -> DVec3 {
 /// What answers the rays of figure 8: names of their times.
 const QUERIES: [&str; 4] = ["ns_paper", "ns_aimed", "ns_closest", "ns_any"];
 
-/// Times of a ray by a field and by tracing it, in turns.
-fn timed(job: &Job, args: &DisplacementBenchArgs, model: &mut Model, console: Console) -> Result<Vec<Row>> {
-    let mut samples = Samples::new(job.shape, 8);
-    let seconds = model.bake(job.shape, None, console, &mut |first, shares| samples.take(first, shares))?;
-    let mut times = vec![Vec::new(); QUERIES.len()];
-    let mut values = Values::new();
+/// An object of figure 8.
+struct Object {
+    way: Way,
+    model: Model,
+    samples: Samples,
+    values: Values,
+    /// Nanoseconds of a ray in every turn but the first, by [`QUERIES`].
+    ns: [Vec<f64>; 4],
+}
+
+impl Object {
+    /// Opens an object and makes its field.
+    fn open(way: Way, job: &Job, args: &DisplacementBenchArgs, models: &Path, console: Console) -> Result<Self> {
+        let triangles = if let Way::Timed(triangles) = way { triangles } else { args.triangles };
+        let (_, file) = model::made(triangles, models, console)?;
+        let mut model = Model::open(&file, &args.adapter, args.rays)?;
+        let mut samples = Samples::new(job.shape, 8);
+        let seconds = model.bake(job.shape, None, console, &mut |first, shares| samples.take(first, shares))?;
+        let mut values = Values::new();
+        for look in [Look::Paper, Look::Aimed] {
+            let errors = errors(&model, args, &by_samples(&samples, look, &model));
+            values.extend(errors.into_iter().map(|(name, x)| (format!("{name}_{look}"), x)));
+        }
+        let own = [
+            ("triangles", model.triangles() as f64),
+            ("bricks", model.bricks() as f64),
+            ("rays", model.rays.len() as f64),
+            ("inside", inside(&model.rays)),
+            ("bake_s", seconds),
+        ];
+        values.extend(own.map(|(name, x)| (name.into(), x)));
+        Ok(Self { way, model, samples, values, ns: Default::default() })
+    }
+
+    /// Answers all rays; nanoseconds of one.
+    fn ask(&mut self, query: &str) -> Result<f64> {
+        let start = Instant::now();
+        match query {
+            "ns_paper" => drop(by_samples(&self.samples, Look::Paper, &self.model)),
+            "ns_aimed" => drop(by_samples(&self.samples, Look::Aimed, &self.model)),
+            _ => drop(self.model.trace(query == "ns_any")?),
+        }
+        Ok(1e9 * start.elapsed().as_secs_f64() / self.model.rays.len().max(1) as f64)
+    }
+}
+
+/// Times of a ray by fields and by tracing it. Objects take turns, too: a drift of the machine meets all alike.
+fn timed(job: &Job, args: &DisplacementBenchArgs, models: &Path, console: Console) -> Result<Vec<Row>> {
+    let open = |&way: &Way| Object::open(way, job, args, models, console);
+    let mut objects = job.ways.iter().map(open).collect::<Result<Vec<Object>>>()?;
     for turn in 0..=args.repeat {
-        for (k, name) in QUERIES.into_iter().enumerate() {
-            console.go_on()?;
-            let start = Instant::now();
-            let found = match name {
-                "ns_paper" => Some(by_samples(&samples, Look::Paper, model)),
-                "ns_aimed" => Some(by_samples(&samples, Look::Aimed, model)),
-                _ => {
-                    model.trace(name == "ns_any")?;
-                    None
+        for object in &mut objects {
+            for (k, query) in QUERIES.into_iter().enumerate() {
+                console.go_on()?;
+                let ns = object.ask(query)?;
+                // What the first turn brings into the caches is not counted.
+                if turn > 0 {
+                    object.ns[k].push(ns);
                 }
-            };
-            // What the first turn brings into the caches is not counted.
-            if turn > 0 {
-                times[k].push(1e9 * start.elapsed().as_secs_f64() / model.rays.len().max(1) as f64);
-            } else if let Some(found) = found {
-                let errors = errors(model, args, &found);
-                values.extend(errors.into_iter().map(|(what, x)| (name.replace("ns", &what), x)));
             }
         }
     }
-    values.extend(QUERIES.into_iter().zip(times).filter_map(|(name, times)| Some((name.into(), median(times)?))));
-    let own = [
-        ("triangles", model.triangles() as f64),
-        ("bricks", model.bricks() as f64),
-        ("rays", model.rays.len() as f64),
-        ("inside", inside(&model.rays)),
-        ("bake_s", seconds),
-    ];
-    values.extend(own.map(|(name, x)| (name.into(), x)));
-    Ok(job.ways.iter().map(|&way| Row { key: job.key(way), values: values.clone() }).collect())
+    let row = |object: Object| {
+        let Object { way, mut values, ns, .. } = object;
+        values.extend(QUERIES.into_iter().zip(ns).filter_map(|(name, ns)| Some((name.into(), median(ns)?))));
+        Row { key: job.key(way), values }
+    };
+    Ok(objects.into_iter().map(row).collect())
 }
 
 #[cfg(test)]

@@ -53,8 +53,8 @@ pub enum Way {
     Held(u32, Look),
     /// Of 8 bits, with directions so mapped.
     Mapped(Mapping, Look),
-    /// All ways to answer a ray, in turns.
-    Timed,
+    /// All ways to answer a ray against an object of so many triangles, in turns.
+    Timed(u64),
 }
 
 /// Bits of samples.
@@ -70,7 +70,7 @@ impl Way {
     pub fn look(self) -> Look {
         match self {
             Self::Asked(look) | Self::Held(_, look) | Self::Mapped(_, look) => look,
-            Self::Timed => Look::Paper,
+            Self::Timed(_) => Look::Paper,
         }
     }
 }
@@ -81,7 +81,7 @@ impl fmt::Display for Way {
             Self::Asked(look) => write!(f, "{look}"),
             Self::Held(bits, look) => write!(f, "{bits} bits, {look}"),
             Self::Mapped(mapping, look) => write!(f, "{mapping}, {look}"),
-            Self::Timed => write!(f, "times"),
+            Self::Timed(triangles) => write!(f, "{triangles} triangles"),
         }
     }
 }
@@ -93,8 +93,6 @@ pub struct Job {
     pub stage: Stage,
     /// How many samples.
     pub shape: Shape,
-    /// Triangles of the object; `None`: the model.
-    pub triangles: Option<u64>,
     /// The ways.
     pub ways: Vec<Way>,
 }
@@ -103,8 +101,7 @@ impl Job {
     /// Names a measurement.
     pub fn key(&self, way: Way) -> String {
         let Shape { directions, .. } = self.shape;
-        let object = self.triangles.map_or(String::new(), |n| format!("/{n} triangles"));
-        format!("{}/{} x {directions}²{object}/{way}", self.stage, self.shape.positions())
+        format!("{}/{} x {directions}²/{way}", self.stage, self.shape.positions())
     }
 }
 
@@ -112,12 +109,8 @@ impl Job {
 pub fn jobs(settings: &Settings) -> Vec<Job> {
     let Settings { rings, directions, objects } = settings;
     let or_last = |all: &[u32]| all.get(1).or(all.last()).copied().unwrap_or(2);
-    let job = |stage, rings, directions, ways: &[Way]| Job {
-        stage,
-        shape: Shape { rings, directions },
-        triangles: None,
-        ways: ways.to_vec(),
-    };
+    let job =
+        |stage, rings, directions, ways: &[Way]| Job { stage, shape: Shape { rings, directions }, ways: ways.to_vec() };
     let asked = [Look::Paper, Look::Aimed, Look::Interpolated].map(Way::Asked);
     let held = BITS.map(|bits| [Look::Paper, Look::Aimed].map(|look| Way::Held(bits, look))).concat();
     let both = |&mapping: &Mapping| [Look::Paper, Look::Aimed].map(|look| Way::Mapped(mapping, look));
@@ -129,8 +122,8 @@ pub fn jobs(settings: &Settings) -> Vec<Job> {
     jobs.extend(fine.iter().map(|&m| job(Stage::Figure4, m, usual, &held)));
     jobs.extend(directions.iter().take(2).map(|&n| job(Stage::Figure5, or_last(rings), n, &mapped)));
     let last = rings.last().copied().unwrap_or(2);
-    let timed = |&triangles: &u64| Job { triangles: Some(triangles), ..job(Stage::Figure8, last, few, &[Way::Timed]) };
-    jobs.extend(objects.iter().map(timed));
+    let timed: Vec<Way> = objects.iter().map(|&triangles| Way::Timed(triangles)).collect();
+    jobs.push(job(Stage::Figure8, last, few, &timed));
     jobs
 }
 

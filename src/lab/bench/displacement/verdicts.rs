@@ -62,9 +62,13 @@ struct Measured<'a> {
 }
 
 impl Measured<'_> {
+    fn has(&self, job: &Job, way: Way) -> bool {
+        self.rows.has(&job.key(way))
+    }
+
     /// The jobs of a stage of which a way was measured.
     fn of(&self, stage: Stage, way: Way) -> impl Iterator<Item = &Job> {
-        self.jobs.iter().filter(move |job| job.stage == stage && self.rows.has(&job.key(way)))
+        self.jobs.iter().filter(move |job| job.stage == stage && self.has(job, way))
     }
 
     fn value(&self, job: &Job, way: Way, name: &str) -> Option<f64> {
@@ -168,32 +172,34 @@ fn over_mappings_by(look: Look, all: &Measured) -> Option<Verdict> {
     })
 }
 
-fn over_triangles(all: &Measured) -> Vec<Verdict> {
+fn over_triangles<'a>(all: &'a Measured<'a>) -> Vec<Verdict> {
     let mut found = Vec::new();
-    let value = |job: &Job, name: &str| all.value(job, Way::Timed, name);
-    let jobs: Vec<&Job> = all.of(Stage::Figure8, Way::Timed).collect();
+    let measured = |job: &'a Job| job.ways.iter().map(move |&way| (job, way)).filter(|(job, way)| all.has(job, *way));
+    let objects: Vec<(&Job, Way)> =
+        all.jobs.iter().filter(|job| job.stage == Stage::Figure8).flat_map(measured).collect();
+    let value = |&(job, way): &(&Job, Way), name: &str| all.value(job, way, name);
+    let size = |&(_, way): &(&Job, Way)| human_count(if let Way::Timed(triangles) = way { triangles } else { 0 });
     for (name, what) in [("ns_paper", "paper"), ("ns_aimed", "aimed")] {
-        let Some((least, most)) = range(jobs.iter().filter_map(|job| value(job, name))) else { continue };
+        let Some((least, most)) = range(objects.iter().filter_map(|object| value(object, name))) else { continue };
         let spread = 100.0 * (most - least) / (most + least);
         let claim = format!("Time of a ray by fields ({what}) over triangles varies by ±");
         found.push(Verdict::new(claim, Value::Of(spread, '%'), "±20 % or less", spread <= 20.0));
     }
     for (name, what) in [("ns_closest", "closest hits"), ("ns_any", "any hit")] {
-        let wins = |job: &&Job| value(job, "ns_aimed").zip(value(job, name)).is_some_and(|(own, exact)| own < exact);
-        let Some(last) = jobs.last() else { continue };
+        let gain = |object: &(&Job, Way)| Some(value(object, name)? / value(object, "ns_aimed")?);
+        let Some(last) = objects.last() else { continue };
         // From where on they win all along.
-        let first = jobs.iter().rposition(|job| !wins(job)).map_or(0, |at| at + 1);
-        let text = match jobs.get(first) {
-            Some(job) if first > 0 => format!("from {} triangles on", human_count(job.triangles.unwrap_or(0))),
+        let loses = |object: &(&Job, Way)| gain(object).is_none_or(|gain| gain <= 1.0);
+        let first = objects.iter().rposition(loses).map_or(0, |at| at + 1);
+        let text = match objects.get(first) {
+            Some(object) if first > 0 => format!("from {} triangles on", size(object)),
             Some(_) => "at every number of triangles".into(),
             None => "at none".into(),
         };
-        let ratio = value(last, name).zip(value(last, "ns_aimed")).map(|(exact, own)| exact / own);
-        let size = human_count(last.triangles.unwrap_or(0));
         let claim = format!("Fields (aimed) beat tracing ({what})");
         found.push(Verdict { claim, found: text.into(), target: "", is_met: None });
-        let claim = format!("Tracing ({what}) over fields (aimed) at {size} triangles");
-        found.push(Verdict { claim, found: Value::ratio(ratio), target: "", is_met: None });
+        let claim = format!("Tracing ({what}) over fields (aimed) at {} triangles", size(last));
+        found.push(Verdict { claim, found: Value::ratio(gain(last)), target: "", is_met: None });
     }
     found
 }
@@ -219,7 +225,7 @@ mod tests {
                     _ => rms(job.shape.positions().into(), job.shape.directions.into()),
                 };
                 let bias = if matches!(way, Way::Held(1, _)) { 2.0 } else { 0.5 };
-                let triangles = job.triangles.unwrap_or(1) as f64;
+                let triangles = if let Way::Timed(triangles) = way { triangles as f64 } else { 1.0 };
                 let own = [
                     ("rms", error),
                     ("bias", bias),
