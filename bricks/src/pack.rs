@@ -16,8 +16,8 @@ const HEAD_BYTES: usize = 4;
 /// Packed bytes come in multiples of this, as the payloads of a file do.
 const PACKED_ALIGN: usize = 16;
 
-/// Most bytes that a byte of a block unpacks to: a match of an LZ4 block takes three bytes, and one more for each 255 in
-/// its length.
+/// Most bytes that a byte of a block unpacks to: a match of an LZ4 block takes three bytes, and one more for each 255
+/// in its length.
 pub const MAX_RATIO: u64 = 255;
 
 /// Why bytes could not be unpacked.

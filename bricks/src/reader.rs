@@ -211,8 +211,8 @@ impl Reader<'_> {
         Ok(Directory(directory))
     }
 
-    /// Reads the records of a section; none of an optional one that the file does not have. `directory` was found right,
-    /// so the length is less than the file's.
+    /// Reads the records of a section; none of an optional one that the file does not have. `directory` was found
+    /// right, so the length is less than the file's.
     pub(crate) fn section<T: Pod>(&self, directory: &Directory, section: Section) -> Result<Vec<T>, Error> {
         let Some(entry) = directory.entry(section) else { return Ok(Vec::new()) };
         debug_assert!(size_of::<T>() == entry.record_bytes as usize);
@@ -278,8 +278,8 @@ impl Reader<'_> {
         decoded.map_err(|error| self.invalid(Flaw::packed(Part::Payload(payload), error)))
     }
 
-    /// Unpacks the samples of `field` to `out`, [`DisplacementField::loaded_bytes`] long, from a copy whose checksum was
-    /// compared.
+    /// Unpacks the samples of `field` to `out`, [`DisplacementField::loaded_bytes`] long, from a copy whose checksum
+    /// was compared.
     pub(crate) fn displacement(
         &self,
         payload: Payload,

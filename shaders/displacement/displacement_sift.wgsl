@@ -67,7 +67,7 @@ fn ask(carrier: DisplacementCarrier, ray: Ray, end: f32, leaves: f32, known: ptr
     let share = share_of(field, chord);
     let t = barrier(barrier(chord.at + from_middle(chord, share)) * per_unit);
     if share < 0.0 || t > end {
-        if enter < near {
+        if enter < near && near > ray.t_min {
             (*known).traced = max((*known).traced, min(near, leave));
         }
     } else if t <= near {

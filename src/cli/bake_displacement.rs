@@ -5,7 +5,7 @@ use super::options::args::BakeDisplacementArgs;
 use crate::cli::output::{note, warn};
 use crate::secondary::displacement::make::{Making, Outcome, Watch, add_fields};
 use crate::secondary::displacement::{Bench, Shape};
-use crate::session::trace::{EXTENT, for_rays};
+use crate::session::trace::for_rays;
 use crate::session::{Opened, Settings, open_scene};
 use crate::settings::Adapter;
 use crate::settings::names;
@@ -87,20 +87,6 @@ pub fn add(path: &Path, output: &Path, making: &Making, memory: u64, adapter: &A
 /// What a scene file says of who has traced its fields.
 pub fn executor_of(bench: &mut Bench) -> u32 {
     if bench.executor.device().backend == "cpu" { DISPLACEMENT_BY_CPU } else { DISPLACEMENT_BY_GPU }
-}
-
-impl Opened {
-    /// For making displacement fields.
-    pub fn bench(&mut self) -> Bench<'_> {
-        let tile = (EXTENT.tile * EXTENT.tile) as usize;
-        Bench {
-            scene: &self.scene,
-            executor: &mut *self.executor,
-            cache: &mut self.cache,
-            most: self.extent.rays(),
-            tile,
-        }
-    }
 }
 
 /// Shows progress.

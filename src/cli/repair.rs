@@ -9,11 +9,15 @@ use super::convert::{expand, mesh_settings, usage, work_settings};
 use super::options::args::RepairArgs;
 use super::{interrupt, verify};
 use crate::cli::output::{Usage, note};
+use crate::secondary::displacement::make::make_again;
+use crate::session::trace::for_rays;
+use crate::session::{Opened, Settings as Walk, open_scene};
+use crate::settings::Adapter;
 use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::ending::Temporary;
 use bricks::layout::PAGE_BYTES;
-use bricks::{Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};
+use bricks::{DISPLACEMENT_BY_CPU, Error, Manifest, Part, Partial, Payload, SceneFile, VerifyReport, Writer};
 use brickwalk_convert::build::{BuildError, BuildSettings, LatticeStep, TextureEncoding, build_source};
 use brickwalk_convert::import::{ImportSettings, import};
 use brickwalk_convert::progress::Progress;
@@ -30,7 +34,7 @@ use xxhash_rust::xxh3::xxh3_64;
 ///
 /// # Errors
 /// More than bricks and textures is damaged, the inputs or options are not those of the conversion (nothing is changed
-/// then), or the file cannot be written. Damaged displacement fields are an error after the rest is repaired.
+/// then), or the file cannot be written.
 pub fn run(args: &RepairArgs) -> Result<()> {
     let name = args.scene.display();
     let scene = SceneFile::open(&args.scene)?;
@@ -39,8 +43,7 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     // The conversion makes no fields.
     let (fields, damaged): (BTreeSet<Payload>, BTreeSet<Payload>) =
         damaged.into_iter().partition(|payload| matches!(payload, Payload::Displacement(_)));
-    if damaged.is_empty() {
-        no_damaged_fields(&scene, &fields)?;
+    if damaged.is_empty() && fields.is_empty() {
         return note(&format!("{name}: OK, nothing to repair\n"));
     }
     // Before the long work, so that a file that cannot be written is found at once.
@@ -52,32 +55,46 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     let target = args.scene.canonicalize().unwrap_or_else(|_| args.scene.clone());
     // Until the end, so that no other process repairs it.
     let _reserved = reserve(&args.scene, &target)?;
-    let scratch = scratch_folder(args.work.scratch.as_deref(), &target)?;
-    let _noted = Temporary::note(scratch.path());
-    let rebuilt = rebuild(args, &scene, scratch.path(), &progress)?;
-    for &payload in &damaged {
-        check(&scene, &rebuilt, payload)?;
-    }
     let mut bytes = 0;
-    for &payload in &damaged {
-        bytes += replace(&scene, &rebuilt, payload, &mut file)?;
+    if !damaged.is_empty() {
+        let scratch = scratch_folder(args.work.scratch.as_deref(), &target)?;
+        let _noted = Temporary::note(scratch.path());
+        let rebuilt = rebuild(args, &scene, scratch.path(), &progress)?;
+        for &payload in &damaged {
+            check(&scene, &rebuilt, payload)?;
+        }
+        for &payload in &damaged {
+            bytes += replace(&scene, &rebuilt, payload, &mut file)?;
+        }
     }
+    bytes += remake_fields(args, &fields, &mut file)?;
     file.sync_all().with_context(|| format!("{name}: cannot sync this file to the disk; repair it again"))?;
-    let parts: Vec<String> = damaged.iter().map(Payload::to_string).collect();
-    note(&format!("{name}: repaired {} ({})\n", parts.join(", "), human_bytes(bytes)))?;
-    no_damaged_fields(&scene, &fields)
+    let parts: Vec<String> = damaged.iter().chain(&fields).map(Payload::to_string).collect();
+    note(&format!("{name}: repaired {} ({})\n", parts.join(", "), human_bytes(bytes)))
 }
 
-/// Refuses damaged displacement fields, by name.
-fn no_damaged_fields(scene: &SceneFile, fields: &BTreeSet<Payload>) -> Result<()> {
-    let names: Vec<String> = fields.iter().map(Payload::to_string).collect();
-    ensure!(
-        fields.is_empty(),
-        "{}: damaged: {}; displacement fields cannot be repaired; bake them again with brickwalk bake-displacement",
-        scene.path().display(),
-        names.join(", ")
-    );
-    Ok(())
+/// Makes damaged displacement fields anew, by the executor that traced them, from a scene whose other payloads are
+/// whole; the bytes written.
+fn remake_fields(args: &RepairArgs, fields: &BTreeSet<Payload>, file: &mut File) -> Result<u64> {
+    let scene = open_scene(&args.scene)?;
+    let mut bytes = 0;
+    for (&payload, record) in fields.iter().filter_map(|payload| match payload {
+        Payload::Displacement(number) => Some((payload, scene.resident().displacement[*number as usize])),
+        _ => None,
+    }) {
+        let adapter = if record.executor == DISPLACEMENT_BY_CPU { Adapter::Cpu } else { Adapter::Auto };
+        let settings = for_rays(&Walk { adapter, ..Walk::exact() });
+        let packed = make_again(&mut Opened::open(scene.clone(), &args.scene, &settings)?.bench(), &record)?;
+        ensure!(
+            (packed.len() as u64, xxh3_64(&packed)) == (record.span.bytes, record.span.checksum),
+            "{}: the rebuilt {payload} differs from the original, which another device or version has made; nothing \
+             of it was changed; make all anew with brickwalk bake-displacement",
+            args.scene.display()
+        );
+        write_payload(&scene, payload, packed, file)?;
+        bytes += record.span.bytes;
+    }
+    Ok(bytes)
 }
 
 /// Reserves the repair of the scene for this process, by a file beside it that goes with the last process.
@@ -225,9 +242,15 @@ fn check(scene: &SceneFile, rebuilt: &SceneFile, payload: Payload) -> Result<()>
 
 /// Writes a rebuilt payload and the zeros after it; returns its length.
 fn replace(scene: &SceneFile, rebuilt: &SceneFile, payload: Payload, file: &mut File) -> Result<u64> {
+    let mut bytes = vec![0; scene.span(payload).bytes as usize];
+    rebuilt.copy_stored(payload, &mut bytes)?;
+    write_payload(scene, payload, bytes, file)
+}
+
+/// Writes a payload and the zeros after it; returns its length.
+fn write_payload(scene: &SceneFile, payload: Payload, mut bytes: Vec<u8>, file: &mut File) -> Result<u64> {
     let span = scene.span(payload);
-    let mut bytes = vec![0; span.bytes.next_multiple_of(PAGE_BYTES) as usize];
-    rebuilt.copy_stored(payload, &mut bytes[..span.bytes as usize])?;
+    bytes.resize(span.bytes.next_multiple_of(PAGE_BYTES) as usize, 0);
     let written = file.seek(SeekFrom::Start(span.offset)).and_then(|_| file.write_all(&bytes));
     written.with_context(|| format!("{}: cannot write {payload}; repair it again", scene.path().display()))?;
     Ok(span.bytes)

@@ -3,8 +3,8 @@
 use super::{ExecutorError, Step, Tracer};
 use crate::stream::Item;
 
-/// Traces the rays of a pass, after the steps in `first` have made them, against `lists`, the leaves of each tile. Their
-/// bricks are `bricks`, which are loaded a few at a time.
+/// Traces the rays of a pass, after the steps in `first` have made them, against `lists`, the leaves of each tile.
+/// Their bricks are `bricks`, which are loaded a few at a time.
 ///
 /// # Errors
 /// What the executor says.

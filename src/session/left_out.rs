@@ -35,7 +35,7 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let fits = renderer.cache.residency.budget_bytes() >= renderer.cache.sizes.sum();
-    let all: [(bool, &str, &str, Option<Keeper>); 7] = [
+    let all: [(bool, &str, &str, Option<Keeper>); 8] = [
         (fits, "queries for missing bricks", "the cache holds every brick and tile", Some(|keep| keep.queries = true)),
         (!manifest.has_textures, "texture lookups", "no material has a texture", Some(|keep| keep.textures = true)),
         (
@@ -52,6 +52,7 @@ pub fn left_out(renderer: &mut Renderer) -> Vec<LeftOut> {
         ),
         (!manifest.has_instances, "instance transforms", "everything is baked into the world", None),
         (has_short_rays, "occupancy maps for ao", "its rays are shorter than three cells of bricks", None),
+        (resident.displacement.is_empty(), "displacement fields", "the scene has none", None),
         (!manifest.has_wide_bricks, "two-part vertices", "every brick is near", None),
     ];
     let all = all.into_iter().filter(|(is_left_out, ..)| *is_left_out);

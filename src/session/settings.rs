@@ -178,8 +178,8 @@ settings! {
         /// all are traced. `roma`: those of `ao` and `diffuse` by occupancy maps, with a bias of a few cells and
         /// without a brick loaded. `auto`: those of `ao` that the maps find free are not traced. `df`: those of `ao` by
         /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
-        /// walk. `displacement`: by what `bake-displacement` has put into the scene file, mostly rays against bricks that
-        /// are not resident. Rays of `shadow` are traced unless asked: shadow=roma.
+        /// walk. `displacement`: by what `bake-displacement` has put into the scene file, mostly rays against bricks
+        /// that are not resident. Rays of `shadow` are traced unless asked: shadow=roma.
         secondary: EffectMethods = EffectMethods::EXACT, "--secondary METHOD", Rule::Any, "", Methods, Common;
 
         /// Measure the error of frames after so many samples per pixel, as 1,4,16,64. `--reference` is what they are

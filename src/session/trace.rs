@@ -13,6 +13,7 @@ use crate::kernels::{Directions, Extent, FrameExecutor, View, layout};
 use crate::output::npy::{Hit, Ray};
 use crate::schedule::cache::Cache;
 use crate::schedule::{self, Lamp, Pass, Step, Tracer, Tracing, attributes};
+use crate::secondary::displacement::Bench;
 use crate::session::Settings;
 use crate::settings::{ImageSize, Schedule};
 use anyhow::Result;
@@ -52,6 +53,20 @@ impl Opened {
             cache: &mut self.cache,
             schedule: self.schedule,
             most: self.extent.rays(),
+        }
+    }
+}
+
+impl Opened {
+    /// For making displacement fields; opened with settings of [`for_rays`].
+    pub fn bench(&mut self) -> Bench<'_> {
+        Bench {
+            scene: &self.scene,
+            executor: &mut *self.executor,
+            cache: &mut self.cache,
+            most: self.extent.rays(),
+            // Tiles are as wide as the extent.
+            tile: (self.extent.tile * self.extent.width) as usize,
         }
     }
 }

@@ -74,6 +74,7 @@ mod shading {
 
 /// Methods of secondary visibility against closed forms and exact rays.
 mod secondary {
+    mod displacement;
     mod dvf;
     mod dvf_paper;
     mod dvf_renew;

@@ -145,7 +145,8 @@ pub struct ConvertArgs {
     #[arg(long, help_heading = "Textures", value_name = "ENCODING", value_parser = textures(), default_value = "bc7")]
     pub textures: TextureEncoding,
     /// Keep the meshes of nodes called NAME, and of nodes below them, as instances that walk --motion can move; *
-    /// matches any characters, ? one. May be repeated [default: none; meshes used once become part of the world object]
+    /// matches any characters, ? one. May be repeated [default: none; meshes used once become part of the world
+    /// object]
     #[arg(long, help_heading = "Meshes", value_name = "NAME")]
     pub movable: Vec<String>,
     /// Leave out inputs that are bad, and say which and why, instead of refusing all of them
@@ -180,12 +181,12 @@ pub struct MeshArgs {
     /// Skip triangles with non-finite vertices instead of refusing the input
     #[arg(long)]
     pub drop_non_finite: bool,
-    /// Store a mesh that is used twice or more once, if it has at least this many triangles; copies of smaller ones are
-    /// baked into the world object
+    /// Store a mesh that is used twice or more once, if it has at least this many triangles; copies of smaller ones
+    /// are baked into the world object
     #[arg(long, value_name = "COUNT", default_value = "1K", value_parser = positive_count32)]
     pub instance_min_triangles: u32,
-    /// Most triangles of smaller meshes, all copies counted, to bake into the world object; beyond this they are stored
-    /// once
+    /// Most triangles of smaller meshes, all copies counted, to bake into the world object; beyond this they are
+    /// stored once
     #[arg(long, value_name = "COUNT", default_value = "4M", value_parser = positive_count)]
     pub bake_budget: u64,
 }
@@ -265,8 +266,8 @@ pub struct SceneArgs {
     /// Random seed; equal seeds and counts make equal scenes
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Store the city's trees and vehicles once and place them as instances; the triangles are the same. Terrain always
-    /// uses instances for plants
+    /// Store the city's trees and vehicles once and place them as instances; the triangles are the same. Terrain
+    /// always uses instances for plants
     #[arg(long)]
     pub instanced: bool,
     /// Place N copies of the whole scene in a square; meshes of 1000 triangles and more are stored once
@@ -354,8 +355,8 @@ pub struct BakeDisplacementArgs {
     /// What gets fields: objects that are placed more than once, bricks of the others, or all
     #[arg(long, value_name = "WHAT", default_value = "all")]
     pub of: Subjects,
-    /// Positions on the sphere of an object: 290, 1090, 4226 or 16642; fields of bricks have as many samples as fit into
-    /// an eighth of their geometry
+    /// Positions on the sphere of an object: 290, 1090, 4226 or 16642; fields of bricks have as many samples as fit
+    /// into an eighth of their geometry
     #[arg(long, value_name = "N", default_value_t = 4226, value_parser = one_of::<290, 1090, 4226, 16642>)]
     pub positions: u32,
     /// Directions of a position of an object, on each axis of their square: 32, 64, 128 or 256

@@ -258,6 +258,7 @@ fn help_explains_units_and_defaults() {
     names.sort();
     let commands = [
         "adapters",
+        "bake-displacement",
         "bench",
         "compare",
         "completions",

@@ -25,6 +25,8 @@ use crate::schedule::{Executor, Lamp, Optimisation, Pass, Step, Tracing};
 use crate::secondary::df::answer::Df;
 use crate::secondary::df::maps::DfMaps;
 use crate::secondary::df::{DistanceField, LEVELS, Options, kernels as df};
+use crate::secondary::displacement;
+use crate::secondary::displacement::make::{Making, add_fields};
 use crate::secondary::dvf::{Cells, Dvf, DvfSettings, DvfTracing, DvfUse, Region, Renewal};
 use crate::secondary::occupancy::{Bom, Cascades, Source};
 use crate::secondary::roma::answer::Roma;
@@ -32,8 +34,10 @@ use crate::secondary::roma::maps::RomaMaps;
 use crate::secondary::roma::{Grid, Role, RomaPart, RomaPass, RomaSettings, Sift};
 use crate::secondary::rsm::RsmSettings;
 use crate::secondary::{EffectMethods, FAMILIES, Method};
-use crate::session::Settings;
 use crate::session::renderer::methods;
+use crate::session::trace::for_rays;
+use crate::session::{Opened, Settings};
+use crate::settings::Adapter;
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, build};
@@ -168,6 +172,18 @@ fn textured(tiled: bool) -> Arc<SceneFile> {
     Arc::new(scene)
 }
 
+/// A scene with displacement fields of few samples, of so many bits.
+fn with_fields(scene: Arc<SceneFile>, bits: u32) -> Arc<SceneFile> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fields.bricks");
+    let settings = for_rays(&Settings { adapter: Adapter::Cpu, ..Settings::exact() });
+    let mut opened = Opened::open(scene, &path, &settings).unwrap();
+    let making = Making { objects: Some(displacement::Shape { rings: 4, directions: 8 }), bricks: true, bits };
+    let made = add_fields(&mut opened.bench(), &path, &making, 0, 1 << 30, &mut ()).unwrap();
+    assert!(made.fields.iter().sum::<usize>() > 0, "{made:?}");
+    Arc::new(SceneFile::from_bytes("fields", std::fs::read(&path).unwrap()).unwrap())
+}
+
 /// One way to render.
 struct Variant {
     schedule: Schedule,
@@ -187,6 +203,8 @@ struct Variant {
     field: Option<u32>,
     /// A method as a session makes it.
     method: Method,
+    /// How displacement fields answer, where they are the method.
+    displacement: Option<displacement::Options>,
     /// How a field of visibility is made that answers rays to the environment, if one does.
     dvf: Option<DvfSettings>,
 }
@@ -203,6 +221,7 @@ const VARIANT: Variant = Variant {
     tile_bytes: None,
     field: None,
     method: Method::Exact,
+    displacement: None,
     dvf: None,
 };
 
@@ -360,6 +379,7 @@ fn render(
     };
     let mut usual = Settings { secondary: EffectMethods::every(variant.method), ..Settings::exact() };
     (usual.roma.size, usual.rsm.size, usual.df.size) = (32, 64, 32);
+    usual.displacement = variant.displacement.clone().unwrap_or_default();
     let methods = methods(&usual, engine.scene.resident());
     let mut renderer = Renderer { engine, methods };
     if let Some(settings) = variant.roma.map(roma) {
@@ -449,6 +469,18 @@ fn twins_agree_with_their_kernels() {
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
     ];
+    let asked = |against, interpolate, memory| Variant {
+        method: Method::Displacement,
+        displacement: Some(displacement::Options { against, interpolate, memory, near: 0.5 }),
+        ..VARIANT
+    };
+    use displacement::{Against, Interpolation};
+    let by_fields = [
+        asked(Against::All, Interpolation::None, 1 << 30),
+        asked(Against::Absent, Interpolation::Both, 1 << 30),
+        Variant { schedule: Schedule::Demand, ..asked(Against::All, Interpolation::Positions, 40_000) },
+        Variant { everything_fits: true, ..asked(Against::All, Interpolation::Directions, 1 << 30) },
+    ];
     // Whatever methods there are, with few cells.
     let usual = Method::ALL.iter().map(|&method| Variant { method, ..VARIANT }).filter(|v| v.method != Method::Exact);
     let variants: Vec<Variant> = variants.into_iter().chain(usual).collect();
@@ -473,6 +505,9 @@ fn twins_agree_with_their_kernels() {
         (Arc::new(probe::scene().unwrap()), &variants[..]),
         (textured(false), &variants[..]),
         (textured(true), &variants[2..11]),
+        (with_fields(Arc::new(probe::scene().unwrap()), 8), &by_fields[..]),
+        (with_fields(textured(false), 8), &by_fields[..2]),
+        (with_fields(textured(false), 1), &by_fields[2..]),
     ];
     let each = std::thread::scope(|scope| {
         let threads = scenes.map(|(scene, variants)| scope.spawn(|| check(scene, variants)));

@@ -31,7 +31,7 @@ pub struct Case {
     pub title: &'static str,
     /// Where truth comes from.
     pub truth: Source,
-    /// Measures it; `None`: the part of the program that it is about is not built yet.
+    /// Measures it; `None`: it has been measured, by the start-up probe.
     pub run: Option<fn(&mut Lab, &mut Checks) -> Result<()>>,
 }
 

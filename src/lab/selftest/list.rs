@@ -4,16 +4,14 @@ use super::boxes::Kind;
 use super::case::Source::{Analytic, Exact, Paths, Reference, Unit};
 use super::case::{Case, Checks, Source};
 use super::lab::Lab;
-use super::{boxes, histories, lights, maps, meshes, roma, samples, shapes, streaming, surfaces, views, visibility};
+use super::{
+    boxes, fields, histories, lights, maps, meshes, roma, samples, shapes, streaming, surfaces, views, visibility,
+};
 use anyhow::Result;
 use brickwalk_scenes::Stiff;
 
 const fn case(number: u32, title: &'static str, truth: Source, run: fn(&mut Lab, &mut Checks) -> Result<()>) -> Case {
     Case { number, title, truth, run: Some(run) }
-}
-
-const fn later(number: u32, title: &'static str, truth: Source) -> Case {
-    Case { number, title, truth, run: None }
 }
 
 /// All sixty.
@@ -85,7 +83,7 @@ pub const CASES: &[Case] = &[
     case(55, "albedo 0", Analytic, surfaces::black),
     case(56, "distances in f16", Reference, maps::distances),
     case(57, "jump flooding without a seed", Unit, maps::no_seed),
-    later(58, "displacement field: inside, tangent, miss", Analytic),
+    case(58, "displacement field: inside, tangent, miss", Analytic, fields::displacement),
     case(59, "uneven scale of instances", Reference, meshes::instances),
     case(60, "ten runs", Paths, views::ten_runs),
 ];

@@ -13,6 +13,7 @@ mod boxes;
 pub mod case;
 pub mod defects;
 mod errors;
+mod fields;
 mod histories;
 mod lab;
 mod lights;

@@ -223,6 +223,15 @@ pub trait Watch {
     fn advance(&mut self, units: u64) -> bool;
 }
 
+/// Nobody.
+impl Watch for () {
+    fn phase(&mut self, _: &'static str, _: u64) {}
+
+    fn advance(&mut self, _: u64) -> bool {
+        true
+    }
+}
+
 /// What came of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {

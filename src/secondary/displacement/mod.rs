@@ -24,6 +24,8 @@ mod library;
 pub mod make;
 mod settings;
 pub mod shape;
+#[cfg(test)]
+mod tests;
 pub mod twin;
 
 pub use answer::Displacement;

@@ -32,14 +32,15 @@ names! {
 settings! {
     /// How displacement fields answer rays.
     pub struct Options {
-        /// With --secondary displacement: bytes of fields that are kept on the device. Of more, those are kept that most
-        /// rays asked, times the bytes of geometry that they stand for.
+        /// With --secondary displacement: bytes of fields that are kept on the device. Of more than these, fields are
+        /// kept by the rays that asked them, times the bytes of geometry that they stand for.
         memory: u64 = 256 << 20, "--displacement-memory SIZE", Rule::Bytes(0), "bytes", Methods, Expert;
-        /// With --secondary displacement: around a ray's start it is traced, up to so many times the distance between
-        /// two positions on a field's sphere.
+        /// With --secondary displacement: up to so many cells of positions a ray is traced from its start. A cell is
+        /// the distance between two positions on a field's sphere: larger where a field has few.
         near: f64 = 2.0, "--displacement-near CELLS", Rule::Real(0.0, 64.0), "cells", Methods, Expert;
-        /// With --secondary displacement: `absent`: fields answer rays that would meet a brick that is not resident, or
-        /// an object that is placed more than once. `all`: every ray that meets something with a field.
+        /// With --secondary displacement: against what fields answer. `absent`: bricks that are not resident, and
+        /// objects that are placed more than once. `all`: whatever has a field, so that frames are the same for every
+        /// cache.
         against: Against = Against::Absent, "--displacement-against WHAT", Rule::Any, "", Methods, Expert;
         /// With --secondary displacement: between which samples of a field is weighed: none, positions, directions,
         /// both.

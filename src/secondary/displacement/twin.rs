@@ -101,7 +101,7 @@ impl Scene<'_> {
         let share = self.view(field).share(&chord, self.own.look);
         let t = chord.distance(share) * per_unit;
         if share < 0.0 || t > end {
-            if enter < near {
+            if enter < near && near > ray.t_min {
                 known.traced = most(known.traced, least(near, leave));
             }
         } else if t <= near {

@@ -37,7 +37,6 @@ fn usage_is_refused_with_status_2() {
         ("--cache", "101%"),
         ("--effects", "primary,glow"),
         ("--environment-rotation", "400"),
-        ("--secondary", "displacement"),
         ("--df-size", "100"),
         ("--schedule", "best"),
         ("--spp", "0"),
