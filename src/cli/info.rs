@@ -4,13 +4,14 @@ use super::options::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
 use super::{cached, instances};
 use crate::cli::output::{print, print_json};
+use crate::secondary::displacement::is_similarity;
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use crate::stream::PayloadSource;
 use crate::stream::Residency;
 use anyhow::{Context, Result};
 use bricks::{
-    BRICK_WIDE, Brick, DisplacementField, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, NEAR_STEPS, ORIGIN_STEPS,
-    PunctualLight, Resident, SceneFile, Texture,
+    BRICK_WIDE, Brick, DisplacementField, Instance, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, NEAR_STEPS,
+    ORIGIN_STEPS, PunctualLight, Resident, SceneFile, Texture,
 };
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -185,7 +186,7 @@ impl<'a> Info<'a> {
             scene,
             facts: facts.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
             lights: r.lights.iter().map(Light::of).collect(),
-            displacement: Displacement::of(&r.displacement),
+            displacement: Displacement::of(&r.displacement, &r.instances),
             left_out: left_out(m),
             warnings: &m.warnings,
             per_triangle: PerTriangle::of(r, &sections, scene.file_bytes()),
@@ -353,6 +354,8 @@ struct Displacement {
     bytes: u64,
     /// As they are loaded.
     loaded_bytes: u64,
+    /// Instances that no field answers for, as they are not scaled alike on all axes: rays against them are traced.
+    uneven_instances: u64,
     /// How the fields are sampled, each way once.
     sampled: Vec<Sampled>,
 }
@@ -373,7 +376,7 @@ struct Sampled {
 
 impl Displacement {
     /// Nothing of no fields.
-    fn of(records: &[DisplacementField]) -> Option<Self> {
+    fn of(records: &[DisplacementField], instances: &[Instance]) -> Option<Self> {
         let mut counts = BTreeMap::<_, u64>::new();
         for field in records {
             let directions = u64::from(field.directions) * u64::from(field.directions);
@@ -394,6 +397,7 @@ impl Displacement {
             bricks,
             bytes: records.iter().map(|field| field.span.bytes).sum(),
             loaded_bytes: records.iter().map(DisplacementField::loaded_bytes).sum(),
+            uneven_instances: instances.iter().filter(|instance| !is_similarity(instance)).count() as u64,
             sampled: sampled.collect(),
         })
     }
@@ -405,6 +409,10 @@ impl Displacement {
         let all = counted(self.fields, "field");
         let mut rows =
             vec![("displacement", format!("{all} of {objects} and {bricks}, {loaded} loaded, {stored} stored"))];
+        if self.uneven_instances > 0 {
+            let uneven = counted(self.uneven_instances, "instance");
+            rows.push(("", format!("none for {uneven}, scaled unevenly: rays against them are traced")));
+        }
         rows.extend(self.sampled.iter().map(|sampled| {
             let Sampled { positions, directions, bits, fields, .. } = sampled;
             let (fields, bits) = (counted(*fields, "field"), counted((*bits).into(), "bit"));
@@ -512,9 +520,14 @@ mod tests {
             span: bricks::Span { offset: 4096, bytes: 32, checksum: 0 },
             ..bytemuck::Zeroable::zeroed()
         };
-        assert_eq!(Displacement::of(&[]), None);
+        assert_eq!(Displacement::of(&[], &[]), None);
         let fields = [field(3, 16, 4, 8), field(4, 16, 4, 8), field(bricks::NONE, 8, 4, 1)];
-        let found = Displacement::of(&fields).unwrap();
+        let [even, uneven] = [2.0, 3.0].map(|y| {
+            let mut world_from_object = [0.0; 12];
+            (world_from_object[0], world_from_object[5], world_from_object[10]) = (2.0, y, 2.0);
+            Instance { world_from_object, ..bytemuck::Zeroable::zeroed() }
+        });
+        let found = Displacement::of(&fields, &[even, uneven, even]).unwrap();
         let sampled = |rings, positions, bits, fields| Sampled { rings, positions, directions: 16, bits, fields };
         assert_eq!(
             found,
@@ -524,6 +537,7 @@ mod tests {
                 bricks: 2,
                 bytes: 96,
                 loaded_bytes: 2 * 1090 * 16 + 592,
+                uneven_instances: 1,
                 sampled: vec![sampled(8, 290, 1, 1), sampled(16, 1090, 8, 2)],
             }
         );
@@ -532,6 +546,7 @@ mod tests {
             rows,
             [
                 "displacement: 3 fields of 1 object and 2 bricks, 34.6 KiB loaded, 96 B stored",
+                ": none for 1 instance, scaled unevenly: rays against them are traced",
                 ": 1 field of 290 positions x 16 directions, 1 bit a sample",
                 ": 2 fields of 1090 positions x 16 directions, 8 bits a sample",
             ]

@@ -31,6 +31,7 @@ pub mod twin;
 pub use answer::Displacement;
 pub use bake::{Bench, Job, Subject};
 pub use ball::Ball;
+pub use carriers::is_similarity;
 pub use field::{Chord, FieldView, code_of};
 pub use library::Library;
 pub use settings::{Against, Interpolation, Options};
