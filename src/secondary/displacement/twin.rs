@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 const RUN: usize = 256;
 /// Slower than this, in device units a unit of t, a ray stays where it is on an axis.
 const LEAST_SPEED: f32 = 8.673_617_4e-19;
-/// Nodes that wait at most: more than the height of [`super::carriers::Carriers`].
+/// Nodes that wait at most: more than the height of a tree of carriers.
 pub const STACK: usize = 32;
 
 /// What rays are asked against.
