@@ -18,6 +18,20 @@ fn eighth_turns(x: f32) -> f32 {
     return select(turns, 1.0 + turns, is_steep);
 }
 
+// Where in the unit square the point of the unit disc lies that is `radius` from its middle, toward d: the inverse of
+// the concentric map (Shirley, Chiu 1997).
+fn square_of_disc(d: vec2<f32>, radius: f32) -> vec2<f32> {
+    let a = abs(d.x);
+    let b = abs(d.y);
+    let greater = max(a, b);
+    if greater == 0.0 {
+        return vec2<f32>(0.5);
+    }
+    let other = barrier(radius * eighth_turns(divide(min(a, b), greater)));
+    let w = select(vec2<f32>(other, radius), vec2<f32>(radius, other), a > b);
+    return vec2<f32>(0.5) + 0.5 * select(w, -w, d < vec2<f32>(0.0));
+}
+
 // The angle of the point (x, y) from the x axis, in units of pi / 4: 0 to 8; 0 of the origin.
 fn eighths_around(x: f32, y: f32) -> f32 {
     let a = abs(x);

@@ -10,7 +10,7 @@
 const QUARTER_TURN: f32 = 1.5707964;
 // Slower than this, in device units a unit of t, a ray stays where it is on an axis.
 const LEAST_SPEED: f32 = 0x1p-60;
-const STACK: u32 = 32u;
+const STACK: u32 = 40u; // more than the height of a tree over 2^32 carriers
 
 // What is known of a ray.
 struct Known {

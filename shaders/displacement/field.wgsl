@@ -84,15 +84,7 @@ fn position_of(rings: u32, at: vec3<f32>) -> u32 {
 fn square_place(d: vec3<f32>) -> vec2<f32> {
     let across = barrier(barrier(d.x * d.x) + barrier(d.y * d.y));
     let radius = square_root(divide(across, barrier(across + barrier(d.z * d.z))));
-    let a = abs(d.x);
-    let b = abs(d.y);
-    let greater = max(a, b);
-    if greater == 0.0 {
-        return vec2<f32>(0.5);
-    }
-    let other = barrier(radius * eighth_turns(divide(min(a, b), greater)));
-    let w = select(vec2<f32>(other, radius), vec2<f32>(radius, other), a > b);
-    return vec2<f32>(0.5) + 0.5 * select(w, -w, d.xy < vec2<f32>(0.0));
+    return square_of_disc(d.xy, radius);
 }
 
 // Share of the chord at which a stored ray meets something; below 0: it meets nothing.

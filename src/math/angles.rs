@@ -18,6 +18,20 @@ pub fn eighth_turns(x: f32) -> f32 {
     if is_steep { 1.0 + turns } else { turns }
 }
 
+/// Where in the unit square the point of the unit disc lies that is `radius` from its middle, toward (x, y): the inverse
+/// of the concentric map (Shirley, Chiu 1997).
+pub fn square_of_disc([x, y]: [f32; 2], radius: f32) -> [f32; 2] {
+    let (a, b) = (x.abs(), y.abs());
+    let (greater, lesser) = if a > b { (a, b) } else { (b, a) };
+    if greater == 0.0 {
+        return [0.5; 2];
+    }
+    let other = radius * eighth_turns(divide(lesser, greater));
+    let (u, v) = if a > b { (radius, other) } else { (other, radius) };
+    let signed = |w: f32, of: f32| 0.5 + 0.5 * if of < 0.0 { -w } else { w };
+    [signed(u, x), signed(v, y)]
+}
+
 /// The angle of the point (x, y) from the x axis, in units of π / 4: 0 to 8; 0 of the origin.
 pub fn eighths_around(x: f32, y: f32) -> f32 {
     let (a, b) = (x.abs(), y.abs());

@@ -93,7 +93,7 @@ impl Carriers {
 
     /// Makes node `number` of `all`.
     fn split(&mut self, number: usize, all: &mut [Boxed], frame: &Frame, scale: f64, height: usize) {
-        assert!(height + 2 < STACK, "halves of fewer than 2^32 things");
+        assert!(height + 2 < STACK, "a tree of halves over fewer than 2^32 leaves is no higher than 32");
         let bounds = all.iter().skip(1).fold(all[0].bounds, |bounds, one| bounds.and(one.bounds));
         let at = |x: i64, k: usize| ((x - frame.reference[k]) as f64 * scale) as f32;
         // Beyond what rounding moves a face by, or a ray's place on it.

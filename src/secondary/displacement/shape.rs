@@ -7,7 +7,7 @@
 //! which are twins of `shaders/displacement/field.wgsl`, rounded operation by operation.
 
 use crate::kernels::layout::DisplacementPosition;
-use crate::math::angles::{eighth_turns, eighths_around};
+use crate::math::angles::{eighths_around, square_of_disc};
 use crate::math::exact::{divide, square_root};
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
@@ -142,16 +142,7 @@ pub fn position_of(rings: u32, at: [f32; 3]) -> u32 {
 /// Where in the unit square a direction of any length lies whose z, along the inward normal, is not below 0.
 pub fn square_place([x, y, z]: [f32; 3]) -> [f32; 2] {
     let across = x * x + y * y;
-    let radius = square_root(divide(across, across + z * z));
-    let (a, b) = (x.abs(), y.abs());
-    let (greater, lesser) = if a > b { (a, b) } else { (b, a) };
-    if greater == 0.0 {
-        return [0.5; 2];
-    }
-    let other = radius * eighth_turns(divide(lesser, greater));
-    let (u, v) = if a > b { (radius, other) } else { (other, radius) };
-    let signed = |w: f32, of: f32| 0.5 + 0.5 * if of < 0.0 { -w } else { w };
-    [signed(u, x), signed(v, y)]
+    square_of_disc([x, y], square_root(divide(across, across + z * z)))
 }
 
 /// The number of the direction of a place in the unit square.

@@ -21,7 +21,7 @@ const RUN: usize = 256;
 /// Slower than this, in device units a unit of t, a ray stays where it is on an axis.
 const LEAST_SPEED: f32 = 8.673_617_4e-19;
 /// Nodes that wait at most: more than the height of a tree of carriers.
-pub const STACK: usize = 32;
+pub const STACK: usize = 40;
 
 /// What rays are asked against.
 struct Scene<'a> {

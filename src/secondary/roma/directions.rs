@@ -5,7 +5,7 @@
 //! stratum of a direction follows from the inverse of the map; that part is the twin of `shaders/roma/roma.wgsl`,
 //! rounded operation by operation.
 
-use crate::math::angles::eighth_turns;
+use crate::math::angles::square_of_disc;
 use crate::math::exact::{divide, square_root};
 use crate::math::sampling::{random4, uniform_hemisphere};
 
@@ -14,16 +14,7 @@ use crate::math::sampling::{random4, uniform_hemisphere};
 pub fn square_of([x, y, z]: [f32; 3]) -> [f32; 2] {
     let across = x * x + y * y;
     let length = square_root(across + z * z);
-    let radius = square_root(divide(across, length * (length + z.abs())));
-    let (a, b) = (x.abs(), y.abs());
-    let (greater, lesser) = if a > b { (a, b) } else { (b, a) };
-    if greater == 0.0 {
-        return [0.5; 2];
-    }
-    let other = radius * eighth_turns(divide(lesser, greater));
-    let (u, v) = if a > b { (radius, other) } else { (other, radius) };
-    let signed = |w: f32, of: f32| 0.5 + 0.5 * if of < 0.0 { -w } else { w };
-    [signed(u, x), signed(v, y)]
+    square_of_disc([x, y], square_root(divide(across, length * (length + z.abs()))))
 }
 
 /// Number of the stratum, of `k` x `k`, that a direction lies in, and whether it is in the upper hemisphere: else its
