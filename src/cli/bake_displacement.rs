@@ -7,9 +7,9 @@ use crate::secondary::displacement::make::{Making, Outcome, Watch, add_fields};
 use crate::secondary::displacement::{Bench, Shape};
 use crate::session::trace::for_rays;
 use crate::session::{Opened, Settings, open_scene};
-use crate::settings::Adapter;
-use crate::settings::names;
 use crate::settings::sizes::{counted, human_bytes, human_count};
+use crate::settings::{Adapter, CacheSize, names};
+use crate::stream::PayloadSource;
 use anyhow::Result;
 use bricks::{DISPLACEMENT_BY_CPU, DISPLACEMENT_BY_GPU};
 use brickwalk_convert::progress::Progress;
@@ -61,8 +61,15 @@ pub fn run(args: &BakeDisplacementArgs) -> Result<()> {
 /// As of [`run`].
 pub fn add(path: &Path, output: &Path, making: &Making, memory: u64, adapter: &Adapter) -> Result<()> {
     let start = Instant::now();
-    let settings = for_rays(&Settings { adapter: adapter.clone(), ..Settings::exact() });
     let scene = open_scene(path)?;
+    // Half of the memory for bricks, of the device or the processor, a quarter for what the host keeps of them.
+    let share = 100.0 * (memory / 2) as f64 / scene.sizes().sum().max(1) as f64;
+    let settings = for_rays(&Settings {
+        adapter: adapter.clone(),
+        cache: CacheSize::Percent(share.min(100.0)),
+        host_cache: memory / 4,
+        ..Settings::exact()
+    });
     let mut opened = Opened::open(Arc::clone(&scene), path, &settings)?;
     warn(std::mem::take(&mut opened.warnings));
     let mut bench = opened.bench();

@@ -18,8 +18,8 @@ pub fn eighth_turns(x: f32) -> f32 {
     if is_steep { 1.0 + turns } else { turns }
 }
 
-/// Where in the unit square the point of the unit disc lies that is `radius` from its middle, toward (x, y): the inverse
-/// of the concentric map (Shirley, Chiu 1997).
+/// Where in the unit square the point of the unit disc lies that is `radius` from its middle, toward (x, y): the
+/// inverse of the concentric map (Shirley, Chiu 1997).
 pub fn square_of_disc([x, y]: [f32; 2], radius: f32) -> [f32; 2] {
     let (a, b) = (x.abs(), y.abs());
     let (greater, lesser) = if a > b { (a, b) } else { (b, a) };

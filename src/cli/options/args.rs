@@ -365,7 +365,7 @@ pub struct BakeDisplacementArgs {
     /// Bits of a sample: 8 (where a ray meets something) or 1 (whether it does)
     #[arg(long, value_name = "BITS", default_value_t = 8, value_parser = one_of::<1, 1, 8, 8>)]
     pub bits: u32,
-    /// Memory limit [default: 1 GiB]
+    /// Memory limit: half of it for bricks, and never less than the two largest of them [default: 1 GiB]
     #[arg(long, value_name = "SIZE", value_parser = size_bytes)]
     pub memory: Option<u64>,
     /// What traces: auto (a hardware GPU if there is one, else the processor), cpu, or the graphics adapter whose name
