@@ -4,6 +4,7 @@
 //! bricks of its own object alone ([`listed`]). Fields share dispatches; tiles of rays belong to one field each.
 
 use super::ball::{Ball, Outermost};
+use super::carriers::is_similarity;
 use super::shape::{Shape, frame};
 use crate::counters::Counters;
 use crate::kernels::frame::Frame;
@@ -176,7 +177,7 @@ impl Run {
 struct Placed {
     frame: Frame,
     world_from_object: DAffine3,
-    /// Leaves of the top level that are its bricks, as of its first instance.
+    /// Leaves of the top level that are its bricks, as of its first instance that is a similarity.
     leaves: Vec<u32>,
 }
 
@@ -184,7 +185,9 @@ impl Placed {
     fn new(resident: &Resident, job: &Job) -> Self {
         let bricks = job.subject.bricks(resident);
         let is_of = |leaf: &bricks::Leaf| bricks.contains(&leaf.brick);
-        let instance = resident.leaves.iter().find(|leaf| is_of(leaf)).map_or(0, |leaf| leaf.instance);
+        // Distances of others are not those of the object.
+        let is_even = |leaf: &bricks::Leaf| is_similarity(&resident.instances[leaf.instance as usize]);
+        let instance = resident.leaves.iter().find(|leaf| is_of(leaf) && is_even(leaf)).map_or(0, |leaf| leaf.instance);
         let world_from_object = affine(&resident.instances[instance as usize].world_from_object);
         let center = world_from_object.transform_point3(job.ball.center);
         let own = |&(_, leaf): &(u32, &bricks::Leaf)| leaf.instance == instance && is_of(leaf);
