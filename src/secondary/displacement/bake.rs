@@ -3,9 +3,9 @@
 //! The rays of a field start on its sphere and are traced by the kernels that trace every other ray, but against the
 //! bricks of its own object alone ([`listed`]). Fields share dispatches; tiles of rays belong to one field each.
 
-use super::ball::{Ball, Outermost};
-use super::carriers::is_similarity;
+use super::ball::Ball;
 use super::shape::{Shape, frame};
+use super::subject::{Subject, is_similarity};
 use crate::counters::Counters;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{Hit, NONE, Params, Ray, T_INFINITE};
@@ -13,11 +13,10 @@ use crate::kernels::{Directions, FrameExecutor, View};
 use crate::scene::placement::affine;
 use crate::schedule::cache::Cache;
 use crate::schedule::{ExecutorError, Pass, Step, Tracer, Tracing, listed};
-use bricks::{Corners, Payload, Resident, SceneFile};
+use bricks::{Resident, SceneFile};
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// What rays are traced with.
 pub struct Bench<'a> {
@@ -31,73 +30,6 @@ pub struct Bench<'a> {
     pub most: usize,
     /// Rays of a tile, which lie one after another.
     pub tile: usize,
-}
-
-/// What a field is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Subject {
-    /// The object.
-    pub object: u32,
-    /// One brick of it, else all.
-    pub brick: Option<u32>,
-}
-
-impl Subject {
-    /// By which scene files have fields in order.
-    pub fn order(self) -> (u32, u32) {
-        (self.object, self.brick.unwrap_or(NONE))
-    }
-
-    /// Its bricks.
-    pub fn bricks(self, resident: &Resident) -> Range<u32> {
-        match self.brick {
-            Some(brick) => brick..brick + 1,
-            None => {
-                let object = &resident.objects[self.object as usize];
-                object.first_brick..object.first_brick + object.brick_count
-            }
-        }
-    }
-
-    /// A small sphere around it, object units.
-    ///
-    /// # Errors
-    /// A brick that cannot be read.
-    pub fn ball(self, scene: &SceneFile) -> Result<Ball, bricks::Error> {
-        let bricks: Vec<u32> = self.bricks(scene.resident()).collect();
-        let each = |brick: &u32| {
-            let mut outermost = Outermost::default();
-            corners(scene, *brick, &mut |point| outermost.add(point)).map(|()| outermost)
-        };
-        let all = bricks.par_iter().map(each).collect::<Result<Vec<_>, _>>()?;
-        let mut outermost = Outermost::default();
-        all.iter().flat_map(Outermost::points).for_each(|point| outermost.add(point));
-        let center = outermost.center().unwrap_or_default();
-        let farthest = |brick: &u32| {
-            let mut farthest = 0.0f64;
-            corners(scene, *brick, &mut |point| farthest = farthest.max(point.distance_squared(center)))?;
-            Ok(farthest)
-        };
-        let all = bricks.par_iter().map(farthest).collect::<Result<Vec<f64>, bricks::Error>>()?;
-        Ok(Ball::new(center, all.into_iter().fold(0.0, f64::max).sqrt()))
-    }
-}
-
-/// Tells the corners of all triangles of a brick, object units.
-fn corners(scene: &SceneFile, number: u32, take: &mut dyn FnMut(DVec3)) -> Result<(), bricks::Error> {
-    let payload = Payload::Geometry(number);
-    let mut bytes = vec![0; scene.loaded_bytes(payload) as usize];
-    scene.copy(payload, &mut bytes)?;
-    let brick = &scene.resident().bricks[number as usize];
-    let object = &scene.resident().objects[brick.object as usize];
-    let [step, unit] = [object.step_log2, object.unit_log2].map(|log2| f64::from(log2).exp2());
-    let corners = Corners::new(brick, &bytes);
-    for triangle in 0..brick.triangle_count {
-        for corner in corners.of(triangle) {
-            take(DVec3::from_array(std::array::from_fn(|k| brick.origin[k] as f64 * step + corner[k] * unit)));
-        }
-    }
-    Ok(())
 }
 
 /// Where rays start and go, beside the positions of a [`Shape`].

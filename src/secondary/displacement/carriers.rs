@@ -1,12 +1,12 @@
 //! What stands in the scene with a field, or without, in a tree of boxes.
 
-use super::bake::Subject;
 use super::library::Library;
+use super::subject::{Subject, is_similarity};
 use super::twin::STACK;
-use crate::kernels::frame::{Frame, is_stretched};
+use crate::kernels::frame::Frame;
 use crate::kernels::layout::{DisplacementCarrier, DisplacementNode, NONE};
 use crate::scene::placement::affine;
-use bricks::{Instance, Resident};
+use bricks::Resident;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -38,11 +38,6 @@ impl Bounds {
     fn middle(&self, k: usize) -> i128 {
         i128::from(self.min[k]) + i128::from(self.max[k])
     }
-}
-
-/// Whether an instance is turned, moved and scaled alike on all axes, so that spheres stay spheres.
-pub fn is_similarity(instance: &Instance) -> bool {
-    !is_stretched(&affine(&instance.world_from_object).matrix3)
 }
 
 /// Something with a box.

@@ -1,9 +1,9 @@
 //! The fields of a scene, and which of them are in memory.
 
-use super::bake::Subject;
 use super::ball::Ball;
 use super::kernels::{CODES, FAMILY, FIELDS, TABLE};
 use super::shape::Shape;
+use super::subject::Subject;
 use crate::kernels::FrameExecutor;
 use crate::kernels::layout::{DisplacementField, DisplacementPosition, NONE};
 use crate::schedule::ExecutorError;

@@ -1,11 +1,13 @@
 //! Fields for a scene: which are made, with how many samples, and what of a stopped run is kept.
 
-use super::bake::{Bench, Job, Subject, bake};
-use super::carriers::is_similarity;
+use super::bake::{Bench, Job, bake};
 use super::field::code_of;
 use super::shape::{MOST_RINGS, Shape};
+use super::subject::{Subject, is_similarity};
 use anyhow::{Context, Result, bail};
 use bricks::{Resident, SceneFile, Writer};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -115,7 +117,7 @@ fn make(
     watch: &mut dyn FnMut(u64) -> bool,
     take: &mut dyn FnMut(usize, Made) -> Result<()>,
 ) -> Result<bool> {
-    let mut open: std::collections::BTreeMap<usize, Samples> = std::collections::BTreeMap::new();
+    let mut open: BTreeMap<usize, Samples> = BTreeMap::new();
     let mut failed = None;
     let mut goes_on = true;
     bake(bench, jobs, None, &mut |number, first, shares| {
@@ -256,7 +258,6 @@ fn kept_name(scene: &Path) -> PathBuf {
 /// # Errors
 /// A brick that cannot be read.
 pub fn jobs_of(scene: &SceneFile, plan: &[(Subject, Shape)]) -> Result<Vec<Job>, bricks::Error> {
-    use rayon::prelude::*;
     let job = |&(subject, shape): &(Subject, Shape)| Ok(Job { subject, ball: subject.ball(scene)?, shape });
     plan.par_iter().map(job).collect()
 }

@@ -24,15 +24,16 @@ mod library;
 pub mod make;
 mod settings;
 pub mod shape;
+mod subject;
 #[cfg(test)]
 mod tests;
 pub mod twin;
 
 pub use answer::Displacement;
-pub use bake::{Bench, Job, Subject};
+pub use bake::{Bench, Job};
 pub use ball::Ball;
-pub use carriers::is_similarity;
 pub use field::{Chord, FieldView, code_of};
 pub use library::Library;
 pub use settings::{Against, Interpolation, Options};
 pub use shape::Shape;
+pub use subject::{Subject, is_similarity};
