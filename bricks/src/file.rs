@@ -6,7 +6,7 @@ use crate::occupancy::OccupancyMap;
 use crate::payload::Payload;
 use crate::place::PlaceError;
 use crate::reader::{Decoding, Reader, duplicate, length_of, open_file};
-use crate::records::{AttributeLayout, Span};
+use crate::records::{AttributeLayout, Brick, Span};
 use crate::resident::Resident;
 use crate::source::{MapSource, ReadSource, Source};
 use crate::validate;
@@ -98,6 +98,10 @@ impl SceneFile {
             lights: reader.section(&directory, Section::Lights)?,
             occupancy: reader.section(&directory, Section::Occupancy)?,
             displacement: reader.section(&directory, Section::Displacement)?,
+            levels: reader.section(&directory, Section::Levels)?,
+            level_leaves: reader.section(&directory, Section::LevelLeaves)?,
+            level_top2: reader.section(&directory, Section::LevelTop2)?,
+            level_top8: reader.section(&directory, Section::LevelTop8)?,
         };
         validate::resident(&resident).map_err(|flaw| reader.invalid(flaw))?;
         validate::spans(&resident, header.directory_offset).map_err(|flaw| reader.invalid(flaw))?;
@@ -130,7 +134,20 @@ impl SceneFile {
         self.resident.place(places)
     }
 
-    /// The resident part; it satisfies [`validate::resident`].
+    /// Has levels be bricks like others, in memory alone: [`Resident::use_levels`].
+    pub fn use_levels(&mut self) {
+        self.resident.use_levels();
+    }
+
+    /// A brick or level that exists.
+    fn brick(&self, index: u32) -> &Brick {
+        match index.checked_sub(self.resident.bricks.len() as u32) {
+            Some(level) => &self.resident.levels[level as usize].brick,
+            None => &self.resident.bricks[index as usize],
+        }
+    }
+
+    /// The resident part; it satisfies [`validate::resident`], but for levels in use.
     pub fn resident(&self) -> &Resident {
         &self.resident
     }
@@ -162,9 +179,9 @@ impl SceneFile {
     /// If the scene has no such brick, texture, tile, map or field, as indexing the resident part would.
     pub fn span(&self, payload: Payload) -> Span {
         match payload {
-            Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry,
-            Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes,
-            Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies,
+            Payload::Geometry(brick) => self.brick(brick).geometry,
+            Payload::Attributes(brick) => self.brick(brick).attributes,
+            Payload::Proxies(brick) => self.brick(brick).proxies,
             Payload::Opacity(map) => self.resident.opacity_maps[map as usize].texels,
             Payload::Texture(texture) => self.resident.textures[texture as usize].tail,
             Payload::Tile(tile) => self.resident.tiles[tile as usize],
@@ -179,7 +196,7 @@ impl SceneFile {
     /// As [`Self::span`].
     pub fn loaded_bytes(&self, payload: Payload) -> u64 {
         match payload {
-            Payload::Attributes(brick) => AttributeLayout::of(&self.resident.bricks[brick as usize]).bytes,
+            Payload::Attributes(brick) => AttributeLayout::of(self.brick(brick)).bytes,
             Payload::Displacement(field) => self.resident.displacement[field as usize].loaded_bytes(),
             _ => self.span(payload).bytes,
         }
@@ -198,9 +215,9 @@ impl SceneFile {
         let length = self.resident.loaded_bytes(payload).ok_or_else(|| self.no_such(payload))?;
         let (span, reader) = self.request(payload, length, out)?;
         match payload {
-            Payload::Attributes(brick) => DECODING.with_borrow_mut(|buffers| {
-                reader.attributes(payload, span, &self.resident.bricks[brick as usize], buffers, out)
-            })?,
+            Payload::Attributes(brick) => {
+                DECODING.with_borrow_mut(|buffers| reader.attributes(payload, span, self.brick(brick), buffers, out))?
+            }
             Payload::Displacement(field) => DECODING.with_borrow_mut(|buffers| {
                 reader.displacement(payload, &self.resident.displacement[field as usize], buffers, out)
             })?,
@@ -303,7 +320,7 @@ struct Validated {
 impl Validated {
     fn none(resident: &Resident) -> Self {
         let none = |count: usize| (0..count).map(|_| AtomicBool::new(false)).collect();
-        let (bricks, textures) = (resident.bricks.len(), resident.textures.len());
+        let (bricks, textures) = (resident.bricks.len() + resident.levels_beside().len(), resident.textures.len());
         Self {
             geometry: none(bricks),
             attributes: none(bricks),

@@ -5,6 +5,7 @@
 //! in the order of their kinds (each on a multiple of [`SECTION_ALIGN`]). The file ends with the last section.
 
 use crate::displacement::DisplacementField;
+use crate::levels::Level;
 use crate::occupancy::Occupancy;
 use crate::records::{
     Brick, Instance, Leaf, Material, Object, OpacityMap, PunctualLight, Span, Texture, TopNode2, TopNode8,
@@ -91,14 +92,11 @@ pub struct DirectoryEntry {
 
 /// Kind kept for directional visibility fields. Not in files of this version.
 pub const KIND_VISIBILITY_FIELDS: u32 = 17;
-/// Kind kept for levels of detail. Not in files of this version.
-pub const KIND_LEVELS_OF_DETAIL: u32 = 19;
 
 /// What a directory kind is called that this version does not have.
 pub(crate) fn unread_kind(kind: u32) -> &'static str {
     match kind {
         KIND_VISIBILITY_FIELDS => "kept for visibility fields",
-        KIND_LEVELS_OF_DETAIL => "kept for levels of detail",
         _ => "unknown",
     }
 }
@@ -135,11 +133,19 @@ pub enum Section {
     Occupancy = 16,
     /// [`DisplacementField`]s; optional.
     Displacement = 18,
+    /// [`Level`]s of detail; optional, as are the three sections that belong to them.
+    Levels = 19,
+    /// [`Leaf`]s of the top level over levels and bricks.
+    LevelLeaves = 20,
+    /// Its [`TopNode2`]s.
+    LevelTop2 = 21,
+    /// Its [`TopNode8`]s.
+    LevelTop8 = 22,
 }
 
 impl Section {
     /// All sections in the order of the file.
-    pub const ALL: [Section; 14] = [
+    pub const ALL: [Section; 18] = [
         Section::Manifest,
         Section::Objects,
         Section::Instances,
@@ -154,6 +160,10 @@ impl Section {
         Section::Lights,
         Section::Occupancy,
         Section::Displacement,
+        Section::Levels,
+        Section::LevelLeaves,
+        Section::LevelTop2,
+        Section::LevelTop8,
     ];
 
     /// Sections that every file has.
@@ -173,7 +183,10 @@ impl Section {
 
     /// Whether a file without records of the section has no entry of it in the directory.
     pub const fn is_optional(self) -> bool {
-        matches!(self, Section::Displacement)
+        matches!(
+            self,
+            Section::Displacement | Section::Levels | Section::LevelLeaves | Section::LevelTop2 | Section::LevelTop8
+        )
     }
 
     /// The section's place in [`Self::ALL`], and in the directory of a file that has all before it.
@@ -181,6 +194,10 @@ impl Section {
         match self {
             Section::Occupancy => 12,
             Section::Displacement => 13,
+            Section::Levels => 14,
+            Section::LevelLeaves => 15,
+            Section::LevelTop2 => 16,
+            Section::LevelTop8 => 17,
             numbered_from_one => numbered_from_one as usize - 1,
         }
     }
@@ -202,6 +219,10 @@ impl Section {
             Section::Lights => size_of::<PunctualLight>(),
             Section::Occupancy => size_of::<Occupancy>(),
             Section::Displacement => size_of::<DisplacementField>(),
+            Section::Levels => size_of::<Level>(),
+            Section::LevelLeaves => size_of::<Leaf>(),
+            Section::LevelTop2 => size_of::<TopNode2>(),
+            Section::LevelTop8 => size_of::<TopNode8>(),
         };
         bytes as u32
     }
@@ -223,6 +244,10 @@ impl Section {
             Section::Lights => "lights",
             Section::Occupancy => "occupancy",
             Section::Displacement => "displacement",
+            Section::Levels => "levels",
+            Section::LevelLeaves => "level leaves",
+            Section::LevelTop2 => "level top2",
+            Section::LevelTop8 => "level top8",
         }
     }
 }

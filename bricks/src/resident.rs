@@ -2,6 +2,7 @@
 
 use crate::displacement::DisplacementField;
 use crate::layout::{ENTRY_BYTES, Section};
+use crate::levels::Level;
 use crate::manifest::Manifest;
 use crate::occupancy::Occupancy;
 use crate::payload::Payload;
@@ -46,6 +47,15 @@ pub struct Resident {
     pub occupancy: Vec<Occupancy>,
     /// Displacement fields, ascending by object and brick.
     pub displacement: Vec<DisplacementField>,
+    /// Levels of detail, children before those that stand for them.
+    pub levels: Vec<Level>,
+    /// Leaves of the top level over bricks and levels: one for every brick and level of every instance. Empty once
+    /// levels are in use.
+    pub level_leaves: Vec<Leaf>,
+    /// The binary tree over them.
+    pub level_top2: Vec<TopNode2>,
+    /// The 8-wide tree over them.
+    pub level_top8: Vec<TopNode8>,
 }
 
 impl Resident {
@@ -66,6 +76,10 @@ impl Resident {
             Section::Lights => self.lights.len(),
             Section::Occupancy => self.occupancy.len(),
             Section::Displacement => self.displacement.len(),
+            Section::Levels => self.levels.len(),
+            Section::LevelLeaves => self.level_leaves.len(),
+            Section::LevelTop2 => self.level_top2.len(),
+            Section::LevelTop8 => self.level_top8.len(),
         }
     }
 
@@ -93,8 +107,8 @@ impl Resident {
     /// Where a payload lies, or `None` if there is no such brick, texture, tile, map or field, or no proxies.
     pub fn span(&self, payload: Payload) -> Option<Span> {
         match payload {
-            Payload::Geometry(brick) => self.bricks.get(brick as usize).map(|brick| brick.geometry),
-            Payload::Attributes(brick) => self.bricks.get(brick as usize).map(|brick| brick.attributes),
+            Payload::Geometry(brick) => self.brick(brick).map(|brick| brick.geometry),
+            Payload::Attributes(brick) => self.brick(brick).map(|brick| brick.attributes),
             Payload::Proxies(brick) => {
                 let brick = self.bricks.get(brick as usize);
                 brick.map(|brick| brick.proxies).filter(|span| *span != Span::default())
@@ -110,16 +124,17 @@ impl Resident {
     /// is that of its span but for attributes and displacement fields, which are encoded in the file.
     pub fn loaded_bytes(&self, payload: Payload) -> Option<u64> {
         match payload {
-            Payload::Attributes(brick) => self.bricks.get(brick as usize).map(|brick| AttributeLayout::of(brick).bytes),
+            Payload::Attributes(brick) => self.brick(brick).map(|brick| AttributeLayout::of(brick).bytes),
             Payload::Displacement(field) => self.displacement.get(field as usize).map(DisplacementField::loaded_bytes),
             _ => self.span(payload).map(|span| span.bytes),
         }
     }
 
-    /// Every payload with its span: the bricks' geometry, attributes and, if any, proxies in order of bricks, then the
+    /// Every payload with its span: geometry, attributes and, if any, proxies in order of bricks and levels, then the
     /// textures' tails, then the tiles, then the opacity maps, then the displacement fields.
     pub fn payloads(&self) -> impl Iterator<Item = (Payload, Span)> + '_ {
-        let bricks = (0u32..).zip(&self.bricks);
+        let levels = self.levels_beside().iter().map(|level| &level.brick);
+        let bricks = (0u32..).zip(self.bricks.iter().chain(levels));
         let bricks = bricks.flat_map(|(index, brick)| {
             let payloads = [Payload::Geometry(index), Payload::Attributes(index), Payload::Proxies(index)];
             let spans = payloads.into_iter().zip([brick.geometry, brick.attributes, brick.proxies]);

@@ -128,6 +128,10 @@ impl Verifier<'_> {
         let lights = self.section(directory, Section::Lights);
         let occupancy = self.section(directory, Section::Occupancy);
         let displacement = self.section(directory, Section::Displacement);
+        let levels = self.section(directory, Section::Levels);
+        let level_leaves = self.section(directory, Section::LevelLeaves);
+        let level_top2 = self.section(directory, Section::LevelTop2);
+        let level_top8 = self.section(directory, Section::LevelTop8);
         self.advance(directory.section_bytes());
 
         let whole = manifest.is_some()
@@ -143,7 +147,11 @@ impl Verifier<'_> {
             && tiles.is_some()
             && lights.is_some()
             && occupancy.is_some()
-            && displacement.is_some();
+            && displacement.is_some()
+            && levels.is_some()
+            && level_leaves.is_some()
+            && level_top2.is_some()
+            && level_top8.is_some();
         let resident = Resident {
             manifest: manifest.unwrap_or_default(),
             objects: objects.unwrap_or_default(),
@@ -159,6 +167,10 @@ impl Verifier<'_> {
             lights: lights.unwrap_or_default(),
             occupancy: occupancy.unwrap_or_default(),
             displacement: displacement.unwrap_or_default(),
+            levels: levels.unwrap_or_default(),
+            level_leaves: level_leaves.unwrap_or_default(),
+            level_top2: level_top2.unwrap_or_default(),
+            level_top8: level_top8.unwrap_or_default(),
         };
         let valid = whole && self.keep_flaw(validate::resident(&resident));
         let tiled = whole && self.keep_flaw(validate::spans(&resident, header.directory_offset));
@@ -251,7 +263,7 @@ fn check_payload(
     // Buffers are not initialised anew where they were long enough before: every byte is written.
     match payload {
         Payload::Attributes(brick) if valid => {
-            let brick = &resident.bricks[brick as usize];
+            let Some(brick) = resident.brick(brick) else { return Ok(()) };
             buffer.resize(AttributeLayout::of(brick).bytes as usize, 0);
             reader.attributes(payload, span, brick, decoding, buffer)?;
         }

@@ -375,6 +375,10 @@ fn section_bytes(resident: &Resident, section: Section) -> serde_json::Result<Co
         Section::Lights => bytemuck::cast_slice(&resident.lights),
         Section::Occupancy => bytemuck::cast_slice(&resident.occupancy),
         Section::Displacement => bytemuck::cast_slice(&resident.displacement),
+        Section::Levels => bytemuck::cast_slice(&resident.levels),
+        Section::LevelLeaves => bytemuck::cast_slice(&resident.level_leaves),
+        Section::LevelTop2 => bytemuck::cast_slice(&resident.level_top2),
+        Section::LevelTop8 => bytemuck::cast_slice(&resident.level_top8),
     }))
 }
 

@@ -28,7 +28,7 @@ pub fn contents(resident: &Resident, payload: Payload, bytes: &[u8], map: Option
         }
         Payload::Attributes(_) | Payload::Proxies(_) | Payload::Opacity(_) | Payload::Displacement(_) => return Ok(()),
     };
-    let brick = &resident.bricks[index as usize];
+    let Some(brick) = resident.brick(index) else { return Ok(()) };
     let object = &resident.objects[brick.object as usize];
     let part = Part::Payload(payload);
     let layout = GeometryLayout::of(brick);

@@ -32,12 +32,14 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
     })?;
     match payload {
         Payload::Geometry(index) => {
-            let brick = &resident.bricks[index as usize];
-            geometry(part, brick, &resident.objects[brick.object as usize], bytes)?;
+            let Some(brick) = resident.brick(index) else { return Ok(()) };
+            let object = &resident.objects[brick.object as usize];
+            geometry(part, brick, (object, triangle_ids(resident, index, brick)), bytes)?;
             opacity(part, brick, resident.materials.len() as u32, bytes)
         }
         Payload::Attributes(index) => {
-            attributes(part, &resident.bricks[index as usize], resident.materials.len() as u32, bytes)
+            let Some(brick) = resident.brick(index) else { return Ok(()) };
+            attributes(part, brick, resident.materials.len() as u32, bytes)
         }
         Payload::Proxies(index) => occupancy::map(resident, index, bytes),
         Payload::Displacement(index) => displacement::loaded(resident, index, bytes),
@@ -49,12 +51,20 @@ pub fn payload(resident: &Resident, payload: Payload, bytes: &[u8]) -> Result<()
     }
 }
 
-fn geometry(part: Part, brick: &Brick, object: &Object, bytes: &[u8]) -> Result<(), Flaw> {
+/// What ids of a brick's triangles are less than. A level of the world may stand for triangles of any instance.
+fn triangle_ids(resident: &Resident, index: u32, brick: &Brick) -> u32 {
+    if brick.object == 0 && index as usize >= resident.exact_bricks() {
+        // A scene has fewer than 2^32, as has been checked.
+        return resident.manifest.triangle_ids as u32;
+    }
+    resident.objects[brick.object as usize].triangle_ids
+}
+
+fn geometry(part: Part, brick: &Brick, (object, triangle_ids): (&Object, u32), bytes: &[u8]) -> Result<(), Flaw> {
     let layout = GeometryLayout::of(brick);
     let (vertex_bytes, steps) = if brick.flags & BRICK_WIDE != 0 { (24, WIDE_STEPS) } else { (12, NEAR_STEPS) };
     let vertices_end = layout.vertices + u64::from(brick.vertex_count) * vertex_bytes;
     let ids_end = layout.ids + u64::from(brick.triangle_count) * 4;
-    let triangle_ids = object.triangle_ids;
     nodes(part, brick, &bytes[..layout.vertices as usize])?;
     // Magnitudes are in the order of their bits, an infinity and what is no number above all. The reach is a power of
     // two in the range of f32, as `validate::resident` has found.

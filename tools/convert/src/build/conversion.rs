@@ -274,6 +274,10 @@ impl Conversion<'_> {
             lights: self.outline.lights.clone(),
             occupancy,
             displacement: Vec::new(),
+            levels: Vec::new(),
+            level_leaves: Vec::new(),
+            level_top2: Vec::new(),
+            level_top8: Vec::new(),
         };
         let dropped = Dropped::count(&resident, &cuts, &rounded_away);
         dropped.warn(&mut warnings);
