@@ -50,6 +50,7 @@ impl fmt::Display for Part {
             Part::Directory => write!(f, "the directory"),
             Part::Section(section) => write!(f, "section {section}"),
             Part::Record(Section::Bricks, index) => write!(f, "brick {index} (section bricks)"),
+            Part::Record(Section::Levels, index) => write!(f, "level {index} (section levels)"),
             Part::Record(section, index) => write!(f, "record {index} of section {section}"),
             Part::Payload(payload) => write!(f, "{payload}"),
             Part::PaddingAfterDirectory => write!(f, "the padding after the directory"),
@@ -186,12 +187,12 @@ pub enum Error {
         /// What can be asked for.
         expected: String,
     },
-    /// A part of a texture is at fault.
+    /// A part of a texture or a level of detail is at fault.
     #[error("{error} ({place})")]
-    Texture {
+    Within {
         /// What is wrong.
         error: Box<Error>,
-        /// Which part of which texture, by its name in the source.
+        /// Which part of which texture, by its name in the source; which level.
         place: String,
     },
 }
@@ -205,7 +206,7 @@ impl Error {
             Error::Corrupt { part, .. } | Error::Padding { part, .. } => Some(*part),
             Error::Invalid { flaw, .. } => Some(flaw.part),
             Error::Request { payload, .. } => Some(Part::Payload(*payload)),
-            Error::Texture { error, .. } => error.part(),
+            Error::Within { error, .. } => error.part(),
         }
     }
 
@@ -220,24 +221,25 @@ impl Error {
             | Error::Padding { path, .. }
             | Error::Invalid { path, .. }
             | Error::Request { path, .. } => path,
-            Error::Texture { error, .. } => error.path(),
+            Error::Within { error, .. } => error.path(),
         }
     }
 
-    /// What is wrong, without the texture that it is about.
+    /// What is wrong, without the texture or level that it is about.
     pub fn cause(&self) -> &Error {
         match self {
-            Error::Texture { error, .. } => error.cause(),
+            Error::Within { error, .. } => error.cause(),
             other => other,
         }
     }
 
-    /// The same error, said to be about a part of a texture if `place` says which.
+    /// The same error, said to be about a part of a texture or a level if `place` says which.
     pub(crate) fn within(self, place: Option<String>) -> Self {
         match (place, self) {
-            (Some(place), error @ (Error::Io { .. } | Error::Corrupt { .. } | Error::Invalid { .. })) => {
-                Error::Texture { error: Box::new(error), place }
-            }
+            (
+                Some(place),
+                error @ (Error::Io { .. } | Error::Corrupt { .. } | Error::Padding { .. } | Error::Invalid { .. }),
+            ) => Error::Within { error: Box::new(error), place },
             (_, error) => error,
         }
     }

@@ -141,10 +141,7 @@ impl SceneFile {
 
     /// A brick or level that exists.
     fn brick(&self, index: u32) -> &Brick {
-        match index.checked_sub(self.resident.bricks.len() as u32) {
-            Some(level) => &self.resident.levels[level as usize].brick,
-            None => &self.resident.bricks[index as usize],
-        }
+        self.resident.existing_brick(index)
     }
 
     /// The resident part; it satisfies [`validate::resident`], but for levels in use.
@@ -208,7 +205,7 @@ impl SceneFile {
     ///
     /// `out` must be [`Self::loaded_bytes`] long; it needs no alignment. After an error its contents are of no use.
     pub fn copy(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
-        self.copy_checked(payload, out).map_err(|error| error.within(self.resident.texture_of(payload)))
+        self.copy_checked(payload, out).map_err(|error| error.within(self.resident.place_of(payload)))
     }
 
     fn copy_checked(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
@@ -264,7 +261,7 @@ impl SceneFile {
     pub fn copy_stored(&self, payload: Payload, out: &mut [u8]) -> Result<(), Error> {
         let span = self.resident.span(payload).ok_or_else(|| self.no_such(payload))?;
         let (span, reader) = self.request(payload, span.bytes, out)?;
-        reader.payload(payload, span, out).map_err(|error| error.within(self.resident.texture_of(payload)))
+        reader.payload(payload, span, out).map_err(|error| error.within(self.resident.place_of(payload)))
     }
 
     /// Where `payload` lies, and a reader of it, if `out` is of the `length` asked for.
@@ -289,7 +286,11 @@ impl SceneFile {
     #[cold]
     fn no_such(&self, payload: Payload) -> Error {
         let expected = match payload {
-            Payload::Geometry(_) | Payload::Attributes(_) => format!("one of {} bricks", self.resident.bricks.len()),
+            Payload::Geometry(_) | Payload::Attributes(_) => {
+                let (bricks, levels) = (self.resident.exact_bricks(), self.resident.levels.len());
+                let levels = if levels > 0 { format!(" and {levels} levels") } else { String::new() };
+                format!("one of {bricks} bricks{levels}")
+            }
             Payload::Proxies(_) => format!("one of {} bricks with proxies", self.resident.occupancy.len()),
             Payload::Texture(_) => format!("one of {} textures", self.resident.textures.len()),
             Payload::Opacity(_) => format!("one of {} opacity maps", self.resident.opacity_maps.len()),

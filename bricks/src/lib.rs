@@ -24,6 +24,7 @@ pub mod ending;
 mod error;
 mod file;
 pub mod layout;
+mod level_use;
 mod levels;
 pub mod manifest;
 mod occupancy;

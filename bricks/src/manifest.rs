@@ -46,7 +46,7 @@ pub struct Manifest {
     pub has_instances: bool,
     /// Any animation in the source (ignored, reported).
     pub has_animation: bool,
-    /// Any wide brick.
+    /// Any wide brick, levels of detail not counted.
     pub has_wide_bricks: bool,
     /// Proxies: an occupancy map for every brick. Not in a scene without bricks.
     pub has_proxies: bool,

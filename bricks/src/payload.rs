@@ -3,7 +3,8 @@
 use std::fmt;
 
 /// A payload of the file: what is read on demand, by index of its [`crate::Brick`], [`crate::Texture`], tile,
-/// [`crate::OpacityMap`] or [`crate::DisplacementField`].
+/// [`crate::OpacityMap`] or [`crate::DisplacementField`]. Bricks of levels of detail ([`crate::Level`]) have the
+/// numbers behind those of the objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Payload {
     /// What traversal of a brick reads, laid out as [`crate::GeometryLayout`] says.

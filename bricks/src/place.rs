@@ -138,7 +138,7 @@ pub fn ceil_shift(x: i64, exponent: u8) -> i64 {
 impl Resident {
     /// The bounds of a leaf of the top level, steps of the world's lattice.
     pub fn leaf_box(&self, leaf: &Leaf) -> Bounds {
-        let (instance, brick) = (&self.instances[leaf.instance as usize], &self.bricks[leaf.brick as usize]);
+        let (instance, brick) = (&self.instances[leaf.instance as usize], self.existing_brick(leaf.brick));
         let own = [brick.min, brick.max];
         match leaf.instance {
             0 => own,
@@ -149,8 +149,9 @@ impl Resident {
         }
     }
 
-    /// Places instances by new matrices, world_from_object, row-major 3x4, and fits both top-level trees and the
-    /// scene's bounds to them. All else stays as it is. After an error nothing has changed.
+    /// Places instances by new matrices, world_from_object, row-major 3x4, and fits the top-level trees, those over
+    /// levels too, and the scene's bounds to them. All else stays as it is: levels of the world that stand for bricks
+    /// of moved instances show them where they were. After an error nothing has changed.
     ///
     /// # Errors
     /// An instance that does not exist or is the world, a matrix without an inverse, a place that is too far out.
@@ -222,38 +223,49 @@ impl Resident {
 
     /// Fits the trees to the instances, of which those that have moved are marked.
     fn refit(&mut self, has_moved: &[bool]) {
-        let mut boxes = vec![[[0; 3]; 2]; self.leaves.len()];
+        use std::mem::take;
+        let (mut top2, mut top8) = (take(&mut self.top2), take(&mut self.top8));
+        self.fit(has_moved, &self.leaves, &mut top2, &mut top8);
+        (self.top2, self.top8) = (top2, top8);
+        let (mut top2, mut top8) = (take(&mut self.level_top2), take(&mut self.level_top8));
+        self.fit(has_moved, &self.level_leaves, &mut top2, &mut top8);
+        (self.level_top2, self.level_top8) = (top2, top8);
+        if let Some(root) = self.top2.first() {
+            let step = pow2(self.objects[0].step_log2);
+            let corner = |p: [i64; 3]| p.map(|x| x as f64 * step);
+            (self.manifest.min, self.manifest.max) = (corner(root.min), corner(root.max));
+        }
+    }
+
+    /// Fits two trees over `leaves` to the instances, of which those that have moved are marked.
+    fn fit(&self, has_moved: &[bool], leaves: &[Leaf], top2: &mut [TopNode2], top8: &mut [TopNode8]) {
+        let mut boxes = vec![[[0; 3]; 2]; leaves.len()];
         // Children follow their parent.
-        for index in (0..self.top2.len()).rev() {
-            let node = self.top2[index];
+        for index in (0..top2.len()).rev() {
+            let node = top2[index];
             let [min, max] = if node.right == TOP_LEAF {
-                let leaf = &self.leaves[node.left as usize];
+                let leaf = &leaves[node.left as usize];
                 let own = if has_moved[leaf.instance as usize] { self.leaf_box(leaf) } else { [node.min, node.max] };
                 boxes[node.left as usize] = own;
                 own
             } else {
-                let [left, right] = [node.left, node.right].map(|child| &self.top2[child as usize]);
+                let [left, right] = [node.left, node.right].map(|child| &top2[child as usize]);
                 union([left.min, left.max], [right.min, right.max])
             };
-            let node = &mut self.top2[index];
+            let node = &mut top2[index];
             (node.min, node.max) = (min, max);
         }
-        let mut bounds = vec![[[0; 3]; 2]; self.top8.len()];
-        for index in (0..self.top8.len()).rev() {
-            let children = child_boxes(&self.top8[index], &bounds, &boxes);
+        let mut bounds = vec![[[0; 3]; 2]; top8.len()];
+        for index in (0..top8.len()).rev() {
+            let children = child_boxes(&top8[index], &bounds, &boxes);
             let mut all = children.iter().flatten().copied();
             // A node has a child.
             let Some(first) = all.next() else { continue };
             let [min, max] = all.fold(first, union);
             bounds[index] = [min, max];
             let Grid { exponent, lo, hi } = Grid::over(&children, min, max);
-            let node = &mut self.top8[index];
+            let node = &mut top8[index];
             (node.origin, node.exponent, node.lo, node.hi) = (min, exponent, lo, hi);
-        }
-        if let Some(root) = self.top2.first() {
-            let step = pow2(self.objects[0].step_log2);
-            let corner = |p: [i64; 3]| p.map(|x| x as f64 * step);
-            (self.manifest.min, self.manifest.max) = (corner(root.min), corner(root.max));
         }
     }
 }

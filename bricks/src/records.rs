@@ -123,7 +123,7 @@ pub struct Brick {
     pub attribute_vertex_count: u32,
     /// Levels of wide nodes, the root counted.
     pub height: u32,
-    /// Zero; for levels of detail.
+    /// Zero.
     pub _reserved0: u32,
     /// Origin in steps of the object's lattice; each a multiple of [`ORIGIN_STEPS`].
     pub origin: [i64; 3],

@@ -104,7 +104,7 @@ impl Resident {
         spans.map(|span| span.bytes).sum::<u64>() + self.opacity_bytes()
     }
 
-    /// Where a payload lies, or `None` if there is no such brick, texture, tile, map or field, or no proxies.
+    /// Where a payload lies, or `None` if there is no such brick, level, texture, tile, map or field, or no proxies.
     pub fn span(&self, payload: Payload) -> Option<Span> {
         match payload {
             Payload::Geometry(brick) => self.brick(brick).map(|brick| brick.geometry),
@@ -157,9 +157,9 @@ impl Resident {
         (own < texture.tile_count).then(|| (index as u32, texture.place_of(own)))
     }
 
-    /// The texture, by its name in the source, that a payload is part of, and which part, in words; `None` if it is of
-    /// none.
-    pub fn texture_of(&self, payload: Payload) -> Option<String> {
+    /// The texture, by its name in the source, that a payload is part of, and which part, in words; or of
+    /// which level it is what; `None` if it is of neither.
+    pub fn place_of(&self, payload: Payload) -> Option<String> {
         let named = |texture: u32| {
             let name = self.manifest.texture_names.get(texture as usize).map_or("", String::as_str);
             format!("texture {texture} \"{name}\"")
@@ -170,11 +170,10 @@ impl Resident {
                 let (texture, TilePlace { level, x, y }) = self.tile_of(tile)?;
                 Some(format!("column {x}, row {y} of level {level} of {}", named(texture)))
             }
-            Payload::Geometry(_)
-            | Payload::Attributes(_)
-            | Payload::Proxies(_)
-            | Payload::Opacity(_)
-            | Payload::Displacement(_) => None,
+            Payload::Geometry(_) | Payload::Attributes(_) => {
+                self.level_of(payload).is_some().then(|| self.name_of(payload))
+            }
+            Payload::Proxies(_) | Payload::Opacity(_) | Payload::Displacement(_) => None,
         }
     }
 }

@@ -207,7 +207,7 @@ impl Verifier<'_> {
             let reader = &self.reader;
             let check = |buffers: &mut (Vec<u8>, Decoding), &(payload, span): &(Payload, Span)| {
                 let checked = check_payload(reader, resident, (payload, span), valid, buffers);
-                checked.err().map(|error| error.within(resident.texture_of(payload)))
+                checked.err().map(|error| error.within(resident.place_of(payload)))
             };
             // The collection keeps the order of the batch.
             let problems: Vec<Option<Error>> = batch.par_iter().map_init(Default::default, check).collect();
@@ -222,7 +222,8 @@ impl Verifier<'_> {
         for (payload, span) in resident.payloads() {
             let end = span.offset + span.bytes;
             debug_assert!(end.next_multiple_of(PAGE_BYTES) <= payload_end);
-            self.padding(Part::PaddingAfterPayload(payload), end, end.next_multiple_of(PAGE_BYTES));
+            let level = resident.level_of(payload).map(|_| resident.name_of(payload));
+            self.padding((Part::PaddingAfterPayload(payload), level), end, end.next_multiple_of(PAGE_BYTES));
         }
     }
 
@@ -231,22 +232,23 @@ impl Verifier<'_> {
         let mut part = Part::PaddingAfterDirectory;
         let mut end = header.directory_offset + header.directory_bytes;
         for (section, entry) in directory.iter() {
-            self.padding(part, end, entry.offset);
+            self.padding((part, None), end, entry.offset);
             part = Part::PaddingAfterSection(*section);
             end = entry.offset + entry.bytes;
         }
     }
 
-    /// Checks that less than a page of bytes is zero.
-    fn padding(&mut self, part: Part, start: u64, end: u64) {
+    /// Checks that less than a page of bytes is zero, which are `part`, of `place`.
+    fn padding(&mut self, (part, place): (Part, Option<String>), start: u64, end: u64) {
         let mut page = [0; PAGE_BYTES as usize];
         let page = &mut page[..(end - start) as usize];
-        let read = self.reader.bytes(part, start, page);
+        let read = self.reader.bytes(part, start, page).map_err(|error| error.within(place.clone()));
         if self.keep(read).is_some()
             && let Some(at) = page.iter().position(|&byte| byte != 0)
         {
             let (path, offset) = (self.reader.path.to_owned(), start + at as u64);
-            self.report.problems.push(Error::Padding { path, part, offset, found: page[at] });
+            let problem = Error::Padding { path, part, offset, found: page[at] };
+            self.report.problems.push(problem.within(place));
         }
         self.advance(end - start);
     }

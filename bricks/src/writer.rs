@@ -190,7 +190,7 @@ impl Writer {
             Some(index) => Err(Flaw {
                 part: Part::Section(Section::Bricks),
                 found: format!(
-                    "no brick, texture, tile, map or field with the payload written at byte {}",
+                    "no brick, level, texture, tile, map or field with the payload written at byte {}",
                     self.spans[index].offset
                 ),
                 expected: "every written payload in use".to_owned(),

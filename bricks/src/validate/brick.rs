@@ -4,14 +4,12 @@ use super::contents;
 use super::node::NodeView;
 use super::rule::{encoded, length, rule};
 use crate::error::{Flaw, Part};
-use crate::layout::Section;
 use crate::payload::Payload;
 use crate::records::{AttributeLayout, BRICK_DETAIL, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout};
 use crate::records::{LATTICE_LIMIT, MAX_BRICK_HEIGHT, NEAR_STEPS, ORIGIN_STEPS, WIDE_STEPS};
 
-/// Checks a brick's record by itself.
-pub(super) fn record(index: u32, brick: &Brick) -> Result<(), Flaw> {
-    let part = Part::Record(Section::Bricks, index);
+/// Checks a brick's record, which is `part` or in it, by itself. `index` is what its payloads are named by.
+pub(super) fn record(part: Part, index: u32, brick: &Brick) -> Result<(), Flaw> {
     let known = BRICK_WIDE | BRICK_INDEX32 | BRICK_OPACITY | BRICK_DETAIL;
     rule(brick.flags & !known == 0, part, || (format!("flags {:#x}", brick.flags), "known flags"))?;
     rule(brick._reserved0 == 0 && brick._reserved1 == [0; 3], part, || ("reserved words", "zero in them"))?;

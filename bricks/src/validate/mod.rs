@@ -1,7 +1,7 @@
 //! The rules of the format, checked once at the file's edge so that everything behind it indexes freely.
 //!
-//! * [`resident`]: the resident part by itself. Every index, range, count and length in it is right, both top-level
-//!   trees are trees over exactly the leaves, nothing is infinite or not a number.
+//! * [`resident`]: the resident part by itself. Every index, range, count and length in it is right, top-level trees
+//!   are trees over exactly their leaves, levels of detail stand for what exists, nothing is infinite or not a number.
 //! * [`payload`]: the bytes of one payload, as it is loaded, against the resident part: every index in it, and that the
 //!   nodes of a brick are a tree no higher than the brick says.
 //! * [`spans`]: payloads fill the file up to the directory and do not overlap, displacement fields last.
@@ -11,6 +11,7 @@
 mod brick;
 mod contents;
 mod displacement;
+mod levels;
 mod node;
 mod occupancy;
 mod payload;
@@ -28,7 +29,7 @@ use crate::records::Span;
 use crate::resident::Resident;
 use rule::rule;
 
-/// Checks the resident part by itself; see the module's head.
+/// Checks the resident part by itself; see the module's head. Levels of detail are beside the scene, as in a file.
 pub fn resident(resident: &Resident) -> Result<(), Flaw> {
     for section in Section::ALL {
         let count = resident.count(section);
@@ -41,13 +42,14 @@ pub fn resident(resident: &Resident) -> Result<(), Flaw> {
     scene::opacity_maps(resident)?;
     scene::lights(resident)?;
     for (index, record) in (0u32..).zip(&resident.bricks) {
-        brick::record(index, record)?;
+        brick::record(Part::Record(Section::Bricks, index), index, record)?;
     }
     occupancy::records(resident)?;
     displacement::records(resident)?;
-    scene::leaves(resident)?;
-    top::binary(&resident.top2, resident.leaves.len())?;
-    top::wide(&resident.top8, resident.leaves.len())?;
+    scene::leaves(resident, Section::Leaves, &resident.leaves, &[])?;
+    top::binary(Section::Top2, &resident.top2, resident.leaves.len())?;
+    top::wide(Section::Top8, &resident.top8, resident.leaves.len())?;
+    levels::levels(resident)?;
     scene::manifest(resident)
 }
 

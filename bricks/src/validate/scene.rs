@@ -3,10 +3,12 @@
 use super::rule::{length, rule};
 use crate::error::{Flaw, Part};
 use crate::layout::Section;
+use crate::levels::Level;
 use crate::payload::Payload;
 use crate::records::WRAP_MIRROR;
 use crate::records::{
-    BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, LIGHT_DISTANT, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED,
+    BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, LIGHT_DISTANT, Leaf, MATERIAL_BLEND,
+    MATERIAL_DOUBLE_SIDED,
 };
 use crate::records::{MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE};
 use crate::records::{
@@ -121,25 +123,40 @@ fn in_units(resident: &Resident, instance: &Instance) -> [f64; 21] {
     })
 }
 
-/// There is one leaf for every brick of every instance.
-pub(super) fn leaves(resident: &Resident) -> Result<(), Flaw> {
-    // Leaves of one instance are numbered by brick from `starts[instance]`, to see that none comes twice.
+/// `section` has one of `leaves` for every brick, and every one of `levels`, of every instance. Levels are of objects
+/// that exist.
+pub(super) fn leaves(resident: &Resident, section: Section, leaves: &[Leaf], levels: &[Level]) -> Result<(), Flaw> {
+    // Bricks of an object are numbered from its first, its levels behind them in their order.
+    let mut own: Vec<u32> = resident.objects.iter().map(|object| object.brick_count).collect();
+    let mut places = Vec::with_capacity(levels.len());
+    for level in levels {
+        let count = &mut own[level.brick.object as usize];
+        places.push(*count);
+        *count += 1;
+    }
+    // Leaves of one instance are numbered so from `starts[instance]`, to see that none comes twice.
     let mut starts = Vec::with_capacity(resident.instances.len());
     let mut count = 0u64;
     for instance in &resident.instances {
         starts.push(count);
-        count += u64::from(resident.objects[instance.object as usize].brick_count);
+        count += u64::from(own[instance.object as usize]);
     }
-    rule(count == resident.leaves.len() as u64, Part::Section(Section::Leaves), || {
-        (format!("{} leaves", resident.leaves.len()), format!("{count}, the bricks of all instances"))
+    let all = if levels.is_empty() { "the bricks" } else { "the bricks and levels" };
+    rule(count == leaves.len() as u64, Part::Section(section), || {
+        (format!("{} leaves", leaves.len()), format!("{count}, {all} of all instances"))
     })?;
-    let mut met = vec![false; resident.leaves.len()];
-    for (index, leaf) in (0u32..).zip(&resident.leaves) {
-        let part = Part::Record(Section::Leaves, index);
+    let mut met = vec![false; leaves.len()];
+    for (index, leaf) in (0u32..).zip(leaves) {
+        let part = Part::Record(section, index);
         let instance = resident.instances.get(leaf.instance as usize);
-        let object = instance.map(|instance| &resident.objects[instance.object as usize]);
-        let brick = object
-            .and_then(|object| leaf.brick.checked_sub(object.first_brick).filter(|&brick| brick < object.brick_count));
+        let brick = instance.and_then(|instance| {
+            let object = &resident.objects[instance.object as usize];
+            let Some(level) = leaf.brick.checked_sub(resident.bricks.len() as u32) else {
+                return leaf.brick.checked_sub(object.first_brick).filter(|&brick| brick < object.brick_count);
+            };
+            let is_of_it = levels.get(level as usize)?.brick.object == instance.object;
+            is_of_it.then(|| places[level as usize])
+        });
         rule(brick.is_some(), part, || {
             (format!("brick {} of instance {}", leaf.brick, leaf.instance), "a brick of the instance's object")
         })?;

@@ -1,4 +1,5 @@
-//! Checks of the two top-level trees. Each is a tree over exactly the leaves, children after parents.
+//! Checks of top-level trees, over bricks alone and over bricks and levels of detail. Each is a tree over exactly the
+//! leaves, children after parents.
 
 use super::node::NodeView;
 use super::rule::rule;
@@ -69,11 +70,11 @@ impl Levels {
     }
 }
 
-/// Checks the binary tree. Bounds of children lie within those of their parent.
-pub(super) fn binary(nodes: &[TopNode2], leaves: usize) -> Result<(), Flaw> {
-    let mut levels = Levels::new(Section::Top2, MAX_TOP2_HEIGHT, nodes.len(), leaves);
+/// Checks a binary tree. Bounds of children lie within those of their parent.
+pub(super) fn binary(section: Section, nodes: &[TopNode2], leaves: usize) -> Result<(), Flaw> {
+    let mut levels = Levels::new(section, MAX_TOP2_HEIGHT, nodes.len(), leaves);
     for (index, node) in (0u32..).zip(nodes) {
-        let part = Part::Record(Section::Top2, index);
+        let part = Part::Record(section, index);
         let level = levels.of(index)?;
         for axis in 0..3 {
             let (min, max) = (node.min[axis], node.max[axis]);
@@ -101,11 +102,11 @@ pub(super) fn binary(nodes: &[TopNode2], leaves: usize) -> Result<(), Flaw> {
     levels.finish()
 }
 
-/// Checks the 8-wide tree. Each leaf child has one leaf.
-pub(super) fn wide(nodes: &[TopNode8], leaves: usize) -> Result<(), Flaw> {
-    let mut levels = Levels::new(Section::Top8, MAX_TOP_HEIGHT, nodes.len(), leaves);
+/// Checks an 8-wide tree. Each leaf child has one leaf.
+pub(super) fn wide(section: Section, nodes: &[TopNode8], leaves: usize) -> Result<(), Flaw> {
+    let mut levels = Levels::new(section, MAX_TOP_HEIGHT, nodes.len(), leaves);
     for (index, node) in (0u32..).zip(nodes) {
-        let part = Part::Record(Section::Top8, index);
+        let part = Part::Record(section, index);
         let level = levels.of(index)?;
         rule(node._reserved == 0, part, || (format!("{:#x} in the reserved word", node._reserved), "zero"))?;
         for axis in 0..3 {

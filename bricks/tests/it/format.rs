@@ -128,6 +128,7 @@ fn structs() -> BTreeMap<String, Table> {
         table!(DisplacementField { object, brick, rings, directions, bits, executor, center, radius, mean, span }),
         table!(Texture { width, height, levels, wrap, encoding, flags, first_tile, tile_count, tail }),
         table!(Node { origin, exponent, inner_mask, child_base, triangle_base, meta, lo, hi }),
+        table!(Level { brick, children, error, bound, color, _reserved }),
         table!(Occupancy { cell_log2, _reserved, origin, bits }),
         table!(AttributeVertex { normal, uv, color }),
         table!(AttributeDetail { tangent, handedness, uv }),
@@ -182,15 +183,16 @@ fn numbers_are_those_of_the_page() {
         format!("| `version` | 8 | 4 | {VERSION} |"),
         format!("| `page_bytes` | 12 | 4 | {PAGE_BYTES} |"),
         format!(
-            "| `directory_bytes` | 32 | 8 | {MIN_DIRECTORY_BYTES}, or {MAX_DIRECTORY_BYTES} with displacement fields |"
+            "| `directory_bytes` | 32 | 8 | {MIN_DIRECTORY_BYTES}, and {ENTRY_BYTES} more for each optional section: at \
+             most {MAX_DIRECTORY_BYTES} |"
         ),
         format!(
-            "{} entries, or {} with displacement fields",
+            "{} entries, up to {} with optional sections",
             MIN_DIRECTORY_BYTES / ENTRY_BYTES,
             MAX_DIRECTORY_BYTES / ENTRY_BYTES
         ),
         format!("{PAGE_BYTES}\nbytes for payloads and the directory, {SECTION_ALIGN} for sections"),
-        format!("{KIND_VISIBILITY_FIELDS} visibility fields, {KIND_LEVELS_OF_DETAIL} levels of detail"),
+        format!("later versions: {KIND_VISIBILITY_FIELDS} visibility fields."),
         format!("m, of a hemisphere, 1 to {MAX_DISPLACEMENT_RINGS} |"),
         format!("square of directions, {MIN_DISPLACEMENT_DIRECTIONS} to {MAX_DISPLACEMENT_DIRECTIONS} |"),
         format!("{DISPLACEMENT_DISTANCES} distances, {DISPLACEMENT_HITS} hits |"),
@@ -207,7 +209,7 @@ fn numbers_are_those_of_the_page() {
     ] {
         assert!(FORMAT.contains(&said), "FORMAT.md does not say {said:?}");
     }
-    assert_eq!(MAX_PAYLOAD_BYTES, 1 << 31);
+    assert_eq!((MAX_PAYLOAD_BYTES, LEVEL_CHILDREN), (1 << 31, 4));
     assert_eq!((ORIGIN_STEPS, NEAR_STEPS, WIDE_STEPS, LATTICE_LIMIT), (1 << 20, 1 << 24, 1 << 46, 1 << 61));
     assert_eq!((*STEP_UNIT_LOG2.start(), *STEP_UNIT_LOG2.end()), (-64, 32));
 }
