@@ -218,7 +218,7 @@ fn occupied(brick: &Brick, step_log2: i32, triangles: &[Triangle]) -> (Occupancy
 
 /// Bounds of a leaf in steps of the world's lattice, outward.
 fn world_bounds(resident: &Resident, leaf: &Leaf) -> Triangle {
-    let brick = &resident.bricks[leaf.brick as usize];
+    let brick = resident.brick(leaf.brick).unwrap();
     let instance = &resident.instances[leaf.instance as usize];
     let step = 2f64.powi(resident.objects[brick.object as usize].step_log2);
     let world_step = 2f64.powi(resident.objects[0].step_log2);
@@ -436,6 +436,49 @@ pub fn scene_with_fields() -> Scene {
     Scene { resident, payloads }
 }
 
+/// Adds levels to the small scene, with or without fields: one over the bricks of the world, one over that of the other
+/// object, and one over the first and over both instances of the second.
+pub fn with_levels(scene: Scene) -> Scene {
+    let Scene { mut resident, mut payloads } = scene;
+    let objects = resident.objects.clone();
+    let leaf = |instance, brick| Leaf { instance, brick };
+    let none = leaf(NONE, NONE);
+    let world = |count, seed| triangles(count, [-(1 << 20), 0, -77], 1 << 32, seed);
+    let wide = BRICK_WIDE | BRICK_INDEX32;
+    let own = triangles(5, [-500, -500, -500], 1000, 6);
+    let levels = [
+        (0, wide, world(30, 4), 40, [leaf(NONE, 0), leaf(NONE, 1), none, none], [1.0, 2.0, 0.25]),
+        (1, BRICK_DETAIL, own, 9, [leaf(NONE, 2), none, none, none], [0.5, 4.0, 1.0]),
+        // Its lengths are not those of the level over the other object's brick.
+        (0, wide, world(4, 5), 51, [leaf(NONE, 3), leaf(1, 4), leaf(2, 4), none], [1.0, 2.5, 0.0]),
+    ];
+    for (number, (object, flags, triangles, last_id, children, [error, bound, color])) in (3..).zip(levels) {
+        let ids: Vec<u32> = (0..triangles.len() as u32).map(|i| last_id - i % 9).collect();
+        let own = (object, &objects[object as usize]);
+        let (brick, geometry, attributes) = brick(own, flags, [0; 3], &triangles, &ids, 2);
+        resident.levels.push(Level { brick, children, error, bound, color: color as f32, _reserved: 0 });
+        payloads.insert(Payload::Geometry(number), geometry);
+        payloads.insert(Payload::Attributes(number), attributes);
+    }
+    resident.level_leaves =
+        [(0, 0), (2, 4), (0, 5), (1, 2), (0, 1), (2, 2), (0, 3), (1, 4)].map(|(i, b)| leaf(i, b)).into();
+    let leaves: Vec<Triangle> = resident.level_leaves.iter().map(|leaf| world_bounds(&resident, leaf)).collect();
+    // The children of node i of a full binary tree are 2 i + 1 and 2 i + 2.
+    let mut nodes = vec![(leaves[0], 0, TOP_LEAF); 7];
+    nodes.extend((0..).zip(&leaves).map(|(index, leaf)| (*leaf, index, TOP_LEAF)));
+    for index in (0..7).rev() {
+        let children = [2 * index + 1, 2 * index + 2];
+        let (min, max) = bounds(&children.map(|child| nodes[child].0));
+        nodes[index] = ([min, max, max], children[0] as u32, children[1] as u32);
+    }
+    let node = |([min, max, _], left, right): (Triangle, u32, u32)| TopNode2 { min, max, left, right };
+    resident.level_top2 = nodes.into_iter().map(node).collect();
+    let (min, max) = bounds(&leaves[1..]);
+    let others: Vec<(Triangle, u8)> = leaves[1..].iter().copied().zip(0x20..).collect();
+    resident.level_top8 = vec![top_node(&[(leaves[0], 0x20), ([min, max, max], 0x39)], 1, 0), top_node(&others, 0, 1)];
+    Scene { resident, payloads }
+}
+
 /// Both trees over the four leaves.
 fn top_level(resident: &mut Resident) {
     let leaves: Vec<Triangle> = resident.leaves.iter().map(|leaf| world_bounds(resident, leaf)).collect();
@@ -476,7 +519,7 @@ impl Scene {
     pub fn stored(&self, payload: Payload) -> Vec<u8> {
         let bytes = &self.payloads[&payload];
         match payload {
-            Payload::Attributes(brick) => attributes::encode(&self.resident.bricks[brick as usize], bytes),
+            Payload::Attributes(brick) => attributes::encode(self.resident.brick(brick).unwrap(), bytes),
             Payload::Displacement(_) => pack::pack(bytes),
             _ => bytes.clone(),
         }
@@ -484,9 +527,14 @@ impl Scene {
 
     /// Writes the payloads and sets their spans.
     pub fn write_payloads(&mut self, writer: &mut Writer) {
+        let bricks = self.resident.bricks.len() as u32;
         for payload in self.payloads.keys() {
             let span = writer.write(&self.stored(*payload)).unwrap();
             match *payload {
+                Payload::Geometry(level @ 3..) => self.resident.levels[(level - bricks) as usize].brick.geometry = span,
+                Payload::Attributes(level @ 3..) => {
+                    self.resident.levels[(level - bricks) as usize].brick.attributes = span;
+                }
                 Payload::Geometry(brick) => self.resident.bricks[brick as usize].geometry = span,
                 Payload::Attributes(brick) => self.resident.bricks[brick as usize].attributes = span,
                 Payload::Proxies(brick) => self.resident.bricks[brick as usize].proxies = span,
@@ -516,6 +564,16 @@ pub fn written_with_fields() -> (tempfile::TempDir, PathBuf, Scene) {
     in_folder(scene_with_fields())
 }
 
+/// As [`written`], with levels of detail.
+pub fn written_with_levels() -> (tempfile::TempDir, PathBuf, Scene) {
+    in_folder(with_levels(scene()))
+}
+
+/// As [`written`], with all that a file can have.
+pub fn written_with_all() -> (tempfile::TempDir, PathBuf, Scene) {
+    in_folder(with_levels(scene_with_fields()))
+}
+
 fn in_folder(mut scene: Scene) -> (tempfile::TempDir, PathBuf, Scene) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.bricks");
@@ -539,13 +597,17 @@ impl Image {
 
     /// The sections that the file has.
     pub fn sections(&self) -> Vec<Section> {
-        let entries = self.header().directory_bytes / ENTRY_BYTES;
-        Section::ALL.into_iter().take(entries as usize).collect()
+        let Header { directory_offset, directory_bytes, .. } = self.header();
+        let entries = (directory_offset..directory_offset + directory_bytes).step_by(ENTRY_BYTES as usize);
+        let kind = |at: u64| bytemuck::pod_read_unaligned::<u32>(&self.bytes[at as usize..][..4]);
+        let named = |kind| Section::ALL.into_iter().find(|section| section.kind() == kind).unwrap();
+        entries.map(|at| named(kind(at))).collect()
     }
 
     fn entry_at(&self, section: Section) -> usize {
-        assert!(self.sections().contains(&section), "the file has no section {section}");
-        self.header().directory_offset as usize + section.index() * size_of::<DirectoryEntry>()
+        let index = self.sections().iter().position(|own| *own == section);
+        let index = index.unwrap_or_else(|| panic!("the file has no section {section}"));
+        self.header().directory_offset as usize + index * size_of::<DirectoryEntry>()
     }
 
     pub fn entry(&self, section: Section) -> DirectoryEntry {
@@ -596,6 +658,7 @@ impl Image {
     /// Changes the bytes of a payload; checksums are right afterwards.
     pub fn edit_payload(&mut self, payload: Payload, edit: impl FnOnce(&mut [u8])) {
         let (section, index) = match payload {
+            Payload::Geometry(level @ 3..) | Payload::Attributes(level @ 3..) => (Section::Levels, level - 3),
             Payload::Geometry(index) | Payload::Attributes(index) | Payload::Proxies(index) => (Section::Bricks, index),
             Payload::Texture(index) => (Section::Textures, index),
             Payload::Opacity(index) => (Section::OpacityMaps, index),
@@ -609,8 +672,11 @@ impl Image {
             span.checksum = xxh3_64(payload);
         };
         match section {
-            Section::Bricks => {
-                let mut record = self.record::<Brick>(section, index);
+            Section::Bricks | Section::Levels => {
+                let mut record = match section {
+                    Section::Levels => self.record::<Level>(section, index).brick,
+                    _ => self.record::<Brick>(section, index),
+                };
                 match payload {
                     Payload::Geometry(_) => update(&mut record.geometry),
                     Payload::Proxies(_) => update(&mut record.proxies),
@@ -619,7 +685,10 @@ impl Image {
                 let root = bytemuck::pod_read_unaligned(&bytes[record.geometry.offset as usize..][..size_of::<Node>()]);
                 record.root = root;
                 self.bytes.copy_from_slice(bytes);
-                self.edit(section, index, |brick| *brick = record);
+                match section {
+                    Section::Levels => self.edit(section, index, |level: &mut Level| level.brick = record),
+                    _ => self.edit(section, index, |brick| *brick = record),
+                }
             }
             Section::Tiles => {
                 let mut record = self.record::<Span>(section, index);

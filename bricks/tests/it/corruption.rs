@@ -1,10 +1,11 @@
 //! Damage of every kind is found and named, and never anything worse.
 
-use crate::common::{self, Image, Scene, written, written_with_fields};
+use crate::common::{self, Image, Scene, written, written_with_all, written_with_fields, written_with_levels};
 use bricks::layout::PAGE_BYTES;
 use bricks::{Access, Error, Part, Payload, SceneFile, Section, verify_file};
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::Path;
 
 fn write_at(mut file: &File, bytes: &[u8], at: usize) {
@@ -67,25 +68,25 @@ fn found(path: &Path, part: Part, at: usize) {
     }
 }
 
-/// Flips a bit of every byte from `start` on, each bit in its turn; the parts that they belong to.
-fn flip(path: &Path, scene: &Scene, start: usize) -> Vec<Part> {
+/// Flips a bit of every byte in `range`, each bit in its turn; the parts that they belong to.
+fn flip(path: &Path, scene: &Scene, range: Range<usize>) -> Vec<Part> {
     let image = Image::read(path);
     let owners = owners(&image, scene);
     assert_eq!(common::problems(path), "");
     let file = File::options().write(true).open(path).unwrap();
-    for (at, (&byte, &part)) in image.bytes.iter().zip(&owners).enumerate().skip(start) {
+    for (at, (&byte, &part)) in image.bytes.iter().zip(&owners).enumerate().take(range.end).skip(range.start) {
         write_at(&file, &[byte ^ 1 << (at % 8)], at);
         found(path, part, at);
         write_at(&file, &[byte], at);
     }
     assert_eq!(common::problems(path), "");
-    owners.into_iter().skip(start).collect()
+    owners.into_iter().take(range.end).skip(range.start).collect()
 }
 
 #[test]
 fn every_byte() {
     let (_folder, path, scene) = written();
-    let owners = flip(&path, &scene, 0);
+    let owners = flip(&path, &scene, 0..usize::MAX);
     let padding = owners.iter().filter(|part| matches!(part, Part::PaddingAfterPayload(_))).count();
     assert!(
         padding > 1000 && owners.iter().any(|part| matches!(part, Part::PaddingAfterSection(_))),
@@ -97,7 +98,7 @@ fn every_byte() {
 #[test]
 fn every_byte_from_the_first_displacement_field_on() {
     let (_folder, path, scene) = written_with_fields();
-    let owners = flip(&path, &scene, scene.resident.displacement[0].span.offset as usize);
+    let owners = flip(&path, &scene, scene.resident.displacement[0].span.offset as usize..usize::MAX);
     for part in [
         Part::Payload(Payload::Displacement(0)),
         Part::Payload(Payload::Displacement(2)),
@@ -110,9 +111,33 @@ fn every_byte_from_the_first_displacement_field_on() {
     assert_eq!(owners.last(), Some(&Part::Section(Section::Displacement)));
 }
 
+/// What a file with levels of detail has besides: their payloads, which are written between those of the bricks.
+#[test]
+fn every_byte_of_levels() {
+    let (_folder, path, scene) = written_with_levels();
+    let directory = Image::read(&path).header().directory_offset as usize;
+    let owners = flip(&path, &scene, directory..usize::MAX);
+    for part in [
+        Part::Directory,
+        Part::Section(Section::Levels),
+        Part::PaddingAfterSection(Section::Levels),
+        Part::Section(Section::LevelLeaves),
+        Part::Section(Section::LevelTop2),
+    ] {
+        assert!(owners.contains(&part), "{part} is not covered");
+    }
+    assert_eq!(owners.last(), Some(&Part::Section(Section::LevelTop8)));
+    for payload in [Payload::Geometry(3), Payload::Attributes(3), Payload::Geometry(5), Payload::Attributes(5)] {
+        let span = scene.resident.span(payload).unwrap();
+        let end = (span.offset + span.bytes).next_multiple_of(PAGE_BYTES) as usize;
+        let owners = flip(&path, &scene, span.offset as usize..end);
+        assert!(owners.contains(&Part::Payload(payload)) && owners.contains(&Part::PaddingAfterPayload(payload)));
+    }
+}
+
 #[test]
 fn every_value_of_every_byte_of_header_fields_and_directory() {
-    for (_folder, path, _) in [written(), written_with_fields()] {
+    for (_folder, path, _) in [written(), written_with_fields(), written_with_all()] {
         every_value(&path);
     }
 }
@@ -182,7 +207,7 @@ fn a_damaged_brick_does_not_hinder_others() {
 
 #[test]
 fn truncated_or_extended() {
-    for (_folder, path, _) in [written(), written_with_fields()] {
+    for (_folder, path, _) in [written(), written_with_all()] {
         cut_anywhere(&path);
     }
 }

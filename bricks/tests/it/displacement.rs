@@ -1,7 +1,7 @@
 //! Displacement fields in files: written, read, refused when they break a rule, left out, put in the place of others.
 
 use crate::common::{self, Image, Scene, scene_with_fields, written, written_with_fields};
-use bricks::layout::{KIND_LEVELS_OF_DETAIL, KIND_VISIBILITY_FIELDS, PAGE_BYTES};
+use bricks::layout::{KIND_VISIBILITY_FIELDS, PAGE_BYTES};
 use bricks::*;
 use std::fs;
 use std::path::Path;
@@ -69,7 +69,7 @@ fn without_fields_nothing_is_written() {
     assert_eq!(plain.header().directory_bytes, 520);
     assert_eq!(fields.header().directory_bytes, 560);
     assert_eq!(plain.sections(), Section::ALL[..13]);
-    assert_eq!(fields.sections(), Section::ALL);
+    assert_eq!(fields.sections(), Section::ALL[..14]);
     let end = plain.header().directory_offset as usize;
     assert!(plain.bytes[4096..end] == fields.bytes[4096..end]);
     for section in &Section::ALL[..13] {
@@ -254,7 +254,6 @@ fn directories() {
     let section = Section::Displacement;
     for (kind, name) in [
         (KIND_VISIBILITY_FIELDS, "kept for visibility fields"),
-        (KIND_LEVELS_OF_DETAIL, "kept for levels of detail"),
         (16, "occupancy"),
         (1, "manifest"),
         (0, "unknown"),

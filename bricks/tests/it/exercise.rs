@@ -2,7 +2,7 @@
 
 use bricks::layout::{DirectoryEntry, ENTRY_BYTES, Header, MAX_DIRECTORY_BYTES, MIN_DIRECTORY_BYTES, PAGE_BYTES};
 use bricks::{
-    BRICK_INDEX32, Brick, DISPLACEMENT_HITS, DisplacementField, GeometryLayout, MAX_BRICK_HEIGHT, Node,
+    BRICK_INDEX32, Brick, DISPLACEMENT_HITS, DisplacementField, GeometryLayout, Level, MAX_BRICK_HEIGHT, Node,
     OCCUPANCY_LEVELS, OccupancyMap, OpacityMap, Payload, Resident, SceneFile, Section, Span, Texture, pack, validate,
 };
 use bytemuck::Pod;
@@ -24,6 +24,7 @@ pub fn exercise(bytes: &[u8]) -> (bool, usize) {
         }
     };
     validate::resident(file.resident()).expect("what opens is valid");
+    levels(file.resident());
     let mut copied = 0;
     for (payload, span) in file.resident().payloads() {
         assert!(span.bytes <= bytes.len() as u64, "a payload longer than the file");
@@ -45,6 +46,31 @@ pub fn exercise(bytes: &[u8]) -> (bool, usize) {
     (true, copied)
 }
 
+/// Has levels be bricks: every leaf has at most one that stands for it, and none stands for itself in the end.
+fn levels(resident: &Resident) {
+    let mut resident = resident.clone();
+    let before: Vec<_> = resident.payloads().collect();
+    resident.use_levels();
+    assert_eq!(resident.payloads().collect::<Vec<_>>(), before);
+    let parents = resident.level_parents();
+    for leaf in 0..parents.len() {
+        let depth = std::iter::successors(Some(leaf), |&leaf| {
+            parents.get(parents[leaf] as usize).map(|_| parents[leaf] as usize)
+        });
+        assert!(depth.take(resident.levels.len() + 2).count() <= resident.levels.len() + 1, "a circle");
+    }
+    let children = |leaf: &bricks::Leaf| {
+        let level = (leaf.brick as usize).checked_sub(resident.exact_bricks());
+        level.map_or(0, |level| resident.levels[level].children().count())
+    };
+    let stood_for = parents.iter().filter(|parent| **parent != bricks::NONE).count();
+    assert_eq!(
+        stood_for,
+        resident.leaves.iter().map(children).sum::<usize>(),
+        "every child of a level is a leaf, once"
+    );
+}
+
 /// Follows every index of a geometry payload without any check, as a kernel does, unpacks proxies, and looks up samples
 /// of a displacement field.
 pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
@@ -64,7 +90,11 @@ pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
         assert!(end == 0 && bytes[byte as usize + 1..].iter().all(|&byte| byte == 0), "nothing behind the samples");
     }
     let Payload::Geometry(index) = payload else { return };
-    let brick = &resident.bricks[index as usize];
+    let brick = resident.brick(index).expect("what was copied exists");
+    let ids = match index as usize >= resident.bricks.len() && brick.object == 0 {
+        true => resident.manifest.triangle_ids,
+        false => resident.objects[brick.object as usize].triangle_ids.into(),
+    };
     let layout = GeometryLayout::of(brick);
     let word = |at: u64| u32::from_le_bytes(bytes[at as usize..at as usize + 4].try_into().unwrap());
     let mut stack = vec![(0u32, 1u32)];
@@ -81,7 +111,7 @@ pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
                 let first = node.triangle_base + u32::from(node.meta[slot] & 31);
                 for triangle in first..first + u32::from(node.meta[slot] >> 5).count_ones() {
                     let id = word(layout.ids + u64::from(triangle) * 4);
-                    assert!(id < resident.objects[brick.object as usize].triangle_ids);
+                    assert!(u64::from(id) < ids);
                     for corner in 0..3 {
                         let at = u64::from(triangle * 3 + corner);
                         let vertex = if brick.flags & BRICK_INDEX32 != 0 {
@@ -107,19 +137,22 @@ pub fn seal(bytes: &mut [u8]) {
     }
     let directory = header.directory_offset;
     let directory_bytes = header.directory_bytes.clamp(MIN_DIRECTORY_BYTES, MAX_DIRECTORY_BYTES);
-    for (index, section) in (0..directory_bytes / ENTRY_BYTES).zip(Section::ALL) {
+    for index in 0..directory_bytes / ENTRY_BYTES {
         let at = directory.saturating_add(index * size_of::<DirectoryEntry>() as u64);
         let Some(mut entry) = read::<DirectoryEntry>(bytes, at) else { return };
-        match section {
-            Section::Bricks => {
+        match Section::ALL.into_iter().find(|section| section.kind() == entry.kind) {
+            Some(Section::Bricks) => {
                 records::<Brick>(bytes, &entry, |brick| {
                     vec![&mut brick.geometry, &mut brick.attributes, &mut brick.proxies]
                 });
             }
-            Section::OpacityMaps => records::<OpacityMap>(bytes, &entry, |map| vec![&mut map.texels]),
-            Section::Textures => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.tail]),
-            Section::Tiles => records::<Span>(bytes, &entry, |span| vec![span]),
-            Section::Displacement => records::<DisplacementField>(bytes, &entry, |field| vec![&mut field.span]),
+            Some(Section::Levels) => {
+                records::<Level>(bytes, &entry, |level| vec![&mut level.brick.geometry, &mut level.brick.attributes])
+            }
+            Some(Section::OpacityMaps) => records::<OpacityMap>(bytes, &entry, |map| vec![&mut map.texels]),
+            Some(Section::Textures) => records::<Texture>(bytes, &entry, |texture| vec![&mut texture.tail]),
+            Some(Section::Tiles) => records::<Span>(bytes, &entry, |span| vec![span]),
+            Some(Section::Displacement) => records::<DisplacementField>(bytes, &entry, |field| vec![&mut field.span]),
             _ => {}
         }
         if let Some(section) = range(bytes, entry.offset, entry.bytes) {

@@ -1,7 +1,7 @@
 //! The format does not change by accident: today's writer makes the very bytes of the committed file, and today's
 //! reader reads them. `BRICKS_REGENERATE_GOLDEN=1` writes the file anew; do so only with a new format version.
 
-use crate::common::{Scene, written, written_with_fields};
+use crate::common::{Scene, written, written_with_fields, written_with_levels};
 use bricks::{SceneFile, verify_file};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -16,13 +16,18 @@ fn golden_file_with_displacement_fields() {
     is_golden("version-4-displacement.bricks", written_with_fields());
 }
 
+#[test]
+fn golden_file_with_levels() {
+    is_golden("version-4-levels.bricks", written_with_levels());
+}
+
 fn is_golden(name: &str, (_folder, path, scene): (TempDir, PathBuf, Scene)) {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
     if std::env::var_os("BRICKS_REGENERATE_GOLDEN").is_some() {
         std::fs::copy(&path, &golden).unwrap();
     }
     let bytes = std::fs::read(&golden).unwrap();
-    assert!(bytes.len() < 112 << 10);
+    assert!(bytes.len() < 144 << 10);
     assert!(bytes == std::fs::read(&path).unwrap(), "the writer's bytes are not those of {}", golden.display());
 
     let file = SceneFile::open(&golden).unwrap();

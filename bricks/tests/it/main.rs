@@ -7,6 +7,7 @@ mod displacement;
 mod exercise;
 mod format;
 mod golden;
+mod levels;
 mod malformed;
 mod malformed_payloads;
 mod occupancy;

@@ -1,7 +1,7 @@
 //! A header, directory or resident part that breaks a rule of the format is refused even where checksums are right.
 
 use crate::common::{self, Image, written};
-use bricks::layout::{KIND_LEVELS_OF_DETAIL, KIND_VISIBILITY_FIELDS};
+use bricks::layout::KIND_VISIBILITY_FIELDS;
 use bricks::*;
 use std::fs;
 
@@ -413,8 +413,8 @@ fn headers() {
     file_refused("pages of 4096 bytes", |image| image.edit_header(|h| h.page_bytes = 8192));
     file_refused("too long", |image| image.edit_header(|h| h.file_bytes -= 1));
     file_refused("too short", |image| image.edit_header(|h| h.file_bytes = u64::MAX));
-    for bytes in [0, 480, 519, 521, 540, 600, u64::MAX] {
-        file_refused("a directory of 520 to 560 bytes", |image| image.edit_header(|h| h.directory_bytes = bytes));
+    for bytes in [0, 480, 519, 521, 540, 760, u64::MAX] {
+        file_refused("a directory of 520 to 720 bytes", |image| image.edit_header(|h| h.directory_bytes = bytes));
     }
     for offset in [0, 4097, 1 << 40, u64::MAX - 4095] {
         file_refused("the header is not valid", |image| image.edit_header(|h| h.directory_offset = offset));
@@ -435,7 +435,6 @@ fn directories() {
     file_refused("kept for visibility fields", |image| {
         image.edit_entry(Leaves, |e| e.kind = KIND_VISIBILITY_FIELDS);
     });
-    file_refused("kept for levels of detail", |image| image.edit_entry(Leaves, |e| e.kind = KIND_LEVELS_OF_DETAIL));
     file_refused("kind 3 (instances)", |image| image.edit_entry(Objects, |e| e.kind = 3));
     file_refused("records of 300 bytes", |image| image.edit_entry(Bricks, |e| e.record_bytes = 300));
     file_refused("4 records in 40 bytes", |image| image.edit_entry(Leaves, |e| e.bytes += 8));

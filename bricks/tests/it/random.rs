@@ -1,6 +1,6 @@
 //! Whatever the bytes of a file, reading it ends in an error or in data that obeys the format; never in a panic.
 
-use crate::common::{Image, written, written_with_fields};
+use crate::common::{Image, written, written_with_all};
 use crate::exercise::{exercise, seal, traverse};
 use bricks::*;
 use proptest::prelude::*;
@@ -33,10 +33,10 @@ fn whole() -> &'static [u8] {
     BYTES.get_or_init(|| std::fs::read(written().1).unwrap_or_default())
 }
 
-/// Those of the small scene with displacement fields, which has a section more.
-fn whole_with_fields() -> &'static [u8] {
+/// Those of the small scene with displacement fields and levels of detail: all sections.
+fn whole_with_all() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
-    BYTES.get_or_init(|| std::fs::read(written_with_fields().1).unwrap_or_default())
+    BYTES.get_or_init(|| std::fs::read(written_with_all().1).unwrap_or_default())
 }
 
 /// Reads the bytes from memory and from a file: with the same result.
@@ -68,10 +68,10 @@ proptest! {
 
     #[test]
     fn damage(
-        fields in any::<bool>(),
+        all in any::<bool>(),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
     ) {
-        let mut bytes = if fields { whole_with_fields() } else { whole() }.to_vec();
+        let mut bytes = if all { whole_with_all() } else { whole() }.to_vec();
         for (at, value) in edits {
             *at.get_mut(&mut bytes) = value;
         }
@@ -79,8 +79,8 @@ proptest! {
     }
 
     #[test]
-    fn header_with_right_checksum(fields in any::<bool>(), at in 2usize..12, value in word()) {
-        let mut image = Image { bytes: if fields { whole_with_fields() } else { whole() }.to_vec() };
+    fn header_with_right_checksum(all in any::<bool>(), at in 2usize..12, value in word()) {
+        let mut image = Image { bytes: if all { whole_with_all() } else { whole() }.to_vec() };
         image.bytes[at * 4..at * 4 + 4].copy_from_slice(&value.to_le_bytes());
         image.edit_header(|_| {});
         read_bytes(&image.bytes);
@@ -88,7 +88,7 @@ proptest! {
 
     #[test]
     fn directory_with_right_checksum(section in 0..Section::ALL.len(), at in 0usize..10, value in word()) {
-        let mut image = Image { bytes: whole_with_fields().to_vec() };
+        let mut image = Image { bytes: whole_with_all().to_vec() };
         image.edit_entry(Section::ALL[section], |entry| {
             let bytes = bytemuck::bytes_of_mut(entry);
             bytes[at * 4..at * 4 + 4].copy_from_slice(&value.to_le_bytes());
@@ -101,7 +101,7 @@ proptest! {
         section in 1..Section::ALL.len(),
         edits in prop::collection::vec((any::<prop::sample::Index>(), word(), any::<bool>()), 1..3),
     ) {
-        let mut image = Image { bytes: whole_with_fields().to_vec() };
+        let mut image = Image { bytes: whole_with_all().to_vec() };
         let bytes = image.section(Section::ALL[section]);
         for (at, value, byte) in edits {
             if byte {
@@ -117,16 +117,16 @@ proptest! {
 
     #[test]
     fn payloads_with_right_checksums(
-        payload in 0usize..12,
+        payload in 0usize..15,
         edits in prop::collection::vec((any::<prop::sample::Index>(), word(), any::<bool>()), 1..3),
     ) {
         let payloads = [
             Payload::Geometry(0), Payload::Geometry(1), Payload::Geometry(2), Payload::Attributes(0),
             Payload::Attributes(1), Payload::Attributes(2), Payload::Texture(0),
             Payload::Texture(1), Payload::Tile(1), Payload::Opacity(0), Payload::Displacement(1),
-            Payload::Displacement(2),
+            Payload::Displacement(2), Payload::Geometry(3), Payload::Geometry(5), Payload::Attributes(4),
         ];
-        let mut image = Image { bytes: whole_with_fields().to_vec() };
+        let mut image = Image { bytes: whole_with_all().to_vec() };
         image.edit_payload(payloads[payload], |bytes| {
             for (at, value, byte) in edits {
                 if byte {
@@ -147,14 +147,14 @@ proptest! {
     /// Words anywhere, bytes cut out, repeated and inserted, and all checksums made right: what the fuzz target tries.
     #[test]
     fn any_change_with_right_checksums(
-        fields in any::<bool>(),
+        all in any::<bool>(),
         words in prop::collection::vec((any::<prop::sample::Index>(), word()), 0..4),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
         moved in prop::option::weighted(
             0.3, (any::<prop::sample::Index>(), any::<prop::sample::Index>(), 0usize..4096)
         ),
     ) {
-        let mut bytes = if fields { whole_with_fields() } else { whole() }.to_vec();
+        let mut bytes = if all { whole_with_all() } else { whole() }.to_vec();
         for (at, value) in words {
             let at = at.index(bytes.len() / 4) * 4;
             bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -176,10 +176,10 @@ proptest! {
     /// Words in the resident part, which is smaller than the payloads and decides more.
     #[test]
     fn any_record_with_right_checksums(
-        fields in any::<bool>(),
+        all in any::<bool>(),
         words in prop::collection::vec((any::<prop::sample::Index>(), word()), 1..4),
     ) {
-        let mut bytes = if fields { whole_with_fields() } else { whole() }.to_vec();
+        let mut bytes = if all { whole_with_all() } else { whole() }.to_vec();
         let resident = Image { bytes: bytes.clone() }.header().directory_offset as usize / 4;
         for (at, value) in words {
             let at = (resident + at.index(bytes.len() / 4 - resident)) * 4;
@@ -193,12 +193,25 @@ proptest! {
 /// Words in the records of displacement fields, which are few, and in their payloads.
 #[test]
 fn any_word_of_displacement_fields() {
+    any_word(Section::Displacement, 100, |resident| resident.displacement.iter().map(|field| field.span).collect());
+}
+
+/// Words in the records of levels of detail and in the leaves over them.
+#[test]
+fn any_word_of_levels() {
+    any_word(Section::Levels, 100, |_| Vec::new());
+    // Every leaf is needed: what is right is what was there.
+    any_word(Section::LevelLeaves, 10, |_| Vec::new());
+}
+
+/// Words in the records of a section and in some payloads; more than `least` files are right but for a payload.
+fn any_word(section: Section, least: usize, payloads: impl Fn(&Resident) -> Vec<Span>) {
     let values = [0, 1, 2, 8, 64, 65, 255, 256, 1 << 31, u32::MAX - 1, u32::MAX];
-    let whole = whole_with_fields();
+    let whole = whole_with_all();
     let image = Image { bytes: whole.to_vec() };
-    let section = image.entry(Section::Displacement);
+    let section = image.entry(section);
     let file = SceneFile::from_bytes("whole", whole).unwrap();
-    let spans = file.resident().displacement.iter().map(|field| (field.span.offset, field.span.bytes));
+    let spans = payloads(file.resident()).into_iter().map(|span| (span.offset, span.bytes));
     let mut opened = 0;
     for (offset, length) in spans.chain([(section.offset, section.bytes)]) {
         for at in (offset..offset + length).step_by(4) {
@@ -210,14 +223,14 @@ fn any_word_of_displacement_fields() {
             }
         }
     }
-    assert!(opened > 100, "{opened} files are right but for the payload");
+    assert!(opened > least, "{opened} files are right but for the payload");
 }
 
 #[test]
 fn the_whole_scene_is_read() {
     assert_eq!(read_bytes(whole()), (true, 14));
-    assert_eq!(read_bytes(whole_with_fields()), (true, 17));
-    for whole in [whole(), whole_with_fields()] {
+    assert_eq!(read_bytes(whole_with_all()), (true, 23));
+    for whole in [whole(), whole_with_all()] {
         sealing_is_right(whole);
     }
 }

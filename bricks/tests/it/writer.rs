@@ -98,7 +98,7 @@ fn what_could_not_be_read_is_not_written() {
     };
     refused(
         &|_, writer| assert!(writer.write(&[1; 16]).is_ok()),
-        "no brick, texture, tile, map or field with the payload written at byte",
+        "no brick, level, texture, tile, map or field with the payload written at byte",
     );
     refused(&|scene, _| scene.resident.bricks[1].geometry.checksum ^= 1, "a span that the writer returned");
     refused(&|scene, _| scene.resident.bricks[1].geometry.offset += 4096, "a span that the writer returned");
