@@ -1,5 +1,6 @@
 //! `info`: what a `.bricks` file holds, and where a triangle comes from.
 
+use super::levels::Levels;
 use super::options::args::InfoArgs;
 use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
 use super::{cached, instances};
@@ -97,6 +98,9 @@ struct Info<'a> {
     /// Displacement fields, where there are some.
     #[serde(skip_serializing_if = "Option::is_none")]
     displacement: Option<Displacement>,
+    /// Levels of detail, where there are some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    levels: Option<Levels>,
     left_out: Vec<LeftOut>,
     warnings: &'a [String],
     /// Bytes of the file by what they hold.
@@ -187,6 +191,7 @@ impl<'a> Info<'a> {
             facts: facts.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
             lights: r.lights.iter().map(Light::of).collect(),
             displacement: Displacement::of(&r.displacement, &r.instances),
+            levels: Levels::of(r),
             left_out: left_out(m),
             warnings: &m.warnings,
             per_triangle: PerTriangle::of(r, &sections, scene.file_bytes()),
@@ -277,7 +282,8 @@ impl<'a> Info<'a> {
         if let Some(more) = self.lights.len().checked_sub(MOST_LIGHTS).filter(|more| *more > 0) {
             row("light", format!("and {} more", human_count(more as u64)));
         }
-        for (name, value) in self.displacement.iter().flat_map(Displacement::human) {
+        let levels = self.levels.iter().flat_map(Levels::human);
+        for (name, value) in self.displacement.iter().flat_map(Displacement::human).chain(levels) {
             row(name, value);
         }
         for LeftOut { what, why } in &self.left_out {

@@ -12,6 +12,7 @@ pub mod demo;
 pub mod info;
 pub mod instances;
 pub mod interrupt;
+pub mod levels;
 pub mod man;
 pub mod memory;
 pub mod options;

@@ -33,6 +33,9 @@ pub struct Sections {
     pub proxies: u64,
     /// Texels.
     pub textures: u64,
+    /// Geometry and attributes of levels of detail. Not listed where there are none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub levels: u64,
     /// Displacement fields, as they are packed. Not listed where there are none.
     #[serde(skip_serializing_if = "is_zero")]
     pub displacement: u64,
@@ -59,6 +62,7 @@ impl Sections {
             sizes.proxies += brick.proxies.bytes;
         }
         sizes.textures = resident.texture_bytes();
+        sizes.levels = resident.levels.iter().map(|level| bytes_of(&level.brick)).sum();
         sizes.displacement = resident.displacement.iter().map(|field| field.span.bytes).sum();
         let bytes = |section: Section| resident.count(section) as u64 * u64::from(section.record_bytes());
         sizes.resident = resident.sections().map(|section| (section.name(), bytes(section))).collect();
@@ -77,7 +81,7 @@ impl Sections {
     fn sum(&self) -> u64 {
         let resident = self.directory + self.resident.values().sum::<u64>();
         let of_bricks = self.geometry() + self.attributes + self.proxies;
-        self.header + of_bricks + self.textures + self.displacement + resident + self.padding
+        self.header + of_bricks + self.levels + self.textures + self.displacement + resident + self.padding
     }
 
     /// Rows for people.
@@ -95,8 +99,10 @@ impl Sections {
             ("textures", self.textures),
             ("padding", self.padding),
         ];
-        if self.displacement > 0 {
-            others.insert(3, ("displacement", self.displacement));
+        for (name, bytes) in [("displacement", self.displacement), ("levels", self.levels)] {
+            if bytes > 0 {
+                others.insert(3, (name, bytes));
+            }
         }
         let resident: Vec<(&str, u64)> = self.resident.iter().map(|(name, bytes)| (*name, *bytes)).collect();
         [format!("geometry: {}", list(&geometry)), list(&others), format!("resident: {}", list(&resident))]
@@ -105,6 +111,11 @@ impl Sections {
 
 fn is_zero(bytes: &u64) -> bool {
     *bytes == 0
+}
+
+/// Bytes of a brick's geometry and attributes in the file.
+pub fn bytes_of(brick: &Brick) -> u64 {
+    brick.geometry.bytes + brick.attributes.bytes
 }
 
 /// Bytes of what shading reads, textures apart, as it is loaded.
@@ -207,7 +218,7 @@ pub fn histogram(bricks: &[Brick]) -> Vec<Bin> {
     for brick in bricks {
         let bin = &mut bins[(log2(brick) - first) as usize];
         bin.bricks += 1;
-        bin.bytes += brick.geometry.bytes + brick.attributes.bytes;
+        bin.bytes += bytes_of(brick);
     }
     bins
 }

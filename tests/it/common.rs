@@ -2,7 +2,8 @@
 
 use bricks::pack::pack;
 use bricks::{
-    DISPLACEMENT_BY_CPU, DISPLACEMENT_DISTANCES, DISPLACEMENT_HITS, DisplacementField, NONE, SceneFile, Span, Writer,
+    DISPLACEMENT_BY_CPU, DISPLACEMENT_DISTANCES, DISPLACEMENT_HITS, DisplacementField, Grid, Leaf, Level, NONE,
+    Payload, SceneFile, Span, TOP_LEAF, TopNode2, TopNode8, Writer,
 };
 use brickwalk::Settings;
 use brickwalk::frame::{Equirectangular, Renderer, environment};
@@ -93,6 +94,59 @@ pub fn add_fields(path: &Path) {
         resident.displacement.push(DisplacementField { span, ..field });
     }
     writer.finish(&resident).expect("a scene with fields");
+}
+
+/// Writes the scene anew with a level of detail that stands for the first bricks of the world by a copy of the first.
+/// Its displacement fields are left out.
+pub fn add_level(path: &Path) {
+    let scene = SceneFile::open(path).expect("the scene");
+    let mut resident = scene.resident().clone();
+    let reserved = Writer::reserve(path).expect("a temporary file");
+    let mut writer = reserved.start_from(&scene, &mut |_| {}).expect("a copy of the payloads");
+    let (world, all) = (&resident.objects[0], resident.bricks.len() as u32);
+    let first = world.first_brick;
+    let mut brick = bricks::Brick { proxies: Span::default(), ..resident.bricks[first as usize] };
+    for (payload, span) in
+        [(Payload::Geometry(first), &mut brick.geometry), (Payload::Attributes(first), &mut brick.attributes)]
+    {
+        let mut bytes = vec![0; span.bytes as usize];
+        scene.copy_stored(payload, &mut bytes).expect("a payload");
+        *span = writer.write(&bytes).expect("room on the disk");
+    }
+    let child = |number| Leaf { instance: NONE, brick: if number < world.brick_count { first + number } else { NONE } };
+    let children = [0, 1, 2, 3].map(child);
+    resident.displacement.clear();
+    resident.levels = vec![Level { brick, children, error: 0.5, bound: 2.0, color: 0.25, _reserved: 0 }];
+    resident.level_leaves = resident.leaves.clone();
+    resident.level_leaves.push(Leaf { instance: 0, brick: all });
+    // Roots over those of the trees over bricks, and over the level.
+    let leaf = resident.leaves.len() as u32;
+    let (whole, shift) = (resident.top2[0], |child| child + 1);
+    let level = TopNode2 { min: brick.min, max: brick.max, left: leaf, right: TOP_LEAF };
+    resident.level_top2 = vec![TopNode2 { left: 1, right: resident.top2.len() as u32 + 1, ..whole }];
+    resident.level_top2.extend(resident.top2.iter().map(|node| match node.right {
+        TOP_LEAF => *node,
+        _ => TopNode2 { left: shift(node.left), right: shift(node.right), ..*node },
+    }));
+    resident.level_top2.push(level);
+    let mut children = [None; 8];
+    (children[0], children[1]) = (Some([whole.min, whole.max]), Some([brick.min, brick.max]));
+    let Grid { exponent, lo, hi } = Grid::over(&children, whole.min, whole.max);
+    let meta = [0x38, 0x20, 0, 0, 0, 0, 0, 0];
+    let root = TopNode8 {
+        origin: whole.min,
+        exponent,
+        inner_mask: 1,
+        child_base: 1,
+        leaf_base: leaf,
+        meta,
+        lo,
+        hi,
+        _reserved: 0,
+    };
+    let below = resident.top8.iter().map(|node| TopNode8 { child_base: shift(node.child_base), ..*node });
+    resident.level_top8 = std::iter::once(root).chain(below).collect();
+    writer.finish(&resident).expect("a scene with a level");
 }
 
 /// A source with every surface half of smooth metal, so that rays of `--effects glossy` leave all of them.

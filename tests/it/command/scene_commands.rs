@@ -1,7 +1,7 @@
 //! The commands that need no graphics adapter, as a user runs them: exit statuses, one line per error, outputs that
 //! appear complete or not at all.
 
-use crate::common::{add_fields, folder, names, succeed};
+use crate::common::{add_fields, add_level, folder, names, succeed};
 use brickwalk::reference::Truth;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -92,6 +92,23 @@ fn a_generated_scene_is_described_and_verified() {
     let text = done(folder, "info fields.bricks");
     assert!(text.contains("2 fields of 1 object and 1 brick, 17.6 KiB loaded, "), "{text}");
     assert!(text.contains("1 field of 1090 positions x 16 directions, 8 bits a sample"), "{text}");
+    assert!(done(folder, "verify fields.bricks").contains("OK"));
+    assert!(info.get("levels").is_none() && info["sections"].get("levels").is_none());
+    assert!(!done(folder, "info city.bricks").contains("depth 1"));
+    add_level(&with_fields);
+    // Fields are added to levels, which stay.
+    add_fields(&with_fields);
+    let levels: serde_json::Value = serde_json::from_str(&done(folder, "info fields.bricks --json")).unwrap();
+    let list = &levels["levels"];
+    assert_eq!((&list["levels"], &list["objects"], &list["depths"][0]["levels"]), (&1.into(), &1.into(), &1.into()));
+    assert_eq!((&list["median_error"], &list["largest_bound"]), (&0.5.into(), &2.0.into()));
+    assert!(list["share_of_bricks"].as_f64().is_some_and(|share| share > 0.0 && share < 1.0), "{list}");
+    assert_eq!(levels["sections"]["levels"], list["bytes"]);
+    assert_eq!(levels["displacement"], fields["displacement"]);
+    assert_eq!(sum(&levels["sections"]), levels["file_bytes"].as_u64().unwrap());
+    assert_eq!(levels["bricks"], info["bricks"]);
+    let text = done(folder, "info fields.bricks");
+    assert!(text.contains("depth 1: 1 level, error 5.000e-1 median, bound 2.000e0"), "{text}");
     assert!(done(folder, "verify fields.bricks").contains("OK"));
     let origin: serde_json::Value =
         serde_json::from_str(&done(folder, &format!("info city.bricks --json --id {}", ids - 1))).unwrap();
