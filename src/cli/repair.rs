@@ -1,4 +1,4 @@
-//! `repair`: rebuilds the damaged bricks and textures of a `.bricks` file.
+//! `repair`: rebuilds the damaged bricks, levels of detail and textures of a `.bricks` file.
 //!
 //! Conversion is deterministic, so the same inputs and options make the same bytes. They are converted to a temporary
 //! file, and of it only what is damaged is taken, and only if it has the checksum that the scene states. It is written
@@ -69,7 +69,7 @@ pub fn run(args: &RepairArgs) -> Result<()> {
     }
     bytes += remake_fields(args, &fields, &mut file)?;
     file.sync_all().with_context(|| format!("{name}: cannot sync this file to the disk; repair it again"))?;
-    let parts: Vec<String> = damaged.iter().chain(&fields).map(Payload::to_string).collect();
+    let parts: Vec<String> = damaged.iter().chain(&fields).map(|payload| scene.resident().name_of(*payload)).collect();
     note(&format!("{name}: repaired {} ({})\n", parts.join(", "), human_bytes(bytes)))
 }
 
@@ -232,12 +232,17 @@ fn check(scene: &SceneFile, rebuilt: &SceneFile, payload: Payload) -> Result<()>
     if facts(scene) == facts(rebuilt) {
         return Ok(());
     }
+    let (file, name) = (scene.path().display(), scene.resident().name_of(payload));
+    ensure!(
+        scene.resident().level_of(payload).is_none() || !rebuilt.resident().levels.is_empty(),
+        "{file}: {name} cannot be rebuilt, as the conversion made no levels of detail; nothing was changed; convert again"
+    );
     let (was, is) = (&scene.resident().manifest.generator, &rebuilt.resident().manifest.generator);
     let remedy = match was == is {
         true => "give the options of the conversion, and check buffers and images beside the inputs".into(),
         false => format!("the file was written by {was}, this is {is}; use that version, or convert again"),
     };
-    bail!("{}: the rebuilt {payload} differs from the original; nothing was changed; {remedy}", scene.path().display())
+    bail!("{file}: the rebuilt {name} differs from the original; nothing was changed; {remedy}")
 }
 
 /// Writes a rebuilt payload and the zeros after it; returns its length.

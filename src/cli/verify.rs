@@ -65,14 +65,34 @@ fn problems(report: &VerifyReport) -> Option<String> {
 }
 
 fn name(problem: &Error) -> String {
+    match problem {
+        Error::Within { place, .. } if is_of_level(problem) => return place.clone(),
+        _ => {}
+    }
     problem.part().map_or_else(|| problem.to_string(), |part| part.to_string())
 }
 
-/// The bricks with a problem, ascending, each once.
+/// Whether a level of detail is at fault: of bricks these alone have a place.
+fn is_of_level(problem: &Error) -> bool {
+    let payload = match problem {
+        Error::Within { .. } => problem.part(),
+        _ => None,
+    };
+    matches!(
+        payload,
+        Some(
+            Part::Payload(Payload::Geometry(_) | Payload::Attributes(_))
+                | Part::PaddingAfterPayload(Payload::Geometry(_) | Payload::Attributes(_))
+        )
+    )
+}
+
+/// The bricks with a problem, ascending, each once; levels of detail are none.
 fn damaged_bricks(report: &VerifyReport) -> Vec<u32> {
     let mut bricks: Vec<u32> = report
         .problems
         .iter()
+        .filter(|problem| !is_of_level(problem))
         .filter_map(|problem| match problem.part()? {
             Part::Record(Section::Bricks, brick) => Some(brick),
             Part::Payload(payload) | Part::PaddingAfterPayload(payload) => match payload {
@@ -110,6 +130,17 @@ mod tests {
         ]))
         .unwrap();
         assert!(line.contains("3 more: brick 4 geometry, texture 9, brick 2 geometry; 2 bricks: 2, 4"), "{line}");
+        // A level has its own name, and is no brick.
+        let mut named = report(&[7, 9].map(|brick| Part::Payload(Payload::Geometry(brick))));
+        named.problems = named
+            .problems
+            .into_iter()
+            .map(|error| Error::Within { error: Box::new(error), place: "level 3 geometry".into() })
+            .chain(report(&[Part::Payload(Payload::Geometry(2))]).problems)
+            .collect();
+        let line = problems(&named).unwrap();
+        assert!(line.contains("(level 3 geometry); 2 more: level 3 geometry, brick 2 geometry"), "{line}");
+        assert!(!line.contains(" bricks: "), "{line}");
         let many: Vec<Part> = (0..1000).map(|i| Part::Payload(Payload::Geometry(i))).collect();
         assert!(problems(&report(&many)).unwrap().len() < 600);
     }

@@ -1,6 +1,6 @@
 //! Damaged scene files that are rebuilt from what they were converted from.
 
-use crate::common::{add_fields, brickwalk, city, folder, names, succeed};
+use crate::common::{add_fields, add_level, brickwalk, city, folder, names, succeed};
 use bricks::{Payload, SceneFile};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -144,6 +144,31 @@ fn a_scene_with_displacement_fields_is_repaired_but_for_these() {
     let (status, said) = repair(&scene, "--from DIR/g.obj");
     assert!(status == Some(1) && said.ends_with(remedy), "{status:?} {said}");
     assert!(std::fs::read(&scene).expect("the scene") == damaged);
+}
+
+/// The input says nothing of the level: it is not rebuilt, and said to be what it is.
+#[test]
+fn a_level_that_the_conversion_does_not_make_is_not_repaired() {
+    let folder = folder();
+    let scene = ground(folder.path());
+    let bricks = SceneFile::open(&scene).expect("the scene").resident().bricks.len() as u32;
+    add_level(&scene);
+    let whole = std::fs::read(&scene).expect("the scene");
+    let damaged = damage(&scene, &[Payload::Geometry(bricks)]);
+    let (status, said) = repair(&scene, "--from DIR/g.obj");
+    assert!(status == Some(1) && said.contains("level 0 geometry cannot be rebuilt"), "{status:?} {said}");
+    assert!(said.contains("convert again") && said.lines().count() == 1, "{said}");
+    assert!(std::fs::read(&scene).expect("the scene") == damaged);
+    let verified = brickwalk(["verify".as_ref(), scene.as_os_str()]);
+    let line = String::from_utf8_lossy(&verified.stderr).into_owned();
+    assert!(line.contains("(level 0 geometry)") && !line.contains(" bricks: "), "{line}");
+
+    // What else is damaged is repaired, and the level stays.
+    std::fs::write(&scene, &whole).expect("the file");
+    damage(&scene, &DAMAGED);
+    let (status, said) = repair(&scene, "--from DIR/g.obj");
+    assert_eq!(status, Some(0), "{said}");
+    assert!(std::fs::read(&scene).expect("the scene") == whole);
 }
 
 /// What a repair leaves that was killed, and one at the same time.
