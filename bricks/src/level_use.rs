@@ -2,7 +2,7 @@
 
 use crate::levels::Level;
 use crate::payload::Payload;
-use crate::records::{Brick, NONE};
+use crate::records::{Brick, Leaf, NONE};
 use crate::resident::Resident;
 use std::collections::HashMap;
 
@@ -63,6 +63,23 @@ impl Resident {
         self.leaves = std::mem::take(&mut self.level_leaves);
         self.top2 = std::mem::take(&mut self.level_top2);
         self.top8 = std::mem::take(&mut self.level_top8);
+    }
+
+    /// Has no ray take a level that stands for instances that have moved: it shows them where they were.
+    pub(crate) fn leave_levels_of(&mut self, has_moved: &[bool]) {
+        let first = self.exact_bricks();
+        let mut is_left = vec![false; self.levels.len()];
+        for index in 0..self.levels.len() {
+            let is_of_moved = |child: Leaf| has_moved.get(child.instance as usize).is_some_and(|&moved| moved);
+            // Children lie before their parents.
+            let is_left_level = |child: Leaf| {
+                child.instance == NONE && (child.brick as usize).checked_sub(first).is_some_and(|level| is_left[level])
+            };
+            is_left[index] = self.levels[index].children().any(|child| is_of_moved(child) || is_left_level(child));
+            if is_left[index] {
+                self.levels[index].error = f64::INFINITY;
+            }
+        }
     }
 
     /// For each leaf of the top level the leaf of the level that stands for it, or [`NONE`]; levels are in use.

@@ -181,6 +181,7 @@ impl Resident {
         if !has_moved.contains(&true) {
             return Ok(());
         }
+        self.leave_levels_of(&has_moved);
         self.refit(&has_moved);
         let world = &self.objects[0];
         let limit = EXTENT_UNITS_LOG2 - (world.step_log2 - world.unit_log2);

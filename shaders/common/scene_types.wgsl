@@ -23,6 +23,13 @@ struct Leaf {             // A leaf of the top-level tree: a brick of an instanc
     brick: u32,           // index of the brick
 }
 
+struct LevelLeaf {        // Of a leaf of the top level, what selection of levels of detail goes by.
+    min: vec3<f32>,       // least coordinates of the box of all that it stands for, in the frame
+    error_square: f32,    // square of its error, device units; 0 of a brick
+    max: vec3<f32>,       // greatest coordinates
+    parent: u32,          // the leaf of the level above, NONE without one
+}
+
 struct Instance {         // A placed object.
     object_from_world: array<vec4<f32>, 3>, // rows; w: translation in the frame
     world_from_object: array<vec4<f32>, 3>, // rows; w: translation in the frame

@@ -6,6 +6,7 @@
 #include "query/tiles.wgsl"
 #include "trace/triangle.wgsl"
 #include "trace/node.wgsl"
+#include "trace/levels.wgsl"
 #include "trace/leaf.wgsl"
 
 // One thread a ray; workgroups are squares of 8 x 8 rays.
@@ -32,6 +33,7 @@ fn main(
         return;
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    let cone = cone_of(ray);
     var r: BrickRay;
     var first = NONE;
     var first_near = T_INFINITE;
@@ -48,7 +50,7 @@ fn main(
             }
             continue;
         }
-        if listed.near > limit {
+        if listed.near > limit || !takes(cone, leaf) {
             continue;
         }
         enter_leaf(&r, world, leaf);

@@ -7,6 +7,7 @@
 #include "query/tiles.wgsl"
 #include "trace/triangle.wgsl"
 #include "trace/node.wgsl"
+#include "trace/levels.wgsl"
 #include "trace/leaf.wgsl"
 
 override OF_TILES: bool = false;
@@ -68,6 +69,7 @@ fn main(
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     let up_to_next = !PAIRS && (params.flags & PARAM_NEXT) != 0u;
+    let cone = cone_of(ray);
     var r: BrickRay;
     var stack: array<Entry, TOP_STACK_SIZE>; // nodes, and where the ray enters them
     stack[0] = Entry(0u, 0.0);
@@ -98,18 +100,22 @@ fn main(
                 continue;
             }
             if (inner & (1u << slot)) != 0u {
+                let child = n1.x + countOneBits(inner & ((1u << slot) - 1u));
+                if is_stood_for_wide(cone, child) {
+                    continue;
+                }
                 if depth == TOP_STACK_SIZE {
                     atomicAdd(&counters[COUNTER_STACK_OVERFLOW], 1u);
                     return;
                 }
-                stack[depth] = Entry(n1.x + countOneBits(inner & ((1u << slot) - 1u)), near);
+                stack[depth] = Entry(child, near);
                 depth += 1u;
                 continue;
             }
             let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
             let brick = leaves[leaf].brick;
             let is_selected = (slots[brick].state & params.select_mask) == params.select_want;
-            if !is_selected || (!PAIRS && is_culled(work.tile, leaf)) {
+            if !is_selected || (!PAIRS && is_culled(work.tile, leaf)) || !takes(cone, leaf) {
                 continue;
             }
             enter_leaf(&r, world, leaf);

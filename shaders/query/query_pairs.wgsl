@@ -7,6 +7,7 @@
 #include "query/tiles.wgsl"
 #include "trace/triangle.wgsl"
 #include "trace/node.wgsl"
+#include "trace/levels.wgsl"
 #include "trace/leaf.wgsl"
 
 // Whether the ray enters a box of the top level in its range, padded as in node_hits.
@@ -30,14 +31,17 @@ const MOST_NODES: u32 = 16u;
 const OWN: u32 = 1u;      // the ray enters the node's own box
 const SEEN: u32 = 2u;     // and what the query asks for
 
-fn look(world: FramedRay, index: u32, t_max: f32) -> u32 {
-    if !enters(world, index, t_max) {
+fn look(world: FramedRay, cone: Cone, index: u32, t_max: f32) -> u32 {
+    if !enters(world, index, t_max) || is_stood_for(cone, index) {
+        return 0u;
+    }
+    let node = top2[index];
+    if node.right == NONE && !takes(cone, node.left) {
         return 0u;
     }
     if (params.flags & PARAM_TIGHTER) == 0u {
         return OWN | SEEN;
     }
-    let node = top2[index];
     if node.right != NONE {
         return OWN | select(0u, SEEN, enters(world, node.left, t_max) || enters(world, node.right, t_max));
     }
@@ -68,8 +72,9 @@ fn ask(pair: Pair, lane: u32, each: bool) {
             continue;
         }
         let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+        let cone = cone_of(ray);
         for (var k = 0u; k < pair.count; k++) {
-            let what = look(world, pair_nodes[pair.first + k], hit.t);
+            let what = look(world, cone, pair_nodes[pair.first + k], hit.t);
             entered |= (what & OWN) << k;
             if (what & SEEN) != 0u {
                 if each {

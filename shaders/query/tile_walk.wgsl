@@ -4,6 +4,7 @@
 #include "common/bindings.wgsl"
 #include "query/tiles.wgsl"
 #include "query/interval.wgsl"
+#include "trace/levels.wgsl"
 
 override WRITE: bool = false;
 
@@ -36,17 +37,21 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             loop {
                 let n = top2[node];
                 if n.right == NONE {
-                    if WRITE {
-                        list[entry.first + found] = Entry(n.left, near);
-                        pair_demand_clear(entry.first + found);
-                    }
-                    found += 1u;
-                    if !WRITE && found > params.list_most {
-                        break;
+                    if tile_may_take(bounds, n.left) {
+                        if WRITE {
+                            list[entry.first + found] = Entry(n.left, near);
+                            pair_demand_clear(entry.first + found);
+                        }
+                        found += 1u;
+                        if !WRITE && found > params.list_most {
+                            break;
+                        }
                     }
                 } else {
-                    let l = tile_meets_box(bounds, top2[n.left].min, top2[n.left].max, params.instance_pad);
-                    let r = tile_meets_box(bounds, top2[n.right].min, top2[n.right].max, params.instance_pad);
+                    var l = tile_meets_box(bounds, top2[n.left].min, top2[n.left].max, params.instance_pad);
+                    var r = tile_meets_box(bounds, top2[n.right].min, top2[n.right].max, params.instance_pad);
+                    l.hit = l.hit && !tile_is_stood_for(bounds, n.left);
+                    r.hit = r.hit && !tile_is_stood_for(bounds, n.right);
                     tested += 2u;
                     culled += u32(!l.hit) + u32(!r.hit);
                     if l.hit && r.hit {

@@ -1,5 +1,6 @@
 // What a ray meets inside one brick: vertices and triangles fetched from the cache, hits written out.
 #include "trace/opacity.wgsl"
+#include "trace/levels.wgsl"
 
 struct Best {
     t: f32,
@@ -109,6 +110,10 @@ fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>,
         // A zero component moves away from where the ray points.
         let sign = bitcast<vec3<u32>>(select(normal, -world_direction, normal == vec3<f32>(0.0))) >> vec3<u32>(31u);
         point = offset_origin(SurfacePoint(p, error, normal, sign.x | (sign.y << 1u) | (sign.z << 2u), area));
+    }
+    let off = level_offset(point, best.leaf);
+    if off > 0.0 {
+        point = barrier3(point + barrier3(off * normal));
     }
     surfaces[ray] = Surface(point, best.leaf, normal, best.triangle, area, best.source, surfaces[ray].pending, 0u);
 }

@@ -8,6 +8,7 @@
 #include "trace/cache.wgsl"
 #include "trace/surface.wgsl"
 #include "trace/node.wgsl"
+#include "trace/levels.wgsl"
 #include "trace/leaf.wgsl"
 #include "trace/brick.wgsl"
 #include "trace/walk_brick.wgsl"
@@ -56,6 +57,7 @@ fn main(
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
+    let cone = cone_of(ray);
     var r: BrickRay;
     r.ray = world;
     var stack: array<vec2<u32>, STACK_SIZE>;
@@ -99,12 +101,17 @@ fn main(
             let inner = top8[5u * group.x].w >> 24u;
             let n1 = top8[5u * group.x + 1u];
             if (inner & (1u << slot)) != 0u {
-                group = top_group(world, n1.x + countOneBits(inner & ((1u << slot) - 1u)), best.t);
+                let child = n1.x + countOneBits(inner & ((1u << slot) - 1u));
+                if is_stood_for_wide(cone, child) {
+                    group = vec2<u32>(0u);
+                    continue;
+                }
+                group = top_group(world, child, best.t);
             } else {
                 let leaf = n1.y + ((select(n1.z, n1.w, slot >= 4u) >> (8u * (slot & 3u))) & 31u);
                 let is_selected =
                     !SELECT || (slots[leaves[leaf].brick].state & params.select_mask) == params.select_want;
-                if !is_selected || (SELECT && OF_TILES && is_culled(work.tile, leaf)) {
+                if !is_selected || (SELECT && OF_TILES && is_culled(work.tile, leaf)) || !takes(cone, leaf) {
                     group = vec2<u32>(0u);
                     continue;
                 }

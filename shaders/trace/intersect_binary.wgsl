@@ -7,6 +7,7 @@
 #include "trace/cache.wgsl"
 #include "trace/surface.wgsl"
 #include "trace/node.wgsl"
+#include "trace/levels.wgsl"
 #include "trace/leaf.wgsl"
 #include "trace/brick.wgsl"
 #include "trace/walk_brick.wgsl"
@@ -79,6 +80,7 @@ fn main(
     let before = hits[index];
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
+    let cone = cone_of(ray);
     var r: BrickRay;
     r.ray = world;
     var walk: Walk;
@@ -127,6 +129,10 @@ fn main(
         }
         if !walk.in_brick {
             let leaf = at & ~BINARY_LEAF;
+            if !takes(cone, leaf) {
+                at = pop(&walk);
+                continue;
+            }
             let brick = leaves[leaf].brick;
             note_use(leaf);
             enter_leaf(&r, world, leaf);

@@ -6,6 +6,7 @@
 #include "trace/cache.wgsl"
 #include "trace/surface.wgsl"
 #include "trace/node.wgsl"
+#include "trace/levels.wgsl"
 #include "trace/leaf.wgsl"
 #include "trace/brick.wgsl"
 #include "trace/walk_brick.wgsl"
@@ -39,6 +40,7 @@ fn main(
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
+    let cone = cone_of(ray);
     var r: BrickRay;
     var stack: array<vec2<u32>, STACK_SIZE>;
     var depth = 0u;
@@ -56,10 +58,10 @@ fn main(
                     }
                     let listed = list[selection[next]];
                     next += 1u;
-                    if listed.near > best.t {
+                    let leaf = listed.leaf;
+                    if listed.near > best.t || !takes(cone, leaf) {
                         continue;
                     }
-                    let leaf = listed.leaf;
                     enter_leaf(&r, world, leaf);
                     enter_brick(&r, leaves[leaf].brick);
                     group = root_group(r.ray.flip);

@@ -2,7 +2,7 @@
 
 use super::{Captures, Effects, Light, Moved};
 use crate::counters::Counters;
-use crate::kernels::FrameExecutor;
+use crate::kernels::{FrameExecutor, Lod};
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 #[cfg(feature = "lab")]
@@ -32,6 +32,12 @@ pub struct RenderSettings {
     pub tracing: Tracing,
     /// Read depth, normals, ids and albedo back.
     pub aov: bool,
+    /// What levels of detail are selected by.
+    pub lod: Lod,
+    /// Of so many blocks one is traced exactly, too, to correct what levels of detail show; 0: none.
+    pub correct_one_in: u32,
+    /// Only the blocks that correct others are rendered: [`super::correct`].
+    pub only_chosen: bool,
     /// Read back what guides denoising and temporal anti-aliasing, and give every pixel directions of its own for ao
     /// and diffuse.
     pub guides: bool,
@@ -77,6 +83,11 @@ impl Engine {
     pub fn bands(&self) -> impl ExactSizeIterator<Item = Range<u32>> + use<> {
         let (height, rows) = (self.size.1, self.band_rows);
         (0..height.div_ceil(rows)).map(move |band| band * rows..((band + 1) * rows).min(height))
+    }
+
+    /// Whether what levels of detail show is corrected.
+    pub fn corrects(&self) -> bool {
+        self.settings.correct_one_in > 0 && self.settings.lod.pixels > 0.0 && !self.settings.only_chosen
     }
 
     /// Rays that are traced at a time.

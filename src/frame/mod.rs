@@ -4,6 +4,7 @@
 mod accumulate;
 mod bands;
 mod capture;
+pub mod correct;
 mod effects;
 mod emissive;
 pub mod engine;

@@ -1,8 +1,11 @@
 //! The frame loop.
 
 use super::bands::Joint;
+use super::correct::correct;
+use super::engine::RenderSettings;
 use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, camera_view};
 use crate::counters::{Counters, Record};
+use crate::kernels::Lod;
 use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::math::sampling::pixel_jitter;
 use crate::scene::Camera;
@@ -49,7 +52,8 @@ impl<'a> Passes<'a> {
         let effects = &engine.settings.effects;
         let occlusion = effects.occlusion.map_or(0, |occlusion| occlusion.rays);
         let a_sample = 2 + occlusion + effects.diffuse.unwrap_or(0) + u32::from(effects.glossy);
-        let samples = engine.settings.samples.saturating_mul(engine.bands().len() as u32);
+        let times = if engine.corrects() { 2 } else { 1 };
+        let samples = engine.settings.samples.saturating_mul(engine.bands().len() as u32 * times);
         Self { watch, done: 0, about: samples.saturating_mul(a_sample) }
     }
 
@@ -157,6 +161,11 @@ impl Renderer {
             let band = Band { frame, camera, first_row: rows.start, checkpoints };
             output.append(band.render(engine, methods, &mut records, &mut passes)?, joint);
         }
+        if engine.corrects() {
+            let exact = exact_blocks(engine, methods, (frame, camera), &mut records, &mut passes)?;
+            let (one_in, seed) = (engine.settings.correct_one_in, frame_seed(engine.settings.seed, frame));
+            correct(&mut output.pixels.radiance, &exact, width, one_in, seed);
+        }
         output.records = records.finish(engine);
         engine.moved = Moved::default();
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
@@ -165,6 +174,35 @@ impl Renderer {
         }
         Ok(output)
     }
+}
+
+/// Seed of the random numbers of a frame.
+fn frame_seed(seed: u32, frame: u32) -> u32 {
+    seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9))
+}
+
+/// The radiance of the blocks that correct what levels of detail show, exactly.
+fn exact_blocks(
+    engine: &mut Engine,
+    methods: &mut Methods,
+    (frame, camera): (u32, &Camera),
+    records: &mut FrameRecords,
+    passes: &mut Passes,
+) -> Result<Vec<[f32; 3]>, RenderError> {
+    let (settings, captures) = (engine.settings, engine.captures.take());
+    let lod = Lod { pixels: 0.0, ..settings.lod };
+    engine.settings =
+        RenderSettings { lod, only_chosen: true, aov: false, guides: false, coverage: false, ..settings };
+    let mut output = FrameOutput::default();
+    let (width, picture) = (engine.size.0 as usize, engine.size.0 as usize * engine.size.1 as usize);
+    let rendered = engine.bands().try_for_each(|rows| {
+        let joint = Joint { band: width * rows.len(), picture };
+        let band = Band { frame, camera, first_row: rows.start, checkpoints: &[] };
+        output.append(band.render(engine, methods, records, passes)?, joint);
+        Ok(())
+    });
+    (engine.settings, engine.captures) = (settings, captures);
+    rendered.map(|()| output.pixels.radiance)
 }
 
 /// Rows of a frame that are rendered at a time, all samples of them: the frame, or a band of it.
@@ -190,7 +228,7 @@ impl Band<'_> {
         let mut output = FrameOutput::default();
         let mut accumulation = Accumulation::default();
         // Nobody is told the sums of a part of the picture.
-        let is_told = engine.bands().len() == 1;
+        let is_told = engine.bands().len() == 1 && !engine.settings.only_chosen;
         let mut guides = engine.settings.guides.then(|| GuideReader::new(camera, engine.size, &engine.moved));
         for sample in 0..engine.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
@@ -198,11 +236,15 @@ impl Band<'_> {
             {
                 captures.begin_batch();
             }
-            let seed = engine.settings.seed.wrapping_add(frame.wrapping_mul(0x9E37_79B9));
+            let seed = frame_seed(engine.settings.seed, frame);
             let mut view =
                 camera_view(engine.scene.resident(), camera, &engine.light, &effects, engine.size, sample, seed);
             view.params.first_row = first_row;
             view.directions.scatter = engine.settings.guides;
+            if engine.settings.only_chosen {
+                view.params.traced_one_in = engine.settings.correct_one_in;
+            }
+            view.directions.lod = Lod { angle: view.params.step_y[3], ..engine.settings.lod };
             // Each sample stands for its share of the pixel: textures are looked up by that.
             view.params.step_y[3] /= (engine.settings.samples as f32).sqrt();
             if engine.settings.taa {

@@ -3,7 +3,7 @@
 use super::{Effects, Light};
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::Params;
-use crate::kernels::{Directions, View};
+use crate::kernels::{Directions, Lod, View};
 use crate::math::sampling::r2;
 use crate::scene::Camera;
 use bricks::Resident;
@@ -64,6 +64,7 @@ pub fn camera_view(
         diffuse: effects.diffuse.unwrap_or(0),
         turn: effects.turn_degrees.to_radians(),
         scatter: false,
+        lod: Lod::default(),
         glossy: effects.glossy,
         shares: effects.environment && light.lamps.environment.is_some() && effects.diffuse.is_some(),
     };

@@ -81,6 +81,7 @@ impl GpuExecutor {
             texels: texels.max(usize::from(keep.textures)),
             opacity: keep.opacity || (opacity::is_needed(resident) && !setup.opaque),
             gloss: keep.gloss || reflectance::is_needed(resident),
+            levels: resident.has_levels_in_use(),
         };
         let most_pages = gpu.max_cache_pages(pages);
         if pages.cache > most_pages {
@@ -116,7 +117,7 @@ impl GpuExecutor {
         }
         let bricks = scene.resident().bricks.len();
         let buffers = Buffers {
-            scene: SceneBuffers::new(&gpu, &scene)?,
+            scene: SceneBuffers::new(&gpu, &scene, kernels.pages.levels)?,
             cache: CachePages::new(&gpu, page_sizes),
             texels: Texels::new(&gpu, &scene, setup.keep.textures)?,
             lamps: LampBuffers::new(&gpu, kernels.pages.gloss),

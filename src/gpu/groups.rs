@@ -104,9 +104,8 @@ impl Groups {
             group("sampling", &kernels.sampling, &entries)
         };
         let cache = filled(cache.pages(), kernels.pages.cache);
-        let bound = 7 + usize::from(kernels.pages.opacity);
         Self {
-            scene: group("scene", &kernels.scene, &numbered(scene.buffers().into_iter().take(bound), 0)),
+            scene: group("scene", &kernels.scene, &by_binding(&scene.buffers(kernels.pages))),
             rays: [rays(&sets[0]), rays(&sets[1]), rays(&sets[2])],
             cache: group("cache", &kernels.cache, &numbered(cache, 0)),
             lamps: group("lamps", &kernels.lamps, &numbered(lamps.buffers(), 0)),
@@ -121,6 +120,13 @@ impl Groups {
 /// The pages, then the first over and over: kernels for more pages than a scene has bind something that is never read.
 fn filled(pages: &[wgpu::Buffer], count: usize) -> impl Iterator<Item = &wgpu::Buffer> {
     (0..count).map(|page| pages.get(page).unwrap_or(&pages[0]))
+}
+
+/// Whole buffers as entries by their bindings.
+pub fn by_binding<'a>(buffers: &[(u32, &'a wgpu::Buffer)]) -> Vec<wgpu::BindGroupEntry<'a>> {
+    let entry =
+        |&(binding, buffer): &(u32, &'a wgpu::Buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() };
+    buffers.iter().map(entry).collect()
 }
 
 /// Whole buffers as entries from binding `first` on.

@@ -64,7 +64,10 @@ impl Kernels {
     pub fn from_sources(gpu: &Gpu, pages: Pages, count: bool, source: &dyn Fn(&str) -> String) -> Self {
         use Bound::{Params, Read, Write};
         let device = &gpu.device;
-        let scene = layout(device, "scene", &[Read; 8][..7 + usize::from(pages.opacity)]);
+        let opacity = pages.opacity.then_some(wgsl::OPACITY_BINDING);
+        let levels = (wgsl::LEVEL_BINDING..wgsl::LEVEL_BINDING + 2).filter(|_| pages.levels);
+        let of_scene = (0..7).chain(opacity).chain(levels).map(|binding| entry(binding, Read));
+        let scene = layout_of(device, "scene", &of_scene.collect::<Vec<_>>());
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write, Params]);
         let cache = layout(device, "cache", &vec![Read; pages.cache]);
         let tiles = layout(device, "tiles", &[Write, Write, Write, Write, Write, Read, Write, Read]);
@@ -164,8 +167,11 @@ fn entry(binding: u32, bound: Bound) -> wgpu::BindGroupLayoutEntry {
 }
 
 fn layout(device: &wgpu::Device, label: &str, bindings: &[Bound]) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = bindings.iter().enumerate().map(|(i, &b)| entry(i as u32, b)).collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+    layout_of(device, label, &bindings.iter().enumerate().map(|(i, &b)| entry(i as u32, b)).collect::<Vec<_>>())
+}
+
+fn layout_of(device: &wgpu::Device, label: &str, entries: &[wgpu::BindGroupLayoutEntry]) -> wgpu::BindGroupLayout {
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
 }
 
 /// The layout of group 2 of the kernels of a family.
@@ -189,7 +195,7 @@ mod tests {
     #[test]
     fn as_many_pages_as_are_promised_can_be_bound() {
         let gpu = Gpu::open(None).unwrap();
-        let pages = |cache| Pages { cache, texels: 1, opacity: true, gloss: true };
+        let pages = |cache| Pages { cache, texels: 1, opacity: true, gloss: true, levels: true };
         let cache = gpu.max_cache_pages(pages(0));
         assert!(cache > 1, "{cache} pages");
         Kernels::new(&gpu, pages(cache), false);

@@ -2,7 +2,9 @@
 
 use super::device::Gpu;
 use super::readback::device_error;
+use super::wgsl::{LEVEL_BINDING, OPACITY_BINDING, Pages};
 use crate::kernels::frame::{Frame, Placement, brick_record};
+use crate::kernels::levels::LevelTable;
 use crate::kernels::{layout, opacity};
 use crate::schedule::ExecutorError;
 use bricks::{Resident, SceneFile};
@@ -17,6 +19,8 @@ pub struct SceneBuffers {
     bricks: wgpu::Buffer,
     roots: wgpu::Buffer,
     opacity: wgpu::Buffer,
+    /// Leaves and nodes of [`LevelTable`], where kernels ask for them.
+    levels: Option<[wgpu::Buffer; 2]>,
     /// Slots and states, written before every submission.
     pub slots: wgpu::Buffer,
     frame: Option<Frame>,
@@ -25,11 +29,12 @@ pub struct SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Allocates buffers for a scene and fills what does not depend on the frame.
+    /// Allocates buffers for a scene and fills what does not depend on the frame. `levels`: whether kernels select
+    /// levels of detail.
     ///
     /// # Errors
     /// Opacity maps that cannot be read, or that are larger than a buffer of the device.
-    pub fn new(gpu: &Gpu, scene: &SceneFile) -> Result<Self, ExecutorError> {
+    pub fn new(gpu: &Gpu, scene: &SceneFile, levels: bool) -> Result<Self, ExecutorError> {
         let resident = scene.resident();
         let table = opacity::table(scene).map_err(device_error)?;
         let bytes = size_of_val(table.as_slice()) as u64;
@@ -53,6 +58,13 @@ impl SceneBuffers {
             roots: buffer("roots", count, size_of::<bricks::Node>()),
             slots: buffer("slots", count, size_of::<layout::Slot>()),
             opacity: buffer("opacity", table.len(), size_of::<[u32; 4]>()),
+            levels: levels.then(|| {
+                let nodes = resident.top2.len() + resident.top8.len();
+                [
+                    buffer("level_leaves", resident.leaves.len(), size_of::<layout::LevelLeaf>()),
+                    buffer("level_nodes", nodes, size_of::<u32>()),
+                ]
+            }),
             frame: None,
             instance_pad: 0.0,
         };
@@ -64,10 +76,13 @@ impl SceneBuffers {
         Ok(buffers)
     }
 
-    /// All of them, in the order of their bindings; the last is bound where kernels ask for opacity.
-    pub fn buffers(&self) -> [&wgpu::Buffer; 8] {
-        let Self { top8, top2, leaves, instances, bricks, roots, slots, opacity, .. } = self;
-        [top8, top2, leaves, instances, bricks, roots, slots, opacity]
+    /// All of them by their bindings, those that kernels for `pages` ask for.
+    pub fn buffers(&self, pages: Pages) -> Vec<(u32, &wgpu::Buffer)> {
+        let Self { top8, top2, leaves, instances, bricks, roots, slots, opacity, levels, .. } = self;
+        let always = (0..).zip([top8, top2, leaves, instances, bricks, roots, slots]);
+        let opacity = pages.opacity.then_some((OPACITY_BINDING, opacity));
+        let levels = (LEVEL_BINDING..).zip(levels.iter().flatten()).filter(|_| pages.levels);
+        always.chain(opacity).chain(levels).collect()
     }
 
     /// Has the next frame place everything anew.
@@ -87,5 +102,10 @@ impl SceneBuffers {
         gpu.queue.write_buffer(&self.top2, 0, bytemuck::cast_slice(&top2));
         gpu.queue.write_buffer(&self.leaves, 0, bytemuck::cast_slice(&leaves));
         gpu.queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&instances));
+        if let Some([of_leaves, of_nodes]) = &self.levels {
+            let LevelTable { leaves, nodes } = LevelTable::new(resident, &frame);
+            gpu.queue.write_buffer(of_leaves, 0, bytemuck::cast_slice(&leaves));
+            gpu.queue.write_buffer(of_nodes, 0, bytemuck::cast_slice(&nodes));
+        }
     }
 }

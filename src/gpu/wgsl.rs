@@ -9,6 +9,14 @@ use std::fmt::Write;
 /// First binding of the texels in the group of texture lookups.
 pub const TEXEL_BINDING: usize = 5;
 
+/// Binding of the opacity maps in the group of the scene.
+#[allow(dead_code)]
+pub const OPACITY_BINDING: u32 = 7;
+
+/// First binding of what levels are selected by in the group of the scene.
+#[allow(dead_code)]
+pub const LEVEL_BINDING: u32 = 8;
+
 /// Numbers of pages that the generated accessors serve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pages {
@@ -20,6 +28,8 @@ pub struct Pages {
     pub opacity: bool,
     /// Whether surfaces reflect otherwise than diffusely.
     pub gloss: bool,
+    /// Whether levels of detail stand for bricks.
+    pub levels: bool,
 }
 
 /// The text of kernel `name`, with includes taken from `file`. `None` if a file is missing.
@@ -45,6 +55,7 @@ fn append(
         "trace/cache.wgsl" => cache_accessors(pages.cache),
         "texture/texels.wgsl" => texel_accessors(pages.texels),
         "trace/opacity.wgsl" if !pages.opacity => OPAQUE.into(),
+        "trace/levels.wgsl" if !pages.levels => NO_LEVELS.into(),
         "shade/gloss.wgsl" if !pages.gloss => MATT.into(),
         _ => file(name)?,
     };
@@ -64,6 +75,34 @@ fn append(
 const OPAQUE: &str = "\
 fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) -> bool {
     return false;
+}
+";
+
+/// What stands for `trace/levels.wgsl` where every ray takes every brick.
+const NO_LEVELS: &str = "\
+struct Cone {
+    square: f32,
+}
+fn cone_of(ray: Ray) -> Cone {
+    return Cone(0.0);
+}
+fn takes(cone: Cone, leaf: u32) -> bool {
+    return true;
+}
+fn is_stood_for(cone: Cone, node: u32) -> bool {
+    return false;
+}
+fn is_stood_for_wide(cone: Cone, node: u32) -> bool {
+    return false;
+}
+fn tile_is_stood_for(tile: TileBounds, node: u32) -> bool {
+    return false;
+}
+fn tile_may_take(tile: TileBounds, leaf: u32) -> bool {
+    return true;
+}
+fn level_offset(point: vec3<f32>, leaf: u32) -> f32 {
+    return 0.0;
 }
 ";
 

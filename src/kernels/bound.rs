@@ -4,6 +4,7 @@
 use super::frame::{Frame, Placement};
 use super::lamps::LampTables;
 use super::layout;
+use super::levels::LevelTable;
 use super::layout::Params;
 use super::payloads::BrickView;
 use super::simd::isa::Best;
@@ -26,6 +27,8 @@ pub struct Scene {
     pub roots: Vec<Node>,
     /// Relative padding of top-level boxes for the rounding of instance rays.
     pub instance_pad: f32,
+    /// What selection of levels of detail goes by; empty where none are in use.
+    pub levels: LevelTable,
     frame: Option<Frame>,
 }
 
@@ -47,6 +50,9 @@ impl Scene {
             let Placement { instances, leaves, top2, top8, instance_pad } = Placement::new(resident, &frame);
             (self.instances, self.leaves, self.top2, self.top8) = (instances, leaves, top2, top8);
             self.instance_pad = instance_pad;
+            if resident.has_levels_in_use() {
+                self.levels = LevelTable::new(resident, &frame);
+            }
         }
     }
 }

@@ -41,6 +41,7 @@ impl Directions {
                 | flag(self.glossy, layout::PARAM_GLOSSY),
             stream: params.sample.wrapping_add(stream << 24),
             length: self.occlusion_length,
+            levels: self.lod.params(pass, params.sun_radius),
             ..*params
         };
         if self.shares {

@@ -16,6 +16,7 @@ pub mod frame;
 mod frame_executor;
 pub mod lamps;
 pub mod layout;
+pub mod levels;
 pub mod opacity;
 pub mod payloads;
 pub mod query;
@@ -34,4 +35,4 @@ pub mod vector;
 
 pub use frame_executor::{DeviceInfo, FrameExecutor, padded};
 pub use lamps::Lamps;
-pub use setup::{Directions, Extent, Keep, Setup, Tuning, View};
+pub use setup::{Directions, Extent, Keep, Lod, Setup, Tuning, View};

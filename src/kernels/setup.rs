@@ -2,6 +2,7 @@
 
 use super::frame::Frame;
 use super::layout::Params;
+use crate::schedule::{Lamp, Pass};
 
 /// Size of the picture, or of the block of rays, in rays, and the tiles over it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +102,44 @@ pub struct Directions {
     pub glossy: bool,
     /// Diffuse rays bring the environment's light as well as rays to it.
     pub shares: bool,
+    /// What levels of detail are selected by.
+    pub lod: Lod,
+}
+
+/// What levels of detail are selected by: a ray takes those whose error is no more than `pixels` times the width of its
+/// cone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lod {
+    /// Tolerance in widths of a ray's cone; 0: none, rays take bricks alone.
+    pub pixels: f32,
+    /// Rays choose at random between two levels, instead of all changing at one distance.
+    pub blend: bool,
+    /// Angle of a pixel, radians.
+    pub angle: f32,
+}
+
+/// Share of a squared width that blending takes off at most: levels blend over a factor of 2 in distance.
+const BLEND: f32 = 0.75;
+
+/// Angle that rays around a hit stand for, radians: what a cosine-weighted ray of a hundred does.
+const AROUND: f32 = 0.18;
+
+impl Lod {
+    /// [`Params::levels`] of the rays of a pass, under a sun with such a tangent of its angular radius.
+    pub fn params(&self, pass: Pass, sun_radius: f32) -> [f32; 4] {
+        let Self { pixels, blend, angle } = *self;
+        if pixels == 0.0 {
+            return [0.0; 4];
+        }
+        let spread = match pass {
+            Pass::Primary | Pass::Glossy | Pass::Shadow(Lamp::Emitter) | Pass::BounceShadow(Lamp::Emitter) => angle,
+            Pass::Shadow(Lamp::Sun) | Pass::BounceShadow(Lamp::Sun) => angle.max(2.0 * sun_radius),
+            Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment) => AROUND,
+            Pass::Occlusion(_) | Pass::Diffuse(_) => AROUND,
+        };
+        let square = |angle: f32| (pixels * angle) * (pixels * angle);
+        [square(angle), square(angle.max(spread)), 1.0, if blend { BLEND } else { 0.0 }]
+    }
 }
 
 /// What a frame needs to know besides the scene.

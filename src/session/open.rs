@@ -162,10 +162,11 @@ impl Session {
             path = path.with_fov_y_degrees(fov)?;
         }
         let lighting = lighting(settings, &scene, file)?;
-        let motion = settings.motion.as_ref().map(|file| SceneMotion::open(file, &scene, &lighting.sources));
+        let (levelled, without_levels) = levelled(&scene, settings.lod);
+        let motion = settings.motion.as_ref().map(|file| SceneMotion::open(file, &levelled, &lighting.sources));
         let motion = motion.transpose()?;
-        let opened = Opened::open(scene.clone(), file, settings)?;
-        let warnings = lighting.warnings.iter().chain(&opened.warnings).cloned();
+        let opened = Opened::open(levelled.clone(), file, settings)?;
+        let warnings = lighting.warnings.iter().chain(&opened.warnings).chain(&without_levels).cloned();
         let mut warnings: Vec<String> = without_effect.into_iter().chain(warnings).collect();
         if settings.frames > 1 && references.as_ref().is_some_and(|references| !references.is_of_all()) {
             warnings.push("--reference is a file: it is the reference of frame 0; name a folder to measure all".into());
@@ -358,10 +359,25 @@ fn check_data(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()>
     Ok(())
 }
 
+/// The scene with its levels of detail in use, if they are asked for; what a person should know where there are none.
+fn levelled(scene: &Arc<SceneFile>, lod: f64) -> (Arc<SceneFile>, Option<String>) {
+    if lod == 0.0 {
+        return (scene.clone(), None);
+    }
+    if scene.resident().levels.is_empty() {
+        let text = "--lod has no effect: the scene has no levels of detail; convert it with --lod on";
+        return (scene.clone(), Some(text.into()));
+    }
+    let mut levelled = scene.duplicate();
+    levelled.use_levels();
+    (Arc::new(levelled), None)
+}
+
 /// A renderer of the same frames, exactly, with a cache and a device session of its own.
 fn reference(scene: Arc<SceneFile>, file: &Path, settings: &Settings, light: Light) -> Result<Renderer> {
     let settings = Settings {
         query_threshold: 0,
+        lod: 0.0,
         requests_out: None,
         secondary: EffectMethods::EXACT,
         interactive: None,

@@ -3,6 +3,7 @@
 use super::lighting::lighting;
 use super::opened::Opened;
 use crate::frame::{Effects, Engine, Light, Methods, Moved, Occlusion, RenderSettings, Renderer};
+use crate::kernels::Lod;
 use crate::picture::Exposure;
 use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
@@ -90,6 +91,9 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         guides: settings.denoise || settings.taa,
         coverage: matches!(settings.exposure, Exposure::Auto { .. }),
         taa: settings.taa,
+        lod: Lod { pixels: settings.lod as f32, blend: settings.lod_blend, angle: 0.0 },
+        correct_one_in: settings.lod_correct.unwrap_or(0),
+        only_chosen: false,
         tile_bytes: settings.interactive,
     }
 }

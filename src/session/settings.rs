@@ -103,6 +103,16 @@ settings! {
         quality: Quality = Quality::Preview, "--quality NAME", Rule::Any, "", Quality, Common;
         /// Samples per pixel. Beyond 64 they are summed in f64.
         spp: u32 = 4, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
+        /// Levels of detail: the error, in pixels, at which a coarser level stands for bricks; 0 is exact. 1 is hardly
+        /// seen, more loads less. Secondary rays are wider than pixels and take coarser levels. Needs a scene converted
+        /// with `--lod on`.
+        lod: f64 = 0.0, "--lod PIXELS", Rule::Real(0.0, 1024.0), "pixels", Quality, Usual;
+        /// Choose at random between two levels of detail where one gives way to the other. It takes noise in the place
+        /// of steps that show as the camera moves.
+        lod_blend: bool = false, "--lod-blend", Rule::Any, "", Quality, Expert;
+        /// Trace one block of 8x8 pixels in so many exactly as well, and correct the others by its difference. What
+        /// levels of detail change of a picture on average then vanishes over frames. [default: off]
+        lod_correct: Option<u32> = None, "--lod-correct N", Rule::Whole(1, 65_536), "blocks", Quality, Expert;
         /// Seed of random sampling.
         seed: u64 = 0, "--seed N", Rule::Any, "", Quality, Usual;
         /// Exposure of PNGs and video in stops (EV), or auto. Radiance is multiplied by 2^EV before the tone map.
@@ -239,6 +249,12 @@ impl Settings {
                 right.display()
             )));
         }
+        if let Some(method) = [Method::Dvf, Method::Displacement].into_iter().find(|&method| self.secondary.has(method))
+            && self.lod > 0.0
+        {
+            let text = format!("--lod and --secondary {method} exclude each other: {method} knows bricks alone; leave one out");
+            return Err(SettingsError::Conflict(text));
+        }
         if !self.checkpoints.is_empty() {
             let text = match (&self.reference, self.denoise || self.taa) {
                 (None, _) => "--checkpoints needs a reference; give --reference FILE.exr, as walk --aov writes it",
@@ -279,7 +295,7 @@ impl Settings {
         let maps = chosen.has(Method::Roma) || chosen.has(Method::Auto);
         let fields = chosen.list().iter().any(|(_, method)| method.name() == "df");
         let lit = self.environment.is_some();
-        let needs: [(&str, bool, &str); 23] = [
+        let needs: [(&str, bool, &str); 25] = [
             ("ao_rays", effects.ao, "--effects ao"),
             ("ao_length", effects.ao, "--effects ao"),
             ("diffuse_rays", effects.diffuse, "--effects diffuse"),
@@ -289,6 +305,8 @@ impl Settings {
             ("rect_light_intensity", self.rect_light.is_some(), "--rect-light"),
             ("video_fps", self.video.is_some(), "--video"),
             ("reference", !self.checkpoints.is_empty(), "--checkpoints"),
+            ("lod_correct", self.lod > 0.0, "--lod above 0"),
+            ("lod_blend", self.lod > 0.0, "--lod above 0"),
             ("progressive", self.samples() > BATCH_SAMPLES, "--spp above 64"),
             ("roma.bom", maps || fields, "--secondary roma, auto or df"),
             ("roma.k", by_maps(chosen.ao), "--secondary ao=roma or ao=auto"),

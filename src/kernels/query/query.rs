@@ -51,7 +51,7 @@ impl PacketKernel for Query<'_> {
             let position = lists.selection[next as usize] as usize;
             let listed = lists.list[position];
             // Their distances are their limits.
-            let mut rays = packet.reaching(isa, listed.near);
+            let mut rays = packet.taking(bound, listed.leaf, packet.reaching(isa, listed.near));
             if rays == 0 {
                 continue;
             }
@@ -113,6 +113,7 @@ fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
     let (ray, hit) = (slot.ray, &slot.hit);
     let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    let cone = bound.cone_of(ray.origin, ray.direction);
     let mut r = BrickRay::outside(&world);
     // The brick that it enters before any other that it asks for, and where.
     let mut first: Option<(usize, f32)> = None;
@@ -126,7 +127,7 @@ fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
             }
             continue;
         }
-        if listed.near > hit.t {
+        if listed.near > hit.t || !bound.takes(&cone, leaf) {
             continue;
         }
         r.enter_leaf(bound.scene, &world, leaf);

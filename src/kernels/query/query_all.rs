@@ -41,6 +41,7 @@ fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pair
     }
     let scene = bound.scene;
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    let cone = bound.cone_of(ray.origin, ray.direction);
     let up_to_next = !COUNT && bound.has(PARAM_NEXT);
     let mut r = BrickRay::outside(&world);
     let Scratch { entered: stack, tally, .. } = scratch;
@@ -67,16 +68,21 @@ fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pair
                 continue;
             }
             if inner & 1 << child != 0 {
+                let index = node.child_base + inner_before(inner, child);
+                if bound.is_stood_for_wide(&cone, index) {
+                    continue;
+                }
                 if stack.len() == TOP_STACK_SIZE {
                     tally.add(COUNTER_STACK_OVERFLOW, 1);
                     return;
                 }
-                stack.push((node.child_base + inner_before(inner, child), near));
+                stack.push((index, near));
                 continue;
             }
             let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
             let brick = bound.brick_of(leaf);
-            if !bound.is_selected(brick) || (!COUNT && pairs.is_culled(bound, slot.tile, leaf)) {
+            let is_left_out = !COUNT && pairs.is_culled(bound, slot.tile, leaf);
+            if !bound.is_selected(brick) || is_left_out || !bound.takes(&cone, leaf) {
                 continue;
             }
             r.enter_leaf(scene, &world, leaf);

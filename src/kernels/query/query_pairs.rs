@@ -8,6 +8,7 @@ use crate::kernels::layout::{COUNTER_PAIRS_TESTED, COUNTER_TIGHTENED, NONE, PARA
 use crate::kernels::rays::{RaySet, is_traced};
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
+use crate::kernels::trace::levels::Cone;
 use crate::kernels::trace::node::{FramedRay, UNIT, framed_ray, node_hits, traversal_mask};
 use crate::kernels::vector::{each, least, most, most3};
 use rayon::prelude::*;
@@ -38,15 +39,18 @@ enum Look {
     Seen,
 }
 
-fn look(bound: &Bound, world: &FramedRay, index: u32, t_max: f32) -> Look {
-    if !enters(bound, world, index, t_max) {
+fn look(bound: &Bound, world: &FramedRay, cone: &Cone, index: u32, t_max: f32) -> Look {
+    if !enters(bound, world, index, t_max) || bound.is_stood_for(cone, index) {
         return Look::Nothing;
     }
     let seen = |seen: bool| if seen { Look::Seen } else { Look::Own };
+    let node = &bound.scene.top2[index as usize];
+    if node.right == NONE && !bound.takes(cone, node.left) {
+        return Look::Nothing;
+    }
     if !bound.has(PARAM_TIGHTER) {
         return Look::Seen;
     }
-    let node = &bound.scene.top2[index as usize];
     if node.right != NONE {
         return seen(enters(bound, world, node.left, t_max) || enters(bound, world, node.right, t_max));
     }
@@ -79,8 +83,9 @@ fn ask(bound: &Bound, set: &RaySet, pair: &Pair, nodes: &[u32], each: bool, out:
                 continue;
             }
             let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+            let cone = bound.cone_of(ray.origin, ray.direction);
             for (k, &node) in nodes.iter().enumerate() {
-                let what = look(bound, &world, node, hit.t);
+                let what = look(bound, &world, &cone, node, hit.t);
                 out.own |= u32::from(what != Look::Nothing) << k;
                 if what == Look::Seen {
                     if each {

@@ -74,11 +74,13 @@ fn walk(bound: &Bound, bounds: &TileBounds, tally: &mut Tally, mut list: impl Fn
     loop {
         let n = &top2[node as usize];
         if n.right == NONE {
-            if !list(Entry { leaf: n.left, near }) {
+            if bound.tile_may_take(bounds, n.left) && !list(Entry { leaf: n.left, near }) {
                 break;
             }
         } else {
-            let (l, r) = (meets(n.left), meets(n.right));
+            let (mut l, mut r) = (meets(n.left), meets(n.right));
+            l.hit = l.hit && !bound.tile_is_stood_for(bounds, n.left);
+            r.hit = r.hit && !bound.tile_is_stood_for(bounds, n.right);
             walked.tested += 2;
             walked.culled += u32::from(!l.hit) + u32::from(!r.hit);
             if l.hit && r.hit {

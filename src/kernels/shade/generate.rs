@@ -9,12 +9,12 @@ use super::shade::Pixels;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT,
-    PARAM_SCATTER, Ray, Surface, T_INFINITE,
+    PARAM_SCATTER, Params, Ray, Surface, T_INFINITE,
 };
 use crate::kernels::rays::{RaySet, start_hit};
 use crate::kernels::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
 use crate::math::exact::barrier;
-use crate::math::sampling::{random2, random4};
+use crate::math::sampling::{pcg, random2, random4};
 use bricks::Material;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -50,6 +50,16 @@ fn along(base: f32, x: f32, step_x: f32, y: f32, step_y: f32) -> f32 {
     barrier(barrier(base + barrier(x * step_x)) + barrier(y * step_y))
 }
 
+/// Whether the ray's block is traced: all are, or the one of its group that is chosen.
+fn is_chosen(p: &Params, column: u32, row: u32) -> bool {
+    let one_in = p.traced_one_in;
+    if one_in == 0 {
+        return true;
+    }
+    let block = row / 8 * p.width.div_ceil(8) + column / 8;
+    block % one_in == pcg((block / one_in) ^ pcg(p.seed)) % one_in
+}
+
 /// Camera rays: direction(x, y) = base + x * step_x + y * step_y through the jittered pixel position, not normalised.
 pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
     let p = bound.params;
@@ -59,7 +69,7 @@ pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
         let y = barrier(row as f32 + p.jitter[1]);
         let direction = each(|k| along(p.base[k], x, p.step_x[k], y, p.step_y[k]));
         // The last band of a picture may reach beyond it.
-        let (t_min, t_max) = if row < p.picture_rows { (0.0, T_INFINITE) } else { (1.0, 0.0) };
+        let (t_min, t_max) = if row < p.picture_rows && is_chosen(p, column, row) { (0.0, T_INFINITE) } else { (1.0, 0.0) };
         (Ray { origin: xyz(p.origin), t_min, direction, t_max }, NONE, Chosen::default())
     });
 }

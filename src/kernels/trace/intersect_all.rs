@@ -74,11 +74,14 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
             if rays == 0 {
                 continue;
             } else if inner & 1 << child != 0 {
-                next = Some((node.child_base + inner_before(inner, child), rays));
+                let index = node.child_base + inner_before(inner, child);
+                let rays = packets.packet.left_by_levels(bound, index, rays);
+                next = (rays != 0).then_some((index, rays));
                 continue;
             }
             let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
-            if !self.is_left_out(tile, leaf) {
+            let rays = if self.is_left_out(tile, leaf) { 0 } else { packets.packet.taking(bound, leaf, rays) };
+            if rays != 0 {
                 packets.walk_leaf(isa, bound, scratch, leaf, rays, any_hit);
             }
         }

@@ -102,6 +102,7 @@ fn trace(bound: &Bound, scratch: &mut Scratch, slot: Slot, trees: &BinaryTrees) 
     }
     let any_hit = bound.has(PARAM_ANY_HIT);
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
+    let cone = bound.cone_of(ray.origin, ray.direction);
     let mut best = Best::before(&slot);
     let mut visits = Visits::default();
     let mut r = BrickRay::outside(&world);
@@ -148,6 +149,10 @@ fn trace(bound: &Bound, scratch: &mut Scratch, slot: Slot, trees: &BinaryTrees) 
         }
         if !walk.in_brick {
             let leaf = at & !BINARY_LEAF;
+            if !bound.takes(&cone, leaf) {
+                at = walk.pop();
+                continue;
+            }
             let brick = bound.brick_of(leaf);
             bound.note_use(leaf);
             r.enter_leaf(bound.scene, &world, leaf);

@@ -45,12 +45,13 @@ impl PacketKernel for IntersectList<'_> {
 
     #[inline(always)]
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
-        let (next, end) = self.run_of(tile);
+        let (bound, (next, end)) = (self.bound, self.run_of(tile));
         for position in next..end {
             let listed = self.listed(position);
             let rays = packets.packet.reaching(isa, listed.near) & !packets.packet.done;
+            let rays = packets.packet.taking(bound, listed.leaf, rays);
             if rays != 0 {
-                packets.walk_leaf(isa, self.bound, scratch, listed.leaf, rays, self.bound.has(PARAM_ANY_HIT));
+                packets.walk_leaf(isa, bound, scratch, listed.leaf, rays, bound.has(PARAM_ANY_HIT));
             }
         }
     }

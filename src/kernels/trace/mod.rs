@@ -6,6 +6,7 @@ pub mod intersect_all;
 pub mod intersect_binary;
 pub mod intersect_list;
 pub mod leaf;
+pub mod levels;
 pub mod node;
 pub mod opacity;
 pub mod packet;

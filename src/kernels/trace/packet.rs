@@ -5,7 +5,9 @@
 //! All that is known of a ray lies in columns, a number or a word a ray, because it is read and written by vectors.
 
 use super::brick::Best;
+use super::levels::Cone;
 use super::node::{FramedRay, framed_ray};
+use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Hit, NONE, Ray};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
@@ -348,6 +350,36 @@ impl Packet {
             rays |= u64::from(isa.splat(near).less_equal(self.t.get(isa, v))) << (v * I::Wide::LANES);
         }
         rays & self.all()
+    }
+
+    /// Of `rays` those that take a leaf of the top level.
+    #[inline(always)]
+    pub fn taking(&self, bound: &Bound, leaf: u32, rays: u64) -> u64 {
+        if !bound.has_levels() { rays } else { self.whose_cones(bound, rays, |cone| bound.takes(cone, leaf)) }
+    }
+
+    /// Of `rays` those for which no level stands for all below a node of the wide top level.
+    #[inline(always)]
+    pub fn left_by_levels(&self, bound: &Bound, node: u32, rays: u64) -> u64 {
+        if !bound.has_levels() { rays } else { self.whose_cones(bound, rays, |c| !bound.is_stood_for_wide(c, node)) }
+    }
+
+    /// Of `rays` those whose cones are as asked; the same cones are asked about once.
+    fn whose_cones(&self, bound: &Bound, rays: u64, ask: impl Fn(&Cone) -> bool) -> u64 {
+        let (mut left, mut found, mut last) = (rays, 0, None);
+        while left != 0 {
+            let i = left.trailing_zeros() as usize % RAYS;
+            left &= left - 1;
+            let at = |columns: &[Column; 3]| [columns[0].0[i], columns[1].0[i], columns[2].0[i]];
+            let cone = bound.cone_of(at(&self.origin), at(&self.direction));
+            let is_so = match last {
+                Some((before, answer)) if before == cone => answer,
+                _ => ask(&cone),
+            };
+            last = Some((cone, is_so));
+            found |= u64::from(is_so) << i;
+        }
+        found
     }
 
     /// Takes note that hits have come nearer.

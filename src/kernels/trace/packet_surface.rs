@@ -187,6 +187,7 @@ impl Packet {
                 let (hit, surface) = (&mut hits_of[places[i] as usize], &mut surfaces[places[i] as usize]);
                 if together >> (i - first) & 1 != 0 {
                     points_of.write(i - first, &self.best(i), hit, surface);
+                    bound.start_off(surface);
                 } else {
                     write_found(bound, &self.ray(i), &self.best(i), hit, surface);
                 }

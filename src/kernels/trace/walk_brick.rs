@@ -121,6 +121,7 @@ pub fn write_found(bound: &Bound, world: &FramedRay, best: &Best, hit: &mut Hit,
         r.enter_leaf(bound.scene, world, best.leaf);
         r.enter_brick(bound, bound.brick_of(best.leaf));
         r.write_hit(bound.scene, best, world.direction, hit, surface);
+        bound.start_off(surface);
     }
 }
 

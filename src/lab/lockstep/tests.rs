@@ -58,7 +58,7 @@ fn device() -> Option<(Gpu, Arc<Kernels>)> {
         crate::skip::skip("no adapter");
         return None;
     };
-    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true }, true));
+    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels: true }, true));
     Some((gpu, kernels))
 }
 
@@ -357,6 +357,9 @@ fn render(
         executor: Box::new(executor),
         cache: Cache::new(residency, sizes.clone(), Vec::new(), None),
         settings: RenderSettings {
+            lod: Default::default(),
+            correct_one_in: 0,
+            only_chosen: false,
             tile_bytes: variant.tile_bytes,
             schedule: variant.schedule,
             effects: effects(),

@@ -238,6 +238,10 @@ impl Level {
                     continue;
                 }
                 let leaf = &resident.leaves[node.left as usize];
+                // Levels of detail have no maps; the bricks that they stand for do.
+                if leaf.brick as usize >= resident.occupancy.len() {
+                    continue;
+                }
                 let place = Place::of(&resident.instances[leaf.instance as usize], record(resident, leaf));
                 // Cut off by the level's end it may be more than one.
                 let is_inside = (0..3).all(|k| all.lo[k] > 0 && all.hi[k] < self.map.cells());

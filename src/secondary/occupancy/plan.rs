@@ -103,8 +103,10 @@ fn finest_near(resident: &Resident, middle: &[f64; 3], cells: u32) -> i32 {
         if node.right == TOP_LEAF {
             let leaf = &resident.leaves[node.left as usize];
             let instance = &resident.instances[leaf.instance as usize];
-            let own = Place::of(instance, &resident.occupancy[leaf.brick as usize]).cell_log2();
-            finest = finest.min(own.max(reaches));
+            // Levels of detail have no maps; the bricks that they stand for do.
+            if let Some(occupancy) = resident.occupancy.get(leaf.brick as usize) {
+                finest = finest.min(Place::of(instance, occupancy).cell_log2().max(reaches));
+            }
         } else {
             stack.extend([node.left, node.right]);
         }

@@ -41,9 +41,10 @@ impl Raster {
             let drawn = random4(level, sample.wrapping_add(STREAM), seed);
             let jitter = [0, 1, 2].map(|k| f64::from(drawn[k]) * 0.5f64.powi(32) - 0.5);
             let empty = || Bom::new(bom.cells(), bom.cell_log2, bom.first);
-            let leaves = &file.resident().leaves;
+            let (leaves, exact) = (&file.resident().leaves, file.resident().exact_bricks());
             leaves
                 .par_iter()
+                .filter(|leaf| (leaf.brick as usize) < exact)
                 .fold(empty, |mut map, leaf| {
                     voxelise(&mut map, self.of_leaf(file, leaf), Voxelisation::Raster { jitter });
                     map
