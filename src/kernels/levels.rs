@@ -144,3 +144,97 @@ fn stand_ins(resident: &Resident, parents: &[u32]) -> Vec<u32> {
     of2.extend(of8);
     of2
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bricks::SceneFile;
+    use brickwalk_convert::build::{BuildSettings, build};
+    use brickwalk_convert::progress::Progress;
+    use brickwalk_scenes::rotated_instances;
+
+    fn scene() -> SceneFile {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bricks");
+        let settings =
+            BuildSettings { brick_triangles: 32, instance_min_triangles: 1, lod: true, ..BuildSettings::default() };
+        build(rotated_instances(7), &settings, &path, &Progress::hidden()).unwrap();
+        let mut scene = SceneFile::open(&path).unwrap();
+        scene.use_levels();
+        scene
+    }
+
+    /// The levels above a leaf, the nearest first.
+    fn above(parents: &[u32], mut leaf: u32) -> Vec<u32> {
+        let mut levels = Vec::new();
+        while parents[leaf as usize] != NONE {
+            leaf = parents[leaf as usize];
+            levels.push(leaf);
+        }
+        levels
+    }
+
+    #[test]
+    fn errors_grow_and_boxes_nest_toward_the_roots() {
+        let scene = scene();
+        let resident = scene.resident();
+        let frame = Frame::near(resident, glam::DVec3::new(3.0, 1.0, -2.0));
+        let table = LevelTable::new(resident, &frame);
+        let mut levels = 0;
+        for (leaf, own) in resident.leaves.iter().zip(&table.leaves) {
+            assert_eq!(own.error_square == 0.0, (leaf.brick as usize) < resident.exact_bricks());
+            if own.parent == NONE {
+                continue;
+            }
+            levels += 1;
+            let parent = &table.leaves[own.parent as usize];
+            assert!(own.error_square <= parent.error_square);
+            assert!((0..3).all(|k| own.min[k] >= parent.min[k] && own.max[k] <= parent.max[k]));
+        }
+        assert!(levels > 100, "{levels}");
+    }
+
+    #[test]
+    fn nodes_know_the_last_level_above_all_that_is_below_them() {
+        let scene = scene();
+        let resident = scene.resident();
+        let parents = resident.level_parents();
+        let found = stand_ins(resident, &parents);
+        let last_common = |leaves: &[u32]| {
+            let first = above(&parents, leaves[0]);
+            let is_common = |level: &&u32| leaves.iter().all(|&leaf| above(&parents, leaf).contains(level));
+            first.iter().find(is_common).copied().unwrap_or(NONE)
+        };
+        let mut below: Vec<Vec<u32>> = vec![Vec::new(); resident.top2.len()];
+        for (index, node) in resident.top2.iter().enumerate().rev() {
+            below[index] = match node.right {
+                TOP_LEAF => vec![node.left],
+                right => [below[node.left as usize].clone(), below[right as usize].clone()].concat(),
+            };
+            assert_eq!(found[index], last_common(&below[index]), "node {index}");
+        }
+        assert!(found.iter().filter(|level| **level != NONE).count() > resident.top2.len() / 2);
+    }
+
+    #[test]
+    fn instances_lengthen_by_their_largest_factor() {
+        let of = |matrix: [f64; 9]| {
+            let [a, b, c, d, e, f, g, h, i] = matrix;
+            stretch(&Instance { world_from_object: [a, b, c, 0.0, d, e, f, 0.0, g, h, i, 0.0], ..resident_instance() })
+        };
+        let (sin, cos) = 0.3f64.sin_cos();
+        for (matrix, factor) in [
+            ([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], 1.0),
+            ([0.0, -2.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 2.0], 2.0),
+            ([3.0 * cos, -sin, 0.0, 3.0 * sin, cos, 0.0, 0.0, 0.0, 0.5], 3.0),
+            ([1e-9, 0.0, 0.0, 0.0, 1e9, 0.0, 0.0, 0.0, 1.0], 1e9),
+        ] {
+            let found = of(matrix);
+            assert!(found >= factor && found < factor * 1.00001, "{found} for {factor}");
+        }
+    }
+
+    fn resident_instance() -> Instance {
+        Instance { object: 0, base: 0, flags: 0, _reserved: 0, world_from_object: Instance::IDENTITY }
+    }
+}

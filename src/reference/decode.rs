@@ -83,13 +83,20 @@ pub enum DecodeError {
 
 /// All objects of a file. Copies of split triangles are merged; that they agree is checked.
 pub(super) fn objects(file: &SceneFile) -> Result<Vec<TruthObject>, DecodeError> {
-    let objects = 0..file.resident().objects.len() as u32;
-    objects.map(|index| object(file, index)).collect()
+    let bricks: Vec<u32> = (0..file.resident().exact_bricks() as u32).collect();
+    objects_of(file, &bricks)
 }
 
-fn object(file: &SceneFile, index: u32) -> Result<TruthObject, DecodeError> {
+/// All objects of a file as these of its bricks and levels of detail show them.
+pub(super) fn objects_of(file: &SceneFile, bricks: &[u32]) -> Result<Vec<TruthObject>, DecodeError> {
+    let objects = 0..file.resident().objects.len() as u32;
+    objects.map(|index| object(file, index, bricks)).collect()
+}
+
+fn object(file: &SceneFile, index: u32, bricks: &[u32]) -> Result<TruthObject, DecodeError> {
     let object = file.resident().objects[index as usize];
-    let bricks = object.first_brick..object.first_brick + object.brick_count;
+    let is_of_it = |brick: &u32| file.resident().brick(*brick).is_some_and(|brick| brick.object == index);
+    let bricks: Vec<u32> = bricks.iter().copied().filter(is_of_it).collect();
     let parts: Vec<Vec<TruthTriangle>> =
         bricks.into_par_iter().map(|index| brick(file, &object, index)).collect::<Result<_, _>>()?;
     let mut triangles: Vec<TruthTriangle> = parts.into_iter().flatten().collect();

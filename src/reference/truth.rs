@@ -51,13 +51,25 @@ impl Truth {
     /// # Errors
     /// A damaged file, a vertex off its lattice, copies of a triangle that differ, an id given twice.
     pub fn load(file: &SceneFile) -> Result<Self, DecodeError> {
+        Self::of_objects(file, decode::objects(file)?)
+    }
+
+    /// What rays meet that take these bricks and levels of detail, by their indices, and nothing else.
+    ///
+    /// # Errors
+    /// As of [`Truth::load`].
+    pub fn load_cut(file: &SceneFile, bricks: &[u32]) -> Result<Self, DecodeError> {
+        Self::of_objects(file, decode::objects_of(file, bricks)?)
+    }
+
+    fn of_objects(file: &SceneFile, objects: Vec<decode::TruthObject>) -> Result<Self, DecodeError> {
         let instance = |instance: &bricks::Instance| TruthInstance {
             object: instance.object,
             base: instance.base,
             world_from_object: (instance.flags & INSTANCE_IDENTITY == 0).then_some(instance.world_from_object),
         };
         let instances = file.resident().instances.iter().map(instance).collect();
-        let truth = Self::new(decode::objects(file)?, instances)?;
+        let truth = Self::new(objects, instances)?;
         Ok(Self { opacities: Opacities::load(file)?, ..truth })
     }
 

@@ -34,6 +34,7 @@ mod exact {
     mod cache_independence;
     mod exactness;
     mod given_rays;
+    mod levels;
     mod motion;
     mod rays;
     mod records;

@@ -16,7 +16,7 @@ use crate::kernels::frame::Frame;
 use crate::kernels::lamps::{Emitter, Lamps, Shape};
 use crate::kernels::layout::{MET, NONE, Params, Ray};
 use crate::kernels::table::KERNELS;
-use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Setup, View};
+use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Lod, Setup, View};
 use crate::scene::{CameraPath, Keyframe};
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
@@ -184,6 +184,41 @@ fn with_fields(scene: Arc<SceneFile>, bits: u32) -> Arc<SceneFile> {
     Arc::new(SceneFile::from_bytes("fields", std::fs::read(&path).unwrap()).unwrap())
 }
 
+/// A hilly plain with copies of a part of it, and levels of detail of all.
+fn with_levels() -> Arc<SceneFile> {
+    let hills = |side: u32, size: f64| {
+        let mut part = Primitive::default();
+        for i in 0..side * side {
+            let [x, z] = [i % side, i / side].map(|k| f64::from(k) * size / f64::from(side - 1));
+            let bumps = (3.0 * x).sin() * (2.3 * z).cos() + 0.1 * f64::from(i * 37 % 11);
+            part.positions.push([x, 0.3 * bumps, z]);
+        }
+        for i in (0..side * (side - 1)).filter(|i| i % side != side - 1) {
+            part.indices.extend([i, i + side, i + 1, i + 1, i + side, i + side + 1]);
+        }
+        Mesh { name: "hills".into(), primitives: vec![part] }
+    };
+    let place = |mesh, x: f64, scale: f64| {
+        let mut matrix = IDENTITY;
+        (matrix[0], matrix[5], matrix[10], matrix[3], matrix[7]) = (scale, scale, scale, x, 2.0);
+        Placement { mesh, world_from_mesh: matrix, ..Placement::default() }
+    };
+    let source = SourceScene {
+        meshes: vec![hills(40, 12.0), hills(24, 2.0)],
+        placements: vec![place(0, 0.0, 1.0), place(1, 1.0, 1.0), place(1, 5.0, -1.5)],
+        materials: vec![bricks::Material { base_color: [0.7, 0.6, 0.5, 1.0], ..Default::default() }],
+        ..SourceScene::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("levels.bricks");
+    let settings = BuildSettings { brick_triangles: 64, instance_min_triangles: 1, lod: true, ..Default::default() };
+    build(source, &settings, &path, &Progress::hidden()).unwrap();
+    let mut scene = SceneFile::from_bytes("levels", std::fs::read(&path).unwrap()).unwrap();
+    assert!(scene.resident().levels.len() > 10 && scene.resident().instances.len() > 2);
+    scene.use_levels();
+    Arc::new(scene)
+}
+
 /// One way to render.
 struct Variant {
     schedule: Schedule,
@@ -207,6 +242,8 @@ struct Variant {
     displacement: Option<displacement::Options>,
     /// How a field of visibility is made that answers rays to the environment, if one does.
     dvf: Option<DvfSettings>,
+    /// What levels of detail are selected by, in a scene that has some.
+    lod: Lod,
 }
 
 const VARIANT: Variant = Variant {
@@ -223,6 +260,7 @@ const VARIANT: Variant = Variant {
     method: Method::Exact,
     displacement: None,
     dvf: None,
+    lod: Lod { pixels: 0.0, blend: false, angle: 0.0 },
 };
 
 fn effects() -> Effects {
@@ -357,7 +395,7 @@ fn render(
         executor: Box::new(executor),
         cache: Cache::new(residency, sizes.clone(), Vec::new(), None),
         settings: RenderSettings {
-            lod: Default::default(),
+            lod: variant.lod,
             correct_one_in: 0,
             only_chosen: false,
             tile_bytes: variant.tile_bytes,
@@ -484,6 +522,17 @@ fn twins_agree_with_their_kernels() {
         Variant { schedule: Schedule::Demand, ..asked(Against::All, Interpolation::Positions, 40_000) },
         Variant { everything_fits: true, ..asked(Against::All, Interpolation::Directions, 1 << 30) },
     ];
+    let selecting = |pixels, blend| Variant { lod: Lod { pixels, blend, angle: 0.0 }, ..VARIANT };
+    let by_levels = [
+        selecting(4.0, false),
+        selecting(0.0, false),
+        Variant { everything_fits: true, schedule: Schedule::Plain, ..selecting(2.0, true) },
+        Variant { everything_fits: true, schedule: Schedule::PlainBinary, ..selecting(8.0, false) },
+        Variant { schedule: Schedule::Demand, ..selecting(4.0, true) },
+        Variant { list_most: 2, threshold: 2, ..selecting(4.0, false) },
+        Variant { fronts: true, ..selecting(4.0, true) },
+        Variant { method: Method::Auto, ..selecting(4.0, false) },
+    ];
     // Whatever methods there are, with few cells.
     let usual = Method::ALL.iter().map(|&method| Variant { method, ..VARIANT }).filter(|v| v.method != Method::Exact);
     let variants: Vec<Variant> = variants.into_iter().chain(usual).collect();
@@ -511,6 +560,7 @@ fn twins_agree_with_their_kernels() {
         (with_fields(Arc::new(probe::scene().unwrap()), 8), &by_fields[..]),
         (with_fields(textured(false), 8), &by_fields[..2]),
         (with_fields(textured(false), 1), &by_fields[2..]),
+        (with_levels(), &by_levels[..]),
     ];
     let each = std::thread::scope(|scope| {
         let threads = scenes.map(|(scene, variants)| scope.spawn(|| check(scene, variants)));
