@@ -54,4 +54,4 @@ pub use records::*;
 pub use resident::Resident;
 pub use texture::{BLOCK_TEXELS, TILE_TEXELS, TilePlace};
 pub use verify::{VerifyReport, verify_file};
-pub use writer::{Partial, Writer};
+pub use writer::{Partial, Writer, Written};

@@ -7,6 +7,7 @@ use crate::layout::{DirectoryEntry, Header, MAGIC, MAX_PAYLOAD_BYTES, PAGE_BYTES
 use crate::payload::Payload;
 use crate::records::Span;
 use crate::resident::Resident;
+use crate::source::{ReadSource, Source};
 use crate::validate;
 use std::borrow::Cow;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -77,6 +78,17 @@ impl Writer {
     pub fn checkpoint(&mut self) -> Result<u64, Error> {
         self.file.flush().map_err(|source| self.write_error(source))?;
         Ok(self.position)
+    }
+
+    /// Opens what has been written so far, to read payloads back. More may be written meanwhile.
+    ///
+    /// # Errors
+    /// What is collected cannot be written, or the file cannot be opened again.
+    pub fn written(&mut self) -> Result<Written, Error> {
+        self.checkpoint()?;
+        let file = self.file.get_ref().reopen();
+        let file = file.map_err(|source| self.error("read what was written of the file", source))?;
+        Ok(Written { path: self.path.clone(), source: ReadSource::new(file) })
     }
 
     /// Leaves the temporary file.
@@ -216,6 +228,29 @@ impl Writer {
 
     fn write_error(&self, source: io::Error) -> Error {
         self.error("write the file; free some space on the disk and convert again", source)
+    }
+}
+
+/// Payloads of a file that is still being written.
+pub struct Written {
+    path: PathBuf,
+    source: ReadSource,
+}
+
+impl Written {
+    /// The bytes of a payload as they were given to [`Writer::write`]; any thread may ask.
+    ///
+    /// # Errors
+    /// The payload cannot be read, or is not what was written.
+    pub fn read(&self, span: Span) -> Result<Vec<u8>, Error> {
+        let mut bytes = vec![0; span.bytes as usize];
+        let read = self.source.read_at(span.offset, &mut bytes).and_then(|()| {
+            let is_same = xxh3_64(&bytes) == span.checksum;
+            if is_same { Ok(()) } else { Err(io::Error::new(io::ErrorKind::InvalidData, "it was damaged meanwhile")) }
+        });
+        let action = || format!("read what was written at byte {}; convert again", span.offset);
+        read.map_err(|source| Error::Io { path: self.path.clone(), action: action(), part: None, source })?;
+        Ok(bytes)
     }
 }
 

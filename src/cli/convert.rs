@@ -103,7 +103,7 @@ impl Job<'_> {
 pub fn build_settings(args: &BuildArgs) -> BuildSettings {
     let settings = work_settings(&args.work);
     let brick_triangles = args.brick_triangles.unwrap_or(settings.brick_triangles);
-    BuildSettings { brick_triangles, proxies: !args.no_proxies, resume: args.resume, ..settings }
+    BuildSettings { brick_triangles, proxies: !args.no_proxies, lod: args.lod, resume: args.resume, ..settings }
 }
 
 /// The settings of the builder for everything that converts.
@@ -174,6 +174,16 @@ pub fn summarise(
         human_bytes(scene.file_bytes()),
         start.elapsed().as_secs_f64()
     ))?;
+    if summary.levels > 0 {
+        say(&format!(
+            "{}: {} of detail, {}, {}, at most {:.3e} from the bricks\n",
+            path.display(),
+            counted(summary.levels, "level"),
+            counted(summary.level_triangles, "triangle"),
+            human_bytes(summary.bytes_levels),
+            summary.level_bound
+        ))?;
+    }
     let phases = summary.phases.iter().map(|(phase, time)| format!("{phase} {:.1} s", time.as_secs_f64()));
     info!("{}: {}", path.display(), phases.collect::<Vec<_>>().join(", "));
     Ok(())

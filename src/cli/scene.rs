@@ -134,6 +134,7 @@ fn refuse_building(args: &BuildArgs) -> Result<()> {
         ("--resume", args.resume),
         ("--fast", args.work.fast),
         ("--no-proxies", args.no_proxies),
+        ("--lod", args.lod),
         ("--displacement", args.displacement),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {

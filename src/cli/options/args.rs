@@ -174,6 +174,11 @@ fn textures() -> impl TypedValueParser<Value = TextureEncoding> {
     })
 }
 
+/// Reads on or off.
+fn switch() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|name| name == "on")
+}
+
 /// Options of what becomes of the triangles and meshes of inputs.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Meshes")]
@@ -202,6 +207,9 @@ pub struct BuildArgs {
     /// Write no occupancy maps; --secondary roma, auto and df need them
     #[arg(long)]
     pub no_proxies: bool,
+    /// Whether to store levels of detail, which stand for bricks far away: on or off
+    #[arg(long, value_name = "WHETHER", default_value = "off", action = clap::ArgAction::Set, value_parser = switch())]
+    pub lod: bool,
     /// Make displacement fields as well, as bake-displacement does without options
     #[arg(long)]
     pub displacement: bool,
@@ -282,7 +290,14 @@ impl SceneArgs {
     /// Those of a city of so many triangles, else the defaults.
     pub fn city(output: PathBuf, triangles: u64, seed: u64) -> Self {
         let work = WorkArgs { threads: None, lattice: None, memory: None, scratch: None, fast: false };
-        let build = BuildArgs { brick_triangles: None, no_proxies: false, displacement: false, resume: false, work };
+        let build = BuildArgs {
+            brick_triangles: None,
+            no_proxies: false,
+            lod: false,
+            displacement: false,
+            resume: false,
+            work,
+        };
         let (kind, triangles) = (SceneKind::Generated(brickwalk_scenes::Kind::City), Some(triangles));
         Self { kind, case: None, output, triangles, seed, instanced: false, copies: 1, build }
     }

@@ -206,7 +206,8 @@ fn with_levels() -> Arc<SceneFile> {
     let source = SourceScene {
         meshes: vec![hills(40, 12.0), hills(24, 2.0)],
         placements: vec![place(0, 0.0, 1.0), place(1, 1.0, 1.0), place(1, 5.0, -1.5)],
-        materials: vec![bricks::Material { base_color: [0.7, 0.6, 0.5, 1.0], ..Default::default() }],
+        sources: vec![bricks::Source { name: "t".into(), bytes: 0, hash: "2d06800538d394c2".into() }],
+        materials: vec![bricks::Material { base_color: [0.7, 0.6, 0.5, 1.0], ..bricks::Material::DIFFUSE }],
         ..SourceScene::default()
     };
     let folder = tempfile::tempdir().unwrap();

@@ -4,14 +4,15 @@ use super::cut::cuts::ObjectCut;
 use super::error::BuildError;
 use super::input::matrix::Affine;
 use super::input::objects::Plan;
+use super::levels;
 use super::settings::{BuildSettings, BuildSummary};
 use super::tree::binary::Box3;
 use super::tree::top_level::{self, TopLevel, world_box};
 use super::triangles::lattice::{Lattice, pow2};
 use crate::source::Outline;
 use bricks::{
-    BRICK_WIDE, Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Leaf, MATERIAL_BLEND, MATERIAL_MASK, Manifest,
-    Material, NONE, Node, Object, Resident,
+    BRICK_WIDE, Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Leaf, Level, MATERIAL_BLEND, MATERIAL_MASK,
+    Manifest, Material, NONE, Node, Object, Resident,
 };
 use rayon::prelude::*;
 use std::time::Duration;
@@ -61,29 +62,65 @@ pub(super) fn build_top(
     lattices: &[Lattice],
     bricks: &[Brick],
 ) -> Result<TopLevel, BuildError> {
-    let leaves: Vec<Leaf> = (0u32..)
-        .zip(instances)
-        .flat_map(|(index, instance)| {
-            let object = &objects[instance.object as usize];
-            (object.first_brick..object.first_brick + object.brick_count)
-                .map(move |brick| Leaf { instance: index, brick })
-        })
-        .collect();
-    let boxes: Vec<Box3> = leaves
-        .par_iter()
-        .map(|leaf| {
-            let (instance, brick) = (&instances[leaf.instance as usize], &bricks[leaf.brick as usize]);
-            let own = Box3 { min: brick.min, max: brick.max };
-            match leaf.instance {
-                0 => own,
-                _ => {
-                    let matrix = Affine(instance.world_from_object);
-                    world_box(own, &lattices[instance.object as usize], &matrix, &lattices[0])
-                }
+    let leaves = leaves(objects, instances, |_, _| ());
+    top_level::build(&leaves, &leaf_boxes(&leaves, instances, lattices, |brick| &bricks[brick as usize]))
+}
+
+/// The trees over the bricks and levels of all instances.
+pub(super) fn build_level_top(
+    objects: &[Object],
+    instances: &[Instance],
+    lattices: &[Lattice],
+    (bricks, records): (&[Brick], &[Level]),
+) -> Result<TopLevel, BuildError> {
+    let first = bricks.len() as u32;
+    let mut of_object = vec![Vec::new(); objects.len()];
+    for (index, level) in (first..).zip(records) {
+        of_object[level.brick.object as usize].push(index);
+    }
+    let more = |instance: u32, leaves: &mut Vec<Leaf>| {
+        let levels = &of_object[instances[instance as usize].object as usize];
+        leaves.extend(levels.iter().map(|&brick| Leaf { instance, brick }));
+    };
+    let leaves = leaves(objects, instances, more);
+    let brick = |index: u32| match index.checked_sub(first) {
+        None => &bricks[index as usize],
+        Some(level) => &records[level as usize].brick,
+    };
+    levels::build_top(&leaves, &leaf_boxes(&leaves, instances, lattices, brick), records, first)
+}
+
+/// A leaf for every brick of every instance; `more` adds others of an instance.
+fn leaves(objects: &[Object], instances: &[Instance], more: impl Fn(u32, &mut Vec<Leaf>)) -> Vec<Leaf> {
+    let mut leaves = Vec::new();
+    for (index, instance) in (0u32..).zip(instances) {
+        let object = &objects[instance.object as usize];
+        let bricks = object.first_brick..object.first_brick + object.brick_count;
+        leaves.extend(bricks.map(|brick| Leaf { instance: index, brick }));
+        more(index, &mut leaves);
+    }
+    leaves
+}
+
+/// The boxes of leaves, steps of the world's lattice.
+fn leaf_boxes<'a>(
+    leaves: &[Leaf],
+    instances: &[Instance],
+    lattices: &[Lattice],
+    brick: impl Fn(u32) -> &'a Brick + Sync,
+) -> Vec<Box3> {
+    let of_leaf = |leaf: &Leaf| {
+        let (instance, brick) = (&instances[leaf.instance as usize], brick(leaf.brick));
+        let own = Box3 { min: brick.min, max: brick.max };
+        match leaf.instance {
+            0 => own,
+            _ => {
+                let matrix = Affine(instance.world_from_object);
+                world_box(own, &lattices[instance.object as usize], &matrix, &lattices[0])
             }
-        })
-        .collect();
-    top_level::build(&leaves, &boxes)
+        }
+    };
+    leaves.par_iter().map(of_leaf).collect()
 }
 
 /// Triangles left out, instances multiplied out.
@@ -131,7 +168,11 @@ pub(super) fn manifest(
         .map_or(([1.0; 3], [-1.0; 3]), |root| (root.min.map(|x| x as f64 * step), root.max.map(|x| x as f64 * step)));
     let is_used = |index: usize| used_materials[index / 64] >> (index % 64) & 1 != 0;
     let any = |test: &dyn Fn(&Material) -> bool| {
-        resident.materials.iter().enumerate().any(|(index, material)| is_used(index) && test(material))
+        // What is added for levels has nothing that the others do not have.
+        resident.materials[..scene.materials.len()]
+            .iter()
+            .enumerate()
+            .any(|(index, material)| is_used(index) && test(material))
     };
     let instanced = resident.instances.iter().map(|instance| &resident.objects[instance.object as usize]);
     Manifest {
@@ -186,6 +227,14 @@ pub(super) fn summary(resident: &Resident, bytes_file: u64, phases: Vec<(&'stati
         bytes_attributes: resident.bricks.iter().map(|brick| brick.attributes.bytes).sum(),
         bytes_proxies: resident.bricks.iter().map(|brick| brick.proxies.bytes).sum::<u64>()
             + size_of_val(resident.occupancy.as_slice()) as u64,
+        levels: resident.levels.len() as u64,
+        level_triangles: resident.levels.iter().map(|level| u64::from(level.brick.triangle_count)).sum(),
+        bytes_levels: resident
+            .levels
+            .iter()
+            .map(|level| level.brick.geometry.bytes + level.brick.attributes.bytes)
+            .sum(),
+        level_bound: resident.levels.iter().map(|level| level.bound).fold(0.0, f64::max),
         bytes_textures: resident.texture_bytes(),
         bytes_file,
         warnings: manifest.warnings.clone(),

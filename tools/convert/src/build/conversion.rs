@@ -11,14 +11,16 @@ use super::encode::jobs::{self, BrickWriter, Job};
 use super::error::BuildError;
 use super::input::objects::{ObjectPlan, Placed, Plan};
 use super::input::parts::Reader;
+use super::levels::{self, Flattened, LevelWriter, Levels};
 use super::settings::{BuildSettings, BuildSummary};
 use super::texture::mips::{self, Textures};
 use super::texture::opacity::Opacities;
+use super::tree::top_level::TopLevel;
 use super::triangles::lattice::Lattice;
 use super::triangles::triangle::{Detailed, Plain, Stored, Triangle};
 use crate::progress::Progress;
 use crate::source::{Outline, Source};
-use bricks::{Brick, Manifest, Occupancy, Partial, Resident, Writer};
+use bricks::{Brick, Manifest, Material, Occupancy, Partial, Resident, Writer};
 use std::fmt::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -54,6 +56,9 @@ struct Written {
     occupancy: Vec<Occupancy>,
     /// Triangles that rounding left without area, by object.
     rounded_away: Vec<u32>,
+    /// Levels of detail, and the materials that they add.
+    levels: Levels,
+    added_materials: Vec<Material>,
     warnings: Vec<String>,
 }
 
@@ -97,7 +102,55 @@ impl Conversion<'_> {
         bricks.write(&jobs, encode, progress)?;
         let (bricks, occupancy, rounded_away) = (bricks.records, bricks.occupancy, bricks.dropped);
         clock.end("bricks");
-        Ok(Written { textures, opacities, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
+        let (levels, added_materials) = self.write_levels(
+            (&textures, &opacities, &used_materials),
+            (&lattices, &bricks),
+            (writer, None),
+            BATCH_TRIANGLES,
+        )?;
+        clock.end("levels");
+        Ok(Written {
+            textures,
+            opacities,
+            cuts,
+            used_materials,
+            lattices,
+            bricks,
+            occupancy,
+            rounded_away,
+            levels,
+            added_materials,
+            warnings,
+        })
+    }
+
+    /// Writes levels of detail over the bricks, if they are wanted.
+    fn write_levels(
+        &self,
+        (textures, opacities, used): (&Textures, &Opacities, &[u64]),
+        (lattices, bricks): (&[Lattice], &[Brick]),
+        (writer, journal): (&mut Writer, Option<&mut Journal>),
+        batch_triangles: usize,
+    ) -> Result<(Levels, Vec<Material>), BuildError> {
+        if !self.settings.lod {
+            return Ok(Default::default());
+        }
+        let (means, opacity) = (textures.material_means(), opacities.of_materials(&textures.materials));
+        let flattened = Flattened::of(&textures.materials, (&means, &opacity), textures.means(), used);
+        let settings = BuildSettings { proxies: false, ..self.settings.clone() };
+        let contexts = jobs::contexts(lattices, &flattened.means, &flattened.opacity, &flattened.details, &settings);
+        let plan = levels::Plan::of(&assemble::object_records(&self.plan, lattices, bricks), bricks);
+        let mut levels = LevelWriter {
+            writer,
+            bricks,
+            contexts: &contexts,
+            flattened: &flattened,
+            brick_triangles: settings.brick_triangles,
+            batch_triangles,
+            progress: self.progress,
+        };
+        let levels = levels.write(&plan, journal)?;
+        Ok((levels, flattened.added))
     }
 
     fn write_opacity(&self, textures: &Textures, writer: &mut Writer) -> Result<Opacities, BuildError> {
@@ -237,7 +290,26 @@ impl Conversion<'_> {
         let (bricks, occupancy) = (bricks.records, bricks.occupancy);
         clock.end("bricks");
         let (cuts, used_materials) = (cuts.objects, cuts.materials);
-        Ok(Written { textures, opacities, cuts, used_materials, lattices, bricks, occupancy, rounded_away, warnings })
+        let (levels, added_materials) = self.write_levels(
+            (&textures, &opacities, &used_materials),
+            (&lattices, &bricks),
+            (writer, Some(journal)),
+            budget.batch,
+        )?;
+        clock.end("levels");
+        Ok(Written {
+            textures,
+            opacities,
+            cuts,
+            used_materials,
+            lattices,
+            bricks,
+            occupancy,
+            rounded_away,
+            levels,
+            added_materials,
+            warnings,
+        })
     }
 
     /// Builds the resident part and finishes the file.
@@ -251,14 +323,21 @@ impl Conversion<'_> {
             bricks,
             occupancy,
             rounded_away,
+            levels,
+            added_materials,
             mut warnings,
         } = written;
         let mut materials = textures.materials;
         opacities.name_maps(&mut materials);
+        materials.extend(added_materials);
         self.progress.phase("top level", 0);
         let objects = assemble::object_records(&self.plan, &lattices, &bricks);
         let instances = assemble::instance_records(&self.plan);
         let top = assemble::build_top(&objects, &instances, &lattices, &bricks)?;
+        let level_top = match levels.records.as_slice() {
+            [] => TopLevel::default(),
+            levels => assemble::build_level_top(&objects, &instances, &lattices, (&bricks, levels))?,
+        };
         let mut resident = Resident {
             manifest: Manifest::default(),
             objects,
@@ -274,10 +353,10 @@ impl Conversion<'_> {
             lights: self.outline.lights.clone(),
             occupancy,
             displacement: Vec::new(),
-            levels: Vec::new(),
-            level_leaves: Vec::new(),
-            level_top2: Vec::new(),
-            level_top8: Vec::new(),
+            levels: levels.records,
+            level_leaves: level_top.leaves,
+            level_top2: level_top.top2,
+            level_top8: level_top.top8,
         };
         let dropped = Dropped::count(&resident, &cuts, &rounded_away);
         dropped.warn(&mut warnings);

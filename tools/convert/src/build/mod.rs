@@ -20,6 +20,7 @@
 //! | `tree` | binary and eight-wide trees, in bricks and above them |
 //! | `texture` | levels, tiles and opacity maps of textures |
 //! | `encode` | bytes of bricks |
+//! | `levels` | levels of detail: bricks that stand for others |
 //! | `assemble` | the resident part |
 //! | `bounded`, `disk` | the same for scenes that do not fit in memory |
 
@@ -31,6 +32,7 @@ mod disk;
 mod encode;
 mod error;
 mod input;
+mod levels;
 mod settings;
 mod texture;
 mod tree;

@@ -52,6 +52,8 @@ pub struct BuildSettings {
     pub fast: bool,
     /// Stores an occupancy map with every brick. Changes nothing else of the scene.
     pub proxies: bool,
+    /// Stores levels of detail behind the bricks. Changes nothing else of the scene.
+    pub lod: bool,
     /// How textures are stored.
     pub textures: TextureEncoding,
     /// Folder for the scratch folder; `None`: that of the output.
@@ -74,6 +76,7 @@ impl Default for BuildSettings {
             memory_bytes: None,
             fast: false,
             proxies: true,
+            lod: false,
             textures: TextureEncoding::default(),
             scratch: None,
             resume: false,
@@ -131,6 +134,14 @@ pub struct BuildSummary {
     pub bytes_attributes: u64,
     /// Bytes of the proxies of all bricks, their resident part included.
     pub bytes_proxies: u64,
+    /// Levels of detail.
+    pub levels: u64,
+    /// Triangles of the levels of detail.
+    pub level_triangles: u64,
+    /// Bytes of the payloads of the levels of detail.
+    pub bytes_levels: u64,
+    /// Largest bound of the distance between a level and what it stands for, in units of its object.
+    pub level_bound: f64,
     /// Bytes of the textures.
     pub bytes_textures: u64,
     /// Bytes of the file.

@@ -8,6 +8,7 @@
 //! | partition | the items of a node that fits with their order; or per thread a block of items and its two sides |
 //! | distribution | per thread a part of the source and triangles not yet appended; the bricks of a window of slots |
 //! | encoding | two chunks of triangles, one being read; per thread a brick, its occupancy, two batches of payloads |
+//! | levels | per thread the children of a level and what it is made in, two batches of payloads |
 //!
 //! A source that lies in memory is not counted, nor is a single image while its texture is made.
 
@@ -19,7 +20,7 @@ use crate::build::input::objects::Plan;
 use crate::build::settings::BuildSettings;
 use crate::build::triangles::triangle::{Detailed, Plain};
 use crate::source::{PART_TRIANGLES, Source};
-use bricks::Material;
+use bricks::{LEVEL_CHILDREN, Material};
 
 /// The program, its stacks, and what the allocator does not give back.
 const RESERVE: u64 = 32 << 20;
@@ -44,6 +45,9 @@ const BLOCK_BYTES: u64 = (BLOCK_RECORDS * 2 * (size_of::<Item>() + size_of::<Pac
 
 /// A triangle of a brick in work: its vertices, hash tables, the trees over it.
 const WORK_BYTES: u64 = 1280;
+
+/// A triangle of the children of a level in work: its payloads, vertices, clusters, colours and distances.
+const LEVEL_WORK_BYTES: u64 = 768;
 
 /// What details add to that, and to a triangle of encoded payloads.
 const DETAIL_WORK_BYTES: u64 = 256;
@@ -98,6 +102,8 @@ struct Needs {
     tables: u64,
     /// A brick in work.
     work: u64,
+    /// A level in work; 0 without levels.
+    level: u64,
     /// A triangle of encoded payloads.
     payload: u64,
     /// A triangle as it lies on the disk.
@@ -133,8 +139,9 @@ impl Budget {
             brick,
             part: u64::from(largest) * (part_bytes + making),
             run: u64::from(largest.min(PART_TRIANGLES)),
-            tables: 2 * slots.div_ceil(brick) * TABLE_BRICK_BYTES,
+            tables: if settings.lod { 4 } else { 2 } * slots.div_ceil(brick) * TABLE_BRICK_BYTES,
             work: brick * (WORK_BYTES + detail(DETAIL_WORK_BYTES)) + occupancy,
+            level: if settings.lod { brick * LEVEL_WORK_BYTES * LEVEL_CHILDREN as u64 } else { 0 },
             payload: PAYLOAD_BYTES + detail(DETAIL_PAYLOAD_BYTES) + map.div_ceil(brick),
             stored: if has_details { size_of::<Detailed>() } else { size_of::<Plain>() } as u64,
         };
@@ -156,8 +163,9 @@ impl Budget {
 impl Needs {
     /// Bytes with all geometry in memory.
     fn all_in_memory(&self, threads: u64, slots: u64, part_bytes: u64) -> u64 {
-        let working = threads
-            * (self.work.min(slots * WORK_BYTES + OCCUPANCY_WORK_BYTES) + 2 * MOST_BATCH.min(slots) * self.payload);
+        let work =
+            self.work.min(slots * WORK_BYTES + OCCUPANCY_WORK_BYTES).max(self.level.min(slots * LEVEL_WORK_BYTES));
+        let working = threads * (work + 2 * MOST_BATCH.min(slots) * self.payload);
         RESERVE + self.tables + slots * (part_bytes + ITEM_BYTES) + working
     }
 
@@ -179,6 +187,11 @@ impl Needs {
         self.work + 2 * (batch + self.brick) * self.payload
     }
 
+    /// A level needs no more than a brick of the payloads that are made.
+    fn levels(&self, batch: u64) -> u64 {
+        if self.level > 0 { self.level + self.work + 2 * (batch + self.brick) * self.payload } else { 0 }
+    }
+
     /// Bytes of the phase that takes the most, each at its least.
     fn largest_phase(&self, threads: u64) -> u64 {
         let items = threads * self.collecting().max(BLOCK_BYTES) + self.least_items() * ITEM_BYTES;
@@ -186,7 +199,7 @@ impl Needs {
         // The last brick of a chunk may exceed it.
         let encoding =
             threads * self.encoding(self.brick.min(MOST_BATCH)) + 4 * self.brick * (self.stored + PLACE_BYTES);
-        items.max(distribution).max(encoding)
+        items.max(distribution).max(encoding).max(threads * self.levels(self.brick.min(MOST_BATCH)))
     }
 
     fn divide(&self, rest: u64, threads: u64) -> Budget {

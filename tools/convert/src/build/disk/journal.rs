@@ -40,6 +40,8 @@ pub(crate) enum Step {
     Encode,
     /// The opacity maps are written.
     Opacity,
+    /// Some levels of detail are written.
+    Levels,
 }
 
 /// A journal that grows by a record with each step.
@@ -102,7 +104,8 @@ impl Journal {
     /// steps that write begin with. `None` if there was no such step.
     pub fn written(&self) -> Result<Option<(u64, Vec<Span>)>, BuildError> {
         let (mut position, mut spans) = (None, Vec::new());
-        let writes = |step: u64| [Step::Textures, Step::Opacity, Step::Encode].iter().any(|kind| *kind as u64 == step);
+        let writing = [Step::Textures, Step::Opacity, Step::Encode, Step::Levels];
+        let writes = |step: u64| writing.iter().any(|kind| *kind as u64 == step);
         for (_, words) in self.done.iter().filter(|(step, _)| writes(*step)) {
             let mut words = WordReader(words);
             position = words.take();

@@ -164,6 +164,11 @@ impl Textures {
         self.materials.iter().map(Material::needs_details).collect()
     }
 
+    /// Mean linear RGB of the textures.
+    pub fn means(&self) -> &[[f32; 3]] {
+        &self.means
+    }
+
     /// Mean colours by material.
     pub fn material_means(&self) -> Vec<MeanColors> {
         self.materials.iter().map(|material| MeanColors::of(material, &self.means)).collect()

@@ -130,6 +130,10 @@ fn push(
 }
 
 impl MaterialOpacity {
+    /// Of a material through which no ray passes.
+    pub const OPAQUE: Self =
+        Self { enough: 0.0, least: 0.0, second_set: false, uv_from_set: [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]] };
+
     /// What decides which rays pass through a triangle with these attribute vertices; `None` if none does.
     pub fn triangle(&self, material: u32, vertices: [&VertexBits; 3]) -> Option<OpacityTriangle> {
         let alphas = vertices.map(|vertex| vertex.0[3] >> 24);

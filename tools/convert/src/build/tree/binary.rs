@@ -49,7 +49,7 @@ impl Box3 {
 }
 
 /// [`BinaryNode::right`] of a leaf.
-pub(super) const LEAF: u32 = u32::MAX;
+pub(crate) const LEAF: u32 = u32::MAX;
 
 /// A node of a binary tree.
 #[derive(Clone, Copy, Debug)]

@@ -2,14 +2,14 @@
 
 use super::binary::{BinaryTree, Box3, LEAF};
 use super::node::encode_top;
-use super::wide::{collapse, collapse_levels};
+use super::wide::{WideTree, collapse, collapse_levels};
 use crate::build::error::BuildError;
 use crate::build::input::matrix::Affine;
 use crate::build::triangles::lattice::Lattice;
-use bricks::{Leaf, MAX_TOP_HEIGHT, TOP_LEAF, TopNode2, TopNode8};
+use bricks::{Leaf, MAX_TOP_HEIGHT, MAX_TOP2_HEIGHT, TOP_LEAF, TopNode2, TopNode8};
 
 /// Most levels of the binary tree, the root counted.
-const BINARY_DEPTH: u32 = 64;
+pub(crate) const BINARY_DEPTH: u32 = 64;
 
 /// Both trees, over the same leaves.
 #[derive(Debug, Default)]
@@ -45,6 +45,34 @@ pub(crate) fn build(leaves: &[Leaf], boxes: &[Box3]) -> Result<TopLevel, BuildEr
         binary = BinaryTree::by_splits(boxes, 0);
         wide = collapse_levels(&binary, 1);
     }
+    Ok(laid_out(&binary, &wide, leaves))
+}
+
+/// The trees that `binary` over the leaves makes; `None` if one of them is too high.
+pub(crate) fn build_over(binary: &BinaryTree, leaves: &[Leaf]) -> Option<TopLevel> {
+    if height(binary) > MAX_TOP2_HEIGHT {
+        return None;
+    }
+    let mut wide = collapse(binary, 1);
+    if wide.height > MAX_TOP_HEIGHT {
+        wide = collapse_levels(binary, 1);
+    }
+    (wide.height <= MAX_TOP_HEIGHT).then(|| laid_out(binary, &wide, leaves))
+}
+
+/// Levels of a binary tree, the root counted.
+fn height(tree: &BinaryTree) -> u32 {
+    let mut levels = vec![1u32; tree.nodes.len()];
+    for (index, node) in tree.nodes.iter().enumerate().filter(|(_, node)| node.right != LEAF) {
+        for child in [node.left, node.right] {
+            levels[child as usize] = levels[index] + 1;
+        }
+    }
+    levels.into_iter().max().unwrap_or(0)
+}
+
+/// Both trees as they are stored.
+fn laid_out(binary: &BinaryTree, wide: &WideTree, leaves: &[Leaf]) -> TopLevel {
     let mut new_of_old = vec![0u32; leaves.len()];
     for (new, &old) in (0u32..).zip(&wide.items) {
         new_of_old[old as usize] = new;
@@ -56,11 +84,11 @@ pub(crate) fn build(leaves: &[Leaf], boxes: &[Box3]) -> Result<TopLevel, BuildEr
         };
         TopNode2 { min: node.bounds.min, max: node.bounds.max, left, right }
     });
-    Ok(TopLevel {
+    TopLevel {
         leaves: wide.items.iter().map(|&old| leaves[old as usize]).collect(),
         top2: top2.collect(),
         top8: wide.nodes.iter().map(encode_top).collect(),
-    })
+    }
 }
 
 #[cfg(test)]

@@ -103,7 +103,7 @@ pub(crate) fn cross(corners: &[[i64; 3]; 3]) -> [f64; 3] {
 }
 
 /// Whether a lattice triangle has no area; exact.
-pub(super) fn is_degenerate(corners: &[[i64; 3]; 3]) -> bool {
+pub(crate) fn is_degenerate(corners: &[[i64; 3]; 3]) -> bool {
     exact_cross(corners) == [0; 3]
 }
 
@@ -116,7 +116,7 @@ fn exact_cross([a, b, c]: &[[i64; 3]; 3]) -> [i128; 3] {
 
 /// Octahedral encoding (Cigolle et al. 2014) with z as the axis of the fold: two snorm16, x in the low half. `None` for
 /// a vector without direction.
-pub(super) fn octahedral(v: [f64; 3]) -> Option<u32> {
+pub(crate) fn octahedral(v: [f64; 3]) -> Option<u32> {
     let sum = v[0].abs() + v[1].abs() + v[2].abs();
     if !sum.is_finite() || sum == 0.0 {
         return None;

@@ -24,6 +24,13 @@ impl Key for [i64; 3] {
     }
 }
 
+impl Key for [u32; 3] {
+    fn hash(&self) -> u64 {
+        let [a, b, c] = self.map(u64::from);
+        mix(mix(0x082e_fa98_ec4e_6c89, a << 32 | b), c)
+    }
+}
+
 /// No value in a bucket.
 const FREE: u32 = u32::MAX;
 

@@ -1,0 +1,277 @@
+//! Vertex clustering: vertices within a cell of a grid become one of them, triangles that lose a corner vanish.
+//!
+//! Rossignac and Borrel 1993, with the representative of least quadric error (Lindstrom 2000, "Out-of-core
+//! simplification of large polygonal models"). Cells lie on the lattice of the object, so that neighbouring levels of
+//! one cell size agree on which vertices come together.
+
+use super::merge::{Merged, Source};
+use super::vector::{Vec3, area_vector, dot, length, square, sub};
+use crate::build::triangles::attributes::is_degenerate;
+use crate::build::triangles::intern::Interner;
+use bricks::NONE;
+
+/// Cells of a grid per axis at most, as a power of two: three numbers of cells fit a word.
+const GRID_BITS: u32 = 20;
+
+/// Grids tried at most.
+const MOST_TRIALS: usize = 12;
+
+/// Share of the triangles asked for that is enough.
+const ENOUGH: f64 = 0.92;
+
+/// A triangle of a level.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Output {
+    /// The source triangle of least id that becomes it.
+    pub source: u32,
+    /// Cells of its corners, in the order of that triangle.
+    pub cells: [u32; 3],
+}
+
+/// Vertices by cells, and the triangles that are left.
+#[derive(Debug)]
+pub(super) struct Clusters {
+    /// Side of a cell, steps.
+    pub size: f64,
+    /// The cell of each position.
+    pub cell_of: Vec<u32>,
+    /// The position that stands for each cell.
+    pub kept: Vec<u32>,
+    /// What is left, ascending by id.
+    pub outputs: Vec<Output>,
+    /// What each source triangle becomes, or [`NONE`].
+    pub output_of: Vec<u32>,
+}
+
+/// Cells of one size.
+struct Grid {
+    size: i64,
+    cell_of: Vec<u32>,
+    cells: usize,
+}
+
+impl Grid {
+    fn of(positions: &[[i64; 3]], least: [i64; 3], size: i64) -> Self {
+        let scale = size as f64;
+        // Exact: coordinates have 46 bits at most, so a quotient below a whole number is not rounded to it.
+        let cell = |x: i64| (x as f64 / scale).floor() as i64;
+        let first = least.map(cell);
+        let mut numbers = Interner::with_capacity(positions.len() / 4);
+        let number = |p: &[i64; 3]| {
+            let [x, y, z]: [u64; 3] = std::array::from_fn(|k| (cell(p[k]) - first[k]) as u64);
+            numbers.intern(x << (2 * (GRID_BITS + 1)) | y << (GRID_BITS + 1) | z).0
+        };
+        let cell_of = positions.iter().map(number).collect();
+        Self { size, cell_of, cells: numbers.values().len() }
+    }
+
+    fn cells(&self, triangle: &Source) -> [u32; 3] {
+        triangle.corners.map(|corner| self.cell_of[corner as usize])
+    }
+
+    /// Triangles with corners in three cells, those of the same cells counted once.
+    fn count(&self, triangles: &[Source]) -> usize {
+        let mut distinct = Interner::with_capacity(triangles.len() / 4);
+        for triangle in triangles {
+            if let Some(key) = key(self.cells(triangle)) {
+                distinct.intern(key);
+            }
+        }
+        distinct.values().len()
+    }
+}
+
+/// The same for all triangles of these cells; `None` if two of them are one.
+fn key(mut cells: [u32; 3]) -> Option<[u32; 3]> {
+    cells.sort_unstable();
+    (cells[0] < cells[1] && cells[1] < cells[2]).then_some(cells)
+}
+
+/// The finest grid found that leaves at most `target` triangles.
+fn search(merged: &Merged, area: f64, target: usize) -> Grid {
+    let [least, most] = merged.bounds();
+    let extent = (0..3).map(|k| most[k] - least[k]).max().unwrap_or(0);
+    let at = |size: i64| {
+        let grid = Grid::of(&merged.positions, least, size);
+        let count = grid.count(&merged.triangles);
+        (grid, count)
+    };
+    // Too fine, and coarse enough: at most two cells an axis.
+    let (mut fine, mut coarse) = ((extent >> GRID_BITS).max(1), extent + 1);
+    if merged.triangles.len() <= target {
+        return at(fine).0;
+    }
+    let mut best: Option<Grid> = None;
+    // As if all were one plane: a triangle has half the area of a cell.
+    let mut size = (2.0 * area / target as f64).sqrt();
+    for _ in 0..MOST_TRIALS {
+        let whole = (size as i64).clamp(fine + 1, (coarse - 1).max(fine + 1));
+        let (grid, count) = at(whole);
+        let is_enough = count as f64 >= ENOUGH * target as f64;
+        if count <= target {
+            coarse = whole;
+            best = Some(grid);
+        } else {
+            fine = whole;
+        }
+        let is_close = (coarse - fine) as f64 <= 0.03 * coarse as f64 || coarse - fine <= 1;
+        if best.is_some() && (is_enough && count <= target || is_close) {
+            break;
+        }
+        let (low, high) = (fine as f64, coarse as f64);
+        let wanted = 0.5 * (1.0 + ENOUGH) * target as f64;
+        size = whole as f64 * (count.max(1) as f64 / wanted).sqrt();
+        // Steps of the rule for planes as long as they stay inside, else halving on a scale of ratios.
+        if size <= low * 1.01 || size >= high * 0.99 {
+            size = (low * high).sqrt();
+        }
+    }
+    best.unwrap_or_else(|| at(extent + 1).0)
+}
+
+/// The sum of squared distances to planes, weighted by areas, relative to a point.
+#[derive(Clone, Copy, Default)]
+struct Quadric {
+    /// xx, yy, zz, xy, xz, yz.
+    second: [f64; 6],
+    first: Vec3,
+}
+
+impl Quadric {
+    /// Adds the plane of unit normal `n` at distance `d` from the point.
+    fn add(&mut self, n: Vec3, d: f64, weight: f64) {
+        let [x, y, z] = n;
+        for (sum, term) in self.second.iter_mut().zip([x * x, y * y, z * z, x * y, x * z, y * z]) {
+            *sum += weight * term;
+        }
+        for (sum, term) in self.first.iter_mut().zip(n) {
+            *sum += weight * d * term;
+        }
+    }
+
+    /// What it is at `p`, but for a constant.
+    fn at(&self, p: Vec3) -> f64 {
+        let [xx, yy, zz, xy, xz, yz] = self.second;
+        let [x, y, z] = p;
+        xx * x * x + yy * y * y + zz * z * z + 2.0 * (xy * x * y + xz * x * z + yz * y * z) - 2.0 * dot(self.first, p)
+    }
+}
+
+/// Clusters `merged` so that at most `target` triangles are left, and at least one. `points` are its positions relative
+/// to some point.
+pub(super) fn cluster(merged: &Merged, points: &[Vec3], target: usize) -> Clusters {
+    let triangle = |source: &Source| source.corners.map(|corner| points[corner as usize]);
+    let vectors: Vec<Vec3> = merged.triangles.iter().map(|source| area_vector(triangle(source))).collect();
+    let area = 0.5 * vectors.iter().map(|&vector| length(vector)).sum::<f64>();
+    let grid = search(merged, area, target);
+    let kept = representatives(merged, points, &vectors, &grid);
+    let (outputs, output_of) = outputs(merged, &grid, &kept);
+    let mut clusters = Clusters { size: grid.size as f64, cell_of: grid.cell_of, kept, outputs, output_of };
+    if clusters.outputs.is_empty() {
+        clusters = each_alone(merged, clusters.size);
+    }
+    if clusters.outputs.len() > target {
+        clusters.keep_largest(points, target);
+    }
+    clusters
+}
+
+/// For each cell the vertex of least quadric error, of equal ones that of least position.
+fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Grid) -> Vec<u32> {
+    // Relative to the first vertex of each cell, so that little is lost where cells are far from the origin.
+    let mut first = vec![NONE; grid.cells];
+    for (position, &cell) in (0u32..).zip(&grid.cell_of) {
+        if first[cell as usize] == NONE {
+            first[cell as usize] = position;
+        }
+    }
+    let mut quadrics = vec![Quadric::default(); grid.cells];
+    for (source, &vector) in merged.triangles.iter().zip(vectors) {
+        let doubled = length(vector);
+        if doubled == 0.0 {
+            continue;
+        }
+        let n = vector.map(|x| x / doubled);
+        let on = points[source.corners[0] as usize];
+        for corner in source.corners {
+            let cell = grid.cell_of[corner as usize] as usize;
+            quadrics[cell].add(n, dot(n, sub(on, points[first[cell] as usize])), doubled);
+        }
+    }
+    let mut best: Vec<(f64, u32)> = vec![(f64::INFINITY, NONE); grid.cells];
+    for (position, (&cell, &point)) in (0u32..).zip(grid.cell_of.iter().zip(points)) {
+        let cell = cell as usize;
+        let error = quadrics[cell].at(sub(point, points[first[cell] as usize]));
+        let (least, of) = best[cell];
+        let is_less = |other: u32| merged.positions[position as usize] < merged.positions[other as usize];
+        if of == NONE || error < least || error == least && is_less(of) {
+            best[cell] = (error, position);
+        }
+    }
+    best.into_iter().map(|(_, position)| position).collect()
+}
+
+/// The triangles that are left, ascending by id, and what each source triangle becomes.
+fn outputs(merged: &Merged, grid: &Grid, kept: &[u32]) -> (Vec<Output>, Vec<u32>) {
+    let mut distinct = Interner::with_capacity(merged.triangles.len() / 4);
+    let mut output_of = vec![NONE; merged.triangles.len()];
+    let mut outputs: Vec<Output> = Vec::new();
+    for (index, source) in (0u32..).zip(&merged.triangles) {
+        let cells = grid.cells(source);
+        let Some(key) = key(cells) else { continue };
+        let (number, is_new) = distinct.intern(key);
+        if is_new {
+            outputs.push(Output { source: index, cells });
+        } else if source.id < merged.triangles[outputs[number as usize].source as usize].id {
+            outputs[number as usize] = Output { source: index, cells };
+        }
+        output_of[index as usize] = number;
+    }
+    let position = |cell: u32| merged.positions[kept[cell as usize] as usize];
+    let mut order: Vec<u32> = (0u32..)
+        .zip(&outputs)
+        .filter(|(_, output)| !is_degenerate(&output.cells.map(position)))
+        .map(|(number, _)| number)
+        .collect();
+    order.sort_unstable_by_key(|&number| merged.triangles[outputs[number as usize].source as usize].id);
+    renumbered(&outputs, output_of, &order)
+}
+
+/// Those outputs that `order` names, in its order.
+fn renumbered(outputs: &[Output], mut output_of: Vec<u32>, order: &[u32]) -> (Vec<Output>, Vec<u32>) {
+    let mut new_of_old = vec![NONE; outputs.len()];
+    for (new, &old) in (0u32..).zip(order) {
+        new_of_old[old as usize] = new;
+    }
+    for output in output_of.iter_mut().filter(|output| **output != NONE) {
+        *output = new_of_old[*output as usize];
+    }
+    (order.iter().map(|&old| outputs[old as usize]).collect(), output_of)
+}
+
+/// Every vertex in a cell of its own: all triangles that have an area.
+fn each_alone(merged: &Merged, size: f64) -> Clusters {
+    let all: Vec<u32> = (0..merged.positions.len() as u32).collect();
+    let grid = Grid { size: 1, cell_of: all.clone(), cells: all.len() };
+    let (outputs, output_of) = outputs(merged, &grid, &all);
+    Clusters { size, cell_of: all.clone(), kept: all, outputs, output_of }
+}
+
+impl Clusters {
+    /// Keeps the `target` triangles of largest area.
+    fn keep_largest(&mut self, points: &[Vec3], target: usize) {
+        let area =
+            |output: &Output| square(area_vector(output.cells.map(|cell| points[self.kept[cell as usize] as usize])));
+        let areas: Vec<f64> = self.outputs.iter().map(area).collect();
+        let mut order: Vec<u32> = (0..self.outputs.len() as u32).collect();
+        order.sort_unstable_by(|&a, &b| areas[b as usize].total_cmp(&areas[a as usize]).then(a.cmp(&b)));
+        order.truncate(target);
+        order.sort_unstable();
+        (self.outputs, self.output_of) = renumbered(&self.outputs, std::mem::take(&mut self.output_of), &order);
+    }
+
+    /// Corners of an output, as positions.
+    pub fn corners(&self, output: &Output) -> [u32; 3] {
+        output.cells.map(|cell| self.kept[cell as usize])
+    }
+}

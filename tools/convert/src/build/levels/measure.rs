@@ -1,0 +1,227 @@
+//! How far a level is from what it stands for: a bound of the distance between both surfaces, and the error that
+//! selection goes by.
+//!
+//! The distance to a convex set is convex, so over a triangle the distance to another is greatest at a corner, and one
+//! that is mapped to it corner by corner is nowhere farther from it than there. That bounds most triangles by how far
+//! their vertices moved. The others are bounded by branch and bound.
+
+use super::cluster::Clusters;
+use super::merge::Merged;
+use super::nearest::{Nearest, distance2};
+use super::surface::Surface;
+use super::vector::{Vec3, length, square, sub};
+use bricks::NONE;
+
+/// Share of the area whose error is not above [`Measured::error`].
+const QUANTILE: f64 = 0.99;
+
+/// Rounding errors of distances, relative.
+const ROUNDING: f64 = 1e-8;
+
+/// What is bounded this much above what is sure to be reached is not looked at closer.
+const TOLERANCE: f64 = 1.03;
+
+/// Times that a triangle is cut in four.
+const MOST_CUTS: u32 = 6;
+
+/// Distances in steps of the object's lattice.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Measured {
+    /// The largest distance, both ways, at most.
+    pub bound: f64,
+    /// What all but the worst hundredth of the area is away, differences of colour weighed in.
+    pub error: f64,
+    /// The largest difference of colours.
+    pub color: f64,
+}
+
+/// The outputs that touch each cell.
+struct Touching {
+    starts: Vec<u32>,
+    outputs: Vec<u32>,
+}
+
+impl Touching {
+    fn of(clusters: &Clusters) -> Self {
+        let mut starts = vec![0u32; clusters.kept.len() + 1];
+        for cell in clusters.outputs.iter().flat_map(|output| output.cells) {
+            starts[cell as usize + 1] += 1;
+        }
+        for cell in 1..starts.len() {
+            starts[cell] += starts[cell - 1];
+        }
+        let mut ends = starts.clone();
+        let mut outputs = vec![0; clusters.outputs.len() * 3];
+        for (number, output) in (0u32..).zip(&clusters.outputs) {
+            for cell in output.cells {
+                outputs[ends[cell as usize] as usize] = number;
+                ends[cell as usize] += 1;
+            }
+        }
+        Self { starts, outputs }
+    }
+
+    fn outputs(&self, cell: u32) -> &[u32] {
+        &self.outputs[self.starts[cell as usize] as usize..self.starts[cell as usize + 1] as usize]
+    }
+}
+
+/// Measures a level; `shown` are the colours of its triangles.
+pub(super) fn measure(
+    merged: &Merged,
+    points: &[Vec3],
+    clusters: &Clusters,
+    surface: &Surface,
+    shown: &[Vec3],
+) -> Measured {
+    let triangles: Vec<[Vec3; 3]> =
+        clusters.outputs.iter().map(|output| clusters.corners(output).map(|corner| points[corner as usize])).collect();
+    let touching = Touching::of(clusters);
+    let mut search = Search { triangles: &triangles, tree: None, lower: 0.0, floor: clusters.size, queries: 0 };
+    let moved: Vec<f64> = points
+        .iter()
+        .zip(&clusters.cell_of)
+        .map(|(&point, &cell)| length(sub(point, points[clusters.kept[cell as usize] as usize])))
+        .collect();
+    // How far vertices are from the level, at most.
+    let away: Vec<f64> = points
+        .iter()
+        .zip(&clusters.cell_of)
+        .zip(&moved)
+        .map(|((&point, &cell), &moved)| match touching.outputs(cell) {
+            [] => search.exact(point),
+            _ if moved == 0.0 => 0.0,
+            near => {
+                let distances = near.iter().map(|&output| distance2(point, &triangles[output as usize]));
+                distances.fold(f64::INFINITY, f64::min).sqrt().min(moved)
+            }
+        })
+        .collect();
+
+    let mut bound = 0.0f64;
+    let mut of_output = vec![f64::INFINITY; clusters.outputs.len()];
+    let mut open: Vec<(f64, u32)> = Vec::new();
+    let mut errors: Vec<(f64, f64)> = Vec::with_capacity(merged.triangles.len());
+    let mut color = 0.0f64;
+    for (index, source) in (0u32..).zip(&merged.triangles) {
+        let number = index as usize;
+        let cells = source.corners.map(|corner| clusters.cell_of[corner as usize]);
+        let most = |values: &[f64]| source.corners.iter().map(|&corner| values[corner as usize]).fold(0.0, f64::max);
+        let mut upper = f64::INFINITY;
+        let output = clusters.output_of[number];
+        if output != NONE {
+            upper = most(&moved);
+            of_output[output as usize] = of_output[output as usize].min(upper);
+        } else if is_edge(cells, &touching, clusters) {
+            upper = most(&moved);
+        }
+        if upper > search.floor {
+            upper = upper.min(most(&away) + reach(source.corners.map(|corner| points[corner as usize])));
+        }
+        if upper > search.floor {
+            open.push((upper, index));
+        } else {
+            bound = bound.max(upper);
+        }
+
+        let shown = match output {
+            NONE => surface.shown(cells, usize::from(surface.class[number])),
+            output => shown[output as usize],
+        };
+        let albedo = surface.albedo[number];
+        let difference = (0..3).map(|k| (f64::from(albedo[k]) - shown[k]).abs()).fold(0.0, f64::max);
+        color = color.max(difference);
+        errors.push((most(&away) + difference * clusters.size, surface.area[number]));
+    }
+    open.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    for (upper, index) in open {
+        let corners = merged.triangles[index as usize].corners.map(|corner| points[corner as usize]);
+        bound = bound.max(search.refine(corners, upper, MOST_CUTS));
+    }
+    for (triangle, upper) in triangles.iter().zip(of_output) {
+        bound = bound.max(upper.min(reach(*triangle)));
+    }
+    Measured { bound: bound * (1.0 + ROUNDING), error: quantile(errors), color }
+}
+
+/// Whether a triangle in at most two cells becomes an edge or vertex of the level.
+fn is_edge([a, b, c]: [u32; 3], touching: &Touching, clusters: &Clusters) -> bool {
+    let other = if a != b { b } else { c };
+    if a != b && a != c && b != c {
+        return false;
+    }
+    touching.outputs(a).iter().any(|&output| clusters.outputs[output as usize].cells.contains(&other))
+}
+
+/// The largest distance of a point of a triangle from its nearest corner, at most.
+fn reach([a, b, c]: [Vec3; 3]) -> f64 {
+    let longest = square(sub(b, a)).max(square(sub(c, b))).max(square(sub(a, c)));
+    (longest / 3.0).sqrt() * (1.0 + ROUNDING)
+}
+
+/// The error that is not exceeded by a share of the area.
+fn quantile(mut errors: Vec<(f64, f64)>) -> f64 {
+    errors.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
+    let all: f64 = errors.iter().map(|(_, area)| area).sum();
+    let mut above = 0.0;
+    for (error, area) in errors {
+        above += area;
+        if above > (1.0 - QUANTILE) * all {
+            return error;
+        }
+    }
+    0.0
+}
+
+/// Branch and bound for the point that is farthest from a level.
+struct Search<'a> {
+    triangles: &'a [[Vec3; 3]],
+    /// Made when it is first asked for.
+    tree: Option<Nearest<'a>>,
+    /// A distance that is reached.
+    lower: f64,
+    /// Below which nothing is looked at closer.
+    floor: f64,
+    queries: usize,
+}
+
+impl Search<'_> {
+    /// The nearest triangle of the level.
+    fn nearest(&mut self, p: Vec3) -> (f64, u32) {
+        self.queries += 1;
+        let (distance2, triangle) = self.tree.get_or_insert_with(|| Nearest::over(self.triangles)).of(p);
+        let distance = distance2.sqrt();
+        self.lower = self.lower.max(distance);
+        (distance, triangle)
+    }
+
+    fn exact(&mut self, p: Vec3) -> f64 {
+        self.nearest(p).0
+    }
+
+    /// What is small enough.
+    fn enough(&self) -> f64 {
+        self.floor.max(TOLERANCE * self.lower)
+    }
+
+    /// The largest distance of a point of a triangle from the level, at most, where `upper` is such a bound.
+    fn refine(&mut self, corners: [Vec3; 3], mut upper: f64, cuts: u32) -> f64 {
+        if upper <= self.enough() {
+            return upper;
+        }
+        let [a, b, c] = corners;
+        let center: Vec3 = std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0);
+        let (distance, nearest) = self.nearest(center);
+        let spread = corners.iter().map(|&corner| square(sub(corner, center))).fold(0.0, f64::max).sqrt();
+        let target = &self.triangles[nearest as usize];
+        let flat = corners.iter().map(|&corner| distance2(corner, target)).fold(0.0, f64::max).sqrt();
+        upper = upper.min(flat).min(distance + spread);
+        if cuts == 0 || upper <= self.enough() {
+            return upper;
+        }
+        let middle = |p: Vec3, q: Vec3| std::array::from_fn(|k| 0.5 * (p[k] + q[k]));
+        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+        let quarters = [[ab, bc, ca], [a, ab, ca], [ab, b, bc], [ca, bc, c]];
+        quarters.into_iter().map(|quarter| self.refine(quarter, upper, cuts - 1)).fold(0.0, f64::max)
+    }
+}
