@@ -41,10 +41,26 @@ pub struct Decoded {
 
 /// Reads a file; everything that can be verified must be right.
 pub fn decode(path: &Path) -> Decoded {
+    let file = open(path);
+    Decoded { resident: file.resident().clone(), bricks: bricks(&file) }
+}
+
+/// Reads a file whose levels are bricks like others, behind those of its objects.
+pub fn decode_levels(path: &Path) -> (Resident, Vec<DecodedBrick>) {
+    let mut file = open(path);
+    file.use_levels();
+    (file.resident().clone(), bricks(&file))
+}
+
+fn open(path: &Path) -> SceneFile {
     let file = SceneFile::open(path).unwrap();
     let report = file.verify(&mut |_, _| {}).unwrap();
     assert!(report.problems.is_empty(), "{:?}", report.problems);
-    let resident = file.resident().clone();
+    file
+}
+
+fn bricks(file: &SceneFile) -> Vec<DecodedBrick> {
+    let resident = file.resident();
     let bricks = (0u32..).zip(&resident.bricks).map(|(index, record)| {
         let read = |payload| {
             let mut bytes = vec![0; file.loaded_bytes(payload) as usize];
@@ -54,8 +70,7 @@ pub fn decode(path: &Path) -> Decoded {
         let object = &resident.objects[record.object as usize];
         brick(record, object, &read(Payload::Geometry(index)), &read(Payload::Attributes(index)))
     });
-    let bricks = bricks.collect();
-    Decoded { resident, bricks }
+    bricks.collect()
 }
 
 fn pods<T: bytemuck::Pod>(bytes: &[u8], offset: u64, count: usize) -> Vec<T> {

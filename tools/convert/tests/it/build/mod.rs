@@ -6,6 +6,7 @@ mod degenerate;
 mod details;
 mod errors;
 mod invariance;
+mod levels;
 mod movable;
 mod placement;
 mod proxies;

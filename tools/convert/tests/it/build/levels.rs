@@ -1,0 +1,391 @@
+//! Levels of detail: what they stand for, how far they are from it, that nothing but the scene decides on them.
+
+use super::bounded::{Computed, bounded, bytes};
+use super::decode::{DecodedBrick, decode, decode_levels};
+use super::scenes::*;
+use bricks::{Level, NONE, Resident};
+use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{IDENTITY, Primitive, SourceScene};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+type Vec3 = [f64; 3];
+
+fn with_levels(brick_triangles: u32) -> BuildSettings {
+    BuildSettings { lod: true, ..settings(brick_triangles) }
+}
+
+/// Boxes of all sizes on a large plane, each of 12 triangles.
+fn blocks(count: u32) -> Primitive {
+    let mut random = Random(5);
+    let mut triangles = vec![
+        [[-60.0, 0.0, -60.0], [60.0, 0.0, 60.0], [60.0, 0.0, -60.0]],
+        [[-60.0, 0.0, -60.0], [-60.0, 0.0, 60.0], [60.0, 0.0, 60.0]],
+    ];
+    for _ in 0..count {
+        let size: Vec3 = [0.3 + random.next(), 0.2 + 4.0 * random.next().powi(3), 0.3 + random.next()];
+        let at = [100.0 * (random.next() - 0.5), 0.0, 100.0 * (random.next() - 0.5)];
+        let corner = |i: usize| -> Vec3 { std::array::from_fn(|k| at[k] + size[k] * f64::from(i as u32 >> k & 1)) };
+        for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+            let [a, b, c, d] = [a, b, c, d].map(corner);
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    soup(&triangles)
+}
+
+fn scattered(count: u32) -> Primitive {
+    let mut random = Random(11);
+    let triangle = |number: u32| {
+        let at = random.point(40.0);
+        let size = if number.is_multiple_of(499) { 20.0 } else { 0.5 };
+        [random.point(size), random.point(size), random.point(size)].map(|p| std::array::from_fn(|k| at[k] + p[k]))
+    };
+    soup(&(0..count).map(triangle).collect::<Vec<_>>())
+}
+
+fn instanced() -> SourceScene {
+    let turned = matrix(rotation(0.7, [1.0, 2.0, 1.5]), [3.0, 1.0, -2.0]);
+    let mirrored = matrix(rotation(2.1, [-1.0, 1.0, 1.0]), [-13.0, 4.0, 1.0]);
+    let meshes = vec![mesh("sheet", vec![sheet(60, 10.0)]), mesh("part", vec![sheet(50, 4.0)])];
+    let placements = vec![placement("a", 1, turned), placement("b", 0, IDENTITY), placement("c", 1, mirrored)];
+    scene(meshes, placements)
+}
+
+/// Scenes of several kinds by name.
+fn kinds() -> Vec<(&'static str, SourceScene)> {
+    vec![
+        ("blocks", plain(vec![blocks(900)])),
+        ("sheet", plain(vec![sheet(80, 30.0)])),
+        ("soup", plain(vec![scattered(9000)])),
+        ("instances", instanced()),
+    ]
+}
+
+fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn to_segment2(p: Vec3, a: Vec3, b: Vec3) -> f64 {
+    let (ab, ap) = (sub(b, a), sub(p, a));
+    let t = if dot(ab, ab) > 0.0 { (dot(ap, ab) / dot(ab, ab)).clamp(0.0, 1.0) } else { 0.0 };
+    let d = std::array::from_fn(|k| ap[k] - t * ab[k]);
+    dot(d, d)
+}
+
+/// The square of the distance from a triangle: of its plane where the foot lies inside, else of an edge.
+fn distance2(p: Vec3, [a, b, c]: [Vec3; 3]) -> f64 {
+    let n = cross(sub(b, a), sub(c, a));
+    let is_inside = |a: Vec3, b: Vec3| dot(cross(sub(b, a), sub(p, a)), n) >= 0.0;
+    if dot(n, n) > 0.0 && is_inside(a, b) && is_inside(b, c) && is_inside(c, a) {
+        return dot(sub(p, a), n).powi(2) / dot(n, n);
+    }
+    to_segment2(p, a, b).min(to_segment2(p, b, c)).min(to_segment2(p, c, a))
+}
+
+/// A tree of boxes over triangles, halved along the longest axis.
+enum Tree {
+    Leaf(Vec<[Vec3; 3]>),
+    Both([Vec3; 2], Box<[Tree; 2]>),
+}
+
+impl Tree {
+    fn over(mut triangles: Vec<[Vec3; 3]>) -> Self {
+        if triangles.len() <= 4 {
+            return Self::Leaf(triangles);
+        }
+        let points = || triangles.iter().flatten();
+        let low: Vec3 = std::array::from_fn(|k| points().map(|p| p[k]).fold(f64::MAX, f64::min));
+        let high: Vec3 = std::array::from_fn(|k| points().map(|p| p[k]).fold(f64::MIN, f64::max));
+        let size = sub(high, low);
+        let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap();
+        let middle = |t: &[Vec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
+        triangles.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
+        let right = triangles.split_off(triangles.len() / 2);
+        Self::Both([low, high], Box::new([Self::over(triangles), Self::over(right)]))
+    }
+
+    fn nearest2(&self, p: Vec3, best: &mut f64) {
+        match self {
+            Self::Leaf(triangles) => triangles.iter().for_each(|&t| *best = best.min(distance2(p, t))),
+            Self::Both([low, high], children) => {
+                let beyond: Vec3 = std::array::from_fn(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0));
+                if dot(beyond, beyond) < *best {
+                    children.iter().for_each(|child| child.nearest2(p, best));
+                }
+            }
+        }
+    }
+
+    fn distance(&self, p: Vec3) -> f64 {
+        let mut best = f64::INFINITY;
+        self.nearest2(p, &mut best);
+        best.sqrt()
+    }
+}
+
+/// Points on triangles, in proportion to their areas.
+fn sample(triangles: &[[Vec3; 3]], count: usize, random: &mut Random) -> Vec<Vec3> {
+    let mut sums = Vec::with_capacity(triangles.len());
+    let mut sum = 0.0;
+    for &[a, b, c] in triangles {
+        let n = cross(sub(b, a), sub(c, a));
+        sum += dot(n, n).sqrt();
+        sums.push(sum);
+    }
+    let mut point = |_| {
+        let at = random.next() * sum;
+        let [a, b, c] = triangles[sums.partition_point(|&s| s < at).min(triangles.len() - 1)];
+        let (mut u, mut v) = (random.next(), random.next());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        std::array::from_fn(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]))
+    };
+    // Corners too: distances are greatest there.
+    let mut points: Vec<Vec3> = (0..count).map(&mut point).collect();
+    points.extend(triangles.iter().flatten().take(count));
+    points
+}
+
+/// The triangles of a brick in units of its object, through the matrix of an instance if it is placed by one.
+fn corners(brick: &DecodedBrick, resident: &Resident, instance: u32) -> Vec<[Vec3; 3]> {
+    let step = 2f64.powi(resident.objects[brick.record.object as usize].step_log2);
+    let place = |p: [i64; 3]| -> Vec3 {
+        let p = p.map(|x| x as f64 * step);
+        if instance == NONE {
+            return p;
+        }
+        let m = &resident.instances[instance as usize].world_from_object;
+        std::array::from_fn(|k| m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3])
+    };
+    (0..brick.indices.len()).map(|triangle| brick.corners(triangle).map(place)).collect()
+}
+
+/// The triangles of all bricks that a level stands for.
+fn exact(level: &Level, (bricks, resident): (&[DecodedBrick], &Resident), instance: u32) -> Vec<[Vec3; 3]> {
+    let first = resident.exact_bricks();
+    let mut all = Vec::new();
+    for child in level.children() {
+        let instance = if child.instance == NONE { instance } else { child.instance };
+        match (child.brick as usize).checked_sub(first) {
+            None => all.extend(corners(&bricks[child.brick as usize], resident, instance)),
+            Some(level) => all.extend(exact(&resident.levels[level], (bricks, resident), instance)),
+        }
+    }
+    all
+}
+
+#[test]
+fn no_point_is_farther_away_than_the_bound() {
+    const POINTS: usize = 100_000;
+    for (name, scene) in kinds() {
+        let (resident, bricks) = decode_levels(&built(&scene, &with_levels(500)).path());
+        let count = resident.levels.len();
+        assert!(count > 3, "{name}: {count} levels");
+        let mut random = Random(3);
+        let (mut violations, mut of_half, mut tightest) = (0, 0, 0.0f64);
+        for (index, level) in resident.levels.iter().enumerate() {
+            let own = corners(&bricks[resident.exact_bricks() + index], &resident, NONE);
+            let below = exact(level, (&bricks, &resident), NONE);
+            let points = POINTS / count / 4;
+            let (from_own, from_below) = (sample(&own, points, &mut random), sample(&below, points, &mut random));
+            let (own, below) = (Tree::over(own), Tree::over(below));
+            let farthest = |points: &[Vec3], tree: &Tree| points.iter().map(|&p| tree.distance(p)).fold(0.0, f64::max);
+            let found = farthest(&from_own, &below).max(farthest(&from_below, &own));
+            violations += usize::from(found > level.bound);
+            of_half += usize::from(found > 0.5 * level.bound);
+            tightest = tightest.max(found / level.bound.max(f64::MIN_POSITIVE));
+            for child in level.children() {
+                if let Some(child) = (child.brick as usize).checked_sub(resident.exact_bricks()) {
+                    let child = &resident.levels[child];
+                    assert!(level.bound >= child.bound && level.error >= child.error);
+                }
+            }
+            assert!(level.error.is_finite() && level.error > 0.0 && (0.0..=1.0).contains(&level.color), "{name}");
+        }
+        println!("{name}: {count} levels, {of_half} of them beyond half the bound, tightest {tightest:.3}");
+        assert_eq!(violations, 0, "{name}");
+        // Half the bound is none.
+        assert!(of_half > 0, "{name}");
+    }
+}
+
+#[test]
+fn levels_are_bricks_of_distinct_triangles_from_their_children() {
+    for (name, scene) in kinds() {
+        let (resident, bricks) = decode_levels(&built(&scene, &with_levels(500)).path());
+        let first = resident.exact_bricks();
+        for (index, level) in resident.levels.iter().enumerate() {
+            let own = &bricks[first + index];
+            let mut ids = own.ids.clone();
+            ids.sort_unstable();
+            ids.dedup();
+            assert!(ids.len() == own.ids.len() && !ids.is_empty() && ids.len() <= 500, "{name}");
+            assert!(level.children().all(|child| (child.brick as usize) < first + index));
+            if level.children().all(|child| child.instance == NONE) {
+                let below = || level.children().map(|child| &bricks[child.brick as usize]);
+                let sources: std::collections::HashSet<u32> = below().flat_map(|brick| brick.ids.clone()).collect();
+                assert!(ids.iter().all(|id| sources.contains(id)), "{name}");
+                let all: usize = below().map(|brick| brick.ids.len()).sum();
+                assert!(ids.len() <= all.div_ceil(4).max(64), "{name}: {} of {all}", ids.len());
+            }
+        }
+        // Every brick and every level but the roots is below one other.
+        let mut times = vec![0; bricks.len()];
+        let within = resident.levels.iter().flat_map(|level| level.children().collect::<Vec<_>>());
+        within.filter(|child| child.instance == NONE).for_each(|child| times[child.brick as usize] += 1);
+        assert!(times.iter().all(|&count| count <= 1), "{name}");
+    }
+}
+
+#[test]
+fn all_else_is_as_without_levels() {
+    let scene = instanced();
+    let (with, without) = (built(&scene, &with_levels(500)), built(&scene, &settings(500)));
+    let (a, b) = (decode(&with.path()).resident, decode(&without.path()).resident);
+    assert_eq!((&a.objects, &a.instances, &a.bricks, &a.leaves), (&b.objects, &b.instances, &b.bricks, &b.leaves));
+    assert_eq!((&a.top2, &a.top8), (&b.top2, &b.top8));
+    assert_eq!((b.levels.len(), b.level_leaves.len()), (0, 0));
+    assert!(!a.levels.is_empty() && with.summary.levels == a.levels.len() as u64);
+    let end = b.bricks.iter().map(|brick| brick.proxies.offset + brick.proxies.bytes).max().unwrap() as usize;
+    assert!(with.bytes()[4096..end] == without.bytes()[4096..end]);
+}
+
+#[test]
+fn what_a_level_stands_for_lies_below_one_node() {
+    for (name, scene) in kinds() {
+        let (resident, _) = decode_levels(&built(&scene, &with_levels(500)).path());
+        let parents = resident.level_parents();
+        // Leaves below each node, and its height.
+        let mut below: Vec<Vec<u32>> = vec![Vec::new(); resident.top2.len()];
+        for (index, node) in resident.top2.iter().enumerate().rev() {
+            below[index] = match node.right {
+                bricks::TOP_LEAF => vec![node.left],
+                right => [below[node.left as usize].clone(), below[right as usize].clone()].concat(),
+            };
+        }
+        let of_level = |leaf: u32| {
+            let mut all = vec![leaf];
+            let mut next = 0;
+            while next < all.len() {
+                let parent = all[next];
+                all.extend((0u32..).zip(&parents).filter(|(_, other)| **other == parent).map(|(child, _)| child));
+                next += 1;
+            }
+            all.sort_unstable();
+            all
+        };
+        below.iter_mut().for_each(|leaves| leaves.sort_unstable());
+        let sets: std::collections::HashSet<&Vec<u32>> = below.iter().collect();
+        for leaf in 0..resident.leaves.len() as u32 {
+            assert!(sets.contains(&of_level(leaf)), "{name}: leaf {leaf}");
+        }
+        assert_eq!(below[0].len(), resident.leaves.len());
+    }
+}
+
+#[test]
+fn neither_threads_nor_memory_change_levels() {
+    let scene = instanced();
+    let with = |threads| built(&scene, &BuildSettings { threads: Some(threads), ..with_levels(400) }).bytes();
+    let one = with(1);
+    assert!(one == with(2) && one == with(3));
+    let source = Computed::new(120_000, 60_000);
+    let lod = |threads, memory| BuildSettings { lod: true, ..bounded(threads, memory) };
+    let all = bytes(&source, &lod(2, 1000));
+    for (threads, memory) in [(1, 44), (2, 52)] {
+        assert!(bytes(&source, &lod(threads, memory)) == all, "{threads} threads, {memory} MiB");
+    }
+}
+
+#[test]
+fn levels_that_were_interrupted_are_continued() {
+    let source = Computed::new(120_000, 60_000);
+    let settings = BuildSettings { lod: true, ..bounded(2, 52) };
+    let all = bytes(&source, &settings);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.bricks");
+    let partial = folder.path().join(".a.bricks.partial");
+    // Where the payloads of bricks end.
+    let without = bytes(&source, &BuildSettings { lod: false, ..settings.clone() }).len() as u64;
+    let mut paused = 0;
+    for (try_number, more) in [0u64, 200_000, 600_000].into_iter().enumerate() {
+        let progress = Progress::hidden();
+        let is_done = AtomicBool::new(false);
+        let result = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_done.load(Ordering::Relaxed) {
+                    let length = std::fs::metadata(&partial).map_or(0, |file| file.len());
+                    if length > without - without / 20 + more {
+                        progress.interrupt();
+                    }
+                    std::thread::sleep(std::time::Duration::from_micros(200));
+                }
+            });
+            let resume = try_number > 0;
+            let result = build_source(&source, &BuildSettings { resume, ..settings.clone() }, &path, &progress);
+            is_done.store(true, Ordering::Relaxed);
+            result
+        });
+        match result {
+            Err(BuildError::Paused { .. }) => paused += 1,
+            other => assert!(other.is_ok(), "{other:?}"),
+        }
+    }
+    assert!(paused > 0, "nothing was interrupted");
+    build_source(&source, &BuildSettings { resume: true, ..settings }, &path, &Progress::hidden()).unwrap();
+    assert!(std::fs::read(&path).unwrap() == all);
+}
+
+/// A plane of squares in two colours, three of them on one material by vertex colours.
+fn checkered(n: u32) -> SourceScene {
+    let mut primitives = [0, 1].map(|material| Primitive { material, ..Primitive::default() });
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        let primitive = &mut primitives[((i + j) % 2) as usize];
+        let first = primitive.positions.len() as u32;
+        let corner = |x: u32, z: u32| [f64::from(x), 0.0, f64::from(z)];
+        primitive.positions.extend([corner(i, j), corner(i, j + 1), corner(i + 1, j + 1), corner(i + 1, j)]);
+        primitive.indices.extend([0, 1, 2, 0, 2, 3].map(|k| first + k));
+    }
+    plain(primitives.to_vec())
+}
+
+#[test]
+fn colours_are_means_by_area() {
+    let (resident, bricks) = decode_levels(&built(&checkered(96), &with_levels(1000)).path());
+    let expected: Vec3 =
+        std::array::from_fn(|k| (0..2).map(|m| f64::from(resident.materials[m].base_color[k])).sum::<f64>() / 2.0);
+    let root = bricks.last().unwrap();
+    let (mut sum, mut area) = ([0.0; 3], 0.0);
+    for index in 0..root.ids.len() {
+        let triangle = root.triangle(index);
+        let [a, b, c] = triangle.corners.map(|p| p.map(|x| x as f64));
+        let n = cross(sub(b, a), sub(c, a));
+        let weight = dot(n, n).sqrt();
+        let base = resident.materials[triangle.material as usize].base_color;
+        area += weight;
+        for (k, sum) in sum.iter_mut().enumerate() {
+            let color: f64 = triangle.attributes.iter().map(|v| f64::from(v.color >> (8 * k) & 255) / 765.0).sum();
+            *sum += weight * color * f64::from(base[k]);
+        }
+    }
+    for (k, sum) in sum.iter().enumerate() {
+        let found = sum / area;
+        assert!((found / expected[k] - 1.0).abs() < 0.01, "channel {k}: {found}, expected {}", expected[k]);
+    }
+    // Of one material nothing is lost.
+    let (resident, bricks) = decode_levels(&built(&plain(vec![sheet(80, 30.0)]), &with_levels(500)).path());
+    for brick in &bricks[resident.exact_bricks()..] {
+        assert!(brick.materials.iter().all(|&material| material == 0));
+        assert!(brick.attributes.iter().all(|vertex| vertex.color == u32::MAX));
+    }
+}
