@@ -15,6 +15,9 @@ use bricks::NONE;
 /// Share of the area whose error is not above [`Measured::error`].
 const QUANTILE: f64 = 0.99;
 
+/// Faces of a cell that a triangle counts as at most, so that one that is large does not hide what lies on it.
+const LARGEST_FACES: f64 = 16.0;
+
 /// Rounding errors of distances, relative.
 const ROUNDING: f64 = 1e-8;
 
@@ -77,7 +80,7 @@ pub(super) fn measure(
     let triangles: Vec<[Vec3; 3]> =
         clusters.outputs.iter().map(|output| clusters.corners(output).map(|corner| points[corner as usize])).collect();
     let touching = Touching::of(clusters);
-    let mut search = Search { triangles: &triangles, tree: None, lower: 0.0, floor: clusters.size, queries: 0 };
+    let mut search = Search { triangles: &triangles, tree: None, lower: 0.0, floor: clusters.size };
     let moved: Vec<f64> = points
         .iter()
         .zip(&clusters.cell_of)
@@ -131,7 +134,10 @@ pub(super) fn measure(
         let albedo = surface.albedo[number];
         let difference = (0..3).map(|k| (f64::from(albedo[k]) - shown[k]).abs()).fold(0.0, f64::max);
         color = color.max(difference);
-        errors.push((most(&away) + difference * clusters.size, surface.area[number]));
+        errors.push((
+            most(&away) + difference * clusters.size,
+            surface.area[number].min(LARGEST_FACES * clusters.size * clusters.size),
+        ));
     }
     open.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     for (upper, index) in open {
@@ -182,13 +188,11 @@ struct Search<'a> {
     lower: f64,
     /// Below which nothing is looked at closer.
     floor: f64,
-    queries: usize,
 }
 
 impl Search<'_> {
     /// The nearest triangle of the level.
     fn nearest(&mut self, p: Vec3) -> (f64, u32) {
-        self.queries += 1;
         let (distance2, triangle) = self.tree.get_or_insert_with(|| Nearest::over(self.triangles)).of(p);
         let distance = distance2.sqrt();
         self.lower = self.lower.max(distance);
