@@ -139,10 +139,18 @@ impl Conversion<'_> {
         let flattened = Flattened::of(&textures.materials, (&means, &opacity), textures.means(), used);
         let settings = BuildSettings { proxies: false, ..self.settings.clone() };
         let contexts = jobs::contexts(lattices, &flattened.means, &flattened.opacity, &flattened.details, &settings);
-        let plan = levels::Plan::of(&assemble::object_records(&self.plan, lattices, bricks), bricks);
+        let instances = assemble::instance_records(&self.plan);
+        let plan = levels::Plan::of(&levels::Scene {
+            objects: &assemble::object_records(&self.plan, lattices, bricks),
+            lattices,
+            bricks,
+            placed: self.plan.resting(&settings.movable),
+            brick_triangles: settings.brick_triangles,
+        });
         let mut levels = LevelWriter {
             writer,
             bricks,
+            instances: &instances,
             contexts: &contexts,
             flattened: &flattened,
             brick_triangles: settings.brick_triangles,

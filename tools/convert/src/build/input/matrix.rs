@@ -44,10 +44,25 @@ impl Affine {
 
     /// Ratio κ of the largest to the smallest singular value of the linear part; infinite if it is singular.
     pub fn scale_ratio(&self) -> f64 {
+        let Some((_, values)) = self.squared_scales() else { return f64::INFINITY };
+        let (least, most) =
+            (values.iter().copied().fold(f64::MAX, f64::min), values.iter().copied().fold(0.0, f64::max));
+        if least > 0.0 { (most / least).sqrt().max(1.0) } else { f64::INFINITY }
+    }
+
+    /// The largest singular value of the linear part: by how much lengths grow at most.
+    pub fn largest_scale(&self) -> f64 {
+        let Some((unit, values)) = self.squared_scales() else { return 0.0 };
+        unit * values.iter().copied().fold(0.0, f64::max).sqrt()
+    }
+
+    /// A length, and the squares of the singular values of the linear part in units of it; `None` if all is zero or
+    /// something not finite.
+    fn squared_scales(&self) -> Option<(f64, [f64; 3])> {
         let m = |row: usize, column: usize| self.0[4 * row + column];
         let largest = (0..9).map(|i| m(i / 3, i % 3).abs()).fold(0.0, f64::max);
         if largest == 0.0 || !largest.is_finite() {
-            return f64::INFINITY;
+            return None;
         }
         let mut g = [[0.0; 3]; 3];
         for (i, row) in g.iter_mut().enumerate() {
@@ -55,10 +70,7 @@ impl Affine {
                 *value = (0..3).map(|k| (m(k, i) / largest) * (m(k, j) / largest)).sum();
             }
         }
-        let values = symmetric_eigenvalues(g);
-        let (least, most) =
-            (values.iter().copied().fold(f64::MAX, f64::min), values.iter().copied().fold(0.0, f64::max));
-        if least > 0.0 { (most / least).sqrt().max(1.0) } else { f64::INFINITY }
+        Some((largest, symmetric_eigenvalues(g)))
     }
 
     /// A box that contains the images of all points of a box, rounding errors included.
@@ -104,6 +116,7 @@ mod tests {
         // A rotation between two scalings of ratio 12: 6, 1.5, 0.5 on orthogonal axes.
         let rotated = affine([6.0 * c, -1.5 * s, 0.0, 6.0 * s, 1.5 * c, 0.0, 0.0, 0.0, -0.5], [9.0; 3]);
         assert!((rotated.scale_ratio() - 12.0).abs() < 1e-12);
+        assert!((rotated.largest_scale() - 6.0).abs() < 1e-12);
         let even = affine([c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0], [0.0; 3]);
         assert!((even.scale_ratio() - 1.0).abs() < 1e-12);
         let singular = affine([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0; 3]);

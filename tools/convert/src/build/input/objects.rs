@@ -152,6 +152,20 @@ pub(crate) struct Plan<'a> {
     pub provenance: Vec<Provenance>,
 }
 
+impl Plan<'_> {
+    /// The instances that none of these names makes movable: their numbers, objects and matrices.
+    pub fn resting(&self, movable: &[String]) -> Vec<(u32, u32, Affine)> {
+        let is_movable = |placement: &Placement| movable.iter().any(|pattern| is_named(pattern, placement));
+        let resting = (1u32..).zip(&self.instances).filter(|(_, instance)| !is_movable(instance.placement));
+        resting.map(|(number, instance)| (number, instance.object, instance.matrix)).collect()
+    }
+}
+
+/// Whether a pattern names a placement or a node above it.
+fn is_named(pattern: &str, placement: &Placement) -> bool {
+    names(pattern, &placement.name) || placement.under.iter().any(|name| names(pattern, name))
+}
+
 /// Plans objects and instances; `scene` must have passed [`check`].
 pub(crate) fn plan<'a>(scene: &'a Outline, settings: &BuildSettings) -> Result<Plan<'a>, BuildError> {
     let counts: Vec<u64> = scene.meshes.iter().map(MeshOutline::triangle_count).collect();
@@ -224,7 +238,7 @@ fn movable(scene: &Outline, invertible: &[bool], settings: &BuildSettings) -> Re
     }
     for (placement, invertible) in scene.placements.iter().zip(invertible) {
         for (pattern, is_met) in settings.movable.iter().zip(&mut is_met) {
-            if names(pattern, &placement.name) || placement.under.iter().any(|name| names(pattern, name)) {
+            if is_named(pattern, placement) {
                 if !invertible {
                     return Err(BuildError::NotMovable { node: placement.name.clone() });
                 }

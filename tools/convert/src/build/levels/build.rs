@@ -1,14 +1,16 @@
 //! Makes levels depth by depth and writes them in order.
 
 use super::flat::Flattened;
+use super::merge::Child;
 use super::plan::{Plan, Planned};
 use super::simplify::{Simplified, simplify};
 use crate::build::disk::journal::{Journal, Step, WordReader, Words};
 use crate::build::encode::brick::BrickContext;
 use crate::build::error::BuildError;
+use crate::build::input::matrix::Affine;
 use crate::build::triangles::lattice::pow2;
 use crate::progress::Progress;
-use bricks::{Brick, Leaf, Level, NONE, Span, Writer, Written};
+use bricks::{Brick, Instance, Leaf, Level, NONE, Span, Writer, Written};
 use rayon::prelude::*;
 
 /// Batches of a step of the journal.
@@ -27,6 +29,8 @@ pub(crate) struct LevelWriter<'a> {
     pub writer: &'a mut Writer,
     /// The bricks, which are written.
     pub bricks: &'a [Brick],
+    /// The instances, the world's first.
+    pub instances: &'a [Instance],
     /// What bricks of each object have in common, with the materials of `flattened`.
     pub contexts: &'a [BrickContext<'a>],
     /// Materials of levels.
@@ -86,14 +90,14 @@ impl LevelWriter<'_> {
             let (batch, after) = rest.split_at(self.batch_length(rest, &levels.records, 1));
             rest = after;
             let (writer, before) = (&mut *self.writer, std::mem::take(&mut ready));
-            let (bricks, records) = (self.bricks, &levels.records);
-            let (contexts, flattened, most) = (self.contexts, self.flattened, self.brick_triangles);
-            let progress = self.progress;
+            let (records, progress) = (&levels.records, self.progress);
+            let from = From { written: &written, bricks: self.bricks, instances: self.instances, levels: records };
+            let how = (self.contexts, self.flattened, self.brick_triangles);
             let (placed, made) = rayon::join(
                 || place(writer, before),
                 || {
                     let make = |planned| {
-                        let made = make(&written, planned, (bricks, records), (contexts, flattened), most);
+                        let made = make(planned, &from, how);
                         progress.advance(1);
                         made.map(|made| (made, planned))
                     };
@@ -129,16 +133,20 @@ impl LevelWriter<'_> {
         children[..planned.children.len()].copy_from_slice(&planned.children);
         let (mut error, mut bound) = (0.0f64, 0.0f64);
         for child in &planned.children {
-            if let Some(level) = level_of(child, self.bricks, levels) {
-                (error, bound) = (error.max(level.error), bound.max(level.bound));
-            }
+            let Some(level) = level_of(child, self.bricks, levels) else { continue };
+            let scale = match child.instance {
+                NONE => 1.0,
+                // Rounded up.
+                index => Affine(self.instances[index as usize].world_from_object).largest_scale() * (1.0 + 1e-12),
+            };
+            (error, bound) = (error.max(level.error * scale), bound.max(level.bound * scale));
         }
         Level {
             brick,
             children,
             error: error.max(made.error * step + 0.5 * error),
             bound: made.bound * step + bound,
-            color: made.color as f32,
+            color: made.color.min(1.0) as f32,
             _reserved: 0,
         }
     }
@@ -169,16 +177,26 @@ fn level_of<'a>(child: &Leaf, bricks: &[Brick], levels: &'a [Level]) -> Option<&
     child.brick.checked_sub(bricks.len() as u32).map(|level| &levels[level as usize])
 }
 
+/// What levels are made from.
+struct From<'a> {
+    written: &'a Written,
+    bricks: &'a [Brick],
+    instances: &'a [Instance],
+    levels: &'a [Level],
+}
+
 fn make(
-    written: &Written,
     planned: &Planned,
-    (bricks, levels): (&[Brick], &[Level]),
-    (contexts, flattened): (&[BrickContext], &Flattened),
-    brick_triangles: u32,
+    from: &From,
+    (contexts, flattened, brick_triangles): (&[BrickContext], &Flattened, u32),
 ) -> Result<Simplified, BuildError> {
-    let children: Vec<&Brick> = planned.children.iter().map(|child| brick_of(child, bricks, levels)).collect();
-    let context = &contexts[planned.object as usize];
-    simplify(written, &children, (context, flattened), brick_triangles)
+    let child = |child: &Leaf| {
+        let brick = brick_of(child, from.bricks, from.levels);
+        let placed = (child.instance != NONE).then(|| &from.instances[child.instance as usize]);
+        Child { brick, lattice: &contexts[brick.object as usize].lattice, placed }
+    };
+    let children: Vec<Child> = planned.children.iter().map(child).collect();
+    simplify(from.written, &children, (&contexts[planned.object as usize], flattened), brick_triangles)
 }
 
 /// Writes the payloads of levels.

@@ -21,5 +21,5 @@ mod vector;
 
 pub(super) use build::{LevelWriter, Levels};
 pub(super) use flat::Flattened;
-pub(super) use plan::Plan;
+pub(super) use plan::{Plan, Scene};
 pub(super) use top::build_top;

@@ -1,10 +1,21 @@
 //! Which bricks and levels each level stands for: trees over boxes, which depend on nothing else.
 
+use super::simplify::target;
+use crate::build::input::matrix::Affine;
 use crate::build::tree::binary::Box3;
+use crate::build::tree::top_level::world_box;
+use crate::build::triangles::lattice::Lattice;
 use bricks::{Brick, LEVEL_CHILDREN, Leaf, NONE, Object};
 
 /// How many times larger than the median a box is that is kept apart from the others.
 const HUGE: f64 = 8.0;
+
+/// Triangles at most of what stands for an object that instances place, where that can be.
+const COARSEST: usize = 128;
+
+/// Stored triangles for each instance that levels of the world stand for, at least: those levels then take less than
+/// the bricks do.
+const TRIANGLES_PER_INSTANCE: u64 = 256;
 
 /// A level to be made.
 #[derive(Clone, Debug)]
@@ -30,6 +41,8 @@ struct Item {
     bounds: Box3,
     child: Leaf,
     depth: u32,
+    /// Its triangles, about.
+    triangles: usize,
     /// Its place among the items of its tree.
     index: u32,
 }
@@ -49,22 +62,33 @@ struct Tree {
     object: u32,
     /// Number of all bricks.
     bricks: u32,
+    brick_triangles: u32,
     levels: Vec<Planned>,
 }
 
 impl Tree {
     /// The level over up to four items; one item is that itself.
     fn level(&mut self, items: &[Item]) -> Item {
-        let [first, others @ ..] = items else { unreachable!("a set of items is not empty") };
-        if others.is_empty() {
-            return *first;
-        }
+        if let [one] = items { *one } else { self.stand_for(items) }
+    }
+
+    /// A level over one to four items.
+    fn stand_for(&mut self, items: &[Item]) -> Item {
         let depth = 1 + items.iter().map(|item| item.depth).max().unwrap_or(0);
         let child = Leaf { instance: NONE, brick: self.bricks + self.levels.len() as u32 };
         let children = items.iter().map(|item| item.child).collect();
         self.levels.push(Planned { object: self.object, children, depth });
-        let bounds = others.iter().fold(first.bounds, |all, item| all.union(&item.bounds));
-        Item { bounds, child, depth, index: first.index }
+        let bounds = items[1..].iter().fold(items[0].bounds, |all, item| all.union(&item.bounds));
+        let triangles = target(items.iter().map(|item| item.triangles).sum(), self.brick_triangles);
+        Item { bounds, child, depth, triangles, index: items[0].index }
+    }
+
+    /// A root of few triangles: levels over each other, above `root`.
+    fn chain(&mut self, mut root: Item) -> Item {
+        while root.triangles > COARSEST {
+            root = self.stand_for(&[root]);
+        }
+        root
     }
 
     /// The root over items, of which there is at least one.
@@ -113,21 +137,62 @@ fn halve(items: &mut [Item]) -> (&mut [Item], &mut [Item]) {
     items.split_at_mut(middle)
 }
 
+/// What levels are planned for.
+pub(crate) struct Scene<'a> {
+    /// The objects.
+    pub objects: &'a [Object],
+    /// Their lattices.
+    pub lattices: &'a [Lattice],
+    /// Their bricks.
+    pub bricks: &'a [Brick],
+    /// Objects that stay where they are, by number of the instance, with the matrix.
+    pub placed: Vec<(u32, u32, Affine)>,
+    /// Most triangles of a brick.
+    pub brick_triangles: u32,
+}
+
+impl Scene<'_> {
+    /// The bricks of an object as items.
+    fn items(&self, object: u32) -> Vec<Item> {
+        let record = &self.objects[object as usize];
+        let own = record.first_brick..record.first_brick + record.brick_count;
+        let item = |(index, brick): (u32, u32)| {
+            let Brick { min, max, triangle_count, .. } = self.bricks[brick as usize];
+            let child = Leaf { instance: NONE, brick };
+            Item { bounds: Box3 { min, max }, child, depth: 0, triangles: triangle_count as usize, index }
+        };
+        (0..).zip(own).map(item).collect()
+    }
+}
+
 impl Plan {
-    /// The levels of all objects within themselves.
-    pub fn of(objects: &[Object], bricks: &[Brick]) -> Self {
-        let mut tree = Tree { object: 0, bricks: bricks.len() as u32, levels: Vec::new() };
-        for (object, record) in (0u32..).zip(objects) {
+    /// The levels of all objects within themselves, and those of the world over the instances too, unless these are too
+    /// many for that.
+    pub fn of(scene: &Scene) -> Self {
+        let (bricks, brick_triangles) = (scene.bricks.len() as u32, scene.brick_triangles);
+        let mut tree = Tree { object: 0, bricks, brick_triangles, levels: Vec::new() };
+        let mut roots = vec![None; scene.objects.len()];
+        for object in 1..scene.objects.len() as u32 {
             tree.object = object;
-            let own = record.first_brick..record.first_brick + record.brick_count;
-            let item = |(index, brick): (u32, u32)| {
-                let Brick { min, max, .. } = bricks[brick as usize];
-                Item { bounds: Box3 { min, max }, child: Leaf { instance: NONE, brick }, depth: 0, index }
-            };
-            let mut items: Vec<Item> = (0..).zip(own).map(item).collect();
-            if items.len() > 1 {
-                tree.root(&mut items);
+            let mut items = scene.items(object);
+            if !items.is_empty() {
+                let root = tree.root(&mut items);
+                roots[object as usize] = Some(tree.chain(root));
             }
+        }
+        tree.object = 0;
+        let mut items = scene.items(0);
+        let stored: u64 = scene.bricks.iter().map(|brick| u64::from(brick.triangle_count)).sum();
+        if scene.placed.len() as u64 <= stored / TRIANGLES_PER_INSTANCE {
+            for &(instance, object, matrix) in &scene.placed {
+                let Some(root) = roots[object as usize] else { continue };
+                let bounds = world_box(root.bounds, &scene.lattices[object as usize], &matrix, &scene.lattices[0]);
+                let child = Leaf { instance, ..root.child };
+                items.push(Item { bounds, child, index: items.len() as u32, ..root });
+            }
+        }
+        if items.len() > 1 {
+            tree.root(&mut items);
         }
         Self::in_order(tree)
     }

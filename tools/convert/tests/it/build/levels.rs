@@ -248,6 +248,23 @@ fn levels_are_bricks_of_distinct_triangles_from_their_children() {
 }
 
 #[test]
+fn levels_of_the_world_stand_for_instances_that_rest() {
+    let placed = |settings: BuildSettings| {
+        let resident = decode(&built(&instanced(), &settings).path()).resident;
+        let placed = resident.levels.iter().flat_map(|level| level.children().map(|child| child.instance));
+        let mut placed: Vec<u32> = placed.filter(|&instance| instance != NONE).collect();
+        placed.sort_unstable();
+        // The last level of an object has few triangles.
+        let of_object = |level: &&Level| level.brick.object == 1;
+        let last = resident.levels.iter().rfind(of_object).map(|level| level.brick.triangle_count);
+        assert!(last.is_some_and(|count| count <= 128), "{last:?}");
+        placed
+    };
+    assert_eq!(placed(with_levels(500)), [1, 2]);
+    assert_eq!(placed(BuildSettings { movable: vec!["c".to_owned()], ..with_levels(500) }), [1]);
+}
+
+#[test]
 fn all_else_is_as_without_levels() {
     let scene = instanced();
     let (with, without) = (built(&scene, &with_levels(500)), built(&scene, &settings(500)));
