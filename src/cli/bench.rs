@@ -7,8 +7,9 @@ use crate::cli::output::{Usage, print};
 use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
 use crate::lab::bench::displacement::args::DisplacementBenchArgs;
 use crate::lab::bench::dvf::args::DvfBenchArgs;
+use crate::lab::bench::lod::args::LodBenchArgs;
 use crate::lab::bench::roma::args::RomaBenchArgs;
-use crate::lab::bench::{chc, displacement, dvf, executors, roma};
+use crate::lab::bench::{chc, displacement, dvf, executors, lod, roma};
 use crate::lab::console::Console;
 use crate::lab::selftest;
 use crate::lab::selftest::args::SelftestArgs;
@@ -43,6 +44,9 @@ enum Experiments {
     /// The experiments of the paper of displacement fields: errors of light in a corner, and times of a ray by the
     /// triangles of the object
     Displacement(Measured<DisplacementBenchArgs>),
+    /// What levels of detail save, and how they err: errors, bytes and times by the tolerance, and working sets by the
+    /// size of scenes
+    Lod(Measured<LodBenchArgs>),
 }
 
 /// The settings of an experiment, less those that are no options.
@@ -105,6 +109,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         }
         Experiments::Displacement(Measured { output, options }) => {
             displacement::run(&DisplacementBenchArgs { output: output.clone(), ..options.over(None)? }, console)
+        }
+        Experiments::Lod(Measured { output, options }) => {
+            lod::run(&LodBenchArgs { output: output.clone(), ..options.over(None)? }, console)
         }
     };
     done.map_err(in_words)

@@ -44,7 +44,7 @@ impl LevelTable {
 
 /// The largest factor by which an instance lengthens anything, rounding included: the root of the largest eigenvalue
 /// of the product of its matrix with its transpose.
-fn stretch(instance: &Instance) -> f64 {
+pub fn stretch(instance: &Instance) -> f64 {
     let linear = affine(&instance.world_from_object).matrix3;
     let mut squares: DMat3 = linear.transpose() * linear;
     let size = squares.to_cols_array().iter().fold(0.0f64, |most, x| most.max(x.abs()));

@@ -152,11 +152,19 @@ pub fn empty_cache(renderer: &mut Renderer) -> Result<()> {
 /// # Errors
 /// It cannot have so many triangles; the file cannot be written.
 pub fn make(settings: &Generated, brick_triangles: u32, file: &Path, console: Console) -> Result<()> {
+    make_by(settings, BuildSettings { brick_triangles, ..BuildSettings::default() }, file, console)
+}
+
+/// [`make`] as `build` says, except for what moves.
+///
+/// # Errors
+/// As of [`make`].
+pub fn make_by(settings: &Generated, build: BuildSettings, file: &Path, console: Console) -> Result<()> {
     let name = || file.display().to_string();
     let progress = (console.job)();
     let scene = generate(settings, &progress).with_context(name)?;
     let movable = settings.kind.movable().iter().map(|&name| name.to_owned()).collect();
-    let build = BuildSettings { movable, brick_triangles, ..BuildSettings::default() };
+    let build = BuildSettings { movable, ..build };
     build_source(&scene, &build, file, &progress).with_context(name)?;
     progress.finish();
     write_paths(&scene, file)?;
