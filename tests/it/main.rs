@@ -88,6 +88,7 @@ mod lab {
     mod bench;
     mod bench_displacement;
     mod bench_dvf;
+    mod bench_lod;
     mod optimisations;
     mod selftest;
 }
