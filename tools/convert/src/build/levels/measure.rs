@@ -104,7 +104,7 @@ pub(super) fn measure(
     let mut bound = 0.0f64;
     let mut of_output = vec![f64::INFINITY; clusters.outputs.len()];
     let mut open: Vec<(f64, u32)> = Vec::new();
-    let mut errors: Vec<(f64, f64)> = Vec::with_capacity(merged.triangles.len());
+    let mut errors: Vec<(f64, f64)> = Vec::with_capacity(3 * merged.triangles.len());
     let mut color = 0.0f64;
     for (index, source) in (0u32..).zip(&merged.triangles) {
         let number = index as usize;
@@ -134,10 +134,10 @@ pub(super) fn measure(
         let albedo = surface.albedo[number];
         let difference = (0..3).map(|k| (f64::from(albedo[k]) - shown[k]).abs()).fold(0.0, f64::max);
         color = color.max(difference);
-        errors.push((
-            most(&away) + difference * clusters.size,
-            surface.area[number].min(LARGEST_FACES * clusters.size * clusters.size),
-        ));
+        // Each corner stands for a third.
+        let weight = surface.area[number].min(LARGEST_FACES * clusters.size * clusters.size) / 3.0;
+        let corners = source.corners.map(|corner| (away[corner as usize] + difference * clusters.size, weight));
+        errors.extend(corners);
     }
     open.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     for (upper, index) in open {
