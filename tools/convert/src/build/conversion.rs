@@ -12,7 +12,7 @@ use super::error::BuildError;
 use super::input::objects::{ObjectPlan, Placed, Plan};
 use super::input::parts::Reader;
 use super::levels::{self, Flattened, LevelWriter, Levels};
-use super::settings::{BuildSettings, BuildSummary};
+use super::settings::{BuildSettings, BuildSummary, TextureEncoding};
 use super::texture::mips::{self, Textures};
 use super::texture::opacity::Opacities;
 use super::tree::top_level::TopLevel;
@@ -81,7 +81,7 @@ impl Conversion<'_> {
     fn write_in_memory(&self, writer: &mut Writer, clock: &mut Clock) -> Result<Written, BuildError> {
         let Self { outline, plan, settings, progress, .. } = self;
         let textures =
-            mips::write(self.source, self.settings.textures, rayon::current_num_threads(), writer, progress)?;
+            mips::write(self.source, self.texture_settings(), rayon::current_num_threads(), writer, progress)?;
         let opacities = self.write_opacity(&textures, writer)?;
         let mut warnings = textures.warnings.clone();
         clock.end("textures");
@@ -124,6 +124,11 @@ impl Conversion<'_> {
         })
     }
 
+    /// How textures are stored, and whether small copies of them are wanted.
+    fn texture_settings(&self) -> (TextureEncoding, bool) {
+        (self.settings.textures, self.settings.lod)
+    }
+
     /// Writes levels of detail over the bricks, if they are wanted.
     fn write_levels(
         &self,
@@ -136,7 +141,7 @@ impl Conversion<'_> {
             return Ok(Default::default());
         }
         let (means, opacity) = (textures.material_means(), opacities.of_materials(&textures.materials));
-        let flattened = Flattened::of(&textures.materials, (&means, &opacity), textures.means(), used);
+        let flattened = Flattened::of(textures, (&means, &opacity), used);
         let settings = BuildSettings { proxies: false, ..self.settings.clone() };
         let contexts = jobs::contexts(lattices, &flattened.means, &flattened.opacity, &flattened.details, &settings);
         let instances = assemble::instance_records(&self.plan);
@@ -258,7 +263,7 @@ impl Conversion<'_> {
         let mut textures = Textures::default();
         let words = journal.step(Step::Textures, || {
             // One at a time, for images may be large.
-            textures = mips::write(self.source, settings.textures, 1, writer, progress)?;
+            textures = mips::write(self.source, self.texture_settings(), 1, writer, progress)?;
             Ok(textures.to_words(writer.checkpoint()?))
         })?;
         let textures = Textures::from_words(&words, outline).ok_or_else(|| journal.damaged())?;

@@ -34,7 +34,7 @@ pub(crate) struct LevelWriter<'a> {
     /// What bricks of each object have in common, with the materials of `flattened`.
     pub contexts: &'a [BrickContext<'a>],
     /// Materials of levels.
-    pub flattened: &'a Flattened,
+    pub flattened: &'a Flattened<'a>,
     /// Most triangles of a level.
     pub brick_triangles: u32,
     /// Triangles a thread works on before what it made is written, which bounds the memory.

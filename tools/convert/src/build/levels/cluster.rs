@@ -267,7 +267,12 @@ impl Clusters {
         order.sort_unstable_by(|&a, &b| areas[b as usize].total_cmp(&areas[a as usize]).then(a.cmp(&b)));
         order.truncate(target);
         order.sort_unstable();
-        (self.outputs, self.output_of) = renumbered(&self.outputs, std::mem::take(&mut self.output_of), &order);
+        self.keep(&order);
+    }
+
+    /// Keeps these outputs, ascending.
+    pub fn keep(&mut self, outputs: &[u32]) {
+        (self.outputs, self.output_of) = renumbered(&self.outputs, std::mem::take(&mut self.output_of), outputs);
     }
 
     /// Corners of an output, as positions.

@@ -6,8 +6,8 @@ use crate::build::input::matrix::Affine;
 use crate::build::triangles::intern::Interner;
 use crate::build::triangles::lattice::{Lattice, pow2};
 use bricks::{
-    AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout, Instance, NO_NORMAL,
-    SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT, Written,
+    AttributeDetail, AttributeLayout, AttributeVertex, BRICK_DETAIL, BRICK_INDEX32, BRICK_WIDE, Brick, GeometryLayout,
+    Instance, NO_NORMAL, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT, Written,
 };
 
 /// Triangles with their distinct vertices.
@@ -39,8 +39,10 @@ pub(super) struct Source {
 pub(super) struct Shade {
     /// Unit normal in the object's space; zero where there is none.
     pub normal: [f32; 3],
-    /// Linear RGB of the vertex colour.
-    pub color: [f32; 3],
+    /// Linear RGB and alpha of the vertex colour.
+    pub color: [f32; 4],
+    /// Both sets of texture coordinates.
+    pub uvs: [[f32; 2]; 2],
 }
 
 /// A child of a level.
@@ -153,9 +155,16 @@ fn add(
     let surfaces = AttributeLayout::of(brick);
     let first = merged.shades.len() as u32;
     let vertices = words::<AttributeVertex>(attributes, 0, brick.attribute_vertex_count as usize);
-    merged.shades.extend(vertices.map(|vertex| Shade {
+    let details = match brick.flags & BRICK_DETAIL {
+        0 => 0,
+        _ => brick.attribute_vertex_count as usize,
+    };
+    let details = words::<AttributeDetail>(attributes, surfaces.details, details).map(|detail| detail.uv);
+    let details = details.chain(std::iter::repeat([0.0; 2]));
+    merged.shades.extend(vertices.zip(details).map(|(vertex, second)| Shade {
         normal: place.normal(normal(vertex.normal)),
         color: std::array::from_fn(|k| (vertex.color >> (8 * k) & 255) as f32 / 255.0),
+        uvs: [vertex.uv, second],
     }));
     let count = brick.triangle_count as usize;
     let ids = words::<u32>(geometry, layout.ids, count);

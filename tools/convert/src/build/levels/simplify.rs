@@ -46,8 +46,9 @@ pub(super) fn simplify(
     let merged = merge(written, children, &context.lattice)?;
     let [origin, _] = merged.bounds();
     let points = merged.relative(origin);
-    let clusters = cluster(&merged, &points, target(merged.triangles.len(), brick_triangles));
-    let surface = Surface::collect(&merged, &points, &clusters, flattened);
+    let mut clusters = cluster(&merged, &points, target(merged.triangles.len(), brick_triangles));
+    let mut surface = Surface::collect(&merged, &points, &clusters, flattened);
+    surface.drop_thin(&points, &mut clusters);
     let (triangles, shown) = surface.triangles(&merged, &clusters, flattened);
     let measured = measure(&merged, &points, &clusters, &surface, &shown);
     let count = triangles.len();

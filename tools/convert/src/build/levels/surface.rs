@@ -3,7 +3,7 @@
 //! What a corner stands for are the triangles that touch its cell and face as it does. A triangle that is large against
 //! a cell counts there no more than a cell's face, but in the one that it becomes as a whole.
 
-use super::cluster::Clusters;
+use super::cluster::{Clusters, Output};
 use super::flat::Flattened;
 use super::merge::Merged;
 use super::vector::{CLASSES, Vec3, add_scaled, area_vector, class, dot, length};
@@ -14,12 +14,18 @@ use bricks::{NO_NORMAL, NONE};
 /// By how much a colour may exceed what a material of the family can show before the white one is taken.
 const EXCESS: f64 = 1.02;
 
+/// Share of what an output stands for that is opaque, at least: a third, as one opaque cell over it hides the others.
+const THIN: f64 = 1.0 / 3.0;
+
 /// Cosine from which on a mean normal is that of the triangle.
 const SAME_DIRECTION: f64 = 0.9999;
 
 /// Sums over triangles.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {
+    /// Area, opaque or not.
+    area: f64,
+    /// Area that is opaque.
     weight: f64,
     albedo: Vec3,
     normal: Vec3,
@@ -28,7 +34,9 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, weight: f64, albedo: Vec3, normal: Vec3, is_smooth: bool) {
+    fn add(&mut self, (area, cover): (f64, f64), albedo: Vec3, normal: Vec3, is_smooth: bool) {
+        let weight = area * cover;
+        self.area += area;
         self.weight += weight;
         self.albedo = add_scaled(self.albedo, weight, albedo);
         self.normal = add_scaled(self.normal, weight, normal);
@@ -36,6 +44,7 @@ impl Sum {
     }
 
     fn merge(&mut self, other: &Self) {
+        self.area += other.area;
         self.weight += other.weight;
         self.albedo = add_scaled(self.albedo, 1.0, other.albedo);
         self.normal = add_scaled(self.normal, 1.0, other.normal);
@@ -74,7 +83,7 @@ pub(super) struct Surface {
     pub albedo: Vec<[f32; 3]>,
     /// Class of each source triangle.
     pub class: Vec<u8>,
-    /// Area of each source triangle, square steps.
+    /// Area of each source triangle that is opaque, square steps.
     pub area: Vec<f64>,
 }
 
@@ -97,13 +106,16 @@ impl Surface {
             let doubled = length(vector);
             let side = class(vector);
             let n = if doubled > 0.0 { vector.map(|x| x / doubled) } else { [0.0; 3] };
-            let mean = flattened.means[source.material as usize].albedo;
+            let shades = source.shades.map(|shade| &merged.shades[shade as usize]);
+            let (mean, cover) = flattened.under(source.material, shades);
+            let alpha = shades.iter().map(|shade| shade.color[3]).sum::<f32>() / 3.0;
+            // Only where rays pass does alpha mean something.
+            let cover = f64::from(if flattened.is_opaque(source.material) { 1.0 } else { cover * alpha });
             let family = flattened.family_of[source.material as usize];
             let third = doubled / 6.0;
             let weight = third.min(face);
             let (mut albedo_sum, mut normal_sum, mut is_smooth) = ([0.0; 3], [0.0; 3], false);
-            for (corner, shade) in source.corners.into_iter().zip(source.shades) {
-                let shade = &merged.shades[shade as usize];
+            for (corner, shade) in source.corners.into_iter().zip(shades) {
                 let albedo = std::array::from_fn(|k| f64::from(mean[k]) * f64::from(shade.color[k]));
                 let has_normal = shade.normal != [0.0; 3];
                 let normal = if has_normal { shade.normal.map(f64::from) } else { n };
@@ -111,23 +123,48 @@ impl Surface {
                 normal_sum = add_scaled(normal_sum, 1.0, normal);
                 is_smooth |= has_normal;
                 let slot = all.slot(clusters.cell_of[corner as usize], side);
-                all.slots[slot].sum.add(weight, albedo, normal, has_normal);
-                all.share(slot, family, weight);
+                all.slots[slot].sum.add((weight, cover), albedo, normal, has_normal);
+                all.share(slot, family, weight * cover);
             }
             let third_of = |sum: Vec3| sum.map(|x| x / 3.0);
             let excess = 3.0 * (third - weight);
             if output != NONE && excess > 0.0 {
                 let (sum, largest, most) = &mut all.own[output as usize];
-                sum.add(excess, third_of(albedo_sum), third_of(normal_sum), is_smooth);
+                sum.add((excess, cover), third_of(albedo_sum), third_of(normal_sum), is_smooth);
                 if excess > *most {
                     (*largest, *most) = (family, excess);
                 }
             }
             all.albedo.push(third_of(albedo_sum).map(|x| x as f32));
             all.class.push(side as u8);
-            all.area.push(0.5 * doubled);
+            all.area.push(0.5 * doubled * cover);
         }
         all
+    }
+
+    /// Leaves out those outputs that stand for what is mostly not there, but for the smallest if there are no others.
+    /// Those that stay are opaque.
+    pub fn drop_thin(&mut self, points: &[Vec3], clusters: &mut Clusters) {
+        if self.slots.iter().all(|slot| slot.sum.weight == slot.sum.area) {
+            return;
+        }
+        let vector = |output: &Output| area_vector(clusters.corners(output).map(|corner| points[corner as usize]));
+        let is_thin = |(output, (own, ..)): (&Output, &(Sum, u32, f64))| {
+            let (side, mut sum) = (class(vector(output)), *own);
+            output.cells.iter().for_each(|&cell| sum.merge(&self.sum_of(cell, side)));
+            sum.weight < THIN * sum.area
+        };
+        let is_thin: Vec<bool> = clusters.outputs.iter().zip(&self.own).map(is_thin).collect();
+        let mut stay: Vec<u32> = (0u32..).zip(&is_thin).filter(|(_, thin)| !**thin).map(|(output, _)| output).collect();
+        if stay.is_empty() {
+            let area = |output: &u32| length(vector(&clusters.outputs[*output as usize]));
+            let outputs = 0..clusters.outputs.len() as u32;
+            stay.extend(outputs.min_by(|a, b| area(a).total_cmp(&area(b)).then(a.cmp(b))));
+        }
+        if stay.len() < is_thin.len() {
+            self.own = stay.iter().map(|&output| self.own[output as usize]).collect();
+            clusters.keep(&stay);
+        }
     }
 
     fn slot(&mut self, cell: u32, side: usize) -> usize {
@@ -175,7 +212,7 @@ impl Surface {
 
     /// The triangles of the level, ascending by id, and the mean linear RGB of each.
     pub fn triangles(&self, merged: &Merged, clusters: &Clusters, flattened: &Flattened) -> (Vec<Triangle>, Vec<Vec3>) {
-        let make = |(number, output): (usize, &super::cluster::Output)| {
+        let make = |(number, output): (usize, &Output)| {
             let corners = clusters.corners(output).map(|corner| merged.positions[corner as usize]);
             let base = corners[0];
             let relative = corners.map(|p| std::array::from_fn(|k| (p[k] - base[k]) as f64));

@@ -1,6 +1,7 @@
 //! Mip chains of textures, averaged by what their texels mean, cut into tiles.
 
 use super::roughness::{Bumps, bumps};
+use super::small::{SMALL_TEXELS, Small};
 use crate::build::disk::journal::{WordReader, Words};
 use crate::build::error::BuildError;
 use crate::build::settings::TextureEncoding;
@@ -26,6 +27,8 @@ pub(crate) struct EncodedTexture {
     pub tail: Vec<u8>,
     /// Mean linear RGB.
     pub mean: [f32; 3],
+    /// A small copy, of colours.
+    pub small: Option<Small>,
 }
 
 /// What texels mean.
@@ -70,15 +73,17 @@ pub(crate) struct Textures {
     pub warnings: Vec<String>,
     /// Mean linear RGB of the textures.
     means: Vec<[f32; 3]>,
+    /// Small copies of those of colours, if they are wanted.
+    small: Vec<Option<Small>>,
     /// Their indices, by index in the source and [`Content`]; [`NONE`] where it is not stored.
     new_of_old: Vec<u32>,
 }
 
-/// Writes the textures in use, `at_once` of which are in memory together. One that cannot be read is left out with a
-/// warning.
+/// Writes the textures in use, `at_once` of which are in memory together, and keeps small copies if they are wanted. One
+/// that cannot be read is left out with a warning.
 pub(crate) fn write(
     source: &dyn Source,
-    encoding: TextureEncoding,
+    (encoding, with_small): (TextureEncoding, bool),
     at_once: usize,
     writer: &mut Writer,
     progress: &Progress,
@@ -102,7 +107,9 @@ pub(crate) fn write(
         for (&(index, content), texture) in some.iter().zip(encoded) {
             match texture {
                 Ok(texture) => {
-                    stored.push(place(index, content), texture?, writer)?;
+                    let mut texture = texture?;
+                    texture.small = texture.small.filter(|_| with_small);
+                    stored.push(place(index, content), texture, writer)?;
                     stored.names.push(names[index as usize].clone());
                 }
                 Err(error) => {
@@ -133,6 +140,7 @@ impl Textures {
         }
         self.records.push(Texture { first_tile, tail: writer.write(&texture.tail)?, ..texture.record });
         self.means.push(texture.mean);
+        self.small.push(texture.small);
         Ok(())
     }
 
@@ -169,6 +177,11 @@ impl Textures {
         &self.means
     }
 
+    /// The small copy of a stored texture, if it is one of colours and they are wanted.
+    pub fn small(&self, texture: u32) -> Option<&Small> {
+        self.small.get(texture as usize)?.as_ref()
+    }
+
     /// Mean colours by material.
     pub fn material_means(&self) -> Vec<MeanColors> {
         self.materials.iter().map(|material| MeanColors::of(material, &self.means)).collect()
@@ -194,6 +207,10 @@ impl Textures {
             words.put(texts.len() as u64);
             texts.iter().for_each(|text| _ = words.put_records(text.as_bytes()));
         }
+        for small in &self.small {
+            words.put(u64::from(small.is_some()));
+            small.iter().for_each(|small| small.put(&mut words));
+        }
         words.0
     }
 
@@ -209,7 +226,10 @@ impl Textures {
             (0..count).map(|_| String::from_utf8(words.take_records()?).ok()).collect()
         };
         let (names, warnings) = (texts()?, texts()?);
-        let mut stored = Self { materials: Vec::new(), records, tiles, names, warnings, means, new_of_old };
+        let records: Vec<Texture> = records;
+        let small = |_| if words.take()? == 0 { Some(None) } else { Small::take(&mut words).map(Some) };
+        let small = records.iter().map(small).collect::<Option<Vec<_>>>()?;
+        let mut stored = Self { materials: Vec::new(), records, tiles, names, warnings, means, small, new_of_old };
         if stored.new_of_old.len() != outline.textures.len() * Content::COUNT {
             return None;
         }
@@ -262,7 +282,7 @@ pub(crate) fn encode(
     };
     let flags = if content == Content::Color { TEXTURE_SRGB } else { 0 };
     let mut record = Texture { width, height, levels, wrap, encoding, flags, ..Texture::default() };
-    let (mut tiles, mut tail) = (Vec::new(), Vec::new());
+    let (mut tiles, mut tail, mut small) = (Vec::new(), Vec::new(), None);
     let mut level = Image { width: width as usize, height: height as usize, texels: content.decode(&texels) };
     if encoding == TEXTURE_BC5 {
         // Unit vectors.
@@ -290,6 +310,9 @@ pub(crate) fn encode(
             }
         }
         let size = record.size(number);
+        if content == Content::Color && small.is_none() && size.iter().all(|&side| side <= SMALL_TEXELS) {
+            small = Some(Small { size, wrap, rgba: texels.clone() });
+        }
         if number < record.tail_level() {
             let [columns, rows] = record.tiles_of(number);
             let of_level = (0..columns * rows).into_par_iter().map(|tile| {
@@ -304,7 +327,7 @@ pub(crate) fn encode(
     }
     record.tile_count = tiles.len() as u32;
     let [red, green, blue, _] = level.texels[0];
-    Ok(EncodedTexture { record, tiles, tail, mean: [red, green, blue] })
+    Ok(EncodedTexture { record, tiles, tail, mean: [red, green, blue], small })
 }
 
 /// The texels from `corner` on, `to` each way, of an image of `size`; beyond its edges its last texels are repeated.
@@ -389,6 +412,11 @@ static LINEAR_OF_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
         (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
     })
 });
+
+/// The linear value of one of sRGB.
+pub(super) fn linear_of_srgb(value: u8) -> f32 {
+    LINEAR_OF_SRGB[value as usize]
+}
 
 /// Linear values from which on the sRGB value is at least i + 1.
 static SRGB_BORDERS: LazyLock<[f32; 255]> = LazyLock::new(|| {

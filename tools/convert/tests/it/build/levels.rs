@@ -3,10 +3,10 @@
 use super::bounded::{Computed, bounded, bytes};
 use super::decode::{DecodedBrick, decode, decode_levels};
 use super::scenes::*;
-use bricks::{Level, NONE, Resident};
+use bricks::{Level, MATERIAL_MASK, NONE, Resident};
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::progress::Progress;
-use brickwalk_convert::source::{IDENTITY, Primitive, SourceScene};
+use brickwalk_convert::source::{IDENTITY, Primitive, SourceScene, SourceTexture};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 type Vec3 = [f64; 3];
@@ -405,4 +405,61 @@ fn colours_are_means_by_area() {
         assert!(brick.materials.iter().all(|&material| material == 0));
         assert!(brick.attributes.iter().all(|vertex| vertex.color == u32::MAX));
     }
+}
+
+/// A sheet of which one half shows one half of a texture, red, and the other one that is blue.
+fn two_coloured(alpha: u8) -> SourceScene {
+    let mut scene = plain(vec![sheet(90, 1.0)]);
+    let texel = |x: u32| if x < 16 { [255, 0, 0, 255] } else { [0, 0, 255, alpha] };
+    let rgba = (0..32).flat_map(|_| (0..32).flat_map(texel)).collect();
+    scene.textures = vec![SourceTexture { name: "halves".to_owned(), width: 32, height: 32, wrap: 0, rgba }];
+    (scene.materials[0].base_color, scene.materials[0].base_color_texture) = ([1.0; 4], 0);
+    scene
+}
+
+#[test]
+fn textures_become_colours_of_vertices() {
+    let (resident, bricks) = decode_levels(&built(&two_coloured(255), &with_levels(500)).path());
+    let root = bricks.last().unwrap();
+    let step = 2f64.powi(resident.objects[0].step_log2);
+    let mut sides = [0; 2];
+    for index in 0..root.ids.len() {
+        let triangle = root.triangle(index);
+        let material = &resident.materials[triangle.material as usize];
+        assert_eq!(material.textures(), [NONE; 5]);
+        let xs = triangle.corners.map(|p| p[0] as f64 * step);
+        // Not where both halves meet, nor at the edge.
+        let is_red = xs.iter().all(|&x| (0.1..0.4).contains(&x));
+        if !is_red && !xs.iter().all(|&x| (-0.4..-0.1).contains(&x)) {
+            continue;
+        }
+        sides[usize::from(is_red)] += 1;
+        for vertex in triangle.attributes {
+            let [r, _, b] =
+                [0, 1, 2].map(|k| f64::from(vertex.color >> (8 * k) & 255) / 255.0 * f64::from(material.base_color[k]));
+            assert!(if is_red { r > 0.98 && b < 0.02 } else { b > 0.98 && r < 0.02 }, "{r} {b} {is_red}");
+        }
+    }
+    assert!(sides[0] > 10 && sides[1] > 10, "{sides:?}");
+}
+
+#[test]
+fn what_is_cut_out_is_not_stood_for() {
+    let area = |scene: &SourceScene| {
+        let (resident, bricks) = decode_levels(&built(scene, &with_levels(500)).path());
+        let root = bricks.last().unwrap();
+        assert!(root.materials.iter().all(|&material| resident.materials[material as usize].flags == 0));
+        let step = 2f64.powi(resident.objects[0].step_log2);
+        let of = |index| {
+            let [a, b, c] = root.corners(index).map(|p| p.map(|x| x as f64 * step));
+            let n = cross(sub(b, a), sub(c, a));
+            0.5 * dot(n, n).sqrt()
+        };
+        (0..root.ids.len()).map(of).sum::<f64>()
+    };
+    let mut scene = two_coloured(0);
+    let whole = area(&scene);
+    scene.materials[0].flags = MATERIAL_MASK;
+    let half = area(&scene);
+    assert!((0.4..0.6).contains(&(half / whole)), "{half} of {whole}");
 }
