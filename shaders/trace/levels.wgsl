@@ -103,14 +103,15 @@ fn tile_may_take(tile: TileBounds, leaf: u32) -> bool {
     return parent == NONE || level_leaves[parent].error_square > tile_widths(tile, parent).x;
 }
 
-// By what rays that start at a hit start off along its normal, beside the rounding of the point: they may meet another
-// level of the surface. The width of the cone at the point, which bounds the errors of all levels that they take there.
+// By what rays that start at a hit start off along its normal, beside the rounding of the point: the error of the level
+// that they take there, which is the coarsest of those that the hit and they may be on.
 fn level_offset(point: vec3<f32>, leaf: u32) -> f32 {
     let square = barrier(params.levels.x * square_of(barrier3(point - params.origin.xyz)));
-    let parent = level_leaves[leaf].parent;
-    let is_exact = level_leaves[leaf].error_square == 0.0;
-    if is_exact && (parent == NONE || level_leaves[parent].error_square > square) {
-        return 0.0;
+    var level = leaf;
+    var parent = level_leaves[level].parent;
+    while parent != NONE && level_leaves[parent].error_square <= square {
+        level = parent;
+        parent = level_leaves[level].parent;
     }
-    return barrier(params.levels.z * square_root(square));
+    return barrier(params.levels.z * square_root(level_leaves[level].error_square));
 }

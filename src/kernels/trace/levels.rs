@@ -148,16 +148,15 @@ impl Bound<'_> {
         }
     }
 
-    /// By what rays that start at a hit start off along its normal, beside the rounding of the point: they may meet
-    /// another level of the surface. The width of the cone at the point, which bounds the errors of all levels that they
-    /// take there.
+    /// By what rays that start at a hit start off along its normal, beside the rounding of the point: the error of the
+    /// level that they take there, which is the coarsest of those that the hit and they may be on.
     fn level_offset(&self, point: Vec3, leaf: u32) -> f32 {
         let ([at_origin, _, offset, _], eye) = (self.params.levels, self.eye());
         let square = barrier(at_origin * square_of(each(|k| point[k] - eye[k])));
-        let LevelLeaf { parent, error_square, .. } = *self.level_leaf(leaf);
-        if error_square == 0.0 && (parent == NONE || self.level_leaf(parent).error_square > square) {
-            return 0.0;
+        let mut level = self.level_leaf(leaf);
+        while level.parent != NONE && self.level_leaf(level.parent).error_square <= square {
+            level = self.level_leaf(level.parent);
         }
-        barrier(offset * square_root(square))
+        barrier(offset * square_root(level.error_square))
     }
 }

@@ -5,7 +5,7 @@
 //! one cell size agree on which vertices come together.
 
 use super::merge::{Merged, Source};
-use super::vector::{Vec3, area_vector, dot, length, square, sub};
+use super::vector::{Vec3, area_vector, cross, dot, length, square, sub};
 use crate::build::triangles::attributes::is_degenerate;
 use crate::build::triangles::intern::Interner;
 use bricks::NONE;
@@ -176,7 +176,28 @@ pub(super) fn cluster(merged: &Merged, points: &[Vec3], target: usize) -> Cluste
     clusters
 }
 
-/// For each cell the vertex of least quadric error, of equal ones that of least position.
+/// The edges that one triangle alone has, each with that triangle: where a level must go on to reach its neighbours.
+fn borders(merged: &Merged) -> Vec<(usize, [u32; 2])> {
+    let mut distinct = Interner::with_capacity(2 * merged.triangles.len());
+    let mut of_edge: Vec<(u32, u32, [u32; 2])> = Vec::with_capacity(2 * merged.triangles.len());
+    for (number, source) in (0u32..).zip(&merged.triangles) {
+        let [a, b, c] = source.corners;
+        for edge in [[a, b], [b, c], [c, a]] {
+            let [low, high] = [edge[0].min(edge[1]), edge[0].max(edge[1])];
+            let (index, is_new) = distinct.intern(u64::from(low) << 32 | u64::from(high));
+            if is_new {
+                of_edge.push((1, number, edge));
+            } else {
+                of_edge[index as usize].0 += 1;
+            }
+        }
+    }
+    let alone = of_edge.into_iter().filter(|(count, ..)| *count == 1);
+    alone.map(|(_, triangle, edge)| (triangle as usize, edge)).collect()
+}
+
+/// For each cell the vertex of least quadric error, of equal ones that of least position. A cell on a border keeps one
+/// of the border, and planes upright on it count, too: otherwise levels draw back from each other, and rays see through.
 fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Grid) -> Vec<u32> {
     // Relative to the first vertex of each cell, so that little is lost where cells are far from the origin.
     let mut first = vec![NONE; grid.cells];
@@ -198,9 +219,28 @@ fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Gr
             quadrics[cell].add(n, dot(n, sub(on, points[first[cell] as usize])), doubled);
         }
     }
+    let mut is_border = vec![false; points.len()];
+    let mut has_border = vec![false; grid.cells];
+    for (triangle, edge) in borders(merged) {
+        let [a, b] = edge.map(|end| points[end as usize]);
+        let along = sub(b, a);
+        let upright = cross(along, vectors[triangle]);
+        let size = length(upright);
+        for end in edge {
+            let cell = grid.cell_of[end as usize] as usize;
+            (is_border[end as usize], has_border[cell]) = (true, true);
+            if size > 0.0 {
+                let n = upright.map(|x| x / size);
+                quadrics[cell].add(n, dot(n, sub(a, points[first[cell] as usize])), square(along));
+            }
+        }
+    }
     let mut best: Vec<(f64, u32)> = vec![(f64::INFINITY, NONE); grid.cells];
     for (position, (&cell, &point)) in (0u32..).zip(grid.cell_of.iter().zip(points)) {
         let cell = cell as usize;
+        if has_border[cell] && !is_border[position as usize] {
+            continue;
+        }
         let error = quadrics[cell].at(sub(point, points[first[cell] as usize]));
         let (least, of) = best[cell];
         let is_less = |other: u32| merged.positions[position as usize] < merged.positions[other as usize];

@@ -18,6 +18,9 @@ const QUANTILE: f64 = 0.99;
 /// Faces of a cell that a triangle counts as at most, so that one that is large does not hide what lies on it.
 const LARGEST_FACES: f64 = 16.0;
 
+/// How far an edge of colours moves on average, in cells.
+const EDGE: f64 = 0.5;
+
 /// Rounding errors of distances, relative.
 const ROUNDING: f64 = 1e-8;
 
@@ -136,7 +139,7 @@ pub(super) fn measure(
         color = color.max(difference);
         // Each corner stands for a third.
         let weight = surface.area[number].min(LARGEST_FACES * clusters.size * clusters.size) / 3.0;
-        let corners = source.corners.map(|corner| (away[corner as usize] + difference * clusters.size, weight));
+        let corners = source.corners.map(|corner| (away[corner as usize] + EDGE * difference * clusters.size, weight));
         errors.extend(corners);
     }
     open.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

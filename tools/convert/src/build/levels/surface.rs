@@ -17,6 +17,12 @@ const EXCESS: f64 = 1.02;
 /// Share of what an output stands for that is opaque, at least: a third, as one opaque cell over it hides the others.
 const THIN: f64 = 1.0 / 3.0;
 
+/// Share of the light that comes from one direction.
+const DIRECT: f64 = 0.7;
+
+/// Length of a mean normal from which on normals do not differ.
+const ALIKE: f64 = 0.995;
+
 /// Cosine from which on a mean normal is that of the triangle.
 const SAME_DIRECTION: f64 = 0.9999;
 
@@ -49,6 +55,12 @@ impl Sum {
         self.albedo = add_scaled(self.albedo, 1.0, other.albedo);
         self.normal = add_scaled(self.normal, 1.0, other.normal);
         self.is_smooth |= other.is_smooth;
+    }
+
+    /// How much darker it is than a surface of its mean normal: normals that differ see less of a light together.
+    fn shade(&self) -> f64 {
+        let together = if self.weight > 0.0 { length(self.normal) / self.weight } else { 1.0 };
+        if together > ALIKE { 1.0 } else { 1.0 - DIRECT * (1.0 - together.max(0.5)) }
     }
 
     fn mean(&self) -> Vec3 {
@@ -237,8 +249,10 @@ impl Surface {
             let is_over = ratios.as_flattened().iter().any(|&x| x > EXCESS);
             let (material, colors) = if is_over { (family.white, means) } else { (family.flat, ratios) };
             let n = vector.map(|x| x / length(vector));
-            let attributes =
-                std::array::from_fn(|k| VertexBits([normal(&sums[k], n), 0, 0, unorm8(colors[k])], NO_DETAIL));
+            let attributes = std::array::from_fn(|k| {
+                let color = colors[k].map(|x| x * sums[k].shade());
+                VertexBits([normal(&sums[k], n), 0, 0, unorm8(color)], NO_DETAIL)
+            });
             let id = merged.triangles[output.source as usize].id;
             let mean = std::array::from_fn(|k| (means[0][k] + means[1][k] + means[2][k]) / 3.0);
             (Triangle { brick: 0, id, material, corners, attributes }, mean)
