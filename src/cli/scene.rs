@@ -207,6 +207,7 @@ mod tests {
             "--lattice -9",
             "--scratch .",
             "--no-proxies",
+            "--lod on",
         ];
         for option in options_of_building {
             let error = scene(&options("d.glb", option)).unwrap_err();

@@ -4,8 +4,8 @@
 //! stands for (`plan`). Levels are made from the bottom up, those of one depth side by side, each from the payloads of
 //! its children as they lie in the file (`merge`), so that memory is bounded by threads and not by the scene (`build`).
 //! One level is made in steps (`simplify`): vertices are clustered on a grid of cells (`cluster`), colours and normals
-//! averaged over what comes together (`surface`), and the distance between both surfaces bounded (`measure`, `nearest`).
-//! Materials without textures are added for them (`flat`), and a top level over bricks and levels (`top`).
+//! averaged over what comes together (`surface`), and the distance between both surfaces bounded (`measure`,
+//! `nearest`). Materials without textures are added for them (`flat`), and a top level over bricks and levels (`top`).
 
 mod build;
 mod cluster;

@@ -122,8 +122,8 @@ impl Tree {
     }
 }
 
-/// Halves at least two items: those that lie below the others along the longest axis of the bounds of their centres, and
-/// the others.
+/// Halves at least two items: those that lie below the others along the longest axis of the bounds of their centres,
+/// and the others.
 fn halve(items: &mut [Item]) -> (&mut [Item], &mut [Item]) {
     let extent = |axis: usize| {
         let centers = items.iter().map(|item| item.center2(axis));

@@ -15,8 +15,8 @@ const SHARE: usize = 4;
 /// Triangles that a level may always have.
 const LEAST_TARGET: usize = 64;
 
-/// How far rounding to the world's lattice moves a point of an instance, steps: half a diagonal, and what is lost as it is
-/// placed.
+/// How far rounding to the world's lattice moves a point of an instance, steps: half a diagonal, and what is lost as it
+/// is placed.
 const PLACED_ROUNDING: f64 = 0.9;
 
 /// A level that is not written yet. Lengths are in steps of the object's lattice.
