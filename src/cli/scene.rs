@@ -110,7 +110,7 @@ fn made_stiff(args: &SceneArgs, progress: &Progress) -> Result<(Vec<PathBuf>, Wr
 /// Writes a scene in the form that the name of the file stands for.
 fn write(scene: &dyn Source, output: &Path, settings: &BuildSettings, progress: &Progress) -> Result<Written> {
     let Some(form) = GltfForm::of(output) else {
-        return Ok(Written::Bricks(usage(build_source(scene, settings, output, progress))?));
+        return Ok(Written::Bricks(Box::new(usage(build_source(scene, settings, output, progress))?)));
     };
     write_gltf(scene, output, form, progress)?;
     let outline = scene.outline();
@@ -120,7 +120,7 @@ fn write(scene: &dyn Source, output: &Path, settings: &BuildSettings, progress: 
 
 /// What became of a scene.
 enum Written {
-    Bricks(BuildSummary),
+    Bricks(Box<BuildSummary>),
     Gltf { triangles: u64 },
 }
 
