@@ -45,8 +45,9 @@ struct Params {           // What every kernel is told.
     first_row: u32,       // of the picture, that the first row of rays belongs to
     picture_rows: u32,    // rows of the picture; camera rays of rows beyond them are not traced
     traced_one_in: u32,   // of so many blocks of 8 x 8 camera rays one is traced (src/frame/correct.rs); 0: all are
-    // levels of detail, squared: the tolerance times the angle of a pixel, the same times the angle that the pass's rays
-    // spread by; z: factor of what rays start off surfaces by; w: share of a squared width that blending may take off
+    // levels of detail, squared: the tolerance times the angle of a pixel, the same times the angle that the pass's
+    // rays spread by; z: factor of what rays start off surfaces by; w: share of a squared width that blending may take
+    // off
     levels: vec4<f32>,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     // what a white surface reflects of the environment, by terms of its normal (light.wgsl)

@@ -191,8 +191,7 @@ fn exact_blocks(
 ) -> Result<Vec<[f32; 3]>, RenderError> {
     let (settings, captures) = (engine.settings, engine.captures.take());
     let lod = Lod { pixels: 0.0, ..settings.lod };
-    engine.settings =
-        RenderSettings { lod, only_chosen: true, aov: false, guides: false, coverage: false, ..settings };
+    engine.settings = RenderSettings { lod, only_chosen: true, aov: false, guides: false, coverage: false, ..settings };
     let mut output = FrameOutput::default();
     let (width, picture) = (engine.size.0 as usize, engine.size.0 as usize * engine.size.1 as usize);
     let rendered = engine.bands().try_for_each(|rows| {

@@ -124,8 +124,10 @@ fn filled(pages: &[wgpu::Buffer], count: usize) -> impl Iterator<Item = &wgpu::B
 
 /// Whole buffers as entries by their bindings.
 pub fn by_binding<'a>(buffers: &[(u32, &'a wgpu::Buffer)]) -> Vec<wgpu::BindGroupEntry<'a>> {
-    let entry =
-        |&(binding, buffer): &(u32, &'a wgpu::Buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() };
+    let entry = |&(binding, buffer): &(u32, &'a wgpu::Buffer)| wgpu::BindGroupEntry {
+        binding,
+        resource: buffer.as_entire_binding(),
+    };
     buffers.iter().map(entry).collect()
 }
 

@@ -4,8 +4,8 @@
 use super::frame::{Frame, Placement};
 use super::lamps::LampTables;
 use super::layout;
-use super::levels::LevelTable;
 use super::layout::Params;
+use super::levels::LevelTable;
 use super::payloads::BrickView;
 use super::simd::isa::Best;
 use crate::schedule::Own;

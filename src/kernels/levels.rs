@@ -1,8 +1,8 @@
 //! Levels of detail in a frame: what selection goes by, for each leaf of the top level, and which levels stand for all
 //! that is below its nodes.
 //!
-//! Boxes and errors are made to nest here, from the bricks to the roots, whatever rounding does: then a ray takes exactly
-//! one leaf on each way from a root to a brick (`shaders/trace/levels.wgsl`).
+//! Boxes and errors are made to nest here, from the bricks to the roots, whatever rounding does: then a ray takes
+//! exactly one leaf on each way from a root to a brick (`shaders/trace/levels.wgsl`).
 
 use super::frame::Frame;
 use super::layout::LevelLeaf;

@@ -252,7 +252,9 @@ impl Settings {
         if let Some(method) = [Method::Dvf, Method::Displacement].into_iter().find(|&method| self.secondary.has(method))
             && self.lod > 0.0
         {
-            let text = format!("--lod and --secondary {method} exclude each other: {method} knows bricks alone; leave one out");
+            let text = format!(
+                "--lod and --secondary {method} exclude each other: {method} knows bricks alone; leave one out"
+            );
             return Err(SettingsError::Conflict(text));
         }
         if !self.checkpoints.is_empty() {

@@ -69,7 +69,8 @@ pub fn generate_primary(bound: &Bound, own: &mut RaySet) {
         let y = barrier(row as f32 + p.jitter[1]);
         let direction = each(|k| along(p.base[k], x, p.step_x[k], y, p.step_y[k]));
         // The last band of a picture may reach beyond it.
-        let (t_min, t_max) = if row < p.picture_rows && is_chosen(p, column, row) { (0.0, T_INFINITE) } else { (1.0, 0.0) };
+        let (t_min, t_max) =
+            if row < p.picture_rows && is_chosen(p, column, row) { (0.0, T_INFINITE) } else { (1.0, 0.0) };
         (Ray { origin: xyz(p.origin), t_min, direction, t_max }, NONE, Chosen::default())
     });
 }

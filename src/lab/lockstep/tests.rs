@@ -58,7 +58,8 @@ fn device() -> Option<(Gpu, Arc<Kernels>)> {
         crate::skip::skip("no adapter");
         return None;
     };
-    let kernels = Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels: true }, true));
+    let kernels =
+        Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels: true }, true));
     Some((gpu, kernels))
 }
 

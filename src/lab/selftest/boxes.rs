@@ -202,7 +202,10 @@ fn entered(lab: &Lab, cases: &[BoxCase]) -> Result<Vec<(u32, [f32; 8])>> {
         };
         return Ok(cases.iter().map(one).collect());
     };
-    let text = kernels::source("probe/probe_boxes", Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false });
+    let text = kernels::source(
+        "probe/probe_boxes",
+        Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false },
+    );
     let text = lab.defect.map_or(text.clone(), |defect| defect.plant(text));
     let words = probe::dispatch(gpu, &probe::module(gpu, &text), "boxes", cases, BoxCase::words, 9)?;
     let one = |words: &[u32]| (words[0], std::array::from_fn(|i| f32::from_bits(words[1 + i])));

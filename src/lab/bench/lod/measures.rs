@@ -92,8 +92,8 @@ impl Seen {
 
 /// A linear value as sRGB has it, 0 to 1: clamped, then encoded (IEC 61966-2-1).
 fn encoded(linear: f32) -> f32 {
-    let x = linear.clamp(0.0, 1.0);
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+    let x = f64::from(linear).clamp(0.0, 1.0);
+    (if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }) as f32
 }
 
 /// A picture in sRGB, 0 to 1, not rounded.

@@ -1,7 +1,8 @@
 //! The tables and plots of the bench.
 
-use super::args::{LodBenchArgs, Settings};
+use super::args::LodBenchArgs;
 use super::plan::{EXACT, Job, Kind, Party, SAMPLES, Stage, Way};
+use super::scale::Settings;
 use super::verdicts::{MB, Verdict, as_table, verdicts};
 use crate::lab::bench::results::{Column, Results, log_plot, percent, plot, ratio, table};
 use crate::lab::bench::scenes::View;
@@ -13,18 +14,18 @@ use brickwalk_report::{Graph, Section, Unit, Value};
 const TITLE: &str = "What levels of detail save, and how they err";
 const READING: &str = "tau: the tolerance, pixels; exact: without levels. Scenes are seen along their far paths unless \
                        said. Errors are against exact pictures of many samples, of which the first camera rays are \
-                       those of the pictures; rays of light differ. RMSE is in sRGB, 0 to 1; \
-                       relMSE is of linear radiance; FLIP is at 67 pixels per degree. MB are 1,000,000 bytes. Times \
+                       those of the pictures; rays of light differ. RMSE is in sRGB, 0 to 1; relMSE is \
+                       of linear radiance; FLIP is at 67 pixels per degree. MB are 1,000,000 bytes. Times \
                        are medians of frames of one sample, all ways in turns in one process.";
-const PICTURES: &str = "The first frame. Silhouettes: RMSE over pixels within one of an edge of the exact picture. Sees \
-                        through: rays through centres that exactly hit something and with levels nothing, or what lies \
-                        behind the plane of the exact hit by more than the level's bound and a pixel; holes: those of \
-                        them away from silhouettes; next pixel's: the share that exact rays of the next pixel would \
-                        see through, bounds left out. Triangles and nodes: tested and visited, of all rays.";
+const PICTURES: &str = "The first frame. Silhouettes: RMSE over pixels within one of an edge of the exact picture. \
+                        Sees through: rays through centres that exactly hit something and with levels nothing, or what \
+                        lies behind the plane of the exact hit by more than the level's bound and a pixel; holes: \
+                        those of them away from silhouettes; next pixel's: the share that exact rays of the next pixel \
+                        would see through, bounds left out. Triangles and nodes: tested and visited, of all rays.";
 const WALKS: &str = "Cold: loaded by the first frame, with an empty cache. Steady: loaded by a later frame. All: a \
                      frame's mean of both. The cache holds a share of all bricks without levels, with levels as many \
-                     bytes. At 100 % times are of frames for which nothing is loaded; else of the later frames of walks \
-                     that begin with an empty cache.";
+                     bytes. At 100 % times are of frames for which nothing is loaded; else of the later frames of \
+                     walks that begin with an empty cache.";
 const POPPING: &str = "Twelve frames, each 2 % of the path after the one before, all by the same rays. Change: mean \
                        absolute difference from the frame before, sRGB, thousandths. Of the error: by what the \
                        difference from the exact frame changes; of noise: the same of exact frames by other rays of \

@@ -1,6 +1,6 @@
 //! The scenes: generated or converted with levels of detail where they are missing.
 
-use super::args::Settings;
+use super::scale::Settings;
 use crate::lab::bench::scenes::{View, make_by};
 use crate::lab::console::Console;
 use crate::output::atomic;

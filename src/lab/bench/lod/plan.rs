@@ -1,7 +1,7 @@
 //! What is measured.
 
-use super::args::Settings;
 use super::places::{self, CITY, CITY_LARGE, PLANT, Subject};
+use super::scale::Settings;
 use crate::lab::bench::scenes::View;
 use crate::session::Settings as WalkSettings;
 use crate::settings::{Effect, EffectList, Turn, names};

@@ -1,9 +1,9 @@
 //! A scene with a cache, opened twice: without levels of detail and with them.
 
-use super::args::Settings;
 use super::measures::Seen;
 use super::places::Place;
 use super::plan::Way;
+use super::scale::Settings;
 use crate::counters::Record;
 use crate::frame::{FrameOutput, Renderer};
 use crate::lab::bench::scenes::{View as Path, empty_cache};

@@ -197,7 +197,8 @@ fn borders(merged: &Merged) -> Vec<(usize, [u32; 2])> {
 }
 
 /// For each cell the vertex of least quadric error, of equal ones that of least position. A cell on a border keeps one
-/// of the border, and planes upright on it count, too: otherwise levels draw back from each other, and rays see through.
+/// of the border, and planes upright on it count, too: otherwise levels draw back from each other, and rays see
+/// through.
 fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Grid) -> Vec<u32> {
     // Relative to the first vertex of each cell, so that little is lost where cells are far from the origin.
     let mut first = vec![NONE; grid.cells];

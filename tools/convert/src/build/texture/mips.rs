@@ -79,8 +79,8 @@ pub(crate) struct Textures {
     new_of_old: Vec<u32>,
 }
 
-/// Writes the textures in use, `at_once` of which are in memory together, and keeps small copies if they are wanted. One
-/// that cannot be read is left out with a warning.
+/// Writes the textures in use, `at_once` of which are in memory together, and keeps small copies if they are wanted.
+/// One that cannot be read is left out with a warning.
 pub(crate) fn write(
     source: &dyn Source,
     (encoding, with_small): (TextureEncoding, bool),
