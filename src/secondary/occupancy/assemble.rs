@@ -107,7 +107,7 @@ impl Assembler {
     /// The scene has no occupancy maps.
     pub fn new(file: Arc<SceneFile>, settings: Settings) -> Result<Self, BomError> {
         let resident = file.resident();
-        if resident.occupancy.len() != resident.bricks.len() {
+        if resident.occupancy.len() != resident.exact_bricks() {
             return Err(BomError::NoProxies { path: file.path().to_owned() });
         }
         let maps = Maps::new(file, settings.budget_bytes);

@@ -15,7 +15,7 @@ use bricks::NONE;
 /// Share of the area whose error is not above [`Measured::error`].
 const QUANTILE: f64 = 0.99;
 
-/// Faces of a cell that a triangle counts as at most, so that one that is large does not hide what lies on it.
+/// Faces of a cell that a triangle counts as at most in the second of two shares.
 const LARGEST_FACES: f64 = 16.0;
 
 /// How far an edge of colours moves on average, in cells.
@@ -138,7 +138,7 @@ pub(super) fn measure(
         let difference = (0..3).map(|k| (f64::from(albedo[k]) - shown[k]).abs()).fold(0.0, f64::max);
         color = color.max(difference);
         // Each corner stands for a third.
-        let weight = surface.area[number].min(LARGEST_FACES * clusters.size * clusters.size) / 3.0;
+        let weight = surface.area[number] / 3.0;
         let corners = source.corners.map(|corner| (away[corner as usize] + EDGE * difference * clusters.size, weight));
         errors.extend(corners);
     }
@@ -150,7 +150,7 @@ pub(super) fn measure(
     for (triangle, upper) in triangles.iter().zip(of_output) {
         bound = bound.max(upper.min(reach(*triangle)));
     }
-    Measured { bound: bound * (1.0 + ROUNDING), error: quantile(errors), color }
+    Measured { bound: bound * (1.0 + ROUNDING), error: quantile(errors, LARGEST_FACES * clusters.size * clusters.size / 3.0), color }
 }
 
 /// Whether a triangle in at most two cells becomes an edge or vertex of the level.
@@ -168,14 +168,16 @@ fn reach([a, b, c]: [Vec3; 3]) -> f64 {
     (longest / 3.0).sqrt() * (1.0 + ROUNDING)
 }
 
-/// The error that is not exceeded by a share of the area.
-fn quantile(mut errors: Vec<(f64, f64)>) -> f64 {
+/// The error that is not exceeded by a share of the area, and not where what is larger than `most` counts as that: what
+/// is large must neither hide what lies on it nor be hidden by how many small things there are.
+fn quantile(mut errors: Vec<(f64, f64)>, most: f64) -> f64 {
     errors.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
-    let all: f64 = errors.iter().map(|(_, area)| area).sum();
-    let mut above = 0.0;
+    let sums = |sums: [f64; 2], area: f64| [sums[0] + area, sums[1] + area.min(most)];
+    let all = errors.iter().fold([0.0; 2], |all, (_, area)| sums(all, *area));
+    let mut above = [0.0; 2];
     for (error, area) in errors {
-        above += area;
-        if above > (1.0 - QUANTILE) * all {
+        above = sums(above, area);
+        if (0..2).any(|k| above[k] > (1.0 - QUANTILE) * all[k]) {
             return error;
         }
     }
