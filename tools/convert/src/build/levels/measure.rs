@@ -21,6 +21,9 @@ const LARGEST_FACES: f64 = 16.0;
 /// How far an edge of colours moves on average, in cells.
 const EDGE: f64 = 0.5;
 
+/// Difference of square roots of colours from which on an edge counts as a whole: it shows, however far it moves.
+const PLAIN: f64 = 0.1;
+
 /// Rounding errors of distances, relative.
 const ROUNDING: f64 = 1e-8;
 
@@ -137,9 +140,12 @@ pub(super) fn measure(
         let albedo = surface.albedo[number];
         let difference = (0..3).map(|k| (f64::from(albedo[k]) - shown[k]).abs()).fold(0.0, f64::max);
         color = color.max(difference);
+        let root = |x: f64| x.max(0.0).sqrt();
+        let seen = (0..3).map(|k| (root(f64::from(albedo[k])) - root(shown[k])).abs()).fold(0.0, f64::max);
+        let edge = EDGE * clusters.size * (seen / PLAIN).min(1.0);
         // Each corner stands for a third.
         let weight = surface.area[number] / 3.0;
-        let corners = source.corners.map(|corner| (away[corner as usize] + EDGE * difference * clusters.size, weight));
+        let corners = source.corners.map(|corner| (away[corner as usize] + edge, weight));
         errors.extend(corners);
     }
     open.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -150,7 +156,11 @@ pub(super) fn measure(
     for (triangle, upper) in triangles.iter().zip(of_output) {
         bound = bound.max(upper.min(reach(*triangle)));
     }
-    Measured { bound: bound * (1.0 + ROUNDING), error: quantile(errors, LARGEST_FACES * clusters.size * clusters.size / 3.0), color }
+    Measured {
+        bound: bound * (1.0 + ROUNDING),
+        error: quantile(errors, LARGEST_FACES * clusters.size * clusters.size / 3.0),
+        color,
+    }
 }
 
 /// Whether a triangle in at most two cells becomes an edge or vertex of the level.
