@@ -77,7 +77,7 @@ impl Resident {
             };
             is_left[index] = self.levels[index].children().any(|child| is_of_moved(child) || is_left_level(child));
             if is_left[index] {
-                self.levels[index].error = f64::INFINITY;
+                self.levels[index].error = f64::MAX;
             }
         }
     }

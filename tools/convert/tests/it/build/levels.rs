@@ -399,11 +399,20 @@ fn colours_are_means_by_area() {
         let found = sum / area;
         assert!((found / expected[k] - 1.0).abs() < 0.01, "channel {k}: {found}, expected {}", expected[k]);
     }
-    // Of one material nothing is lost.
-    let (resident, bricks) = decode_levels(&built(&plain(vec![sheet(80, 30.0)]), &with_levels(500)).path());
-    for brick in &bricks[resident.exact_bricks()..] {
-        assert!(brick.materials.iter().all(|&material| material == 0));
-        assert!(brick.attributes.iter().all(|vertex| vertex.color == u32::MAX));
+    // Of one material nothing is lost where all normals are one; where they differ the colour is darkened, evenly.
+    let [squares, _] = checkered(96).meshes[0].primitives.clone().try_into().unwrap();
+    for (part, is_flat) in [(squares, true), (sheet(80, 30.0), false)] {
+        let (resident, bricks) = decode_levels(&built(&plain(vec![part]), &with_levels(500)).path());
+        let mut darkest = 255;
+        for brick in &bricks[resident.exact_bricks()..] {
+            assert!(brick.materials.iter().all(|&material| material == 0));
+            for vertex in &brick.attributes {
+                let [r, g, b, alpha] = vertex.color.to_le_bytes();
+                assert!(r == g && g == b && alpha == 255 && r >= 160, "{:x}", vertex.color);
+                darkest = darkest.min(r);
+            }
+        }
+        assert_eq!(darkest == 255, is_flat, "{darkest}");
     }
 }
 
@@ -437,7 +446,8 @@ fn textures_become_colours_of_vertices() {
         for vertex in triangle.attributes {
             let [r, _, b] =
                 [0, 1, 2].map(|k| f64::from(vertex.color >> (8 * k) & 255) / 255.0 * f64::from(material.base_color[k]));
-            assert!(if is_red { r > 0.98 && b < 0.02 } else { b > 0.98 && r < 0.02 }, "{r} {b} {is_red}");
+            // Normals that differ may darken it.
+            assert!(if is_red { r > 0.64 && b < 0.02 } else { b > 0.64 && r < 0.02 }, "{r} {b} {is_red}");
         }
     }
     assert!(sides[0] > 10 && sides[1] > 10, "{sides:?}");
