@@ -19,7 +19,7 @@ const QUANTILE: f64 = 0.99;
 const LARGEST_FACES: f64 = 16.0;
 
 /// How far an edge of colours moves on average, in cells.
-const EDGE: f64 = 0.5;
+const EDGE: f64 = 0.35;
 
 /// Difference of square roots of colours from which on an edge counts as a whole: it shows, however far it moves.
 const PLAIN: f64 = 0.1;
