@@ -124,8 +124,8 @@ const BLEND: f32 = 0.75;
 /// Angle that rays around a hit stand for, radians: what a cosine-weighted ray of a hundred does.
 const AROUND: f32 = 0.18;
 
-/// Errors of the level at a hit that rays start off by: most of a level is nearer than its error, and what starts too far
-/// off starts behind something else.
+/// Errors of the level at a hit that rays start off by: most of a level is nearer than its error, and what starts too
+/// far off starts behind something else.
 const OFFSET: f32 = 0.5;
 
 impl Lod {
