@@ -145,6 +145,7 @@ fn rebuild(args: &RepairArgs, scene: &SceneFile, scratch: &Path, progress: &Prog
         brick_triangles: manifest.brick_triangles,
         lattice: args.work.lattice.or_else(of_case),
         proxies: manifest.has_proxies,
+        lod: !scene.resident().levels.is_empty(),
         movable: manifest.movable.clone(),
         textures: match scene.resident().textures.first() {
             Some(texture) if texture.encoding == bricks::TEXTURE_RGBA8 => TextureEncoding::Raw,
