@@ -6,15 +6,9 @@ use bricks::*;
 use std::collections::BTreeSet;
 use std::fs;
 
-/// The spoiled records are refused with a message that names `part` and says `found`.
 #[track_caller]
 fn refused(part: Part, found: &str, spoil: impl FnOnce(&mut Resident)) {
-    let mut resident = written_with_levels().2.resident;
-    validate::resident(&resident).unwrap();
-    spoil(&mut resident);
-    let flaw = validate::resident(&resident).expect_err(found);
-    assert_eq!(flaw.part, part, "{flaw}");
-    assert!(flaw.found.contains(found), "{flaw} does not say {found}");
+    common::refused(written_with_levels().2.resident, part, found, spoil);
 }
 
 #[track_caller]
