@@ -62,6 +62,28 @@ struct Written {
     warnings: Vec<String>,
 }
 
+impl Written {
+    fn without_levels(
+        (textures, opacities, warnings): (Textures, Opacities, Vec<String>),
+        (cuts, used_materials, lattices): (Vec<ObjectCut>, Vec<u64>, Vec<Lattice>),
+        (bricks, occupancy, rounded_away): (Vec<Brick>, Vec<Occupancy>, Vec<u32>),
+    ) -> Self {
+        Self {
+            textures,
+            opacities,
+            cuts,
+            used_materials,
+            lattices,
+            bricks,
+            occupancy,
+            rounded_away,
+            levels: Levels::default(),
+            added_materials: Vec::new(),
+            warnings,
+        }
+    }
+}
+
 impl Conversion<'_> {
     /// Converts with all geometry in memory.
     pub fn in_memory(&self) -> Result<BuildSummary, BuildError> {
@@ -102,26 +124,11 @@ impl Conversion<'_> {
         bricks.write(&jobs, encode, progress)?;
         let (bricks, occupancy, rounded_away) = (bricks.records, bricks.occupancy, bricks.dropped);
         clock.end("bricks");
-        let (levels, added_materials) = self.write_levels(
-            (&textures, &opacities, &used_materials),
-            (&lattices, &bricks),
-            (writer, None),
-            BATCH_TRIANGLES,
-        )?;
+        let (images, pieces) = ((textures, opacities, warnings), (cuts, used_materials, lattices));
+        let mut written = Written::without_levels(images, pieces, (bricks, occupancy, rounded_away));
+        self.write_levels(&mut written, (writer, None), BATCH_TRIANGLES)?;
         clock.end("levels");
-        Ok(Written {
-            textures,
-            opacities,
-            cuts,
-            used_materials,
-            lattices,
-            bricks,
-            occupancy,
-            rounded_away,
-            levels,
-            added_materials,
-            warnings,
-        })
+        Ok(written)
     }
 
     /// How textures are stored, and whether small copies of them are wanted.
@@ -132,14 +139,14 @@ impl Conversion<'_> {
     /// Writes levels of detail over the bricks, if they are wanted.
     fn write_levels(
         &self,
-        (textures, opacities, used): (&Textures, &Opacities, &[u64]),
-        (lattices, bricks): (&[Lattice], &[Brick]),
+        written: &mut Written,
         (writer, journal): (&mut Writer, Option<&mut Journal>),
         batch_triangles: usize,
-    ) -> Result<(Levels, Vec<Material>), BuildError> {
+    ) -> Result<(), BuildError> {
         if !self.settings.lod {
-            return Ok(Default::default());
+            return Ok(());
         }
+        let Written { textures, opacities, lattices, bricks, used_materials: used, .. } = &*written;
         let (means, opacity) = (textures.material_means(), opacities.of_materials(&textures.materials));
         let flattened = Flattened::of(textures, (&means, &opacity), used);
         let settings = BuildSettings { proxies: false, ..self.settings.clone() };
@@ -163,7 +170,9 @@ impl Conversion<'_> {
             progress: self.progress,
         };
         let levels = levels.write(&plan, journal)?;
-        Ok((levels, flattened.added))
+        let added = flattened.added;
+        (written.levels, written.added_materials) = (levels, added);
+        Ok(())
     }
 
     fn write_opacity(&self, textures: &Textures, writer: &mut Writer) -> Result<Opacities, BuildError> {
@@ -303,26 +312,11 @@ impl Conversion<'_> {
         let (bricks, occupancy) = (bricks.records, bricks.occupancy);
         clock.end("bricks");
         let (cuts, used_materials) = (cuts.objects, cuts.materials);
-        let (levels, added_materials) = self.write_levels(
-            (&textures, &opacities, &used_materials),
-            (&lattices, &bricks),
-            (writer, Some(journal)),
-            budget.batch,
-        )?;
+        let (images, pieces) = ((textures, opacities, warnings), (cuts, used_materials, lattices));
+        let mut written = Written::without_levels(images, pieces, (bricks, occupancy, rounded_away));
+        self.write_levels(&mut written, (writer, Some(journal)), budget.batch)?;
         clock.end("levels");
-        Ok(Written {
-            textures,
-            opacities,
-            cuts,
-            used_materials,
-            lattices,
-            bricks,
-            occupancy,
-            rounded_away,
-            levels,
-            added_materials,
-            warnings,
-        })
+        Ok(written)
     }
 
     /// Builds the resident part and finishes the file.

@@ -2,9 +2,10 @@
 //!
 //! Rossignac and Borrel 1993, with the representative of least quadric error (Lindstrom 2000, "Out-of-core
 //! simplification of large polygonal models"). Cells lie on the lattice of the object, so that neighbouring levels of
-//! one cell size agree on which vertices come together.
+//! one cell size agree on which vertices come together. What would be lost stays as strands and specks.
 
 use super::merge::{Merged, Source};
+use super::strands::{self, Collapsed};
 use super::vector::{Vec3, area_vector, cross, dot, length, square, sub};
 use crate::build::triangles::attributes::is_degenerate;
 use crate::build::triangles::intern::Interner;
@@ -17,15 +18,22 @@ const GRID_BITS: u32 = 20;
 const MOST_TRIALS: usize = 12;
 
 /// Share of the triangles asked for that is enough.
-const ENOUGH: f64 = 0.92;
+const ENOUGH: f64 = 0.9;
+
+/// By which power of the size of cells the number of triangles falls at first.
+const SLOPE: f64 = -1.4;
 
 /// A triangle of a level.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Output {
-    /// The source triangle of least id that becomes it.
+    /// The source triangle whose id it takes.
     pub source: u32,
-    /// Cells of its corners, in the order of that triangle.
+    /// What it stands for: the sources of this group.
+    pub group: u32,
+    /// Cells that its corners belong to.
     pub cells: [u32; 3],
+    /// Its corners, as positions.
+    pub corners: [u32; 3],
 }
 
 /// Vertices by cells, and the triangles that are left.
@@ -33,21 +41,27 @@ pub(super) struct Output {
 pub(super) struct Clusters {
     /// Side of a cell, steps.
     pub size: f64,
-    /// The cell of each position.
+    /// The cell of each position of the sources.
     pub cell_of: Vec<u32>,
     /// The position that stands for each cell.
     pub kept: Vec<u32>,
     /// What is left, ascending by id.
     pub outputs: Vec<Output>,
-    /// What each source triangle becomes, or [`NONE`].
-    pub output_of: Vec<u32>,
+    /// The group of each source triangle that outputs stand for, or [`NONE`].
+    pub group_of: Vec<u32>,
+    /// For each group how far the corners of its outputs are from positions of the sources: 0 but for strands and
+    /// specks.
+    pub spread: Vec<f64>,
 }
 
 /// Cells of one size.
-struct Grid {
-    size: i64,
-    cell_of: Vec<u32>,
-    cells: usize,
+pub(super) struct Grid {
+    /// Side of a cell, steps.
+    pub size: i64,
+    /// The cell of each position.
+    pub cell_of: Vec<u32>,
+    /// Where each of them is, as three numbers.
+    pub places: Vec<u64>,
 }
 
 impl Grid {
@@ -62,14 +76,22 @@ impl Grid {
             numbers.intern(x << (2 * (GRID_BITS + 1)) | y << (GRID_BITS + 1) | z).0
         };
         let cell_of = positions.iter().map(number).collect();
-        Self { size, cell_of, cells: numbers.values().len() }
+        Self { size, cell_of, places: numbers.values().to_vec() }
     }
 
-    fn cells(&self, triangle: &Source) -> [u32; 3] {
+    /// Whether two cells touch.
+    pub fn are_neighbours(&self, cells: [u32; 2]) -> bool {
+        let [a, b] = cells.map(|cell| self.places[cell as usize]);
+        let number = |place: u64, k: u32| place >> (k * (GRID_BITS + 1)) & ((1 << (GRID_BITS + 1)) - 1);
+        (0..3).all(|k| number(a, k).abs_diff(number(b, k)) <= 1)
+    }
+
+    /// Cells of the corners of a triangle.
+    pub fn cells(&self, triangle: &Source) -> [u32; 3] {
         triangle.corners.map(|corner| self.cell_of[corner as usize])
     }
 
-    /// Triangles with corners in three cells, those of the same cells counted once.
+    /// How many outputs there would be.
     fn count(&self, triangles: &[Source]) -> usize {
         let mut distinct = Interner::with_capacity(triangles.len() / 4);
         for triangle in triangles {
@@ -77,7 +99,7 @@ impl Grid {
                 distinct.intern(key);
             }
         }
-        distinct.values().len()
+        distinct.values().len() + Collapsed::of(triangles, self, distinct.values()).outputs()
     }
 }
 
@@ -102,6 +124,7 @@ fn search(merged: &Merged, area: f64, target: usize) -> Grid {
         return at(fine).0;
     }
     let mut best: Option<Grid> = None;
+    let mut before: Option<(f64, f64)> = None;
     // As if all were one plane: a triangle has half the area of a cell.
     let mut size = (2.0 * area / target as f64).sqrt();
     for _ in 0..MOST_TRIALS {
@@ -119,9 +142,14 @@ fn search(merged: &Merged, area: f64, target: usize) -> Grid {
             break;
         }
         let (low, high) = (fine as f64, coarse as f64);
-        let wanted = 0.5 * (1.0 + ENOUGH) * target as f64;
-        size = whole as f64 * (count.max(1) as f64 / wanted).sqrt();
-        // Steps of the rule for planes as long as they stay inside, else halving on a scale of ratios.
+        let wanted = (0.5 * (1.0 + ENOUGH) * target as f64).ln();
+        let at = ((whole as f64).ln(), (count.max(1) as f64).ln());
+        // Counts fall with a power of the size: at first one between those of planes and of what is strewn.
+        let slope = before.map_or(SLOPE, |before| (at.1 - before.1) / (at.0 - before.0));
+        let slope = if slope.is_finite() { slope.clamp(4.0 * SLOPE, 0.25 * SLOPE) } else { SLOPE };
+        size = (at.0 + (wanted - at.1) / slope).exp();
+        before = Some(at);
+        // Steps of that rule as long as they stay inside, else halving on a scale of ratios.
         if size <= low * 1.01 || size >= high * 0.99 {
             size = (low * high).sqrt();
         }
@@ -158,26 +186,37 @@ impl Quadric {
 }
 
 /// Clusters `merged` so that at most `target` triangles are left, and at least one. `points` are its positions relative
-/// to some point.
-pub(super) fn cluster(merged: &Merged, points: &[Vec3], target: usize) -> Clusters {
+/// to some point. Positions that outputs need beside those of the sources are added to both.
+pub(super) fn cluster(merged: &mut Merged, points: &mut Vec<Vec3>, target: usize) -> Clusters {
     let triangle = |source: &Source| source.corners.map(|corner| points[corner as usize]);
     let vectors: Vec<Vec3> = merged.triangles.iter().map(|source| area_vector(triangle(source))).collect();
     let area = 0.5 * vectors.iter().map(|&vector| length(vector)).sum::<f64>();
     let grid = search(merged, area, target);
-    let kept = representatives(merged, points, &vectors, &grid);
-    let (outputs, output_of) = outputs(merged, &grid, &kept);
-    let mut clusters = Clusters { size: grid.size as f64, cell_of: grid.cell_of, kept, outputs, output_of };
+    let borders = borders(merged);
+    let kept = representatives(merged, points, (&vectors, &borders), &grid);
+    let (outputs, group_of, triples) = outputs(merged, &grid, &kept);
+    let spread = vec![0.0; triples.len()];
+    let mut clusters = Clusters { size: grid.size as f64, cell_of: Vec::new(), kept, outputs, group_of, spread };
+    let collapsed = Collapsed::of(&merged.triangles, &grid, &triples);
+    strands::add(merged, points, (&vectors, &borders), (&grid, &collapsed), &mut clusters);
+    clusters.cell_of = grid.cell_of;
+    clusters.outputs.retain(|output| !is_degenerate(&output.corners.map(|corner| merged.positions[corner as usize])));
     if clusters.outputs.is_empty() {
         clusters = each_alone(merged, clusters.size);
     }
+    clusters.outputs.sort_unstable_by_key(|output| merged.triangles[output.source as usize].id);
     if clusters.outputs.len() > target {
         clusters.keep_largest(points, target);
     }
+    clusters.forget_groups();
     clusters
 }
 
+/// A triangle and an edge that it alone has.
+pub(super) type Border = (usize, [u32; 2]);
+
 /// The edges that one triangle alone has, each with that triangle: where a level must go on to reach its neighbours.
-fn borders(merged: &Merged) -> Vec<(usize, [u32; 2])> {
+fn borders(merged: &Merged) -> Vec<Border> {
     let mut distinct = Interner::with_capacity(2 * merged.triangles.len());
     let mut of_edge: Vec<(u32, u32, [u32; 2])> = Vec::with_capacity(2 * merged.triangles.len());
     for (number, source) in (0u32..).zip(&merged.triangles) {
@@ -199,15 +238,20 @@ fn borders(merged: &Merged) -> Vec<(usize, [u32; 2])> {
 /// For each cell the vertex of least quadric error, of equal ones that of least position. A cell on a border keeps one
 /// of the border, and planes upright on it count, too: otherwise levels draw back from each other, and rays see
 /// through.
-fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Grid) -> Vec<u32> {
+fn representatives(
+    merged: &Merged,
+    points: &[Vec3],
+    (vectors, borders): (&[Vec3], &[Border]),
+    grid: &Grid,
+) -> Vec<u32> {
     // Relative to the first vertex of each cell, so that little is lost where cells are far from the origin.
-    let mut first = vec![NONE; grid.cells];
+    let mut first = vec![NONE; grid.places.len()];
     for (position, &cell) in (0u32..).zip(&grid.cell_of) {
         if first[cell as usize] == NONE {
             first[cell as usize] = position;
         }
     }
-    let mut quadrics = vec![Quadric::default(); grid.cells];
+    let mut quadrics = vec![Quadric::default(); grid.places.len()];
     for (source, &vector) in merged.triangles.iter().zip(vectors) {
         let doubled = length(vector);
         if doubled == 0.0 {
@@ -221,8 +265,8 @@ fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Gr
         }
     }
     let mut is_border = vec![false; points.len()];
-    let mut has_border = vec![false; grid.cells];
-    for (triangle, edge) in borders(merged) {
+    let mut has_border = vec![false; grid.places.len()];
+    for &(triangle, edge) in borders {
         let [a, b] = edge.map(|end| points[end as usize]);
         let along = sub(b, a);
         let upright = cross(along, vectors[triangle]);
@@ -236,7 +280,7 @@ fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Gr
             }
         }
     }
-    let mut best: Vec<(f64, u32)> = vec![(f64::INFINITY, NONE); grid.cells];
+    let mut best: Vec<(f64, u32)> = vec![(f64::INFINITY, NONE); grid.places.len()];
     for (position, (&cell, &point)) in (0u32..).zip(grid.cell_of.iter().zip(points)) {
         let cell = cell as usize;
         if has_border[cell] && !is_border[position as usize] {
@@ -252,57 +296,39 @@ fn representatives(merged: &Merged, points: &[Vec3], vectors: &[Vec3], grid: &Gr
     best.into_iter().map(|(_, position)| position).collect()
 }
 
-/// The triangles that are left, ascending by id, and what each source triangle becomes.
-fn outputs(merged: &Merged, grid: &Grid, kept: &[u32]) -> (Vec<Output>, Vec<u32>) {
+/// The triangles that are left, the group of each source triangle, and the cells of each group.
+fn outputs(merged: &Merged, grid: &Grid, kept: &[u32]) -> (Vec<Output>, Vec<u32>, Vec<[u32; 3]>) {
     let mut distinct = Interner::with_capacity(merged.triangles.len() / 4);
-    let mut output_of = vec![NONE; merged.triangles.len()];
+    let mut group_of = vec![NONE; merged.triangles.len()];
     let mut outputs: Vec<Output> = Vec::new();
-    for (index, source) in (0u32..).zip(&merged.triangles) {
-        let cells = grid.cells(source);
+    for (source, triangle) in (0u32..).zip(&merged.triangles) {
+        let cells = grid.cells(triangle);
         let Some(key) = key(cells) else { continue };
-        let (number, is_new) = distinct.intern(key);
+        let (group, is_new) = distinct.intern(key);
+        let output = Output { source, group, cells, corners: cells.map(|cell| kept[cell as usize]) };
         if is_new {
-            outputs.push(Output { source: index, cells });
-        } else if source.id < merged.triangles[outputs[number as usize].source as usize].id {
-            outputs[number as usize] = Output { source: index, cells };
+            outputs.push(output);
+        } else if triangle.id < merged.triangles[outputs[group as usize].source as usize].id {
+            outputs[group as usize] = output;
         }
-        output_of[index as usize] = number;
+        group_of[source as usize] = group;
     }
-    let position = |cell: u32| merged.positions[kept[cell as usize] as usize];
-    let mut order: Vec<u32> = (0u32..)
-        .zip(&outputs)
-        .filter(|(_, output)| !is_degenerate(&output.cells.map(position)))
-        .map(|(number, _)| number)
-        .collect();
-    order.sort_unstable_by_key(|&number| merged.triangles[outputs[number as usize].source as usize].id);
-    renumbered(&outputs, output_of, &order)
-}
-
-/// Those outputs that `order` names, in its order.
-fn renumbered(outputs: &[Output], mut output_of: Vec<u32>, order: &[u32]) -> (Vec<Output>, Vec<u32>) {
-    let mut new_of_old = vec![NONE; outputs.len()];
-    for (new, &old) in (0u32..).zip(order) {
-        new_of_old[old as usize] = new;
-    }
-    for output in output_of.iter_mut().filter(|output| **output != NONE) {
-        *output = new_of_old[*output as usize];
-    }
-    (order.iter().map(|&old| outputs[old as usize]).collect(), output_of)
+    (outputs, group_of, distinct.values().to_vec())
 }
 
 /// Every vertex in a cell of its own: all triangles that have an area.
 fn each_alone(merged: &Merged, size: f64) -> Clusters {
     let all: Vec<u32> = (0..merged.positions.len() as u32).collect();
-    let grid = Grid { size: 1, cell_of: all.clone(), cells: all.len() };
-    let (outputs, output_of) = outputs(merged, &grid, &all);
-    Clusters { size, cell_of: all.clone(), kept: all, outputs, output_of }
+    let grid = Grid { size: 1, cell_of: all.clone(), places: vec![0; all.len()] };
+    let (mut outputs, group_of, triples) = outputs(merged, &grid, &all);
+    outputs.retain(|output| !is_degenerate(&output.corners.map(|corner| merged.positions[corner as usize])));
+    Clusters { size, cell_of: all.clone(), kept: all, outputs, group_of, spread: vec![0.0; triples.len()] }
 }
 
 impl Clusters {
     /// Keeps the `target` triangles of largest area.
     fn keep_largest(&mut self, points: &[Vec3], target: usize) {
-        let area =
-            |output: &Output| square(area_vector(output.cells.map(|cell| points[self.kept[cell as usize] as usize])));
+        let area = |output: &Output| square(area_vector(output.corners.map(|corner| points[corner as usize])));
         let areas: Vec<f64> = self.outputs.iter().map(area).collect();
         let mut order: Vec<u32> = (0..self.outputs.len() as u32).collect();
         order.sort_unstable_by(|&a, &b| areas[b as usize].total_cmp(&areas[a as usize]).then(a.cmp(&b)));
@@ -313,11 +339,56 @@ impl Clusters {
 
     /// Keeps these outputs, ascending.
     pub fn keep(&mut self, outputs: &[u32]) {
-        (self.outputs, self.output_of) = renumbered(&self.outputs, std::mem::take(&mut self.output_of), outputs);
+        self.outputs = outputs.iter().map(|&output| self.outputs[output as usize]).collect();
+        self.forget_groups();
     }
 
-    /// Corners of an output, as positions.
-    pub fn corners(&self, output: &Output) -> [u32; 3] {
-        output.cells.map(|cell| self.kept[cell as usize])
+    /// Takes sources out of groups that no output stands for.
+    fn forget_groups(&mut self) {
+        let mut is_used = vec![false; self.spread.len()];
+        self.outputs.iter().for_each(|output| is_used[output.group as usize] = true);
+        for group in self.group_of.iter_mut().filter(|group| **group != NONE) {
+            if !is_used[*group as usize] {
+                *group = NONE;
+            }
+        }
+    }
+
+    /// Whether a group is of strands or specks.
+    pub fn is_thin(&self, group: u32) -> bool {
+        self.spread[group as usize] > 0.0
+    }
+}
+
+/// The outputs that touch each cell.
+pub(super) struct Touching {
+    starts: Vec<u32>,
+    outputs: Vec<u32>,
+}
+
+impl Touching {
+    /// Of all outputs.
+    pub fn of(clusters: &Clusters) -> Self {
+        let mut starts = vec![0u32; clusters.kept.len() + 1];
+        for cell in clusters.outputs.iter().flat_map(|output| output.cells) {
+            starts[cell as usize + 1] += 1;
+        }
+        for cell in 1..starts.len() {
+            starts[cell] += starts[cell - 1];
+        }
+        let mut ends = starts.clone();
+        let mut outputs = vec![0; clusters.outputs.len() * 3];
+        for (number, output) in (0u32..).zip(&clusters.outputs) {
+            for cell in output.cells {
+                outputs[ends[cell as usize] as usize] = number;
+                ends[cell as usize] += 1;
+            }
+        }
+        Self { starts, outputs }
+    }
+
+    /// Those of a cell.
+    pub fn outputs(&self, cell: u32) -> &[u32] {
+        &self.outputs[self.starts[cell as usize] as usize..self.starts[cell as usize + 1] as usize]
     }
 }

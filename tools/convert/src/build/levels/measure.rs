@@ -5,7 +5,8 @@
 //! that is mapped to it corner by corner is nowhere farther from it than there. That bounds most triangles by how far
 //! their vertices moved. The others are bounded by branch and bound.
 
-use super::cluster::Clusters;
+use super::cluster::{Clusters, Touching};
+use super::fit::Fitted;
 use super::merge::Merged;
 use super::nearest::{Nearest, distance2};
 use super::surface::Surface;
@@ -18,8 +19,8 @@ const QUANTILE: f64 = 0.99;
 /// Faces of a cell that a triangle counts as at most in the second of two shares.
 const LARGEST_FACES: f64 = 16.0;
 
-/// How far an edge of colours moves on average, in cells.
-const EDGE: f64 = 0.35;
+/// What an edge of colours that moves counts as, in cells.
+const EDGE: f64 = 0.15;
 
 /// Difference of square roots of colours from which on an edge counts as a whole: it shows, however far it moves.
 const PLAIN: f64 = 0.1;
@@ -44,88 +45,55 @@ pub(super) struct Measured {
     pub color: f64,
 }
 
-/// The outputs that touch each cell.
-struct Touching {
-    starts: Vec<u32>,
-    outputs: Vec<u32>,
-}
-
-impl Touching {
-    fn of(clusters: &Clusters) -> Self {
-        let mut starts = vec![0u32; clusters.kept.len() + 1];
-        for cell in clusters.outputs.iter().flat_map(|output| output.cells) {
-            starts[cell as usize + 1] += 1;
-        }
-        for cell in 1..starts.len() {
-            starts[cell] += starts[cell - 1];
-        }
-        let mut ends = starts.clone();
-        let mut outputs = vec![0; clusters.outputs.len() * 3];
-        for (number, output) in (0u32..).zip(&clusters.outputs) {
-            for cell in output.cells {
-                outputs[ends[cell as usize] as usize] = number;
-                ends[cell as usize] += 1;
-            }
-        }
-        Self { starts, outputs }
-    }
-
-    fn outputs(&self, cell: u32) -> &[u32] {
-        &self.outputs[self.starts[cell as usize] as usize..self.starts[cell as usize + 1] as usize]
-    }
-}
-
-/// Measures a level; `shown` are the colours of its triangles.
+/// Measures a level.
 pub(super) fn measure(
     merged: &Merged,
     points: &[Vec3],
-    clusters: &Clusters,
+    (clusters, touching): (&Clusters, &Touching),
     surface: &Surface,
-    shown: &[Vec3],
+    fitted: &Fitted,
 ) -> Measured {
     let triangles: Vec<[Vec3; 3]> =
-        clusters.outputs.iter().map(|output| clusters.corners(output).map(|corner| points[corner as usize])).collect();
-    let touching = Touching::of(clusters);
+        clusters.outputs.iter().map(|output| output.corners.map(|corner| points[corner as usize])).collect();
     let mut search = Search { triangles: &triangles, tree: None, lower: 0.0, floor: clusters.size };
     let moved: Vec<f64> = points
         .iter()
         .zip(&clusters.cell_of)
         .map(|(&point, &cell)| length(sub(point, points[clusters.kept[cell as usize] as usize])))
         .collect();
-    // How far vertices are from the level, at most.
-    let away: Vec<f64> = points
-        .iter()
-        .zip(&clusters.cell_of)
-        .zip(&moved)
-        .map(|((&point, &cell), &moved)| match touching.outputs(cell) {
+    // How far a vertex is from the level, at most.
+    let away = |search: &mut Search, vertex: u32| {
+        let (point, moved) = (points[vertex as usize], moved[vertex as usize]);
+        match touching.outputs(clusters.cell_of[vertex as usize]) {
             [] => search.exact(point),
-            _ if moved == 0.0 => 0.0,
             near => {
                 let distances = near.iter().map(|&output| distance2(point, &triangles[output as usize]));
                 distances.fold(f64::INFINITY, f64::min).sqrt().min(moved)
             }
-        })
-        .collect();
+        }
+    };
 
     let mut bound = 0.0f64;
-    let mut of_output = vec![f64::INFINITY; clusters.outputs.len()];
+    let mut of_group = vec![f64::INFINITY; clusters.spread.len()];
     let mut open: Vec<(f64, u32)> = Vec::new();
-    let mut errors: Vec<(f64, f64)> = Vec::with_capacity(3 * merged.triangles.len());
+    let mut errors: Vec<(f64, f64)> = Vec::with_capacity(merged.triangles.len());
     let mut color = 0.0f64;
     for (index, source) in (0u32..).zip(&merged.triangles) {
         let number = index as usize;
         let cells = source.corners.map(|corner| clusters.cell_of[corner as usize]);
-        let most = |values: &[f64]| source.corners.iter().map(|&corner| values[corner as usize]).fold(0.0, f64::max);
+        let moved = source.corners.iter().map(|&corner| moved[corner as usize]).fold(0.0, f64::max);
         let mut upper = f64::INFINITY;
-        let output = clusters.output_of[number];
-        if output != NONE {
-            upper = most(&moved);
-            of_output[output as usize] = of_output[output as usize].min(upper);
-        } else if is_edge(cells, &touching, clusters) {
-            upper = most(&moved);
+        let group = clusters.group_of[number];
+        if group != NONE {
+            // Strands and specks hold the positions that stand for their cells only within their spread.
+            upper = moved + clusters.spread[group as usize];
+            of_group[group as usize] = of_group[group as usize].min(upper);
+        } else if is_edge(cells, touching, clusters) {
+            upper = moved;
         }
         if upper > search.floor {
-            upper = upper.min(most(&away) + reach(source.corners.map(|corner| points[corner as usize])));
+            let away = source.corners.iter().map(|&corner| away(&mut search, corner)).fold(0.0, f64::max);
+            upper = upper.min(away + reach(source.corners.map(|corner| points[corner as usize])));
         }
         if upper > search.floor {
             open.push((upper, index));
@@ -133,32 +101,31 @@ pub(super) fn measure(
             bound = bound.max(upper);
         }
 
-        let shown = match output {
-            NONE => surface.shown(cells, usize::from(surface.class[number])),
-            output => shown[output as usize],
-        };
-        let albedo = surface.albedo[number];
+        let (shown, albedo) = (fitted.shown[number], surface.albedo[number]);
         let difference = (0..3).map(|k| (f64::from(albedo[k]) - shown[k]).abs()).fold(0.0, f64::max);
         color = color.max(difference);
         let root = |x: f64| x.max(0.0).sqrt();
         let seen = (0..3).map(|k| (root(f64::from(albedo[k])) - root(shown[k])).abs()).fold(0.0, f64::max);
         let edge = EDGE * clusters.size * (seen / PLAIN).min(1.0);
-        // Each corner stands for a third.
-        let weight = surface.area[number] / 3.0;
-        let corners = source.corners.map(|corner| (away[corner as usize] + edge, weight));
-        errors.extend(corners);
+        let distance = match fitted.distances[number] {
+            f64::INFINITY => source.corners.iter().map(|&corner| away(&mut search, corner)).fold(0.0, f64::max),
+            distance => distance,
+        };
+        errors.push((distance + edge, surface.area[number]));
     }
     open.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     for (upper, index) in open {
         let corners = merged.triangles[index as usize].corners.map(|corner| points[corner as usize]);
         bound = bound.max(search.refine(corners, upper, MOST_CUTS));
     }
-    for (triangle, upper) in triangles.iter().zip(of_output) {
-        bound = bound.max(upper.min(reach(*triangle)));
+    for (triangle, output) in triangles.iter().zip(&clusters.outputs) {
+        let (group, spread) = (output.group as usize, clusters.spread[output.group as usize]);
+        let mapped = if spread > 0.0 { f64::INFINITY } else { of_group[group] };
+        bound = bound.max(mapped.min(reach(*triangle) + spread));
     }
     Measured {
         bound: bound * (1.0 + ROUNDING),
-        error: quantile(errors, LARGEST_FACES * clusters.size * clusters.size / 3.0),
+        error: quantile(errors, LARGEST_FACES * clusters.size * clusters.size),
         color,
     }
 }

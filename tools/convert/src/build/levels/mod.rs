@@ -9,12 +9,14 @@
 
 mod build;
 mod cluster;
+mod fit;
 mod flat;
 mod measure;
 mod merge;
 mod nearest;
 mod plan;
 mod simplify;
+mod strands;
 mod surface;
 mod top;
 mod vector;

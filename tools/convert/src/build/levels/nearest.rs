@@ -3,40 +3,50 @@
 use super::vector::{Vec3, add_scaled, dot, square, sub};
 use crate::build::tree::binary::{BinaryTree, Box3, LEAF};
 
-/// The square of the distance of `p` from a triangle, which may have no area. What it is the distance to is a point of
-/// the triangle but for rounding, so it is never less than the true one by more than that.
-pub(super) fn distance2(p: Vec3, [a, b, c]: &[Vec3; 3]) -> f64 {
+/// The square of the distance of `p` from a triangle, which may have no area.
+pub(super) fn distance2(p: Vec3, triangle: &[Vec3; 3]) -> f64 {
+    closest(p, triangle).0
+}
+
+/// The same, with the weights of the corners at the nearest point. What it is the distance to is a point of the
+/// triangle but for rounding, so it is never less than the true one by more than that.
+#[inline]
+pub(super) fn closest(p: Vec3, [a, b, c]: &[Vec3; 3]) -> (f64, Vec3) {
     let (ab, ac, ap) = (sub(*b, *a), sub(*c, *a), sub(p, *a));
     // Ericson 2005, "Real-Time Collision Detection", 5.1.5.
     let (d1, d2) = (dot(ab, ap), dot(ac, ap));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return square(ap);
+        return (square(ap), [1.0, 0.0, 0.0]);
     }
     let bp = sub(p, *b);
     let (d3, d4) = (dot(ab, bp), dot(ac, bp));
     if d3 >= 0.0 && d4 <= d3 {
-        return square(bp);
+        return (square(bp), [0.0, 1.0, 0.0]);
     }
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return square(add_scaled(ap, -share(d1, d1 - d3), ab));
+        let v = share(d1, d1 - d3);
+        return (square(add_scaled(ap, -v, ab)), [1.0 - v, v, 0.0]);
     }
     let cp = sub(p, *c);
     let (d5, d6) = (dot(ab, cp), dot(ac, cp));
     if d6 >= 0.0 && d5 <= d6 {
-        return square(cp);
+        return (square(cp), [0.0, 0.0, 1.0]);
     }
     let vb = d5 * d2 - d1 * d6;
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return square(add_scaled(ap, -share(d2, d2 - d6), ac));
+        let w = share(d2, d2 - d6);
+        return (square(add_scaled(ap, -w, ac)), [1.0 - w, 0.0, w]);
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return square(add_scaled(bp, -share(d4 - d3, (d4 - d3) + (d5 - d6)), sub(*c, *b)));
+        let w = share(d4 - d3, (d4 - d3) + (d5 - d6));
+        return (square(add_scaled(bp, -w, sub(*c, *b))), [0.0, 1.0 - w, w]);
     }
     let all = va + vb + vc;
     let (v, w) = (share(vb, all), share(vc, all));
-    square(add_scaled(add_scaled(ap, -v, ab), -w.min(1.0 - v), ac))
+    let w = w.min(1.0 - v);
+    (square(add_scaled(add_scaled(ap, -v, ab), -w, ac)), [1.0 - v - w, v, w])
 }
 
 /// a / b within 0 to 1; 0 where there is no b.

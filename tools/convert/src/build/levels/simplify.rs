@@ -1,6 +1,6 @@
 //! Makes one level of its children.
 
-use super::cluster::cluster;
+use super::cluster::{Touching, cluster};
 use super::flat::Flattened;
 use super::measure::measure;
 use super::merge::{Child, merge};
@@ -43,14 +43,16 @@ pub(super) fn simplify(
     (context, flattened): (&BrickContext, &Flattened),
     brick_triangles: u32,
 ) -> Result<Simplified, BuildError> {
-    let merged = merge(written, children, &context.lattice)?;
+    let mut merged = merge(written, children, &context.lattice)?;
     let [origin, _] = merged.bounds();
-    let points = merged.relative(origin);
-    let mut clusters = cluster(&merged, &points, target(merged.triangles.len(), brick_triangles));
-    let mut surface = Surface::collect(&merged, &points, &clusters, flattened);
-    surface.drop_thin(&points, &mut clusters);
-    let (triangles, shown) = surface.triangles(&merged, &clusters, flattened);
-    let measured = measure(&merged, &points, &clusters, &surface, &shown);
+    let mut points = merged.relative(origin);
+    let most = target(merged.triangles.len(), brick_triangles);
+    let mut clusters = cluster(&mut merged, &mut points, most);
+    let surface = Surface::collect(&merged, &points, &clusters, flattened);
+    surface.drop_clear(&points, &mut clusters);
+    let touching = Touching::of(&clusters);
+    let (triangles, fitted) = surface.triangles(&merged, &points, (&clusters, &touching), flattened);
+    let measured = measure(&merged, &points, (&clusters, &touching), &surface, &fitted);
     let count = triangles.len();
     let encoded = brick::encode(context, triangles.into_iter(), count);
     let rounding = if children.iter().any(|child| child.placed.is_some()) { PLACED_ROUNDING } else { 0.0 };

@@ -3,7 +3,8 @@
 //! What a corner stands for are the triangles that touch its cell and face as it does. A triangle that is large against
 //! a cell counts there no more than a cell's face, but in the one that it becomes as a whole.
 
-use super::cluster::{Clusters, Output};
+use super::cluster::{Clusters, Output, Touching};
+use super::fit::{Fitted, fit};
 use super::flat::Flattened;
 use super::merge::Merged;
 use super::vector::{CLASSES, Vec3, add_scaled, area_vector, class, dot, length};
@@ -15,7 +16,7 @@ use bricks::{NO_NORMAL, NONE};
 const EXCESS: f64 = 1.02;
 
 /// Share of what an output stands for that is opaque, at least: a third, as one opaque cell over it hides the others.
-const THIN: f64 = 1.0 / 3.0;
+const CLEAR: f64 = 1.0 / 3.0;
 
 /// Share of the light that comes from one direction.
 const DIRECT: f64 = 0.7;
@@ -27,7 +28,7 @@ const ALIKE: f64 = 0.995;
 const SAME_DIRECTION: f64 = 0.9999;
 
 /// Sums over triangles.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Sum {
     /// Area, opaque or not.
     area: f64,
@@ -40,6 +41,8 @@ struct Sum {
 }
 
 impl Sum {
+    const EMPTY: Self = Self { area: 0.0, weight: 0.0, albedo: [0.0; 3], normal: [0.0; 3], is_smooth: false };
+
     fn add(&mut self, (area, cover): (f64, f64), albedo: Vec3, normal: Vec3, is_smooth: bool) {
         let weight = area * cover;
         self.area += area;
@@ -76,11 +79,29 @@ struct Share {
     weight: f64,
 }
 
-/// A cell as seen from one of six sides.
+/// A cell as seen from one of six sides, with the shares of families.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     sum: Sum,
     shares: u32,
+}
+
+impl Slot {
+    const EMPTY: Self = Self { sum: Sum::EMPTY, shares: NONE };
+
+    fn share(&mut self, shares: &mut Vec<Share>, family: u32, weight: f64) {
+        let mut at = self.shares;
+        while at != NONE {
+            let share = &mut shares[at as usize];
+            if share.family == family {
+                share.weight += weight;
+                return;
+            }
+            at = share.next;
+        }
+        shares.push(Share { family, next: self.shares, weight });
+        self.shares = shares.len() as u32 - 1;
+    }
 }
 
 /// Means over cells, and what they make of the outputs.
@@ -89,12 +110,10 @@ pub(super) struct Surface {
     /// Slots of each cell by class, or [`NONE`].
     of_cell: Vec<[u32; CLASSES]>,
     shares: Vec<Share>,
-    /// What outputs stand for beyond their cells, with the family of the largest part.
-    own: Vec<(Sum, u32, f64)>,
+    /// What groups of outputs stand for beyond their cells; all of it where they are strands and specks.
+    own: Vec<Slot>,
     /// Mean albedo of each source triangle.
     pub albedo: Vec<[f32; 3]>,
-    /// Class of each source triangle.
-    pub class: Vec<u8>,
     /// Area of each source triangle that is opaque, square steps.
     pub area: Vec<f64>,
 }
@@ -107,13 +126,12 @@ impl Surface {
             slots: Vec::new(),
             of_cell: vec![[NONE; CLASSES]; clusters.kept.len()],
             shares: Vec::new(),
-            own: vec![(Sum::default(), NONE, 0.0); clusters.outputs.len()],
+            own: vec![Slot::EMPTY; clusters.spread.len()],
             albedo: Vec::with_capacity(count),
-            class: Vec::with_capacity(count),
             area: Vec::with_capacity(count),
         };
         let face = clusters.size * clusters.size;
-        for (source, &output) in merged.triangles.iter().zip(&clusters.output_of) {
+        for (source, &group) in merged.triangles.iter().zip(&clusters.group_of) {
             let vector = area_vector(source.corners.map(|corner| points[corner as usize]));
             let doubled = length(vector);
             let side = class(vector);
@@ -125,7 +143,8 @@ impl Surface {
             let cover = f64::from(if flattened.is_opaque(source.material) { 1.0 } else { cover * alpha });
             let family = flattened.family_of[source.material as usize];
             let third = doubled / 6.0;
-            let weight = third.min(face);
+            let is_thin = group != NONE && clusters.is_thin(group);
+            let weight = if is_thin { 0.0 } else { third.min(face) };
             let (mut albedo_sum, mut normal_sum, mut is_smooth) = ([0.0; 3], [0.0; 3], false);
             for (corner, shade) in source.corners.into_iter().zip(shades) {
                 let albedo = std::array::from_fn(|k| f64::from(mean[k]) * f64::from(shade.color[k]));
@@ -134,21 +153,21 @@ impl Surface {
                 albedo_sum = add_scaled(albedo_sum, 1.0, albedo);
                 normal_sum = add_scaled(normal_sum, 1.0, normal);
                 is_smooth |= has_normal;
+                if is_thin {
+                    continue;
+                }
                 let slot = all.slot(clusters.cell_of[corner as usize], side);
                 all.slots[slot].sum.add((weight, cover), albedo, normal, has_normal);
-                all.share(slot, family, weight * cover);
+                all.slots[slot].share(&mut all.shares, family, weight * cover);
             }
             let third_of = |sum: Vec3| sum.map(|x| x / 3.0);
             let excess = 3.0 * (third - weight);
-            if output != NONE && excess > 0.0 {
-                let (sum, largest, most) = &mut all.own[output as usize];
-                sum.add((excess, cover), third_of(albedo_sum), third_of(normal_sum), is_smooth);
-                if excess > *most {
-                    (*largest, *most) = (family, excess);
-                }
+            if group != NONE && excess > 0.0 {
+                let own = &mut all.own[group as usize];
+                own.sum.add((excess, cover), third_of(albedo_sum), third_of(normal_sum), is_smooth);
+                own.share(&mut all.shares, family, excess * cover);
             }
             all.albedo.push(third_of(albedo_sum).map(|x| x as f32));
-            all.class.push(side as u8);
             all.area.push(0.5 * doubled * cover);
         }
         all
@@ -156,25 +175,27 @@ impl Surface {
 
     /// Leaves out those outputs that stand for what is mostly not there, but for the smallest if there are no others.
     /// Those that stay are opaque.
-    pub fn drop_thin(&mut self, points: &[Vec3], clusters: &mut Clusters) {
+    pub fn drop_clear(&self, points: &[Vec3], clusters: &mut Clusters) {
         if self.slots.iter().all(|slot| slot.sum.weight == slot.sum.area) {
             return;
         }
-        let vector = |output: &Output| area_vector(clusters.corners(output).map(|corner| points[corner as usize]));
-        let is_thin = |(output, (own, ..)): (&Output, &(Sum, u32, f64))| {
-            let (side, mut sum) = (class(vector(output)), *own);
-            output.cells.iter().for_each(|&cell| sum.merge(&self.sum_of(cell, side)));
-            sum.weight < THIN * sum.area
+        let vector = |output: &Output| area_vector(output.corners.map(|corner| points[corner as usize]));
+        let is_clear = |output: &Output| {
+            let (side, mut sum) = (class(vector(output)), self.own[output.group as usize].sum);
+            if !clusters.is_thin(output.group) {
+                output.cells.iter().for_each(|&cell| sum.merge(&self.sum_of(cell, side)));
+            }
+            sum.weight < CLEAR * sum.area
         };
-        let is_thin: Vec<bool> = clusters.outputs.iter().zip(&self.own).map(is_thin).collect();
-        let mut stay: Vec<u32> = (0u32..).zip(&is_thin).filter(|(_, thin)| !**thin).map(|(output, _)| output).collect();
+        let is_clear: Vec<bool> = clusters.outputs.iter().map(is_clear).collect();
+        let opaque = (0u32..).zip(&is_clear).filter(|(_, is_clear)| !**is_clear);
+        let mut stay: Vec<u32> = opaque.map(|(output, _)| output).collect();
         if stay.is_empty() {
             let area = |output: &u32| length(vector(&clusters.outputs[*output as usize]));
             let outputs = 0..clusters.outputs.len() as u32;
             stay.extend(outputs.min_by(|a, b| area(a).total_cmp(&area(b)).then(a.cmp(b))));
         }
-        if stay.len() < is_thin.len() {
-            self.own = stay.iter().map(|&output| self.own[output as usize]).collect();
+        if stay.len() < is_clear.len() {
             clusters.keep(&stay);
         }
     }
@@ -183,23 +204,9 @@ impl Surface {
         let slot = &mut self.of_cell[cell as usize][side];
         if *slot == NONE {
             *slot = self.slots.len() as u32;
-            self.slots.push(Slot { sum: Sum::default(), shares: NONE });
+            self.slots.push(Slot::EMPTY);
         }
         *slot as usize
-    }
-
-    fn share(&mut self, slot: usize, family: u32, weight: f64) {
-        let mut at = self.slots[slot].shares;
-        while at != NONE {
-            let share = &mut self.shares[at as usize];
-            if share.family == family {
-                share.weight += weight;
-                return;
-            }
-            at = share.next;
-        }
-        self.shares.push(Share { family, next: self.slots[slot].shares, weight });
-        self.slots[slot].shares = self.shares.len() as u32 - 1;
     }
 
     /// The slots that a corner in `cell` of a triangle that faces `side` stands for: those of its side, else all.
@@ -211,33 +218,48 @@ impl Surface {
     }
 
     fn sum_of(&self, cell: u32, side: usize) -> Sum {
-        let mut sum = Sum::default();
+        let mut sum = Sum::EMPTY;
         self.slots_of(cell, side).for_each(|slot| sum.merge(&slot.sum));
         sum
     }
 
-    /// Linear RGB that a level shows near a source triangle with corners in these cells which is none of its own.
-    pub fn shown(&self, cells: [u32; 3], side: usize) -> Vec3 {
-        let means = cells.map(|cell| self.sum_of(cell, side).mean());
-        std::array::from_fn(|k| (means[0][k] + means[1][k] + means[2][k]) / 3.0)
+    /// Whether a group stands for more than its cells do.
+    pub fn has_own(&self, group: u32) -> bool {
+        self.own[group as usize].sum.area > 0.0
     }
 
-    /// The triangles of the level, ascending by id, and the mean linear RGB of each.
-    pub fn triangles(&self, merged: &Merged, clusters: &Clusters, flattened: &Flattened) -> (Vec<Triangle>, Vec<Vec3>) {
-        let make = |(number, output): (usize, &Output)| {
-            let corners = clusters.corners(output).map(|corner| merged.positions[corner as usize]);
-            let base = corners[0];
-            let relative = corners.map(|p| std::array::from_fn(|k| (p[k] - base[k]) as f64));
-            let vector = area_vector(relative);
-            let side = class(vector);
-            let (own, own_family, own_weight) = &self.own[number];
-            let sums = output.cells.map(|cell| {
-                let mut sum = self.sum_of(cell, side);
-                sum.merge(own);
-                sum
-            });
-            let means = sums.map(|sum| sum.mean());
-            let family = self.largest(output.cells, side, (*own_family, *own_weight));
+    /// What an output stands for, at each corner.
+    fn sums(&self, output: &Output, side: usize, is_thin: bool) -> [Sum; 3] {
+        output.cells.map(|cell| {
+            let mut sum = if is_thin { Sum::EMPTY } else { self.sum_of(cell, side) };
+            sum.merge(&self.own[output.group as usize].sum);
+            sum
+        })
+    }
+
+    /// The triangles of the level, ascending by id, and how they fit.
+    pub fn triangles(
+        &self,
+        merged: &Merged,
+        points: &[Vec3],
+        (clusters, touching): (&Clusters, &Touching),
+        flattened: &Flattened,
+    ) -> (Vec<Triangle>, Fitted) {
+        let faces = |output: &Output| {
+            let vector = area_vector(output.corners.map(|corner| points[corner as usize]));
+            (vector, class(vector), clusters.is_thin(output.group))
+        };
+        let mean = |output: &Output| {
+            let (_, side, is_thin) = faces(output);
+            self.sums(output, side, is_thin).map(|sum| sum.mean())
+        };
+        let means = clusters.outputs.iter().map(mean).collect();
+        let fitted = fit(merged, points, (clusters, touching), self, means);
+        let make = |(output, means): (&Output, &[Vec3; 3])| {
+            let (vector, side, is_thin) = faces(output);
+            let sums = self.sums(output, side, is_thin);
+            let id = merged.triangles[output.source as usize].id;
+            let family = self.drawn(output, side, is_thin, id);
             let family = &flattened.families[family as usize];
             let ratio = |mean: Vec3| -> Vec3 {
                 std::array::from_fn(|k| match f64::from(family.base[k]) {
@@ -247,44 +269,57 @@ impl Surface {
             };
             let ratios = means.map(ratio);
             let is_over = ratios.as_flattened().iter().any(|&x| x > EXCESS);
-            let (material, colors) = if is_over { (family.white, means) } else { (family.flat, ratios) };
+            let (material, colors) = if is_over { (family.white, *means) } else { (family.flat, ratios) };
             let n = vector.map(|x| x / length(vector));
             let attributes = std::array::from_fn(|k| {
-                let color = colors[k].map(|x| x * sums[k].shade());
-                VertexBits([normal(&sums[k], n), 0, 0, unorm8(color)], NO_DETAIL)
+                // Normals of what is round say nothing; its triangles face as many ways.
+                let (normal, shade) = if is_thin { (NO_NORMAL, 1.0) } else { (normal(&sums[k], n), sums[k].shade()) };
+                VertexBits([normal, 0, 0, unorm8(colors[k].map(|x| x * shade))], NO_DETAIL)
             });
-            let id = merged.triangles[output.source as usize].id;
-            let mean = std::array::from_fn(|k| (means[0][k] + means[1][k] + means[2][k]) / 3.0);
-            (Triangle { brick: 0, id, material, corners, attributes }, mean)
+            let corners = output.corners.map(|corner| merged.positions[corner as usize]);
+            Triangle { brick: 0, id, material, corners, attributes }
         };
-        clusters.outputs.iter().enumerate().map(make).unzip()
+        (clusters.outputs.iter().zip(&fitted.corners).map(make).collect(), fitted)
     }
 
-    /// The family with the largest share, of equal ones the first.
-    fn largest(&self, cells: [u32; 3], side: usize, (own, own_weight): (u32, f64)) -> u32 {
+    /// A family drawn by its share, so that of many triangles the share is right: a level emits and shines as much as
+    /// what it stands for.
+    fn drawn(&self, output: &Output, side: usize, is_thin: bool, id: u32) -> u32 {
         let mut found: Vec<(u32, f64)> = Vec::with_capacity(8);
-        let mut add = |family: u32, weight: f64| match found.iter_mut().find(|(other, _)| *other == family) {
-            Some((_, sum)) => *sum += weight,
-            None => found.push((family, weight)),
-        };
-        for cell in cells {
-            for slot in self.slots_of(cell, side) {
-                let mut at = slot.shares;
-                while at != NONE {
-                    let share = &self.shares[at as usize];
-                    add(share.family, share.weight);
-                    at = share.next;
+        let mut add = |slot: &Slot| {
+            let mut at = slot.shares;
+            while at != NONE {
+                let share = &self.shares[at as usize];
+                match found.iter_mut().find(|(other, _)| *other == share.family) {
+                    Some((_, sum)) => *sum += share.weight,
+                    None => found.push((share.family, share.weight)),
                 }
+                at = share.next;
             }
-        }
-        if own != NONE {
-            add(own, own_weight);
-        }
-        let more = |best: (u32, f64), next: &(u32, f64)| {
-            if next.1 > best.1 || next.1 == best.1 && next.0 < best.0 { *next } else { best }
         };
-        found.iter().fold((NONE, -1.0), more).0
+        if !is_thin {
+            output.cells.iter().for_each(|&cell| self.slots_of(cell, side).for_each(&mut add));
+        }
+        add(&self.own[output.group as usize]);
+        if let [(family, _)] = found[..] {
+            return family;
+        }
+        found.sort_unstable_by_key(|(family, _)| *family);
+        let all: f64 = found.iter().map(|(_, weight)| weight).sum();
+        let mut left = all * f64::from(scattered(id)) / (f64::from(u32::MAX) + 1.0);
+        let is_it = |(_, weight): &&(u32, f64)| {
+            left -= weight;
+            left < 0.0
+        };
+        found.iter().find(is_it).or(found.last()).map_or(NONE, |(family, _)| *family)
     }
+}
+
+/// Bits that are unlike those of ids near to it.
+fn scattered(mut id: u32) -> u32 {
+    id = (id ^ id >> 16).wrapping_mul(0x045d_9f3b);
+    id = (id ^ id >> 16).wrapping_mul(0x045d_9f3b);
+    id ^ id >> 16
 }
 
 /// The octahedral mean normal; none where that of the triangle, `n`, does.

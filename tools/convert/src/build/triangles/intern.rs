@@ -69,6 +69,19 @@ impl<T: Key> Interner<T> {
         }
     }
 
+    /// The number of `value`, if it has one.
+    pub fn find(&self, value: T) -> Option<u32> {
+        let mask = self.buckets.len() - 1;
+        let mut at = (value.hash() >> 20) as usize & mask;
+        loop {
+            match self.buckets[at] {
+                FREE => return None,
+                number if self.values[number as usize] == value => return Some(number),
+                _ => at = (at + 1) & mask,
+            }
+        }
+    }
+
     /// All values, by number.
     pub fn values(&self) -> &[T] {
         &self.values

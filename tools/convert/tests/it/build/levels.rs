@@ -7,6 +7,7 @@ use bricks::{Level, MATERIAL_MASK, NONE, Resident};
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Primitive, SourceScene, SourceTexture};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 type Vec3 = [f64; 3];
@@ -184,25 +185,37 @@ fn exact(level: &Level, (bricks, resident): (&[DecodedBrick], &Resident), instan
     all
 }
 
+/// The points of a scene that are looked at: as many as the environment says, else 100,000.
+fn points() -> usize {
+    std::env::var("BRICKWALK_POINTS").map_or(100_000, |points| points.parse().expect("a number of points"))
+}
+
+/// For files beside those of [`kinds`], name them in `BRICKWALK_LEVELS`, with colons between them.
 #[test]
 fn no_point_is_farther_away_than_the_bound() {
-    const POINTS: usize = 100_000;
-    for (name, scene) in kinds() {
-        let (resident, bricks) = decode_levels(&built(&scene, &with_levels(500)).path());
+    let own = kinds().into_iter().map(|(name, scene)| {
+        let built = built(&scene, &with_levels(500));
+        (name.to_owned(), decode_levels(&built.path()), 0.5)
+    });
+    let named = std::env::var("BRICKWALK_LEVELS").unwrap_or_default();
+    let named = named.split(':').filter(|name| !name.is_empty());
+    // The bound of what is smooth is not looked at closer below a cell.
+    let named = named.map(|name| (name.to_owned(), decode_levels(Path::new(name)), 0.25));
+    for (name, (resident, bricks), part) in own.chain(named) {
         let count = resident.levels.len();
-        assert!(count > 3, "{name}: {count} levels");
+        assert!(count > 1, "{name}: {count} levels");
         let mut random = Random(3);
-        let (mut violations, mut of_half, mut tightest) = (0, 0, 0.0f64);
+        let (mut violations, mut of_part, mut tightest) = (0, 0, 0.0f64);
         for (index, level) in resident.levels.iter().enumerate() {
             let own = corners(&bricks[resident.exact_bricks() + index], &resident, NONE);
             let below = exact(level, (&bricks, &resident), NONE);
-            let points = POINTS / count / 4;
+            let points = points() / count / 4 + 1;
             let (from_own, from_below) = (sample(&own, points, &mut random), sample(&below, points, &mut random));
             let (own, below) = (Tree::over(own), Tree::over(below));
             let farthest = |points: &[Vec3], tree: &Tree| points.iter().map(|&p| tree.distance(p)).fold(0.0, f64::max);
             let found = farthest(&from_own, &below).max(farthest(&from_below, &own));
             violations += usize::from(found > level.bound);
-            of_half += usize::from(found > 0.5 * level.bound);
+            of_part += usize::from(found > part * level.bound);
             tightest = tightest.max(found / level.bound.max(f64::MIN_POSITIVE));
             for child in level.children() {
                 if let Some(child) = (child.brick as usize).checked_sub(resident.exact_bricks()) {
@@ -212,10 +225,10 @@ fn no_point_is_farther_away_than_the_bound() {
             }
             assert!(level.error.is_finite() && level.error >= 0.0 && (0.0..=1.0).contains(&level.color), "{name}");
         }
-        println!("{name}: {count} levels, {of_half} of them beyond half the bound, tightest {tightest:.3}");
+        println!("{name}: {count} levels, {of_part} of them beyond {part} of the bound, tightest {tightest:.3}");
         assert_eq!(violations, 0, "{name}");
-        // Half the bound is none.
-        assert!(of_half > 0, "{name}");
+        // A part of the bound is none.
+        assert!(of_part > 0, "{name}");
     }
 }
 
@@ -414,6 +427,93 @@ fn colours_are_means_by_area() {
         }
         assert_eq!(darkest == 255, is_flat, "{darkest}");
     }
+}
+
+/// Rods of 12 triangles, 4 units long and 0.02 thick, strewn in all directions.
+fn rods(count: u32) -> Primitive {
+    let mut random = Random(23);
+    let mut triangles = Vec::new();
+    for _ in 0..count {
+        let (at, along) = (random.point(40.0), random.point(1.0));
+        let unit = |v: Vec3| v.map(|x| x / dot(v, v).sqrt());
+        let w = unit(along);
+        let u = unit(cross(w, [0.3, 0.5, 0.8]));
+        let v = cross(w, u);
+        let corner = |i: usize| -> Vec3 {
+            let [s, t, l] = [0, 1, 2].map(|k| if i >> k & 1 != 0 { 1.0 } else { -1.0 });
+            std::array::from_fn(|k| at[k] + 0.01 * (s * u[k] + t * v[k]) + 2.0 * l * w[k])
+        };
+        for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+            let [a, b, c, d] = [a, b, c, d].map(corner);
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    soup(&triangles)
+}
+
+fn area(triangles: &[[Vec3; 3]]) -> f64 {
+    let of = |&[a, b, c]: &[Vec3; 3]| {
+        let n = cross(sub(b, a), sub(c, a));
+        0.5 * dot(n, n).sqrt()
+    };
+    triangles.iter().map(of).sum()
+}
+
+#[test]
+fn what_is_thinner_than_a_cell_stays_as_wide_as_it_looks() {
+    let (resident, bricks) = decode_levels(&built(&plain(vec![rods(600)]), &with_levels(500)).path());
+    let mut levels = 0;
+    for (index, level) in resident.levels.iter().enumerate() {
+        if level.children().any(|child| child.brick as usize >= resident.exact_bricks()) {
+            continue;
+        }
+        levels += 1;
+        let own = corners(&bricks[resident.exact_bricks() + index], &resident, NONE);
+        let below = exact(level, (&bricks, &resident), NONE);
+        // Cauchy: a convex body looks like a quarter of its surface on the mean, a sheet like half of its area.
+        let ratio = 0.5 * area(&own) / (0.25 * area(&below));
+        println!("{ratio}");
+        assert!((0.7..1.1).contains(&ratio), "{ratio}");
+        let tree = Tree::over(own);
+        let far = sample(&below, 1000, &mut Random(2)).into_iter().filter(|&p| tree.distance(p) > 0.5).count();
+        assert!(far < 20, "{far}");
+    }
+    assert!(levels > 3);
+}
+
+#[test]
+fn a_level_emits_as_much_as_what_it_stands_for() {
+    let mut random = Random(31);
+    let mut scene = checkered(96);
+    scene.meshes[0].primitives = {
+        let squares = &scene.meshes[0].primitives;
+        let mut parts =
+            [Primitive { material: 0, ..Primitive::default() }, Primitive { material: 1, ..Primitive::default() }];
+        for square in squares.iter().flat_map(|part| part.positions.chunks_exact(4)) {
+            let part = &mut parts[usize::from(random.next() < 0.1)];
+            let first = part.positions.len() as u32;
+            part.positions.extend_from_slice(square);
+            part.indices.extend([0, 1, 2, 0, 2, 3].map(|k| first + k));
+        }
+        parts.to_vec()
+    };
+    scene.materials[1].emission = [3.0, 2.0, 1.0];
+    let (resident, bricks) = decode_levels(&built(&scene, &with_levels(1000)).path());
+    let mean = |bricks: &[DecodedBrick]| {
+        let (mut sum, mut all) = (0.0, 0.0);
+        for brick in bricks {
+            for (triangle, &material) in corners(brick, &resident, NONE).iter().zip(&brick.materials) {
+                let weight = area(&[*triangle]);
+                all += weight;
+                sum += weight * f64::from(resident.materials[material as usize].emission[0]);
+            }
+        }
+        sum / all
+    };
+    let (exact, levels) = bricks.split_at(resident.exact_bricks());
+    let (exact, levels) = (mean(exact), mean(levels));
+    assert!((0.25..0.35).contains(&exact), "{exact}");
+    assert!((levels / exact - 1.0).abs() < 0.2, "{levels}, exactly {exact}");
 }
 
 /// A sheet of which one half shows one half of a texture, red, and the other one that is blue.
