@@ -126,7 +126,7 @@ const AROUND: f32 = 0.18;
 
 /// Errors of the level at a hit that rays start off by: most of a level is nearer than its error, and what starts too
 /// far off starts behind something else.
-const OFFSET: f32 = 0.5;
+const OFFSET: f32 = 0.25;
 
 impl Lod {
     /// [`Params::levels`] of the rays of a pass, under a sun with such a tangent of its angular radius.
