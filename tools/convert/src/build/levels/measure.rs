@@ -119,9 +119,9 @@ pub(super) fn measure(
         bound = bound.max(search.refine(corners, upper, MOST_CUTS));
     }
     for (triangle, output) in triangles.iter().zip(&clusters.outputs) {
+        // A strand is within its spread of its edge, which an edge of each of its sources becomes end by end.
         let (group, spread) = (output.group as usize, clusters.spread[output.group as usize]);
-        let mapped = if spread > 0.0 { f64::INFINITY } else { of_group[group] };
-        bound = bound.max(mapped.min(reach(*triangle) + spread));
+        bound = bound.max(of_group[group].min(reach(*triangle) + spread));
     }
     Measured {
         bound: bound * (1.0 + ROUNDING),
