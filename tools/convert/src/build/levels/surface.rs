@@ -245,19 +245,15 @@ impl Surface {
         (clusters, touching): (&Clusters, &Touching),
         flattened: &Flattened,
     ) -> (Vec<Triangle>, Fitted) {
-        let faces = |output: &Output| {
+        let stands_for = |output: &Output| {
             let vector = area_vector(output.corners.map(|corner| points[corner as usize]));
-            (vector, class(vector), clusters.is_thin(output.group))
+            (vector, self.sums(output, class(vector), clusters.is_thin(output.group)))
         };
-        let mean = |output: &Output| {
-            let (_, side, is_thin) = faces(output);
-            self.sums(output, side, is_thin).map(|sum| sum.mean())
-        };
-        let means = clusters.outputs.iter().map(mean).collect();
+        let all: Vec<(Vec3, [Sum; 3])> = clusters.outputs.iter().map(stands_for).collect();
+        let means = all.iter().map(|(_, sums)| sums.map(|sum| sum.mean())).collect();
         let fitted = fit(merged, points, (clusters, touching), self, means);
-        let make = |(output, means): (&Output, &[Vec3; 3])| {
-            let (vector, side, is_thin) = faces(output);
-            let sums = self.sums(output, side, is_thin);
+        let make = |((output, (vector, sums)), means): ((&Output, &(Vec3, [Sum; 3])), &[Vec3; 3])| {
+            let (side, is_thin) = (class(*vector), clusters.is_thin(output.group));
             let id = merged.triangles[output.source as usize].id;
             let family = self.drawn(output, side, is_thin, id);
             let family = &flattened.families[family as usize];
@@ -270,7 +266,7 @@ impl Surface {
             let ratios = means.map(ratio);
             let is_over = ratios.as_flattened().iter().any(|&x| x > EXCESS);
             let (material, colors) = if is_over { (family.white, *means) } else { (family.flat, ratios) };
-            let n = vector.map(|x| x / length(vector));
+            let n = vector.map(|x| x / length(*vector));
             let attributes = std::array::from_fn(|k| {
                 // Normals of what is round say nothing; its triangles face as many ways.
                 let (normal, shade) = if is_thin { (NO_NORMAL, 1.0) } else { (normal(&sums[k], n), sums[k].shade()) };
@@ -279,7 +275,7 @@ impl Surface {
             let corners = output.corners.map(|corner| merged.positions[corner as usize]);
             Triangle { brick: 0, id, material, corners, attributes }
         };
-        (clusters.outputs.iter().zip(&fitted.corners).map(make).collect(), fitted)
+        (clusters.outputs.iter().zip(&all).zip(&fitted.corners).map(make).collect(), fitted)
     }
 
     /// A family drawn by its share, so that of many triangles the share is right: a level emits and shines as much as
