@@ -104,6 +104,13 @@ impl Slot {
     }
 }
 
+/// What an output stands for, at each corner.
+struct StandsFor {
+    /// Twice the area vector of the output.
+    vector: Vec3,
+    sums: [Sum; 3],
+}
+
 /// Means over cells, and what they make of the outputs.
 pub(super) struct Surface {
     slots: Vec<Slot>,
@@ -247,12 +254,12 @@ impl Surface {
     ) -> (Vec<Triangle>, Fitted) {
         let stands_for = |output: &Output| {
             let vector = area_vector(output.corners.map(|corner| points[corner as usize]));
-            (vector, self.sums(output, class(vector), clusters.is_thin(output.group)))
+            StandsFor { vector, sums: self.sums(output, class(vector), clusters.is_thin(output.group)) }
         };
-        let all: Vec<(Vec3, [Sum; 3])> = clusters.outputs.iter().map(stands_for).collect();
-        let means = all.iter().map(|(_, sums)| sums.map(|sum| sum.mean())).collect();
+        let all: Vec<StandsFor> = clusters.outputs.iter().map(stands_for).collect();
+        let means = all.iter().map(|output| output.sums.map(|sum| sum.mean())).collect();
         let fitted = fit(merged, points, (clusters, touching), self, means);
-        let make = |((output, (vector, sums)), means): ((&Output, &(Vec3, [Sum; 3])), &[Vec3; 3])| {
+        let make = |((output, StandsFor { vector, sums }), means): ((&Output, &StandsFor), &[Vec3; 3])| {
             let (side, is_thin) = (class(*vector), clusters.is_thin(output.group));
             let id = merged.triangles[output.source as usize].id;
             let family = self.drawn(output, side, is_thin, id);
