@@ -262,7 +262,7 @@ impl Surface {
         let make = |((output, StandsFor { vector, sums }), means): ((&Output, &StandsFor), &[Vec3; 3])| {
             let (side, is_thin) = (class(*vector), clusters.is_thin(output.group));
             let id = merged.triangles[output.source as usize].id;
-            let family = self.drawn(output, side, is_thin, id);
+            let family = self.drawn(output, side, is_thin, scattered(id ^ scattered(clusters.size as u32)));
             let family = &flattened.families[family as usize];
             let ratio = |mean: Vec3| -> Vec3 {
                 std::array::from_fn(|k| match f64::from(family.base[k]) {
@@ -286,8 +286,9 @@ impl Surface {
     }
 
     /// A family drawn by its share, so that of many triangles the share is right: a level emits and shines as much as
-    /// what it stands for.
-    fn drawn(&self, output: &Output, side: usize, is_thin: bool, id: u32) -> u32 {
+    /// what it stands for. `random` must differ from level to level: a triangle that was drawn once would else be
+    /// drawn again, as it counts in the share.
+    fn drawn(&self, output: &Output, side: usize, is_thin: bool, random: u32) -> u32 {
         let mut found: Vec<(u32, f64)> = Vec::with_capacity(8);
         let mut add = |slot: &Slot| {
             let mut at = slot.shares;
@@ -309,7 +310,7 @@ impl Surface {
         }
         found.sort_unstable_by_key(|(family, _)| *family);
         let all: f64 = found.iter().map(|(_, weight)| weight).sum();
-        let mut left = all * f64::from(scattered(id)) / (f64::from(u32::MAX) + 1.0);
+        let mut left = all * f64::from(random) / (f64::from(u32::MAX) + 1.0);
         let is_it = |(_, weight): &&(u32, f64)| {
             left -= weight;
             left < 0.0

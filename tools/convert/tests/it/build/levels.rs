@@ -485,7 +485,15 @@ fn what_is_thinner_than_a_cell_stays_as_wide_as_it_looks() {
 
 #[test]
 fn a_level_emits_as_much_as_what_it_stands_for() {
-    let mut random = Random(31);
+    // The coarsest levels have few triangles, so that one scene alone says little.
+    let ratios: Vec<f64> = (0..12).map(|seed| emitted_ratio(31 + seed)).collect();
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    assert!((mean - 1.0).abs() < 0.1, "{mean}: {ratios:?}");
+}
+
+/// What levels emit over what they should; a tenth of the squares of a plane emits.
+fn emitted_ratio(seed: u64) -> f64 {
+    let mut random = Random(seed);
     let mut scene = checkered(96);
     scene.meshes[0].primitives = {
         let squares = &scene.meshes[0].primitives;
@@ -515,7 +523,7 @@ fn a_level_emits_as_much_as_what_it_stands_for() {
     let (exact, levels) = bricks.split_at(resident.exact_bricks());
     let (exact, levels) = (mean(exact), mean(levels));
     assert!((0.25..0.35).contains(&exact), "{exact}");
-    assert!((levels / exact - 1.0).abs() < 0.2, "{levels}, exactly {exact}");
+    levels / exact
 }
 
 /// A sheet of which one half shows one half of a texture, red, and the other one that is blue.
