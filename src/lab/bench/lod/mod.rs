@@ -179,6 +179,7 @@ fn errors(view: &mut View, way: Way, samples: u32, exact: &Exact) -> Result<Valu
         let cost = Cost::of(&records);
         let sum = |count: fn(&crate::counters::Record) -> u64| records.iter().map(count).sum::<u64>() as f64;
         let through = seen_through(view, way, &depth, exact)?;
+        let missed: Vec<bool> = depth.iter().map(|depth| depth.is_infinite()).collect();
         if !way.is_levelled() {
             // What a pixel's shift of all rays alone would do.
             let next = exact.seen.seen_through(&exact.seen.shifted(), exact.angle, |_| 0.0);
@@ -188,6 +189,7 @@ fn errors(view: &mut View, way: Way, samples: u32, exact: &Exact) -> Result<Valu
             ("silhouettes", exact.seen.share(&exact.silhouettes, |_| true)),
             ("see_through", exact.seen.share(&through, |_| true)),
             ("holes", exact.seen.share(&through, |i| !exact.silhouettes[i])),
+            ("missed", exact.seen.share(&missed, |_| true)),
             ("rays", sum(|record| record.rays_traced)),
             ("nodes", sum(|record| record.nodes_visited)),
             ("triangles", sum(|record| record.triangles_tested)),

@@ -20,7 +20,7 @@ const READING: &str = "tau: the tolerance, pixels; exact: without levels. Scenes
 const PICTURES: &str = "The first frame. Silhouettes: RMSE over pixels within one of an edge of the exact picture. \
                         Sees through: rays through centres that exactly hit something and with levels nothing, or what \
                         lies behind the plane of the exact hit by more than the level's bound and a pixel; holes: \
-                        those of them away from silhouettes; next pixel's: the share that exact rays of the next pixel \
+                        those of them away from silhouettes; hits nothing: those that nothing stops; next pixel's: the share that exact rays of the next pixel \
                         would see through, bounds left out. Triangles and nodes: tested and visited, of all rays.";
 const WALKS: &str = "Cold: loaded by the first frame, with an empty cache. Steady: loaded by a later frame. All: a \
                      frame's mean of both. The cache holds a share of all bricks without levels, with levels as many \
@@ -132,7 +132,7 @@ fn lines<'a>(stage: Stage, kind: Kind, jobs: &'a [Job], rows: &'a Rows) -> Vec<L
 }
 
 fn pictures(stage: Stage, jobs: &[Job], rows: &Rows) -> Section {
-    let columns: [Column<Line>; 15] = [
+    let columns: [Column<Line>; 16] = [
         ("scene", |line| line.party.scene.into()),
         ("way", |line| line.party.way.to_string().into()),
         ("samples", |line| f64::from(line.samples).into()),
@@ -144,6 +144,7 @@ fn pictures(stage: Stage, jobs: &[Job], rows: &Rows) -> Section {
         ("RMSE, silhouettes", |line| line.number("rmse_silhouettes")),
         ("sees through, %", |line| percent(line.value("see_through"))),
         ("holes, %", |line| percent(line.value("holes"))),
+        ("hits nothing, %", |line| percent(line.value("missed"))),
         ("next pixel's, %", |line| percent(line.value("next_pixel"))),
         ("bricks, primary", |line| line.number("bricks")),
         ("triangles, M", |line| line.millions("triangles")),
