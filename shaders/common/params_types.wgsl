@@ -46,8 +46,7 @@ struct Params {           // What every kernel is told.
     picture_rows: u32,    // rows of the picture; camera rays of rows beyond them are not traced
     traced_one_in: u32,   // of so many blocks of 8 x 8 camera rays one is traced (src/frame/correct.rs); 0: all are
     // levels of detail, squared: the tolerance times the angle of a pixel, the same times the angle that the pass's
-    // rays spread by; z: factor of what rays start off surfaces by; w: share of a squared width that blending may take
-    // off
+    // rays spread by at least; z: the tolerance; w: share of a squared width that blending may take off
     levels: vec4<f32>,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
     // what a white surface reflects of the environment, by terms of its normal (light.wgsl)
@@ -69,6 +68,7 @@ const PARAM_EMISSION: u32 = 1024u; // shade: with the hits' emission
 const PARAM_MISS: u32 = 2048u;    // shade: with the background, where rays missed
 const PARAM_COARSER: u32 = 16384u; // coarser levels of textures stand for what is not resident
 const PARAM_GLOSSY: u32 = 8192u;   // what surfaces reflect otherwise than diffusely comes by rays of its own, too
+const LEVEL_OFFSET: f32 = 0.25;    // errors of the level at a hit that rays start off by: most of a level is nearer
 const BATCH_SAMPLES: u32 = 64u;   // samples that are summed before the radiance is emptied
 const NONE: u32 = 0xffffffffu;     // "no such thing", in every index that may be absent
 const T_INFINITE: f32 = 3.4028234e38; // t_max of an unbounded ray: the greatest f32

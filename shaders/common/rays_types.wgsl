@@ -23,7 +23,9 @@ struct Surface {          // Where a hit lies, for the rays that start from it.
     // was drawn (Chosen)
     area: f32,
     source: u32,          // id of the triangle that the ray starts from, which it does not meet; NONE: of none
-    pending: u32,         // 0: the ray has asked from the root, for nothing: it wants nothing else in its pass
+    // bit 0 is 0 where the ray has asked from the root, for nothing: it wants nothing else in its pass; the other bits
+    // are those of an f32, without its sign: the square of what its cone spreads by beyond its pass's (levels.wgsl)
+    pending: u32,
     emitter: u32,         // of rays to emitters: theirs; of rays to the environment: the number of their candidate
 }
 
@@ -35,7 +37,9 @@ struct TileBounds {       // Bounds of the traced rays of a tile.
     direction_min: vec3<f32>, // least components of the directions
     rays: u32,            // traced rays of the tile
     direction_max: vec3<f32>, // greatest components of the directions
-    padding: u32,
+    // what their cones spread by beyond their pass's, squared: the upper half of an f32, of the least in the high half,
+    // rounded down, of the greatest in the low half, rounded up
+    spreads: u32,
 }
 
 struct TileList {         // where a tile's entries lie in the lists

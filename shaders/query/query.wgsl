@@ -33,7 +33,7 @@ fn main(
         return;
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let cone = cone_of(ray);
+    let cone = cone_of(index, ray);
     var r: BrickRay;
     var first = NONE;
     var first_near = T_INFINITE;

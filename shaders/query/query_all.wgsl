@@ -55,21 +55,21 @@ fn main(
     if index == NONE {
         return;
     }
-    if !PAIRS && surfaces[index].pending == 0u {
+    if !PAIRS && !is_pending(index) {
         return;
     }
     let ray = rays[index];
     let hit = hits[index];
     let occluded = (params.flags & PARAM_ANY_HIT) != 0u && hit.id != NONE;
     if !PAIRS {
-        surfaces[index].pending = 0u;
+        set_pending(index, false);
     }
     if !is_traced(index, ray) || params.top_count == 0u || occluded {
         return;
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     let up_to_next = !PAIRS && (params.flags & PARAM_NEXT) != 0u;
-    let cone = cone_of(ray);
+    let cone = cone_of(index, ray);
     var r: BrickRay;
     var stack: array<Entry, TOP_STACK_SIZE>; // nodes, and where the ray enters them
     stack[0] = Entry(0u, 0.0);
@@ -148,7 +148,7 @@ fn main(
         }
     }
     if asks > 0u {
-        surfaces[index].pending = 1u;
+        set_pending(index, true);
         atomicAdd(&demand[first].next, 1u);
         atomicAdd(&counters[COUNTER_PAIRS_VISIBLE], asks);
     }

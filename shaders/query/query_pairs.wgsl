@@ -72,7 +72,7 @@ fn ask(pair: Pair, lane: u32, each: bool) {
             continue;
         }
         let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-        let cone = cone_of(ray);
+        let cone = cone_of(at, ray);
         for (var k = 0u; k < pair.count; k++) {
             let what = look(world, cone, pair_nodes[pair.first + k], hit.t);
             entered |= (what & OWN) << k;

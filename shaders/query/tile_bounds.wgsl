@@ -2,6 +2,7 @@
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "query/tiles.wgsl"
+#include "query/tile_spreads.wgsl"
 
 var<workgroup> origin_min: array<vec3<f32>, 64>;
 var<workgroup> origin_max: array<vec3<f32>, 64>;
@@ -28,6 +29,7 @@ fn main(
     var d1 = vec3<f32>(-T_INFINITE);
     var t = vec2<f32>(T_INFINITE, 0.0);
     var n = 0u;
+    start_spreads(lane);
     if tile < params.tiles {
         for (var i = lane; i < w * h; i += 64u) {
             let index = (y0 + i / w) * params.width + x0 + i % w;
@@ -39,6 +41,7 @@ fn main(
                 d1 = max(d1, ray.direction);
                 t = vec2<f32>(min(t.x, ray.t_min), max(t.y, hits[index].t));
                 n += 1u;
+                bound_spread(lane, index);
             }
         }
     }
@@ -57,11 +60,12 @@ fn main(
             direction_max[lane] = max(direction_max[lane], direction_max[lane + step]);
             range[lane] = vec2<f32>(min(range[lane].x, range[lane + step].x), max(range[lane].y, range[lane + step].y));
             traced[lane] += traced[lane + step];
+            join_spreads(lane, lane + step);
         }
     }
     if lane == 0u && tile < params.tiles {
         tile_bounds[tile] = TileBounds(origin_min[0], range[0].x, origin_max[0], range[0].y,
-                                       direction_min[0], traced[0], direction_max[0], 0u);
+                                       direction_min[0], traced[0], direction_max[0], tile_spreads());
         atomicAdd(&counters[COUNTER_RAYS_TRACED], traced[0]);
     }
 }

@@ -7,6 +7,7 @@
 #include "shade/lamps.wgsl"
 #include "shade/light.wgsl"
 #include "shade/gloss.wgsl"
+#include "shade/cones.wgsl"
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -19,6 +20,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var ray = Ray(surface.point, 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0);
     var carried = vec3<f32>(0.0);
     var density = 0.0;
+    var alpha = 0.0;
     if surface.leaf != NONE {
         let g = gbuffer[index];
         let s = gloss_of(g, -seen_rays[index].direction);
@@ -28,6 +30,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             if density > 0.0 && dot(surface.normal, ray.direction) > 0.0 {
                 ray.t_min = 0.0;
                 ray.t_max = T_INFINITE;
+                alpha = greatest_alpha(s);
                 carried = reflected(s, ray.direction) * (dot(g.normal, ray.direction) / (PI * density));
             }
         }
@@ -36,4 +39,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     throughput[index] = vec4<f32>(carried, 0.0);
     densities[index] = density;
     start_hit(index, ray.t_max, seen_hits[index].id);
+    if alpha > 0.0 {
+        widen_reflected(index, density, alpha);
+    }
 }

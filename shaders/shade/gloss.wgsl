@@ -81,6 +81,11 @@ fn is_glossy(s: Gloss) -> bool {
     return s.alpha > 0.0;
 }
 
+// Square of the roughness of its widest lobe.
+fn greatest_alpha(s: Gloss) -> f32 {
+    return max(s.alpha, s.coat_alpha);
+}
+
 // A lobe toward d: x is distribution and masking over 4 times both cosines, y the density by which directions are
 // drawn.
 fn lobe(s: Gloss, alpha: f32, d: vec3<f32>, half_way: vec3<f32>) -> vec2<f32> {

@@ -52,12 +52,12 @@ fn main(
     }
     let any_hit = (params.flags & PARAM_ANY_HIT) != 0u;
     let before = hits[index];
-    if SELECT && ((any_hit && before.id != NONE) || surfaces[index].pending == 0u) {
+    if SELECT && ((any_hit && before.id != NONE) || !is_pending(index)) {
         return;
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
-    let cone = cone_of(ray);
+    let cone = cone_of(index, ray);
     var r: BrickRay;
     r.ray = world;
     var stack: array<vec2<u32>, STACK_SIZE>;

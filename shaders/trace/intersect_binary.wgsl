@@ -80,7 +80,7 @@ fn main(
     let before = hits[index];
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
-    let cone = cone_of(ray);
+    let cone = cone_of(index, ray);
     var r: BrickRay;
     r.ray = world;
     var walk: Walk;

@@ -40,7 +40,7 @@ fn main(
     }
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     var best = Best(before.t, before.id, NONE, 0u, 0.0, 0.0, 0.0, 0.0, surfaces[index].source);
-    let cone = cone_of(ray);
+    let cone = cone_of(index, ray);
     var r: BrickRay;
     var stack: array<vec2<u32>, STACK_SIZE>;
     var depth = 0u;

@@ -34,10 +34,24 @@ fn blend_of(direction: vec3<f32>) -> f32 {
     return barrier(1.0 - barrier(params.levels.w * barrier(f32(h >> 8u) * 5.9604645e-8)));
 }
 
-fn cone_of(ray: Ray) -> Cone {
+// Square of what the cone of a ray spreads by: what its pass's do, or more.
+fn spread_of(ray: u32) -> f32 {
+    return max(params.levels.y, bitcast<f32>(surfaces[ray].pending >> 1u));
+}
+
+// Whether a ray may still ask for bricks.
+fn is_pending(ray: u32) -> bool {
+    return (surfaces[ray].pending & 1u) != 0u;
+}
+
+fn set_pending(ray: u32, pending: bool) {
+    surfaces[ray].pending = (surfaces[ray].pending & ~1u) | u32(pending);
+}
+
+fn cone_of(index: u32, ray: Ray) -> Cone {
     let blend = blend_of(ray.direction);
     let square = barrier(params.levels.x * square_of(barrier3(ray.origin - params.origin.xyz)));
-    return Cone(ray.origin, barrier(blend * square), barrier(blend * params.levels.y));
+    return Cone(ray.origin, barrier(blend * square), barrier(blend * spread_of(index)));
 }
 
 fn width_square(cone: Cone, leaf: u32) -> f32 {
@@ -82,10 +96,11 @@ fn tile_widths(tile: TileBounds, leaf: u32) -> vec2<f32> {
     let at_max = max(max(lo - tile.origin_max, tile.origin_max - hi), none);
     let blend = barrier(1.0 - params.levels.w);
     let least_square = barrier(blend * barrier(params.levels.x * square_of(from_eye)));
-    let least_spread = barrier(blend * params.levels.y);
+    let least_spread = barrier(blend * max(params.levels.y, bitcast<f32>(tile.spreads & 0xffff0000u)));
+    let most_spread = max(params.levels.y, bitcast<f32>(tile.spreads << 16u));
     let most_square = barrier(params.levels.x * square_of(to_eye));
     return vec2<f32>(barrier(least_square + barrier(least_spread * square_of(nearest))),
-                     barrier(most_square + barrier(params.levels.y * square_of(max(at_min, at_max)))));
+                     barrier(most_square + barrier(most_spread * square_of(max(at_min, at_max)))));
 }
 
 // Whether a level stands for all below a node of the binary top level, for every ray of the tile.
@@ -113,5 +128,5 @@ fn level_offset(point: vec3<f32>, leaf: u32) -> f32 {
         level = parent;
         parent = level_leaves[level].parent;
     }
-    return barrier(params.levels.z * square_root(level_leaves[level].error_square));
+    return barrier(LEVEL_OFFSET * square_root(level_leaves[level].error_square));
 }

@@ -141,6 +141,12 @@ impl CpuExecutor {
         &mut self.buffers.pixels.gbuffers[set]
     }
 
+    /// Has the rays of a set such surfaces, for tests.
+    #[cfg(test)]
+    pub(crate) fn set_surfaces(&mut self, pass: Pass, surfaces: Vec<layout::Surface>) {
+        self.buffers.sets[pass.set()].surfaces = surfaces;
+    }
+
     /// The words of a buffer of a family, for tests.
     #[cfg(test)]
     pub(crate) fn words(&mut self, family: &'static Family, buffer: usize) -> &mut Vec<u32> {

@@ -191,6 +191,26 @@ mod tests {
     use super::*;
     use std::panic::AssertUnwindSafe;
 
+    /// Where no ray can take a level, kernels have nothing of levels or of the widths of cones.
+    #[test]
+    fn without_levels_nothing_of_them_is_in_kernels() {
+        let has = |levels: bool| -> Vec<&str> {
+            let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels };
+            let of_levels = |file: &str| {
+                let text = source(file, pages);
+                ["params.levels", "level_leaves", "pending >>", "workgroup> spreads"]
+                    .iter()
+                    .any(|part| text.contains(part))
+            };
+            KERNELS.iter().filter(|kernel| of_levels(kernel.file)).map(|kernel| kernel.name).collect()
+        };
+        assert_eq!(has(false), Vec::<&str>::new());
+        let with = has(true);
+        for name in ["intersect_all", "query", "tile_bounds", "generate_glossy"] {
+            assert!(with.contains(&name), "{name} is not in {with:?}");
+        }
+    }
+
     /// The device checks the limit when pipelines are made, and panics where no one asked for its errors.
     #[test]
     fn as_many_pages_as_are_promised_can_be_bound() {

@@ -56,6 +56,8 @@ fn append(
         "texture/texels.wgsl" => texel_accessors(pages.texels),
         "trace/opacity.wgsl" if !pages.opacity => OPAQUE.into(),
         "trace/levels.wgsl" if !pages.levels => NO_LEVELS.into(),
+        "query/tile_spreads.wgsl" if !pages.levels => NO_SPREADS.into(),
+        "shade/cones.wgsl" if !pages.levels => NO_CONES.into(),
         "shade/gloss.wgsl" if !pages.gloss => MATT.into(),
         _ => file(name)?,
     };
@@ -83,7 +85,13 @@ const NO_LEVELS: &str = "\
 struct Cone {
     square: f32,
 }
-fn cone_of(ray: Ray) -> Cone {
+fn is_pending(ray: u32) -> bool {
+    return surfaces[ray].pending != 0u;
+}
+fn set_pending(ray: u32, pending: bool) {
+    surfaces[ray].pending = u32(pending);
+}
+fn cone_of(index: u32, ray: Ray) -> Cone {
     return Cone(0.0);
 }
 fn takes(cone: Cone, leaf: u32) -> bool {
@@ -106,6 +114,21 @@ fn level_offset(point: vec3<f32>, leaf: u32) -> f32 {
 }
 ";
 
+/// What stands for `query/tile_spreads.wgsl` there.
+const NO_SPREADS: &str = "\
+fn start_spreads(lane: u32) {}
+fn bound_spread(lane: u32, ray: u32) {}
+fn join_spreads(lane: u32, other: u32) {}
+fn tile_spreads() -> u32 {
+    return 0u;
+}
+";
+
+/// What stands for `shade/cones.wgsl` there.
+const NO_CONES: &str = "\
+fn widen_reflected(ray: u32, density: f32, alpha: f32) {}
+";
+
 /// What stands for `shade/gloss.wgsl` where all surfaces are Lambertian.
 const MATT: &str = "\
 struct Gloss {
@@ -116,6 +139,9 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
 }
 fn is_glossy(s: Gloss) -> bool {
     return false;
+}
+fn greatest_alpha(s: Gloss) -> f32 {
+    return 0.0;
 }
 fn reflected(s: Gloss, d: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(0.0);

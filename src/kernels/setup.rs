@@ -124,10 +124,6 @@ const BLEND: f32 = 0.75;
 /// Angle that rays around a hit stand for, radians: what a cosine-weighted ray of a hundred does.
 const AROUND: f32 = 0.18;
 
-/// Errors of the level at a hit that rays start off by: most of a level is nearer than its error, and what starts too
-/// far off starts behind something else.
-const OFFSET: f32 = 0.25;
-
 impl Lod {
     /// [`Params::levels`] of the rays of a pass, under a sun with such a tangent of its angular radius.
     pub fn params(&self, pass: Pass, sun_radius: f32) -> [f32; 4] {
@@ -142,7 +138,7 @@ impl Lod {
             Pass::Occlusion(_) | Pass::Diffuse(_) => AROUND,
         };
         let square = |angle: f32| (pixels * angle) * (pixels * angle);
-        [square(angle), square(angle.max(spread)), OFFSET, if blend { BLEND } else { 0.0 }]
+        [square(angle), square(angle.max(spread)), pixels * pixels, if blend { BLEND } else { 0.0 }]
     }
 }
 

@@ -32,6 +32,7 @@ mod command {
 mod exact {
     mod bands;
     mod cache_independence;
+    mod cones;
     mod exactness;
     mod given_rays;
     mod levels;

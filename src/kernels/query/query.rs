@@ -7,6 +7,7 @@ use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
+use crate::kernels::trace::levels::spread_of;
 use crate::kernels::trace::node::{entered_children, framed_ray, node_hits};
 use crate::kernels::trace::packet::RAYS;
 use crate::kernels::trace::packet_node::Place;
@@ -113,7 +114,7 @@ fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
     let (ray, hit) = (slot.ray, &slot.hit);
     let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let cone = bound.cone_of(ray.origin, ray.direction);
+    let cone = bound.cone_of(ray.origin, ray.direction, spread_of(slot.surface));
     let mut r = BrickRay::outside(&world);
     // The brick that it enters before any other that it asks for, and where.
     let mut first: Option<(usize, f32)> = None;

@@ -9,6 +9,7 @@ use crate::kernels::layout::{
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::tiles::PairCounts;
 use crate::kernels::trace::leaf::BrickRay;
+use crate::kernels::trace::levels::{is_pending, set_pending, spread_of};
 use crate::kernels::trace::node::{by_priority, entered_children, framed_ray, inner_before, node_hits};
 use crate::kernels::trace::run::{Work, for_each_ray};
 use crate::kernels::trace::scratch::Scratch;
@@ -28,20 +29,20 @@ pub fn count_pairs(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
 }
 
 fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
-    if !COUNT && slot.surface.pending == 0 {
+    if !COUNT && !is_pending(slot.surface) {
         return;
     }
     let (ray, hit) = (*slot.ray, *slot.hit);
     let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
     if !COUNT {
-        slot.surface.pending = 0;
+        set_pending(slot.surface, false);
     }
     if !slot.is_traced() || bound.params.top_count == 0 || occluded {
         return;
     }
     let scene = bound.scene;
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let cone = bound.cone_of(ray.origin, ray.direction);
+    let cone = bound.cone_of(ray.origin, ray.direction, spread_of(slot.surface));
     let up_to_next = !COUNT && bound.has(PARAM_NEXT);
     let mut r = BrickRay::outside(&world);
     let Scratch { entered: stack, tally, .. } = scratch;
@@ -107,7 +108,7 @@ fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pair
         }
     }
     if let Some((brick, _)) = first {
-        slot.surface.pending = 1;
+        set_pending(slot.surface, true);
         bound.demand[brick].add_next();
         tally.add(COUNTER_PAIRS_VISIBLE, asks);
     }

@@ -8,7 +8,7 @@ use crate::kernels::layout::{COUNTER_PAIRS_TESTED, COUNTER_TIGHTENED, NONE, PARA
 use crate::kernels::rays::{RaySet, is_traced};
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
-use crate::kernels::trace::levels::Cone;
+use crate::kernels::trace::levels::{Cone, spread_of};
 use crate::kernels::trace::node::{FramedRay, UNIT, framed_ray, node_hits, traversal_mask};
 use crate::kernels::vector::{each, least, most, most3};
 use rayon::prelude::*;
@@ -83,7 +83,7 @@ fn ask(bound: &Bound, set: &RaySet, pair: &Pair, nodes: &[u32], each: bool, out:
                 continue;
             }
             let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-            let cone = bound.cone_of(ray.origin, ray.direction);
+            let cone = bound.cone_of(ray.origin, ray.direction, spread_of(&set.surfaces[at]));
             for (k, &node) in nodes.iter().enumerate() {
                 let what = look(bound, &world, &cone, node, hit.t);
                 out.own |= u32::from(what != Look::Nothing) << k;

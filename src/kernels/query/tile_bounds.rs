@@ -4,6 +4,7 @@
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{COUNTER_RAYS_TRACED, T_INFINITE, TileBounds};
 use crate::kernels::rays::{RaySet, is_traced};
+use crate::kernels::trace::levels::spread_of;
 use crate::kernels::vector::{each, least, most};
 use rayon::prelude::*;
 
@@ -29,8 +30,9 @@ fn bounds_of(bound: &Bound, set: &RaySet, tile: u32) -> TileBounds {
         direction_min: [T_INFINITE; 3],
         rays: 0,
         direction_max: [-T_INFINITE; 3],
-        padding: 0,
+        spreads: 0,
     };
+    let mut spreads = [T_INFINITE, 0.0];
     for y in y0..y1 {
         for x in x0..x1 {
             let at = (y * p.width + x) as usize;
@@ -43,8 +45,14 @@ fn bounds_of(bound: &Bound, set: &RaySet, tile: u32) -> TileBounds {
                 b.t_min = least(b.t_min, ray.t_min);
                 b.t_max = most(b.t_max, set.hits[at].t);
                 b.rays += 1;
+                let own = spread_of(&set.surfaces[at]);
+                spreads = [least(spreads[0], own), most(spreads[1], own)];
             }
         }
+    }
+    if b.rays > 0 {
+        let [least, most] = spreads.map(f32::to_bits);
+        b.spreads = least & 0xffff_0000 | (most + 0xffff) >> 16;
     }
     b
 }

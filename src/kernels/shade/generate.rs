@@ -2,6 +2,7 @@
 //! `generate_around.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
 
 use super::choose::{Chosen, choose_direction, choose_emitter};
+use super::cones::{self, widen};
 use super::gloss::Gloss;
 use super::lamps::{environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
@@ -241,8 +242,8 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
             Ray { direction, ..none(surface.point) }
         }
     });
-    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut());
-    carried.enumerate().with_min_len(1024).for_each(|(index, (carried, density))| {
+    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut()).zip(own.surfaces.par_iter_mut());
+    carried.enumerate().with_min_len(1024).for_each(|(index, ((carried, density), surface))| {
         (*carried, *density) = ([0.0; 4], 0.0);
         let ray = &own.rays[index];
         if ray.t_min <= ray.t_max {
@@ -251,6 +252,7 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
             let reflected = s.reflected(ray.direction);
             let share = dot(gbuffer[index].normal, ray.direction) / (PI * *density);
             (0..3).for_each(|k| carried[k] = reflected[k] * share);
+            widen(bound, surface, cones::reflected(*density, s.greatest_alpha()));
         }
     });
 }

@@ -94,6 +94,11 @@ impl Gloss {
         s
     }
 
+    /// Square of the roughness of its widest lobe.
+    pub fn greatest_alpha(&self) -> f32 {
+        most(self.alpha, self.coat_alpha)
+    }
+
     /// Whether there is more than the diffuse part.
     pub fn is_glossy(&self) -> bool {
         self.alpha > 0.0

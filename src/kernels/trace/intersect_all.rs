@@ -2,6 +2,7 @@
 //! `shaders/trace/intersect_all.wgsl`, for rays of one octant together. They walk the wide top-level tree and, in its
 //! leaves, the bricks.
 
+use super::levels::is_pending;
 use super::node::inner_before;
 use super::packet_node::Place;
 use super::packet_walk::{PacketGroup, PacketScratch, put, take};
@@ -37,7 +38,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
     fn takes(&self, slot: &Slot) -> bool {
         let bound = self.bound;
         let is_found = bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
-        let is_left_out = SELECT && (is_found || slot.surface.pending == 0);
+        let is_left_out = SELECT && (is_found || !is_pending(slot.surface));
         slot.is_traced() && bound.params.top_count != 0 && !is_left_out
     }
 

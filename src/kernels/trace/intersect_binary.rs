@@ -4,6 +4,7 @@
 use super::binary_tree::{Tree, top_height, tree_of};
 use super::brick::Best;
 use super::leaf::BrickRay;
+use super::levels::spread_of;
 use super::node::{FramedRay, UNIT, framed_ray};
 use super::run::{Work, for_each_ray};
 use super::scratch::Scratch;
@@ -102,7 +103,7 @@ fn trace(bound: &Bound, scratch: &mut Scratch, slot: Slot, trees: &BinaryTrees) 
     }
     let any_hit = bound.has(PARAM_ANY_HIT);
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let cone = bound.cone_of(ray.origin, ray.direction);
+    let cone = bound.cone_of(ray.origin, ray.direction, spread_of(slot.surface));
     let mut best = Best::before(&slot);
     let mut visits = Visits::default();
     let mut r = BrickRay::outside(&world);

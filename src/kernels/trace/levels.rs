@@ -2,7 +2,7 @@
 //! `shaders/trace/levels.wgsl`. Where no levels are in use all of this says at once that a ray takes everything.
 
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{LevelLeaf, NONE, Surface, TileBounds};
+use crate::kernels::layout::{LEVEL_OFFSET, LevelLeaf, NONE, Surface, TileBounds};
 use crate::kernels::vector::{Vec3, each, most};
 use crate::math::exact::{barrier, square_root};
 
@@ -19,6 +19,24 @@ pub struct Cone {
 
 fn square_of(v: Vec3) -> f32 {
     barrier(barrier(barrier(v[0] * v[0]) + barrier(v[1] * v[1])) + barrier(v[2] * v[2]))
+}
+
+/// What the cone of a ray spreads by beyond its pass's, squared.
+#[inline(always)]
+pub fn spread_of(surface: &Surface) -> f32 {
+    f32::from_bits(surface.pending >> 1)
+}
+
+/// Whether a ray may still ask for bricks.
+#[inline(always)]
+pub fn is_pending(surface: &Surface) -> bool {
+    surface.pending & 1 != 0
+}
+
+/// Notes whether it may.
+#[inline(always)]
+pub fn set_pending(surface: &mut Surface, pending: bool) {
+    surface.pending = surface.pending & !1 | u32::from(pending);
 }
 
 impl Bound<'_> {
@@ -47,9 +65,9 @@ impl Bound<'_> {
         barrier(1.0 - barrier(share * barrier((h >> 8) as f32 * 5.960_464_5e-8)))
     }
 
-    /// The cone of a ray.
+    /// The cone of a ray that spreads beyond its pass's by an angle, given squared ([`spread_of`]).
     #[inline(always)]
-    pub fn cone_of(&self, origin: Vec3, direction: Vec3) -> Cone {
+    pub fn cone_of(&self, origin: Vec3, direction: Vec3, own: f32) -> Cone {
         if !self.has_levels() {
             return Cone::default();
         }
@@ -57,7 +75,7 @@ impl Bound<'_> {
         let eye = self.eye();
         let blend = self.blend_of(direction);
         let square = barrier(at_origin * square_of(each(|k| origin[k] - eye[k])));
-        Cone { origin, square: barrier(blend * square), spread: barrier(blend * spread) }
+        Cone { origin, square: barrier(blend * square), spread: barrier(blend * most(spread, own)) }
     }
 
     fn level_leaf(&self, leaf: u32) -> &LevelLeaf {
@@ -108,11 +126,12 @@ impl Bound<'_> {
         let farthest = each(|k| most(from(o0, k), from(o1, k)));
         let blend = barrier(1.0 - share);
         let least_square = barrier(blend * barrier(at_origin * square_of(from_eye)));
-        let least_spread = barrier(blend * spread);
+        let least_spread = barrier(blend * most(spread, f32::from_bits(tile.spreads & 0xffff_0000)));
+        let most_spread = most(spread, f32::from_bits(tile.spreads << 16));
         let most_square = barrier(at_origin * square_of(to_eye));
         [
             barrier(least_square + barrier(least_spread * square_of(nearest))),
-            barrier(most_square + barrier(spread * square_of(farthest))),
+            barrier(most_square + barrier(most_spread * square_of(farthest))),
         ]
     }
 
@@ -151,12 +170,12 @@ impl Bound<'_> {
     /// By what rays that start at a hit start off along its normal, beside the rounding of the point: the error of the
     /// level that they take there, which is the coarsest of those that the hit and they may be on.
     fn level_offset(&self, point: Vec3, leaf: u32) -> f32 {
-        let ([at_origin, _, offset, _], eye) = (self.params.levels, self.eye());
+        let ([at_origin, ..], eye) = (self.params.levels, self.eye());
         let square = barrier(at_origin * square_of(each(|k| point[k] - eye[k])));
         let mut level = self.level_leaf(leaf);
         while level.parent != NONE && self.level_leaf(level.parent).error_square <= square {
             level = self.level_leaf(level.parent);
         }
-        barrier(offset * square_root(level.error_square))
+        barrier(LEVEL_OFFSET * square_root(level.error_square))
     }
 }

@@ -5,10 +5,10 @@
 //! All that is known of a ray lies in columns, a number or a word a ray, because it is read and written by vectors.
 
 use super::brick::Best;
-use super::levels::Cone;
+use super::levels::{Cone, spread_of};
 use super::node::{FramedRay, framed_ray};
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, NONE, Ray};
+use crate::kernels::layout::{Hit, NONE, Ray, Surface};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, least, most};
@@ -144,6 +144,8 @@ pub struct Packet {
     pub t_min: Column,
     /// Distances of the hits.
     pub t: Column,
+    /// What cones spread by beyond their pass's, squared.
+    pub spread: Column,
     /// Greatest magnitude of the origin's components.
     pub reach: Column,
     /// Their hits.
@@ -187,6 +189,7 @@ impl Packet {
             along: zero,
             t_min: zero,
             t: zero,
+            spread: zero,
             reach: zero,
             found,
             bounds: Bounds::default(),
@@ -198,9 +201,9 @@ impl Packet {
         (self.count, self.done, self.flip) = (0, 0, flip);
     }
 
-    /// Adds a ray of the octant that knows `hit` and starts from triangle `source`, to at most 63 others.
+    /// Adds a ray of the octant that knows `hit`, to at most 63 others.
     #[inline(always)]
-    pub fn add(&mut self, ray: &Ray, hit: &Hit, source: u32) {
+    pub fn add(&mut self, ray: &Ray, hit: &Hit, surface: &Surface) {
         let i = self.count % RAYS;
         self.count += 1;
         for k in 0..3 {
@@ -208,7 +211,8 @@ impl Packet {
             self.direction[k].0[i] = ray.direction[k];
         }
         (self.t_min.0[i], self.t.0[i]) = (most(ray.t_min, 0.0), hit.t);
-        (self.found.id.0[i], self.found.leaf.0[i], self.found.source.0[i]) = (hit.id, NONE, source);
+        self.spread.0[i] = spread_of(surface);
+        (self.found.id.0[i], self.found.leaf.0[i], self.found.source.0[i]) = (hit.id, NONE, surface.source);
     }
 
     /// Completes the packet: the frames of all rays, and their bounds. Lanes without a ray of their own repeat the
@@ -371,7 +375,7 @@ impl Packet {
             let i = left.trailing_zeros() as usize % RAYS;
             left &= left - 1;
             let at = |columns: &[Column; 3]| [columns[0].0[i], columns[1].0[i], columns[2].0[i]];
-            let cone = bound.cone_of(at(&self.origin), at(&self.direction));
+            let cone = bound.cone_of(at(&self.origin), at(&self.direction), self.spread.0[i]);
             let is_so = match last {
                 Some((before, answer)) if before == cone => answer,
                 _ => ask(&cone),

@@ -231,7 +231,7 @@ fn run_block<I: Isa>(
         packets.packet.clear(groups.octant as u32);
         for &at in places {
             let slot = band.slot(block.tile, at as usize);
-            packets.packet.add(slot.ray, slot.hit, slot.surface.source);
+            packets.packet.add(slot.ray, slot.hit, slot.surface);
         }
         packets.packet.seal(isa);
         kernel.run_packet(isa, &mut task.scratch, &mut packets, block.tile);

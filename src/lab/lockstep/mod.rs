@@ -3,7 +3,8 @@
 //!
 //! Rays that start at hits are within [`Lockstep::bound`] of each other, because WGSL leaves sine, cosine, division and
 //! inverse square root some ulps; the device's are then given to both, so that everything that follows can be compared
-//! exactly: hits, surfaces, lists, what is asked and counted, bit for bit. What is read and added for shading is
+//! exactly: hits, surfaces, lists, what is asked and counted, bit for bit. Widths of their cones are compared and
+//! given likewise. What is read and added for shading is
 //! compared within the bound; before textures are looked up both are given the device's, so that which tiles are asked
 //! for and read can be compared exactly.
 
@@ -14,6 +15,7 @@ use crate::gpu::executor::GpuExecutor;
 use crate::kernels::dispatch::dispatches;
 use crate::kernels::layout::{DvfGrid, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList};
 use crate::kernels::table::Family;
+use crate::kernels::trace::levels::spread_of;
 use crate::kernels::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::secondary::FAMILIES;
@@ -60,6 +62,8 @@ pub enum Defect {
     LampMaps,
     /// Points of fields of visibility lie elsewhere.
     Points,
+    /// Cones of rays that have a width of their own are wider by 1/64.
+    Cones,
 }
 
 /// Both executors.
@@ -72,6 +76,10 @@ pub struct Lockstep {
     tuning: Tuning,
     findings: Arc<Mutex<Findings>>,
 }
+
+/// Greatest difference of widths of cones, relative, squared: a density of directions that a sharp lobe draws is much
+/// more sensitive to roundings than they are.
+const SPREADS: f32 = 1.0 / 1024.0;
 
 impl Findings {
     fn note(&mut self, text: impl FnOnce() -> String) {
@@ -210,6 +218,17 @@ impl Lockstep {
                 findings.numbers("ends of rays", context, 0.0, &[g.t_min, g.t_max], &[c.t_min, c.t_max]);
             }
         }
+        let mut spreads = self.cpu.read_surfaces(pass)?;
+        for (i, (g, c)) in self.gpu.read_surfaces(pass)?.iter().zip(&mut spreads).enumerate() {
+            let is_traced = rays[i].t_min <= rays[i].t_max && own[i].t_min <= own[i].t_max;
+            let wider = if self.defect == Some(Defect::Cones) { 1.0 + 1.0 / 64.0 } else { 1.0 };
+            let [of_gpu, of_cpu] = [spread_of(g), wider * spread_of(c)];
+            if is_traced && (of_gpu > 0.0 || of_cpu > 0.0) {
+                findings.numbers("spreads", context, SPREADS, &[1.0], &[of_cpu / of_gpu]);
+            }
+            c.pending = g.pending;
+        }
+        self.cpu.set_surfaces(pass, spreads);
         own = rays;
         if self.defect == Some(Defect::Rays) {
             own.iter_mut().for_each(|ray| ray.origin[0] += 1.0 / 1024.0);

@@ -18,6 +18,7 @@ use crate::kernels::shade::lamps::unit;
 use crate::kernels::shade::light::{ambient, background};
 use crate::kernels::shade::shade::{Pixels, for_each_pixel, is_traced as is_ray};
 use crate::kernels::table::{atomic, words};
+use crate::kernels::trace::levels::is_pending;
 use crate::kernels::vector::{Vec3, each, most3};
 use crate::math::exact::{
     TriangleHit, barrier, diffprod, divide, length_of, offset_origin, scaled, square_root, surface_point,
@@ -382,7 +383,7 @@ pub fn write(bound: &Bound, tables: &Tables, set: &mut RaySet) {
     let rays = rays.par_iter().zip(hits.par_iter_mut()).zip(&*surfaces).enumerate().with_min_len(RUN);
     rays.for_each(|(index, ((ray, hit), surface))| {
         if first != NONE {
-            let waits = is_traced(ray, hit) && surface.pending != 0;
+            let waits = is_traced(ray, hit) && is_pending(surface);
             note(tables, first, index, waits);
             if waits {
                 hit.t = -1.0;

@@ -26,7 +26,8 @@ fn cities(folder: &Path) -> [PathBuf; 2] {
     })
 }
 
-fn levelled(scene: &Path) -> Arc<SceneFile> {
+/// The scene with its levels in use.
+pub(super) fn levelled(scene: &Path) -> Arc<SceneFile> {
     let mut file = open_scene(scene).expect("the scene").duplicate();
     assert!(!file.resident().levels.is_empty(), "{} has no levels", scene.display());
     file.use_levels();
@@ -35,14 +36,14 @@ fn levelled(scene: &Path) -> Arc<SceneFile> {
 
 /// The tree of levels of a scene without instances, in world units: of each brick and level its box with all below it,
 /// its error, and the level above.
-struct Tree {
-    boxes: Vec<[DVec3; 2]>,
+pub(super) struct Tree {
+    pub boxes: Vec<[DVec3; 2]>,
     errors: Vec<f64>,
     parents: Vec<Option<usize>>,
 }
 
 impl Tree {
-    fn of(resident: &Resident) -> Self {
+    pub(super) fn of(resident: &Resident) -> Self {
         let exact = resident.exact_bricks();
         let step = f64::from(resident.objects[0].step_log2).exp2();
         let corner = |p: [i64; 3]| DVec3::from_array(p.map(|x| x as f64 * step));
@@ -81,24 +82,36 @@ impl Tree {
     }
 }
 
+/// What rays of a pass have met.
+pub(super) struct Met<'a> {
+    pub rays: &'a [Ray],
+    pub hits: &'a [Hit],
+    /// Hits that they start from.
+    pub from: Option<&'a [Hit]>,
+    /// Whether it was asked what they meet, not only if anything.
+    pub closest: bool,
+}
+
 /// What of rays is compared.
-struct Asked<'a> {
-    tree: &'a Tree,
-    file: &'a SceneFile,
-    frame: Frame,
-    eye: DVec3,
-    /// Square of the tolerance times the angle of a pixel, and times what the rays spread by.
-    squares: [f64; 2],
-    truths: HashMap<Vec<u32>, Truth>,
+pub(super) struct Asked<'a> {
+    pub tree: &'a Tree,
+    pub file: &'a SceneFile,
+    pub frame: Frame,
+    pub eye: DVec3,
+    /// Square of the tolerance times the angle of a pixel.
+    pub of_eye: f64,
+    pub truths: HashMap<Vec<u32>, Truth>,
 }
 
 impl Asked<'_> {
-    fn judge(&mut self, rays: &[Ray], hits: &[Hit], from: Option<&[Hit]>, tally: &mut Tally) -> [usize; 2] {
+    /// Judges hits of rays with cones whose angle times the tolerance, squared, is `spread` of a ray's number; how many
+    /// were left out because f32 may take another level, and how many took one.
+    pub(super) fn judge(&mut self, met: &Met, spread: impl Fn(usize) -> f64, tally: &mut Tally) -> [usize; 2] {
         let (mut unsure, mut levels) = (0, 0);
-        for (i, (ray, hit)) in rays.iter().zip(hits).enumerate().filter(|(_, (ray, _))| ray.t_min <= ray.t_max) {
+        let all = met.rays.iter().zip(met.hits).enumerate();
+        for (i, (ray, hit)) in all.filter(|(_, (ray, _))| ray.t_min <= ray.t_max) {
             let at = self.frame.origin + DVec3::from_array(ray.origin.map(f64::from)) * self.frame.unit;
-            let [of_eye, spread] = self.squares;
-            let Some(cut) = self.tree.cut(at, of_eye * (at - self.eye).length_squared(), spread) else {
+            let Some(cut) = self.tree.cut(at, self.of_eye * (at - self.eye).length_squared(), spread(i)) else {
                 unsure += 1;
                 continue;
             };
@@ -109,9 +122,11 @@ impl Asked<'_> {
             let (origin, unit) = (self.frame.origin.to_array(), self.frame.unit);
             let t_max = if ray.t_max > 3e38 { f32::INFINITY } else { ray.t_max };
             let asked = TruthRay::from_f32(origin, unit, ray.origin, ray.direction, ray.t_min, t_max);
-            tally.add(match from {
-                None => judge(truth, &asked, (hit.id != NONE).then_some((hit.id, f64::from(hit.t)))),
-                Some(from) => judge_any(truth, &asked.excluding(from[i].id), hit.id != NONE),
+            let asked = met.from.map_or(asked, |from| asked.excluding(from[i].id));
+            tally.add(if met.closest {
+                judge(truth, &asked, (hit.id != NONE).then_some((hit.id, f64::from(hit.t))))
+            } else {
+                judge_any(truth, &asked, hit.id != NONE)
             });
         }
         [unsure, levels]
@@ -146,23 +161,27 @@ fn rays_meet_what_their_cones_select() {
             file: &file,
             frame: Frame::near(file.resident(), camera.position),
             eye: camera.position,
-            squares: [pixel, pixel].map(|angle| (pixels * angle).powi(2)),
+            of_eye: (pixels * pixel).powi(2),
             truths: HashMap::new(),
         };
         let mut tally = Tally::default();
-        let [unsure, levels] = asked.judge(&primary.0, &primary.1, None, &mut tally);
+        let of_camera = Met { rays: &primary.0, hits: &primary.1, from: None, closest: true };
+        let own = asked.of_eye;
+        let [unsure, levels] = asked.judge(&of_camera, |_| own, &mut tally);
         println!("{schedule}, camera rays: {tally}, {unsure} not sure");
         let rays = primary.0.len();
         assert!(tally.mismatches == 0 && unsure * 4 < rays && levels * 2 > rays, "{tally}, {unsure}, {levels}");
         let mut tally = Tally::default();
-        asked.squares[1] = (pixels * pixel.max(sun)).powi(2);
-        let [unsure, levels] = asked.judge(&shadow.0, &shadow.1, Some(&primary.1), &mut tally);
+        let of_sun = Met { rays: &shadow.0, hits: &shadow.1, from: Some(&primary.1), closest: false };
+        let own = (pixels * pixel.max(sun)).powi(2);
+        let [unsure, levels] = asked.judge(&of_sun, |_| own, &mut tally);
         println!("{schedule}, shadow rays: {tally}, {unsure} not sure, {} cuts", asked.truths.len());
         assert!(tally.mismatches == 0 && unsure * 4 < rays && levels > 100, "{tally}, {unsure}, {levels}");
         // The control: what a cone half as wide selects is something else.
         let mut control = Tally::default();
-        asked.squares = [pixel, pixel].map(|angle| (pixels * angle / 2.0).powi(2));
-        asked.judge(&primary.0, &primary.1, None, &mut control);
+        asked.of_eye /= 4.0;
+        let own = asked.of_eye;
+        asked.judge(&of_camera, |_| own, &mut control);
         assert!(control.mismatches > 20, "{control}");
     }
 }

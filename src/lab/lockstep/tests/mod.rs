@@ -363,7 +363,7 @@ fn twins_agree_with_their_kernels() {
         Variant { schedule: Schedule::Demand, ..asked(Against::All, Interpolation::Positions, 40_000) },
         Variant { everything_fits: true, ..asked(Against::All, Interpolation::Directions, 1 << 30) },
     ];
-    let selecting = |pixels, blend| Variant { lod: Lod { pixels, blend, angle: 0.0 }, ..VARIANT };
+    let selecting = |pixels, blend| Variant { lod: Lod { pixels, blend, ..Lod::default() }, ..VARIANT };
     let by_levels = [
         selecting(4.0, false),
         selecting(0.0, false),
@@ -426,6 +426,7 @@ fn twins_agree_with_their_kernels() {
 fn a_twin_that_differs_is_noticed() {
     let Some(device) = device() else { return };
     let (opaque, plain, tiled) = (Arc::new(probe::scene().unwrap()), textured(false), textured(true));
+    let levelled = with_levels();
     let cases = [
         (Defect::Rays, &plain, "hits"),
         (Defect::Seed, &opaque, "directions"),
@@ -437,6 +438,7 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::Fields, &plain, "distances"),
         (Defect::LampMaps, &plain, "radiance"),
         (Defect::Points, &plain, "rays of points"),
+        (Defect::Cones, &levelled, "spreads"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
@@ -444,7 +446,8 @@ fn a_twin_that_differs_is_noticed() {
         let field = (defect == Defect::Fields).then_some(64);
         // Points of the set of Hammersley have no seed but for how their rays are turned.
         let dvf = (defect == Defect::Points).then(|| visibility(8));
-        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, dvf, ..VARIANT };
+        let lod = Lod { pixels: if defect == Defect::Cones { 4.0 } else { 0.0 }, ..Lod::default() };
+        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, dvf, lod, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();
         assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);

@@ -133,7 +133,7 @@ pub fn with_fields(scene: Arc<SceneFile>, bits: u32) -> Arc<SceneFile> {
     Arc::new(SceneFile::from_bytes("fields", std::fs::read(&path).unwrap()).unwrap())
 }
 
-/// A hilly plain with copies of a part of it, and levels of detail of all.
+/// A hilly plain with copies of a part of it, and levels of detail of all. It glows and reflects.
 pub fn with_levels() -> Arc<SceneFile> {
     let hills = |side: u32, size: f64| {
         let mut part = Primitive::default();
@@ -156,7 +156,15 @@ pub fn with_levels() -> Arc<SceneFile> {
         meshes: vec![hills(40, 12.0), hills(24, 2.0)],
         placements: vec![place(0, 0.0, 1.0), place(1, 1.0, 1.0), place(1, 5.0, -1.5)],
         sources: vec![bricks::Source { name: "t".into(), bytes: 0, hash: "2d06800538d394c2".into() }],
-        materials: vec![bricks::Material { base_color: [0.7, 0.6, 0.5, 1.0], ..bricks::Material::DIFFUSE }],
+        materials: vec![bricks::Material {
+            base_color: [0.7, 0.6, 0.5, 1.0],
+            metallic: 0.8,
+            roughness: 0.6,
+            emission: [0.3, 0.2, 0.1],
+            clearcoat: 0.5,
+            clearcoat_roughness: 0.3,
+            ..bricks::Material::DIFFUSE
+        }],
         ..SourceScene::default()
     };
     let folder = tempfile::tempdir().unwrap();
