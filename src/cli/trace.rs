@@ -3,10 +3,11 @@
 use super::cached;
 use super::options::args::TraceArgs;
 use crate::cli::output::{print_json, warn};
+use crate::kernels::Lod;
 use crate::kernels::layout::NONE;
 use crate::output::npy::{self, Rays};
-use crate::session::trace::{check, for_rays, trace};
-use crate::session::{Opened, open_scene};
+use crate::session::trace::{Traced, check, for_rays, trace};
+use crate::session::{Opened, levelled, open_scene};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::progress::Progress;
 
@@ -21,11 +22,22 @@ pub fn run(args: &TraceArgs) -> Result<()> {
         check(ray).with_context(|| format!("{}: row {row}", args.rays.display()))?;
     }
     let scene = &cached::scene(&args.scene)?;
-    let mut opened = Opened::open(open_scene(scene)?, scene, &settings)?;
-    warn(std::mem::take(&mut opened.warnings));
+    let (file, without_levels) = levelled(&open_scene(scene)?, settings.lod);
+    let mut opened = Opened::open(file, scene, &settings)?;
+    warn(std::mem::take(&mut opened.warnings).into_iter().chain(without_levels));
+    if settings.lod == 0.0 && args.spread.is_some() {
+        warn(["--spread has no effect: --lod is 0, which is exact"]);
+    }
     let progress = Progress::new();
     progress.phase("rays", rays.len() as u64);
-    let traced = trace(&mut opened.traced(), &rays, args.any, &mut |rays| progress.advance(rays));
+    let lod = Lod {
+        pixels: settings.lod as f32,
+        angle: args.spread.unwrap_or_default() as f32,
+        given: true,
+        ..Lod::default()
+    };
+    let mut traced = Traced { lod, ..opened.traced() };
+    let traced = trace(&mut traced, &rays, args.any, &mut |rays| progress.advance(rays));
     let (hits, stats) = traced.with_context(|| scene.display().to_string())?;
     progress.finish();
     if let Some(row) = hits.iter().position(|hit| hit.t.is_nan() || hit.u.is_nan() || hit.v.is_nan()) {

@@ -116,6 +116,8 @@ pub struct Lod {
     pub blend: bool,
     /// Angle of a pixel, radians.
     pub angle: f32,
+    /// Rays are given: each starts without width, wherever that is.
+    pub given: bool,
 }
 
 /// Share of a squared width that blending takes off at most: levels blend over a factor of 2 in distance.
@@ -127,7 +129,7 @@ const AROUND: f32 = 0.18;
 impl Lod {
     /// [`Params::levels`] of the rays of a pass, under a sun with such a tangent of its angular radius.
     pub fn params(&self, pass: Pass, sun_radius: f32) -> [f32; 4] {
-        let Self { pixels, blend, angle } = *self;
+        let Self { pixels, blend, angle, given } = *self;
         if pixels == 0.0 {
             return [0.0; 4];
         }
@@ -138,7 +140,12 @@ impl Lod {
             Pass::Occlusion(_) | Pass::Diffuse(_) => AROUND,
         };
         let square = |angle: f32| (pixels * angle) * (pixels * angle);
-        [square(angle), square(angle.max(spread)), pixels * pixels, if blend { BLEND } else { 0.0 }]
+        [
+            if given { 0.0 } else { square(angle) },
+            square(angle.max(spread)),
+            pixels * pixels,
+            if blend { BLEND } else { 0.0 },
+        ]
     }
 }
 

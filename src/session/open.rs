@@ -10,6 +10,7 @@ use super::trace::{self, Traced};
 use super::viewpoint;
 use crate::counters::Record;
 use crate::frame::{Accumulation, Captures, Engine, FrameWatch, Light, Pixels, RenderError, Renderer};
+use crate::kernels::Lod;
 use crate::output::npy::{Hit, Ray};
 use crate::output::{exr, png, srgb};
 use crate::picture::denoise::Resolve;
@@ -307,7 +308,8 @@ impl Session {
         let Engine { scene, executor, cache, settings, .. } = &mut self.renderer.engine;
         // What frames may leave out given rays must find.
         let threshold = std::mem::take(&mut executor.tuning().threshold);
-        let mut traced = Traced { scene, executor: &mut **executor, cache, schedule: settings.schedule, most };
+        let mut traced =
+            Traced { scene, executor: &mut **executor, cache, schedule: settings.schedule, most, lod: Lod::default() };
         let found = trace::trace(&mut traced, rays, any, &mut |_| ());
         self.renderer.executor.tuning().threshold = threshold;
         let (hits, _) = found.with_context(|| self.file.display().to_string())?;
@@ -360,7 +362,7 @@ fn check_data(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()>
 }
 
 /// The scene with its levels of detail in use, if they are asked for; what a person should know where there are none.
-fn levelled(scene: &Arc<SceneFile>, lod: f64) -> (Arc<SceneFile>, Option<String>) {
+pub(crate) fn levelled(scene: &Arc<SceneFile>, lod: f64) -> (Arc<SceneFile>, Option<String>) {
     if lod == 0.0 {
         return (scene.clone(), None);
     }

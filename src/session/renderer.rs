@@ -91,7 +91,7 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         guides: settings.denoise || settings.taa,
         coverage: matches!(settings.exposure, Exposure::Auto { .. }),
         taa: settings.taa,
-        lod: Lod { pixels: settings.lod as f32, blend: settings.lod_blend, angle: 0.0 },
+        lod: Lod { pixels: settings.lod as f32, blend: settings.lod_blend, ..Lod::default() },
         correct_one_in: settings.lod_correct.unwrap_or(0),
         only_chosen: false,
         tile_bytes: settings.interactive,

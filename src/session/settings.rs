@@ -436,5 +436,16 @@ impl Settings {
 }
 
 /// The settings that count where rays are given.
-pub const TRACE: [&str; 10] =
-    ["cache", "host_cache", "schedule", "tile", "workers", "evict", "requests_out", "count", "adapter", "opaque"];
+pub const TRACE: [&str; 11] = [
+    "cache",
+    "host_cache",
+    "schedule",
+    "tile",
+    "workers",
+    "evict",
+    "requests_out",
+    "count",
+    "adapter",
+    "opaque",
+    "lod",
+];

@@ -9,7 +9,7 @@ use super::opened::Opened;
 use crate::counters::Counters;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{NONE, Params};
-use crate::kernels::{Directions, Extent, FrameExecutor, View, layout};
+use crate::kernels::{Directions, Extent, FrameExecutor, Lod, View, layout};
 use crate::output::npy::{Hit, Ray};
 use crate::schedule::cache::Cache;
 use crate::schedule::{self, Lamp, Pass, Step, Tracer, Tracing, attributes};
@@ -42,6 +42,8 @@ pub struct Traced<'a> {
     pub schedule: Schedule,
     /// Most rays of a dispatch.
     pub most: usize,
+    /// What levels of detail are selected by, in a scene that has them in use.
+    pub lod: Lod,
 }
 
 impl Opened {
@@ -53,6 +55,7 @@ impl Opened {
             cache: &mut self.cache,
             schedule: self.schedule,
             most: self.extent.rays(),
+            lod: Lod::default(),
         }
     }
 }
@@ -92,7 +95,8 @@ pub struct Found {
 /// have been traced since it was told last.
 ///
 /// Rays are rounded to f32 relative to a point near their origin, or near the scene if that is far away, and what they
-/// hit is decided so. `t` and the normal are then those of the given ray and the triangle in f64.
+/// hit is decided so. `t` and the normal are then those of the given ray and the triangle in f64. The cone that levels
+/// are selected by starts where [`approach`] has the ray start: of a ray from far away it is narrower than it might be.
 ///
 /// # Errors
 /// A damaged brick, or the device's.
@@ -189,7 +193,8 @@ pub fn trace_device(
 ) -> Result<Vec<layout::Hit>> {
     let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
     let (executor, cache) = (&mut *traced.executor, &mut *traced.cache);
-    executor.begin_frame(&View { frame: *frame, params: Params::default(), directions: Directions::default() });
+    let directions = Directions { lod: traced.lod, ..Directions::default() };
+    executor.begin_frame(&View { frame: *frame, params: Params::default(), directions });
     executor.set_rays(pass, rays);
     cache.begin_pass("trace", 0);
     let mut tracer = Tracer { executor: &mut *executor, cache, pass, tracing: &Tracing::default(), stats };

@@ -488,6 +488,13 @@ pub struct TraceArgs {
     /// Seen from its tip, vertices 0, 1, 2 of the source file run counter-clockwise. It is zero on a miss.
     #[arg(long, conflicts_with = "any")]
     pub normals: bool,
+    /// With --lod: the angle of the pixel that each ray stands for, in radians, above 0 to 1 [default: none]
+    ///
+    /// At a distance of D world units from a ray's origin a pixel is RADIANS * D wide. A camera of H rows with a
+    /// vertical angle of view FOV has about FOV / H. A hit on a level of detail has the distance and normal of the
+    /// level's triangle, u and v weight its vertices, and triangle is one of those of the source that it stands for
+    #[arg(long, value_name = "RADIANS", allow_negative_numbers = true, value_parser = spread)]
+    pub spread: Option<f64>,
     /// Print statistics as a JSON object
     #[arg(long)]
     pub json: bool,
@@ -509,8 +516,20 @@ impl TraceArgs {
             let flag = entry.field.flag();
             return Err(Usage(format!("--{flag} is for walk; leave it out of trace")).into());
         }
-        self.given.over(self.file.as_deref())
+        let settings = self.given.over(self.file.as_deref())?;
+        if settings.lod > 0.0 && self.spread.is_none() {
+            let text = "--lod needs --spread RADIANS: rays of a file have no pixels; give the angle that each stands \
+                        for, such as --spread 0.001";
+            return Err(Usage(text.into()).into());
+        }
+        Ok(settings)
     }
+}
+
+/// The angle of a pixel.
+fn spread(text: &str) -> Result<f64, String> {
+    let found = text.parse().ok().filter(|&angle: &f64| angle > 0.0 && angle <= 1.0);
+    found.ok_or_else(|| "it must be an angle in radians, above 0 and at most 1, such as 0.001".into())
 }
 
 /// What the columns of `replay` are.

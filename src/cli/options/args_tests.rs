@@ -212,6 +212,29 @@ fn trace_refuses_what_is_for_walks() {
 }
 
 #[test]
+fn levels_of_given_rays_need_the_angle_of_a_pixel() {
+    let line = |options: &str| format!("trace s.bricks --rays r.npy -o h.npy {options}");
+    let of = |options: &str| match parse(&line(options)).unwrap() {
+        Command::Trace(args) => args,
+        other => panic!("{other:?}"),
+    };
+    let args = of("--lod 1.5 --spread 0.002");
+    assert_eq!((args.settings().unwrap().lod, args.spread), (1.5, Some(0.002)));
+    assert_eq!(of("").settings().unwrap().lod, 0.0);
+    assert!(of("--lod 0").settings().is_ok() && of("--lod 0 --spread 1").settings().is_ok());
+    assert!(of("--lod 1").settings().unwrap_err().to_string().contains("--spread"));
+    for bad in ["--spread 0", "--spread -0.1", "--spread 1.01", "--spread nan", "--spread inf", "--spread wide"] {
+        let error = parse(&line(&format!("--lod 1 {bad}"))).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{bad}");
+        assert!(error.to_string().contains("radians"), "{bad}: {error}");
+    }
+    for bad in ["--lod -1", "--lod 1025", "--lod nan", "--lod far"] {
+        let error = parse(&line(&format!("{bad} --spread 0.01"))).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{bad}");
+    }
+}
+
+#[test]
 fn options_of_other_commands_arrive() {
     let Command::Convert(c) =
         parse("convert a.gltf b.glb -o s.bricks --brick-triangles 4K --threads 2 --lattice -12 --drop-non-finite")

@@ -100,10 +100,87 @@ fn normals_are_a_field_of_their_own() {
     assert_eq!(refused.status.code(), Some(2), "normals of no hits are wrong usage");
 }
 
+/// A hilly plain of two triangles a square.
+fn hills(side: usize) -> String {
+    let mut text = String::new();
+    for i in 0..side * side {
+        let (x, y) = ((i % side) as f64, (i / side) as f64);
+        text += &format!("v {x} {y} {}\n", 0.2 * (0.9 * x).sin() * (0.7 * y).cos() + 0.02 * (i * 37 % 11) as f64);
+    }
+    for i in (1..=side * (side - 1)).filter(|i| i % side != 0) {
+        text += &format!("f {} {} {}\nf {} {} {}\n", i, i + 1, i + side, i + 1, i + side + 1, i + side);
+    }
+    text
+}
+
+#[test]
+fn hits_of_levels_are_near_and_are_asked_for() {
+    let folder = folder();
+    let folder = folder.path();
+    let scene = converted(folder, &hills(60), "--brick-triangles 100 --lod on");
+    // Straight down, from high above.
+    let ray = |i: u32| [1.0 + f64::from(i % 50) * 1.13, 1.0 + f64::from(i / 50) * 1.09, 70.0, 0.0, 0.0, -1.0];
+    let rays: Vec<u8> = (0..2500).flat_map(ray).flat_map(f64::to_le_bytes).collect();
+    array(&folder.join("rays.npy"), "<f8", "(2500, 6)", &rays);
+    let trace = |options: &str| trace(folder, &scene, &options.split_whitespace().collect::<Vec<_>>()).1;
+    let exact = trace("");
+    assert!(trace("--lod 0") == exact && trace("--lod 0 --spread 0.5") == exact);
+    let t = |row: &[u8]| f64::from_le_bytes(row[..8].try_into().expect("eight"));
+    let far = |hits: &[u8]| {
+        let apart = hits.chunks_exact(20).zip(exact.chunks_exact(20)).map(|(a, b)| (t(a) - t(b)).abs());
+        let (met, missed): (Vec<f64>, Vec<f64>) = apart.partition(|apart| apart.is_finite());
+        assert!(missed.len() < 25, "{} rays of 2500 pass through", missed.len());
+        met.into_iter().fold(0.0, f64::max)
+    };
+    let id = |row: &[u8]| u32::from_le_bytes(row[8..12].try_into().expect("four"));
+    let ids = |hits: &[u8]| hits.chunks_exact(20).all(|row| id(row) < 6962 || t(row).is_infinite());
+    let (fine, coarse) = (trace("--lod 1 --spread 0.003"), trace("--lod 2 --spread 0.01"));
+    assert!(fine != exact && coarse != fine);
+    // A level's error is the distance of nearly all of it, not of all.
+    let (of_fine, of_coarse) = (far(&fine), far(&coarse));
+    assert!(of_fine > 0.0 && of_fine < 0.6 && of_fine <= of_coarse && of_coarse < 2.0, "{of_fine}, {of_coarse}");
+    assert!(ids(&fine) && ids(&coarse), "triangles of the source");
+    // The width goes by the tolerance times the angle, and neither by caches nor by schedules.
+    assert!(trace("--lod 2 --spread 0.01 --cache 10%") == coarse);
+    assert!(trace("--lod 2 --spread 0.01 --cache 10% --schedule demand --tile 8") == coarse);
+    assert!(trace("--lod 4 --spread 0.005") == coarse);
+    let any: Vec<u8> = coarse.chunks_exact(20).map(|row| u8::from(t(row).is_finite())).collect();
+    assert!(trace("--lod 2 --spread 0.01 --any") == any);
+}
+
+#[test]
+fn levels_that_nothing_asks_for_are_said() {
+    let folder = folder();
+    let folder = folder.path();
+    let scene = converted(folder, SQUARE, "");
+    let rays = folder.join("rays.npy");
+    array(&rays, "<f8", "(6, 6)", &numbers(6).iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
+    let run = |options: &str| {
+        let words = ["trace".into(), scene.clone(), "--rays".into(), rays.clone(), "-o".into(), folder.join("x.npy")];
+        let done = brickwalk(words.into_iter().chain(options.split_whitespace().map(PathBuf::from)));
+        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    let (code, said) = run("--lod 1");
+    assert!(code == Some(2) && said.contains("--lod needs --spread RADIANS"), "{said}");
+    let (code, said) = run("--lod 1 --spread 0.001");
+    assert!(code == Some(0) && said.contains("the scene has no levels of detail"), "{said}");
+    let (code, said) = run("--spread 0.001");
+    assert!(code == Some(0) && said.contains("--spread has no effect"), "{said}");
+    let (code, said) = run("--lod 1 --spread 2");
+    assert!(code == Some(2) && said.contains("an angle in radians, above 0 and at most 1"), "{said}");
+}
+
 #[test]
 fn help_says_what_u_and_v_weight() {
     let help = succeed(["trace", "--help"]).split_whitespace().collect::<Vec<_>>().join(" ");
-    for says in ["u weights vertex 1 and v vertex 2", "order of the source file", "(N, 8) or (N, 6)", "--opaque"] {
+    for says in [
+        "u weights vertex 1 and v vertex 2",
+        "order of the source file",
+        "(N, 8) or (N, 6)",
+        "--opaque",
+        "--lod",
+        "in radians, above 0",
+    ] {
         assert!(help.contains(says), "{says}: {help}");
     }
 }

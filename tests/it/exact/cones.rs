@@ -3,13 +3,16 @@
 use super::levels::{Asked, Met, Tree, levelled};
 use crate::common::{self, folder, walk};
 use bricks::SceneFile;
+use brickwalk::kernels::Lod;
 use brickwalk::kernels::frame::Frame;
-use brickwalk::kernels::layout::{self, GBuffer, Hit, Surface};
+use brickwalk::kernels::layout::{self, GBuffer, Hit, NONE, Surface};
+use brickwalk::output::npy;
 use brickwalk::reference::Tally;
 use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::Pass;
 use brickwalk::session::Opened;
 use brickwalk::session::renderer::renderer;
+use brickwalk::session::trace::{Traced, device_ray, for_rays, trace};
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_scenes::{Settings as SceneSettings, generate, write_paths};
@@ -173,5 +176,72 @@ fn pictures_depend_on_no_more_than_cones() {
         let exact = render(&without, &format!("{adapter}-without"), &format!("--adapter {adapter} --cache 30%"));
         assert!(with("--lod 0 --cache 30%") == exact, "{adapter}: levels in the file changed an exact picture");
         assert!(first != exact, "{adapter}: levels changed nothing");
+    }
+}
+
+#[test]
+fn given_rays_widen_by_the_angle_they_are_given() {
+    let folder = folder();
+    let [scene, _] = metal_cities(folder.path());
+    let file = levelled(&scene);
+    let tree = Tree::of(file.resident());
+    let (tolerance, angle) = (2.0, 0.004);
+    let resident = file.resident();
+    let manifest = &resident.manifest;
+    let (min, max) = (DVec3::from(manifest.min), DVec3::from(manifest.max));
+    // From above the scene and from within it.
+    let given: Vec<npy::Ray> = (0..1500i32)
+        .map(|i| {
+            let part = |step: f64| (f64::from(i) * step).fract();
+            // Many share an origin, and so what they take.
+            let place = |step: f64| (f64::from(i % 25) * step).fract();
+            let origin = min + (max - min) * DVec3::new(place(0.618), 0.6 + place(0.37), place(0.755));
+            // Toward bricks, by lengths of a direction of all sizes.
+            let [low, high] = tree.boxes[i as usize * 7 % resident.exact_bricks()];
+            let target = low + (high - low) * DVec3::new(part(0.45), part(0.81), part(0.29));
+            let direction = (target - origin) * (0.001 + part(0.57));
+            npy::Ray {
+                origin: origin.to_array(),
+                direction: direction.to_array(),
+                t_min: 0.0,
+                t_max: if i % 9 == 0 { 2.0 } else { f64::INFINITY },
+            }
+        })
+        .collect();
+    for schedule in ["chc", "demand"] {
+        let settings = for_rays(&common::settings(&format!("--lod {tolerance} --schedule {schedule} --cache 40%")));
+        let mut opened = Opened::open(file.clone(), &scene, &settings).expect("a session");
+        let lod = Lod { pixels: tolerance as f32, angle: angle as f32, given: true, ..Lod::default() };
+        let mut trace_all = |lod: Lod, any: bool| {
+            let mut traced = Traced { lod, ..opened.traced() };
+            trace(&mut traced, &given, any, &mut |_| ()).expect("hits").0
+        };
+        let (closest, any) = (trace_all(lod, false), trace_all(lod, true));
+        assert!(closest.iter().zip(&any).all(|(c, a)| (c.triangle == NONE) == (a.triangle == NONE)));
+        let (frame, eye) = (Frame::near(resident, min), min);
+        let mut asked = Asked { tree: &tree, file: &file, frame, eye, of_eye: 0.0, truths: HashMap::new() };
+        let mut judge = |angle: f64, hits: &[npy::Hit]| {
+            let (mut tally, mut counts) = (Tally::default(), [0; 2]);
+            for (ray, hit) in given.iter().zip(hits) {
+                let frame = Frame::near(resident, DVec3::from_array(ray.origin));
+                let device = device_ray(ray, &frame);
+                let t = if hit.t.is_finite() { (hit.t / device.t_scale) as f32 } else { f32::MAX };
+                let found = Hit { t, id: hit.triangle, u: hit.u, v: hit.v };
+                (asked.frame, asked.eye) = (frame, frame.origin);
+                let met = Met { rays: &[device.ray], hits: &[found], from: None, closest: true };
+                let own = asked.judge(&met, |_| (tolerance * angle).powi(2), &mut tally);
+                counts = [counts[0] + own[0], counts[1] + own[1]];
+            }
+            (tally, counts)
+        };
+        let (tally, [unsure, levels]) = judge(angle, &closest);
+        println!("{schedule}: {tally}, {unsure} not sure, {levels} of levels");
+        assert!(tally.mismatches == 0 && unsure * 4 < given.len() && levels > 500, "{tally}, {unsure}, {levels}");
+        // The controls: a quarter of the angle selects something else, and no tolerance what is exact.
+        let (control, _) = judge(angle / 4.0, &closest);
+        assert!(control.mismatches > 20, "{control}");
+        let exact = trace_all(Lod::default(), false);
+        let (tally, _) = judge(0.0, &exact);
+        assert!(tally.mismatches == 0 && exact.iter().zip(&closest).any(|(e, c)| e.triangle != c.triangle), "{tally}");
     }
 }

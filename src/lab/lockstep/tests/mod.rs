@@ -101,7 +101,7 @@ const VARIANT: Variant = Variant {
     method: Method::Exact,
     displacement: None,
     dvf: None,
-    lod: Lod { pixels: 0.0, blend: false, angle: 0.0 },
+    lod: Lod { pixels: 0.0, blend: false, angle: 0.0, given: false },
 };
 
 fn effects() -> Effects {
