@@ -18,8 +18,7 @@ pub mod trace;
 mod viewpoint;
 
 pub use crate::output::npy::{Hit, Ray};
-pub(crate) use open::levelled;
-pub use open::{Frame, Session, Watch, developed};
+pub use open::{Frame, Session, Watch, developed, levelled};
 pub use opened::{Opened, open_scene};
 pub use pictures::{Pictures, Preview};
 pub use settings::{Settings, TRACE};

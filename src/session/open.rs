@@ -362,7 +362,7 @@ fn check_data(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()>
 }
 
 /// The scene with its levels of detail in use, if they are asked for; what a person should know where there are none.
-pub(crate) fn levelled(scene: &Arc<SceneFile>, lod: f64) -> (Arc<SceneFile>, Option<String>) {
+pub fn levelled(scene: &Arc<SceneFile>, lod: f64) -> (Arc<SceneFile>, Option<String>) {
     if lod == 0.0 {
         return (scene.clone(), None);
     }
