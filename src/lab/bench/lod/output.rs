@@ -20,7 +20,8 @@ const READING: &str = "tau: the tolerance, pixels; exact: without levels. Scenes
 const PICTURES: &str = "The first frame. Silhouettes: RMSE over pixels within one of an edge of the exact picture. \
                         Sees through: rays through centres that exactly hit something and with levels nothing, or what \
                         lies behind the plane of the exact hit by more than the level's bound and a pixel; holes: \
-                        those of them away from silhouettes; hits nothing: those that nothing stops; next pixel's: the share that exact rays of the next pixel \
+                        those of them away from silhouettes; hits nothing: those that nothing stops; next \
+                        pixel's: the share that exact rays of the next pixel \
                         would see through, bounds left out. Triangles and nodes: tested and visited, of all rays.";
 const WALKS: &str = "Cold: loaded by the first frame, with an empty cache. Steady: loaded by a later frame. All: a \
                      frame's mean of both. The cache holds a share of all bricks without levels, with levels as many \
