@@ -24,7 +24,8 @@ struct Surface {          // Where a hit lies, for the rays that start from it.
     area: f32,
     source: u32,          // id of the triangle that the ray starts from, which it does not meet; NONE: of none
     // bit 0 is 0 where the ray has asked from the root, for nothing: it wants nothing else in its pass; the other bits
-    // are those of an f32, without its sign: the square of what its cone spreads by beyond its pass's (levels.wgsl)
+    // are those of an f32 below 2, without its sign: the square of what its cone spreads by beyond its pass's
+    // (levels.wgsl); bit 31 is PENDING_MISSING
     pending: u32,
     emitter: u32,         // of rays to emitters: theirs; of rays to the environment: the number of their candidate
 }
@@ -77,6 +78,10 @@ struct PairDemand {       // what the rays of a tile still ask of a leaf
     rays: atomic<u32>,    // that ask for the leaf's brick
     nearest: atomic<u32>, // bits of the least entry distance
 }
+
+// Bit of pending, after rays have asked for what stands in: some of what they would enter is missing, and nothing
+// stands in for it. No cone spreads so much that it needs the bit.
+const PENDING_MISSING: u32 = 0x80000000u;
 
 const STATE_GEOMETRY: u32 = 1u;    // geometry is resident
 const STATE_DONE: u32 = 2u;        // every ray that wanted it has been intersected with it in this pass

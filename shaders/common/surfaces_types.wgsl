@@ -76,6 +76,7 @@ const MATERIAL_DOUBLE_SIDED: u32 = 4u; // both sides are drawn
 const MATERIAL_UNLIT: u32 = 8u;    // it shows its base colour, whatever the light
 const GBUFFER_READ: u32 = 1u;      // attributes are read
 const GBUFFER_WAITS: u32 = 62u;    // bits of textures that have still to be looked up, the first is that of texture 0
+const GBUFFER_COARSER: u32 = 64u;  // a coarser level of a texture was looked up
 const GBUFFER_FIRST: u32 = 1u;     // bit of texture 0 among GBUFFER_WAITS
 const BASE_COLOR: u32 = 0u;        // textures of a material, by number
 const NORMAL: u32 = 1u;            // its normal texture

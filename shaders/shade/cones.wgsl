@@ -5,10 +5,12 @@
 const RAYS_AROUND: f32 = 100.0;
 // Square of the angle of one of them that is cosine-weighted, along the normal: pi / 100. No cone is wider.
 const WIDEST: f32 = 0.031415927;
+// What no square exceeds whatever the tolerance: `pending` has room for no more.
+const MOST_SPREAD: f32 = 1.0;
 
 // Has the cone of a ray that was just started spread by an angle, given squared.
 fn widen(ray: u32, square: f32) {
-    surfaces[ray].pending |= bitcast<u32>(params.levels.z * min(square, WIDEST)) << 1u;
+    surfaces[ray].pending |= bitcast<u32>(min(params.levels.z * min(square, WIDEST), MOST_SPREAD)) << 1u;
 }
 
 // Of a ray drawn by a density over solid angles, from a lobe with the square `alpha` of a roughness: the solid angle

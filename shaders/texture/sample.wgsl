@@ -120,6 +120,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     if is_coarser {
         atomicAdd(&counters[COUNTER_UNRESOLVED], 1u);
+        g.state |= GBUFFER_COARSER;
     }
     gbuffer[index] = g;
 }

@@ -118,6 +118,43 @@ fn tile_may_take(tile: TileBounds, leaf: u32) -> bool {
     return parent == NONE || level_leaves[parent].error_square > tile_widths(tile, parent).x;
 }
 
+// In frames that may load so much only, leaves are marked by the signs of their errors: levels below which something
+// is missing, and all that is below these. A marked level suffices for every ray, so that the topmost stands in.
+fn is_marked(leaf: u32) -> bool {
+    return (bitcast<u32>(level_leaves[leaf].error_square) >> 31u) != 0u;
+}
+
+// Whether a level would suffice if nothing were missing.
+fn would_suffice(cone: Cone, leaf: u32) -> bool {
+    return abs(level_leaves[leaf].error_square) <= width_square(cone, leaf);
+}
+
+// Whether the ray would take a leaf.
+fn would_take(cone: Cone, leaf: u32) -> bool {
+    if !would_suffice(cone, leaf) {
+        return false;
+    }
+    let parent = level_leaves[leaf].parent;
+    return parent == NONE || !would_suffice(cone, parent);
+}
+
+// Whether a level that the ray would take, or one above it, stands for all below a node of the wide top level.
+fn would_be_stood_for_wide(cone: Cone, node: u32) -> bool {
+    let level = level_nodes[params.top_count + node];
+    return level != NONE && would_suffice(cone, level);
+}
+
+// The leaf that stands in for one that the ray would take: itself where nothing is marked above it.
+fn stand_in_of(leaf: u32) -> u32 {
+    var level = leaf;
+    var parent = level_leaves[level].parent;
+    while parent != NONE && is_marked(parent) {
+        level = parent;
+        parent = level_leaves[level].parent;
+    }
+    return level;
+}
+
 // By what rays that start at a hit start off along its normal, beside the rounding of the point: the error of the level
 // that they take there, which is the coarsest of those that the hit and they may be on.
 fn level_offset(point: vec3<f32>, leaf: u32) -> f32 {
@@ -128,5 +165,5 @@ fn level_offset(point: vec3<f32>, leaf: u32) -> f32 {
         level = parent;
         parent = level_leaves[level].parent;
     }
-    return barrier(LEVEL_OFFSET * square_root(level_leaves[level].error_square));
+    return barrier(LEVEL_OFFSET * square_root(abs(level_leaves[level].error_square)));
 }

@@ -79,6 +79,7 @@ mod tests {
             normal: &normal,
             triangle: &ids,
             albedo: &albedo,
+            state: None,
         };
         exr::write(&a, &aovs).unwrap();
         let mut other = ids.clone();

@@ -22,7 +22,7 @@ pub fn run(args: &TraceArgs) -> Result<()> {
         check(ray).with_context(|| format!("{}: row {row}", args.rays.display()))?;
     }
     let scene = &cached::scene(&args.scene)?;
-    let (file, without_levels) = levelled(&open_scene(scene)?, settings.lod);
+    let (file, without_levels) = levelled(&open_scene(scene)?, &settings);
     let mut opened = Opened::open(file, scene, &settings)?;
     warn(std::mem::take(&mut opened.warnings).into_iter().chain(without_levels));
     if settings.lod == 0.0 && args.spread.is_some() {

@@ -6,7 +6,7 @@ use serde::ser::SerializeMap;
 
 counters! {
     /// Schedules that the effect's passes were traced by, with `+` between them, the first used first: `chc`, `demand`,
-    /// `plain`, `plain-bvh2`. Empty where nothing was traced.
+    /// `plain`, `plain-bvh2`, `cut` of frames with a budget. Empty where nothing was traced.
     schedule: Names ["name"] names;
     /// Rays generated: `rays_traced` + `rays_answered`. A ray with an empty interval is none.
     rays: u64 ["rays"] = |c| c.rays_traced + c.rays_answered;
@@ -135,8 +135,13 @@ counters! {
     /// Pixels of which a ray of the effect hit something else than in the exact rendering: another triangle, for
     /// shadows and occlusion something rather than nothing or the other way round.
     error_pixels: u64 ["pixels"] sum, only "with `--measure-error`";
-    /// Pixels, of every sample and direction, whose textures were looked up in coarser levels than they ask for.
-    unresolved_pixels: u64 ["pixels"] sum from COUNTER_UNRESOLVED, only "with `--interactive`";
+    /// Pixels of the frame that show what they show with everything resident. Of the pass `primary` alone.
+    pixels_exact: u64 ["pixels"] sum, only "with `--frame-budget`";
+    /// Pixels of the frame where levels of detail stand in for bricks that are missing. Of the pass `primary` alone.
+    pixels_bounded: u64 ["pixels"] sum, only "with `--frame-budget`";
+    /// Pixels, of every sample and direction, whose textures were looked up in coarser levels than they ask for, or
+    /// where nothing stands in for a brick that is missing.
+    unresolved_pixels: u64 ["pixels"] sum from COUNTER_UNRESOLVED, only "with `--frame-budget`";
     /// Pixels whose radiance was not finite.
     non_finite: u64 ["pixels"] sum from COUNTER_NON_FINITE;
 }

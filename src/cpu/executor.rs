@@ -7,6 +7,7 @@ use crate::kernels::dispatch::{Dispatch, are_pairs_culled, dispatches};
 use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{self, Params};
 use crate::kernels::payloads::AttributeView;
+use crate::kernels::query::query_all;
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
@@ -225,6 +226,10 @@ impl Executor for CpuExecutor {
         Ok(())
     }
 
+    fn mark_leaves(&mut self, marks: &Arc<[bool]>) {
+        self.scene.mark_leaves(marks);
+    }
+
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         let params = self.params();
         let resident = self.file.resident();
@@ -275,6 +280,9 @@ impl Executor for CpuExecutor {
         report.tiles = textures::demand(&tile_demand.iter().map(TileDemand::get).collect::<Vec<_>>());
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) {
             report.pair_rays = std::mem::take(&mut self.buffers.tiles.pair_rays);
+        }
+        if steps.contains(&Step::QueryStandIns) {
+            report.states = query_all::states(&self.buffers.sets[pass.set()]);
         }
         Ok(report)
     }

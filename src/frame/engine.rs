@@ -1,6 +1,6 @@
 //! What passes are traced with: a scene, an executor, a cache, a schedule.
 
-use super::{Captures, Effects, Light, Moved};
+use super::{Budgeted, Captures, Effects, Light, Moved};
 use crate::counters::Counters;
 use crate::kernels::{FrameExecutor, Lod};
 use crate::schedule::auto::Auto;
@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use crate::settings::Schedule;
+pub use crate::settings::{FrameBudget, Schedule};
 
 /// How frames are rendered.
 #[derive(Clone, Copy, Debug)]
@@ -43,9 +43,8 @@ pub struct RenderSettings {
     pub guides: bool,
     /// Samples lie at other points of their pixels in every frame.
     pub taa: bool,
-    /// Interactive: bytes of tiles of textures that a frame may load. Coarser levels stand for the others, and the
-    /// frame is exact only where `unresolved_pixels` says 0.
-    pub tile_bytes: Option<u64>,
+    /// What a frame may load. What is resident stands in for the rest ([`super::PixelState`]).
+    pub budget: Option<FrameBudget>,
 }
 
 /// A scene, an executor and a cache that passes are traced with. It knows no method of secondary visibility.
@@ -70,6 +69,8 @@ pub struct Engine {
     /// The temporal fronts, when they are on.
     #[cfg(feature = "lab")]
     pub fronts: Option<Fronts>,
+    /// What frames with a budget keep; they are traced by no other schedule.
+    pub budgeted: Option<Budgeted>,
     /// What [`Schedule::Auto`] has measured.
     pub auto: Auto,
     /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
@@ -111,6 +112,11 @@ impl Engine {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
+        if let Some(mut budgeted) = self.budgeted.take() {
+            let done = budgeted.trace(&mut self.tracer(pass, stats), first);
+            self.budgeted = Some(budgeted);
+            return done;
+        }
         let schedule = self.settings.schedule;
         if schedule != Schedule::Auto {
             return self.trace_by(schedule, frame, pass, first, stats);

@@ -3,6 +3,7 @@
 
 mod accumulate;
 mod bands;
+mod budget;
 mod capture;
 pub mod correct;
 mod effects;
@@ -21,10 +22,11 @@ pub mod triangles;
 pub mod view;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};
+pub use budget::{Budgeted, PixelState};
 pub use capture::{Captures, EffectError};
 pub use effects::{Effects, Occlusion};
 pub use emissive::{MOST_TRIANGLES, ShiningTriangles, emissive_triangles};
-pub use engine::{Engine, RenderSettings, Schedule};
+pub use engine::{Engine, FrameBudget, RenderSettings, Schedule};
 pub use environment::{EnvironmentNotes, Equirectangular, environment, luminance};
 pub use guides::{GuideReader, Guides, Seen};
 pub use light::Light;

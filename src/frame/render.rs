@@ -3,13 +3,15 @@
 use super::bands::Joint;
 use super::correct::correct;
 use super::engine::RenderSettings;
-use super::{Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, camera_view};
+use super::{
+    Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState, camera_view,
+};
 use crate::counters::{Counters, Record};
 use crate::kernels::Lod;
 use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::math::sampling::pixel_jitter;
 use crate::scene::Camera;
-use crate::schedule::{ExecutorError, Lamp, Pass, Shading, Step, attributes};
+use crate::schedule::{ExecutorError, Lamp, Pass, Shading, Step};
 use std::ops::{Deref, DerefMut};
 use thiserror::Error;
 
@@ -77,6 +79,8 @@ pub struct Pixels {
     pub id: Vec<u32>,
     /// Linear base colour; zero on a miss. Empty without AOVs.
     pub albedo: Vec<[f32; 3]>,
+    /// Whether what the pixel shows is exact. Empty where frames have no budget.
+    pub state: Vec<PixelState>,
 }
 
 impl Pixels {
@@ -126,7 +130,7 @@ impl DerefMut for Renderer {
 
 impl Renderer {
     /// Renders one frame. Without ROMA and distance fields it is exact; with them, too, pixels depend on scene, camera,
-    /// lights and settings alone, unless [`super::RenderSettings::tile_bytes`] bounds what is loaded.
+    /// lights and settings alone, unless [`super::RenderSettings::budget`] bounds what is loaded.
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.
@@ -150,7 +154,7 @@ impl Renderer {
         if let Some(captures) = &mut engine.captures {
             captures.clear();
         }
-        engine.cache.begin_frame(engine.settings.tile_bytes);
+        engine.begin_budget();
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
         engine.executor.set_lamps(&engine.light.lamps)?;
@@ -168,9 +172,14 @@ impl Renderer {
         }
         output.records = records.finish(engine);
         engine.moved = Moved::default();
+        if let Some(budgeted) = &mut engine.budgeted {
+            output.pixels.state = budgeted.take_states();
+        }
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
         if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {
             primary.non_finite += output.pixels.not_finite();
+            let of = |state| output.pixels.state.iter().filter(|own| **own == state).count() as u64;
+            (primary.pixels_exact, primary.pixels_bounded) = (of(PixelState::Exact), of(PixelState::Bounded));
         }
         Ok(output)
     }
@@ -259,7 +268,7 @@ impl Band<'_> {
             }
             records.pass(engine, "primary", |r, stats| {
                 r.trace(frame, Pass::Primary, &[Step::Generate], stats)?;
-                attributes::resolve(&mut *r.executor, &mut r.cache, Pass::Primary, stats)?;
+                r.resolve(Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
                 let shading =
                     Shading { sun: !effects.shadow, sky, emission: true, miss: true, environment: false, gloss: false };
@@ -350,7 +359,7 @@ fn bounce(
             return r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats);
         }
         r.trace(frame, pass, &plan.first(), stats)?;
-        attributes::resolve(&mut *r.executor, &mut r.cache, pass, stats)?;
+        r.resolve(pass, stats)?;
         let is_diffuse = matches!(pass, Pass::Diffuse(_));
         // What rays to lamps bring to the surface itself must not come by diffuse rays as well, or be weighted.
         let shading = Shading {
@@ -474,6 +483,7 @@ mod tests {
             normal: vec![[0.0; 3]; 2],
             id: vec![1, 2],
             albedo: vec![[0.5; 3]; 2],
+            state: Vec::new(),
         };
         assert_eq!(sound.not_finite(), 0);
         let spoil: [fn(&mut Pixels); 5] = [

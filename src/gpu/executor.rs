@@ -223,6 +223,11 @@ impl GpuExecutor {
         if dispatches.iter().any(|dispatch| dispatch.kernel == names::count_pairs) {
             self.make_room_for_counts()?;
         }
+        let rays = self.extent.rays();
+        let asks_for_stand_ins = dispatches.iter().any(|dispatch| dispatch.kernel == names::query_stand_ins);
+        if asks_for_stand_ins {
+            self.make_room_for_pair_rays(rays as u64);
+        }
         let strides = [size_of::<Params>(), 4 * Own::WORDS].map(|bytes| stride(&self.gpu, bytes));
         let mut told = strides.map(|stride| vec![0u8; stride as usize * dispatches.len()]);
         for (i, dispatch) in dispatches.iter().enumerate() {
@@ -315,6 +320,10 @@ impl GpuExecutor {
             let rays: Vec<u32> = self.read_all(&self.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
         }
+        if asks_for_stand_ins {
+            let states: Vec<u32> = self.read_all(&self.buffers.tiles.pair_rays)?;
+            report.states = states[..rays].to_vec();
+        }
         let times = self.timing.read(&self.gpu, dispatches.len())?;
         let mut ms_phases = [0.0; 3];
         for (dispatch, ms) in dispatches.iter().zip(times) {
@@ -333,11 +342,15 @@ impl GpuExecutor {
         if 4 * pairs > self.gpu.limits.max_storage_buffer_binding_size {
             return Err(report::too_many_pairs(tiles, leaves));
         }
-        if self.buffers.tiles.pair_rays.size() < 4 * pairs {
-            self.buffers.tiles.pair_rays = storage(&self.gpu, "pair rays", pairs as usize, 4);
+        self.make_room_for_pair_rays(pairs);
+        Ok(())
+    }
+
+    fn make_room_for_pair_rays(&mut self, count: u64) {
+        if self.buffers.tiles.pair_rays.size() < 4 * count {
+            self.buffers.tiles.pair_rays = storage(&self.gpu, "pair rays", count as usize, 4);
             self.rebind();
         }
-        Ok(())
     }
 
     /// Grows the lists to at least `entries`.
@@ -520,6 +533,10 @@ impl Executor for GpuExecutor {
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError> {
         let bytes = |item: Item| self.scene.loaded_bytes(item.into());
         self.buffers.cache.load(&self.gpu, &self.workers, loads, bytes)
+    }
+
+    fn mark_leaves(&mut self, marks: &Arc<[bool]>) {
+        self.buffers.scene.mark_leaves(&self.gpu, marks);
     }
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {

@@ -8,6 +8,7 @@ use crate::kernels::levels::LevelTable;
 use crate::kernels::{layout, opacity};
 use crate::schedule::ExecutorError;
 use bricks::{Resident, SceneFile};
+use std::sync::Arc;
 use wgpu::BufferUsages;
 
 /// The buffers of group 0.
@@ -21,6 +22,8 @@ pub struct SceneBuffers {
     opacity: wgpu::Buffer,
     /// Leaves and nodes of [`LevelTable`], where kernels ask for them.
     levels: Option<[wgpu::Buffer; 2]>,
+    table: LevelTable,
+    marks: Arc<[bool]>,
     /// Slots and states, written before every submission.
     pub slots: wgpu::Buffer,
     frame: Option<Frame>,
@@ -65,6 +68,8 @@ impl SceneBuffers {
                     buffer("level_nodes", nodes, size_of::<u32>()),
                 ]
             }),
+            table: LevelTable::default(),
+            marks: Arc::new([]),
             frame: None,
             instance_pad: 0.0,
         };
@@ -102,10 +107,20 @@ impl SceneBuffers {
         gpu.queue.write_buffer(&self.top2, 0, bytemuck::cast_slice(&top2));
         gpu.queue.write_buffer(&self.leaves, 0, bytemuck::cast_slice(&leaves));
         gpu.queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&instances));
-        if let Some([of_leaves, of_nodes]) = &self.levels {
-            let LevelTable { leaves, nodes } = LevelTable::new(resident, &frame);
-            gpu.queue.write_buffer(of_leaves, 0, bytemuck::cast_slice(&leaves));
-            gpu.queue.write_buffer(of_nodes, 0, bytemuck::cast_slice(&nodes));
+        if let Some([_, of_nodes]) = &self.levels {
+            self.table = LevelTable::new(resident, &frame);
+            gpu.queue.write_buffer(of_nodes, 0, bytemuck::cast_slice(&self.table.nodes));
+            let marks = self.marks.clone();
+            self.mark_leaves(gpu, &marks);
+        }
+    }
+
+    /// Marks leaves: [`crate::schedule::Executor::mark_leaves`].
+    pub fn mark_leaves(&mut self, gpu: &Gpu, marks: &Arc<[bool]>) {
+        self.marks = marks.clone();
+        if let Some([of_leaves, _]) = &self.levels {
+            self.table.mark(marks);
+            gpu.queue.write_buffer(of_leaves, 0, bytemuck::cast_slice(&self.table.leaves));
         }
     }
 }

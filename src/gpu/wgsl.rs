@@ -109,6 +109,21 @@ fn tile_is_stood_for(tile: TileBounds, node: u32) -> bool {
 fn tile_may_take(tile: TileBounds, leaf: u32) -> bool {
     return true;
 }
+fn is_marked(leaf: u32) -> bool {
+    return false;
+}
+fn would_suffice(cone: Cone, leaf: u32) -> bool {
+    return true;
+}
+fn would_take(cone: Cone, leaf: u32) -> bool {
+    return true;
+}
+fn would_be_stood_for_wide(cone: Cone, node: u32) -> bool {
+    return false;
+}
+fn stand_in_of(leaf: u32) -> u32 {
+    return leaf;
+}
 fn level_offset(point: vec3<f32>, leaf: u32) -> f32 {
     return 0.0;
 }

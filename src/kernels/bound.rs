@@ -10,6 +10,7 @@ use super::payloads::BrickView;
 use super::simd::isa::Best;
 use crate::schedule::Own;
 use bricks::{Node, Resident};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The resident part of a scene, relative to the reference point of a frame: group 0 of the kernels.
@@ -29,6 +30,7 @@ pub struct Scene {
     pub instance_pad: f32,
     /// What selection of levels of detail goes by; empty where none are in use.
     pub levels: LevelTable,
+    marks: Arc<[bool]>,
     frame: Option<Frame>,
 }
 
@@ -52,8 +54,15 @@ impl Scene {
             self.instance_pad = instance_pad;
             if resident.has_levels_in_use() {
                 self.levels = LevelTable::new(resident, &frame);
+                self.levels.mark(&self.marks);
             }
         }
+    }
+
+    /// Marks leaves: [`crate::schedule::Executor::mark_leaves`].
+    pub fn mark_leaves(&mut self, marks: &Arc<[bool]>) {
+        self.marks = marks.clone();
+        self.levels.mark(marks);
     }
 }
 

@@ -145,6 +145,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
     };
     let bounds = |phase| kernel(kernels::tile_bounds, params, across(params.tiles), phase);
     let resident = layout::STATE_GEOMETRY;
+    let ready = layout::STATE_GEOMETRY | layout::STATE_ATTRIBUTES;
     let not_done = layout::STATE_GEOMETRY | layout::STATE_DONE;
     let unprocessed = |undone: bool| if undone { layout::STATE_DONE } else { not_done };
     match step {
@@ -194,6 +195,10 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
                 Some(0),
             )]
         }
+        Step::IntersectReady => {
+            let params = Params { select_mask: ready, select_want: ready, ..params };
+            vec![kernel(kernels::intersect_selected, params, by_tile, Some(0))]
+        }
         Step::IntersectAllBatch => {
             let params = Params { select_mask: layout::STATE_BATCH, select_want: layout::STATE_BATCH, ..params };
             vec![kernel(kernels::intersect_selected, params, by_tile, Some(2))]
@@ -207,6 +212,10 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
             let flags = params.flags | if up_to_next { layout::PARAM_NEXT } else { 0 };
             let params = Params { select_mask: unprocessed(undone), select_want: 0, flags, ..params };
             if from_root { vec![kernel(kernels::query_all, params, by_tile, Some(1))] } else { query(params, Some(1)) }
+        }
+        Step::QueryStandIns => {
+            let params = Params { select_mask: ready, select_want: ready, ..params };
+            vec![kernel(kernels::query_stand_ins, params, by_tile, Some(1))]
         }
         Step::QueryPairs { tighter } => {
             let flags = params.flags | if tighter { layout::PARAM_TIGHTER } else { 0 };

@@ -40,6 +40,14 @@ impl LevelTable {
         let leaves = (0..boxes.len()).map(leaf).collect();
         Self { leaves, nodes: stand_ins(resident, &parents) }
     }
+
+    /// Marks leaves by the signs of their errors; leaves without a mark, or all where there are none, have none.
+    pub fn mark(&mut self, marks: &[bool]) {
+        for (index, leaf) in self.leaves.iter_mut().enumerate() {
+            let is_marked = marks.get(index).is_some_and(|&mark| mark);
+            leaf.error_square = leaf.error_square.copysign(if is_marked { -1.0 } else { 1.0 });
+        }
+    }
 }
 
 /// The largest factor by which an instance lengthens anything, rounding included: the root of the largest eigenvalue

@@ -8,7 +8,7 @@
 use super::bound::Bound;
 use super::payloads::AttributeView;
 use super::query::query::query;
-use super::query::query_all::{count_pairs, query_all};
+use super::query::query_all::{count_pairs, query_all, query_stand_ins};
 use super::query::query_pairs::query_pairs;
 use super::query::tile_bounds::tile_bounds;
 use super::query::tile_lists::{query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
@@ -232,6 +232,7 @@ kernels! {
     query_all: "query/query_all" Tiles [] |b, t| query_all(b, t.own, Work::All, &t.tiles.pair_counts);
     query_from_root: "query/query_all" Tiles [OF_TILES = 1]
         |b, t| query_all(b, t.own, Work::Rooted(&t.tiles.lists), &t.tiles.pair_counts);
+    query_stand_ins: "query/query_all" Tiles [STAND_INS = 1] |b, t| query_stand_ins(b, t.own, &t.tiles.pair_counts);
     count_pairs: "query/query_all" Tiles [PAIRS = 1] |b, t| {
         t.tiles.pair_counts.start(b.params.tiles, b.scene.leaves.len())?;
         count_pairs(b, t.own, &t.tiles.pair_counts);

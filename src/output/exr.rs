@@ -26,6 +26,9 @@ pub struct Aovs<'a> {
     pub triangle: &'a [u32],
     /// Linear base colour: `albedo.R albedo.G albedo.B`.
     pub albedo: &'a [[f32; 3]],
+    /// Of frames with a budget 0 where the pixel is exact, 1 where a level of detail stands in for what is missing, 2
+    /// where nothing does: `state.id` (u32). Others have none.
+    pub state: Option<&'a [u32]>,
 }
 
 /// Writes one EXR with one part, scan lines, ZIP compression; the same values give the same bytes.
@@ -34,7 +37,9 @@ pub struct Aovs<'a> {
 /// An array has the wrong length, or the file cannot be written.
 pub fn write(path: &Path, aovs: &Aovs) -> Result<()> {
     let pixels = aovs.width as usize * aovs.height as usize;
-    let lengths = [aovs.radiance.len(), aovs.depth.len(), aovs.normal.len(), aovs.triangle.len(), aovs.albedo.len()];
+    let state = aovs.state.map_or(pixels, <[u32]>::len);
+    let [radiance, normal, albedo] = [aovs.radiance, aovs.normal, aovs.albedo].map(<[_]>::len);
+    let lengths = [radiance, aovs.depth.len(), normal, aovs.triangle.len(), albedo, state];
     ensure!(
         pixels > 0 && lengths.iter().all(|&n| n == pixels),
         "{}: arrays of {lengths:?} entries are no image of {}x{}",
@@ -58,6 +63,7 @@ pub fn write(path: &Path, aovs: &Aovs) -> Result<()> {
             ("albedo.B", plane(aovs.albedo, 2)),
         ]
         .into_iter()
+        .chain(aovs.state.map(|state| ("state.id", FlatSamples::U32(state.to_vec()))))
         .map(|(name, samples)| AnyChannel::new(name, samples))
         .collect(),
     );
@@ -97,6 +103,7 @@ mod tests {
             normal: &normal,
             triangle: &triangle,
             albedo: &albedo,
+            state: Some(&triangle),
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
@@ -131,6 +138,7 @@ mod tests {
             "normal.X",
             "normal.Y",
             "normal.Z",
+            "state.id",
             "triangle.id",
         ];
         assert_eq!(names, expected);

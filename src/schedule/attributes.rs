@@ -3,7 +3,7 @@
 //! tiles are resident together, so that what it gives does not depend on what else is, and the hit waits for the last.
 //! Where a frame may load so many bytes of tiles only, coarser levels stand for the tiles that it does not load.
 
-use super::cache::Cache;
+use super::cache::{Allowance, Cache};
 use super::{Executor, ExecutorError, Lamp, Pass, Report, Step, TileDemand};
 use crate::counters::Counters;
 use crate::stream::Item;
@@ -40,9 +40,9 @@ pub fn resolve(
         rest = &rest[count..];
         report = executor.run(next, last(rest), &cache.states)?;
     }
-    match cache.tile_allowance {
+    match cache.allowance {
         None => sample(executor, cache, next, report, stats)?,
-        Some(allowance) => sample_within(allowance, executor, cache, next, report, stats)?,
+        Some(_) => sample_within(executor, cache, next, report, stats)?,
     }
     stats.bricks_hit.extend(hit);
     Ok(())
@@ -80,18 +80,17 @@ fn sample(
     }
 }
 
-/// Loads the tiles that most hits wait for, as many as `allowance` bytes are, and has coarser levels stand for the
+/// Loads the tiles that most hits wait for, as far as the frame's allowance goes, and has coarser levels stand for the
 /// others. What was not used of it is left to the passes that follow. `report`: of the first [`Step::Sample`].
 fn sample_within(
-    allowance: u64,
     executor: &mut dyn Executor,
     cache: &mut Cache,
     next: Pass,
     mut report: Report,
     stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
-    let mut left = allowance;
     loop {
+        let left = cache.allowance.as_ref().map_or(0, Allowance::left);
         let mut tiles = note(report, cache, stats);
         tiles.retain(|tile| tile.rays > 0);
         if tiles.is_empty() {
@@ -109,7 +108,7 @@ fn sample_within(
         let before = stats.bytes_textures;
         cache.load(executor, &items, usize::MAX, stats)?;
         let loaded = stats.bytes_textures - before;
-        left -= loaded;
+        cache.spend(loaded);
         if loaded == 0 {
             let report = executor.run(next, &[Step::SampleCoarser], &cache.states)?;
             note(report, cache, stats);
@@ -117,7 +116,6 @@ fn sample_within(
         }
         report = executor.run(next, &[Step::Sample], &cache.states)?;
     }
-    cache.tile_allowance = Some(left);
     Ok(())
 }
 

@@ -2,14 +2,44 @@
 
 use super::{BrickStates, Executor, ExecutorError, Load};
 use crate::counters::Counters;
+use crate::settings::FrameBudget;
 use crate::stream::{Item, Kind, Residency, Sizes, Trace};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Most bricks loaded between two queries where some of them may turn out to be hidden by others.
 pub const BATCH_BRICKS: usize = 8;
 
 /// Most bytes loaded at once: they take as much memory on their way to the device.
 const BATCH_BYTES: u64 = 64 << 20;
+
+/// What a frame may still load.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowance {
+    bytes: u64,
+    until: Option<Instant>,
+}
+
+impl Allowance {
+    /// Of a frame that begins now; `least` bytes at least.
+    fn new(budget: FrameBudget, least: u64) -> Self {
+        match budget {
+            FrameBudget::Bytes(bytes) => Self { bytes: bytes.max(least), until: None },
+            FrameBudget::Time(ms) => {
+                Self { bytes: u64::MAX, until: Some(Instant::now() + Duration::from_secs_f64(ms / 1e3)) }
+            }
+        }
+    }
+
+    /// Bytes that may still be loaded.
+    pub fn left(&self) -> u64 {
+        if self.until.is_some_and(|until| Instant::now() >= until) { 0 } else { self.bytes }
+    }
+
+    /// Takes off what has been loaded.
+    pub fn spend(&mut self, bytes: u64) {
+        self.bytes = self.bytes.saturating_sub(bytes);
+    }
+}
 
 /// What is resident, what everything weighs, and what was asked for.
 pub struct Cache {
@@ -23,8 +53,8 @@ pub struct Cache {
     pub nodes: Vec<u64>,
     /// Requests in order, when they are recorded.
     pub trace: Option<Trace>,
-    /// Bytes of tiles that may still be loaded in this frame; `None` where every tile is waited for.
-    pub tile_allowance: Option<u64>,
+    /// What may still be loaded in this frame; `None` where everything is waited for.
+    pub allowance: Option<Allowance>,
     /// The frame, from 1, and per item the frame that loaded it last.
     frame: u32,
     loaded_in: Vec<u32>,
@@ -35,7 +65,7 @@ impl Cache {
     pub fn new(residency: Residency, sizes: Sizes, nodes: Vec<u64>, trace: Option<Trace>) -> Self {
         let states = BrickStates::new(sizes.bricks.len(), sizes.tiles.len());
         let loaded_in = vec![0; sizes.rows()];
-        Self { residency, states, sizes, nodes, trace, tile_allowance: None, frame: 0, loaded_in }
+        Self { residency, states, sizes, nodes, trace, allowance: None, frame: 0, loaded_in }
     }
 
     /// Starts a pass: nothing is done, nothing is pinned.
@@ -49,10 +79,13 @@ impl Cache {
         }
     }
 
-    /// Starts a frame that may load `tile_bytes` of tiles, one of them at least; with `None` it waits for every tile.
-    pub fn begin_frame(&mut self, tile_bytes: Option<u64>) {
-        let largest = || self.sizes.tiles.iter().copied().max().unwrap_or(0);
-        self.tile_allowance = tile_bytes.map(|bytes| bytes.max(largest()));
+    /// Starts a frame that may load so much, one payload at least; with `None` it waits for everything.
+    pub fn begin_frame(&mut self, budget: Option<FrameBudget>) {
+        self.allowance = budget.map(|budget| {
+            let bricks = self.sizes.bricks.iter().flat_map(|&(geometry, attributes)| [geometry, attributes]);
+            let largest = bricks.chain(self.sizes.tiles.iter().copied()).max().unwrap_or(0);
+            Allowance::new(budget, largest)
+        });
     }
 
     /// Which bricks' geometry is resident.
@@ -140,6 +173,57 @@ impl Cache {
             taken += count;
         }
         Ok(taken)
+    }
+
+    /// Loads `items`, the most urgent first, as far as they fit beside each other and beside `kept`, and as the frame's
+    /// allowance goes. What is resident of them stays. Returns whether anything was loaded.
+    ///
+    /// # Errors
+    /// As of [`Self::load`].
+    pub fn load_within(
+        &mut self,
+        executor: &mut dyn Executor,
+        items: &[Item],
+        kept: &[Item],
+        stats: &mut Counters,
+    ) -> Result<bool, ExecutorError> {
+        self.begin_batch();
+        for &item in kept {
+            self.residency.pin(item);
+        }
+        let mut rest = items;
+        let mut has_loaded = false;
+        while let (Some(allowance), false) = (self.allowance, rest.is_empty()) {
+            let left = allowance.left();
+            // What each and all before it in the batch add to what is resident.
+            let sums: Vec<u64> = (rest.iter().take(2 * BATCH_BRICKS))
+                .scan(0, |sum, &item| {
+                    let is_resident = self.residency.slot(item).is_some();
+                    *sum += if is_resident { 0 } else { self.residency.bytes(item) };
+                    Some(*sum)
+                })
+                .take_while(|&sum| sum <= left)
+                .collect();
+            let count = match sums.len() {
+                0 => 0,
+                most => self.load_beside(executor, &rest[..most], most, stats)?,
+            };
+            let bytes = count.checked_sub(1).map_or(0, |last| sums[last]);
+            self.spend(bytes);
+            has_loaded |= bytes > 0;
+            rest = &rest[count..];
+            if count < sums.len() || count == 0 {
+                break;
+            }
+        }
+        Ok(has_loaded)
+    }
+
+    /// Takes bytes that have been loaded off the frame's allowance.
+    pub fn spend(&mut self, bytes: u64) {
+        if let Some(allowance) = &mut self.allowance {
+            allowance.spend(bytes);
+        }
     }
 
     fn begin_batch(&mut self) {

@@ -2,6 +2,7 @@
 
 use super::{BrickStates, Optimisations, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, Slot};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// One payload to be copied into the cache.
@@ -48,6 +49,11 @@ pub trait Executor {
     /// # Errors
     /// More than the device holds.
     fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError>;
+
+    /// Marks leaves of the top level, where levels of detail are in use: those of levels below which something is
+    /// missing, and all below these. Marked levels suffice for every ray, so that the topmost stand in. It holds until
+    /// other marks are set; none are set at first.
+    fn mark_leaves(&mut self, marks: &Arc<[bool]>);
 
     /// Runs `steps` in order over the rays of `pass` against bricks in the given states, waits, and reports.
     ///

@@ -13,6 +13,7 @@ pub mod attributes;
 pub mod auto;
 pub mod cache;
 mod chc;
+pub mod cut;
 mod demand;
 mod executor;
 #[cfg(feature = "lab")]

@@ -50,6 +50,9 @@ pub struct Report {
     pub most_selected: u32,
     /// What kernels of a method counted for it, from its first counter on.
     pub own: [u64; OWN_COUNTERS],
+    /// After [`Step::QueryStandIns`](super::Step::QueryStandIns) for each ray 0 where it has the hit that it has with
+    /// everything resident, else 1, and 3 where nothing stands in for some brick that it would enter.
+    pub states: Vec<u32>,
     /// Rays that see each node, after [`Step::QueryPairs`](super::Step::QueryPairs).
     pub pair_rays: Vec<u32>,
 }

@@ -41,6 +41,8 @@ pub enum Step {
     IntersectBinary,
     /// Intersect what is resident and not done, from the root: phase 1.
     IntersectAllResident,
+    /// Intersect what is resident with its attributes, from the root: phase 1.
+    IntersectReady,
     /// Intersect the rays that asked for a brick with the batch just loaded, from the root: phase 3.
     IntersectAllBatch,
     /// With a threshold: count how many rays of each tile see each leaf, and leave pairs of a tile and a leaf that no
@@ -52,6 +54,10 @@ pub enum Step {
     },
     /// Ask ray by ray which bricks are still wanted: phase 2.
     Query(Query),
+    /// Ask ray by ray, from the hits of [`Step::IntersectReady`], for what stands in for bricks that would be entered:
+    /// levels of detail that are marked ([`Executor::mark_leaves`](super::Executor::mark_leaves)), and bricks that are
+    /// missing. Rays that ask for nothing, and have hit nothing that stands in, have their final hits: phase 2.
+    QueryStandIns,
     /// Ask how many rays see each node of the queries set by [`Executor::set_pairs`](super::Executor::set_pairs): phase
     /// 2 of the fronts.
     QueryPairs {
@@ -164,6 +170,7 @@ impl Step {
                 | Step::IntersectAll
                 | Step::IntersectBinary
                 | Step::IntersectAllResident
+                | Step::IntersectReady
                 | Step::IntersectAllBatch
         )
     }

@@ -96,12 +96,14 @@ impl Frame {
     /// # Errors
     /// The file cannot be written; the frame has no AOVs.
     pub fn write_exr(&self, file: &Path) -> Result<()> {
-        let Pixels { radiance, depth, normal, id, albedo } = &self.pixels;
+        let Pixels { radiance, depth, normal, id, albedo, state } = &self.pixels;
         if depth.len() != radiance.len() {
             bail!("{}: the frame has no AOVs; render it with aov", file.display());
         }
         let (width, height) = self.size;
-        exr::write(file, &exr::Aovs { width, height, radiance, depth, normal, triangle: id, albedo })
+        let state: Vec<u32> = state.iter().map(|&state| state as u32).collect();
+        let state = (!state.is_empty()).then_some(&state[..]);
+        exr::write(file, &exr::Aovs { width, height, radiance, depth, normal, triangle: id, albedo, state })
     }
 }
 
@@ -163,7 +165,7 @@ impl Session {
             path = path.with_fov_y_degrees(fov)?;
         }
         let lighting = lighting(settings, &scene, file)?;
-        let (levelled, without_levels) = levelled(&scene, settings.lod);
+        let (levelled, without_levels) = levelled(&scene, settings);
         let motion = settings.motion.as_ref().map(|file| SceneMotion::open(file, &levelled, &lighting.sources));
         let motion = motion.transpose()?;
         let opened = Opened::open(levelled.clone(), file, settings)?;
@@ -306,7 +308,8 @@ impl Session {
         }
         let most = self.renderer.rays();
         let Engine { scene, executor, cache, settings, .. } = &mut self.renderer.engine;
-        // What frames may leave out given rays must find.
+        // What frames may leave out given rays must find, and no level stands in for it.
+        executor.mark_leaves(&Arc::from([]));
         let threshold = std::mem::take(&mut executor.tuning().threshold);
         let mut traced =
             Traced { scene, executor: &mut **executor, cache, schedule: settings.schedule, most, lod: Lod::default() };
@@ -362,12 +365,19 @@ fn check_data(scene: &SceneFile, file: &Path, settings: &Settings) -> Result<()>
 }
 
 /// The scene with its levels of detail in use, if they are asked for; what a person should know where there are none.
-pub fn levelled(scene: &Arc<SceneFile>, lod: f64) -> (Arc<SceneFile>, Option<String>) {
-    if lod == 0.0 {
+pub fn levelled(scene: &Arc<SceneFile>, settings: &Settings) -> (Arc<SceneFile>, Option<String>) {
+    let has_budget = settings.frame_budget().is_some();
+    if settings.lod == 0.0 && !has_budget {
         return (scene.clone(), None);
     }
     if scene.resident().levels.is_empty() {
-        let text = "--lod has no effect: the scene has no levels of detail; convert it with --lod on";
+        let text = match has_budget {
+            true => {
+                "--frame-budget shows nothing in place of bricks that have not arrived: the scene has no levels of \
+                     detail; convert it with --lod on"
+            }
+            false => "--lod has no effect: the scene has no levels of detail; convert it with --lod on",
+        };
         return (scene.clone(), Some(text.into()));
     }
     let mut levelled = scene.duplicate();
@@ -383,6 +393,7 @@ fn reference(scene: Arc<SceneFile>, file: &Path, settings: &Settings, light: Lig
         requests_out: None,
         secondary: EffectMethods::EXACT,
         interactive: None,
+        frame_budget: None,
         measure_needed: false,
         aov: false,
         ..settings.clone()

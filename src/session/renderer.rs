@@ -2,7 +2,7 @@
 
 use super::lighting::lighting;
 use super::opened::Opened;
-use crate::frame::{Effects, Engine, Light, Methods, Moved, Occlusion, RenderSettings, Renderer};
+use crate::frame::{Budgeted, Effects, Engine, Light, Methods, Moved, Occlusion, RenderSettings, Renderer};
 use crate::kernels::Lod;
 use crate::picture::Exposure;
 use crate::schedule::Tracing;
@@ -38,6 +38,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         executor.allow_bounces();
     }
     let methods = methods(settings, scene.resident());
+    let budgeted = render.budget.map(|_| Budgeted::new(scene.resident()));
     let engine = Engine {
         scene,
         executor,
@@ -49,6 +50,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         tile: extent.tile,
         #[cfg(feature = "lab")]
         fronts: settings.fronts.then(Fronts::default),
+        budgeted,
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
@@ -94,7 +96,7 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         lod: Lod { pixels: settings.lod as f32, blend: settings.lod_blend, ..Lod::default() },
         correct_one_in: settings.lod_correct.unwrap_or(0),
         only_chosen: false,
-        tile_bytes: settings.interactive,
+        budget: settings.frame_budget(),
     }
 }
 

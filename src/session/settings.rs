@@ -10,8 +10,8 @@ use crate::secondary::df;
 use crate::secondary::{EffectMethods, Method, displacement, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
-    Adapter, CacheSize, Direction, EffectList, Entry, Environment, Group, ImageSize, Length, Policy, Rectangle, Rule,
-    Schedule, SettingsError, Turn, settings,
+    Adapter, CacheSize, Direction, EffectList, Entry, Environment, FrameBudget, Group, ImageSize, Length, Policy,
+    Rectangle, Rule, Schedule, SettingsError, Turn, settings,
 };
 use std::path::PathBuf;
 
@@ -150,10 +150,14 @@ settings! {
         cache: CacheSize = CacheSize::Auto, "--cache SIZE|P%|auto", Rule::Any, "", Cache, Common;
         /// Host memory for verified bricks; 0 keeps none.
         host_cache: u64 = 1 << 30, "--host-cache SIZE", Rule::Bytes(0), "bytes", Cache, Expert;
-        /// Bytes of texture tiles that a frame loads at most. Tiles that most hits ask for come first; a coarser level
-        /// that is resident stands for the others, and `unresolved_pixels` counts such hits. While the camera rests,
-        /// frames become exact. Bricks are waited for. [default: off, tiles are waited for as well]
-        interactive: Option<u64> = None, "--interactive SIZE", Rule::Bytes(1), "bytes", Cache, Usual;
+        /// What a frame loads at most: a size, as 8M, or what arrives in so many milliseconds, as 50. Levels of detail
+        /// that are resident stand in for other bricks, coarser levels of textures for other tiles. What most rays ask
+        /// for comes first, so that while the camera rests frames become exact. Records count pixels that are, and
+        /// `state.id` in EXR files says which. The largest payload is always loaded whole. Not together with
+        /// --secondary. [default: off, everything is waited for]
+        frame_budget: Option<FrameBudget> = None, "--frame-budget MS|SIZE", Rule::Any, "", Cache, Usual;
+        /// Old form of --frame-budget SIZE.
+        interactive: Option<u64> = None, "--interactive SIZE", Rule::Bytes(1), "bytes", Cache, Expert;
         /// Which brick makes room for another: round-robin, second-chance, lru. `round-robin`: the next one in the
         /// cache; `second-chance`: the next one not used since its last turn; `lru`: the one not used for longest.
         evict: Policy = Policy::RoundRobin, "--evict NAME", Rule::Any, "", Cache, Expert;
@@ -257,6 +261,17 @@ impl Settings {
             );
             return Err(SettingsError::Conflict(text));
         }
+        if self.frame_budget().is_some() {
+            let has_methods = self.secondary != EffectMethods::EXACT;
+            let others = [(has_methods, "--secondary"), (self.lod_correct.is_some(), "--lod-correct")];
+            if let Some((_, other)) = others.into_iter().find(|(is_on, _)| *is_on) {
+                let text = format!(
+                    "--frame-budget and {other} exclude each other: rays of a budget meet what has arrived, \
+                                    others wait; leave one out"
+                );
+                return Err(SettingsError::Conflict(text));
+            }
+        }
         if !self.checkpoints.is_empty() {
             let text = match (&self.reference, self.denoise || self.taa) {
                 (None, _) => "--checkpoints needs a reference; give --reference FILE.exr, as walk --aov writes it",
@@ -356,12 +371,17 @@ impl Settings {
         let needs = [
             (self.secondary != EffectMethods::EXACT, "--secondary"),
             (self.has_fronts(), "--fronts on"),
-            (self.interactive.is_some(), "--interactive"),
+            (self.frame_budget().is_some(), "--frame-budget"),
             (!self.checkpoints.is_empty(), "--checkpoints"),
             (self.progressive, "--progressive"),
             (self.measure_error, "--measure-error"),
         ];
         needs.into_iter().find(|(is_on, _)| *is_on).map(|(_, option)| option)
+    }
+
+    /// What a frame may load.
+    pub fn frame_budget(&self) -> Option<FrameBudget> {
+        self.frame_budget.or(self.interactive.map(FrameBudget::Bytes))
     }
 
     /// Whether `chc` keeps query pairs from frame to frame.

@@ -4,7 +4,7 @@ use super::open::Session;
 use crate::counters::Record;
 use crate::frame::Renderer;
 use crate::session::Settings;
-use crate::settings::{Length, Schedule, Value as _};
+use crate::settings::{FrameBudget, Length, Schedule, Value as _};
 use serde_json::{Map, Value, json};
 
 /// Raised when a field changes its meaning.
@@ -59,7 +59,8 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "cache_bytes": renderer.cache.residency.budget_bytes(),
             "cache_percent": 100.0 * renderer.cache.residency.budget_bytes() as f64 / streamed_bytes.max(1) as f64,
             "host_cache_bytes": s.host_cache,
-            "interactive_bytes": s.interactive,
+            "frame_budget": s.frame_budget().map(|budget| budget.to_string()),
+            "interactive_bytes": s.frame_budget().and_then(FrameBudget::bytes),
             "secondary": s.secondary.to_string(),
             "roma": reports.remove("roma"),
             "df": reports.remove("df"),

@@ -7,6 +7,9 @@ use std::str::FromStr;
 /// Largest width or height of an image, pixels.
 pub const MAX_IMAGE_PX: u32 = 16384;
 
+/// Longest time of a frame's budget, milliseconds: an hour.
+const MAX_BUDGET_MS: f64 = 3.6e6;
+
 /// Most digits behind a point.
 const MOST_DECIMALS: usize = 9;
 
@@ -186,6 +189,49 @@ impl fmt::Display for CacheSize {
     }
 }
 
+/// What a frame may load: bytes, or as much as arrives in so many milliseconds from its begin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FrameBudget {
+    /// Milliseconds, above 0.
+    Time(f64),
+    /// Bytes, at least 1.
+    Bytes(u64),
+}
+
+impl FrameBudget {
+    /// Its bytes; of a time none.
+    pub fn bytes(self) -> Option<u64> {
+        match self {
+            Self::Time(_) => None,
+            Self::Bytes(bytes) => Some(bytes),
+        }
+    }
+}
+
+impl FromStr for FrameBudget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = text.strip_suffix("ms").unwrap_or(text).parse::<f64>();
+        match number {
+            Ok(ms) if ms > 0.0 && ms <= MAX_BUDGET_MS => Ok(Self::Time(ms)),
+            Ok(_) => Err(format!("a time is a number of milliseconds above 0 and at most {MAX_BUDGET_MS}")),
+            Err(_) => size_bytes(text).map(Self::Bytes).map_err(|_| {
+                "a budget is a time in milliseconds, as in 50, or a size with its unit, as in 8M".to_owned()
+            }),
+        }
+    }
+}
+
+impl fmt::Display for FrameBudget {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Time(ms) => write!(f, "{ms}ms"),
+            Self::Bytes(bytes) => write!(f, "{bytes}B"),
+        }
+    }
+}
+
 /// Width and height of an image, each 1..=[`MAX_IMAGE_PX`] pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageSize {
@@ -252,6 +298,20 @@ mod tests {
         assert!(positive_count("0K").is_err());
         assert_eq!(positive_count32("4294967295"), Ok(u32::MAX));
         assert!(positive_count32("4294967296").is_err());
+    }
+
+    #[test]
+    fn budgets_are_times_or_sizes() {
+        assert_eq!("50".parse(), Ok(FrameBudget::Time(50.0)));
+        assert_eq!("12.5ms".parse(), Ok(FrameBudget::Time(12.5)));
+        assert_eq!("8M".parse(), Ok(FrameBudget::Bytes(8 << 20)));
+        assert_eq!("1B".parse(), Ok(FrameBudget::Bytes(1)));
+        for budget in [FrameBudget::Time(0.25), FrameBudget::Bytes(12_345)] {
+            assert_eq!(budget.to_string().parse(), Ok(budget));
+        }
+        for bad in ["", "0", "-3", "0ms", "nan", "inf", "1e9", "0M", "8 M", "ms", "5s"] {
+            assert!(bad.parse::<FrameBudget>().is_err(), "{bad}");
+        }
     }
 
     #[test]

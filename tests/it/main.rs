@@ -31,6 +31,7 @@ mod command {
 /// the motion.
 mod exact {
     mod bands;
+    mod budget;
     mod cache_independence;
     mod cones;
     mod exactness;

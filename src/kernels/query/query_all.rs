@@ -1,15 +1,17 @@
 //! Ray-by-ray queries of the whole top level: twin of `shaders/query/query_all.wgsl`. Near children first, each ray
 //! asks for the bricks in the wanted state of whose root it enters a child box at or before its present hit, and notes
-//! whether it asked for any. Or it asks for nothing, and counted is how many rays of a tile see each leaf.
+//! whether it asked for any. Or it asks for nothing, and counted is how many rays of a tile see each leaf. Or it asks,
+//! for the bricks that it would enter if nothing were missing, those that stand in for them.
 
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     COUNTER_PAIRS_INVISIBLE, COUNTER_PAIRS_VISIBLE, COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT, PARAM_NEXT,
+    PENDING_MISSING, Surface,
 };
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::tiles::PairCounts;
 use crate::kernels::trace::leaf::BrickRay;
-use crate::kernels::trace::levels::{is_pending, set_pending, spread_of};
+use crate::kernels::trace::levels::{Cone, is_pending, set_pending, spread_of};
 use crate::kernels::trace::node::{by_priority, entered_children, framed_ray, inner_before, node_hits};
 use crate::kernels::trace::run::{Work, for_each_ray};
 use crate::kernels::trace::scratch::Scratch;
@@ -20,35 +22,58 @@ const TOP_STACK_SIZE: usize = 192;
 
 /// Of the rays of `work`, all or those that walk from the root.
 pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts) {
-    for_each_ray(set, bound, work, |scratch, slot| ask::<false>(bound, scratch, slot, pairs));
+    for_each_ray(set, bound, work, |scratch, slot| ask::<WANTED>(bound, scratch, slot, pairs));
+}
+
+/// What [`query_stand_ins`] left each ray with: [`crate::schedule::Report::states`].
+pub fn states(set: &RaySet) -> Vec<u32> {
+    let state = |surface: &Surface| u32::from(is_pending(surface)) | surface.pending >> 31 << 1;
+    set.surfaces.iter().map(state).collect()
+}
+
+/// Of all rays: what stands in for what they would enter.
+pub fn query_stand_ins(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<STAND_INS>(bound, scratch, slot, pairs));
 }
 
 /// Of all rays: how many of a tile see each leaf. `pairs` have been started.
 pub fn count_pairs(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
-    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<true>(bound, scratch, slot, pairs));
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<PAIRS>(bound, scratch, slot, pairs));
 }
 
-fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
-    if !COUNT && !is_pending(slot.surface) {
+/// What a ray asks for: bricks in the wanted state.
+const WANTED: u32 = 0;
+/// Nothing; it counts for pairs.
+const PAIRS: u32 = 1;
+/// What stands in.
+const STAND_INS: u32 = 2;
+
+fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
+    if WHAT == WANTED && !is_pending(slot.surface) {
         return;
     }
     let (ray, hit) = (*slot.ray, *slot.hit);
     let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
-    if !COUNT {
+    if WHAT != PAIRS {
         set_pending(slot.surface, false);
+    }
+    let cone = bound.cone_of(ray.origin, ray.direction, spread_of(slot.surface));
+    if WHAT == STAND_INS && is_stand_in(bound, &cone, slot.surface.leaf) {
+        bound.demand[bound.brick_of(slot.surface.leaf)].add_ray(hit.t);
+        set_pending(slot.surface, true);
     }
     if !slot.is_traced() || bound.params.top_count == 0 || occluded {
         return;
     }
     let scene = bound.scene;
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
-    let cone = bound.cone_of(ray.origin, ray.direction, spread_of(slot.surface));
-    let up_to_next = !COUNT && bound.has(PARAM_NEXT);
+    let up_to_next = WHAT != PAIRS && bound.has(PARAM_NEXT);
     let mut r = BrickRay::outside(&world);
     let Scratch { entered: stack, tally, .. } = scratch;
     stack.clear();
     stack.push((0, 0.0));
     let mut asks = 0;
+    let mut is_missing = false;
     // The brick that it enters before any other that it asks for, and where.
     let mut first: Option<(usize, f32)> = None;
     let mut limit = hit.t;
@@ -70,7 +95,11 @@ fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pair
             }
             if inner & 1 << child != 0 {
                 let index = node.child_base + inner_before(inner, child);
-                if bound.is_stood_for_wide(&cone, index) {
+                let is_left = match WHAT {
+                    STAND_INS => bound.would_be_stood_for_wide(&cone, index),
+                    _ => bound.is_stood_for_wide(&cone, index),
+                };
+                if is_left {
                     continue;
                 }
                 if stack.len() == TOP_STACK_SIZE {
@@ -81,9 +110,13 @@ fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pair
                 continue;
             }
             let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
-            let brick = bound.brick_of(leaf);
-            let is_left_out = !COUNT && pairs.is_culled(bound, slot.tile, leaf);
-            if !bound.is_selected(brick) || is_left_out || !bound.takes(&cone, leaf) {
+            let mut brick = bound.brick_of(leaf);
+            let is_selected = bound.is_selected(brick);
+            let is_asked_for = match WHAT {
+                STAND_INS => (!is_selected || bound.stand_in_of(leaf) != leaf) && bound.would_take(&cone, leaf),
+                _ => is_selected && bound.takes(&cone, leaf),
+            };
+            if !is_asked_for || WHAT != PAIRS && pairs.is_culled(bound, slot.tile, leaf) {
                 continue;
             }
             r.enter_leaf(scene, &world, leaf);
@@ -93,7 +126,11 @@ fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pair
             if entered == 0 {
                 continue;
             }
-            if COUNT {
+            if WHAT == STAND_INS {
+                brick = bound.brick_of(bound.stand_in_of(leaf));
+                is_missing |= !bound.is_selected(brick);
+            }
+            if WHAT == PAIRS {
                 count(bound, tally, pairs.add(slot.tile, leaf));
                 continue;
             }
@@ -109,9 +146,15 @@ fn ask<const COUNT: bool>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pair
     }
     if let Some((brick, _)) = first {
         set_pending(slot.surface, true);
+        slot.surface.pending |= if is_missing { PENDING_MISSING } else { 0 };
         bound.demand[brick].add_next();
         tally.add(COUNTER_PAIRS_VISIBLE, asks);
     }
+}
+
+/// Whether what a ray has hit stands in for something else.
+fn is_stand_in(bound: &Bound, cone: &Cone, leaf: u32) -> bool {
+    leaf != NONE && bound.is_marked(leaf) && !bound.would_suffice(cone, leaf)
 }
 
 /// Counts a ray that sees a pair which `before` saw. A pair is visible from one ray above the threshold on.

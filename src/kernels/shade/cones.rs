@@ -11,10 +11,14 @@ pub const RAYS_AROUND: f32 = 100.0;
 /// Square of the angle of one of them that is cosine-weighted, along the normal. No cone is wider.
 pub const WIDEST: f32 = PI / RAYS_AROUND;
 
+/// What no square exceeds whatever the tolerance: [`Surface::pending`] has room for no more.
+const MOST_SPREAD: f32 = 1.0;
+
 /// Has the cone of a ray that was just started spread by an angle, given squared.
 pub fn widen(bound: &Bound, surface: &mut Surface, square: f32) {
     if bound.has_levels() {
-        surface.pending |= (bound.params.levels[2] * least(square, WIDEST)).to_bits() << 1;
+        let square = least(bound.params.levels[2] * least(square, WIDEST), MOST_SPREAD);
+        surface.pending |= square.to_bits() << 1;
     }
 }
 

@@ -6,7 +6,7 @@ use super::texels::{Sampling, TileDemand};
 use super::texture::{Level, color_at, level_at, levels_of, tile_at};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
-    COUNTER_UNRESOLVED, GBUFFER_FIRST, GBUFFER_WAITS, GBuffer, MATERIAL_UNLIT, NONE, PARAM_COARSER,
+    COUNTER_UNRESOLVED, GBUFFER_COARSER, GBUFFER_FIRST, GBUFFER_WAITS, GBuffer, MATERIAL_UNLIT, NONE, PARAM_COARSER,
 };
 use crate::kernels::vector::{Vec3, cross, dot, each, mix, most};
 use bricks::{BASE_COLOR, METALLIC_ROUGHNESS, NORMAL, OCCLUSION};
@@ -120,5 +120,6 @@ pub(crate) fn look_up(g: &mut GBuffer, index: u32, from: Sampling, demand: &[Til
     if g.state & GBUFFER_WAITS == 0 {
         settle(g, m.flags);
     }
+    g.state |= if is_coarser { GBUFFER_COARSER } else { 0 };
     is_coarser
 }

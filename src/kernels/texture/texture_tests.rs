@@ -5,7 +5,7 @@ use super::sample::look_up;
 use super::texels::{Sampling, Texels, TileDemand};
 use super::texture::{Levels, color_at, level_at, levels_of, tile_at};
 use super::{bc5, bc7};
-use crate::kernels::layout::{GBUFFER_FIRST, GBUFFER_READ, GBuffer, NONE, Params, Ray, Surface};
+use crate::kernels::layout::{GBUFFER_COARSER, GBUFFER_FIRST, GBUFFER_READ, GBuffer, NONE, Params, Ray, Surface};
 use crate::kernels::shade::resolve::footprint_of;
 use block_compression::decode::decompress_blocks_as_rgba8;
 use block_compression::{BC7Settings, CompressionVariant};
@@ -336,7 +336,8 @@ fn the_next_resident_level_stands_for_missing_tiles() {
         let demand: Vec<TileDemand> = held.iter().map(|_| TileDemand::default()).collect();
         let mut g = waiting;
         let is_coarser = look_up(&mut g, 77, from, &demand, true);
-        assert!(g.state == GBUFFER_READ && demand.iter().all(|d| d.get().rays == 0), "no hit waits");
+        let state = if is_coarser { GBUFFER_READ | GBUFFER_COARSER } else { GBUFFER_READ };
+        assert!(g.state == state && demand.iter().all(|d| d.get().rays == 0), "no hit waits");
         let used = demand.iter().filter(|d| d.get().used > 0).count();
         (is_coarser, used, g.albedo)
     };

@@ -82,10 +82,14 @@ impl Bound<'_> {
         &self.scene.levels.leaves[leaf as usize]
     }
 
-    fn suffices(&self, cone: &Cone, leaf: u32) -> bool {
+    fn width_square(&self, cone: &Cone, leaf: u32) -> f32 {
         let level = self.level_leaf(leaf);
         let d = each(|k| most(most(level.min[k] - cone.origin[k], cone.origin[k] - level.max[k]), 0.0));
-        level.error_square <= barrier(cone.square + barrier(cone.spread * square_of(d)))
+        barrier(cone.square + barrier(cone.spread * square_of(d)))
+    }
+
+    fn suffices(&self, cone: &Cone, leaf: u32) -> bool {
+        self.level_leaf(leaf).error_square <= self.width_square(cone, leaf)
     }
 
     /// Whether the ray takes a leaf.
@@ -155,6 +159,48 @@ impl Bound<'_> {
                 || self.level_leaf(level.parent).error_square > self.tile_widths(tile, level.parent)[0])
     }
 
+    /// Whether a leaf is marked: a level below which something is missing, or a leaf below such a one.
+    #[inline(always)]
+    pub fn is_marked(&self, leaf: u32) -> bool {
+        self.has_levels() && self.level_leaf(leaf).error_square.is_sign_negative()
+    }
+
+    /// Whether a level would suffice if nothing were missing.
+    pub fn would_suffice(&self, cone: &Cone, leaf: u32) -> bool {
+        !self.has_levels() || self.level_leaf(leaf).error_square.abs() <= self.width_square(cone, leaf)
+    }
+
+    /// Whether the ray would take a leaf.
+    pub fn would_take(&self, cone: &Cone, leaf: u32) -> bool {
+        if !self.has_levels() {
+            return true;
+        }
+        let parent = self.level_leaf(leaf).parent;
+        self.would_suffice(cone, leaf) && (parent == NONE || !self.would_suffice(cone, parent))
+    }
+
+    /// Whether a level that the ray would take, or one above it, stands for all below a node of the wide top level.
+    pub fn would_be_stood_for_wide(&self, cone: &Cone, node: u32) -> bool {
+        if !self.has_levels() {
+            return false;
+        }
+        let level = self.scene.levels.nodes[(self.params.top_count + node) as usize];
+        level != NONE && self.would_suffice(cone, level)
+    }
+
+    /// The leaf that stands in for one that the ray would take: itself where nothing is marked above it.
+    pub fn stand_in_of(&self, leaf: u32) -> u32 {
+        let mut level = leaf;
+        while self.has_levels() {
+            let parent = self.level_leaf(level).parent;
+            if parent == NONE || !self.is_marked(parent) {
+                break;
+            }
+            level = parent;
+        }
+        level
+    }
+
     /// Has rays that start at a hit start off its surface where they may meet another level of it.
     #[inline(always)]
     pub fn start_off(&self, surface: &mut Surface) {
@@ -176,6 +222,6 @@ impl Bound<'_> {
         while level.parent != NONE && self.level_leaf(level.parent).error_square <= square {
             level = self.level_leaf(level.parent);
         }
-        barrier(LEVEL_OFFSET * square_root(level.error_square))
+        barrier(LEVEL_OFFSET * square_root(level.error_square.abs()))
     }
 }

@@ -163,6 +163,7 @@ impl Findings {
         self.words("tiles", context, &tiles(gpu), &tiles(cpu));
         self.words("used bricks", context, &gpu.used, &cpu.used);
         self.words("rays of pairs", context, &gpu.pair_rays, &cpu.pair_rays);
+        self.words("states", context, &gpu.states, &cpu.states);
     }
 }
 
@@ -372,6 +373,11 @@ impl Executor for Lockstep {
     fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError> {
         self.gpu.set_pairs(queries, nodes)?;
         self.cpu.set_pairs(queries, nodes)
+    }
+
+    fn mark_leaves(&mut self, marks: &Arc<[bool]>) {
+        self.gpu.mark_leaves(marks);
+        self.cpu.mark_leaves(marks);
     }
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {

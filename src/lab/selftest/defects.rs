@@ -198,6 +198,7 @@ impl Executor for Faulty {
         to self.inner {
             fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError>;
             fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError>;
+            fn mark_leaves(&mut self, marks: &Arc<[bool]>);
         }
     }
 

@@ -181,7 +181,7 @@ fn settings_that_do_not_go_together_are_refused() {
     for options in [
         "--secondary ao=roma",
         "--fronts on",
-        "--interactive 1M",
+        "--frame-budget 1M",
         "--checkpoints 1 --reference a.exr",
         "--progressive",
         "--measure-error",

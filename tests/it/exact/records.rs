@@ -20,6 +20,7 @@ use brickwalk::settings::Schedule;
 use brickwalk::stream::{Item, Kind, Slot};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Passes everything on and keeps what went through.
@@ -45,6 +46,10 @@ impl Executor for Spy<'_> {
 
     fn set_pairs(&mut self, queries: &[PairQuery], nodes: &[u32]) -> Result<(), ExecutorError> {
         self.inner.set_pairs(queries, nodes)
+    }
+
+    fn mark_leaves(&mut self, marks: &Arc<[bool]>) {
+        self.inner.mark_leaves(marks);
     }
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {

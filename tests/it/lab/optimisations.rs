@@ -52,7 +52,7 @@ struct Seen {
 }
 
 fn seen(renderer: &mut Renderer, pixels: &Pixels) -> Seen {
-    let Pixels { radiance, depth, normal, id, albedo } = pixels;
+    let Pixels { radiance, depth, normal, id, albedo, .. } = pixels;
     let vectors = radiance.iter().chain(normal).chain(albedo).flatten();
     let bits: Vec<u32> = vectors.chain(depth).map(|x| x.to_bits()).chain(id.iter().copied()).collect();
     let hits: Vec<Hit> = renderer.executor.read_hits(Pass::Primary).expect("hits");

@@ -7,8 +7,8 @@ use self::scenes::{textured, with_fields, with_levels};
 use super::{Defect, Findings, Lockstep};
 use crate::cpu::CpuExecutor;
 use crate::frame::{
-    Effects, Engine, Equirectangular, Light, Moved, Occlusion, RenderSettings, Renderer, Schedule, emissive_triangles,
-    environment,
+    Budgeted, Effects, Engine, Equirectangular, FrameBudget, Light, Moved, Occlusion, RenderSettings, Renderer,
+    Schedule, emissive_triangles, environment,
 };
 use crate::gpu::device::Gpu;
 use crate::gpu::executor::GpuExecutor;
@@ -73,8 +73,8 @@ struct Variant {
     without: &'static [Optimisation],
     /// Columns that rays answered by occupancy maps pass, if they are; 0: they are snapped; what these do for them.
     roma: Option<(u32, Role)>,
-    /// Bytes of tiles that a frame may load.
-    tile_bytes: Option<u64>,
+    /// Bytes that a frame may load.
+    budget: Option<u64>,
     /// Look-ups of rays answered by distance fields, if they are.
     field: Option<u32>,
     /// A method as a session makes it.
@@ -96,7 +96,7 @@ const VARIANT: Variant = Variant {
     list_most: u32::MAX,
     without: &[],
     roma: None,
-    tile_bytes: None,
+    budget: None,
     field: None,
     method: Method::Exact,
     displacement: None,
@@ -239,7 +239,7 @@ fn render(
             lod: variant.lod,
             correct_one_in: 0,
             only_chosen: false,
-            tile_bytes: variant.tile_bytes,
+            budget: variant.budget.map(FrameBudget::Bytes),
             schedule: variant.schedule,
             effects: effects(),
             samples: 1,
@@ -255,6 +255,7 @@ fn render(
         band_rows: variant.rows,
         tile: EXTENT.tile,
         fronts: variant.fronts.then(Fronts::default),
+        budgeted: variant.budget.map(|_| Budgeted::new(scene.resident())),
         auto: Auto::default(),
         captures: None,
         moved: Moved::default(),
@@ -324,8 +325,9 @@ fn twins_agree_with_their_kernels() {
         Variant { list_most: 3, ..VARIANT },
         Variant { list_most: 3, threshold: 4, ..VARIANT },
         Variant { list_most: 0, threshold: 2, ..VARIANT },
-        // Coarser levels stand for most tiles.
-        Variant { tile_bytes: Some(0), ..VARIANT },
+        // Most bricks are missing, and coarser levels stand for most tiles.
+        Variant { budget: Some(1), ..VARIANT },
+        Variant { budget: Some(1 << 30), everything_fits: true, ..VARIANT },
         Variant { schedule: Schedule::Demand, ..VARIANT },
         Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },
@@ -373,6 +375,9 @@ fn twins_agree_with_their_kernels() {
         Variant { list_most: 2, threshold: 2, ..selecting(4.0, false) },
         Variant { fronts: true, ..selecting(4.0, true) },
         Variant { method: Method::Auto, ..selecting(4.0, false) },
+        // Levels stand in for what is missing.
+        Variant { budget: Some(20_000), everything_fits: true, ..selecting(0.0, false) },
+        Variant { budget: Some(40_000), ..selecting(2.0, false) },
     ];
     // Whatever methods there are, with few cells.
     let usual = Method::ALL.iter().map(|&method| Variant { method, ..VARIANT }).filter(|v| v.method != Method::Exact);
@@ -397,7 +402,7 @@ fn twins_agree_with_their_kernels() {
     let scenes = [
         (Arc::new(probe::scene().unwrap()), &variants[..]),
         (textured(false), &variants[..]),
-        (textured(true), &variants[2..11]),
+        (textured(true), &variants[2..12]),
         (with_fields(Arc::new(probe::scene().unwrap()), 8), &by_fields[..]),
         (with_fields(textured(false), 8), &by_fields[..2]),
         (with_fields(textured(false), 1), &by_fields[2..]),

@@ -1,0 +1,146 @@
+//! Frames with a budget: they load no more, pixels that are said to be exact show what they show with everything
+//! resident, and while the camera rests all become exact.
+
+use crate::common::{adapters, folder, json, records, settings, succeed, walk};
+use brickwalk::counters::Record;
+use brickwalk::frame::{PixelState, Pixels};
+use brickwalk::scene::Camera;
+use brickwalk::session::{Frame, Session};
+use brickwalk::settings::Group as _;
+use std::path::{Path, PathBuf};
+
+/// A city with levels of detail.
+fn city(folder: &Path) -> PathBuf {
+    let scene = folder.join("city.bricks");
+    let words = ["scene", "city", "--triangles", "60K", "--brick-triangles", "500", "--lod", "on", "-o"];
+    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
+    scene
+}
+
+/// What a pixel shows, bit for bit.
+fn words(pixels: &Pixels, at: usize) -> [u32; 11] {
+    let [r, g, b] = pixels.radiance[at];
+    let [x, y, z] = pixels.normal[at];
+    let [u, v, w] = pixels.albedo[at];
+    let mut words = [r, g, b, x, y, z, u, v, w, pixels.depth[at], 0.0].map(f32::to_bits);
+    words[10] = pixels.id[at];
+    words
+}
+
+/// What comes of frames of a camera that jumps twice and then rests.
+#[derive(Default, Debug)]
+struct Outcome {
+    exact: usize,
+    /// Of those that are not exact, how many show something else.
+    others: usize,
+    /// Pixels that are not exact, of the last frame.
+    left: usize,
+    unresolved: usize,
+}
+
+/// Renders `frames` frames in three places with options beside `common` on an adapter, each against that of a session
+/// without a budget.
+fn compare(scene: &Path, adapter: &str, [common, options]: [&str; 2], frames: usize, budget: u64) -> Outcome {
+    let common = format!("{common} --aov --path {}", scene.with_extension("near.json").display());
+    let open = |options: &str| {
+        let mut settings = settings(&format!("{common} {options}"));
+        settings.set("adapter", adapter).expect("an adapter");
+        Session::open(scene, &settings).expect("a session")
+    };
+    let [mut bounded, mut whole] = [format!("{options} --frame-budget {budget}B"), String::new()].map(|o| open(&o));
+    let cameras: Vec<Camera> = [0, 6, 11].iter().map(|&at| whole.path().frame(at, 12)).collect();
+    let mut outcome = Outcome::default();
+    for camera in cameras.iter().flat_map(|camera| std::iter::repeat_n(camera, frames)) {
+        let [found, truth]: [Frame; 2] = [&mut bounded, &mut whole].map(|of| of.frame(camera).expect("a frame"));
+        assert!(truth.pixels.state.is_empty(), "a frame without a budget has no states");
+        let bytes = |r: &Record| r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures;
+        let loaded: u64 = found.records.iter().map(bytes).sum();
+        assert!(loaded <= budget, "frame {} loads {loaded} bytes", found.number);
+        outcome.left = 0;
+        for (at, state) in found.pixels.state.iter().enumerate() {
+            let is_same = words(&found.pixels, at) == words(&truth.pixels, at);
+            if *state == PixelState::Exact {
+                assert!(is_same, "{options}: pixel {at} of frame {} is said to be exact", found.number);
+                outcome.exact += 1;
+            } else {
+                outcome.left += 1;
+                outcome.others += usize::from(!is_same);
+                outcome.unresolved += usize::from(*state == PixelState::Unresolved);
+            }
+        }
+        let primary = found.records.iter().find(|record| record.pass == "primary").expect("a record");
+        let exact = found.pixels.state.len() - outcome.left;
+        assert_eq!(primary.pixels_exact, exact as u64);
+        assert!(primary.pixels_bounded <= outcome.left as u64);
+    }
+    outcome
+}
+
+#[test]
+fn pixels_that_are_said_to_be_exact_are() {
+    let folder = folder();
+    let scene = city(folder.path());
+    let shadows = "--size 320x180 --effects primary,shadow --spp 1";
+    let all = "--size 96x64 --effects primary,shadow,ao,diffuse,glossy --ao-rays 2 --diffuse-rays 2 --spp 2";
+    let mut exact = 0;
+    for (common, options, frames, has_room) in [
+        (shadows, "--cache 100%", 9, true),
+        (shadows, "--cache 20%", 4, false),
+        (&format!("{shadows} --lod 1"), "--cache 50%", 5, false),
+        (all, "--cache 100%", 40, true),
+        (all, "--cache 30%", 8, false),
+    ] {
+        let outcome = compare(&scene, "cpu", [common, options], frames, 200_000);
+        // Controls: what is not said to be exact differs indeed, and levels stand in for all of it.
+        assert!(outcome.others > 1000, "{common} {options}: {outcome:?}");
+        assert!(outcome.exact > 1000, "{common} {options}: {outcome:?}");
+        if has_room {
+            assert_eq!((outcome.left, outcome.unresolved), (0, 0), "{common} {options}: {outcome:?}");
+        }
+        exact += outcome.exact;
+    }
+    assert!(exact > 1_000_000, "{exact}");
+}
+
+#[test]
+fn devices_know_which_pixels_are_exact_too() {
+    let folder = folder();
+    let scene = city(folder.path());
+    for adapter in adapters().iter().filter(|adapter| *adapter != "cpu") {
+        let common = "--size 72x40 --effects primary,shadow,ao --ao-rays 1 --spp 1";
+        let outcome = compare(&scene, adapter, [common, "--cache 100%"], 12, 200_000);
+        assert!(outcome.exact > 1000 && outcome.others > 100 && outcome.left == 0, "{outcome:?}");
+    }
+}
+
+#[test]
+fn a_scene_without_levels_says_what_is_missing() {
+    let folder = folder();
+    let scene = folder.path().join("bare.bricks");
+    let words = ["scene", "city", "--triangles", "20K", "--brick-triangles", "500", "-o"];
+    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
+    let outcome = compare(&scene, "cpu", ["--size 96x64 --effects primary,shadow --spp 1", ""], 12, 100_000);
+    assert!(outcome.unresolved > 1000 && outcome.others > 500 && outcome.left == 0, "{outcome:?}");
+}
+
+#[test]
+fn walks_write_states_and_count_them() {
+    let folder = folder();
+    let scene = city(folder.path());
+    let path = scene.with_extension("near.json");
+    for budget in ["200K", "25ms"] {
+        let output = folder.path().join(budget);
+        let options = format!("--frames 3 --size 96x64 --aov --frame-budget {budget} --adapter cpu");
+        walk(&scene, &output, &format!("{options} --path {}", path.display()));
+        let loaded = brickwalk::metrics::load(output.join("frames/0000.exr")).expect("a picture");
+        let brickwalk::metrics::Channel::Integer(states) = &loaded.channels["state.id"] else { panic!("no integers") };
+        let of = |state| states.iter().filter(|own| **own == state).count() as u64;
+        let records = records(&output);
+        let first = records.iter().find(|record| record["pass"] == "primary").expect("a record");
+        assert_eq!([&first["pixels_exact"], &first["pixels_bounded"]], [of(0), of(1)]);
+        assert_eq!(of(0) + of(1) + of(2), 96 * 64);
+        assert!(first["schedule"] == "cut", "{first}");
+        let summary = json(&output.join("summary.json"));
+        assert!(summary["settings"]["frame_budget"].is_string(), "{}", summary["settings"]);
+    }
+}
