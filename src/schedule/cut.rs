@@ -1,13 +1,17 @@
 //! Frames that may load so much only: levels of detail that are resident stand in for what is not.
 //!
-//! *Theory*: a cut through the trees of levels. A level is *open* where all of its children are ready, geometry and
-//! attributes; rays pass an open level by as far as their cones ask for, and stop at a closed one, which stands in for
-//! all below it. So a pass is traced over what is ready in one go, and loads nothing. Queries then ask, ray by ray,
-//! what stands in for the bricks that would be entered before the hit. A ray that asks for nothing has the hit that it
-//! has with everything resident. What most rays ask for is opened first, as far as the frame's allowance goes.
+//! *Theory*: a cut through the trees of levels. Rays pass an *open* level by as far as their cones ask for, and stop at
+//! a closed one, which stands in for all below it. So a pass is traced over what is ready, geometry and attributes, in
+//! one go, and loads nothing. Queries then ask, ray by ray, what stands in for the bricks that would be entered before
+//! the hit. A ray that asks for nothing has the hit that it has with everything resident. What most rays ask for is
+//! opened first, as far as the frame's allowance goes.
 //!
-//! The invariant: roots of the trees, what rays used last, and what stands beside and above it, stay while others make
-//! room. So detail that is seen does not come and go, and where it does not all fit the cut rests where it is.
+//! A level opens when all of its children are ready. It closes when rays ask for something below it that has made room
+//! for others meanwhile and cannot be loaded at once. So children that no ray enters take no room, and there is a hole
+//! for as long only as it takes to close a level.
+//!
+//! The invariant: roots of the trees, what rays used last, and what is above it, stay while others make room. So detail
+//! that is seen does not come and go, and where it does not all fit the cut rests where it is.
 
 use super::cache::Cache;
 use super::{Demand, Executor, ExecutorError, Pass, Step, Tracer};
@@ -27,6 +31,10 @@ pub struct Cut {
     /// For each brick what it stands for; bricks that are no levels, and levels that stand for what has moved, for
     /// nothing.
     children: Vec<Vec<u32>>,
+    /// For each brick the levels that stand for it.
+    parents: Vec<Vec<u32>>,
+    /// For each brick whether rays pass it by; no level stands for anything else.
+    is_open: Vec<bool>,
     /// For each leaf of the top level its brick, and the leaf of the level that stands for it, or [`NONE`].
     leaves: Vec<(u32, u32)>,
     /// Leaves, parents before children.
@@ -46,17 +54,17 @@ impl Cut {
     pub fn new(resident: &Resident) -> Self {
         let (first, count) = (resident.exact_bricks(), resident.bricks.len());
         let mut children = vec![Vec::new(); count];
-        let mut is_below = vec![false; count];
+        let mut parents = vec![Vec::new(); count];
+        let mut is_left = vec![false; count];
         let in_use = resident.has_levels_in_use();
         for (level, record) in resident.levels.iter().enumerate().filter(|_| in_use) {
             // What stands for something that has moved no ray takes.
-            let is_left = record.error == f64::MAX;
+            is_left[first + level] = record.error == f64::MAX;
             let mut own: Vec<u32> = record.children().map(|child| child.brick).collect();
             own.sort_unstable();
             own.dedup();
-            own.retain(|_| !is_left);
-            own.iter().for_each(|&child| is_below[child as usize] = true);
-            is_below[first + level] |= is_left;
+            own.retain(|_| !is_left[first + level]);
+            own.iter().for_each(|&child| parents[child as usize].push((first + level) as u32));
             children[first + level] = own;
         }
         let above = if in_use { resident.level_parents() } else { Vec::new() };
@@ -66,9 +74,11 @@ impl Cut {
         // Children are bricks or levels before their parent.
         let mut order: Vec<u32> = (0..leaves.len() as u32).collect();
         order.sort_unstable_by_key(|&leaf| Reverse(leaves[leaf as usize].0));
-        let roots = (0..count as u32).filter(|&brick| in_use && !is_below[brick as usize]).collect();
+        let is_root = |&brick: &u32| in_use && parents[brick as usize].is_empty() && !is_left[brick as usize];
+        let roots = (0..count as u32).filter(is_root).collect();
         let used = [vec![false; count], vec![false; count]];
-        Self { children, leaves, order, roots, asked: BTreeMap::new(), used, is_first: true }
+        let is_open = vec![false; count];
+        Self { children, parents, is_open, leaves, order, roots, asked: BTreeMap::new(), used, is_first: true }
     }
 
     /// Starts a frame: what was used in the one before is still kept.
@@ -79,8 +89,8 @@ impl Cut {
         self.is_first = true;
     }
 
-    /// Loads what rays asked for as far as the allowance goes, and marks what stands in from now on. Returns whether
-    /// anything was loaded.
+    /// Loads what rays asked for as far as the allowance goes, opens and closes levels, and marks what stands in from
+    /// now on. Returns whether rays may find something else now.
     fn refine(
         &mut self,
         executor: &mut dyn Executor,
@@ -88,11 +98,32 @@ impl Cut {
         stats: &mut Counters,
     ) -> Result<bool, ExecutorError> {
         let wanted = self.wanted(cache);
-        self.asked.clear();
+        let asked = std::mem::take(&mut self.asked);
         let kept: Vec<Item> = self.kept(cache).into_iter().flat_map(both).collect();
-        let has_loaded = cache.load_within(executor, &wanted, &kept, stats)?;
+        let mut has_changed = cache.load_within(executor, &wanted, &kept, stats)?;
+        for level in 0..self.children.len() {
+            let own = &self.children[level];
+            self.is_open[level] |= !own.is_empty() && own.iter().all(|&child| is_ready(cache, child));
+        }
+        for &brick in asked.keys().filter(|&&brick| !is_ready(cache, brick)) {
+            has_changed |= self.close_above(brick, cache);
+        }
         executor.mark_leaves(&self.marks(cache));
-        Ok(has_loaded)
+        Ok(has_changed)
+    }
+
+    /// Closes the nearest levels above a brick that can stand in for it. Returns whether any was open.
+    fn close_above(&mut self, brick: u32, cache: &Cache) -> bool {
+        let mut above = self.parents[brick as usize].clone();
+        let mut has_closed = false;
+        while let Some(level) = above.pop() {
+            if is_ready(cache, level) {
+                has_closed |= std::mem::replace(&mut self.is_open[level as usize], false);
+            } else {
+                above.extend(&self.parents[level as usize]);
+            }
+        }
+        has_closed
     }
 
     /// What to load, the most urgent first, and what of that is resident already: bricks that nothing stands in for,
@@ -117,7 +148,7 @@ impl Cut {
             .collect()
     }
 
-    /// The bricks that stay: roots that are ready, what was used, and what stands beside and above it.
+    /// The bricks that stay: roots that are ready, what was used, and what stands above it.
     fn kept(&self, cache: &Cache) -> Vec<u32> {
         let [now, before] = &self.used;
         let mut is_kept: Vec<bool> = now.iter().zip(before).map(|(now, before)| *now || *before).collect();
@@ -126,18 +157,15 @@ impl Cut {
         for level in 0..self.children.len() {
             is_kept[level] |= self.children[level].iter().any(|&child| is_kept[child as usize]);
         }
-        let beside = self.children.iter().filter(|own| own.iter().any(|&child| is_kept[child as usize]));
-        let beside: Vec<u32> = beside.flatten().copied().collect();
-        beside.iter().for_each(|&brick| is_kept[brick as usize] = true);
         (0..is_kept.len() as u32).filter(|&brick| is_kept[brick as usize]).collect()
     }
 
     /// Which leaves are marked: closed levels that are ready, and all below them.
     fn marks(&self, cache: &Cache) -> Arc<[bool]> {
-        let stands_in = |level: u32| {
-            is_ready(cache, level) && self.children[level as usize].iter().any(|&child| !is_ready(cache, child))
+        let stands_in = |level: usize| {
+            !self.is_open[level] && !self.children[level].is_empty() && is_ready(cache, level as u32)
         };
-        let stands_in: Vec<bool> = (0..self.children.len() as u32).map(stands_in).collect();
+        let stands_in: Vec<bool> = (0..self.children.len()).map(stands_in).collect();
         let mut marks = vec![false; self.leaves.len()];
         for &leaf in &self.order {
             let (brick, parent) = self.leaves[leaf as usize];
@@ -176,7 +204,8 @@ pub fn trace(t: &mut Tracer, cut: &mut Cut, first: &[Step]) -> Result<Vec<u32>, 
         t.stats.bricks_entered.extend(report.used.iter().copied());
         cut.note(&report.used, &asks.demand, t.cache);
         let has_left = t.cache.allowance.as_ref().is_some_and(|allowance| allowance.left() > 0);
-        let goes_on = is_first && has_left && !cut.asked.is_empty();
+        let has_holes = cut.asked.keys().any(|&brick| !is_ready(t.cache, brick));
+        let goes_on = is_first && (has_left || has_holes) && !cut.asked.is_empty();
         if !goes_on || !cut.refine(t.executor, t.cache, t.stats)? {
             let states = std::mem::take(&mut asks.states);
             t.stats.add(report);
