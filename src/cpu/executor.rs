@@ -7,7 +7,7 @@ use crate::kernels::dispatch::{Dispatch, are_pairs_culled, dispatches};
 use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{self, Params};
 use crate::kernels::payloads::AttributeView;
-use crate::kernels::query::query_all;
+use crate::kernels::query::stand_ins;
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
@@ -282,7 +282,7 @@ impl Executor for CpuExecutor {
             report.pair_rays = std::mem::take(&mut self.buffers.tiles.pair_rays);
         }
         if steps.contains(&Step::QueryStandIns) {
-            report.states = query_all::states(&self.buffers.sets[pass.set()]);
+            report.states = stand_ins::states(&self.buffers.sets[pass.set()]);
         }
         Ok(report)
     }

@@ -195,6 +195,10 @@ impl Cache {
         let mut has_loaded = false;
         while let (Some(allowance), false) = (self.allowance, rest.is_empty()) {
             let left = allowance.left();
+            // What is resident of the batch must not make room for the rest of it.
+            for &item in rest.iter().take(2 * BATCH_BRICKS) {
+                self.residency.pin(item);
+            }
             // What each and all before it in the batch add to what is resident.
             let sums: Vec<u64> = (rest.iter().take(2 * BATCH_BRICKS))
                 .scan(0, |sum, &item| {

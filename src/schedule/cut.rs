@@ -162,9 +162,8 @@ impl Cut {
 
     /// Which leaves are marked: closed levels that are ready, and all below them.
     fn marks(&self, cache: &Cache) -> Arc<[bool]> {
-        let stands_in = |level: usize| {
-            !self.is_open[level] && !self.children[level].is_empty() && is_ready(cache, level as u32)
-        };
+        let stands_in =
+            |level: usize| !self.is_open[level] && !self.children[level].is_empty() && is_ready(cache, level as u32);
         let stands_in: Vec<bool> = (0..self.children.len()).map(stands_in).collect();
         let mut marks = vec![false; self.leaves.len()];
         for &leaf in &self.order {

@@ -6,6 +6,7 @@ pub mod interval;
 pub mod query;
 pub mod query_all;
 pub mod query_pairs;
+pub mod stand_ins;
 pub mod tile_bounds;
 pub mod tile_lists;
 pub mod tile_walk;

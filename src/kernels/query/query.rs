@@ -2,14 +2,14 @@
 //! enter a child box of the brick's root at or before their present hit, and where the nearest does.
 
 use crate::kernels::bound::{Bound, entry_bits};
-use crate::kernels::layout::{INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT};
+use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT, Surface};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::spread_of;
 use crate::kernels::trace::node::{entered_children, framed_ray, node_hits};
-use crate::kernels::trace::packet::RAYS;
+use crate::kernels::trace::packet::{Packet, RAYS};
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::PacketScratch;
 use crate::kernels::trace::run::{PacketKernel, Work, for_each_ray, run_for_each_packet};
@@ -103,6 +103,10 @@ impl PacketKernel for Query<'_> {
             }
         }
     }
+
+    /// Their limits are no hits.
+    #[inline(always)]
+    fn write<I: Isa>(&self, _: I, _: &Packet, _: &mut [Hit], _: &mut [Surface], _: &[u32]) {}
 }
 
 /// What a ray needed, its hit being final.

@@ -6,7 +6,7 @@
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     COUNTER_PAIRS_INVISIBLE, COUNTER_PAIRS_VISIBLE, COUNTER_STACK_OVERFLOW, NONE, PARAM_ANY_HIT, PARAM_NEXT,
-    PENDING_MISSING, Surface,
+    PENDING_MISSING,
 };
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::tiles::PairCounts;
@@ -25,17 +25,6 @@ pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts
     for_each_ray(set, bound, work, |scratch, slot| ask::<WANTED>(bound, scratch, slot, pairs));
 }
 
-/// What [`query_stand_ins`] left each ray with: [`crate::schedule::Report::states`].
-pub fn states(set: &RaySet) -> Vec<u32> {
-    let state = |surface: &Surface| u32::from(is_pending(surface)) | surface.pending >> 31 << 1;
-    set.surfaces.iter().map(state).collect()
-}
-
-/// Of all rays: what stands in for what they would enter.
-pub fn query_stand_ins(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
-    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<STAND_INS>(bound, scratch, slot, pairs));
-}
-
 /// Of all rays: how many of a tile see each leaf. `pairs` have been started.
 pub fn count_pairs(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
     for_each_ray(set, bound, Work::All, |scratch, slot| ask::<PAIRS>(bound, scratch, slot, pairs));
@@ -46,13 +35,16 @@ const WANTED: u32 = 0;
 /// Nothing; it counts for pairs.
 const PAIRS: u32 = 1;
 /// What stands in.
-const STAND_INS: u32 = 2;
+pub const STAND_INS: u32 = 2;
 
-fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
+/// Queries of one ray.
+pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
     if WHAT == WANTED && !is_pending(slot.surface) {
         return;
     }
     let (ray, hit) = (*slot.ray, *slot.hit);
+    // Of rays for stand-ins those that are pending may ask.
+    let asks_nothing = WHAT == STAND_INS && !is_pending(slot.surface);
     let occluded = bound.has(PARAM_ANY_HIT) && hit.id != NONE;
     if WHAT != PAIRS {
         set_pending(slot.surface, false);
@@ -62,7 +54,7 @@ fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs:
         bound.demand[bound.brick_of(slot.surface.leaf)].add_ray(hit.t);
         set_pending(slot.surface, true);
     }
-    if !slot.is_traced() || bound.params.top_count == 0 || occluded {
+    if !slot.is_traced() || bound.params.top_count == 0 || occluded || asks_nothing {
         return;
     }
     let scene = bound.scene;

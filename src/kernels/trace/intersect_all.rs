@@ -4,13 +4,14 @@
 
 use super::levels::is_pending;
 use super::node::inner_before;
+use super::packet::Packet;
 use super::packet_node::Place;
 use super::packet_walk::{PacketGroup, PacketScratch, put, take};
 use super::run::{PacketKernel, Work, run_for_each_packet};
 use super::scratch::Scratch;
 use super::walk_brick::Group;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{NONE, PARAM_ANY_HIT};
+use crate::kernels::layout::{Hit, NONE, PARAM_ANY_HIT, Surface};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::PairCounts;
@@ -86,5 +87,10 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
                 packets.walk_leaf(isa, bound, scratch, leaf, rays, any_hit);
             }
         }
+    }
+
+    #[inline(always)]
+    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+        packet.write(isa, self.bound, hits, surfaces, places);
     }
 }

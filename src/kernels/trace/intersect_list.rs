@@ -1,11 +1,12 @@
 //! Intersects rays of one octant with a run of the selected leaves of their tile, in their order: twin of
 //! `shaders/trace/intersect_list.wgsl`.
 
+use super::packet::Packet;
 use super::packet_walk::PacketScratch;
 use super::run::{PacketKernel, Work, run_for_each_packet};
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Entry, NONE, PARAM_ANY_HIT};
+use crate::kernels::layout::{Entry, Hit, NONE, PARAM_ANY_HIT, Surface};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
@@ -54,5 +55,10 @@ impl PacketKernel for IntersectList<'_> {
                 packets.walk_leaf(isa, bound, scratch, listed.leaf, rays, bound.has(PARAM_ANY_HIT));
             }
         }
+    }
+
+    #[inline(always)]
+    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+        packet.write(isa, self.bound, hits, surfaces, places);
     }
 }

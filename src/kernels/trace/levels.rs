@@ -46,6 +46,12 @@ impl Bound<'_> {
         !self.scene.levels.leaves.is_empty()
     }
 
+    /// Whether no cone has a width: rays take bricks alone, or what is marked.
+    #[inline(always)]
+    pub fn are_cones_empty(&self) -> bool {
+        !self.has_levels() || self.params.levels[..3] == [0.0; 3]
+    }
+
     fn eye(&self) -> Vec3 {
         let [x, y, z, _] = self.params.origin;
         [x, y, z]

@@ -369,7 +369,11 @@ impl Packet {
     }
 
     /// Of `rays` those whose cones are as asked; the same cones are asked about once.
-    fn whose_cones(&self, bound: &Bound, rays: u64, ask: impl Fn(&Cone) -> bool) -> u64 {
+    #[inline(always)]
+    pub fn whose_cones(&self, bound: &Bound, rays: u64, ask: impl Fn(&Cone) -> bool) -> u64 {
+        if bound.are_cones_empty() {
+            return if ask(&Cone::default()) { rays } else { 0 };
+        }
         let (mut left, mut found, mut last) = (rays, 0, None);
         while left != 0 {
             let i = left.trailing_zeros() as usize % RAYS;

@@ -2,7 +2,7 @@
 //! packets.
 
 use super::node::octant;
-use super::packet::RAYS;
+use super::packet::{Packet, RAYS};
 use super::packet_walk::PacketScratch;
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
@@ -153,6 +153,9 @@ pub trait PacketKernel: Sync {
 
     /// Runs it for the rays of the packet, which are of the tile; what they find stays with them.
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize);
+
+    /// Writes what ray i of the packet has found to the i-th of `places`.
+    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]);
 }
 
 /// Edge of the blocks whose rays are made packets of, those of an octant together.
@@ -236,7 +239,7 @@ fn run_block<I: Isa>(
         packets.packet.seal(isa);
         kernel.run_packet(isa, &mut task.scratch, &mut packets, block.tile);
         packets.count(bound, &mut task.scratch.tally);
-        packets.packet.write(isa, bound, band.hits, band.surfaces, places);
+        kernel.write(isa, &packets.packet, band.hits, band.surfaces, places);
     }
     (task.packets, task.groups) = (Some(packets), Some(groups));
 }

@@ -1,0 +1,106 @@
+//! What stands in for bricks that rays would enter: `query_all` with STAND_INS, where rays of one octant find together
+//! whether any of them asks. Most do not, and only the others ask one by one.
+
+use super::query_all::{STAND_INS, ask};
+use crate::kernels::bound::Bound;
+use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, Surface};
+use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::simd::isa::Isa;
+use crate::kernels::tiles::PairCounts;
+use crate::kernels::trace::leaf::BrickRay;
+use crate::kernels::trace::levels::{is_pending, set_pending};
+use crate::kernels::trace::node::inner_before;
+use crate::kernels::trace::packet::Packet;
+use crate::kernels::trace::packet_node::Place;
+use crate::kernels::trace::packet_walk::{PacketGroup, PacketScratch, put, take};
+use crate::kernels::trace::run::{PacketKernel, Work, for_each_ray, run_for_each_packet};
+use crate::kernels::trace::scratch::Scratch;
+use crate::kernels::trace::walk_brick::Group;
+
+/// Of all rays: what stands in for what they would enter.
+pub fn query_stand_ins(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
+    run_for_each_packet(set, bound, Work::All, &Askers { bound });
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<STAND_INS>(bound, scratch, slot, pairs));
+}
+
+/// What [`query_stand_ins`] left each ray with: [`crate::schedule::Report::states`].
+pub fn states(set: &RaySet) -> Vec<u32> {
+    let state = |surface: &Surface| u32::from(is_pending(surface)) | surface.pending >> 31 << 1;
+    set.surfaces.iter().map(state).collect()
+}
+
+/// Leaves those rays pending that may ask.
+struct Askers<'a> {
+    bound: &'a Bound<'a>,
+}
+
+impl PacketKernel for Askers<'_> {
+    #[inline(always)]
+    fn takes(&self, slot: &Slot) -> bool {
+        let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
+        slot.is_traced() && !is_occluded && is_pending(slot.surface) && self.bound.params.top_count != 0
+    }
+
+    #[inline(always)]
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, _: usize) {
+        let bound = self.bound;
+        let PacketScratch { packet, top, .. } = packets;
+        let flip = packet.flip;
+        let whole = Place::new([0.0; 3], [0.0; 3], bound.params.instance_pad);
+        let any = packet.ray(0);
+        let mut r = BrickRay::outside(&any);
+        let mut depth = 0;
+        let mut next = Some((0, packet.all()));
+        loop {
+            if let Some((index, rays)) = next.take() {
+                let node = &bound.scene.top8[index as usize];
+                let mut group = PacketGroup { group: Group { base: index, bits: 0 }, rays: [0; 8] };
+                let mut met = packet.open(isa, node, &whole, rays, &mut group.rays);
+                while met != 0 {
+                    group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ flip);
+                    met &= met - 1;
+                }
+                if !put(top, &mut depth, group, &mut scratch.tally) {
+                    break;
+                }
+            }
+            if depth == 0 {
+                break;
+            }
+            let (group, child, rays) = take(top, &mut depth, flip);
+            let rays = rays & !packet.done;
+            let node = &bound.scene.top8[group.base as usize];
+            let inner = u32::from(node.inner_mask);
+            if rays == 0 {
+                continue;
+            } else if inner & 1 << child != 0 {
+                let index = node.child_base + inner_before(inner, child);
+                let rays = packet.whose_cones(bound, rays, |cone| !bound.would_be_stood_for_wide(cone, index));
+                next = (rays != 0).then_some((index, rays));
+                continue;
+            }
+            let leaf = node.triangle_base + u32::from(node.meta[child as usize] & 31);
+            let brick = bound.brick_of(leaf);
+            if bound.is_selected(brick) && bound.stand_in_of(leaf) == leaf {
+                continue;
+            }
+            let mut rays = packet.whose_cones(bound, rays, |cone| bound.would_take(cone, leaf));
+            let instance = bound.scene.leaves[leaf as usize].instance;
+            if rays != 0 && bound.scene.instances[instance as usize].flags & INSTANCE_IDENTITY != 0 {
+                r.enter_leaf(bound.scene, &any, leaf);
+                let place = Place::new(r.offset_high, r.offset_low, 0.0);
+                let mut entered = [0; 8];
+                packet.open(isa, &bound.scene.roots[brick], &place, rays, &mut entered);
+                rays = entered.iter().fold(0, |all, rays| all | rays);
+            }
+            packet.done |= rays;
+        }
+    }
+
+    #[inline(always)]
+    fn write<I: Isa>(&self, _: I, packet: &Packet, _: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+        for (i, &at) in places.iter().enumerate() {
+            set_pending(&mut surfaces[at as usize], packet.done >> i & 1 != 0);
+        }
+    }
+}
