@@ -146,7 +146,7 @@ fn what_needs_the_whole_picture_is_refused_in_bands() {
     let folder = folder();
     let scene = city(folder.path(), "10K", "4K");
     let out = folder.path().join("out");
-    for options in ["--secondary roma --effects ao", "--fronts on", "--interactive 1M", "--measure-error"] {
+    for options in ["--secondary roma --effects ao", "--fronts on", "--frame-budget 1M", "--measure-error"] {
         let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), out.as_os_str()];
         let given = format!("{VIEW} --adapter cpu --bands 4 {options}");
         let output = common::brickwalk(words.into_iter().chain(given.split(' ').map(AsRef::as_ref)));
