@@ -27,6 +27,12 @@ fn words(pixels: &Pixels, at: usize) -> [u32; 11] {
     words
 }
 
+/// Bytes that a frame has loaded.
+fn loaded(frame: &Frame) -> u64 {
+    let bytes = |r: &Record| r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures;
+    frame.records.iter().map(bytes).sum()
+}
+
 /// What comes of frames of a camera that jumps twice and then rests.
 #[derive(Default, Debug)]
 struct Outcome {
@@ -53,9 +59,7 @@ fn compare(scene: &Path, adapter: &str, [common, options]: [&str; 2], frames: us
     for camera in cameras.iter().flat_map(|camera| std::iter::repeat_n(camera, frames)) {
         let [found, truth]: [Frame; 2] = [&mut bounded, &mut whole].map(|of| of.frame(camera).expect("a frame"));
         assert!(truth.pixels.state.is_empty(), "a frame without a budget has no states");
-        let bytes = |r: &Record| r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures;
-        let loaded: u64 = found.records.iter().map(bytes).sum();
-        assert!(loaded <= budget, "frame {} loads {loaded} bytes", found.number);
+        assert!(loaded(&found) <= budget, "frame {} loads {} bytes", found.number, loaded(&found));
         outcome.left = 0;
         for (at, state) in found.pixels.state.iter().enumerate() {
             let is_same = words(&found.pixels, at) == words(&truth.pixels, at);
@@ -111,6 +115,22 @@ fn devices_know_which_pixels_are_exact_too() {
         let outcome = compare(&scene, adapter, [common, "--cache 100%"], 12, 200_000);
         assert!(outcome.exact > 1000 && outcome.others > 100 && outcome.left == 0, "{outcome:?}");
     }
+}
+
+#[test]
+fn where_not_all_fits_the_cut_comes_to_rest() {
+    let folder = folder();
+    let scene = city(folder.path());
+    let options = "--size 96x64 --effects primary,shadow --spp 1 --cache 6% --frame-budget 200K --adapter cpu";
+    let mut session = Session::open(&scene, &settings(options)).expect("a session");
+    let camera = session.path().frame(0, 2);
+    let frames: Vec<Frame> = (0..24).map(|_| session.frame(&camera).expect("a frame")).collect();
+    let is_exact = |frame: &Frame| frame.pixels.state.iter().all(|&state| state == PixelState::Exact);
+    assert!(loaded(&frames[0]) > 0 && !is_exact(&frames[23]), "the cache holds what the camera sees");
+    assert_eq!(frames[20..].iter().map(loaded).collect::<Vec<_>>(), [0; 4]);
+    let unresolved =
+        |frame: &Frame| frame.pixels.state.iter().filter(|&&state| state == PixelState::Unresolved).count();
+    assert_eq!(unresolved(&frames[23]), 0, "levels stand in");
 }
 
 #[test]
