@@ -35,6 +35,11 @@ impl Allowance {
         if self.until.is_some_and(|until| Instant::now() >= until) { 0 } else { self.bytes }
     }
 
+    /// Whether something may still be loaded after what takes so long.
+    pub fn outlasts(&self, time: Duration) -> bool {
+        self.bytes > 0 && self.until.is_none_or(|until| Instant::now() + time < until)
+    }
+
     /// Takes off what has been loaded.
     pub fn spend(&mut self, bytes: u64) {
         self.bytes = self.bytes.saturating_sub(bytes);

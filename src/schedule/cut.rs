@@ -21,6 +21,7 @@ use bricks::{NONE, Resident};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Share of the cache that the roots of the trees may take before rays ask for them: 1 in so many parts.
 const ROOTS: u64 = 4;
@@ -186,7 +187,8 @@ impl Cut {
 
 /// Traces the rays of a pass, after the steps in `first` have made them, over what is ready, and says what each is left
 /// with ([`super::Report::states`]). Before the first camera rays of a frame the cut is refined, and again while they
-/// ask for something and the allowance is not used up; what other rays ask for comes in the next frame.
+/// ask for something and the allowance lasts until they are traced once more, or where nothing stands in for something.
+/// What other rays ask for comes in the next frame.
 ///
 /// # Errors
 /// A brick that cannot be read; the device's.
@@ -198,11 +200,12 @@ pub fn trace(t: &mut Tracer, cut: &mut Cut, first: &[Step]) -> Result<Vec<u32>, 
         cut.refine(t.executor, t.cache, t.stats)?;
     }
     loop {
+        let start = Instant::now();
         let mut report = t.executor.run(t.pass, &steps, &t.cache.states)?;
         let mut asks = t.executor.run(t.pass, &[Step::QueryStandIns], &t.cache.states)?;
         t.stats.bricks_entered.extend(report.used.iter().copied());
         cut.note(&report.used, &asks.demand, t.cache);
-        let has_left = t.cache.allowance.as_ref().is_some_and(|allowance| allowance.left() > 0);
+        let has_left = t.cache.allowance.as_ref().is_some_and(|allowance| allowance.outlasts(start.elapsed()));
         let has_holes = cut.asked.keys().any(|&brick| !is_ready(t.cache, brick));
         let goes_on = is_first && (has_left || has_holes) && !cut.asked.is_empty();
         if !goes_on || !cut.refine(t.executor, t.cache, t.stats)? {
