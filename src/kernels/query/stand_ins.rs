@@ -12,10 +12,9 @@ use crate::kernels::trace::levels::{is_pending, set_pending};
 use crate::kernels::trace::node::inner_before;
 use crate::kernels::trace::packet::Packet;
 use crate::kernels::trace::packet_node::Place;
-use crate::kernels::trace::packet_walk::{PacketGroup, PacketScratch, put, take};
+use crate::kernels::trace::packet_walk::{PacketScratch, put, take, top_group};
 use crate::kernels::trace::run::{PacketKernel, Work, for_each_ray, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
-use crate::kernels::trace::walk_brick::Group;
 
 /// Of all rays: what stands in for what they would enter.
 pub fn query_stand_ins(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
@@ -52,14 +51,8 @@ impl PacketKernel for Askers<'_> {
         let mut depth = 0;
         let mut next = Some((0, packet.all()));
         loop {
-            if let Some((index, rays)) = next.take() {
-                let node = &bound.scene.top8[index as usize];
-                let mut group = PacketGroup { group: Group { base: index, bits: 0 }, rays: [0; 8] };
-                let mut met = packet.open(isa, node, &whole, rays, &mut group.rays);
-                while met != 0 {
-                    group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ flip);
-                    met &= met - 1;
-                }
+            if let Some(visit) = next.take() {
+                let group = top_group(isa, bound, packet, &whole, visit);
                 if !put(top, &mut depth, group, &mut scratch.tally) {
                     break;
                 }

@@ -6,10 +6,9 @@ use super::levels::is_pending;
 use super::node::inner_before;
 use super::packet::Packet;
 use super::packet_node::Place;
-use super::packet_walk::{PacketGroup, PacketScratch, put, take};
+use super::packet_walk::{PacketScratch, put, take, top_group};
 use super::run::{PacketKernel, Work, run_for_each_packet};
 use super::scratch::Scratch;
-use super::walk_brick::Group;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Hit, NONE, PARAM_ANY_HIT, Surface};
 use crate::kernels::rays::{RaySet, Slot};
@@ -54,14 +53,8 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
         let mut next = Some((0, packets.packet.all()));
         loop {
             if let Some((index, rays)) = next.take() {
-                let node = &bound.scene.top8[index as usize];
-                let mut group = PacketGroup { group: Group { base: index, bits: 0 }, rays: [0; 8] };
-                let mut met = packets.packet.open(isa, node, &place, rays, &mut group.rays);
+                let group = top_group(isa, bound, &packets.packet, &place, (index, rays));
                 packets.visits.nodes = packets.visits.nodes.wrapping_add(rays.count_ones());
-                while met != 0 {
-                    group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ flip);
-                    met &= met - 1;
-                }
                 if !put(&mut packets.top, &mut depth, group, &mut scratch.tally) {
                     break;
                 }

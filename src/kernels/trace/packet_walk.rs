@@ -44,6 +44,25 @@ impl Default for PacketScratch {
     }
 }
 
+/// The children of a node of the wide top level that `rays` of the packet enter.
+#[inline(always)]
+pub fn top_group<I: Isa>(
+    isa: I,
+    bound: &Bound,
+    packet: &Packet,
+    place: &Place,
+    (base, rays): (u32, u64),
+) -> PacketGroup {
+    let node = &bound.scene.top8[base as usize];
+    let mut group = PacketGroup { group: Group { base, bits: 0 }, rays: [0; 8] };
+    let mut met = packet.open(isa, node, place, rays, &mut group.rays);
+    while met != 0 {
+        group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ packet.flip);
+        met &= met - 1;
+    }
+    group
+}
+
 /// Takes the nearest child of the group on top of the stack: its node, its slot and the rays that enter it. The group
 /// is taken down with its last child.
 #[inline(always)]
