@@ -86,7 +86,21 @@ tell_skipped() {
     [ "$count" -eq 0 ]
 }
 
-# With the argument `tests`, what tests want: a Vulkan driver, and NumPy where apt-get brings it.
+# The libraries that a window loads on X11.
+have_window_libraries() {
+    local ldconfig name
+    for ldconfig in ldconfig /sbin/ldconfig /usr/sbin/ldconfig; do
+        have "$ldconfig" || continue
+        for name in libxkbcommon-x11.so.0 libXcursor.so.1 libXi.so.6 libXrandr.so.2; do
+            "$ldconfig" -p 2>/dev/null | grep -F "$name" >/dev/null || return 1
+        done
+        return 0
+    done
+    return 1
+}
+
+# With the argument `tests`, what tests want: a Vulkan driver, and where apt-get brings them NumPy and a display without
+# a screen.
 prepare() {
     if ! have cargo && [ -r "${HOME:-/root}/.cargo/env" ]; then
         # shellcheck source=/dev/null
@@ -102,7 +116,12 @@ prepare() {
     if [ "${1:-}" = tests ] && [ "$(uname -s)" = Linux ]; then
         have_vulkan_loader || missing+=(libvulkan1)
         have_vulkan_driver || missing+=(mesa-vulkan-drivers)
-        ! have apt-get || have_numpy || missing+=(python3-numpy)
+        if have apt-get; then
+            have_numpy || missing+=(python3-numpy)
+            have Xvfb || missing+=(xvfb)
+            have xdotool || missing+=(xdotool)
+            have_window_libraries || missing+=(libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2)
+        fi
     fi
     if [ "${#missing[@]}" -gt 0 ]; then
         install_packages "${missing[@]}"

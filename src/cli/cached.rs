@@ -11,6 +11,7 @@ use crate::output::atomic;
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::import::{EXTENSIONS, FileState, ImportSettings, Input, TILESET, import};
+use brickwalk_convert::progress::Progress;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Write;
@@ -80,6 +81,19 @@ fn folder() -> Result<PathBuf> {
 /// # Errors
 /// The model is missing or bad; the cache folder cannot be written to.
 pub fn scene(path: &Path) -> Result<PathBuf> {
+    scene_told(path, None, &say)
+}
+
+/// [`scene`], which says nothing and tells `progress` how far it is.
+///
+/// # Errors
+/// As [`scene`].
+#[cfg(feature = "viewer")]
+pub fn scene_quietly(path: &Path, progress: &Progress) -> Result<PathBuf> {
+    scene_told(path, Some(progress), &|_| ())
+}
+
+fn scene_told(path: &Path, progress: Option<&Progress>, say: &dyn Fn(&str)) -> Result<PathBuf> {
     if !is_model(path) {
         return Ok(path.into());
     }
@@ -95,12 +109,13 @@ pub fn scene(path: &Path) -> Result<PathBuf> {
     std::fs::create_dir_all(folder).with_context(|| {
         format!("{}: cannot make this folder for converted models; name another in {FOLDER_VARIABLE}", folder.display())
     })?;
-    let lock = lock(&file.with_extension("lock"), path)?;
+    let lock = lock(&file.with_extension("lock"), path, say)?;
     if is_current(&file) {
         say(&format!("{}: converted before, as {}", path.display(), file.display()));
     } else {
         say(&format!("{}: converted into {}, once", path.display(), file.display()));
-        convert(path, &file, &settings)?;
+        let progress = progress.cloned().unwrap_or_else(interrupt::job);
+        convert(path, &file, &settings, &progress, say)?;
     }
     drop(lock);
     Ok(file)
@@ -117,16 +132,15 @@ fn is_current(file: &Path) -> bool {
     file.is_file() && read().is_some_and(|sources| sources.are_current())
 }
 
-fn convert(model: &Path, file: &Path, settings: &BuildSettings) -> Result<()> {
+fn convert(model: &Path, file: &Path, settings: &BuildSettings, progress: &Progress, say: &dyn Fn(&str)) -> Result<()> {
     let start = Instant::now();
     // Whatever becomes of this, the list is no longer that of the scene.
     let _ = std::fs::remove_file(list_of(file));
-    let progress = interrupt::job();
     let scratch = file.parent().map(Path::to_path_buf);
     // With its full path, for the list of files.
     let input = Input::from(std::path::absolute(model).unwrap_or_else(|_| model.into()));
-    let source = import(&[input], &ImportSettings { scratch, ..ImportSettings::default() }, &progress)?;
-    let summary = match build_source(&source, settings, file, &progress) {
+    let source = import(&[input], &ImportSettings { scratch, ..ImportSettings::default() }, progress)?;
+    let summary = match build_source(&source, settings, file, progress) {
         Err(BuildError::Interrupted(_) | BuildError::Paused { .. }) => bail!("{}: interrupted", model.display()),
         built => usage(built)?,
     };
@@ -148,7 +162,7 @@ fn say(line: &str) {
 
 /// The right to convert a model, which other processes wait for until the file is closed. It stays: whoever waits has
 /// it open.
-fn lock(path: &Path, model: &Path) -> Result<File> {
+fn lock(path: &Path, model: &Path, say: &dyn Fn(&str)) -> Result<File> {
     let file = File::options().create(true).truncate(false).write(true).open(path);
     let file = file.with_context(|| {
         format!("{}: cannot write to this folder; name another in {FOLDER_VARIABLE}", path.display())

@@ -44,7 +44,7 @@ pub fn run(args: &DemoArgs) -> Result<()> {
 /// What a walk through a scene of so many bytes showed.
 fn shown(records: &[Record], all_bytes: u64) -> String {
     let sum = |of: fn(&Record) -> u64| records.iter().map(of).sum::<u64>();
-    let bytes = sum(|r| r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures);
+    let bytes = sum(Record::loaded_bytes);
     let cache = records.first().map_or(0, |record| record.cache_bytes);
     format!(
         "The scene takes {}, its cache held {}: {} were loaded ({}), {} evicted to make room, and every \

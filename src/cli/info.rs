@@ -6,6 +6,7 @@ use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogr
 use super::{cached, instances};
 use crate::cli::output::{print, print_json};
 use crate::secondary::displacement::is_similarity;
+use crate::session::Origin;
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use crate::stream::PayloadSource;
 use crate::stream::Residency;
@@ -33,7 +34,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     let scene = SceneFile::open(cached::scene(&args.scene)?)?;
     if let Some(id) = args.id {
         let origin = origin(&scene, id)?;
-        return if args.json { print_json(&origin) } else { print(&origin.human()) };
+        return if args.json { print_json(&Told { format: FORMAT, origin }) } else { print(&origin.human()) };
     }
     if args.instances {
         let rows = instances::rows(scene.resident());
@@ -428,32 +429,18 @@ impl Displacement {
     }
 }
 
-/// Where a triangle comes from.
-#[derive(Debug, PartialEq, Serialize)]
-struct Origin {
+/// Where a triangle comes from, as JSON has it.
+#[derive(Debug, Serialize)]
+struct Told {
     format: u32,
-    id: u32,
-    file: String,
-    node: String,
-    mesh: String,
-    primitive: u32,
-    /// Within the primitive, strips and fans expanded.
-    triangle: u32,
-}
-
-impl Origin {
-    fn human(&self) -> String {
-        format!(
-            "triangle {}: file {}, node {}, mesh {}, primitive {}, triangle {} of it\n",
-            self.id, self.file, self.node, self.mesh, self.primitive, self.triangle
-        )
-    }
+    #[serde(flatten)]
+    origin: Origin,
 }
 
 /// Finds a global triangle id in the manifest's provenance.
 fn origin(scene: &SceneFile, id: u32) -> Result<Origin> {
     let manifest = &scene.resident().manifest;
-    find(manifest, id).with_context(|| {
+    Origin::of(manifest, id).with_context(|| {
         let file = scene.path().display();
         match manifest.triangle_ids {
             0 => format!("{file}: no triangle has id {id}; the scene is empty"),
@@ -462,60 +449,9 @@ fn origin(scene: &SceneFile, id: u32) -> Result<Origin> {
     })
 }
 
-fn find(manifest: &Manifest, id: u32) -> Option<Origin> {
-    let p = instances::origin(manifest, id)?;
-    let triangle = id - p.first_id;
-    let source = manifest.sources.get(p.source as usize);
-    (triangle < p.count).then(|| Origin {
-        format: FORMAT,
-        id,
-        file: source.map_or_else(|| format!("source {}", p.source), |s| s.name.clone()),
-        node: p.node.clone(),
-        mesh: p.mesh.clone(),
-        primitive: p.primitive,
-        triangle,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bricks::{Provenance, Source};
-
-    fn manifest() -> Manifest {
-        let range = |first_id, count, node: &str| Provenance {
-            first_id,
-            count,
-            source: 0,
-            node: node.into(),
-            mesh: "mesh".into(),
-            primitive: first_id,
-            under: Vec::new(),
-        };
-        Manifest {
-            sources: vec![Source { name: "a.gltf".into(), bytes: 5, hash: "00".into() }],
-            triangle_ids: 30,
-            provenance: vec![range(0, 10, "left"), range(10, 0, "empty"), range(10, 20, "right")],
-            ..Manifest::default()
-        }
-    }
-
-    #[test]
-    fn ids_are_traced_to_their_primitive() {
-        let m = manifest();
-        for (id, node, triangle) in [(0, "left", 0), (9, "left", 9), (10, "right", 0), (29, "right", 19)] {
-            let o = find(&m, id).unwrap();
-            assert_eq!((o.node.as_str(), o.triangle, o.file.as_str()), (node, triangle, "a.gltf"), "{id}");
-        }
-        assert_eq!(find(&m, 30), None);
-        assert_eq!(find(&m, u32::MAX), None);
-        assert_eq!(find(&Manifest::default(), 0), None);
-        let text = find(&m, 12).unwrap().human();
-        for part in ["triangle 12:", "a.gltf", "node right", "mesh mesh", "primitive 10", "triangle 2 of it"] {
-            assert!(text.contains(part), "{text}");
-        }
-    }
-
     #[test]
     fn displacement_fields_are_counted() {
         let field = |brick, rings, directions, bits| DisplacementField {

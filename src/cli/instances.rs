@@ -1,6 +1,7 @@
 //! `info --instances`: what `walk --motion` can move, by number and by name.
 
-use bricks::{Manifest, Provenance, Resident};
+use crate::session::provenance;
+use bricks::Resident;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -30,7 +31,7 @@ pub fn rows(resident: &Resident) -> Vec<Row<'_>> {
         }
     }
     let row = |(instance, record): (u32, &bricks::Instance)| {
-        let from = origin(&resident.manifest, record.base);
+        let from = provenance(&resident.manifest, record.base);
         let [min, max] = bounds[instance as usize].map(|corner| corner.map(|x| x as f64 * step));
         Row {
             instance,
@@ -43,12 +44,6 @@ pub fn rows(resident: &Resident) -> Vec<Row<'_>> {
         }
     };
     (0u32..).zip(&resident.instances).skip(1).map(row).collect()
-}
-
-/// Where a triangle comes from, if there is one of this id.
-pub fn origin(manifest: &Manifest, id: u32) -> Option<&Provenance> {
-    let after = manifest.provenance.partition_point(|one| one.first_id <= id);
-    manifest.provenance[..after].last()
 }
 
 /// The same, a line each.

@@ -23,6 +23,8 @@ pub mod replay;
 pub mod scene;
 pub mod trace;
 pub mod verify;
+#[cfg(feature = "viewer")]
+pub mod view;
 pub mod walk;
 pub mod watcher;
 
@@ -81,6 +83,8 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Repair(args) => repair::run(args),
         Command::BakeDisplacement(args) => bake_displacement::run(args),
         Command::Walk(args) => walk::run(args),
+        #[cfg(feature = "viewer")]
+        Command::View(args) => view::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),

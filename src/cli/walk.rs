@@ -105,7 +105,7 @@ fn told(frame: u32, records: &[Record]) -> String {
     let effect = |r: &Record| {
         let schedule = r.schedule.to_string();
         let by = if schedule.is_empty() { String::new() } else { format!(" by {schedule}") };
-        let bytes = r.bytes_bvh + r.bytes_geometry + r.bytes_attributes + r.bytes_textures;
+        let bytes = r.loaded_bytes();
         let loaded = if bytes > 0 { format!(", {} loaded", human_bytes(bytes)) } else { String::new() };
         format!("{} {:.1} ms{by}{loaded}", r.pass, r.ms)
     };

@@ -176,6 +176,11 @@ impl Record {
         counters.count_sets();
         Self { frame, pass, counters }
     }
+
+    /// Bytes that were loaded: bricks, attributes, textures.
+    pub fn loaded_bytes(&self) -> u64 {
+        self.bytes_bvh + self.bytes_geometry + self.bytes_attributes + self.bytes_textures
+    }
 }
 
 impl Deref for Record {

@@ -309,6 +309,18 @@ impl FrameExecutor for CpuExecutor {
         Keep { queries: true, textures: true, ..Keep::default() }
     }
 
+    fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError> {
+        let has_bounces = !self.buffers.sets[2].rays.is_empty();
+        self.extent = extent;
+        self.buffers.sets = [extent.rays(), extent.rays(), 0].map(RaySet::new);
+        self.buffers.pixels = Pixels::new(extent.rays());
+        self.buffers.tiles = TileLists::new(extent.tiles() as usize);
+        if has_bounces {
+            self.allow_bounces();
+        }
+        Ok(())
+    }
+
     fn allow_bounces(&mut self) {
         self.buffers.sets[2] = RaySet::new(self.extent.rays());
         self.buffers.pixels.allow_bounces();

@@ -58,6 +58,7 @@ pub struct GpuExecutor {
     pairs_are_culled: bool,
     pair_count: u32,
     pair_nodes: u32,
+    has_bounces: bool,
 }
 
 impl GpuExecutor {
@@ -109,12 +110,8 @@ impl GpuExecutor {
         page_sizes: &[u64],
         setup: Setup,
     ) -> Result<Self, ExecutorError> {
-        let most = most_rays(&gpu);
         let extent = setup.extent;
-        if extent.rays() as u64 > most {
-            let text = format!("{:?} holds {most} pixels at a time; ask for a smaller --size or --tile", gpu.info.name);
-            return Err(ExecutorError::Device(text));
-        }
+        check_extent(&gpu, extent)?;
         let bricks = scene.resident().bricks.len();
         let buffers = Buffers {
             scene: SceneBuffers::new(&gpu, &scene, kernels.pages.levels)?,
@@ -154,6 +151,7 @@ impl GpuExecutor {
             pairs_are_culled: false,
             pair_count: 0,
             pair_nodes: 0,
+            has_bounces: false,
         })
     }
 
@@ -380,7 +378,20 @@ impl FrameExecutor for GpuExecutor {
         Keep { queries: true, textures: true, opacity: true, gloss: true }
     }
 
+    fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError> {
+        check_extent(&self.gpu, extent)?;
+        let rays = extent.rays();
+        let bounces = if self.has_bounces { rays } else { 0 };
+        self.extent = extent;
+        self.buffers.sets = [rays, rays, bounces].map(|rays| RayBuffers::new(&self.gpu, rays));
+        self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, bounces);
+        self.buffers.tiles = TileBuffers::new(&self.gpu, extent, self.buffers.tiles.capacity);
+        self.rebind();
+        Ok(())
+    }
+
     fn allow_bounces(&mut self) {
+        self.has_bounces = true;
         let rays = self.extent.rays();
         self.buffers.sets[2] = RayBuffers::new(&self.gpu, rays);
         self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, rays);
@@ -551,6 +562,16 @@ impl Executor for GpuExecutor {
         report.counters.round_trips += round_trips;
         Ok(report)
     }
+}
+
+/// Refuses more rays than the device holds.
+fn check_extent(gpu: &Gpu, extent: Extent) -> Result<(), ExecutorError> {
+    let most = most_rays(gpu);
+    if extent.rays() as u64 <= most {
+        return Ok(());
+    }
+    let text = format!("{:?} holds {most} pixels at a time; ask for a smaller --size or --tile", gpu.info.name);
+    Err(ExecutorError::Device(text))
 }
 
 /// Bytes from what one dispatch is told to the next: the device's alignment for dynamic offsets.

@@ -2,7 +2,7 @@
 
 use super::layout::{GBuffer, Hit, Ray, Surface};
 use super::table::Family;
-use super::{Keep, Lamps, Tuning, View};
+use super::{Extent, Keep, Lamps, Tuning, View};
 use crate::schedule::{Executor, ExecutorError, Pass};
 use crate::stream::Workers;
 use bricks::SceneFile;
@@ -44,6 +44,13 @@ pub trait FrameExecutor: Executor {
     /// What it leaves out where a scene does not need it, unless it was set up to keep it. On anything else its kernels
     /// decide as they run.
     fn leaves_out(&self) -> Keep;
+
+    /// Takes pictures, or blocks of rays, of another size from now on. What passes have left is lost; the cache, lamps
+    /// and buffers of methods stay.
+    ///
+    /// # Errors
+    /// More rays than the device holds.
+    fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError>;
 
     /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160
     /// bytes a pixel; without it they must not be run.

@@ -1,5 +1,7 @@
 //! An image in memory.
 
+use super::color::linear_from_srgb;
+
 /// A picture in linear Rec. 709 RGB, rows top to bottom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
@@ -43,6 +45,12 @@ impl Image {
     pub fn from_fn(width: usize, height: usize, mut pixel: impl FnMut(usize, usize) -> [f32; 3]) -> Self {
         let rgb = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
         Self { width, height, rgb }
+    }
+
+    /// An image of sRGB bytes, row by row.
+    pub fn from_srgb(width: usize, height: usize, pixels: &[[u8; 3]]) -> Self {
+        let linear: Vec<f32> = (0..=255u8).map(|byte| linear_from_srgb(f64::from(byte) / 255.0) as f32).collect();
+        Self { width, height, rgb: pixels.iter().map(|pixel| pixel.map(|byte| linear[usize::from(byte)])).collect() }
     }
 
     /// The pixel at column `x` of row `y`.

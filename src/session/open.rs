@@ -120,6 +120,9 @@ pub fn developed(radiance: &[[f32; 3]], stops: f64, tone_map: ToneMap) -> Vec<[u
 /// A scene on a device, with settings: it renders frames and traces rays.
 pub struct Session {
     pub(super) file: PathBuf,
+    /// As they were given.
+    pub(super) given: Settings,
+    /// With what suits the scene.
     pub(super) settings: Settings,
     pub(super) path: CameraPath,
     pub(super) renderer: Renderer,
@@ -137,7 +140,7 @@ pub struct Session {
     reference: Option<Renderer>,
     /// What the first frame showed, to be rendered once more.
     first: Option<(Arc<SceneFile>, Light)>,
-    warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
 }
 
 impl Session {
@@ -153,6 +156,7 @@ impl Session {
         check_data(&scene, file, settings)?;
         // What a scene suits was not chosen.
         let without_effect = settings.without_effect();
+        let given = settings.clone();
         let settings = &settings.suited(&scene.resident().manifest);
         let mut path = match &settings.path {
             Some(file) => CameraPath::read(file)?,
@@ -179,6 +183,7 @@ impl Session {
         renderer.captures = settings.measure_error.then(Captures::default);
         Ok(Self {
             file: file.into(),
+            given,
             settings: settings.clone(),
             path,
             renderer,
@@ -310,6 +315,7 @@ impl Session {
         let Engine { scene, executor, cache, settings, .. } = &mut self.renderer.engine;
         // What frames may leave out given rays must find, and no level stands in for it.
         executor.mark_leaves(&Arc::from([]));
+        cache.begin_frame(None);
         let threshold = std::mem::take(&mut executor.tuning().threshold);
         let mut traced =
             Traced { scene, executor: &mut **executor, cache, schedule: settings.schedule, most, lod: Lod::default() };

@@ -85,6 +85,14 @@ mod secondary {
     mod roma_diffuse;
 }
 
+/// The window: the thread that renders for it, its panels, and the window itself on a display.
+#[cfg(feature = "viewer")]
+mod window {
+    mod display;
+    mod panels;
+    mod studio;
+}
+
 /// Bench, selftest and switchable optimisations.
 mod lab {
     mod bench;

@@ -1,6 +1,8 @@
 //! The command line: every subcommand, every option with its unit and default. Values are validated here, so that
 //! commands receive only what they can use; what is wrong ends as usage with exit status 2.
 
+#[cfg(feature = "viewer")]
+use super::group_args::OfView;
 use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
 use super::scene_kind::{SceneKind, scene_help};
@@ -52,6 +54,9 @@ pub enum Command {
     BakeDisplacement(BakeDisplacementArgs),
     /// Render frames along a camera path, with records and a report
     Walk(Box<WalkArgs>),
+    /// Open a window, and fly through a scene
+    #[cfg(feature = "viewer")]
+    View(Box<ViewArgs>),
     /// Find the closest hits of given rays
     Trace(TraceArgs),
     /// Replay recorded brick requests with other cache sizes and policies
@@ -446,6 +451,42 @@ impl WalkArgs {
     pub fn files(&self) -> Result<(&Path, &Path), Usage> {
         let missing = || Usage("walk needs a scene and --output".into());
         self.scene.as_deref().zip(self.output.as_deref()).ok_or_else(missing)
+    }
+}
+
+/// Options of `view`.
+#[cfg(feature = "viewer")]
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct ViewArgs {
+    /// The scene: a .bricks file, or a model, which is converted first, as by `walk`. [default: none; drop one on the
+    /// window]
+    #[arg(value_name = "S.bricks|MODEL")]
+    pub scene: Option<PathBuf>,
+    /// Folder for screenshots and paths [default: the current one]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Read settings from a file (TOML); options on the command line override it [default: none]
+    #[arg(long = "settings", value_name = "F.toml", hide_short_help = true)]
+    file: Option<PathBuf>,
+    /// Show all options, with those for experts
+    #[arg(long, action = clap::ArgAction::HelpLong)]
+    pub help_all: Option<bool>,
+    /// What is rendered, and how.
+    #[command(flatten)]
+    given: GroupArgs<OfView>,
+}
+
+#[cfg(feature = "viewer")]
+impl ViewArgs {
+    /// The settings, as those of `walk`.
+    ///
+    /// # Errors
+    /// A bad file; settings that do not go together.
+    pub fn settings(&self) -> anyhow::Result<Settings> {
+        let settings = self.given.over(self.file.as_deref())?;
+        settings.check().map_err(usage)?;
+        Ok(settings)
     }
 }
 

@@ -2,6 +2,8 @@
 //! of settings has for it.
 
 use crate::session::{Settings, TRACE};
+#[cfg(feature = "viewer")]
+use crate::settings::Heading;
 use crate::settings::value::LINE;
 use crate::settings::{Entry, Group, Level, file};
 use clap::builder::StyledStr;
@@ -56,6 +58,21 @@ impl View for OfTrace {
 
     fn level(entry: &Entry) -> Option<Level> {
         TRACE.contains(&entry.key().as_str()).then_some(Level::Common)
+    }
+}
+
+/// Those of `view`: what a walk through frames is about, files and measurements, has no place there.
+#[cfg(feature = "viewer")]
+#[derive(Clone, Copy, Debug)]
+pub struct OfView;
+
+#[cfg(feature = "viewer")]
+impl View for OfView {
+    type Group = Settings;
+
+    fn has(entry: &Entry) -> bool {
+        let is_about_files = matches!(entry.field.heading, Heading::Output | Heading::Measurement);
+        !is_about_files && !["frames", "motion", "requests_out"].contains(&entry.key().as_str())
     }
 }
 

@@ -16,7 +16,7 @@ use crate::kernels::dispatch::dispatches;
 use crate::kernels::layout::{DvfGrid, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList};
 use crate::kernels::table::Family;
 use crate::kernels::trace::levels::spread_of;
-use crate::kernels::{DeviceInfo, Directions, FrameExecutor, Keep, Lamps, Tuning, View};
+use crate::kernels::{DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::secondary::FAMILIES;
 use crate::secondary::df::kernels as df;
@@ -434,6 +434,11 @@ impl FrameExecutor for Lockstep {
     fn texture_bytes(&self) -> u64 {
         assert_eq!(self.gpu.texture_bytes(), self.cpu.texture_bytes());
         self.gpu.texture_bytes()
+    }
+
+    fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError> {
+        self.gpu.set_extent(extent)?;
+        self.cpu.set_extent(extent)
     }
 
     fn allow_bounces(&mut self) {

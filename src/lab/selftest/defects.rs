@@ -10,7 +10,7 @@ use crate::gpu::wgsl::Pages;
 use crate::kernels::frame::Frame;
 use crate::kernels::layout::{GBuffer, Hit, Ray, Surface};
 use crate::kernels::table::Family;
-use crate::kernels::{DeviceInfo, FrameExecutor, Keep, Lamps, Tuning, View};
+use crate::kernels::{DeviceInfo, Extent, FrameExecutor, Keep, Lamps, Tuning, View};
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
 use crate::stream::Workers;
 use anyhow::{Result, bail};
@@ -223,6 +223,7 @@ impl FrameExecutor for Faulty {
             fn texture_bytes(&self) -> u64;
             fn workers(&self) -> &Workers;
             fn leaves_out(&self) -> Keep;
+            fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError>;
             fn allow_bounces(&mut self);
             fn make_binary(&mut self) -> Result<(), ExecutorError>;
             fn tuning(&mut self) -> &mut Tuning;

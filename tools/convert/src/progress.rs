@@ -74,6 +74,11 @@ impl Progress {
         self.bar.inc(steps);
     }
 
+    /// How far the current phase is: its name, the steps that are done, and all; 0: not known.
+    pub fn so_far(&self) -> (String, u64, u64) {
+        (self.bar.message(), self.bar.position(), self.bar.length().unwrap_or(0))
+    }
+
     /// Asks the job to stop as soon as it can; what it has begun it takes back or leaves so that it can be continued.
     pub fn interrupt(&self) {
         self.interrupted.store(true, Ordering::Relaxed);

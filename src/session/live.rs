@@ -1,0 +1,131 @@
+//! Settings that change while a session is open, and pictures of a camera that nobody has planned: what a window needs.
+//! A picture is that of a walk whose only frame it is, so that what is seen in the end is what `walk` writes.
+
+use super::Session;
+use super::lighting::lighting;
+use super::open::Frame;
+use super::renderer::render_settings;
+use crate::frame::{Budgeted, RenderError};
+use crate::kernels::Extent;
+use crate::kernels::layout::{Hit, NONE, Surface};
+use crate::picture::denoise::Resolve;
+use crate::picture::exposure::Meter;
+use crate::scene::Camera;
+use crate::schedule::Pass;
+use crate::session::{Settings, Watch};
+use crate::settings::{Entry, Group, Heading};
+use anyhow::{Context, Result};
+use std::sync::Arc;
+
+/// Settings under other headings that may change while a session is open.
+const ALSO: [&str; 5] = ["size", "fov", "aov", "frame_budget", "interactive"];
+
+/// Whether a setting may change while a session is open.
+fn is_live(entry: &Entry) -> bool {
+    let of_heading = matches!(entry.field.heading, Heading::Effects | Heading::Light | Heading::Quality);
+    let key = entry.key();
+    key != "opaque" && ((of_heading && entry.table.is_empty()) || ALSO.contains(&key.as_str()))
+}
+
+impl Settings {
+    /// The first setting that differs in `other` and that a session takes when it is opened only.
+    pub fn needs_opening(&self, other: &Self) -> Option<Entry> {
+        let is_other = |entry: &Entry| self.get(&entry.key()) != other.get(&entry.key());
+        Self::entries().into_iter().find(|entry| !is_live(entry) && is_other(entry))
+    }
+
+    /// Whether `other` asks for other light.
+    fn lights_otherwise(&self, other: &Self) -> bool {
+        let is_light = |entry: &Entry| entry.field.heading == Heading::Light || entry.field.key == "effects";
+        let is_other = |entry: &Entry| self.get(&entry.key()) != other.get(&entry.key());
+        Self::entries().iter().any(|entry| is_light(entry) && is_other(entry))
+    }
+}
+
+impl Session {
+    /// Whether `settings` differ from those of the session in what it takes when it is opened only.
+    pub fn needs_opening(&self, settings: &Settings) -> bool {
+        self.given.needs_opening(settings).is_some()
+    }
+
+    /// Takes other settings for the pictures to come: size, effects, light, quality, budget. The device and its cache
+    /// stay as they are, and so does what is set when a session is opened ([`Settings::needs_opening`]).
+    ///
+    /// # Errors
+    /// Settings that do not go together; an environment that cannot be read; a picture that the device does not hold.
+    /// The session then keeps those it had.
+    pub fn set(&mut self, settings: &Settings) -> Result<()> {
+        if *settings == self.given {
+            return Ok(());
+        }
+        settings.check()?;
+        let suited = settings.suited(&self.renderer.scene.resident().manifest);
+        let lighting = match self.settings.lights_otherwise(&suited) {
+            true => Some(lighting(&suited, &self.renderer.scene, &self.file)?),
+            false => None,
+        };
+        let engine = &mut self.renderer.engine;
+        let size = (suited.size.width, suited.size.height);
+        if size != engine.size {
+            let extent = Extent { width: size.0, height: size.1, tile: engine.tile };
+            engine.executor.set_extent(extent).with_context(|| self.file.display().to_string())?;
+            (engine.size, engine.band_rows) = (size, size.1);
+        }
+        let render = render_settings(&suited, engine.settings.schedule);
+        if render.effects.has_bounces() && !engine.settings.effects.has_bounces() {
+            engine.executor.allow_bounces();
+        }
+        match (render.budget, &engine.budgeted) {
+            (None, _) => {
+                engine.budgeted = None;
+                engine.executor.mark_leaves(&Arc::from([]));
+            }
+            (Some(_), None) => engine.budgeted = Some(Budgeted::new(engine.scene.resident())),
+            (Some(_), Some(_)) => {}
+        }
+        engine.settings = render;
+        if let Some(lighting) = lighting {
+            engine.light = lighting.light.clone();
+            self.warnings.extend(lighting.warnings.iter().cloned());
+            self.lighting = lighting;
+        }
+        (self.settings, self.given) = (suited, settings.clone());
+        Ok(())
+    }
+
+    /// What `camera` sees, as a walk shows it whose only frame this is; `None`: `watch` stopped it. With a budget
+    /// ([`Settings::frame_budget`]) pixels say how exact they are, and the same again brings more of them.
+    ///
+    /// # Errors
+    /// A brick that cannot be read, or the device's.
+    pub fn picture(&mut self, camera: &Camera, watch: &mut dyn Watch) -> Result<Option<Frame>> {
+        let name = || self.file.display().to_string();
+        let mut output = match self.renderer.frame_watched(0, camera, &[], watch) {
+            Err(RenderError::Interrupted) => return Ok(None),
+            output => output.with_context(name)?,
+        };
+        let Settings { denoise, taa, exposure, tone_map, .. } = self.settings;
+        Resolve::new(denoise, taa).frame(&mut output);
+        let stops = Meter::new(exposure, tone_map.white()).stops(&output.pixels.radiance, &output.coverage, 0.0);
+        let (size, pixels, records) = (self.renderer.size, output.pixels, output.records);
+        Ok(Some(Frame { number: 0, size, pixels, records, checkpoints: Vec::new(), exposure_ev: stops, tone_map }))
+    }
+
+    /// The brick that the last camera ray of each pixel of the last picture hit, and whether it is in the cache now;
+    /// `None`: it hit nothing.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn bricks_seen(&mut self) -> Result<Vec<Option<(u32, bool)>>> {
+        let engine = &mut self.renderer.engine;
+        let hits = engine.executor.read_hits(Pass::Primary)?;
+        let surfaces = engine.executor.read_surfaces(Pass::Primary)?;
+        let leaves = &engine.scene.resident().leaves;
+        let brick = |leaf: u32| leaves.get(leaf as usize).map(|leaf| leaf.brick);
+        let of = |(hit, surface): (&Hit, &Surface)| {
+            let brick = brick(surface.leaf).filter(|_| hit.id != NONE)?;
+            Some((brick, engine.cache.states.geometry(brick as usize).is_some()))
+        };
+        Ok(hits.iter().zip(&surfaces).map(of).collect())
+    }
+}

@@ -1,0 +1,147 @@
+//! What is painted over a picture: what the engine did for each pixel.
+
+use crate::frame::PixelState;
+use crate::settings::names;
+
+names! {
+    /// What is painted over the picture.
+    Overlay {
+        /// Nothing.
+        None = "none",
+        /// Which pixels are exact, bounded, unresolved.
+        State = "state",
+        /// The bricks that were hit, each in a colour of its own.
+        Bricks = "bricks",
+        /// Bricks that were hit: in the cache, or not.
+        Residency = "residency",
+        /// Distances.
+        Depth = "depth",
+        /// Normals.
+        Normals = "normals",
+        /// The tiles that queries are made for.
+        Tiles = "tiles",
+    }
+}
+
+/// Weight of the overlay's colour.
+const WEIGHT: f32 = 0.55;
+
+/// What an overlay may show of a picture's pixels.
+pub struct Pixels<'a> {
+    /// Width and height in pixels, and the edge of a tile.
+    pub size: (u32, u32),
+    /// Edge of a tile in pixels.
+    pub tile: u32,
+    /// How exact they are; empty: all are.
+    pub states: &'a [PixelState],
+    /// Distances.
+    pub depth: &'a [f32],
+    /// Normals.
+    pub normals: &'a [[f32; 3]],
+    /// The bricks that were hit, and whether they are in the cache.
+    pub bricks: &'a [Option<(u32, bool)>],
+}
+
+/// Colours of the states.
+pub const STATES: [[u8; 3]; 3] = [[60, 170, 90], [235, 170, 40], [215, 60, 60]];
+
+/// A colour for a number, far from those of its neighbours.
+pub fn color_of(number: u32) -> [u8; 3] {
+    // The golden angle around the circle of hues, with two levels of light.
+    let hue = (f64::from(number) * 0.618_033_988_75).fract() * 6.0;
+    let light = if number.is_multiple_of(2) { 230.0 } else { 170.0 };
+    let of = |offset: f64| {
+        let x = (hue + offset) % 6.0;
+        let share = (2.0 - (x - 3.0).abs()).clamp(0.0, 1.0);
+        (light * (0.25 + 0.75 * (1.0 - share))) as u8
+    };
+    [of(0.0), of(2.0), of(4.0)]
+}
+
+impl Overlay {
+    /// Whether it shows bricks.
+    pub fn shows_bricks(self) -> bool {
+        matches!(self, Self::Bricks | Self::Residency)
+    }
+
+    /// Paints it over `picture`.
+    pub fn paint(self, pixels: &Pixels, picture: &mut [[u8; 3]]) {
+        if self == Self::None {
+            return;
+        }
+        let greatest = pixels.depth.iter().copied().filter(|depth| depth.is_finite()).fold(0.0, f32::max);
+        for (index, shown) in picture.iter_mut().enumerate() {
+            let own = match self {
+                Self::None => None,
+                Self::State => Some(STATES[pixels.states.get(index).copied().unwrap_or_default() as usize]),
+                Self::Bricks => pixels.bricks.get(index).copied().flatten().map(|(brick, _)| color_of(brick)),
+                Self::Residency => {
+                    let hit = pixels.bricks.get(index).copied().flatten();
+                    hit.map(|(_, is_resident)| STATES[if is_resident { 0 } else { 2 }])
+                }
+                Self::Depth => pixels.depth.get(index).filter(|depth| depth.is_finite()).map(|depth| {
+                    // Near is light; equal ratios are equal steps.
+                    let share = (1.0 + 1000.0 * depth / greatest.max(f32::MIN_POSITIVE)).log2() / 1001f32.log2();
+                    [(255.0 * (1.0 - share)) as u8; 3]
+                }),
+                Self::Normals => {
+                    pixels.normals.get(index).map(|normal| normal.map(|x| (127.5 + 127.5 * x.clamp(-1.0, 1.0)) as u8))
+                }
+                Self::Tiles => {
+                    let (x, y) = (index as u32 % pixels.size.0, index as u32 / pixels.size.0);
+                    let is_edge = x.is_multiple_of(pixels.tile) || y.is_multiple_of(pixels.tile);
+                    is_edge.then_some([255; 3])
+                }
+            };
+            let weight = if matches!(self, Self::Depth | Self::Normals) { 1.0 } else { WEIGHT };
+            if let Some(own) = own {
+                *shown = std::array::from_fn(|k| {
+                    (f32::from(shown[k]) * (1.0 - weight) + f32::from(own[k]) * weight).round() as u8
+                });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_overlay_shows_what_it_is_about() {
+        let pixels = Pixels {
+            size: (2, 2),
+            tile: 2,
+            states: &[PixelState::Exact, PixelState::Bounded, PixelState::Unresolved, PixelState::Exact],
+            depth: &[1.0, 1.0, f32::INFINITY, 100.0],
+            normals: &[[0.0, 1.0, 0.0]; 4],
+            bricks: &[Some((3, true)), Some((3, true)), None, Some((4, false))],
+        };
+        let shown = |overlay: Overlay| {
+            let mut picture = vec![[100; 3]; 4];
+            overlay.paint(&pixels, &mut picture);
+            picture
+        };
+        assert_eq!(shown(Overlay::None), [[100; 3]; 4]);
+        let states = shown(Overlay::State);
+        assert!(states[0] == states[3] && states[0] != states[1] && states[1] != states[2]);
+        let bricks = shown(Overlay::Bricks);
+        assert!(bricks[0] == bricks[1] && bricks[2] == [100; 3] && bricks[3] != bricks[0]);
+        let residency = shown(Overlay::Residency);
+        assert!(residency[0] == residency[1] && residency[2] == [100; 3] && residency[3] != residency[0]);
+        let depth = shown(Overlay::Depth);
+        assert!(depth[0] == depth[1] && depth[0][0] > depth[3][0] && depth[2] == [100; 3]);
+        assert_eq!(shown(Overlay::Normals)[0], [127, 255, 127]);
+        let tiles = shown(Overlay::Tiles);
+        assert!(tiles[0] != [100; 3] && tiles[1] != [100; 3] && tiles[3] == [100; 3]);
+    }
+
+    #[test]
+    fn neighbours_have_other_colours() {
+        for number in 0..100u32 {
+            let [a, b] = [number, number + 1].map(color_of);
+            let apart: i32 = (0..3).map(|k| (i32::from(a[k]) - i32::from(b[k])).abs()).sum();
+            assert!(apart > 60, "{number}: {a:?} {b:?}");
+        }
+    }
+}
