@@ -91,7 +91,7 @@ pub mod settings;
 #[path = "../tests/skip.rs"]
 mod skip;
 pub mod stream;
-#[cfg(feature = "viewer")]
+#[cfg(any(feature = "serve", feature = "viewer"))]
 pub mod view;
 
 pub use session::{Session, Settings};

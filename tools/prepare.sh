@@ -99,8 +99,13 @@ have_window_libraries() {
     return 1
 }
 
+# Whether this is Debian, where a browser is a package like others.
+is_debian() {
+    grep -qx 'ID=debian' /etc/os-release 2>/dev/null
+}
+
 # With the argument `tests`, what tests want: a Vulkan driver, and where apt-get brings them NumPy and a display without
-# a screen.
+# a screen and a browser.
 prepare() {
     if ! have cargo && [ -r "${HOME:-/root}/.cargo/env" ]; then
         # shellcheck source=/dev/null
@@ -120,6 +125,7 @@ prepare() {
             have_numpy || missing+=(python3-numpy)
             have Xvfb || missing+=(xvfb)
             have xdotool || missing+=(xdotool)
+            ! is_debian || have chromium || missing+=(chromium)
             have_window_libraries || missing+=(libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2)
         fi
     fi

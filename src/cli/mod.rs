@@ -21,6 +21,8 @@ pub mod quality;
 pub mod repair;
 pub mod replay;
 pub mod scene;
+#[cfg(feature = "serve")]
+pub mod serve;
 pub mod trace;
 pub mod verify;
 #[cfg(feature = "viewer")]
@@ -85,6 +87,8 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Walk(args) => walk::run(args),
         #[cfg(feature = "viewer")]
         Command::View(args) => view::run(args),
+        #[cfg(feature = "serve")]
+        Command::Serve(args) => serve::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),

@@ -9,6 +9,7 @@
 use super::environment::Equirectangular;
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 /// Radius of the ground and of the top of the atmosphere, km.
 const GROUND: f64 = 6360.0;
@@ -135,8 +136,14 @@ fn mie_phase(c: f64) -> f64 {
 }
 
 impl SkyModel {
+    /// The model, computed once a process.
+    pub fn shared() -> &'static Self {
+        static MODEL: OnceLock<SkyModel> = OnceLock::new();
+        MODEL.get_or_init(Self::computed)
+    }
+
     /// Computes the tables.
-    pub fn computed() -> Self {
+    fn computed() -> Self {
         let transmittance = Table::new(256, 64, |r, mu| {
             let (length, reaches_ground) = end(r, mu);
             if reaches_ground {

@@ -17,7 +17,7 @@ use image::ImageDecoder;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Most texels of an environment image each way, and in all: 1.5 GiB as it is read.
 const MOST_SIZE: usize = 1 << 15;
@@ -156,10 +156,12 @@ fn punctual(light: &PunctualLight, scale: f64) -> Emitter {
 /// The sky of the sun of `light`, which takes the colour that the air leaves it, over a ground that both light. At an
 /// elevation of 45 degrees both are as bright as those that they replace.
 fn physical_sky(light: &mut Light, sun_intensity: f64, sky_intensity: f64) -> Equirectangular {
-    let model = SkyModel::computed();
+    let model = SkyModel::shared();
     let [usual_sun, usual_sky] = Light::usual_luminance();
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    let reference = SkyModel::irradiance(&model.image([0.0, half, -half], [1.0; 2], [128, 64]));
+    static REFERENCE: OnceLock<[f64; 3]> = OnceLock::new();
+    let reference =
+        *REFERENCE.get_or_init(|| SkyModel::irradiance(&model.image([0.0, half, -half], [1.0; 2], [128, 64])));
     let sun = model.sun(light.sun_direction.y);
     let sun_scale = sun_intensity * usual_sun / luminance(model.sun(half));
     light.sun_color = sun.map(|c| (c * sun_scale) as f32);

@@ -85,11 +85,13 @@ mod secondary {
     mod roma_diffuse;
 }
 
-/// The window: the thread that renders for it, its panels, and the window itself on a display.
-#[cfg(feature = "viewer")]
+/// The window: the thread that renders for it, its panels, the window itself on a display, and the same in a browser.
+#[cfg(all(feature = "serve", feature = "viewer"))]
 mod window {
+    mod browser;
     mod display;
     mod panels;
+    mod serve;
     mod studio;
 }
 

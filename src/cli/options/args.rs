@@ -1,7 +1,7 @@
 //! The command line: every subcommand, every option with its unit and default. Values are validated here, so that
 //! commands receive only what they can use; what is wrong ends as usage with exit status 2.
 
-#[cfg(feature = "viewer")]
+#[cfg(any(feature = "serve", feature = "viewer"))]
 use super::group_args::OfView;
 use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
@@ -57,6 +57,9 @@ pub enum Command {
     /// Open a window, and fly through a scene
     #[cfg(feature = "viewer")]
     View(Box<ViewArgs>),
+    /// Serve the same in a browser, from a machine without a screen
+    #[cfg(feature = "serve")]
+    Serve(Box<ServeArgs>),
     /// Find the closest hits of given rays
     Trace(TraceArgs),
     /// Replay recorded brick requests with other cache sizes and policies
@@ -479,6 +482,48 @@ pub struct ViewArgs {
 
 #[cfg(feature = "viewer")]
 impl ViewArgs {
+    /// The settings, as those of `walk`.
+    ///
+    /// # Errors
+    /// A bad file; settings that do not go together.
+    pub fn settings(&self) -> anyhow::Result<Settings> {
+        let settings = self.given.over(self.file.as_deref())?;
+        settings.check().map_err(usage)?;
+        Ok(settings)
+    }
+}
+
+/// Options of `serve`.
+#[cfg(feature = "serve")]
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct ServeArgs {
+    /// The scene: a .bricks file, or a model, which is converted first, as by `walk`
+    #[arg(value_name = "S.bricks|MODEL")]
+    pub scene: PathBuf,
+    /// Port to listen on; 0: any that is free
+    #[arg(long, value_name = "N", default_value_t = 7878)]
+    pub port: u16,
+    /// Address to listen on. All of a network can reach 0.0.0.0; the token in the link is all that keeps others out,
+    /// and it is not encrypted. Better is a tunnel: ssh -L 7878:127.0.0.1:7878 HOST
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    pub bind: std::net::IpAddr,
+    /// Sessions at a time, at most; each has a cache of its own
+    #[arg(long, value_name = "N", default_value = "4", value_parser = ranged::<1, 64>)]
+    pub viewers: u32,
+    /// Read settings from a file (TOML); options on the command line override it [default: none]
+    #[arg(long = "settings", value_name = "F.toml", hide_short_help = true)]
+    file: Option<PathBuf>,
+    /// Show all options, with those for experts
+    #[arg(long, action = clap::ArgAction::HelpLong)]
+    pub help_all: Option<bool>,
+    /// What is rendered, and how.
+    #[command(flatten)]
+    given: GroupArgs<OfView>,
+}
+
+#[cfg(feature = "serve")]
+impl ServeArgs {
     /// The settings, as those of `walk`.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 //! of settings has for it.
 
 use crate::session::{Settings, TRACE};
-#[cfg(feature = "viewer")]
+#[cfg(any(feature = "serve", feature = "viewer"))]
 use crate::settings::Heading;
 use crate::settings::value::LINE;
 use crate::settings::{Entry, Group, Level, file};
@@ -61,12 +61,12 @@ impl View for OfTrace {
     }
 }
 
-/// Those of `view`: what a walk through frames is about, files and measurements, has no place there.
-#[cfg(feature = "viewer")]
+/// Those of `view` and `serve`: what a walk through frames is about, files and measurements, has no place there.
+#[cfg(any(feature = "serve", feature = "viewer"))]
 #[derive(Clone, Copy, Debug)]
 pub struct OfView;
 
-#[cfg(feature = "viewer")]
+#[cfg(any(feature = "serve", feature = "viewer"))]
 impl View for OfView {
     type Group = Settings;
 

@@ -305,7 +305,9 @@ impl Worker {
         match Session::open(&file, &self.pace.opening(&settings)) {
             Ok(mut session) => {
                 self.path = Some((path.clone(), file.clone()));
-                let warnings = session.take_warnings();
+                let mut warnings = session.take_warnings();
+                // The panel of the scene says so, of a budget that nobody has asked for.
+                warnings.retain(|line| settings.frame_budget().is_some() || !line.starts_with("--frame-budget"));
                 let scene = describe(&mut session, path, file);
                 self.session = Some(session);
                 if is_again && self.wish.is_some() {

@@ -1,0 +1,149 @@
+//! The same behind a web page, for machines without a screen: one page without other files, pictures and input over a
+//! WebSocket. Whoever has the token in the link gets a session, as far as there are some left.
+//!
+//! | part | what it does |
+//! | --- | --- |
+//! | this file | listens, checks tokens, counts sessions |
+//! | `guest` | one session: what is told becomes wishes, pictures go out as fast as they are taken |
+//! | `told` | what a page tells, and what it may set |
+//! | `encode` | pictures as bytes |
+//! | `page.html` | the page |
+
+mod encode;
+mod guest;
+mod told;
+
+use super::studio::{Converter, Pace};
+use crate::session::Settings;
+use anyhow::{Context, Result};
+use axum::Router;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::{Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::Deserialize;
+use std::net::{IpAddr, SocketAddr};
+use std::path::PathBuf;
+use std::sync::Arc;
+use tokio::net::TcpListener;
+use tokio::sync::{Notify, Semaphore};
+
+const PAGE: &str = include_str!("page.html");
+/// Most bytes of what a page tells at once.
+const MOST_BYTES: usize = 1 << 16;
+
+/// What is served.
+pub struct Options {
+    /// A scene file or a model.
+    pub scene: PathBuf,
+    /// Settings that sessions begin with.
+    pub settings: Settings,
+    /// What time pictures have.
+    pub pace: Pace,
+    /// Where to listen.
+    pub address: IpAddr,
+    /// 0: any that is free.
+    pub port: u16,
+    /// Most sessions at a time.
+    pub most: usize,
+}
+
+/// What all connections share.
+struct Shared {
+    options: Options,
+    converter: Converter,
+    token: String,
+    sessions: Arc<Semaphore>,
+    /// Told when the server ends.
+    ends: Arc<Notify>,
+}
+
+/// What comes with an address.
+#[derive(Deserialize)]
+struct Asked {
+    #[serde(default)]
+    token: String,
+}
+
+impl Shared {
+    /// Whether a token is the one; it takes the same time wherever they differ.
+    fn knows(&self, token: &str) -> bool {
+        let differences = token.bytes().zip(self.token.bytes()).fold(0, |sum, (a, b)| sum | (a ^ b));
+        token.len() == self.token.len() && differences == 0
+    }
+}
+
+/// 128 random bits, in hexadecimal.
+fn token() -> Result<String> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).map_err(|error| anyhow::anyhow!("no random numbers for a token: {error}"))?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Serves until the process is told to stop; `ready` gets the link as soon as it works.
+///
+/// # Errors
+/// The address cannot be listened on.
+pub fn run(options: Options, converter: Converter, ready: impl FnOnce(&str) -> Result<()>) -> Result<()> {
+    let address = SocketAddr::new(options.address, options.port);
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let sessions = Arc::new(Semaphore::new(options.most));
+    let shared = Arc::new(Shared { options, converter, token: token()?, sessions, ends: Arc::default() });
+    runtime.block_on(async {
+        let listener = TcpListener::bind(address).await;
+        let listener = listener.with_context(|| format!("{address}: cannot listen there; give another --port"))?;
+        let port = listener.local_addr()?.port();
+        let host = match shared.options.address {
+            IpAddr::V4(address) => address.to_string(),
+            IpAddr::V6(address) => format!("[{address}]"),
+        };
+        ready(&format!("http://{host}:{port}/?token={}", shared.token))?;
+        let ends = shared.ends.clone();
+        let until = async move {
+            // Without a handler the process ends at once, which is as good.
+            let _ = tokio::signal::ctrl_c().await;
+            ends.notify_waiters();
+        };
+        axum::serve(listener, router(shared)).with_graceful_shutdown(until).await.context("the server")
+    })
+}
+
+fn router(shared: Arc<Shared>) -> Router {
+    Router::new().route("/", get(page)).route("/session", get(session)).with_state(shared)
+}
+
+/// The page.
+async fn page(State(shared): State<Arc<Shared>>, Query(asked): Query<Asked>) -> Response {
+    if !shared.knows(&asked.token) {
+        return refused();
+    }
+    let own = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src blob: data:";
+    let headers = [
+        (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+        (header::CACHE_CONTROL, "no-store"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::CONTENT_SECURITY_POLICY, own),
+    ];
+    (headers, PAGE).into_response()
+}
+
+/// A session, if there is one left.
+async fn session(State(shared): State<Arc<Shared>>, Query(asked): Query<Asked>, upgrade: WebSocketUpgrade) -> Response {
+    if !shared.knows(&asked.token) {
+        return refused();
+    }
+    let Ok(permit) = shared.sessions.clone().try_acquire_owned() else {
+        let text = format!("all {} sessions are taken; close one, or serve with more --viewers", shared.options.most);
+        return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
+    };
+    upgrade.max_message_size(MOST_BYTES).on_upgrade(move |socket| async move {
+        guest::receive(socket, &shared.options, shared.converter.clone(), shared.ends.clone()).await;
+        drop(permit);
+    })
+}
+
+fn refused() -> Response {
+    let text = "the token in the link is missing or wrong; take the link that brickwalk serve printed\n";
+    (StatusCode::UNAUTHORIZED, text).into_response()
+}
