@@ -83,6 +83,8 @@ pub struct Viewer {
     pub comparison: Option<Comparison>,
     /// Whether one is under way.
     pub is_comparing: bool,
+    /// A camera that was left behind, and how many bricks it shows: [`Overlay::Frozen`].
+    pub frozen: Option<(Camera, usize)>,
     /// The path that is being recorded.
     pub keyframes: Vec<Keyframe>,
     /// Seconds into the path while it is played.
@@ -114,6 +116,7 @@ impl Viewer {
             measured: Vec::new(),
             comparison: None,
             is_comparing: false,
+            frozen: None,
             keyframes: Vec::new(),
             playing: None,
             messages: VecDeque::new(),
@@ -142,6 +145,10 @@ impl Viewer {
                 News::Shown(shown) => self.saw(shown),
                 News::Found(found, purpose) => self.found(found.map(|found| *found), purpose),
                 News::Compared(comparison) => (self.comparison, self.is_comparing) = (Some(*comparison), false),
+                News::Frozen(camera, bricks) => {
+                    self.frozen = Some((camera, bricks));
+                    self.overlay = Overlay::Frozen;
+                }
                 News::Saved(file) => self.say(&format!("{}: saved", file.display()), false),
                 News::Told(text) => self.say(&text, false),
                 News::Failed(text) => {
@@ -169,6 +176,7 @@ impl Viewer {
         // What belonged to the scene before.
         (self.found, self.comparison, self.shown, self.wished) = (None, None, None, None);
         self.measured.clear();
+        self.frozen = None;
         self.keyframes.clear();
         self.history.clear();
         self.playing = None;
@@ -301,6 +309,27 @@ impl Viewer {
             let [min, max] = scene.bounds.map(DVec3::from_array);
             navigator.go_to(0.5 * (min + max), 0.25 * (max - min).length());
         }
+    }
+
+    /// Leaves the camera behind, to look at what it shows from elsewhere; or forgets it.
+    pub fn freeze(&mut self) {
+        let was_frozen = self.frozen.take().is_some();
+        if was_frozen && self.overlay == Overlay::Frozen {
+            self.overlay = Overlay::None;
+        }
+        self.studio.ask(Ask::Freeze(!was_frozen));
+    }
+
+    /// The corners of the picture of the camera that was left behind, at the distance of what is seen now, and where it
+    /// is: the edges of its frustum are from there to these.
+    pub fn frustum(&self) -> Option<(DVec3, [DVec3; 4])> {
+        let (camera, _) = self.frozen?;
+        let size = self.settings.size;
+        let basis = camera.ray_basis(size.width, size.height);
+        let (width, height) = (f64::from(size.width), f64::from(size.height));
+        let far = (camera.target - camera.position).length();
+        let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
+        Some((camera.position, corners.map(|[x, y]| camera.position + basis.direction(x, y) * far)))
     }
 
     /// Renders the exact picture and compares.

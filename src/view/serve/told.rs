@@ -98,6 +98,8 @@ pub enum Told {
     Home,
     /// The whole scene.
     All,
+    /// Leaves the camera behind, or forgets it.
+    Freeze,
     /// Another overlay.
     Overlay {
         /// Its name.

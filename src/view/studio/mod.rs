@@ -56,6 +56,8 @@ pub enum Ask {
     Compare,
     /// Write the picture as it is shown to this file, a PNG.
     Save(PathBuf),
+    /// Keep in mind which bricks the picture shows, for [`Overlay::Frozen`]; or forget them.
+    Freeze(bool),
 }
 
 /// What a place is asked for.
@@ -83,6 +85,8 @@ pub enum Stage {
 /// A picture.
 #[derive(Clone, Debug)]
 pub struct Shown {
+    /// Counts pictures: another one has another number.
+    pub number: u64,
     /// From where.
     pub camera: Camera,
     /// Width and height in pixels.
@@ -160,6 +164,8 @@ pub enum News {
     Compared(Box<Comparison>),
     /// A picture was written.
     Saved(PathBuf),
+    /// The picture of this camera shows so many bricks, which are kept in mind.
+    Frozen(Camera, usize),
     /// What a person should know.
     Told(String),
     /// What went wrong. What can be shown is shown on.

@@ -2,6 +2,7 @@
 
 use crate::frame::PixelState;
 use crate::settings::names;
+use std::collections::HashSet;
 
 names! {
     /// What is painted over the picture.
@@ -14,6 +15,8 @@ names! {
         Bricks = "bricks",
         /// Bricks that were hit: in the cache, or not.
         Residency = "residency",
+        /// Bricks that a camera which was left behind shows, and others.
+        Frozen = "frozen",
         /// Distances.
         Depth = "depth",
         /// Normals.
@@ -40,6 +43,8 @@ pub struct Pixels<'a> {
     pub normals: &'a [[f32; 3]],
     /// The bricks that were hit, and whether they are in the cache.
     pub bricks: &'a [Option<(u32, bool)>],
+    /// The bricks of the camera that was left behind.
+    pub frozen: &'a HashSet<u32>,
 }
 
 /// Colours of the states.
@@ -61,7 +66,7 @@ pub fn color_of(number: u32) -> [u8; 3] {
 impl Overlay {
     /// Whether it shows bricks.
     pub fn shows_bricks(self) -> bool {
-        matches!(self, Self::Bricks | Self::Residency)
+        matches!(self, Self::Bricks | Self::Residency | Self::Frozen)
     }
 
     /// Paints it over `picture`.
@@ -78,6 +83,10 @@ impl Overlay {
                 Self::Residency => {
                     let hit = pixels.bricks.get(index).copied().flatten();
                     hit.map(|(_, is_resident)| STATES[if is_resident { 0 } else { 2 }])
+                }
+                Self::Frozen => {
+                    let hit = pixels.bricks.get(index).copied().flatten();
+                    hit.map(|(brick, _)| STATES[if pixels.frozen.contains(&brick) { 0 } else { 2 }])
                 }
                 Self::Depth => pixels.depth.get(index).filter(|depth| depth.is_finite()).map(|depth| {
                     // Near is light; equal ratios are equal steps.
@@ -116,6 +125,7 @@ mod tests {
             depth: &[1.0, 1.0, f32::INFINITY, 100.0],
             normals: &[[0.0, 1.0, 0.0]; 4],
             bricks: &[Some((3, true)), Some((3, true)), None, Some((4, false))],
+            frozen: &HashSet::from([4]),
         };
         let shown = |overlay: Overlay| {
             let mut picture = vec![[100; 3]; 4];
@@ -129,6 +139,8 @@ mod tests {
         assert!(bricks[0] == bricks[1] && bricks[2] == [100; 3] && bricks[3] != bricks[0]);
         let residency = shown(Overlay::Residency);
         assert!(residency[0] == residency[1] && residency[2] == [100; 3] && residency[3] != residency[0]);
+        let frozen = shown(Overlay::Frozen);
+        assert!(frozen[3] == residency[0] && frozen[0] == residency[3] && frozen[2] == [100; 3]);
         let depth = shown(Overlay::Depth);
         assert!(depth[0] == depth[1] && depth[0][0] > depth[3][0] && depth[2] == [100; 3]);
         assert_eq!(shown(Overlay::Normals)[0], [127, 255, 127]);

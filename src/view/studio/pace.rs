@@ -61,13 +61,16 @@ impl Pace {
         }
     }
 
-    /// The same while the camera moves: `scale` times the width and height.
-    pub fn of_moving(&self, settings: &Settings, scale: f64) -> Settings {
+    /// The same while the camera moves: `scale` times the width and height. Where no levels of detail stand in for what
+    /// is missing, more of it is waited for.
+    pub fn of_moving(&self, settings: &Settings, scale: f64, has_levels: bool) -> Settings {
         let of = |edge: u32| ((f64::from(edge) * scale).round() as u32).max(1);
         let size = ImageSize { width: of(settings.size.width), height: of(settings.size.height) };
         // What the light of few samples is worth falls with the pixels.
         let lod = if may_have_budget(settings) { settings.lod.max(1.0) } else { settings.lod };
-        Settings { size, spp: 1, lod, taa: false, ..self.opening(&Settings { taa: false, ..settings.clone() }) }
+        let frame_budget = budget(settings, if has_levels { self.budget } else { self.resting });
+        let opening = self.opening(&Settings { taa: false, ..settings.clone() });
+        Settings { size, spp: 1, lod, frame_budget, ..opening }
     }
 
     /// The same of a camera that rests, of so many samples; `waits`: everything is waited for.
@@ -219,20 +222,21 @@ mod tests {
     fn settings_follow_what_can_be_shown() {
         let pace = Pace::default();
         let asked = Settings::from_options("--size 640x360 --spp 16 --taa").unwrap();
-        let moving = pace.of_moving(&asked, 0.25);
+        let moving = pace.of_moving(&asked, 0.25, true);
         assert_eq!((moving.size.width, moving.size.height, moving.spp, moving.lod), (160, 90, 1, 1.0));
         assert!(moving.check().is_ok() && moving.aov && moving.frame_budget == Some(pace.budget));
+        assert_eq!(pace.of_moving(&asked, 0.25, false).frame_budget, Some(pace.resting));
         assert!(pace.of_resting(&asked, 4, true).frame_budget.is_none());
         assert_eq!(pace.of_resting(&asked, 4, false).lod, 0.0);
         // What excludes a budget has none.
         for options in ["--secondary roma", "--lod 1 --lod-correct 16"] {
             let asked = Settings::from_options(options).unwrap();
-            for of in [pace.opening(&asked), pace.of_moving(&asked, 0.5), pace.of_resting(&asked, 1, false)] {
+            for of in [pace.opening(&asked), pace.of_moving(&asked, 0.5, true), pace.of_resting(&asked, 1, false)] {
                 assert!(of.check().is_ok() && of.frame_budget.is_none(), "{options}");
             }
         }
         let own = Settings::from_options("--interactive 1M").unwrap();
-        assert_eq!(pace.of_moving(&own, 1.0).frame_budget, Some(FrameBudget::Bytes(1 << 20)));
+        assert_eq!(pace.of_moving(&own, 1.0, false).frame_budget, Some(FrameBudget::Bytes(1 << 20)));
         assert!(pace.opening(&asked).needs_opening(&moving).is_none());
     }
 }

@@ -13,8 +13,10 @@ use crate::session::{Frame, Session, Settings, Watch, developed};
 use crate::stream::PayloadSource;
 use anyhow::{Context, Result, anyhow};
 use brickwalk_convert::progress::Progress;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
@@ -103,8 +105,12 @@ pub struct Worker {
     wish: Option<Wish>,
     plan: Plan,
     scale: Scale,
+    /// Whether something stands in for what is missing.
+    has_levels: bool,
     /// The last picture that was told.
     last: Option<(Frame, Wish)>,
+    /// Bricks that [`Overlay::Frozen`] shows.
+    frozen: HashSet<u32>,
     /// The failure that was told last.
     failure: String,
 }
@@ -123,7 +129,9 @@ impl Worker {
             wish: None,
             plan: Plan::Idle,
             scale: Scale::new(),
+            has_levels: false,
             last: None,
+            frozen: HashSet::new(),
             failure: String::new(),
         }
     }
@@ -220,7 +228,7 @@ impl Worker {
 
     fn moving(&mut self) -> Result<Plan, Trouble> {
         let Some(wish) = self.wish.clone() else { return Ok(Plan::Idle) };
-        let settings = self.pace.of_moving(&wish.settings, self.scale.factor());
+        let settings = self.pace.of_moving(&wish.settings, self.scale.factor(), self.has_levels);
         let start = Instant::now();
         self.with(&settings)?;
         let set = start.elapsed();
@@ -253,7 +261,7 @@ impl Worker {
         let mut gives = Gives { inbox: &self.inbox, is_patient };
         let Some(frame) = session.picture(&wish.camera, &mut gives)? else { return Ok(None) };
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        let shown = shown(session, &frame, wish, stage, ms)?;
+        let shown = shown(session, &frame, wish, &self.frozen, (stage, ms))?;
         self.last = Some((frame, wish.clone()));
         self.tell.tell(News::Shown(Arc::new(shown)));
         Ok(Some(ms))
@@ -265,6 +273,11 @@ impl Worker {
             Ask::What { x, y, purpose } => self.what(x, y, purpose),
             Ask::Compare => self.compare(),
             Ask::Save(file) => self.save(&file),
+            Ask::Freeze(true) => self.freeze(),
+            Ask::Freeze(false) => {
+                self.frozen.clear();
+                Ok(())
+            }
         };
         if let Err(error) = answered {
             self.fail(&error);
@@ -309,6 +322,7 @@ impl Worker {
                 // The panel of the scene says so, of a budget that nobody has asked for.
                 warnings.retain(|line| settings.frame_budget().is_some() || !line.starts_with("--frame-budget"));
                 let scene = describe(&mut session, path, file);
+                self.has_levels = scene.has_levels;
                 self.session = Some(session);
                 if is_again && self.wish.is_some() {
                     self.plan = Plan::Move;
@@ -317,6 +331,7 @@ impl Worker {
                     return;
                 }
                 (self.wish, self.last, self.plan) = (None, None, Plan::Idle);
+                self.frozen.clear();
                 self.scale = Scale::new();
                 self.tell.tell(News::Opened(Box::new(scene)));
                 for warning in warnings {
@@ -363,11 +378,20 @@ impl Worker {
         Ok(())
     }
 
+    fn freeze(&mut self) -> Result<()> {
+        let (_, wish) = self.last.as_ref().context("there is no picture yet")?;
+        let camera = wish.camera;
+        let session = self.session.as_mut().context("no scene is open")?;
+        self.frozen = session.bricks_seen()?.into_iter().flatten().map(|(brick, _)| brick).collect();
+        self.tell.tell(News::Frozen(camera, self.frozen.len()));
+        Ok(())
+    }
+
     fn save(&mut self, file: &Path) -> Result<()> {
         let (frame, wish) = self.last.as_ref().context("there is no picture to save")?;
         let (frame, wish) = (frame.clone(), wish.clone());
         let session = self.session.as_mut().context("no scene is open")?;
-        let shown = shown(session, &frame, &wish, Stage::Done, 0.0)?;
+        let shown = shown(session, &frame, &wish, &self.frozen, (Stage::Done, 0.0))?;
         png::write(file, shown.size.0, shown.size.1, &shown.pixels)?;
         self.tell.tell(News::Saved(file.into()));
         Ok(())
@@ -384,7 +408,14 @@ fn states(frame: &Frame) -> [u64; 3] {
 }
 
 /// `frame` as it is shown, with the overlay that is wished.
-fn shown(session: &mut Session, frame: &Frame, wish: &Wish, stage: Stage, ms: f64) -> Result<Shown> {
+fn shown(
+    session: &mut Session,
+    frame: &Frame,
+    wish: &Wish,
+    frozen: &HashSet<u32>,
+    (stage, ms): (Stage, f64),
+) -> Result<Shown> {
+    static NUMBER: AtomicU64 = AtomicU64::new(1);
     let bricks = if wish.overlay.shows_bricks() { session.bricks_seen()? } else { Vec::new() };
     let mut pixels = developed(&frame.pixels.radiance, frame.exposure_ev, frame.tone_map);
     let of = Pixels {
@@ -394,10 +425,12 @@ fn shown(session: &mut Session, frame: &Frame, wish: &Wish, stage: Stage, ms: f6
         depth: &frame.pixels.depth,
         normals: &frame.pixels.normal,
         bricks: &bricks,
+        frozen,
     };
     wish.overlay.paint(&of, &mut pixels);
     let states = states(frame);
     Ok(Shown {
+        number: NUMBER.fetch_add(1, Ordering::Relaxed),
         camera: wish.camera,
         size: frame.size,
         pixels,

@@ -44,7 +44,7 @@ pub struct Desk {
 }
 
 /// What a key does in the window, for the help.
-pub const KEYS: [(&str, &str); 16] = [
+pub const KEYS: [(&str, &str); 17] = [
     ("W A S D", "fly forward, left, back, right"),
     ("Q E", "fly down, up"),
     ("Shift", "faster"),
@@ -55,6 +55,7 @@ pub const KEYS: [(&str, &str); 16] = [
     ("double click", "go there"),
     ("M", "measuring mode"),
     ("O", "next overlay"),
+    ("C", "leave the camera behind, to see its bricks from elsewhere"),
     ("Home, F", "first view; the whole scene"),
     ("K, Space", "set a keyframe; play the path"),
     ("P", "screenshot"),
@@ -153,6 +154,9 @@ impl Desk {
         if pressed(Key::O) {
             let next = Overlay::ALL.iter().position(|&overlay| overlay == viewer.overlay).map_or(0, |at| at + 1);
             viewer.overlay = Overlay::ALL[next % Overlay::ALL.len()];
+        }
+        if pressed(Key::C) {
+            viewer.freeze();
         }
         if pressed(Key::Home) {
             viewer.go_home();
@@ -268,6 +272,17 @@ impl Desk {
             label(&painter, middle, &format!("{distance:.4}"));
         }
         ends.into_iter().for_each(|end| dot(end, Color32::LIGHT_BLUE));
+        if let Some((from, corners)) = viewer.frustum() {
+            let edge = Stroke::new(1.5, Color32::from_rgb(255, 220, 90));
+            let corners = corners.map(at);
+            for k in 0..4 {
+                for ends in [[at(from), corners[k]], [corners[k], corners[(k + 1) % 4]]] {
+                    if let [Some(a), Some(b)] = ends {
+                        painter.line_segment([a, b], edge);
+                    }
+                }
+            }
+        }
         if viewer.keyframes.len() > 1 && viewer.playing.is_none() {
             viewer.keyframes.iter().for_each(|key| dot(at(key.position.into()), Color32::LIGHT_GREEN));
         }

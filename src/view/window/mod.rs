@@ -6,13 +6,14 @@ pub mod panels;
 pub mod present;
 pub mod raster;
 pub mod recent;
+mod surface;
 
 use super::studio::{Converter, Pace};
 use super::viewer::Viewer;
 use crate::session::Settings;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use desk::Desk;
-use present::{Content, Presenter, Soft};
+use present::{Content, Presenter, presenter};
 use recent::Recent;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,6 +26,9 @@ use winit::window::{Fullscreen, Window, WindowId};
 
 /// Frames of the window come no sooner after one another: the processor's time is that of pictures.
 const LEAST: Duration = Duration::from_millis(15);
+
+/// A window that fails again within this time ends.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What the window is opened with.
 pub struct Options {
@@ -65,6 +69,8 @@ struct Open {
     drawn: Instant,
     wanted: Option<Instant>,
     title: String,
+    /// When the presenter was last replaced.
+    renewed: Option<Instant>,
 }
 
 struct App {
@@ -83,7 +89,7 @@ impl App {
             .with_inner_size(PhysicalSize::new(size.width, size.height))
             .with_min_inner_size(PhysicalSize::new(320, 200));
         let window = Arc::new(events.create_window(attributes).context("cannot open a window")?);
-        let presenter = Box::new(Soft::new(events.owned_display_handle(), window.clone())?);
+        let presenter = presenter(events.owned_display_handle(), &window)?;
         let context = egui::Context::default();
         let scale = window.scale_factor() as f32;
         let input = egui_winit::State::new(
@@ -105,7 +111,7 @@ impl App {
         }
         let desk = Desk::new(viewer, Recent::load(), self.options.folder.clone());
         let (drawn, wanted, title) = (Instant::now(), Some(Instant::now()), String::new());
-        Ok(Open { window, presenter, context, input, desk, drawn, wanted, title })
+        Ok(Open { window, presenter, context, input, desk, drawn, wanted, title, renewed: None })
     }
 
     /// Whatever ends the window ends the program.
@@ -159,6 +165,23 @@ impl Open {
         Ok(asked)
     }
 
+    /// Another presenter in the place of one that failed; once in a while.
+    fn present_anew(&mut self, events: &ActiveEventLoop) -> Result<()> {
+        if self.renewed.is_some_and(|renewed| renewed.elapsed() < PATIENCE) {
+            bail!("the window cannot be drawn");
+        }
+        self.renewed = Some(Instant::now());
+        self.presenter = presenter(events.owned_display_handle(), &self.window)?;
+        // A new one knows no textures: all of them come again with a new context's first frame.
+        self.context = egui::Context::default();
+        let scale = self.window.scale_factor() as f32;
+        let (theme, root) = (self.window.theme(), egui::ViewportId::ROOT);
+        self.input = egui_winit::State::new(self.context.clone(), root, &*self.window, Some(scale), theme, None);
+        self.desk.state = panels::State::default();
+        self.want(Instant::now());
+        Ok(())
+    }
+
     fn change_screen(&self) {
         let is_full = self.window.fullscreen().is_some();
         self.window.set_fullscreen((!is_full).then_some(Fullscreen::Borderless(None)));
@@ -203,7 +226,11 @@ impl ApplicationHandler<News> for App {
                         open.change_screen();
                     }
                 }
-                Err(error) => self.fail(events, error),
+                // Another device, or without one the processor, goes on.
+                Err(error) => match open.present_anew(events) {
+                    Ok(()) => open.desk.viewer.say(&format!("{error:#}; the window goes on"), true),
+                    Err(_) => self.fail(events, error),
+                },
             },
             event => {
                 let response = open.input.on_window_event(&open.window, &event);

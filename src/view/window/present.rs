@@ -1,18 +1,20 @@
 //! How a frame of the window gets onto the screen.
 
 use super::raster::{Canvas, Painter};
+use super::surface::Surface;
 use crate::view::studio::Shown;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use egui::epaint::ClippedPrimitive;
 use egui::epaint::textures::TexturesDelta;
 use egui::{Pos2, Rect};
 use std::num::NonZeroU32;
 use std::sync::Arc;
+use tracing::info;
 use winit::event_loop::OwnedDisplayHandle;
 use winit::window::Window;
 
 /// The ground behind everything.
-const GROUND: [u8; 3] = [27, 27, 27];
+pub const GROUND: [u8; 3] = [27, 27, 27];
 
 /// What a frame of the window consists of.
 pub struct Content<'a> {
@@ -26,6 +28,29 @@ pub struct Content<'a> {
     pub textures: &'a mut TexturesDelta,
     /// Pixels of a point.
     pub pixels_per_point: f32,
+}
+
+/// Chooses who brings frames onto the screen: `gpu` or `soft`. Without it a GPU does, if it is one.
+pub const VARIABLE: &str = "BRICKWALK_PRESENT";
+
+/// What brings the frames of `window` onto the screen.
+///
+/// # Errors
+/// Nothing does, or what was asked for by name does not.
+pub fn presenter(display: OwnedDisplayHandle, window: &Arc<Window>) -> Result<Box<dyn Presenter>> {
+    let soft = |display| -> Result<Box<dyn Presenter>> { Ok(Box::new(Soft::new(display, window.clone())?)) };
+    match std::env::var(VARIABLE).as_deref() {
+        Ok("soft") => soft(display),
+        Ok("gpu") => Ok(Box::new(Surface::new(display, window.clone(), true)?)),
+        Ok(other) if !other.is_empty() => bail!("{VARIABLE}={other}: it must be gpu or soft"),
+        _ => match Surface::new(display.clone(), window.clone(), false) {
+            Ok(surface) => Ok(Box::new(surface)),
+            Err(error) => {
+                info!("window: drawn by the processor: {error:#}");
+                soft(display)
+            }
+        },
+    }
 }
 
 /// Brings frames onto the screen.

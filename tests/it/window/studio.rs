@@ -240,10 +240,23 @@ fn overlays_show_what_the_engine_knows() {
     let camera = opened.way.frame(0, 1);
     let (plain, _) = rest(&studio, &wish(camera, &asked));
     let mut seen = vec![plain.pixels.clone()];
+    studio.ask(Ask::Freeze(true));
+    let (from, bricks) = until(&studio, |news| match news {
+        News::Frozen(from, bricks) => Some((from, bricks)),
+        _ => None,
+    });
+    assert!(from == camera && bricks > 1 && bricks < opened.bricks);
     for &overlay in Overlay::ALL.iter().filter(|&&overlay| overlay != Overlay::None) {
         let (last, _) = rest(&studio, &Wish { overlay, ..wish(camera, &asked) });
-        assert!(!seen.contains(&last.pixels), "{overlay} shows nothing");
+        assert!(!seen.contains(&last.pixels) || overlay == Overlay::Frozen, "{overlay} shows nothing");
         seen.push(last.pixels.clone());
+        if overlay == Overlay::Frozen {
+            // From where it was left every brick is its own; from elsewhere others are seen, too.
+            let is_red = |pixel: &&[u8; 3]| pixel[0] > 40 + pixel[1];
+            let red = |shown: &Shown| shown.pixels.iter().filter(is_red).count();
+            let (elsewhere, _) = rest(&studio, &Wish { overlay, ..wish(opened.way.frame(9, 10), &asked) });
+            assert!(10 * red(&last) < red(&elsewhere), "{} and {}", red(&last), red(&elsewhere));
+        }
     }
 }
 

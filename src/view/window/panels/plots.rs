@@ -24,6 +24,14 @@ pub fn show(desk: &mut Desk, ui: &mut Ui) {
             }
         });
     }
+    let text = if viewer.frozen.is_some() { "Let the camera go (C)" } else { "Leave the camera behind (C)" };
+    let hint = "Fly on and look at the bricks that the camera shows: green are its own, red are others.";
+    if ui.button(text).on_hover_text(hint).clicked() {
+        viewer.freeze();
+    }
+    if let Some((_, bricks)) = viewer.frozen {
+        ui.weak(format!("it shows {bricks} bricks"));
+    }
     let history: Vec<Taken> = viewer.history.iter().copied().collect();
     if let Some(last) = history.last() {
         let line = |ui: &mut Ui, name: &str, now: String, of: fn(&Taken) -> f64| {
