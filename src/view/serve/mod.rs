@@ -118,7 +118,8 @@ async fn page(State(shared): State<Arc<Shared>>, Query(asked): Query<Asked>) -> 
     if !shared.knows(&asked.token) {
         return refused();
     }
-    let own = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src blob: data:";
+    let own = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \
+               img-src blob: data:";
     let headers = [
         (header::CONTENT_TYPE, "text/html; charset=utf-8"),
         (header::CACHE_CONTROL, "no-store"),

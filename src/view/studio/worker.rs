@@ -107,8 +107,8 @@ pub struct Worker {
     scale: Scale,
     /// Whether something stands in for what is missing.
     has_levels: bool,
-    /// The last picture that was told.
-    last: Option<(Frame, Wish)>,
+    /// The last picture that was told, what was wished, and how it came about.
+    last: Option<(Frame, Wish, (Stage, f64))>,
     /// Bricks that [`Overlay::Frozen`] shows.
     frozen: HashSet<u32>,
     /// The failure that was told last.
@@ -151,7 +151,12 @@ impl Worker {
                 Turn::Converted(_, Err(text)) => self.fail(&anyhow!(text)),
                 Turn::Wish(wish) => {
                     let is_same = self.wish.as_ref().is_some_and(|own| *own == *wish);
+                    let is_view = |own: &Wish| own.camera == wish.camera && own.settings == wish.settings;
+                    let is_view = self.wish.as_ref().is_some_and(is_view);
                     self.wish = Some(*wish);
+                    if is_view && !is_same && self.repaint().is_some() {
+                        continue;
+                    }
                     if !is_same && self.path.is_some() {
                         let is_open = self.session.is_some();
                         self.plan = if is_open { Plan::Move } else { Plan::Open(Instant::now()) };
@@ -173,7 +178,7 @@ impl Worker {
 
     fn is_of_moving(&self) -> bool {
         let size = self.wish.as_ref().map(|wish| (wish.settings.size.width, wish.settings.size.height));
-        self.last.as_ref().is_none_or(|(frame, _)| Some(frame.size) != size)
+        self.last.as_ref().is_none_or(|(frame, ..)| Some(frame.size) != size)
     }
 
     /// Makes and tells the next picture of the plan.
@@ -248,10 +253,25 @@ impl Worker {
         if self.picture(&wish, stage, false)?.is_none() {
             return Ok(Plan::Refine(steps));
         }
-        let Some((frame, _)) = &self.last else { return Ok(Plan::Idle) };
+        let Some((frame, ..)) = &self.last else { return Ok(Plan::Idle) };
         let pixels = frame.pixels.radiance.len() as u64;
         let states = states(frame);
         Ok(if steps.note(states[0], pixels) { Plan::Idle } else { Plan::Refine(steps) })
+    }
+
+    /// Tells the last picture again, under another overlay; `None`: it is not that of the wish, or the executor holds
+    /// another by now.
+    fn repaint(&mut self) -> Option<()> {
+        let wish = self.wish.clone()?;
+        let (frame, of, taken) = self.last.as_ref()?;
+        let session = self.session.as_mut()?;
+        if (of.camera, &of.settings) != (wish.camera, &wish.settings) || session.renderer().size != frame.size {
+            return None;
+        }
+        let shown = shown(session, frame, &wish, &self.frozen, *taken).ok()?;
+        self.last.as_mut()?.1 = wish;
+        self.tell.tell(News::Shown(Arc::new(shown)));
+        Some(())
     }
 
     /// Makes a picture and tells it; its milliseconds, or `None`: something newer came.
@@ -262,7 +282,7 @@ impl Worker {
         let Some(frame) = session.picture(&wish.camera, &mut gives)? else { return Ok(None) };
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let shown = shown(session, &frame, wish, &self.frozen, (stage, ms))?;
-        self.last = Some((frame, wish.clone()));
+        self.last = Some((frame, wish.clone(), (stage, ms)));
         self.tell.tell(News::Shown(Arc::new(shown)));
         Ok(Some(ms))
     }
@@ -357,7 +377,7 @@ impl Worker {
     }
 
     fn compare(&mut self) -> Result<()> {
-        let (shown, wish) = self.last.clone().context("there is no picture to compare")?;
+        let (shown, wish, _) = self.last.clone().context("there is no picture to compare")?;
         let resting = self.pace.of_resting(&wish.settings, wish.settings.samples(), true);
         let secondary = EffectMethods::EXACT;
         let exact = Settings { secondary, lod: 0.0, lod_correct: None, denoise: false, ..resting };
@@ -379,7 +399,7 @@ impl Worker {
     }
 
     fn freeze(&mut self) -> Result<()> {
-        let (_, wish) = self.last.as_ref().context("there is no picture yet")?;
+        let (_, wish, _) = self.last.as_ref().context("there is no picture yet")?;
         let camera = wish.camera;
         let session = self.session.as_mut().context("no scene is open")?;
         self.frozen = session.bricks_seen()?.into_iter().flatten().map(|(brick, _)| brick).collect();
@@ -388,10 +408,9 @@ impl Worker {
     }
 
     fn save(&mut self, file: &Path) -> Result<()> {
-        let (frame, wish) = self.last.as_ref().context("there is no picture to save")?;
-        let (frame, wish) = (frame.clone(), wish.clone());
+        let (frame, wish, taken) = self.last.as_ref().context("there is no picture to save")?;
         let session = self.session.as_mut().context("no scene is open")?;
-        let shown = shown(session, &frame, &wish, &self.frozen, (Stage::Done, 0.0))?;
+        let shown = shown(session, frame, wish, &self.frozen, *taken)?;
         png::write(file, shown.size.0, shown.size.1, &shown.pixels)?;
         self.tell.tell(News::Saved(file.into()));
         Ok(())
