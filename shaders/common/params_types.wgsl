@@ -49,6 +49,7 @@ struct Params {           // What every kernel is told.
     // rays spread by at least; z: the tolerance; w: share of a squared width that blending may take off
     levels: vec4<f32>,
     environment_turn: vec4<f32>, // x, y: cosine and sine of its turn about +Y
+    clip: vec4<f32>,      // unit normal of the plane that the scene is cut at; w: its product with points of the plane
     // what a white surface reflects of the environment, by terms of its normal (light.wgsl)
     ambient: array<vec4<f32>, 9>,
 }

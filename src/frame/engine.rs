@@ -9,6 +9,7 @@ use crate::schedule::cache::Cache;
 use crate::schedule::fronts::{FrontPass, Fronts};
 use crate::schedule::{self, ExecutorError, Pass, Shading, Step, Tracer, Tracing};
 use bricks::SceneFile;
+use glam::DVec3;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
@@ -45,6 +46,8 @@ pub struct RenderSettings {
     pub taa: bool,
     /// What a frame may load. What is resident stands in for the rest ([`super::PixelState`]).
     pub budget: Option<FrameBudget>,
+    /// A point and the unit normal of a plane, world space: what the normal points to is there for no ray.
+    pub clip: Option<(DVec3, DVec3)>,
 }
 
 /// A scene, an executor and a cache that passes are traced with. It knows no method of secondary visibility.
@@ -112,6 +115,14 @@ impl Engine {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
+        let clipped;
+        let first = match self.settings.clip {
+            Some(_) => {
+                clipped = [first, &[Step::ClipRays]].concat();
+                &clipped[..]
+            }
+            None => first,
+        };
         if let Some(mut budgeted) = self.budgeted.take() {
             let done = budgeted.trace(&mut self.tracer(pass, stats), first);
             self.budgeted = Some(budgeted);

@@ -253,6 +253,10 @@ impl Band<'_> {
                 view.params.traced_one_in = engine.settings.correct_one_in;
             }
             view.directions.lod = Lod { angle: view.params.step_y[3], ..engine.settings.lod };
+            if let Some((point, normal)) = engine.settings.clip {
+                let off = normal.dot(point - view.frame.origin) / view.frame.unit;
+                view.params.clip = [normal.x as f32, normal.y as f32, normal.z as f32, off as f32];
+            }
             // Each sample stands for its share of the pixel: textures are looked up by that.
             view.params.step_y[3] /= (engine.settings.samples as f32).sqrt();
             if engine.settings.taa {

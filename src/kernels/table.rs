@@ -15,6 +15,7 @@ use super::query::tile_bounds::tile_bounds;
 use super::query::tile_lists::{query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::query::tile_walk::{tile_walk_count, tile_walk_write};
 use super::rays::RaySet;
+use super::shade::clip_rays::clip_rays;
 use super::shade::generate::{
     generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
@@ -206,6 +207,7 @@ kernels! {
     generate_glossy: "shade/generate_glossy" Shading []
         |b, t| generate_glossy(b, t.own, t.seen, t.pixels, t.materials);
     start_hits: "shade/start_hits" Tiles [] |_, t| start_hits(t.own);
+    clip_rays: "shade/clip_rays" Tiles [] |b, t| clip_rays(b, t.own);
 
     clear_gbuffer: "shade/clear_gbuffer" Shading [] |b, t| clear_gbuffer(b, t.pixels, t.shaded);
     resolve: "shade/resolve" CacheShading []

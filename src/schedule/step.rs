@@ -7,6 +7,8 @@ pub enum Step {
     Generate,
     /// Start the hits of rays given from outside.
     StartHits,
+    /// Leave of the rays what lies on this side of the plane that the scene is cut at.
+    ClipRays,
     /// Count the rays traced, where no other step does.
     CountRays,
     /// Bounds of the tiles, their walk of the top level, their lists of leaves.

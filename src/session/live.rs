@@ -18,7 +18,7 @@ use anyhow::{Context, Result};
 use std::sync::Arc;
 
 /// Settings under other headings that may change while a session is open.
-const ALSO: [&str; 5] = ["size", "fov", "aov", "frame_budget", "interactive"];
+const ALSO: [&str; 6] = ["size", "fov", "clip", "aov", "frame_budget", "interactive"];
 
 /// Whether a setting may change while a session is open.
 fn is_live(entry: &Entry) -> bool {

@@ -97,6 +97,7 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         correct_one_in: settings.lod_correct.unwrap_or(0),
         only_chosen: false,
         budget: settings.frame_budget(),
+        clip: settings.clip.map(|plane| (plane.point, plane.normal.unit())),
     }
 }
 

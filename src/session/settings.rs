@@ -10,8 +10,8 @@ use crate::secondary::df;
 use crate::secondary::{EffectMethods, Method, displacement, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
-    Adapter, CacheSize, Direction, EffectList, Entry, Environment, FrameBudget, Group, ImageSize, Length, Policy,
-    Rectangle, Rule, Schedule, SettingsError, Turn, settings,
+    Adapter, CacheSize, Direction, EffectList, Entry, Environment, FrameBudget, Group, ImageSize, Length, Plane,
+    Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
 };
 use std::path::PathBuf;
 
@@ -46,6 +46,10 @@ settings! {
         /// Vertical field of view. [default: the path's]
         fov: Option<f64> = None, "--fov DEG", Rule::Real(MIN_FOV_Y_DEGREES, MAX_FOV_Y_DEGREES), "degrees",
             Camera, Usual;
+        /// A plane that the scene is cut at, to look into it: a point and a normal, world space. What lies on the side
+        /// that the normal points to is there for no ray, light and shadow among them. Not together with --secondary.
+        /// [default: none]
+        clip: Option<Plane> = None, "--clip X,Y,Z,NX,NY,NZ", Rule::Any, "", Camera, Usual;
         /// Motion of instances (JSON); docs/using.md has the form. What moves is an instance: see `info --instances`
         /// and `convert --movable`. [default: nothing moves]
         motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
@@ -260,6 +264,10 @@ impl Settings {
                 "--lod and --secondary {method} exclude each other: {method} knows bricks alone; leave one out"
             );
             return Err(SettingsError::Conflict(text));
+        }
+        if self.clip.is_some() && self.secondary != EffectMethods::EXACT {
+            let text = "--clip and --secondary exclude each other: methods know the whole scene; leave one out";
+            return Err(SettingsError::Conflict(text.into()));
         }
         if self.frame_budget().is_some() {
             let has_methods = self.secondary != EffectMethods::EXACT;

@@ -21,7 +21,9 @@ pub mod value;
 
 pub use group::{Entry, Field, Group, Heading, Level, SettingsError};
 pub use sizes::{CacheSize, FrameBudget, ImageSize};
-pub use types::{Adapter, Direction, Effect, EffectList, Environment, Length, Policy, Rectangle, Schedule, Turn};
+pub use types::{
+    Adapter, Direction, Effect, EffectList, Environment, Length, Plane, Policy, Rectangle, Schedule, Turn,
+};
 pub use value::{Lines, Plain, Rule, Value};
 
 pub(crate) use declare::settings;

@@ -196,7 +196,34 @@ impl fmt::Display for Rectangle {
     }
 }
 
-/// Three numbers, and nine, are lists in files.
+/// A plane that a scene is cut at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// A point of it, world space.
+    pub point: DVec3,
+    /// Unit normal; what lies on the side that it points to is cut away.
+    pub normal: Direction,
+}
+
+impl FromStr for Plane {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let values = numbers::<6>(text).filter(|values| values[..3].iter().all(|value| value.abs() <= 1e9));
+        let values = values.ok_or("it must be six numbers: a point within 1e9, a normal")?;
+        let normal = Direction([values[3], values[4], values[5]]);
+        let normal = normal.normalized().map(|_| normal).ok_or("its normal must have a length")?;
+        Ok(Self { point: DVec3::new(values[0], values[1], values[2]), normal })
+    }
+}
+
+impl fmt::Display for Plane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{}", Direction(self.point.to_array()), self.normal)
+    }
+}
+
+/// Three numbers, six, and nine, are lists in files.
 macro_rules! value_of_numbers {
     ($($name:ty),*) => { $(
         impl Value for $name {
@@ -213,7 +240,7 @@ macro_rules! value_of_numbers {
     )* };
 }
 
-value_of_numbers!(Direction, Rectangle);
+value_of_numbers!(Direction, Plane, Rectangle);
 
 /// Degrees of a random turn, 0 to 360; `full` is all of them.
 #[derive(Clone, Copy, Debug, PartialEq)]

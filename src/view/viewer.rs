@@ -9,7 +9,7 @@ use crate::output::atomic;
 use crate::scene::path::{CameraPath, Keyframe};
 use crate::scene::{Camera, Projection};
 use crate::session::Settings;
-use crate::settings::ImageSize;
+use crate::settings::{Direction, ImageSize, Plane};
 use anyhow::{Context, Result};
 use glam::DVec3;
 use std::collections::VecDeque;
@@ -309,6 +309,21 @@ impl Viewer {
             let [min, max] = scene.bounds.map(DVec3::from_array);
             navigator.go_to(0.5 * (min + max), 0.25 * (max - min).length());
         }
+    }
+
+    /// Cuts the scene at the point that was clicked on, or in front of the camera, across the view; or makes it whole.
+    pub fn clip(&mut self) {
+        if self.settings.clip.take().is_some() {
+            return;
+        }
+        let Some(camera) = self.camera() else { return };
+        let (_, _, forward) = camera.frame();
+        let reach = self.navigator.as_ref().map_or(1.0, Navigator::reach);
+        let point = self.found.as_ref().map_or(camera.position + forward * (0.5 * reach), |found| found.point);
+        // Along an axis, which is what plans and sections are; what is toward the camera goes.
+        let axis = DVec3::AXES[(0..3).max_by(|&a, &b| forward[a].abs().total_cmp(&forward[b].abs())).unwrap_or(1)];
+        let normal = Direction((axis * -forward.dot(axis).signum()).to_array());
+        self.settings.clip = Some(Plane { point, normal });
     }
 
     /// Leaves the camera behind, to look at what it shows from elsewhere; or forgets it.

@@ -33,6 +33,7 @@ mod exact {
     mod bands;
     mod budget;
     mod cache_independence;
+    mod clip;
     mod cones;
     mod exactness;
     mod given_rays;

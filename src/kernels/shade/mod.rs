@@ -1,6 +1,7 @@
 //! Twins of the kernels that make rays and shade what they hit.
 
 pub mod choose;
+pub mod clip_rays;
 pub mod cones;
 pub mod generate;
 pub mod gloss;

@@ -149,6 +149,7 @@ impl Guest {
             Told::Measure { on } => viewer.mode = if on { Mode::Measure } else { Mode::Tell },
             Told::Home => viewer.go_home(),
             Told::All => viewer.see_all(),
+            Told::Clip => viewer.clip(),
             Told::Freeze => viewer.freeze(),
             Told::Overlay { name } => match name.parse() {
                 Ok(overlay) => viewer.overlay = overlay,

@@ -98,6 +98,8 @@ pub enum Told {
     Home,
     /// The whole scene.
     All,
+    /// Cuts the scene open, or makes it whole.
+    Clip,
     /// Leaves the camera behind, or forgets it.
     Freeze,
     /// Another overlay.

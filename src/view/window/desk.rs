@@ -44,7 +44,7 @@ pub struct Desk {
 }
 
 /// What a key does in the window, for the help.
-pub const KEYS: [(&str, &str); 17] = [
+pub const KEYS: [(&str, &str); 18] = [
     ("W A S D", "fly forward, left, back, right"),
     ("Q E", "fly down, up"),
     ("Shift", "faster"),
@@ -54,6 +54,7 @@ pub const KEYS: [(&str, &str); 17] = [
     ("click", "what is it? In measuring mode: measure from here to there"),
     ("double click", "go there"),
     ("M", "measuring mode"),
+    ("X", "cut the scene open at what was clicked on, or make it whole"),
     ("O", "next overlay"),
     ("C", "leave the camera behind, to see its bricks from elsewhere"),
     ("Home, F", "first view; the whole scene"),
@@ -154,6 +155,9 @@ impl Desk {
         if pressed(Key::O) {
             let next = Overlay::ALL.iter().position(|&overlay| overlay == viewer.overlay).map_or(0, |at| at + 1);
             viewer.overlay = Overlay::ALL[next % Overlay::ALL.len()];
+        }
+        if pressed(Key::X) {
+            viewer.clip();
         }
         if pressed(Key::C) {
             viewer.freeze();

@@ -219,6 +219,7 @@ fn every_control_changes_what_it_says() {
         ("reflections", |s| s.effects.glossy),
         ("environment's shadows", |s| s.effects.environment),
         ("denoise", |s| s.denoise),
+        ("cut open", |s| s.clip.is_some()),
         ("exposure by itself", |s| matches!(s.exposure, Exposure::Auto { .. })),
     ] {
         let before = of(&settings(&harness));

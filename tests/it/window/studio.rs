@@ -159,6 +159,7 @@ fn settings_change_while_a_scene_is_open() {
         "--environment off --sky-intensity 2",
         "--spp 3 --exposure -1",
         "--tone-map reinhard",
+        "--clip 0,4,0,0.1,1,0",
         "--size 64x40",
         // What a session is opened with: it is opened again.
         "--cache 20%",

@@ -75,6 +75,8 @@ struct Variant {
     roma: Option<(u32, Role)>,
     /// Bytes that a frame may load.
     budget: Option<u64>,
+    /// The scene is cut at a plane through the middle of its bounds, with this normal.
+    clip: Option<DVec3>,
     /// Look-ups of rays answered by distance fields, if they are.
     field: Option<u32>,
     /// A method as a session makes it.
@@ -97,6 +99,7 @@ const VARIANT: Variant = Variant {
     without: &[],
     roma: None,
     budget: None,
+    clip: None,
     field: None,
     method: Method::Exact,
     displacement: None,
@@ -240,6 +243,10 @@ fn render(
             correct_one_in: 0,
             only_chosen: false,
             budget: variant.budget.map(FrameBudget::Bytes),
+            clip: variant.clip.map(|normal| {
+                let [min, max] = [manifest.min, manifest.max].map(DVec3::from_array);
+                (0.5 * (min + max), normal.normalize())
+            }),
             schedule: variant.schedule,
             effects: effects(),
             samples: 1,
@@ -328,6 +335,9 @@ fn twins_agree_with_their_kernels() {
         // Most bricks are missing, and coarser levels stand for most tiles.
         Variant { budget: Some(1), ..VARIANT },
         Variant { budget: Some(1 << 30), everything_fits: true, ..VARIANT },
+        Variant { clip: Some(DVec3::new(0.3, 1.0, -0.2)), ..VARIANT },
+        Variant { clip: Some(DVec3::NEG_Y), schedule: Schedule::Demand, ..VARIANT },
+        Variant { clip: Some(DVec3::X), everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { schedule: Schedule::Demand, ..VARIANT },
         Variant { schedule: Schedule::Demand, without: &[ResidentFirst, Requery], ..VARIANT },
         Variant { without: &[RootWalk, FrontToBack], ..VARIANT },

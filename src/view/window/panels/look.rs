@@ -2,9 +2,10 @@
 
 use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
-use crate::settings::EffectList;
+use crate::settings::{Direction, EffectList};
 use crate::view::window::desk::Desk;
 use egui::{ComboBox, DragValue, Slider, Ui};
+use glam::DVec3;
 
 /// The camera, and views that were kept.
 pub fn view(desk: &mut Desk, ui: &mut Ui) {
@@ -28,6 +29,7 @@ pub fn view(desk: &mut Desk, ui: &mut Ui) {
         let [x, y, z] = navigator.camera().position.to_array();
         ui.weak(format!("at {x:.2} {y:.2} {z:.2}"));
     }
+    clip(desk, ui);
     let Some(scene) = desk.viewer.scene.as_ref().map(|scene| scene.path.clone()) else { return };
     for (index, view) in desk.recent.views_of(&scene) {
         ui.horizontal(|ui| {
@@ -40,6 +42,37 @@ pub fn view(desk: &mut Desk, ui: &mut Ui) {
                 desk.recent.forget(index);
             }
         });
+    }
+}
+
+/// The plane that the scene is cut at.
+fn clip(desk: &mut Desk, ui: &mut Ui) {
+    let viewer = &mut desk.viewer;
+    let mut is_cut = viewer.settings.clip.is_some();
+    let hint = "X: at what was clicked on, across the view. What is beyond the plane is there for no ray.";
+    if ui.checkbox(&mut is_cut, "cut open").on_hover_text(hint).changed() {
+        viewer.clip();
+    }
+    let bounds = viewer.scene.as_ref().map_or([[0.0; 3], [1.0; 3]], |scene| scene.bounds);
+    let Some(plane) = &mut viewer.settings.clip else { return };
+    ui.horizontal(|ui| {
+        for (axis, name) in DVec3::AXES.into_iter().zip(["x", "y", "z"]) {
+            let is_own = plane.normal.unit().dot(axis).abs() > 0.99;
+            if ui.selectable_label(is_own, name).clicked() {
+                plane.normal = Direction(axis.to_array());
+            }
+        }
+        if ui.button("turn over").clicked() {
+            plane.normal = Direction((-plane.normal.unit()).to_array());
+        }
+    });
+    // Along the normal, over the bounds.
+    let normal = plane.normal.unit();
+    let corners = (0..8).map(|i| DVec3::from_array(std::array::from_fn(|k| bounds[i >> k & 1][k])).dot(normal));
+    let (least, most) = corners.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let mut along = plane.point.dot(normal);
+    if least < most && ui.add(Slider::new(&mut along, least..=most).text("along its normal")).changed() {
+        plane.point += normal * (along - plane.point.dot(normal));
     }
 }
 
