@@ -2,8 +2,9 @@
 
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::scene::Camera;
-use crate::session::{Frame, Hit, Origin, Ray, Session, developed};
+use crate::session::{Frame, Hit, Origin, Ray, Session, developed, provenance};
 use anyhow::Result;
+use bricks::{Material, NONE};
 use glam::DVec3;
 
 /// What is at a place.
@@ -19,6 +20,10 @@ pub struct Found {
     pub origin: Option<Origin>,
     /// Its global id.
     pub triangle: u32,
+    /// Triangles of its primitive.
+    pub of: u32,
+    /// The number of its material, and what it is made of; `None`: it could not be read.
+    pub material: Option<(u32, Material)>,
 }
 
 impl Found {
@@ -29,10 +34,19 @@ impl Found {
         if let Some(Origin { file, node, mesh, primitive, triangle, .. }) = &self.origin {
             let named = |name: &str| if name.is_empty() { "(no name)".to_owned() } else { name.to_owned() };
             lines.push(format!("node {}", named(node)));
-            lines.push(format!("mesh {}, primitive {primitive}, triangle {triangle}", named(mesh)));
+            let of = self.of;
+            lines.push(format!("mesh {}, primitive {primitive}, triangle {triangle} of {of}", named(mesh)));
             lines.push(format!("file {file}"));
         }
         lines.push(format!("triangle id {}", self.triangle));
+        if let Some((number, material)) = &self.material {
+            let [r, g, b, a] = material.base_color;
+            let Material { metallic, roughness, emission, .. } = *material;
+            let textured = if material.base_color_texture == NONE { "" } else { " and a texture" };
+            lines.push(format!("material {number}: colour {r:.2} {g:.2} {b:.2}, alpha {a:.2}{textured}"));
+            let shines = if emission.iter().any(|&e| e > 0.0) { ", it shines" } else { "" };
+            lines.push(format!("metallic {metallic:.2}, roughness {roughness:.2}{shines}"));
+        }
         lines.push(format!("at {x:.4} {y:.4} {z:.4}"));
         lines.push(format!("distance {:.4}", self.distance));
         lines
@@ -51,10 +65,18 @@ pub fn found(session: &mut Session, camera: &Camera, (x, y): (f64, f64), aspect:
         Ray { origin: camera.position.to_array(), direction: direction.to_array(), t_min: 0.0, t_max: f64::INFINITY };
     let hits = session.trace(&[ray], false)?;
     let Some(&Hit { t, triangle, normal, .. }) = hits.first().filter(|hit| hit.t.is_finite()) else { return Ok(None) };
-    let origin = Origin::of(&session.renderer().scene.resident().manifest, triangle);
+    // Whatever traces the ray reads the attributes of what it hits.
+    let surface = session.renderer().executor.read_gbuffer()?.first().copied();
+    let scene = session.renderer().scene.clone();
+    let resident = scene.resident();
+    let material =
+        surface.and_then(|surface| Some((surface.material, *resident.materials.get(surface.material as usize)?)));
+    let origin = Origin::of(&resident.manifest, triangle);
+    let of = provenance(&resident.manifest, triangle).map_or(0, |range| range.count);
     let normal = DVec3::from_array(normal.map(f64::from));
     let point = camera.position + direction * t;
-    Ok(Some(Found { point, distance: (point - camera.position).length(), normal, origin, triangle }))
+    let distance = (point - camera.position).length();
+    Ok(Some(Found { point, distance, normal, origin, triangle, of, material }))
 }
 
 /// How far a picture is from the exact one, both as a display shows them.

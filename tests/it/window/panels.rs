@@ -12,6 +12,8 @@ use brickwalk::view::window::desk::{Asked, Desk};
 use brickwalk::view::window::present::{Content, draw};
 use brickwalk::view::window::raster::{Canvas, Painter};
 use brickwalk::view::window::recent::Recent;
+use brickwalk_convert::build::{BuildSettings, build_source};
+use brickwalk_convert::import::{ImportSettings, Input, import};
 use egui::{Key, Modifiers, PointerButton, Pos2, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -36,8 +38,12 @@ fn city(folder: &Path) -> PathBuf {
 
 /// A window over a scene, with all of the panel in it.
 fn window(scene: &Path, options: &str, folder: &Path) -> Harness<'static, Window> {
+    opened(scene, options, folder, Arc::new(|path, _| Ok(path.into())))
+}
+
+/// The same, where models are converted so.
+fn opened(scene: &Path, options: &str, folder: &Path, converter: Converter) -> Harness<'static, Window> {
     let settings = Settings::from_options(&format!("--adapter cpu {options}")).expect("options");
-    let converter: Converter = Arc::new(|path, _| Ok(path.into()));
     let mut viewer = Viewer::new(&settings, Pace::default(), converter, Arc::new(|| ())).expect("a viewer");
     viewer.open(scene);
     let desk = Desk::new(viewer, Recent::default(), folder.into());
@@ -271,4 +277,61 @@ fn a_file_that_is_none_is_told() {
     press(&mut harness, "Open");
     until(&mut harness, "the scene", |viewer| viewer.scene.is_some());
     until(&mut harness, "its picture", is_done);
+}
+
+/// A file that is dropped on the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn a_model_that_is_dropped_is_converted_and_shown() {
+    let folder = folder();
+    let scene = city(folder.path());
+    let model = folder.path().join("other.glb");
+    let words = ["scene", "city", "--triangles", "20K", "--seed", "7", "-o"];
+    succeed(words.iter().map(std::ffi::OsStr::new).chain([model.as_os_str()]));
+    let converter: Converter = Arc::new(|path, progress| {
+        if path.extension().is_some_and(|ending| ending == "bricks") {
+            return Ok(path.into());
+        }
+        let source = import(&[Input::from(path.to_path_buf())], &ImportSettings::default(), progress)?;
+        let file = path.with_extension("bricks");
+        build_source(&source, &BuildSettings::default(), &file, progress)?;
+        Ok(file)
+    });
+    let mut harness = opened(&scene, "--spp 1 --cache 40%", folder.path(), converter);
+    until(&mut harness, "the first picture", is_done);
+    // What is no model is told, and what is shown stays.
+    let none = folder.path().join("none.glb");
+    std::fs::write(&none, "no model").expect("a file");
+    for (path, is_model) in [(&none, false), (&model, true)] {
+        harness.input_mut().dropped_files.push(Arc::new(Dropped(path.clone())));
+        harness.step();
+        if is_model {
+            let name = model.clone();
+            until(&mut harness, "the other scene", |viewer| {
+                viewer.scene.as_ref().is_some_and(|scene| scene.path == name)
+            });
+        } else {
+            until(&mut harness, "a message", |viewer| {
+                viewer.messages.iter().any(|message| message.is_failure && message.text.contains("none.glb"))
+            });
+            assert!(harness.state().desk.viewer.scene.as_ref().is_some_and(|own| own.path == scene));
+        }
+    }
+    until(&mut harness, "its picture", is_done);
+    let viewer = &harness.state().desk.viewer;
+    assert!(
+        viewer.scene.as_ref().is_some_and(|scene| scene.file.ends_with("other.bricks") && scene.triangles < 40_000)
+    );
 }

@@ -94,6 +94,11 @@ fn walked(scene: &Path, folder: &Path, settings: &Settings, camera: &Camera) -> 
     brickwalk::session::developed(&picture.rgb, 0.0, brickwalk::picture::tone_map::ToneMap::None)
 }
 
+/// What a material is, byte for byte.
+fn bytes_of(material: &bricks::Material) -> &[u8] {
+    bytemuck::bytes_of(material)
+}
+
 fn wish(camera: Camera, settings: &Settings) -> Wish {
     Wish { camera, settings: settings.clone(), overlay: Overlay::None }
 }
@@ -203,6 +208,11 @@ fn places_are_told_and_pictures_compared_and_saved() {
     let told = succeed(words);
     let origin = found.origin.as_ref().expect("an origin");
     assert!(told.contains(&format!("node {}", origin.node)) && told.contains(&origin.mesh), "{told}");
+    let (number, material) = found.material.expect("a material");
+    let resident = brickwalk::session::open_scene(&scene).expect("the scene");
+    let materials = &resident.resident().materials;
+    assert_eq!(bytes_of(&material), bytes_of(&materials[number as usize]));
+    assert!(found.of > 0 && found.lines().iter().any(|line| line.starts_with(&format!("material {number}:"))));
     // Above the horizon there is nothing.
     studio.ask(Ask::What { x: 0.5, y: 0.01, purpose: Purpose::Measure });
     assert!(until(&studio, |news| match news {
