@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// # Errors
 /// Settings that do not go together; a scene that is not there; an address that cannot be listened on.
 pub fn run(args: &ServeArgs) -> Result<()> {
-    let settings = args.settings()?;
+    let settings = args.given.settings()?;
     // What is missing is told now rather than to whoever opens the page; a model is converted once for all.
     let scene = cached::scene(&args.scene)?;
     crate::session::open_scene(&scene)?;

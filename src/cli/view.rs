@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// # Errors
 /// Settings that do not go together; there is no display, or it fails.
 pub fn run(args: &ViewArgs) -> Result<()> {
-    let settings = args.settings()?;
+    let settings = args.given.settings()?;
     let options = Options {
         scene: args.scene.clone(),
         settings,

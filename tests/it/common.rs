@@ -69,6 +69,32 @@ pub fn city(folder: &Path, triangles: &str, brick_triangles: &str) -> PathBuf {
     scene
 }
 
+/// A generated city of small bricks with levels of detail in `folder`.
+pub fn levelled_city(folder: &Path) -> PathBuf {
+    let scene = folder.join("city.bricks");
+    let words = ["scene", "city", "--triangles", "60K", "--brick-triangles", "500", "--lod", "on", "-o"];
+    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
+    scene
+}
+
+/// Whether there is such a program.
+pub fn has_program(name: &str) -> bool {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&folders).any(|folder| folder.join(name).is_file())
+}
+
+/// Waits until there is something, for a minute and a half at most.
+pub fn wait<T>(what: &str, mut is: impl FnMut() -> Option<T>) -> T {
+    let start = std::time::Instant::now();
+    loop {
+        if let Some(found) = is() {
+            return found;
+        }
+        assert!(start.elapsed().as_secs() < 90, "{what} did not come");
+        std::thread::sleep(std::time::Duration::from_millis(30));
+    }
+}
+
 /// Adds displacement fields of any samples to a scene: of the first brick of the world, and of the whole world.
 pub fn add_fields(path: &Path) {
     let scene = SceneFile::open(path).expect("the scene");

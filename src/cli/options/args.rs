@@ -457,6 +457,34 @@ impl WalkArgs {
     }
 }
 
+/// Which settings `view` and `serve` begin with.
+#[cfg(any(feature = "serve", feature = "viewer"))]
+#[derive(Clone, Debug, Args)]
+pub struct ViewSettings {
+    /// Read settings from a file (TOML); options on the command line override it [default: none]
+    #[arg(long = "settings", value_name = "F.toml", hide_short_help = true)]
+    file: Option<PathBuf>,
+    /// Show all options, with those for experts
+    #[arg(long, action = clap::ArgAction::HelpLong)]
+    pub help_all: Option<bool>,
+    /// What is rendered, and how.
+    #[command(flatten)]
+    given: GroupArgs<OfView>,
+}
+
+#[cfg(any(feature = "serve", feature = "viewer"))]
+impl ViewSettings {
+    /// The settings, as those of `walk`.
+    ///
+    /// # Errors
+    /// A bad file; settings that do not go together.
+    pub fn settings(&self) -> anyhow::Result<Settings> {
+        let settings = self.given.over(self.file.as_deref())?;
+        settings.check().map_err(usage)?;
+        Ok(settings)
+    }
+}
+
 /// Options of `view`.
 #[cfg(feature = "viewer")]
 #[derive(Clone, Debug, Args)]
@@ -469,28 +497,9 @@ pub struct ViewArgs {
     /// Folder for screenshots and paths [default: the current one]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Read settings from a file (TOML); options on the command line override it [default: none]
-    #[arg(long = "settings", value_name = "F.toml", hide_short_help = true)]
-    file: Option<PathBuf>,
-    /// Show all options, with those for experts
-    #[arg(long, action = clap::ArgAction::HelpLong)]
-    pub help_all: Option<bool>,
     /// What is rendered, and how.
     #[command(flatten)]
-    given: GroupArgs<OfView>,
-}
-
-#[cfg(feature = "viewer")]
-impl ViewArgs {
-    /// The settings, as those of `walk`.
-    ///
-    /// # Errors
-    /// A bad file; settings that do not go together.
-    pub fn settings(&self) -> anyhow::Result<Settings> {
-        let settings = self.given.over(self.file.as_deref())?;
-        settings.check().map_err(usage)?;
-        Ok(settings)
-    }
+    pub given: ViewSettings,
 }
 
 /// Options of `serve`.
@@ -511,28 +520,9 @@ pub struct ServeArgs {
     /// Sessions at a time, at most; each has a cache of its own
     #[arg(long, value_name = "N", default_value = "4", value_parser = ranged::<1, 64>)]
     pub viewers: u32,
-    /// Read settings from a file (TOML); options on the command line override it [default: none]
-    #[arg(long = "settings", value_name = "F.toml", hide_short_help = true)]
-    file: Option<PathBuf>,
-    /// Show all options, with those for experts
-    #[arg(long, action = clap::ArgAction::HelpLong)]
-    pub help_all: Option<bool>,
     /// What is rendered, and how.
     #[command(flatten)]
-    given: GroupArgs<OfView>,
-}
-
-#[cfg(feature = "serve")]
-impl ServeArgs {
-    /// The settings, as those of `walk`.
-    ///
-    /// # Errors
-    /// A bad file; settings that do not go together.
-    pub fn settings(&self) -> anyhow::Result<Settings> {
-        let settings = self.given.over(self.file.as_deref())?;
-        settings.check().map_err(usage)?;
-        Ok(settings)
-    }
+    pub given: ViewSettings,
 }
 
 /// Settings that do not go together are wrong usage.

@@ -1,21 +1,13 @@
 //! Frames with a budget: they load no more, pixels that are said to be exact show what they show with everything
 //! resident, and while the camera rests all become exact.
 
-use crate::common::{adapters, folder, json, records, settings, succeed, walk};
+use crate::common::{adapters, folder, json, levelled_city as city, records, settings, succeed, walk};
 use brickwalk::counters::Record;
 use brickwalk::frame::{PixelState, Pixels};
 use brickwalk::scene::Camera;
 use brickwalk::session::{Frame, Session};
 use brickwalk::settings::Group as _;
-use std::path::{Path, PathBuf};
-
-/// A city with levels of detail.
-fn city(folder: &Path) -> PathBuf {
-    let scene = folder.join("city.bricks");
-    let words = ["scene", "city", "--triangles", "60K", "--brick-triangles", "500", "--lod", "on", "-o"];
-    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
-    scene
-}
+use std::path::Path;
 
 /// What a pixel shows, bit for bit.
 fn words(pixels: &Pixels, at: usize) -> [u32; 11] {

@@ -2,7 +2,7 @@
 //! camera, buttons do what they say.
 
 use super::serve::Server;
-use crate::common::{city, folder, skip};
+use crate::common::{city, folder, has_program, skip, wait};
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -34,9 +34,7 @@ impl Drop for Browser {
 impl Browser {
     /// `None`, and the test is skipped, without a browser.
     fn start(folder: &Path) -> Option<Self> {
-        let folders = std::env::var_os("PATH").unwrap_or_default();
-        let find = |name: &&str| std::env::split_paths(&folders).any(|folder| folder.join(name).is_file());
-        let Some(program) = NAMES.into_iter().find(find) else {
+        let Some(program) = NAMES.into_iter().find(|name| has_program(name)) else {
             skip("chromium is not installed");
             return None;
         };
@@ -135,17 +133,6 @@ fn fetched(port: u16, path: &str) -> Option<String> {
     let _ = stream.read_to_end(&mut answer);
     let text = String::from_utf8_lossy(&answer).into_owned();
     text.split_once("\r\n\r\n").map(|(_, body)| body.to_owned())
-}
-
-fn wait<T>(what: &str, mut is: impl FnMut() -> Option<T>) -> T {
-    let start = Instant::now();
-    loop {
-        if let Some(found) = is() {
-            return found;
-        }
-        assert!(start.elapsed() < MOST, "{what} did not come");
-        std::thread::sleep(Duration::from_millis(50));
-    }
 }
 
 const DONE: &str = "window.brickwalk?.head?.stage === 'done'";

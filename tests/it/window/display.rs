@@ -1,13 +1,10 @@
 //! The window itself, on a display without a screen: real keys and clicks, and what a person does without a display.
 
-use crate::common::{adapters, city, folder, names, skip};
+use crate::common::{adapters, city, folder, has_program, names, skip, wait};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
-
-/// Nothing here takes longer.
-const MOST: Duration = Duration::from_secs(90);
+use std::time::Duration;
 
 /// A process that ends with the test.
 struct Ends(Child);
@@ -21,11 +18,7 @@ impl Drop for Ends {
 
 /// A display without a screen, and its name; `None`, and the test is skipped, without the programs for it.
 fn display() -> Option<(Ends, String)> {
-    let has = |program: &str| {
-        let folders = std::env::var_os("PATH").unwrap_or_default();
-        std::env::split_paths(&folders).any(|folder| folder.join(program).is_file())
-    };
-    if !["Xvfb", "xdotool"].into_iter().all(has) {
+    if !["Xvfb", "xdotool"].into_iter().all(has_program) {
         skip("Xvfb and xdotool are not installed");
         return None;
     }
@@ -65,17 +58,6 @@ impl Hand<'_> {
             let found = String::from_utf8_lossy(&output.stdout).lines().last().map(str::to_owned);
             found.filter(|id| !id.is_empty())
         })
-    }
-}
-
-fn wait<T>(what: &str, mut is: impl FnMut() -> Option<T>) -> T {
-    let start = Instant::now();
-    loop {
-        if let Some(found) = is() {
-            return found;
-        }
-        assert!(start.elapsed() < MOST, "{what} did not come");
-        std::thread::sleep(Duration::from_millis(30));
     }
 }
 

@@ -1,7 +1,7 @@
 //! The panels: what a person finds there by its label, presses, and what comes of it. No display is needed: what is
 //! drawn goes through the window's own rasteriser.
 
-use crate::common::{folder, names, succeed};
+use crate::common::{folder, levelled_city as city, names, succeed};
 use brickwalk::Settings;
 use brickwalk::picture::exposure::Exposure;
 use brickwalk::session::Session;
@@ -27,13 +27,6 @@ const MOST: Duration = Duration::from_secs(60);
 struct Window {
     desk: Desk,
     asked: Asked,
-}
-
-fn city(folder: &Path) -> PathBuf {
-    let scene = folder.join("city.bricks");
-    let words = ["scene", "city", "--triangles", "60K", "--brick-triangles", "500", "--lod", "on", "-o"];
-    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
-    scene
 }
 
 /// A window over a scene, with all of the panel in it.

@@ -1,26 +1,19 @@
 //! The thread that renders for a window: what is seen in the end is what `walk` writes, wishes are answered soon, and
 //! nothing that goes wrong ends it.
 
-use crate::common::{adapters, folder, names, succeed};
+use crate::common::{adapters, folder, levelled_city as city, names, succeed};
 use brickwalk::Settings;
 use brickwalk::metrics::load;
 use brickwalk::scene::Camera;
 use brickwalk::settings::{Adapter, Group, ImageSize};
 use brickwalk::view::studio::{Ask, Converter, News, Overlay, Pace, Purpose, Scene, Shown, Stage, Studio, Wish};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Nothing here takes longer.
 const MOST: Duration = Duration::from_secs(120);
-
-fn city(folder: &Path) -> PathBuf {
-    let scene = folder.join("city.bricks");
-    let words = ["scene", "city", "--triangles", "60K", "--brick-triangles", "500", "--lod", "on", "-o"];
-    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
-    scene
-}
 
 fn settings(options: &str) -> Settings {
     Settings::from_options(options).expect("options")
