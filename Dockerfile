@@ -3,6 +3,7 @@
 #   docker build -t brickwalk .
 #   docker run --rm -v "$PWD:/data" brickwalk scene city -o city.bricks
 #   docker run --rm -v "$PWD:/data" brickwalk walk city.bricks -o out
+#   docker run --rm -v "$PWD:/data" -p 127.0.0.1:7878:7878 brickwalk serve city.bricks --bind 0.0.0.0
 #
 # Without a GPU the processor renders. For an NVIDIA GPU add `--gpus all`, for others `--device /dev/dri`. With
 # `--build-arg VULKAN=` the image is smaller by some 300 MB and renders on the processor alone.
