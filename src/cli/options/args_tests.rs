@@ -293,8 +293,10 @@ fn help_explains_units_and_defaults() {
         "replay",
         "scene",
         "selftest",
+        "serve",
         "trace",
         "verify",
+        "view",
         "walk",
     ];
     assert_eq!(names, commands);
