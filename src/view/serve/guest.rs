@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::encode::encoded;
-use super::told::{MOST_SIDE, Told, number, set};
+use super::told::{Told, number, set, size};
 use crate::settings::Group;
 use crate::settings::sizes::human_count;
 use crate::view::navigate::Thrust;
@@ -119,7 +119,7 @@ impl Guest {
         let viewer = &mut self.viewer;
         match told {
             Told::Taken => self.sent = None,
-            Told::Size { width, height } => self.size = (width.clamp(1, MOST_SIDE), height.clamp(1, MOST_SIDE)),
+            Told::Size { width, height } => self.size = size(width, height),
             Told::Thrust { forward, right, up, fast } => {
                 let [forward, right, up] = [forward, right, up].map(|x| number(x, 1.0));
                 self.thrust = Thrust { forward, right, up, is_fast: fast };

@@ -51,8 +51,8 @@ struct News;
 /// # Errors
 /// There is no display; the display's.
 pub fn run(options: Options, converter: Converter) -> Result<()> {
-    let no_display = "there is no display for a window; `brickwalk serve` shows the scene in a browser, `brickwalk walk` \
-                      renders without one";
+    let no_display = "there is no display for a window; `brickwalk serve` shows the scene in a browser, \
+                      `brickwalk walk` renders without one";
     let events = EventLoop::<News>::with_user_event().build().map_err(|error| anyhow!("{no_display}: {error}"))?;
     let mut app = App { options, converter, proxy: events.create_proxy(), open: None, failure: None };
     events.run_app(&mut app).context("the window")?;
