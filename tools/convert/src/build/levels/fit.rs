@@ -6,9 +6,9 @@
 
 use super::cluster::{Clusters, Output, Touching};
 use super::merge::Merged;
-use super::nearest::closest;
+use super::nearest::{closest, distance2};
 use super::surface::Surface;
-use super::vector::{CLASSES, Vec3, add_scaled, area_vector, class, dot, length, square, sub};
+use super::vector::{CLASSES, Vec3, add_scaled, area_vector, class, dot, length, sub};
 use bricks::NONE;
 
 /// Steps toward the least squares (Jacobi).
@@ -134,79 +134,154 @@ fn samples(
     (clusters, touching): (&Clusters, &Touching),
     surface: &Surface,
 ) -> Vec<Sample> {
-    let unit = |v: Vec3| {
-        let size = length(v);
-        v.map(|x| if size > 0.0 { x / size } else { 0.0 })
-    };
-    let place = |output: &Output| {
-        let corners = output.corners.map(|corner| points[corner as usize]);
-        let center = std::array::from_fn(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
-        let radius = corners.iter().map(|&corner| square(sub(corner, center))).fold(0.0, f64::max).sqrt();
-        Place { corners, normal: unit(area_vector(corners)), center, radius }
-    };
-    let places: Vec<Place> = clusters.outputs.iter().map(place).collect();
+    let places = Places::of(points, clusters);
     let face = clusters.size * clusters.size;
     let mut output_of = vec![NONE; clusters.spread.len()];
     (0u32..).zip(&clusters.outputs).for_each(|(number, output)| output_of[output.group as usize] = number);
     let mut samples = Vec::with_capacity(merged.triangles.len());
     let mut near: Vec<u32> = Vec::new();
+    let mut bounds: Vec<f32> = Vec::new();
     let mut seen_by = vec![NONE; clusters.outputs.len()];
     for (source, triangle) in (0u32..).zip(&merged.triangles) {
         let (area, group) = (surface.area[source as usize], clusters.group_of[source as usize]);
         if area <= 0.0 {
             continue;
         }
+        let corners = triangle.corners.map(|corner| points[corner as usize]);
+        let n = unit(area_vector(corners));
         near.clear();
         let mut add = |output: u32| {
             if std::mem::replace(&mut seen_by[output as usize], source) != source {
                 near.push(output);
             }
         };
-        // What it became first: others are then known to be farther away.
+        // What it became counts where others are as near.
         if group != NONE {
             add(output_of[group as usize]);
         }
-        for corner in triangle.corners {
-            touching.outputs(clusters.cell_of[corner as usize]).iter().for_each(|&output| add(output));
+        let [a, b, c] = triangle.corners.map(|corner| clusters.cell_of[corner as usize]);
+        touching.outputs(a).iter().for_each(|&output| add(output));
+        if b != a {
+            touching.outputs(b).iter().for_each(|&output| add(output));
+        }
+        if c != a && c != b {
+            touching.outputs(c).iter().for_each(|&output| add(output));
         }
         if group != NONE && clusters.is_thin(group) {
             near.retain(|&output| clusters.outputs[output as usize].group == group);
         }
-        let [a, b, c] = triangle.corners.map(|corner| points[corner as usize]);
-        let n = unit(area_vector([a, b, c]));
         let cuts = if area > 4.0 * face { 4 } else { 1 + usize::from(area > face) };
         let weight = (area / (cuts * cuts) as f64) as f32;
+        let [a, b, c] = corners;
         for (s, t) in centers(cuts) {
             let p = add_scaled(add_scaled(a, s, sub(b, a)), t, sub(c, a));
-            let (mut least, mut root) = (f64::INFINITY, f64::INFINITY);
-            let mut best = None;
-            for &output in &near {
-                let place = &places[output as usize];
-                let turned = TURNED * face * (1.0 - dot(n, place.normal));
-                if turned >= least || square(sub(p, place.center)) > (root + place.radius).powi(2) {
-                    continue;
-                }
-                let (distance2, at) = closest(p, &place.corners);
-                if distance2 + turned < least {
-                    least = distance2 + turned;
-                    root = least.sqrt();
-                    let at = at.map(|x| x as f32);
-                    best = Some(Sample { source, output, at, distance: distance2.sqrt() as f32, weight });
-                }
-            }
-            samples.extend(best);
+            let nearest = places.nearest(p, n, &near, &mut bounds);
+            samples.extend(nearest.map(|(output, distance2, at)| {
+                let at = at.map(|x| x as f32);
+                Sample { source, output, at, distance: distance2.sqrt() as f32, weight }
+            }));
         }
     }
     samples
+}
+
+fn unit(v: Vec3) -> Vec3 {
+    let size = length(v);
+    v.map(|x| if size > 0.0 { x / size } else { 0.0 })
 }
 
 /// A triangle of the level.
 struct Place {
     corners: [Vec3; 3],
     normal: Vec3,
-    /// Of a ball that holds it.
-    center: Vec3,
-    radius: f64,
+}
+
+/// What holds a triangle of the level, and its normal; the fourth numbers are 0.
+#[derive(Clone, Copy)]
+struct Outline {
+    min: [f32; 4],
+    max: [f32; 4],
+    normal: [f32; 4],
+}
+
+impl Outline {
+    /// The square of the distance of a point, at least.
+    fn distance2(&self, p: [f32; 4]) -> f32 {
+        let beyond: [f32; 4] = std::array::from_fn(|k| (self.min[k] - p[k]).max(p[k] - self.max[k]).max(0.0));
+        dot4(beyond, beyond)
+    }
+}
+
+fn dot4(a: [f32; 4], b: [f32; 4]) -> f32 {
+    let [x, y, z, w]: [f32; 4] = std::array::from_fn(|k| a[k] * b[k]);
+    (x + z) + (y + w)
+}
+
+/// Rounded.
+fn narrow([x, y, z]: Vec3) -> [f32; 4] {
+    [x as f32, y as f32, z as f32, 0.0]
+}
+
+/// The triangles of a level. What is rounded to f32 only tells which need not be looked at: it is slack enough that
+/// nothing that is near is left out.
+struct Places {
+    places: Vec<Place>,
+    outlines: Vec<Outline>,
+    /// A face of a cell times [`TURNED`].
+    turned: f64,
+}
+
+/// Relative slack of what is computed in f32 from a few rounded numbers.
+const SLACK: f64 = 1e-5;
+
+impl Places {
+    fn of(points: &[Vec3], clusters: &Clusters) -> Self {
+        let all = clusters.outputs.iter().map(|output| output.corners.map(|corner| points[corner as usize]));
+        let places: Vec<Place> = all.map(|corners| Place { corners, normal: unit(area_vector(corners)) }).collect();
+        // The box and the point that is looked at are both rounded.
+        let largest = points.as_flattened().iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        let slack = 4.0 * f64::from(f32::EPSILON) * largest;
+        let outline = |Place { corners: [a, b, c], normal }: &Place| Outline {
+            min: narrow(std::array::from_fn(|k| a[k].min(b[k]).min(c[k]) - slack)),
+            max: narrow(std::array::from_fn(|k| a[k].max(b[k]).max(c[k]) + slack)),
+            normal: narrow(*normal),
+        };
+        let outlines = places.iter().map(outline).collect();
+        Self { places, outlines, turned: TURNED * clusters.size * clusters.size }
+    }
+
+    /// The nearest to `p` on a triangle of normal `n` of some, what is turned counted as farther away: its number, the
+    /// square of its distance, and the weights of its corners there. Of equal ones the first. `bounds` is overwritten.
+    fn nearest(&self, p: Vec3, n: Vec3, near: &[u32], bounds: &mut Vec<f32>) -> Option<(u32, f64, Vec3)> {
+        let (point, normal, turned) = (narrow(p), narrow(n), self.turned as f32);
+        let bound = |&output: &u32| {
+            let outline = self.outlines[output as usize];
+            outline.distance2(point) + turned * (1.0 - SLACK as f32 - dot4(normal, outline.normal))
+        };
+        bounds.clear();
+        bounds.extend(near.iter().map(bound));
+        let distance = |number: usize| {
+            let place = &self.places[near[number] as usize];
+            distance2(p, &place.corners) + self.turned * (1.0 - dot(n, place.normal))
+        };
+        // What is likely the nearest at first: others are then known to be farther away.
+        let first = (0..bounds.len()).reduce(|best, k| if bounds[k] < bounds[best] { k } else { best })?;
+        let (mut best, mut least) = (first, distance(first));
+        let most = |least: f64| (least * (1.0 + SLACK)) as f32;
+        let mut enough = most(least);
+        for (number, &bound) in bounds.iter().enumerate() {
+            if bound > enough || number == first {
+                continue;
+            }
+            let distance = distance(number);
+            if distance < least || distance == least && number < best {
+                (best, least) = (number, distance);
+                enough = most(least);
+            }
+        }
+        let (distance2, at) = closest(p, &self.places[near[best] as usize].corners);
+        Some((near[best], distance2, at))
+    }
 }
 
 /// Centres of the parts of a triangle whose edges are cut in so many, along its first and second edge.
