@@ -68,7 +68,11 @@ impl Grid {
     fn of(positions: &[[i64; 3]], least: [i64; 3], size: i64) -> Self {
         let scale = size as f64;
         // Exact: coordinates have 46 bits at most, so a quotient below a whole number is not rounded to it.
-        let cell = |x: i64| (x as f64 / scale).floor() as i64;
+        let cell = |x: i64| {
+            let quotient = x as f64 / scale;
+            let whole = quotient as i64;
+            whole - i64::from(whole as f64 > quotient)
+        };
         let first = least.map(cell);
         let mut numbers = Interner::with_capacity(positions.len() / 4);
         let number = |p: &[i64; 3]| {
@@ -90,16 +94,43 @@ impl Grid {
     pub fn cells(&self, triangle: &Source) -> [u32; 3] {
         triangle.corners.map(|corner| self.cell_of[corner as usize])
     }
+}
+
+/// Triangles by the cells of their corners.
+struct Groups {
+    /// The group of each triangle, or [`NONE`] of one that collapses.
+    of_triangle: Vec<u32>,
+    /// Cells of each group, ascending. Groups are in the order of their first triangles.
+    cells: Vec<[u32; 3]>,
+}
+
+impl Groups {
+    fn of(triangles: &[Source], grid: &Grid) -> Self {
+        let mut distinct = Interner::with_capacity(triangles.len() / 4);
+        let group = |triangle| key(grid.cells(triangle)).map_or(NONE, |key| distinct.intern(key).0);
+        let of_triangle = triangles.iter().map(group).collect();
+        Self { of_triangle, cells: distinct.into_values() }
+    }
+}
+
+/// What a grid makes of the triangles.
+struct Trial {
+    grid: Grid,
+    groups: Groups,
+    collapsed: Collapsed,
+}
+
+impl Trial {
+    fn of(merged: &Merged, least: [i64; 3], size: i64) -> Self {
+        let grid = Grid::of(&merged.positions, least, size);
+        let groups = Groups::of(&merged.triangles, &grid);
+        let collapsed = Collapsed::of(&merged.triangles, &grid, &groups.cells);
+        Self { grid, groups, collapsed }
+    }
 
     /// How many outputs there would be.
-    fn count(&self, triangles: &[Source]) -> usize {
-        let mut distinct = Interner::with_capacity(triangles.len() / 4);
-        for triangle in triangles {
-            if let Some(key) = key(self.cells(triangle)) {
-                distinct.intern(key);
-            }
-        }
-        distinct.values().len() + Collapsed::of(triangles, self, distinct.values()).outputs()
+    fn count(&self) -> usize {
+        self.groups.cells.len() + self.collapsed.outputs()
     }
 }
 
@@ -109,31 +140,28 @@ fn key(mut cells: [u32; 3]) -> Option<[u32; 3]> {
     (cells[0] < cells[1] && cells[1] < cells[2]).then_some(cells)
 }
 
-/// The finest grid found that leaves at most `target` triangles.
-fn search(merged: &Merged, area: f64, target: usize) -> Grid {
+/// The finest grid found that leaves at most `target` triangles, and what it makes of them.
+fn search(merged: &Merged, area: f64, target: usize) -> Trial {
     let [least, most] = merged.bounds();
     let extent = (0..3).map(|k| most[k] - least[k]).max().unwrap_or(0);
-    let at = |size: i64| {
-        let grid = Grid::of(&merged.positions, least, size);
-        let count = grid.count(&merged.triangles);
-        (grid, count)
-    };
+    let at = |size: i64| Trial::of(merged, least, size);
     // Too fine, and coarse enough: at most two cells an axis.
     let (mut fine, mut coarse) = ((extent >> GRID_BITS).max(1), extent + 1);
     if merged.triangles.len() <= target {
-        return at(fine).0;
+        return at(fine);
     }
-    let mut best: Option<Grid> = None;
+    let mut best: Option<Trial> = None;
     let mut before: Option<(f64, f64)> = None;
     // As if all were one plane: a triangle has half the area of a cell.
     let mut size = (2.0 * area / target as f64).sqrt();
     for _ in 0..MOST_TRIALS {
         let whole = (size as i64).clamp(fine + 1, (coarse - 1).max(fine + 1));
-        let (grid, count) = at(whole);
+        let trial = at(whole);
+        let count = trial.count();
         let is_enough = count as f64 >= ENOUGH * target as f64;
         if count <= target {
             coarse = whole;
-            best = Some(grid);
+            best = Some(trial);
         } else {
             fine = whole;
         }
@@ -154,7 +182,7 @@ fn search(merged: &Merged, area: f64, target: usize) -> Grid {
             size = (low * high).sqrt();
         }
     }
-    best.unwrap_or_else(|| at(extent + 1).0)
+    best.unwrap_or_else(|| at(extent + 1))
 }
 
 /// The sum of squared distances to planes, weighted by areas, relative to a point.
@@ -191,13 +219,12 @@ pub(super) fn cluster(merged: &mut Merged, points: &mut Vec<Vec3>, target: usize
     let triangle = |source: &Source| source.corners.map(|corner| points[corner as usize]);
     let vectors: Vec<Vec3> = merged.triangles.iter().map(|source| area_vector(triangle(source))).collect();
     let area = 0.5 * vectors.iter().map(|&vector| length(vector)).sum::<f64>();
-    let grid = search(merged, area, target);
+    let Trial { grid, groups, collapsed } = search(merged, area, target);
     let borders = borders(merged);
     let kept = representatives(merged, points, (&vectors, &borders), &grid);
-    let (outputs, group_of, triples) = outputs(merged, &grid, &kept);
-    let spread = vec![0.0; triples.len()];
+    let outputs = outputs(merged, &grid, &groups, &kept);
+    let (group_of, spread) = (groups.of_triangle, vec![0.0; groups.cells.len()]);
     let mut clusters = Clusters { size: grid.size as f64, cell_of: Vec::new(), kept, outputs, group_of, spread };
-    let collapsed = Collapsed::of(&merged.triangles, &grid, &triples);
     strands::add(merged, points, (&vectors, &borders), (&grid, &collapsed), &mut clusters);
     clusters.cell_of = grid.cell_of;
     clusters.outputs.retain(|output| !is_degenerate(&output.corners.map(|corner| merged.positions[corner as usize])));
@@ -296,33 +323,36 @@ fn representatives(
     best.into_iter().map(|(_, position)| position).collect()
 }
 
-/// The triangles that are left, the group of each source triangle, and the cells of each group.
-fn outputs(merged: &Merged, grid: &Grid, kept: &[u32]) -> (Vec<Output>, Vec<u32>, Vec<[u32; 3]>) {
-    let mut distinct = Interner::with_capacity(merged.triangles.len() / 4);
-    let mut group_of = vec![NONE; merged.triangles.len()];
-    let mut outputs: Vec<Output> = Vec::new();
-    for (source, triangle) in (0u32..).zip(&merged.triangles) {
-        let cells = grid.cells(triangle);
-        let Some(key) = key(cells) else { continue };
-        let (group, is_new) = distinct.intern(key);
-        let output = Output { source, group, cells, corners: cells.map(|cell| kept[cell as usize]) };
-        if is_new {
-            outputs.push(output);
-        } else if triangle.id < merged.triangles[outputs[group as usize].source as usize].id {
-            outputs[group as usize] = output;
+/// The triangles that are left, one for each group: that of least id.
+fn outputs(merged: &Merged, grid: &Grid, groups: &Groups, kept: &[u32]) -> Vec<Output> {
+    let mut outputs: Vec<Output> = Vec::with_capacity(groups.cells.len());
+    for ((source, triangle), &group) in (0u32..).zip(&merged.triangles).zip(&groups.of_triangle) {
+        if group == NONE {
+            continue;
         }
-        group_of[source as usize] = group;
+        let before = outputs.get(group as usize);
+        if before.is_some_and(|before| merged.triangles[before.source as usize].id <= triangle.id) {
+            continue;
+        }
+        let cells = grid.cells(triangle);
+        let output = Output { source, group, cells, corners: cells.map(|cell| kept[cell as usize]) };
+        match outputs.get_mut(group as usize) {
+            Some(before) => *before = output,
+            None => outputs.push(output),
+        }
     }
-    (outputs, group_of, distinct.values().to_vec())
+    outputs
 }
 
 /// Every vertex in a cell of its own: all triangles that have an area.
 fn each_alone(merged: &Merged, size: f64) -> Clusters {
     let all: Vec<u32> = (0..merged.positions.len() as u32).collect();
     let grid = Grid { size: 1, cell_of: all.clone(), places: vec![0; all.len()] };
-    let (mut outputs, group_of, triples) = outputs(merged, &grid, &all);
+    let groups = Groups::of(&merged.triangles, &grid);
+    let mut outputs = outputs(merged, &grid, &groups, &all);
     outputs.retain(|output| !is_degenerate(&output.corners.map(|corner| merged.positions[corner as usize])));
-    Clusters { size, cell_of: all.clone(), kept: all, outputs, group_of, spread: vec![0.0; triples.len()] }
+    let (group_of, spread) = (groups.of_triangle, vec![0.0; groups.cells.len()]);
+    Clusters { size, cell_of: all.clone(), kept: all, outputs, group_of, spread }
 }
 
 impl Clusters {

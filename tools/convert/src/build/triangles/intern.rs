@@ -87,6 +87,11 @@ impl<T: Key> Interner<T> {
         &self.values
     }
 
+    /// The same, without the numbers.
+    pub fn into_values(self) -> Vec<T> {
+        self.values
+    }
+
     fn grow(&mut self) {
         let size = self.buckets.len() * 2;
         self.buckets.clear();
