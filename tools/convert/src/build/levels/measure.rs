@@ -148,15 +148,24 @@ fn reach([a, b, c]: [Vec3; 3]) -> f64 {
 /// The error that is not exceeded by a share of the area, and not where what is larger than `most` counts as that: what
 /// is large must neither hide what lies on it nor be hidden by how many small things there are.
 fn quantile(mut errors: Vec<(f64, f64)>, most: f64) -> f64 {
-    errors.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
     let sums = |sums: [f64; 2], area: f64| [sums[0] + area, sums[1] + area.min(most)];
     let all = errors.iter().fold([0.0; 2], |all, (_, area)| sums(all, *area));
+    let descending = |a: &(f64, f64), b: &(f64, f64)| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1));
     let mut above = [0.0; 2];
-    for (error, area) in errors {
-        above = sums(above, area);
-        if (0..2).any(|k| above[k] > (1.0 - QUANTILE) * all[k]) {
-            return error;
+    let mut rest = errors.as_mut_slice();
+    while !rest.is_empty() {
+        // Few triangles are above it, so that the others need no order.
+        let last = rest.len() / 32;
+        rest.select_nth_unstable_by(last, descending);
+        let (some, below) = rest.split_at_mut(last + 1);
+        some.sort_unstable_by(descending);
+        for (error, area) in &*some {
+            above = sums(above, *area);
+            if (0..2).any(|k| above[k] > (1.0 - QUANTILE) * all[k]) {
+                return *error;
+            }
         }
+        rest = below;
     }
     0.0
 }
