@@ -1,7 +1,7 @@
 //! The steps of a conversion, in memory and by way of the disk.
 
 use super::assemble::{self, Dropped};
-use super::bounded::budget::Budget;
+use super::bounded::budget::{self, Budget};
 use super::bounded::cuts::{Bounded, BoundedCuts};
 use super::cut::cuts::{self, ObjectCut};
 use super::disk::journal::{self, Journal, Step};
@@ -126,6 +126,7 @@ impl Conversion<'_> {
         clock.end("bricks");
         let (images, pieces) = ((textures, opacities, warnings), (cuts, used_materials, lattices));
         let mut written = Written::without_levels(images, pieces, (bricks, occupancy, rounded_away));
+        budget::keep();
         self.write_levels(&mut written, (writer, None), BATCH_TRIANGLES)?;
         clock.end("levels");
         Ok(written)

@@ -1,4 +1,4 @@
-//! Makes levels depth by depth and writes them in order.
+//! Makes levels, each as soon as its children are written, and writes them in order.
 
 use super::flat::Flattened;
 use super::merge::Child;
@@ -11,9 +11,11 @@ use crate::build::input::matrix::Affine;
 use crate::build::triangles::lattice::pow2;
 use crate::progress::Progress;
 use bricks::{Brick, Instance, Leaf, Level, NONE, Span, Writer, Written};
-use rayon::prelude::*;
+use rayon::Scope;
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Batches of a step of the journal.
+/// Batches of triangles of a step of the journal.
 const STEP_BATCHES: usize = 16;
 
 /// The levels of a scene.
@@ -48,16 +50,16 @@ impl LevelWriter<'_> {
     pub fn write(&mut self, plan: &Plan, mut journal: Option<&mut Journal>) -> Result<Levels, BuildError> {
         let mut levels = Levels::default();
         self.progress.phase("levels", plan.levels.len() as u64);
+        let Some(journal) = &mut journal else {
+            self.write_some(&plan.levels, &mut levels)?;
+            return Ok(levels);
+        };
         let mut rest = plan.levels.as_slice();
         while let Some(first) = rest.first() {
             let depth = &rest[..rest.partition_point(|planned| planned.depth <= first.depth)];
-            let step = self.batch_length(depth, &levels.records, STEP_BATCHES);
-            let (some, after) = rest.split_at(step);
+            let (some, after) = rest.split_at(self.step_length(depth, &levels.records));
             rest = after;
-            match &mut journal {
-                None => self.write_some(some, &mut levels)?,
-                Some(journal) => self.step(some, &mut levels, journal)?,
-            }
+            self.step(some, &mut levels, journal)?;
         }
         Ok(levels)
     }
@@ -80,75 +82,153 @@ impl LevelWriter<'_> {
         if levels.records.len() == first + some.len() { Ok(()) } else { Err(journal.damaged()) }
     }
 
-    /// Makes and writes levels whose children are all written. One batch is written while the next is made.
+    /// Makes and writes levels, the children of each written before it or among them.
     fn write_some(&mut self, planned: &[Planned], levels: &mut Levels) -> Result<(), BuildError> {
-        let written = self.writer.written()?;
-        let mut ready: Vec<(Simplified, &Planned)> = Vec::new();
-        let mut rest = planned;
-        while !rest.is_empty() || !ready.is_empty() {
-            self.progress.check()?;
-            let (batch, after) = rest.split_at(self.batch_length(rest, &levels.records, 1));
-            rest = after;
-            let (writer, before) = (&mut *self.writer, std::mem::take(&mut ready));
-            let (records, progress) = (&levels.records, self.progress);
-            let from = From { written: &written, bricks: self.bricks, instances: self.instances, levels: records };
-            let how = (self.contexts, self.flattened, self.brick_triangles);
-            let (placed, made) = rayon::join(
-                || place(writer, before),
-                || {
-                    let make = |planned| {
-                        let made = make(planned, &from, how);
-                        progress.advance(1);
-                        made.map(|made| (made, planned))
-                    };
-                    batch.par_iter().with_max_len(1).map(make).collect::<Result<Vec<_>, _>>()
-                },
-            );
-            let placed = placed?;
-            ready = made?;
-            for (placed, planned, simplified) in placed {
-                let record = self.record(planned, placed, simplified, &levels.records);
-                levels.records.push(record);
-            }
-        }
-        Ok(())
+        let threads = rayon::current_num_threads();
+        let maker = Maker {
+            written: self.writer.written()?,
+            bricks: self.bricks,
+            instances: self.instances,
+            contexts: self.contexts,
+            flattened: self.flattened,
+            brick_triangles: self.brick_triangles,
+            progress: self.progress,
+        };
+        let line = Mutex::new(Line {
+            planned,
+            begun: VecDeque::new(),
+            in_work: 0,
+            threads,
+            most_triangles: 2 * self.batch_triangles * threads,
+            records: &mut levels.records,
+            writer: Some(&mut *self.writer),
+            error: None,
+        });
+        rayon::scope(|scope| go_on(scope, &line, &maker));
+        let line = line.into_inner().unwrap_or_else(PoisonError::into_inner);
+        assert!(line.error.is_some() || line.planned.is_empty() && line.begun.is_empty(), "all levels are written");
+        line.error.map_or(Ok(()), Err)
     }
 
-    /// How many of the next levels make up so many batches: those that are made before they are written.
-    fn batch_length(&self, planned: &[Planned], levels: &[Level], batches: usize) -> usize {
-        let budget = self.batch_triangles * rayon::current_num_threads() * batches;
+    /// How many of the next levels make up a step.
+    fn step_length(&self, planned: &[Planned], levels: &[Level]) -> usize {
+        let budget = self.batch_triangles * rayon::current_num_threads() * STEP_BATCHES;
         let mut triangles = 0;
         let is_within = |planned: &&Planned| {
             let before = triangles;
-            let children = planned.children.iter().map(|child| brick_of(child, self.bricks, levels));
-            triangles += children.map(|brick| brick.triangle_count as usize).sum::<usize>();
+            triangles += triangles_of(&planned.children, self.bricks, levels);
             before < budget
         };
         planned.iter().take_while(is_within).count()
     }
+}
 
-    fn record(&self, planned: &Planned, brick: Brick, made: Lengths, levels: &[Level]) -> Level {
-        let step = pow2(self.contexts[planned.object as usize].lattice.step_log2);
-        let mut children = [Leaf { instance: NONE, brick: NONE }; bricks::LEVEL_CHILDREN];
-        children[..planned.children.len()].copy_from_slice(&planned.children);
-        let (mut error, mut bound) = (0.0f64, 0.0f64);
-        for child in &planned.children {
-            let Some(level) = level_of(child, self.bricks, levels) else { continue };
-            let scale = match child.instance {
-                NONE => 1.0,
-                // Rounded up.
-                index => Affine(self.instances[index as usize].world_from_object).largest_scale() * (1.0 + 1e-12),
-            };
-            (error, bound) = (error.max(level.error * scale), bound.max(level.bound * scale));
+/// Levels that are made side by side and written in the order of their plan, each begun as soon as its children are
+/// written.
+struct Line<'a> {
+    /// Those that are not begun.
+    planned: &'a [Planned],
+    /// Those that are begun and not written, in order.
+    begun: VecDeque<Begun<'a>>,
+    /// Threads that make one.
+    in_work: usize,
+    /// Threads there are.
+    threads: usize,
+    /// Triangles of the children of those that are begun at which none is begun, which bounds the memory.
+    most_triangles: usize,
+    /// Records of those that are written.
+    records: &'a mut Vec<Level>,
+    /// Where they are written; taken while a thread writes.
+    writer: Option<&'a mut Writer>,
+    /// What went wrong first.
+    error: Option<BuildError>,
+}
+
+/// A level that is begun.
+struct Begun<'a> {
+    planned: &'a Planned,
+    /// Triangles of its children.
+    triangles: usize,
+    made: Option<Simplified>,
+}
+
+impl<'a> Line<'a> {
+    /// Takes the next level, if one can be begun: where its record will be, and the records of its children.
+    fn begin(&mut self, maker: &Maker) -> Option<(usize, &'a Planned, Vec<Brick>)> {
+        let (planned, after) = self.planned.split_first()?;
+        let triangles: usize = self.begun.iter().map(|begun| begun.triangles).sum();
+        if self.error.is_some() || self.in_work >= self.threads || triangles >= self.most_triangles {
+            return None;
         }
-        Level {
-            brick,
-            children,
-            error: error.max(made.error * step + 0.5 * error),
-            bound: made.bound * step + bound,
-            color: made.color.min(1.0) as f32,
-            _reserved: 0,
+        let index = self.records.len() + self.begun.len();
+        let first = maker.bricks.len() + self.records.len();
+        if planned.children.iter().any(|child| child.brick as usize >= first) {
+            return None;
         }
+        if let Err(error) = maker.progress.check() {
+            self.error = Some(error.into());
+            return None;
+        }
+        let children = planned.children.iter().map(|child| *brick_of(child, maker.bricks, self.records)).collect();
+        let triangles = triangles_of(&planned.children, maker.bricks, self.records);
+        self.planned = after;
+        self.in_work += 1;
+        self.begun.push_back(Begun { planned, triangles, made: None });
+        Some((index, planned, children))
+    }
+
+    /// Takes back what was made of the level whose record will be there.
+    fn end(&mut self, index: usize, made: Result<Simplified, BuildError>) {
+        self.in_work -= 1;
+        match made {
+            Ok(made) => self.begun[index - self.records.len()].made = Some(made),
+            Err(error) => self.error = self.error.take().or(Some(error)),
+        }
+    }
+
+    /// The level that is to be written next, if it is made, and where; until that is given back no other thread writes.
+    fn take_made(&mut self) -> Option<(Simplified, &'a mut Writer)> {
+        if self.writer.is_none() || self.error.is_some() {
+            return None;
+        }
+        let made = self.begun.front_mut()?.made.take()?;
+        self.writer.take().map(|writer| (made, writer))
+    }
+}
+
+fn locked<'s, 'a>(line: &'s Mutex<Line<'a>>) -> MutexGuard<'s, Line<'a>> {
+    // After a panic nothing is made of what the line holds.
+    line.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Begins levels, as many as can be.
+fn go_on<'s, 'a>(scope: &Scope<'s>, line: &'s Mutex<Line<'a>>, maker: &'s Maker<'a>) {
+    let mut begin = locked(line);
+    while let Some((index, planned, children)) = begin.begin(maker) {
+        scope.spawn(move |scope| {
+            let made = maker.make(planned, &children);
+            maker.progress.advance(1);
+            locked(line).end(index, made);
+            write_made(line, maker);
+            go_on(scope, line, maker);
+        });
+    }
+}
+
+/// Writes levels that are made, unless another thread does.
+fn write_made(line: &Mutex<Line>, maker: &Maker) {
+    loop {
+        let Some((level, writer)) = locked(line).take_made() else { return };
+        let placed = place(writer, level);
+        let mut line = locked(line);
+        line.writer = Some(writer);
+        let result = placed.map(|(brick, lengths)| {
+            if let Some(Begun { planned, .. }) = line.begun.pop_front() {
+                let record = maker.record(planned, brick, lengths, line.records);
+                line.records.push(record);
+            }
+        });
+        line.error = result.err().or(line.error.take());
     }
 }
 
@@ -177,39 +257,68 @@ fn level_of<'a>(child: &Leaf, bricks: &[Brick], levels: &'a [Level]) -> Option<&
     child.brick.checked_sub(bricks.len() as u32).map(|level| &levels[level as usize])
 }
 
+/// Triangles of children.
+fn triangles_of(children: &[Leaf], bricks: &[Brick], levels: &[Level]) -> usize {
+    children.iter().map(|child| brick_of(child, bricks, levels).triangle_count as usize).sum()
+}
+
 /// What levels are made from.
-struct From<'a> {
-    written: &'a Written,
+struct Maker<'a> {
+    written: Written,
     bricks: &'a [Brick],
     instances: &'a [Instance],
-    levels: &'a [Level],
+    contexts: &'a [BrickContext<'a>],
+    flattened: &'a Flattened<'a>,
+    brick_triangles: u32,
+    progress: &'a Progress,
 }
 
-fn make(
-    planned: &Planned,
-    from: &From,
-    (contexts, flattened, brick_triangles): (&[BrickContext], &Flattened, u32),
-) -> Result<Simplified, BuildError> {
-    let child = |child: &Leaf| {
-        let brick = brick_of(child, from.bricks, from.levels);
-        let placed = (child.instance != NONE).then(|| &from.instances[child.instance as usize]);
-        Child { brick, lattice: &contexts[brick.object as usize].lattice, placed }
-    };
-    let children: Vec<Child> = planned.children.iter().map(child).collect();
-    simplify(from.written, &children, (&contexts[planned.object as usize], flattened), brick_triangles)
-}
-
-/// Writes the payloads of levels.
-fn place<'a>(
-    writer: &mut Writer,
-    levels: Vec<(Simplified, &'a Planned)>,
-) -> Result<Vec<(Brick, &'a Planned, Lengths)>, BuildError> {
-    let mut placed = Vec::with_capacity(levels.len());
-    for (level, planned) in levels {
-        let geometry = writer.write(&level.encoded.geometry)?;
-        let attributes = writer.write(&level.encoded.attributes)?;
-        let brick = Brick { geometry, attributes, proxies: Span::default(), ..level.encoded.record };
-        placed.push((brick, planned, Lengths { error: level.error, bound: level.bound, color: level.color }));
+impl Maker<'_> {
+    /// Makes a level of its children.
+    fn make(&self, planned: &Planned, children: &[Brick]) -> Result<Simplified, BuildError> {
+        let children: Vec<Child> =
+            planned.children.iter().zip(children).map(|(child, brick)| self.child(child, brick)).collect();
+        let context = &self.contexts[planned.object as usize];
+        simplify(&self.written, &children, (context, self.flattened), self.brick_triangles)
     }
-    Ok(placed)
+
+    fn child<'c>(&'c self, child: &Leaf, brick: &'c Brick) -> Child<'c> {
+        let lattice = &self.contexts[brick.object as usize].lattice;
+        let placed = (child.instance != NONE).then(|| &self.instances[child.instance as usize]);
+        Child { brick, lattice, placed }
+    }
+
+    /// The record of a level that is written.
+    fn record(&self, planned: &Planned, brick: Brick, made: Lengths, levels: &[Level]) -> Level {
+        let step = pow2(self.contexts[planned.object as usize].lattice.step_log2);
+        let mut children = [Leaf { instance: NONE, brick: NONE }; bricks::LEVEL_CHILDREN];
+        children[..planned.children.len()].copy_from_slice(&planned.children);
+        let (mut error, mut bound) = (0.0f64, 0.0f64);
+        for child in &planned.children {
+            let Some(level) = level_of(child, self.bricks, levels) else { continue };
+            let scale = match child.instance {
+                NONE => 1.0,
+                // Rounded up.
+                index => Affine(self.instances[index as usize].world_from_object).largest_scale() * (1.0 + 1e-12),
+            };
+            (error, bound) = (error.max(level.error * scale), bound.max(level.bound * scale));
+        }
+        Level {
+            brick,
+            children,
+            error: error.max(made.error * step + 0.5 * error),
+            bound: made.bound * step + bound,
+            color: made.color.min(1.0) as f32,
+            _reserved: 0,
+        }
+    }
+}
+
+/// Writes the payloads of a level, so that they can be read.
+fn place(writer: &mut Writer, level: Simplified) -> Result<(Brick, Lengths), BuildError> {
+    let geometry = writer.write(&level.encoded.geometry)?;
+    let attributes = writer.write(&level.encoded.attributes)?;
+    writer.checkpoint()?;
+    let brick = Brick { geometry, attributes, proxies: Span::default(), ..level.encoded.record };
+    Ok((brick, Lengths { error: level.error, bound: level.bound, color: level.color }))
 }
