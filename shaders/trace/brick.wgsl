@@ -1,4 +1,5 @@
 // What a ray meets inside one brick: vertices and triangles fetched from the cache, hits written out.
+#include "trace/hidden.wgsl"
 #include "trace/opacity.wgsl"
 #include "trace/levels.wgsl"
 
@@ -70,7 +71,10 @@ fn test_triangle(r: ptr<function, BrickRay>, best: ptr<function, Best>, triangle
         return false;
     }
     let id = (*r).base + cache_word((*r).page, (*r).ids + triangle);
-    if (h.t == (*best).t && id >= (*best).id) || id == (*best).source || passes(r, triangle, id, h) {
+    if (h.t == (*best).t && id >= (*best).id) || id == (*best).source {
+        return false;
+    }
+    if is_hidden(id) || passes(r, triangle, id, h) {
         return false;
     }
     *best = Best(h.t, id, (*r).leaf, triangle, h.u, h.v, h.w, h.det, (*best).source);

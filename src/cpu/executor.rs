@@ -331,6 +331,13 @@ impl FrameExecutor for CpuExecutor {
         Ok(())
     }
 
+    fn set_hidden(&mut self, bounds: &[u32]) -> Result<(), ExecutorError> {
+        self.scene.hidden = bounds.to_vec();
+        Ok(())
+    }
+
+    fn lose_device(&mut self) {}
+
     fn tuning(&mut self) -> &mut Tuning {
         &mut self.tuning
     }

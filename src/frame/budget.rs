@@ -1,10 +1,13 @@
 //! Frames that may load so much only: which pixels show what they would with everything resident.
 
-use super::{Engine, Moved};
+use super::voxels::Voxels;
+use super::{Engine, Moved, Pixels};
 use crate::counters::Counters;
+use crate::kernels::FrameExecutor;
 use crate::kernels::layout::{GBUFFER_COARSER, GBuffer};
+use crate::scene::Camera;
 use crate::schedule::cut::{self, Cut};
-use crate::schedule::{ExecutorError, Pass, Step, Tracer, attributes};
+use crate::schedule::{BrickStates, ExecutorError, Pass, Step, Tracer, attributes};
 use bricks::Resident;
 
 /// What a pixel shows: that of its worst ray.
@@ -34,14 +37,21 @@ impl PixelState {
 /// What frames with a budget keep.
 pub struct Budgeted {
     cut: Cut,
+    stands_in: bool,
+    /// What stands in where there are no levels.
+    voxels: Option<Voxels>,
+    /// Pixels whose camera rays, of the last sample, are not resolved.
+    asks: Vec<bool>,
     /// Of each pixel of the frame.
     states: Vec<PixelState>,
 }
 
 impl Budgeted {
-    /// Of a scene.
-    pub fn new(resident: &Resident) -> Self {
-        Self { cut: Cut::new(resident), states: Vec::new() }
+    /// Of a scene. `stands_in`: its levels of detail, if it has any, stand in for what is missing.
+    pub fn new(resident: &Resident, stands_in: bool) -> Self {
+        let voxels = if stands_in && !resident.has_levels_in_use() { Voxels::new(resident) } else { None };
+        let cut = Cut::new(resident, stands_in);
+        Self { cut, stands_in, voxels, asks: Vec::new(), states: Vec::new() }
     }
 
     /// Starts a frame of so many pixels.
@@ -49,6 +59,8 @@ impl Budgeted {
         self.cut.begin_frame();
         self.states.clear();
         self.states.resize(pixels, PixelState::Exact);
+        self.asks.clear();
+        self.asks.resize(pixels, false);
     }
 
     /// Traces the rays of a pass.
@@ -58,13 +70,36 @@ impl Budgeted {
     pub fn trace(&mut self, t: &mut Tracer, first: &[Step]) -> Result<(), ExecutorError> {
         let states = cut::trace(t, &mut self.cut, first)?;
         let mut unresolved = 0;
-        for (pixel, &state) in self.states.iter_mut().zip(&states) {
-            let state = PixelState::of_ray(state);
+        let is_camera = t.pass == Pass::Primary && self.voxels.is_some();
+        for (index, (pixel, &state)) in self.states.iter_mut().zip(&states).enumerate() {
+            let mut state = PixelState::of_ray(state);
             unresolved += u64::from(state == PixelState::Unresolved);
+            if is_camera {
+                self.asks[index] = state == PixelState::Unresolved;
+                // What stands in is put there at the end of the frame.
+                state = state.min(PixelState::Bounded);
+            }
             *pixel = state.max(*pixel);
         }
         t.stats.unresolved_pixels += unresolved;
         Ok(())
+    }
+
+    /// Puts what stands in for missing bricks into the pixels of a frame, whose states are taken.
+    ///
+    /// # Errors
+    /// The device's.
+    fn stand_in(
+        &mut self,
+        (resident, states): (&Resident, &BrickStates),
+        executor: &mut dyn FrameExecutor,
+        view: (&Camera, (u32, u32)),
+        pixels: &mut Pixels,
+    ) -> Result<(), ExecutorError> {
+        match &mut self.voxels {
+            Some(voxels) => voxels.stand_in((resident, states), executor, view, &self.asks, pixels),
+            None => Ok(()),
+        }
     }
 
     /// What the pixels of the frame show.
@@ -88,12 +123,24 @@ impl Engine {
     pub(super) fn begin_budget(&mut self) {
         self.cache.begin_frame(self.settings.budget);
         if self.moved != Moved::default() {
-            self.budgeted = self.budgeted.take().map(|_| Budgeted::new(self.scene.resident()));
+            let resident = self.scene.resident();
+            self.budgeted = self.budgeted.take().map(|own| Budgeted::new(resident, own.stands_in));
         }
         let pixels = self.rays();
         if let Some(budgeted) = &mut self.budgeted {
             budgeted.begin_frame(pixels);
         }
+    }
+
+    /// Takes the states of a frame's pixels, and shows what stands in for bricks that are missing.
+    ///
+    /// # Errors
+    /// The device's.
+    pub(super) fn end_budget(&mut self, camera: &Camera, pixels: &mut Pixels) -> Result<(), ExecutorError> {
+        let Some(budgeted) = &mut self.budgeted else { return Ok(()) };
+        pixels.state = budgeted.take_states();
+        let scene = (self.scene.resident(), &self.cache.states);
+        budgeted.stand_in(scene, &mut *self.executor, (camera, self.size), pixels)
     }
 
     /// Reads the attributes of all hits of `pass` and looks their textures up, as far as the frame's budget goes.

@@ -1,6 +1,6 @@
 //! What passes are traced with: a scene, an executor, a cache, a schedule.
 
-use super::{Budgeted, Captures, Effects, Light, Moved};
+use super::{Answers, Budgeted, Captures, Effects, Light, Moved};
 use crate::counters::Counters;
 use crate::kernels::{FrameExecutor, Lod};
 use crate::schedule::auto::Auto;
@@ -46,6 +46,8 @@ pub struct RenderSettings {
     pub taa: bool,
     /// What a frame may load. What is resident stands in for the rest ([`super::PixelState`]).
     pub budget: Option<FrameBudget>,
+    /// Secondary rays start from one pixel in four, and what they bring is spread to the others: [`super::half_rate`].
+    pub half_rate: bool,
     /// A point and the unit normal of a plane, world space: what the normal points to is there for no ray.
     pub clip: Option<(DVec3, DVec3)>,
 }
@@ -78,6 +80,8 @@ pub struct Engine {
     pub auto: Auto,
     /// What the effects of the frame did, where that is to be compared; taken between passes, outside of their times.
     pub captures: Option<Captures>,
+    /// Who answered the secondary rays of the last frame, where that is asked for.
+    pub answers: Option<Answers>,
     /// What has moved since the frame before.
     pub moved: Moved,
 }
@@ -94,6 +98,12 @@ impl Engine {
         self.settings.correct_one_in > 0 && self.settings.lod.pixels > 0.0 && !self.settings.only_chosen
     }
 
+    /// Whether secondary rays start from one pixel in four: of pictures of one sample, of which it is known what they
+    /// show.
+    pub fn halves(&self) -> bool {
+        self.settings.half_rate && self.settings.samples == 1 && self.settings.aov
+    }
+
     /// Rays that are traced at a time.
     pub fn rays(&self) -> usize {
         self.size.0 as usize * self.band_rows as usize
@@ -102,6 +112,14 @@ impl Engine {
     /// Whether rays lead to the environment.
     pub fn draws_environment(&self) -> bool {
         self.settings.effects.environment && self.light.lamps.environment.is_some()
+    }
+
+    /// Notes who answered the rays of a pass that has just been traced, where that is asked for.
+    pub(super) fn note_answers(&mut self, pass: Pass, is_whole: bool) -> Result<(), ExecutorError> {
+        match &mut self.answers {
+            Some(answers) => answers.note(&mut *self.executor, pass, is_whole),
+            None => Ok(()),
+        }
     }
 
     /// Shades the hits of the set before that of `pass`.
@@ -115,14 +133,10 @@ impl Engine {
     /// # Errors
     /// A brick that cannot be read, or the device's.
     pub fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
-        let clipped;
-        let first = match self.settings.clip {
-            Some(_) => {
-                clipped = [first, &[Step::ClipRays]].concat();
-                &clipped[..]
-            }
-            None => first,
-        };
+        let after =
+            [(self.settings.clip.is_some(), Step::ClipRays), (self.halves() && pass != Pass::Primary, Step::HalveRays)];
+        let after = after.into_iter().filter_map(|(is_on, step)| is_on.then_some(step));
+        let first: &[Step] = &first.iter().copied().chain(after).collect::<Vec<_>>();
         if let Some(mut budgeted) = self.budgeted.take() {
             let done = budgeted.trace(&mut self.tracer(pass, stats), first);
             self.budgeted = Some(budgeted);

@@ -2,6 +2,7 @@
 //! the sum of the samples.
 
 mod accumulate;
+mod answers;
 mod bands;
 mod budget;
 mod capture;
@@ -11,6 +12,7 @@ mod emissive;
 pub mod engine;
 mod environment;
 mod guides;
+pub mod half_rate;
 mod light;
 pub mod moved;
 mod pass_record;
@@ -20,8 +22,10 @@ pub mod secondary;
 mod sky_model;
 pub mod triangles;
 pub mod view;
+mod voxels;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};
+pub use answers::{Answered, Answers};
 pub use budget::{Budgeted, PixelState};
 pub use capture::{Captures, EffectError};
 pub use effects::{Effects, Occlusion};

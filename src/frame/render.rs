@@ -3,6 +3,7 @@
 use super::bands::Joint;
 use super::correct::correct;
 use super::engine::RenderSettings;
+use super::half_rate;
 use super::{
     Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState, camera_view,
 };
@@ -154,6 +155,9 @@ impl Renderer {
         if let Some(captures) = &mut engine.captures {
             captures.clear();
         }
+        if let Some(answers) = &mut engine.answers {
+            answers.pixels.clear();
+        }
         engine.begin_budget();
         let mut output = FrameOutput::default();
         let mut records = FrameRecords::new(frame);
@@ -172,8 +176,9 @@ impl Renderer {
         }
         output.records = records.finish(engine);
         engine.moved = Moved::default();
-        if let Some(budgeted) = &mut engine.budgeted {
-            output.pixels.state = budgeted.take_states();
+        engine.end_budget(camera, &mut output.pixels)?;
+        if engine.halves() {
+            half_rate::note_states(&mut output.pixels);
         }
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
         if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {
@@ -279,6 +284,7 @@ impl Band<'_> {
                 r.shade(Pass::Shadow(Lamp::Sun), shading, stats)
             })?;
             passes.advance()?;
+            let before = if engine.halves() { Some(engine.executor.read_radiance()?) } else { None };
             if sample == 0 {
                 for method in methods.iter_mut() {
                     method.after_camera_rays(engine, records, &view)?;
@@ -322,7 +328,11 @@ impl Band<'_> {
             let finished = sample + 1;
             let is_batch = finished.is_multiple_of(BATCH_SAMPLES) || finished == engine.settings.samples;
             let goes_on = if is_batch {
-                accumulation.add(&engine.executor.read_radiance()?);
+                let mut sum = engine.executor.read_radiance()?;
+                if let Some(before) = &before {
+                    half_rate::spread(engine.size.0 as usize, &output.pixels, before, &mut sum);
+                }
+                accumulation.add(&sum);
                 !is_told || passes.watch.samples(finished, &accumulation)
             } else if is_told && checkpoints.contains(&finished) {
                 let mut so_far = accumulation.clone();
@@ -357,12 +367,14 @@ fn bounce(
         let draws = r.draws_environment();
         if plan.is_whole {
             stats.add(r.executor.run(pass, &plan.first(), &r.cache.states)?);
+            r.note_answers(pass, true)?;
             lit = Some(plan.light);
             // What is met shows nothing by itself.
             let shading = Shading { miss: true, environment: draws, ..Shading::default() };
             return r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats);
         }
         r.trace(frame, pass, &plan.first(), stats)?;
+        r.note_answers(pass, false)?;
         r.resolve(pass, stats)?;
         let is_diffuse = matches!(pass, Pass::Diffuse(_));
         // What rays to lamps bring to the surface itself must not come by diffuse rays as well, or be weighted.
@@ -443,7 +455,7 @@ fn trace_and_add(
     if plan.is_whole {
         let steps = [&plan.first()[..], &[plan.add]].concat();
         stats.add(engine.executor.run(pass, &steps, &engine.cache.states)?);
-        return Ok(());
+        return engine.note_answers(pass, true);
     }
     engine.trace(frame, pass, &plan.first(), stats)?;
     let last = [&[Step::QueryHits], &plan.after[..], &[plan.add]].concat();
@@ -451,7 +463,7 @@ fn trace_and_add(
     methods.learn(pass, &report);
     stats.bricks_hit.extend(report.demand.iter().map(|d| d.brick));
     stats.add(report);
-    Ok(())
+    engine.note_answers(pass, false)
 }
 
 fn read_aovs(engine: &mut Engine, unit: f64, pixels: &mut Pixels) -> Result<(), ExecutorError> {

@@ -37,7 +37,7 @@ impl BinaryTrees {
     /// A brick that cannot be read; nodes beyond what the device holds, with how much is needed.
     pub fn new(gpu: &Gpu, scene: &SceneFile, kernels: &Kernels) -> Result<Self, ExecutorError> {
         let count = scene.resident().bricks.len();
-        let bound = OTHER_BUFFERS + kernels.pages.cache + usize::from(kernels.pages.opacity);
+        let bound = OTHER_BUFFERS + kernels.pages.cache + kernels.pages.of_scene();
         let most = (gpu.limits.max_storage_buffers_per_shader_stage as usize).saturating_sub(bound);
         let mut pages = Pages { gpu, most, buffers: Vec::new(), filling: Vec::new(), count: 0, bytes: 0 };
         let mut roots = Vec::with_capacity(count);

@@ -292,11 +292,9 @@ impl Gpu {
         page_bytes(&self.limits)
     }
 
-    /// Most pages of cache beside so many pages of texels, and the table of opacity.
+    /// Most pages of cache beside so many pages of texels, and what else kernels ask for.
     pub fn max_cache_pages(&self, beside: Pages) -> usize {
-        let taken = (SAMPLING_STORAGE_BUFFERS + beside.texels).max(FIXED_STORAGE_BUFFERS as usize)
-            + usize::from(beside.opacity)
-            + 2 * usize::from(beside.levels);
+        let taken = (SAMPLING_STORAGE_BUFFERS + beside.texels).max(FIXED_STORAGE_BUFFERS as usize) + beside.of_scene();
         let pages = (self.limits.max_storage_buffers_per_shader_stage as usize).saturating_sub(taken);
         // Kernels that light bind lamps in place of the cache.
         if pages < LAMP_STORAGE_BUFFERS { 0 } else { pages.min(64) }

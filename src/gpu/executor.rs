@@ -83,16 +83,9 @@ impl GpuExecutor {
             opacity: keep.opacity || (opacity::is_needed(resident) && !setup.opaque),
             gloss: keep.gloss || reflectance::is_needed(resident),
             levels: resident.has_levels_in_use(),
+            hides: setup.hides,
         };
-        let most_pages = gpu.max_cache_pages(pages);
-        if pages.cache > most_pages {
-            let text = format!(
-                "{:?} holds caches of at most {} bytes ({most_pages} pages); ask for a smaller --cache",
-                gpu.info.name,
-                most_pages as u64 * gpu.page_bytes()
-            );
-            return Err(ExecutorError::Device(text));
-        }
+        check_pages(&gpu, pages)?;
         let kernels = Arc::new(Kernels::new(&gpu, pages, setup.count));
         Self::with_kernels(gpu, kernels, scene, workers, page_sizes, setup)
     }
@@ -398,6 +391,26 @@ impl FrameExecutor for GpuExecutor {
         self.rebind();
     }
 
+    fn set_hidden(&mut self, bounds: &[u32]) -> Result<(), ExecutorError> {
+        if !self.kernels.pages.hides && !bounds.is_empty() {
+            let pages = Pages { hides: true, ..self.kernels.pages };
+            check_pages(&self.gpu, pages)?;
+            self.kernels = Arc::new(Kernels::new(&self.gpu, pages, self.kernels.count));
+            // What was made for the kernels before.
+            self.families.clear();
+            if self.binary.is_some() {
+                self.make_binary()?;
+            }
+        }
+        self.buffers.scene.set_hidden(&self.gpu, bounds);
+        self.rebind();
+        Ok(())
+    }
+
+    fn lose_device(&mut self) {
+        self.gpu.device.destroy();
+    }
+
     fn tuning(&mut self) -> &mut Tuning {
         &mut self.tuning
     }
@@ -562,6 +575,18 @@ impl Executor for GpuExecutor {
         report.counters.round_trips += round_trips;
         Ok(report)
     }
+}
+
+/// Refuses more pages of the cache than the device binds.
+fn check_pages(gpu: &Gpu, pages: Pages) -> Result<(), ExecutorError> {
+    let most = gpu.max_cache_pages(pages);
+    if pages.cache <= most {
+        return Ok(());
+    }
+    let bytes = most as u64 * gpu.page_bytes();
+    let name = &gpu.info.name;
+    let text = format!("{name:?} holds caches of at most {bytes} bytes ({most} pages); ask for a smaller --cache");
+    Err(ExecutorError::Device(text))
 }
 
 /// Refuses more rays than the device holds.

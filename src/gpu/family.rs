@@ -40,7 +40,7 @@ impl FamilyBuffers {
         family: &'static Family,
     ) -> Result<Self, ExecutorError> {
         let lamp_buffers = if family.has_lamps { LAMP_BUFFERS } else { 0 };
-        let needed = OTHER_BUFFERS + lamp_buffers + family.buffers.len() + usize::from(kernels.pages.opacity);
+        let needed = OTHER_BUFFERS + lamp_buffers + family.buffers.len() + kernels.pages.of_scene();
         let most = gpu.limits.max_storage_buffers_per_shader_stage as usize;
         if most < needed {
             return Err(ExecutorError::Device(format!(

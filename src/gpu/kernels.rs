@@ -50,7 +50,7 @@ pub struct Kernels {
     /// A group of nothing.
     pub none: wgpu::BindGroupLayout,
     /// Whether intersection kernels count nodes and triangles.
-    count: bool,
+    pub count: bool,
     pipelines: HashMap<&'static str, wgpu::ComputePipeline>,
 }
 
@@ -66,7 +66,8 @@ impl Kernels {
         let device = &gpu.device;
         let opacity = pages.opacity.then_some(wgsl::OPACITY_BINDING);
         let levels = (wgsl::LEVEL_BINDING..wgsl::LEVEL_BINDING + 2).filter(|_| pages.levels);
-        let of_scene = (0..7).chain(opacity).chain(levels).map(|binding| entry(binding, Read));
+        let hidden = pages.hides.then_some(wgsl::HIDDEN_BINDING);
+        let of_scene = (0..7).chain(opacity).chain(levels).chain(hidden).map(|binding| entry(binding, Read));
         let scene = layout_of(device, "scene", &of_scene.collect::<Vec<_>>());
         let rays = layout(device, "rays", &[Params, Write, Write, Write, Write, Write, Params]);
         let cache = layout(device, "cache", &vec![Read; pages.cache]);
@@ -195,7 +196,7 @@ mod tests {
     #[test]
     fn without_levels_nothing_of_them_is_in_kernels() {
         let has = |levels: bool| -> Vec<&str> {
-            let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels };
+            let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels, hides: true };
             let of_levels = |file: &str| {
                 let text = source(file, pages);
                 ["params.levels", "level_leaves", "pending >>", "workgroup> spreads"]
@@ -215,7 +216,7 @@ mod tests {
     #[test]
     fn as_many_pages_as_are_promised_can_be_bound() {
         let gpu = Gpu::open(None).unwrap();
-        let pages = |cache| Pages { cache, texels: 1, opacity: true, gloss: true, levels: true };
+        let pages = |cache| Pages { cache, texels: 1, opacity: true, gloss: true, levels: true, hides: true };
         let cache = gpu.max_cache_pages(pages(0));
         assert!(cache > 1, "{cache} pages");
         Kernels::new(&gpu, pages(cache), false);

@@ -81,7 +81,10 @@ pub fn run(gpu: &Gpu) -> ProbeReport {
 
 /// The text of `shaders/probe/probe.wgsl` with what it includes.
 pub fn source() -> String {
-    kernels::source("probe/probe", Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false })
+    kernels::source(
+        "probe/probe",
+        Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false, hides: false },
+    )
 }
 
 /// [`run`] with another text of the kernels.

@@ -2,12 +2,12 @@
 
 use super::device::Gpu;
 use super::readback::device_error;
-use super::wgsl::{LEVEL_BINDING, OPACITY_BINDING, Pages};
+use super::wgsl::{HIDDEN_BINDING, LEVEL_BINDING, OPACITY_BINDING, Pages};
 use crate::kernels::frame::{Frame, Placement, brick_record};
 use crate::kernels::levels::LevelTable;
 use crate::kernels::{layout, opacity};
 use crate::schedule::ExecutorError;
-use bricks::{Resident, SceneFile};
+use bricks::{NONE, Resident, SceneFile};
 use std::sync::Arc;
 use wgpu::BufferUsages;
 
@@ -23,6 +23,7 @@ pub struct SceneBuffers {
     /// Leaves and nodes of [`LevelTable`], where kernels ask for them.
     levels: Option<[wgpu::Buffer; 2]>,
     table: LevelTable,
+    hidden: wgpu::Buffer,
     marks: Arc<[bool]>,
     /// Slots and states, written before every submission.
     pub slots: wgpu::Buffer,
@@ -69,6 +70,7 @@ impl SceneBuffers {
                 ]
             }),
             table: LevelTable::default(),
+            hidden: hidden_buffer(gpu, &[]),
             marks: Arc::new([]),
             frame: None,
             instance_pad: 0.0,
@@ -83,11 +85,17 @@ impl SceneBuffers {
 
     /// All of them by their bindings, those that kernels for `pages` ask for.
     pub fn buffers(&self, pages: Pages) -> Vec<(u32, &wgpu::Buffer)> {
-        let Self { top8, top2, leaves, instances, bricks, roots, slots, opacity, levels, .. } = self;
+        let Self { top8, top2, leaves, instances, bricks, roots, slots, opacity, levels, hidden, .. } = self;
         let always = (0..).zip([top8, top2, leaves, instances, bricks, roots, slots]);
         let opacity = pages.opacity.then_some((OPACITY_BINDING, opacity));
         let levels = (LEVEL_BINDING..).zip(levels.iter().flatten()).filter(|_| pages.levels);
-        always.chain(opacity).chain(levels).collect()
+        let hidden = pages.hides.then_some((HIDDEN_BINDING, hidden));
+        always.chain(opacity).chain(levels).chain(hidden).collect()
+    }
+
+    /// Hides triangles: [`crate::kernels::FrameExecutor::set_hidden`]. Groups are to be made anew.
+    pub fn set_hidden(&mut self, gpu: &Gpu, bounds: &[u32]) {
+        self.hidden = hidden_buffer(gpu, bounds);
     }
 
     /// Has the next frame place everything anew.
@@ -123,4 +131,14 @@ impl SceneBuffers {
             gpu.queue.write_buffer(of_leaves, 0, bytemuck::cast_slice(&self.table.leaves));
         }
     }
+}
+
+/// Ids at which hiding begins and ends. A buffer has an element at least: where nothing is hidden an id that no triangle
+/// has.
+fn hidden_buffer(gpu: &Gpu, bounds: &[u32]) -> wgpu::Buffer {
+    let bounds = if bounds.is_empty() { &[NONE] } else { bounds };
+    let bytes: &[u8] = bytemuck::cast_slice(bounds);
+    let buffer = gpu.buffer("hidden", bytes.len() as u64, BufferUsages::STORAGE | BufferUsages::COPY_DST);
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    buffer
 }

@@ -17,6 +17,10 @@ pub const OPACITY_BINDING: u32 = 7;
 #[allow(dead_code)]
 pub const LEVEL_BINDING: u32 = 8;
 
+/// Binding of the ids that are hidden in the group of the scene.
+#[allow(dead_code)]
+pub const HIDDEN_BINDING: u32 = 10;
+
 /// Numbers of pages that the generated accessors serve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pages {
@@ -30,6 +34,16 @@ pub struct Pages {
     pub gloss: bool,
     /// Whether levels of detail stand for bricks.
     pub levels: bool,
+    /// Whether triangles may be hidden.
+    pub hides: bool,
+}
+
+#[allow(dead_code)]
+impl Pages {
+    /// Buffers in the group of the scene that kernels ask for where the scene does.
+    pub fn of_scene(self) -> usize {
+        usize::from(self.opacity) + 2 * usize::from(self.levels) + usize::from(self.hides)
+    }
 }
 
 /// The text of kernel `name`, with includes taken from `file`. `None` if a file is missing.
@@ -55,6 +69,7 @@ fn append(
         "trace/cache.wgsl" => cache_accessors(pages.cache),
         "texture/texels.wgsl" => texel_accessors(pages.texels),
         "trace/opacity.wgsl" if !pages.opacity => OPAQUE.into(),
+        "trace/hidden.wgsl" if !pages.hides => ALL_THERE.into(),
         "trace/levels.wgsl" if !pages.levels => NO_LEVELS.into(),
         "query/tile_spreads.wgsl" if !pages.levels => NO_SPREADS.into(),
         "shade/cones.wgsl" if !pages.levels => NO_CONES.into(),
@@ -76,6 +91,13 @@ fn append(
 /// What stands for `trace/opacity.wgsl` where no ray passes through a triangle.
 const OPAQUE: &str = "\
 fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) -> bool {
+    return false;
+}
+";
+
+/// What stands for `trace/hidden.wgsl` where no triangle is hidden.
+const ALL_THERE: &str = "\
+fn is_hidden(id: u32) -> bool {
     return false;
 }
 ";

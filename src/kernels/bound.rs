@@ -30,6 +30,8 @@ pub struct Scene {
     pub instance_pad: f32,
     /// What selection of levels of detail goes by; empty where none are in use.
     pub levels: LevelTable,
+    /// Global ids at which hiding begins and ends in turns: [`super::FrameExecutor::set_hidden`].
+    pub hidden: Vec<u32>,
     marks: Arc<[bool]>,
     frame: Option<Frame>,
 }

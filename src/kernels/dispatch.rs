@@ -161,6 +161,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
         }
         Step::StartHits => vec![kernel(kernels::start_hits, params, per_ray, None)],
         Step::ClipRays => vec![kernel(kernels::clip_rays, params, per_ray, None)],
+        Step::HalveRays => vec![kernel(kernels::halve_rays, params, per_ray, None)],
         Step::CountRays => vec![bounds(None)],
         Step::Lists | Step::ShortLists => {
             let is_short = step == Step::ShortLists;

@@ -56,11 +56,21 @@ pub trait FrameExecutor: Executor {
     /// bytes a pixel; without it they must not be run.
     fn allow_bounces(&mut self);
 
+    /// Hides triangles from all rays from now on. `bounds`: global ids, ascending, at which hiding begins and ends in
+    /// turns.
+    ///
+    /// # Errors
+    /// A cache of as many pages as the device binds, with how large it may be.
+    fn set_hidden(&mut self, bounds: &[u32]) -> Result<(), ExecutorError>;
+
     /// Makes what [`crate::schedule::Step::IntersectBinary`] needs; without it that step must not be run.
     ///
     /// # Errors
     /// A brick that cannot be read; more nodes than the device holds, with how much is needed.
     fn make_binary(&mut self) -> Result<(), ExecutorError>;
+
+    /// Loses the device, as drivers do when they fail: what is asked of it from now on fails. The processor is not lost.
+    fn lose_device(&mut self);
 
     /// What holds for submissions from now on.
     fn tuning(&mut self) -> &mut Tuning;

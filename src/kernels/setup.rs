@@ -43,6 +43,8 @@ pub struct Setup {
     pub count: bool,
     /// Every triangle stops every ray, whatever its alpha.
     pub opaque: bool,
+    /// Triangles are hidden from the start, or soon ([`super::FrameExecutor::set_hidden`]).
+    pub hides: bool,
     /// What is kept though the scene does not need it.
     pub keep: Keep,
 }

@@ -19,6 +19,7 @@ use super::shade::clip_rays::clip_rays;
 use super::shade::generate::{
     generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
+use super::shade::halve_rays::halve_rays;
 use super::shade::resolve::resolve;
 use super::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
 use super::texture::sample::sample;
@@ -208,6 +209,7 @@ kernels! {
         |b, t| generate_glossy(b, t.own, t.seen, t.pixels, t.materials);
     start_hits: "shade/start_hits" Tiles [] |_, t| start_hits(t.own);
     clip_rays: "shade/clip_rays" Tiles [] |b, t| clip_rays(b, t.own);
+    halve_rays: "shade/halve_rays" Tiles [] |b, t| halve_rays(b, t.own);
 
     clear_gbuffer: "shade/clear_gbuffer" Shading [] |b, t| clear_gbuffer(b, t.pixels, t.shaded);
     resolve: "shade/resolve" CacheShading []

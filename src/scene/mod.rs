@@ -7,6 +7,7 @@ pub mod motion;
 pub mod path;
 pub mod placement;
 mod projection;
+pub mod top_walk;
 
 pub use camera::{Camera, RayBasis};
 pub use framing::{Picture, path_from_bounds};

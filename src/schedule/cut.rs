@@ -51,13 +51,14 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Through the trees of a scene, all closed; without levels in use it has none.
-    pub fn new(resident: &Resident) -> Self {
+    /// Through the trees of a scene, all closed. Without levels in use, or where they may not stand in for anything, it
+    /// has none.
+    pub fn new(resident: &Resident, stands_in: bool) -> Self {
         let (first, count) = (resident.exact_bricks(), resident.bricks.len());
         let mut children = vec![Vec::new(); count];
         let mut parents = vec![Vec::new(); count];
         let mut is_left = vec![false; count];
-        let in_use = resident.has_levels_in_use();
+        let in_use = stands_in && resident.has_levels_in_use();
         for (level, record) in resident.levels.iter().enumerate().filter(|_| in_use) {
             // What stands for something that has moved no ray takes.
             is_left[first + level] = record.error == f64::MAX;

@@ -9,6 +9,8 @@ pub enum Step {
     StartHits,
     /// Leave of the rays what lies on this side of the plane that the scene is cut at.
     ClipRays,
+    /// Leave out the rays of three pixels in four: of all whose column or row is odd.
+    HalveRays,
     /// Count the rays traced, where no other step does.
     CountRays,
     /// Bounds of the tiles, their walk of the top level, their lists of leaves.

@@ -2,10 +2,11 @@
 //! A picture is that of a walk whose only frame it is, so that what is seen in the end is what `walk` writes.
 
 use super::Session;
+use super::hidden;
 use super::lighting::lighting;
 use super::open::Frame;
 use super::renderer::render_settings;
-use crate::frame::{Budgeted, RenderError};
+use crate::frame::{Answered, Answers, Budgeted, RenderError, RenderSettings};
 use crate::kernels::Extent;
 use crate::kernels::layout::{Hit, NONE, Surface};
 use crate::picture::denoise::Resolve;
@@ -18,7 +19,7 @@ use anyhow::{Context, Result};
 use std::sync::Arc;
 
 /// Settings under other headings that may change while a session is open.
-const ALSO: [&str; 6] = ["size", "fov", "clip", "aov", "frame_budget", "interactive"];
+const ALSO: [&str; 8] = ["size", "fov", "clip", "hide", "only", "aov", "frame_budget", "interactive"];
 
 /// Whether a setting may change while a session is open.
 fn is_live(entry: &Entry) -> bool {
@@ -64,12 +65,18 @@ impl Session {
             true => Some(lighting(&suited, &self.renderer.scene, &self.file)?),
             false => None,
         };
+        let is_hidden_otherwise = (&self.settings.hide, &self.settings.only) != (&suited.hide, &suited.only);
+        let hidden = hidden::bounds(&suited, &self.renderer.scene.resident().manifest)?;
         let engine = &mut self.renderer.engine;
         let size = (suited.size.width, suited.size.height);
         if size != engine.size {
             let extent = Extent { width: size.0, height: size.1, tile: engine.tile };
             engine.executor.set_extent(extent).with_context(|| self.file.display().to_string())?;
             (engine.size, engine.band_rows) = (size, size.1);
+        }
+        if is_hidden_otherwise {
+            engine.executor.set_hidden(&hidden).with_context(|| self.file.display().to_string())?;
+            engine.budgeted = None;
         }
         let render = render_settings(&suited, engine.settings.schedule);
         if render.effects.has_bounces() && !engine.settings.effects.has_bounces() {
@@ -80,10 +87,10 @@ impl Session {
                 engine.budgeted = None;
                 engine.executor.mark_leaves(&Arc::from([]));
             }
-            (Some(_), None) => engine.budgeted = Some(Budgeted::new(engine.scene.resident())),
+            (Some(_), None) => engine.budgeted = Some(Budgeted::new(engine.scene.resident(), !suited.hides())),
             (Some(_), Some(_)) => {}
         }
-        engine.settings = render;
+        engine.settings = RenderSettings { half_rate: engine.settings.half_rate, ..render };
         if let Some(lighting) = lighting {
             engine.light = lighting.light.clone();
             self.warnings.extend(lighting.warnings.iter().cloned());
@@ -109,6 +116,23 @@ impl Session {
         let stops = Meter::new(exposure, tone_map.white()).stops(&output.pixels.radiance, &output.coverage, 0.0);
         let (size, pixels, records) = (self.renderer.size, output.pixels, output.records);
         Ok(Some(Frame { number: 0, size, pixels, records, checkpoints: Vec::new(), exposure_ev: stops, tone_map }))
+    }
+
+    /// Traces the secondary rays of one pixel in four from now on, and spreads what they bring, in pictures of one sample
+    /// with AOVs; or all of them.
+    pub fn set_half_rate(&mut self, is_half: bool) {
+        self.renderer.engine.settings.half_rate = is_half;
+    }
+
+    /// Notes who answers the secondary rays of pictures from now on, or stops to.
+    pub fn note_answers(&mut self, notes: bool) {
+        let answers = &mut self.renderer.engine.answers;
+        *answers = answers.take().filter(|_| notes).or(notes.then(Answers::default));
+    }
+
+    /// Who answered the secondary rays of the last picture; `None`: that was not noted.
+    pub fn answers(&self) -> Option<&[Answered]> {
+        self.renderer.engine.answers.as_ref().map(|answers| &answers.pixels[..])
     }
 
     /// The brick that the last camera ray of each pixel of the last picture hit, and whether it is in the cache now;

@@ -3,10 +3,13 @@
 pub mod bands;
 pub mod checkpoints;
 pub mod device;
+mod extent;
+mod hidden;
 pub mod left_out;
 pub mod lighting;
 mod live;
 pub mod motion;
+mod nodes;
 mod open;
 pub mod opened;
 mod origin;
@@ -20,6 +23,8 @@ pub mod trace;
 mod viewpoint;
 
 pub use crate::output::npy::{Hit, Ray};
+pub use extent::extent;
+pub use nodes::{Named, SceneNode, find, nodes};
 pub use open::{Frame, Session, Watch, developed, levelled};
 pub use opened::{Opened, open_scene};
 pub use origin::{Origin, provenance};

@@ -2,6 +2,7 @@
 
 use super::bands::Bands;
 use super::device::Device;
+use super::hidden;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::output::atomic;
 use crate::schedule::ExecutorError;
@@ -188,7 +189,15 @@ impl Opened {
                 settings.query_threshold, extent.tile
             ));
         }
-        let setup = Setup { extent, threshold, count: settings.count, opaque: settings.opaque, keep: Keep::default() };
+        let hidden = hidden::bounds(settings, &scene.resident().manifest).with_context(|| format!("{name}"))?;
+        let setup = Setup {
+            extent,
+            threshold,
+            count: settings.count,
+            opaque: settings.opaque,
+            hides: !hidden.is_empty(),
+            keep: Keep::default(),
+        };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
         info!(
             "cache: {} of {} of bricks and tiles, {policy}, in {}; host cache {}",
@@ -205,8 +214,8 @@ impl Opened {
         let host = HostCache::new(settings.host_cache);
         let threads = settings.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
-        #[cfg_attr(not(feature = "lab"), expect(unused_mut))]
         let mut executor = make(needs).with_context(|| format!("{name}"))?;
+        executor.set_hidden(&hidden).with_context(|| format!("{name}"))?;
         let node = size_of::<bricks::Node>() as u64;
         let nodes = scene.resident().bricks.iter().map(|brick| u64::from(brick.node_count) * node).collect();
         #[cfg(feature = "lab")]

@@ -38,7 +38,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         executor.allow_bounces();
     }
     let methods = methods(settings, scene.resident());
-    let budgeted = render.budget.map(|_| Budgeted::new(scene.resident()));
+    let budgeted = render.budget.map(|_| Budgeted::new(scene.resident(), !settings.hides()));
     let engine = Engine {
         scene,
         executor,
@@ -53,6 +53,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         budgeted,
         auto: Auto::default(),
         captures: None,
+        answers: None,
         moved: Moved::default(),
     };
     Renderer { engine, methods }
@@ -97,6 +98,7 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         correct_one_in: settings.lod_correct.unwrap_or(0),
         only_chosen: false,
         budget: settings.frame_budget(),
+        half_rate: false,
         clip: settings.clip.map(|plane| (plane.point, plane.normal.unit())),
     }
 }

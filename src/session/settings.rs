@@ -50,6 +50,12 @@ settings! {
         /// that the normal points to is there for no ray, light and shadow among them. Not together with --secondary.
         /// [default: none]
         clip: Option<Plane> = None, "--clip X,Y,Z,NX,NY,NZ", Rule::Any, "", Camera, Usual;
+        /// Nodes that are left out. Names have commas between them; * stands for any characters, ? for any one, and
+        /// #N is the node that triangle N is of. What is hidden is there for no ray; lamps among it shine on. Not
+        /// together with --lod and --secondary. [default: none]
+        hide: Vec<String> = Vec::new(), "--hide NODES", Rule::Any, "", Camera, Usual;
+        /// Nodes that are shown alone, named as those of --hide. [default: all]
+        only: Vec<String> = Vec::new(), "--only NODES", Rule::Any, "", Camera, Usual;
         /// Motion of instances (JSON); docs/using.md has the form. What moves is an instance: see `info --instances`
         /// and `convert --movable`. [default: nothing moves]
         motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
@@ -265,8 +271,17 @@ impl Settings {
             );
             return Err(SettingsError::Conflict(text));
         }
-        if self.clip.is_some() && self.secondary != EffectMethods::EXACT {
-            let text = "--clip and --secondary exclude each other: methods know the whole scene; leave one out";
+        let leaves_out = [(self.clip.is_some(), "--clip"), (self.hides(), "--hide or --only")];
+        if let Some((_, option)) = leaves_out.into_iter().find(|(is_on, _)| *is_on)
+            && self.secondary != EffectMethods::EXACT
+        {
+            return Err(SettingsError::Conflict(format!(
+                "{option} and --secondary exclude each other: methods know the whole scene; leave one out"
+            )));
+        }
+        if self.hides() && self.lod > 0.0 {
+            let text = "--hide or --only and --lod exclude each other: levels of detail stand for what is hidden, too; \
+                        leave one out";
             return Err(SettingsError::Conflict(text.into()));
         }
         if self.frame_budget().is_some() {
@@ -387,6 +402,11 @@ impl Settings {
         needs.into_iter().find(|(is_on, _)| *is_on).map(|(_, option)| option)
     }
 
+    /// Whether nodes are left out.
+    pub fn hides(&self) -> bool {
+        !self.hide.is_empty() || !self.only.is_empty()
+    }
+
     /// What a frame may load.
     pub fn frame_budget(&self) -> Option<FrameBudget> {
         self.frame_budget.or(self.interactive.map(FrameBudget::Bytes))
@@ -464,7 +484,7 @@ impl Settings {
 }
 
 /// The settings that count where rays are given.
-pub const TRACE: [&str; 11] = [
+pub const TRACE: [&str; 13] = [
     "cache",
     "host_cache",
     "schedule",
@@ -476,4 +496,6 @@ pub const TRACE: [&str; 11] = [
     "adapter",
     "opaque",
     "lod",
+    "hide",
+    "only",
 ];

@@ -37,6 +37,7 @@ mod exact {
     mod cones;
     mod exactness;
     mod given_rays;
+    mod hidden;
     mod levels;
     mod motion;
     mod rays;

@@ -28,13 +28,13 @@ fn a_sound_device_passes() {
 /// An executor over the probe's own scene, with as many pages as asked and one kernel's text changed.
 fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<GpuExecutor> {
     let gpu = device()?;
-    let pages = Pages { cache: pages, texels: 1, opacity: false, gloss: false, levels: false };
+    let pages = Pages { cache: pages, texels: 1, opacity: false, gloss: false, levels: false, hides: false };
     let source = |kernel: &str| change(kernel, kernels::source(kernel, pages));
     let kernels = Arc::new(Kernels::from_sources(&gpu, pages, false, &source));
     let scene = Arc::new(scene().unwrap());
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1).unwrap();
     let extent = Extent { width: 8, height: 8, tile: 8 };
-    let setup = Setup { extent, threshold: 0, count: false, opaque: false, keep: Keep::default() };
+    let setup = Setup { extent, threshold: 0, count: false, opaque: false, hides: false, keep: Keep::default() };
     Some(GpuExecutor::with_kernels(gpu, kernels, scene, workers, &[], setup).unwrap())
 }
 

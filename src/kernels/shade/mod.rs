@@ -5,6 +5,7 @@ pub mod clip_rays;
 pub mod cones;
 pub mod generate;
 pub mod gloss;
+pub mod halve_rays;
 pub mod lamps;
 pub mod light;
 pub mod random;

@@ -1,5 +1,6 @@
 //! What a ray meets inside one brick: twin of `shaders/trace/brick.wgsl`.
 
+use super::hidden::is_hidden;
 use super::leaf::{BrickRay, row_direction, rows_point};
 use super::node::UNIT;
 use crate::kernels::bound::Scene;
@@ -67,7 +68,10 @@ impl BrickRay<'_> {
             return false;
         }
         let id = self.id(triangle);
-        if (hit.t == best.t && id >= best.id) || id == best.source || self.passes(triangle, id, &hit) {
+        if (hit.t == best.t && id >= best.id) || id == best.source {
+            return false;
+        }
+        if is_hidden(self.hidden, id) || self.passes(triangle, id, &hit) {
             return false;
         }
         *best = Best { t: hit.t, id, leaf: self.leaf, triangle, hit, source: best.source };

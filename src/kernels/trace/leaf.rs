@@ -35,6 +35,8 @@ pub struct BrickRay<'a> {
     pub brick: BrickView<'a>,
     /// What is drawn from where rays pass through triangles at random.
     pub draw: Draw,
+    /// What is hidden: [`Scene::hidden`].
+    pub hidden: &'a [u32],
     /// The ray and the offset as vectors.
     pub lanes: Lanes,
 }
@@ -72,6 +74,7 @@ impl<'a> BrickRay<'a> {
             base: 0,
             brick: BrickView::default(),
             draw: Draw::default(),
+            hidden: &[],
             lanes: Lanes::default(),
         }
     }
@@ -81,6 +84,7 @@ impl<'a> BrickRay<'a> {
     pub fn enter_brick(&mut self, bound: &Bound<'a>, brick: usize) {
         self.brick = bound.bricks[brick];
         self.draw = Draw { seed: bound.params.seed, stream: bound.params.stream };
+        self.hidden = &bound.scene.hidden;
     }
 
     /// Points the ray at a leaf. The ray of the instance is made anew only where the instance is not the world.

@@ -2,6 +2,7 @@
 
 pub mod binary_tree;
 pub mod brick;
+pub mod hidden;
 pub mod intersect_all;
 pub mod intersect_binary;
 pub mod intersect_list;

@@ -2,6 +2,7 @@
 //! same order. Lanes whose numbers leave the range in which an f32 operation is what the kernel carries out in integers
 //! are tested alone.
 
+use super::hidden::is_hidden;
 use super::leaf::BrickRay;
 use super::packet::{Packet, RAYS, turned};
 use crate::kernels::simd::isa::{Isa, inside};
@@ -101,6 +102,9 @@ impl Packet {
         let id = isa.splat_bits(r.id(triangle));
         hit &= !self.t.get(isa, v).less_equal(t) | id.less_bits(found.id.get(isa, v));
         hit &= !id.same_bits(found.source.get(isa, v));
+        if hit != 0 && is_hidden(r.hidden, r.id(triangle)) {
+            return 0;
+        }
         if hit != 0 && !r.brick.opacity.of.is_empty() {
             hit = self.stopped(r, triangle, (v, hit), [u, v_, w, det]);
         }

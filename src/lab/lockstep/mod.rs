@@ -446,6 +446,15 @@ impl FrameExecutor for Lockstep {
         self.cpu.allow_bounces();
     }
 
+    fn set_hidden(&mut self, bounds: &[u32]) -> Result<(), ExecutorError> {
+        self.gpu.set_hidden(bounds)?;
+        self.cpu.set_hidden(bounds)
+    }
+
+    fn lose_device(&mut self) {
+        self.gpu.lose_device();
+    }
+
     fn make_binary(&mut self) -> Result<(), ExecutorError> {
         self.gpu.make_binary()?;
         self.cpu.make_binary()

@@ -225,6 +225,8 @@ impl FrameExecutor for Faulty {
             fn leaves_out(&self) -> Keep;
             fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError>;
             fn allow_bounces(&mut self);
+            fn set_hidden(&mut self, bounds: &[u32]) -> Result<(), ExecutorError>;
+            fn lose_device(&mut self);
             fn make_binary(&mut self) -> Result<(), ExecutorError>;
             fn tuning(&mut self) -> &mut Tuning;
             fn set_lamps(&mut self, lamps: &Arc<Lamps>) -> Result<(), ExecutorError>;

@@ -179,8 +179,14 @@ impl Lab {
             Device::Cpu => Box::new(CpuExecutor::new(scene.clone(), workers, setup)?),
             Device::Gpu(gpu) => {
                 // One set of pipelines serves all scenes with so many pages.
-                let pages =
-                    Pages { cache: page_sizes.len().max(1), texels: 1, opacity: false, gloss: false, levels: false };
+                let pages = Pages {
+                    cache: page_sizes.len().max(1),
+                    texels: 1,
+                    opacity: false,
+                    gloss: false,
+                    levels: false,
+                    hides: false,
+                };
                 let known = self.kernels.iter().find(|kernels| kernels.pages == pages).cloned();
                 let kernels = match (known, self.defect) {
                     (Some(kernels), _) => kernels,

@@ -7,7 +7,7 @@ use brickwalk::frame::{PixelState, Pixels};
 use brickwalk::scene::Camera;
 use brickwalk::session::{Frame, Session};
 use brickwalk::settings::Group as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a pixel shows, bit for bit.
 fn words(pixels: &Pixels, at: usize) -> [u32; 11] {
@@ -125,14 +125,93 @@ fn where_not_all_fits_the_cut_comes_to_rest() {
     assert_eq!(unresolved(&frames[23]), 0, "levels stand in");
 }
 
+/// A city without levels of detail.
+fn bare(folder: &Path) -> PathBuf {
+    let scene = folder.join("bare.bricks");
+    let words = ["scene", "city", "--triangles", "20K", "--brick-triangles", "500", "-o"];
+    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
+    scene
+}
+
 #[test]
 fn a_scene_without_levels_says_what_is_missing() {
     let folder = folder();
-    let scene = folder.path().join("bare.bricks");
-    let words = ["scene", "city", "--triangles", "20K", "--brick-triangles", "500", "-o"];
-    succeed(words.iter().map(std::ffi::OsStr::new).chain([scene.as_os_str()]));
-    let outcome = compare(&scene, "cpu", ["--size 96x64 --effects primary,shadow --spp 1", ""], 12, 100_000);
-    assert!(outcome.unresolved > 1000 && outcome.others > 500 && outcome.left == 0, "{outcome:?}");
+    let scene = bare(folder.path());
+    let lit = compare(&scene, "cpu", ["--size 96x64 --effects primary,shadow --spp 1", ""], 12, 100_000);
+    assert!(lit.unresolved > 50 && lit.others > 500 && lit.left == 0, "{lit:?}");
+    // Cells stand in for what camera rays miss, and nothing for what throws shadows.
+    for adapter in adapters() {
+        let seen = compare(&scene, &adapter, ["--size 96x64 --effects primary --spp 1", ""], 12, 100_000);
+        assert!(seen.unresolved == 0 && seen.others > 500 && seen.left == 0, "{adapter}: {seen:?}");
+    }
+}
+
+#[test]
+fn cells_stand_in_before_what_they_stand_for() {
+    let folder = folder();
+    let scene = bare(folder.path());
+    let options = |more: &str| {
+        let path = scene.with_extension("near.json");
+        settings(&format!("--size 96x64 --effects primary --spp 1 --aov --path {} {more}", path.display()))
+    };
+    let [mut bounded, mut whole] =
+        ["--frame-budget 60000B", ""].map(|more| Session::open(&scene, &options(more)).expect("a session"));
+    let camera = whole.path().frame(0, 12);
+    let [found, truth] = [&mut bounded, &mut whole].map(|of| of.frame(&camera).expect("a frame").pixels);
+    let (mut stand_ins, mut farther) = (0, 0);
+    for (pixel, state) in found.state.iter().enumerate().filter(|(_, state)| **state == PixelState::Bounded) {
+        let [shown, true_depth] = [&found, &truth].map(|of| of.depth[pixel]);
+        assert!(shown <= true_depth * 1.0001, "pixel {pixel}, {state:?}: {shown} lies behind {true_depth}");
+        stand_ins += usize::from(shown < true_depth);
+        // The control: without cells the ray goes on to what is there, or to nothing.
+        farther += usize::from(found.id[pixel] == brickwalk::kernels::layout::NONE && shown.is_finite());
+    }
+    assert!(stand_ins > 500 && farther > 300, "{stand_ins} cells, {farther} of them before nothing");
+    assert!(found.state.iter().all(|&state| state != PixelState::Unresolved));
+    // Cells are as bright as what was seen, not black and not white.
+    let mean = |pixels: &Pixels| pixels.radiance.iter().map(|c| f64::from(c[1])).sum::<f64>() / 6144.0;
+    let ratio = mean(&found) / mean(&truth);
+    assert!((0.5..2.0).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn half_rate_says_that_its_light_is_not_exact_and_is_near_it() {
+    let folder = folder();
+    let scene = bare(folder.path());
+    for adapter in adapters() {
+        let effects = "primary,shadow,ao,diffuse --ao-rays 1 --diffuse-rays 1";
+        let mut settings = settings(&format!("--size 96x64 --effects {effects} --aov --frame-budget 1G"));
+        settings.set("adapter", &adapter).expect("an adapter");
+        settings.path = Some(scene.with_extension("near.json"));
+        let mut session = Session::open(&scene, &settings).expect("a session");
+        let camera = session.path().frame(0, 12);
+        let picture = |session: &mut Session, half: bool| {
+            session.set_half_rate(half);
+            session.picture(&camera, &mut ()).expect("a frame").expect("a frame")
+        };
+        let is_exact = |frame: &Frame| frame.pixels.state.iter().all(|&state| state == PixelState::Exact);
+        let whole = (0..20).map(|_| picture(&mut session, false)).find(is_exact).expect("all exact");
+        let half = picture(&mut session, true);
+        let rays = |frame: &Frame| {
+            let secondary = frame.records.iter().filter(|record| record.pass != "primary");
+            secondary.map(|record| record.rays_traced).sum::<u64>()
+        };
+        assert!(3 * rays(&half) < rays(&whole), "{} and {} rays", rays(&half), rays(&whole));
+        settings.set("spp", "64").expect("samples");
+        session.set(&settings).expect("settings");
+        let truth = picture(&mut session, false);
+        let error = |frame: &Frame| {
+            let pairs = frame.pixels.radiance.iter().zip(&truth.pixels.radiance);
+            pairs.map(|(a, b)| f64::from(a[1] - b[1]).abs()).sum::<f64>()
+        };
+        // Fewer rays, and less noise: neighbours share theirs.
+        assert!(error(&half) < error(&whole), "{adapter}: {} and {}", error(&half), error(&whole));
+        for (pixel, state) in half.pixels.state.iter().enumerate() {
+            let shows_nothing = half.pixels.depth[pixel].is_infinite();
+            assert_eq!(*state == PixelState::Exact, shows_nothing, "pixel {pixel}");
+            assert_eq!(half.pixels.depth[pixel], whole.pixels.depth[pixel], "camera rays are those of all pixels");
+        }
+    }
 }
 
 #[test]

@@ -41,7 +41,7 @@ use crate::session::renderer::methods;
 use crate::stream::{HostCache, PayloadSource, Policy, Residency, ResidencyError, Workers};
 use bricks::SceneFile;
 use glam::DVec3;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Of numbers that pass through sine, cosine and inverse square roots; the greatest difference that software Vulkan
 /// shows is a fraction of it.
@@ -49,15 +49,30 @@ const BOUND: f32 = 1.0 / 65_536.0;
 
 const EXTENT: Extent = Extent { width: 40, height: 28, tile: 16 };
 
-/// A device and its kernels, or the test is skipped.
-fn device() -> Option<(Gpu, Arc<Kernels>)> {
+/// A device and its kernels.
+struct Device {
+    gpu: Gpu,
+    kernels: Arc<Kernels>,
+    /// Those that hide triangles, once they are asked for. A device need not bind what these and a method bind.
+    hiding: OnceLock<Arc<Kernels>>,
+}
+
+impl Device {
+    fn kernels(&self, hides: bool) -> Arc<Kernels> {
+        let make = || Arc::new(Kernels::new(&self.gpu, Pages { hides: true, ..self.kernels.pages }, true));
+        if hides { self.hiding.get_or_init(make).clone() } else { self.kernels.clone() }
+    }
+}
+
+/// A device, or the test is skipped.
+fn device() -> Option<Device> {
     let Ok(gpu) = Gpu::open(None) else {
         crate::skip::skip("no adapter");
         return None;
     };
-    let kernels =
-        Arc::new(Kernels::new(&gpu, Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels: true }, true));
-    Some((gpu, kernels))
+    let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels: true, hides: false };
+    let kernels = Arc::new(Kernels::new(&gpu, pages, true));
+    Some(Device { gpu, kernels, hiding: OnceLock::new() })
 }
 
 /// One way to render.
@@ -77,6 +92,10 @@ struct Variant {
     budget: Option<u64>,
     /// The scene is cut at a plane through the middle of its bounds, with this normal.
     clip: Option<DVec3>,
+    /// Every second run of so many triangles is hidden; 0: none.
+    hides: u32,
+    /// Secondary rays of one pixel in four alone.
+    half_rate: bool,
     /// Look-ups of rays answered by distance fields, if they are.
     field: Option<u32>,
     /// A method as a session makes it.
@@ -100,6 +119,8 @@ const VARIANT: Variant = Variant {
     roma: None,
     budget: None,
     clip: None,
+    hides: 0,
+    half_rate: false,
     field: None,
     method: Method::Exact,
     displacement: None,
@@ -156,18 +177,18 @@ fn visibility(octahedral: u32) -> DvfSettings {
 
 /// Both executors with pages of these sizes.
 fn lockstep(
-    (gpu, kernels): &(Gpu, Arc<Kernels>),
+    device: &Device,
     scene: &Arc<SceneFile>,
     pages: &[u64],
-    &Variant { rows: height, threshold, .. }: &Variant,
+    &Variant { rows: height, threshold, hides, .. }: &Variant,
     findings: &Arc<Mutex<Findings>>,
 ) -> Lockstep {
     let extent = Extent { height, ..EXTENT };
-    let setup = Setup { extent, threshold, count: true, opaque: false, keep: Keep::default() };
+    let setup = Setup { extent, threshold, count: true, opaque: false, hides: hides > 0, keep: Keep::default() };
     let host = || HostCache::new(1 << 20);
     let on_gpu = GpuExecutor::with_kernels(
-        gpu.clone(),
-        kernels.clone(),
+        device.gpu.clone(),
+        device.kernels(hides > 0),
         scene.clone(),
         Workers::new(scene.clone(), host(), 1).unwrap(),
         pages,
@@ -203,14 +224,14 @@ fn path(min: DVec3, max: DVec3) -> CameraPath {
 
 /// Renders two frames in lockstep.
 fn render(
-    device: &(Gpu, Arc<Kernels>),
+    device: &Device,
     scene: &Arc<SceneFile>,
     variant: &Variant,
     defect: Option<Defect>,
     findings: &Arc<Mutex<Findings>>,
 ) {
     let sizes = scene.sizes();
-    let page_bytes = device.0.page_bytes();
+    let page_bytes = device.gpu.page_bytes();
     let residency = |budget| Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin);
     let least = match residency(16) {
         Err(ResidencyError::CacheTooSmall { needed, .. }) => needed,
@@ -224,6 +245,10 @@ fn render(
         executor = executor.with_defect(defect);
     }
     executor.allow_bounces();
+    if variant.hides > 0 {
+        let bounds: Vec<u32> = (0..1000).map(|run| run * variant.hides).collect();
+        executor.set_hidden(&bounds).unwrap();
+    }
     executor.tuning().list_most = variant.list_most;
     if variant.schedule == Schedule::PlainBinary {
         executor.make_binary().unwrap();
@@ -243,6 +268,7 @@ fn render(
             correct_one_in: 0,
             only_chosen: false,
             budget: variant.budget.map(FrameBudget::Bytes),
+            half_rate: variant.half_rate,
             clip: variant.clip.map(|normal| {
                 let [min, max] = [manifest.min, manifest.max].map(DVec3::from_array);
                 (0.5 * (min + max), normal.normalize())
@@ -255,16 +281,17 @@ fn render(
             guides: false,
             coverage: false,
             taa: false,
-            aov: false,
+            aov: variant.half_rate,
         },
         light,
         size: (EXTENT.width, EXTENT.height),
         band_rows: variant.rows,
         tile: EXTENT.tile,
         fronts: variant.fronts.then(Fronts::default),
-        budgeted: variant.budget.map(|_| Budgeted::new(scene.resident())),
+        budgeted: variant.budget.map(|_| Budgeted::new(scene.resident(), variant.hides == 0)),
         auto: Auto::default(),
         captures: None,
+        answers: None,
         moved: Moved::default(),
     };
     let mut usual = Settings { secondary: EffectMethods::every(variant.method), ..Settings::exact() };
@@ -336,6 +363,12 @@ fn twins_agree_with_their_kernels() {
         Variant { budget: Some(1), ..VARIANT },
         Variant { budget: Some(1 << 30), everything_fits: true, ..VARIANT },
         Variant { clip: Some(DVec3::new(0.3, 1.0, -0.2)), ..VARIANT },
+        Variant { half_rate: true, ..VARIANT },
+        Variant { half_rate: true, clip: Some(DVec3::Y), schedule: Schedule::Demand, ..VARIANT },
+        Variant { hides: 7, ..VARIANT },
+        Variant { hides: 1, schedule: Schedule::Demand, ..VARIANT },
+        Variant { hides: 30, budget: Some(20_000), ..VARIANT },
+        Variant { hides: 20, everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { clip: Some(DVec3::NEG_Y), schedule: Schedule::Demand, ..VARIANT },
         Variant { clip: Some(DVec3::X), everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { schedule: Schedule::Demand, ..VARIANT },
@@ -517,10 +550,10 @@ fn rays(cells: u32) -> Vec<Ray> {
 const FRAME: Frame = Frame { reference: [0; 3], unit: 1.0, origin: DVec3::ZERO };
 
 /// A scene for rays that maps answer, the pages of a cache for all of it, and that cache.
-fn given(device: &(Gpu, Arc<Kernels>)) -> (Arc<SceneFile>, Vec<u64>, Cache) {
+fn given(device: &Device) -> (Arc<SceneFile>, Vec<u64>, Cache) {
     let scene = Arc::new(probe::scene().unwrap());
     let sizes = scene.sizes();
-    let page_bytes = device.0.page_bytes();
+    let page_bytes = device.gpu.page_bytes();
     let budget = Residency::budget_for_all(&sizes, page_bytes);
     let residency = Residency::new(&sizes, budget, page_bytes, Policy::RoundRobin).unwrap();
     let pages = residency.page_sizes().collect();
