@@ -5,13 +5,15 @@ use super::navigate::{Navigator, Thrust};
 use super::studio::{
     Ask, Comparison, Converter, Found, News, Overlay, Pace, Purpose, Scene, Shown, Studio, Wake, Wish,
 };
+use crate::counters::Record;
 use crate::output::atomic;
 use crate::scene::path::{CameraPath, Keyframe};
 use crate::scene::{Camera, Projection};
-use crate::session::Settings;
+use crate::session::{Named, Settings};
 use crate::settings::{Direction, ImageSize, Plane};
 use anyhow::{Context, Result};
 use glam::DVec3;
+use serde::Deserialize;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,6 +23,8 @@ use std::time::{Duration, Instant};
 const MESSAGE: Duration = Duration::from_secs(8);
 /// Pictures that plots go back.
 const HISTORY: usize = 240;
+/// Seconds from one keyframe to the next while a flight is recorded.
+const RECORD_S: f64 = 0.5;
 /// Seconds from one keyframe to the next where a person sets them by hand.
 const KEYFRAME_S: f64 = 2.0;
 /// What is seen around a point that was gone to, as a share of the distance that it was seen from.
@@ -48,6 +52,8 @@ pub struct Taken {
     pub exact: f64,
     /// Round trips to the device.
     pub round_trips: u64,
+    /// Of the payloads of bricks that rays entered, the share that was in the cache.
+    pub hits: f64,
 }
 
 /// What a click means.
@@ -58,6 +64,18 @@ pub enum Mode {
     Tell,
     /// Measure from here to there.
     Measure,
+}
+
+/// What is done with a node.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum NodeAct {
+    /// Go there.
+    Go,
+    /// Leave it out.
+    Hide,
+    /// Show it alone.
+    Only,
 }
 
 /// What a person sees and does.
@@ -85,8 +103,16 @@ pub struct Viewer {
     pub is_comparing: bool,
     /// A camera that was left behind, and how many bricks it shows: [`Overlay::Frozen`].
     pub frozen: Option<(Camera, usize)>,
+    /// The nodes that were found by name, and how many there are in all.
+    pub nodes: Option<(Vec<Named>, usize)>,
+    /// A node that was gone to, and its bounds, world units.
+    pub located: Option<(Named, [DVec3; 2])>,
+    /// Whether a node is looked for.
+    pub is_locating: bool,
     /// The path that is being recorded.
     pub keyframes: Vec<Keyframe>,
+    /// While a flight is recorded, seconds since it began.
+    pub recording: Option<f64>,
     /// Seconds into the path while it is played.
     pub playing: Option<f64>,
     /// What to read, oldest first.
@@ -117,7 +143,11 @@ impl Viewer {
             comparison: None,
             is_comparing: false,
             frozen: None,
+            nodes: None,
+            located: None,
+            is_locating: false,
             keyframes: Vec::new(),
+            recording: None,
             playing: None,
             messages: VecDeque::new(),
             history: VecDeque::new(),
@@ -144,6 +174,8 @@ impl Viewer {
                 News::Opened(scene) => self.opened(*scene),
                 News::Shown(shown) => self.saw(shown),
                 News::Found(found, purpose) => self.found(found.map(|found| *found), purpose),
+                News::Nodes(nodes, count) => self.nodes = Some((nodes, count)),
+                News::Located(node, bounds) => self.located(node, bounds),
                 News::Compared(comparison) => (self.comparison, self.is_comparing) = (Some(*comparison), false),
                 News::Frozen(camera, bricks) => {
                     self.frozen = Some((camera, bricks));
@@ -152,7 +184,7 @@ impl Viewer {
                 News::Saved(file) => self.say(&format!("{}: saved", file.display()), false),
                 News::Told(text) => self.say(&text, false),
                 News::Failed(text) => {
-                    self.is_comparing = false;
+                    (self.is_comparing, self.is_locating) = (false, false);
                     self.say(&text, true);
                 }
             }
@@ -177,9 +209,11 @@ impl Viewer {
         (self.found, self.comparison, self.shown, self.wished) = (None, None, None, None);
         self.measured.clear();
         self.frozen = None;
+        (self.nodes, self.located, self.is_locating) = (None, None, false);
+        self.show_all();
         self.keyframes.clear();
         self.history.clear();
-        self.playing = None;
+        (self.playing, self.recording) = (None, None);
         self.scene = Some(scene);
     }
 
@@ -193,6 +227,7 @@ impl Viewer {
             bytes: shown.loaded_bytes(),
             exact: shown.states[0] as f64 / pixels.max(1) as f64,
             round_trips: shown.records.iter().map(|record| record.round_trips).sum(),
+            hits: hits(&shown),
         });
         while self.history.len() > HISTORY {
             self.history.pop_front();
@@ -218,6 +253,18 @@ impl Viewer {
         }
     }
 
+    fn located(&mut self, node: Named, bounds: Option<[DVec3; 2]>) {
+        self.is_locating = false;
+        let Some([min, max]) = bounds else {
+            return self.say(&format!("{}: no triangle of it is stored", node.name), true);
+        };
+        if let Some(navigator) = &mut self.navigator {
+            self.playing = None;
+            navigator.go_to(0.5 * (min + max), 0.5 * (max - min).length());
+        }
+        self.located = Some((node, [min, max]));
+    }
+
     /// Moves on by `seconds`. Whether the camera moved.
     pub fn advance(&mut self, thrust: Thrust, seconds: f64) -> bool {
         if !thrust.is_none() {
@@ -233,12 +280,47 @@ impl Viewer {
             self.playing = (time < last).then_some((time + seconds).min(last));
             return true;
         }
-        self.navigator.as_mut().is_some_and(|navigator| navigator.advance(thrust, seconds))
+        let has_moved = self.navigator.as_mut().is_some_and(|navigator| navigator.advance(thrust, seconds));
+        self.note_flight(seconds);
+        has_moved
+    }
+
+    /// Records a flight from now on, in the place of the path that there is; or ends that.
+    pub fn record(&mut self) {
+        self.playing = None;
+        match self.recording.take() {
+            Some(time) => self.add_recorded(time),
+            None => {
+                self.keyframes.clear();
+                self.recording = Some(0.0);
+                self.add_recorded(0.0);
+            }
+        }
+    }
+
+    /// A flight that is recorded goes on for `seconds`.
+    fn note_flight(&mut self, seconds: f64) {
+        let Some(before) = self.recording else { return };
+        let time = before + seconds;
+        self.recording = Some(time);
+        if self.keyframes.last().is_none_or(|last| time - last.time >= RECORD_S) {
+            self.add_recorded(time);
+        }
+    }
+
+    fn add_recorded(&mut self, time: f64) {
+        let is_later = self.keyframes.last().is_none_or(|last| time > last.time);
+        if let Some(camera) = self.camera().filter(|_| is_later) {
+            let (position, target) = (camera.position.to_array(), camera.target.to_array());
+            self.keyframes.push(Keyframe { time, position, target });
+        }
     }
 
     /// Whether the camera moves by itself.
     pub fn is_moving_itself(&self) -> bool {
-        self.playing.is_some() || self.navigator.as_ref().is_some_and(Navigator::is_in_flight)
+        self.playing.is_some()
+            || self.recording.is_some()
+            || self.navigator.as_ref().is_some_and(Navigator::is_in_flight)
     }
 
     /// The camera, once a scene is open.
@@ -293,6 +375,53 @@ impl Viewer {
     pub fn measure(&self) -> Option<f64> {
         let [a, b] = self.measured[..] else { return None };
         Some((b - a).length())
+    }
+
+    /// Looks for nodes by their names.
+    pub fn find(&mut self, text: &str) {
+        self.studio.ask(Ask::Find(text.into()));
+    }
+
+    /// Goes to a node, once it is known where that is, leaves it out, or shows it alone.
+    pub fn act(&mut self, act: NodeAct, node: &Named) {
+        let mut settings = self.settings.clone();
+        let pattern = node.pattern.clone();
+        match act {
+            NodeAct::Go => {
+                self.is_locating = true;
+                return self.studio.ask(Ask::Locate(node.clone()));
+            }
+            NodeAct::Hide => {
+                settings.hide.retain(|other| *other != pattern);
+                settings.hide.push(pattern);
+            }
+            NodeAct::Only => (settings.only, settings.hide) = (vec![pattern], Vec::new()),
+        }
+        self.leave_out(settings);
+    }
+
+    /// Shows everything again.
+    pub fn show_all(&mut self) {
+        self.settings.hide.clear();
+        self.settings.only.clear();
+    }
+
+    /// Takes settings that leave nodes out, without what does not go with that.
+    fn leave_out(&mut self, settings: Settings) {
+        let changed = Settings { lod: 0.0, lod_correct: None, ..settings };
+        if changed.lod != self.settings.lod {
+            self.say("levels of detail stand for what is hidden, too: they are off now", false);
+        }
+        match changed.check() {
+            Ok(()) => self.settings = changed,
+            Err(error) => self.say(&error.to_string(), true),
+        }
+    }
+
+    /// The corners of the node that was gone to, world units.
+    pub fn located_corners(&self) -> Option<[DVec3; 8]> {
+        let (_, bounds) = self.located.as_ref()?;
+        Some(std::array::from_fn(|i| DVec3::from_array(std::array::from_fn(|k| bounds[i >> k & 1][k]))))
     }
 
     /// Back to the first view.
@@ -361,11 +490,8 @@ impl Viewer {
 
     /// Adds a keyframe where the camera is.
     pub fn add_keyframe(&mut self) {
-        if let Some(camera) = self.camera() {
-            let time = self.keyframes.last().map_or(0.0, |last| last.time + KEYFRAME_S);
-            let (position, target) = (camera.position.to_array(), camera.target.to_array());
-            self.keyframes.push(Keyframe { time, position, target });
-        }
+        let time = self.keyframes.last().map_or(0.0, |last| last.time + KEYFRAME_S);
+        self.add_recorded(time);
     }
 
     /// The path of the keyframes.
@@ -422,6 +548,13 @@ impl Viewer {
         self.keyframes = CameraPath::read(file)?.keyframes().to_vec();
         Ok(())
     }
+}
+
+/// Of the payloads of bricks that rays of a picture entered, the share that was in the cache: a brick has two.
+fn hits(shown: &Shown) -> f64 {
+    let sum = |of: fn(&Record) -> u64| shown.records.iter().map(of).sum::<u64>() as f64;
+    let (loaded, needed) = (sum(|record| record.bricks_loaded), 2.0 * sum(|record| record.bricks_needed.count()));
+    (1.0 - loaded / needed.max(1.0)).max(0.0)
 }
 
 /// A file in `folder` that does not exist: `stem.ending`, or `stem-2.ending` and so on.

@@ -40,6 +40,7 @@ mod tests {
         let camera = Camera { position: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, fov_y: 1.0 };
         let pixels: Vec<[u8; 3]> = (0..35 * 21u32).map(|i| [i as u8, (i * 7) as u8, (i / 35) as u8]).collect();
         let shown = |stage| Shown {
+            legend: String::new(),
             number: 1,
             camera,
             size: (35, 21),

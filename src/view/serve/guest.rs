@@ -150,6 +150,18 @@ impl Guest {
             Told::Home => viewer.go_home(),
             Told::All => viewer.see_all(),
             Told::Clip => viewer.clip(),
+            Told::Find { text } => viewer.find(&text),
+            Told::Node { act, number } => {
+                let node = match number {
+                    Some(number) => viewer.nodes.as_ref().and_then(|(nodes, _)| nodes.get(number)),
+                    None => viewer.found.as_ref().and_then(|found| found.node.as_ref()),
+                };
+                match node.cloned() {
+                    Some(node) => viewer.act(act, &node),
+                    None => viewer.say("there is no such node", true),
+                }
+            }
+            Told::ShowAll => viewer.show_all(),
             Told::Freeze => viewer.freeze(),
             Told::Overlay { name } => match name.parse() {
                 Ok(overlay) => viewer.overlay = overlay,
@@ -161,6 +173,7 @@ impl Guest {
                 }
             }
             Told::Keyframe => viewer.add_keyframe(),
+            Told::Record => viewer.record(),
             Told::ForgetPath => viewer.keyframes.clear(),
             Told::Play => viewer.play(),
             Told::Path => match viewer.path() {
@@ -207,6 +220,10 @@ impl Guest {
             .iter()
             .filter_map(|&key| Some((key.to_owned(), Value::from(viewer.settings.get(key)?.to_string()))))
             .collect();
+        let nodes = viewer.nodes.as_ref().map(|(nodes, count)| {
+            let names: Vec<&str> = nodes.iter().map(|node| node.name.as_str()).collect();
+            json!({"names": names, "count": count})
+        });
         let conversion = viewer.conversion().map(|own| {
             let (phase, done, all) = own.so_far;
             json!({"phase": phase, "done": done, "all": all})
@@ -221,10 +238,15 @@ impl Guest {
             "overlay": viewer.overlay.name(),
             "overlays": Overlay::NAMES,
             "found": viewer.found.as_ref().map(|found| found.lines()),
+            "has_node": viewer.found.as_ref().is_some_and(|found| found.node.is_some()),
+            "nodes": nodes,
+            "located": viewer.located.as_ref().map(|(node, [min, max])| json!({"name": node.name, "size": (*max - *min).to_array()})),
+            "left_out": [&viewer.settings.hide, &viewer.settings.only],
             "measuring": viewer.mode == Mode::Measure,
             "measured": viewer.measure(),
             "keyframes": viewer.keyframes.len(),
             "playing": viewer.playing.is_some(),
+            "recording": viewer.recording.is_some(),
             "conversion": conversion,
             "comparing": viewer.is_comparing,
             "comparison": comparison,
@@ -255,6 +277,7 @@ impl Guest {
             "ms": shown.ms,
             "loaded": shown.loaded_bytes(),
             "position": camera.position.to_array(),
+            "legend": shown.legend,
         });
         let head = head.to_string();
         let mut message = (head.len() as u32).to_le_bytes().to_vec();

@@ -3,6 +3,7 @@
 
 use crate::session::Settings;
 use crate::settings::{Environment, Group, SettingsError};
+use crate::view::viewer::NodeAct;
 use serde::Deserialize;
 
 /// Settings that a page may change.
@@ -109,6 +110,20 @@ pub enum Told {
     All,
     /// Cuts the scene open, or makes it whole.
     Clip,
+    /// Looks for nodes by name.
+    Find {
+        /// A part of it.
+        text: String,
+    },
+    /// Does something with a node: one of those found by name, or the one that was clicked on.
+    Node {
+        /// What.
+        act: NodeAct,
+        /// Which of those found.
+        number: Option<usize>,
+    },
+    /// Shows everything again.
+    ShowAll,
     /// Leaves the camera behind, or forgets it.
     Freeze,
     /// Another overlay.
@@ -125,6 +140,8 @@ pub enum Told {
     },
     /// A keyframe where the camera is.
     Keyframe,
+    /// Records a flight, or stops.
+    Record,
     /// No keyframes any more.
     ForgetPath,
     /// Play the path, or stop.

@@ -1,8 +1,9 @@
 //! What a person asks of a picture: what is there, and how far it is from the exact one.
 
+use super::overlay::heat;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
 use crate::scene::Camera;
-use crate::session::{Frame, Hit, Origin, Ray, Session, developed, provenance};
+use crate::session::{Frame, Hit, Named, Origin, Ray, Session, developed, provenance};
 use anyhow::Result;
 use bricks::{Material, NONE};
 use glam::DVec3;
@@ -16,6 +17,8 @@ pub struct Found {
     pub distance: f64,
     /// Unit normal of the triangle, world space.
     pub normal: DVec3,
+    /// The node that the triangle is of.
+    pub node: Option<Named>,
     /// Where the triangle comes from; `None`: nobody wrote that down.
     pub origin: Option<Origin>,
     /// Its global id.
@@ -72,11 +75,12 @@ pub fn found(session: &mut Session, camera: &Camera, (x, y): (f64, f64), aspect:
     let material =
         surface.and_then(|surface| Some((surface.material, *resident.materials.get(surface.material as usize)?)));
     let origin = Origin::of(&resident.manifest, triangle);
+    let node = Named::of(&resident.manifest, triangle);
     let of = provenance(&resident.manifest, triangle).map_or(0, |range| range.count);
     let normal = DVec3::from_array(normal.map(f64::from));
     let point = camera.position + direction * t;
     let distance = (point - camera.position).length();
-    Ok(Some(Found { point, distance, normal, origin, triangle, of, material }))
+    Ok(Some(Found { point, distance, normal, node, origin, triangle, of, material }))
 }
 
 /// How far a picture is from the exact one, both as a display shows them.
@@ -107,16 +111,7 @@ pub fn compared(shown: &Frame, exact: &Frame, ms: f64) -> Result<Comparison> {
     let map = flip_ldr(&a, &b, PIXELS_PER_DEGREE)?;
     let [a, b] = [shown, exact].map(|frame| Image { width, height, rgb: frame.pixels.radiance.clone() });
     let errors = pixel_errors(&a, &b)?;
-    let colours = map.errors.iter().map(|&error| heat(if error.is_nan() { 1.0 } else { error }));
-    Ok(Comparison { flip: map.mean(), rmse: errors.rmse, size: exact.size, map: colours.collect(), ms })
-}
-
-/// A colour of an error in 0..=1: black, then violet, red, yellow, white.
-fn heat(error: f32) -> [u8; 3] {
-    const STOPS: [[f32; 3]; 5] =
-        [[0.0, 0.0, 0.0], [80.0, 20.0, 110.0], [200.0, 50.0, 50.0], [250.0, 190.0, 60.0], [255.0; 3]];
     // Small errors are those that one looks for.
-    let at = error.clamp(0.0, 1.0).sqrt() * 4.0;
-    let k = (at as usize).min(3);
-    std::array::from_fn(|c| (STOPS[k][c] + (STOPS[k + 1][c] - STOPS[k][c]) * (at - k as f32)) as u8)
+    let colours = map.errors.iter().map(|&error| heat(if error.is_nan() { 1.0 } else { error.max(0.0).sqrt() }));
+    Ok(Comparison { flip: map.mean(), rmse: errors.rmse, size: exact.size, map: colours.collect(), ms })
 }

@@ -8,6 +8,7 @@ mod inbox;
 mod inspect;
 mod overlay;
 mod pace;
+mod steps;
 mod worker;
 
 pub use inspect::{Comparison, Found};
@@ -18,9 +19,10 @@ use crate::counters::Record;
 use crate::frame::PixelState;
 use crate::scene::Camera;
 use crate::scene::path::CameraPath;
-use crate::session::Settings;
+use crate::session::{Named, Settings};
 use anyhow::Result;
 use brickwalk_convert::progress::Progress;
+use glam::DVec3;
 use inbox::Inbox;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -56,6 +58,12 @@ pub enum Ask {
     Compare,
     /// Write the picture as it is shown to this file, a PNG.
     Save(PathBuf),
+    /// Which nodes have this in their names?
+    Find(String),
+    /// Where is this node, and how large? Bricks are read for it while pictures go on.
+    Locate(Named),
+    /// Lose the device that renders, as drivers do: what is shown must come back.
+    LoseDevice,
     /// Keep in mind which bricks the picture shows, for [`Overlay::Frozen`]; or forget them.
     Freeze(bool),
 }
@@ -107,6 +115,8 @@ pub struct Shown {
     pub records: Vec<Record>,
     /// Stops (EV) that it is exposed by.
     pub exposure_ev: f64,
+    /// What the colours of the overlay say.
+    pub legend: String,
 }
 
 impl Shown {
@@ -160,6 +170,10 @@ pub enum News {
     Shown(Arc<Shown>),
     /// What is at a place; `None`: nothing.
     Found(Option<Box<Found>>, Purpose),
+    /// The first nodes with what was asked for in their names, and how many there are.
+    Nodes(Vec<Named>, usize),
+    /// The bounds of a node, world units; `None`: none of it is stored.
+    Located(Named, Option<[DVec3; 2]>),
     /// How far the picture is from the exact one.
     Compared(Box<Comparison>),
     /// A picture was written.

@@ -1,6 +1,7 @@
 //! What is painted over a picture: what the engine did for each pixel.
 
-use crate::frame::PixelState;
+use super::steps::Steps;
+use crate::frame::{Answered, PixelState};
 use crate::settings::names;
 use std::collections::HashSet;
 
@@ -23,6 +24,12 @@ names! {
         Normals = "normals",
         /// The tiles that queries are made for.
         Tiles = "tiles",
+        /// How many bricks the rays of each tile enter: its visible query pairs.
+        Queries = "queries",
+        /// How many nodes of the top level each pixel's ray visits.
+        Steps = "steps",
+        /// Who answered the secondary rays of each pixel: tracing, or a method.
+        Methods = "methods",
     }
 }
 
@@ -45,10 +52,31 @@ pub struct Pixels<'a> {
     pub bricks: &'a [Option<(u32, bool)>],
     /// The bricks of the camera that was left behind.
     pub frozen: &'a HashSet<u32>,
+    /// What rays meet of the top level; `None`: not known.
+    pub steps: Option<&'a Steps>,
+    /// Who answered secondary rays; empty: not known.
+    pub answers: &'a [Answered],
 }
+
+/// Colours of rays that were traced, and of those that a method answered.
+const METHODS: [[u8; 3]; 2] = [[70, 130, 230], [235, 170, 40]];
 
 /// Colours of the states.
 pub const STATES: [[u8; 3]; 3] = [[60, 170, 90], [235, 170, 40], [215, 60, 60]];
+
+/// The greatest count, at least 1.
+fn most_of(counts: &[u32]) -> f32 {
+    counts.iter().copied().max().unwrap_or(0).max(1) as f32
+}
+
+/// A colour of a share in 0..=1: black, then violet, red, yellow, white.
+pub fn heat(share: f32) -> [u8; 3] {
+    const STOPS: [[f32; 3]; 5] =
+        [[0.0, 0.0, 0.0], [80.0, 20.0, 110.0], [200.0, 50.0, 50.0], [250.0, 190.0, 60.0], [255.0; 3]];
+    let at = share.clamp(0.0, 1.0) * 4.0;
+    let k = (at as usize).min(3);
+    std::array::from_fn(|c| (STOPS[k][c] + (STOPS[k + 1][c] - STOPS[k][c]) * (at - k as f32)) as u8)
+}
 
 /// A colour for a number, far from those of its neighbours.
 pub fn color_of(number: u32) -> [u8; 3] {
@@ -64,6 +92,25 @@ pub fn color_of(number: u32) -> [u8; 3] {
 }
 
 impl Overlay {
+    /// What its colours say of a picture.
+    pub fn legend(self, pixels: &Pixels) -> String {
+        let most = |of: fn(&Steps) -> &Vec<u32>| pixels.steps.and_then(|steps| of(steps).iter().max()).unwrap_or(&0);
+        match self {
+            Self::None | Self::Tiles => String::new(),
+            Self::State => "green: exact, amber: bounded, red: unresolved".into(),
+            Self::Bricks => "a colour for each brick".into(),
+            Self::Residency => "green: in the cache, red: not any more".into(),
+            Self::Frozen => "green: bricks of the camera that was left behind, red: others".into(),
+            Self::Depth => "white: near, black: far".into(),
+            Self::Normals => "red, green, blue: x, y, z".into(),
+            Self::Queries => {
+                format!("black: 0, white: {} bricks that rays of a tile enter", most(|steps| &steps.bricks))
+            }
+            Self::Steps => format!("black: 0, white: {} nodes of the top level", most(|steps| &steps.nodes)),
+            Self::Methods => "blue: secondary rays were traced, amber: a method answered them".into(),
+        }
+    }
+
     /// Whether it shows bricks.
     pub fn shows_bricks(self) -> bool {
         matches!(self, Self::Bricks | Self::Residency | Self::Frozen)
@@ -74,6 +121,11 @@ impl Overlay {
         if self == Self::None {
             return;
         }
+        let counts: Option<&[u32]> = pixels.steps.map(|steps| match self {
+            Self::Queries => &steps.bricks[..],
+            _ => &steps.nodes[..],
+        });
+        let most = counts.map_or(1.0, most_of);
         let greatest = pixels.depth.iter().copied().filter(|depth| depth.is_finite()).fold(0.0, f32::max);
         for (index, shown) in picture.iter_mut().enumerate() {
             let own = match self {
@@ -101,8 +153,20 @@ impl Overlay {
                     let is_edge = x.is_multiple_of(pixels.tile) || y.is_multiple_of(pixels.tile);
                     is_edge.then_some([255; 3])
                 }
+                Self::Queries | Self::Steps => {
+                    counts.and_then(|counts| counts.get(index)).map(|&count| heat(count as f32 / most))
+                }
+                Self::Methods => pixels.answers.get(index).and_then(|&Answered { traced, by_method }| {
+                    let all = (traced + by_method) as f32;
+                    let mix = |k: usize| {
+                        let [traced_color, method_color] = METHODS.map(|color| f32::from(color[k]));
+                        (traced_color * traced as f32 + method_color * by_method as f32) / all
+                    };
+                    (all > 0.0).then(|| std::array::from_fn(|k| mix(k) as u8))
+                }),
             };
-            let weight = if matches!(self, Self::Depth | Self::Normals) { 1.0 } else { WEIGHT };
+            let weight =
+                if matches!(self, Self::Depth | Self::Normals | Self::Queries | Self::Steps) { 1.0 } else { WEIGHT };
             if let Some(own) = own {
                 *shown = std::array::from_fn(|k| {
                     (f32::from(shown[k]) * (1.0 - weight) + f32::from(own[k]) * weight).round() as u8
@@ -126,6 +190,8 @@ mod tests {
             normals: &[[0.0, 1.0, 0.0]; 4],
             bricks: &[Some((3, true)), Some((3, true)), None, Some((4, false))],
             frozen: &HashSet::from([4]),
+            steps: Some(&Steps { nodes: vec![0, 5, 10, 10], bricks: vec![3, 3, 1, 1] }),
+            answers: &[(1, 0), (0, 2), (0, 0), (1, 1)].map(|(traced, by_method)| Answered { traced, by_method }),
         };
         let shown = |overlay: Overlay| {
             let mut picture = vec![[100; 3]; 4];
@@ -144,6 +210,14 @@ mod tests {
         let depth = shown(Overlay::Depth);
         assert!(depth[0] == depth[1] && depth[0][0] > depth[3][0] && depth[2] == [100; 3]);
         assert_eq!(shown(Overlay::Normals)[0], [127, 255, 127]);
+        let steps = shown(Overlay::Steps);
+        assert!(steps[0] == [0; 3] && steps[2] == [255; 3] && steps[3] == steps[2] && steps[1] != steps[2]);
+        assert!(Overlay::Steps.legend(&pixels).contains("white: 10 nodes"));
+        let queries = shown(Overlay::Queries);
+        assert!(queries[0] == [255; 3] && queries[0] == queries[1] && queries[2] == queries[3]);
+        let methods = shown(Overlay::Methods);
+        assert!(methods[0] != [100; 3] && methods[1] != methods[0] && methods[2] == [100; 3]);
+        assert!(methods[3] != methods[0] && methods[3] != methods[1]);
         let tiles = shown(Overlay::Tiles);
         assert!(tiles[0] != [100; 3] && tiles[1] != [100; 3] && tiles[3] == [100; 3]);
     }

@@ -2,7 +2,7 @@
 
 use crate::secondary::EffectMethods;
 use crate::session::Settings;
-use crate::settings::{FrameBudget, ImageSize};
+use crate::settings::{EffectList, FrameBudget, ImageSize};
 use std::time::Duration;
 
 /// Factors of width and height that pictures of a moving camera have.
@@ -25,6 +25,8 @@ pub struct Pace {
     pub budget: FrameBudget,
     /// What pictures of a resting camera load at most.
     pub resting: FrameBudget,
+    /// Secondary rays of one pixel in four while the camera moves, where nothing else answers them.
+    pub half_rate: bool,
     /// A camera that has not moved for so long rests.
     pub pause: Duration,
 }
@@ -35,6 +37,7 @@ impl Default for Pace {
             moving: Duration::from_millis(50),
             budget: FrameBudget::Time(25.0),
             resting: FrameBudget::Time(150.0),
+            half_rate: true,
             pause: Duration::from_millis(80),
         }
     }
@@ -67,10 +70,16 @@ impl Pace {
         let of = |edge: u32| ((f64::from(edge) * scale).round() as u32).max(1);
         let size = ImageSize { width: of(settings.size.width), height: of(settings.size.height) };
         // What the light of few samples is worth falls with the pixels.
-        let lod = if may_have_budget(settings) { settings.lod.max(1.0) } else { settings.lod };
-        let frame_budget = budget(settings, if has_levels { self.budget } else { self.resting });
+        let takes_levels = may_have_budget(settings) && !settings.hides();
+        let lod = if takes_levels { settings.lod.max(1.0) } else { settings.lod };
+        let frame_budget = budget(settings, if has_levels && takes_levels { self.budget } else { self.resting });
         let opening = self.opening(&Settings { taa: false, ..settings.clone() });
         Settings { size, spp: 1, lod, frame_budget, ..opening }
+    }
+
+    /// Whether pictures of a moving camera have secondary rays of one pixel in four.
+    pub fn halves(&self, settings: &Settings) -> bool {
+        self.half_rate && settings.effects != EffectList::PRIMARY && may_have_budget(settings)
     }
 
     /// The same of a camera that rests, of so many samples; `waits`: everything is waited for.

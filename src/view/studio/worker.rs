@@ -4,12 +4,13 @@ use super::inbox::{Inbox, Turn};
 use super::inspect::{compared, found};
 use super::overlay::Pixels;
 use super::pace::{Refinement, Scale};
-use super::{Ask, Converter, News, Pace, Purpose, Scene, Shown, Stage, Wake, Wish};
+use super::steps::steps;
+use super::{Ask, Converter, News, Overlay, Pace, Purpose, Scene, Shown, Stage, Wake, Wish};
 use crate::frame::{FrameWatch, PixelState};
 use crate::output::png;
 use crate::schedule::cache::Cache;
 use crate::secondary::EffectMethods;
-use crate::session::{Frame, Session, Settings, Watch, developed};
+use crate::session::{Frame, Named, Session, Settings, Watch, developed, extent, find};
 use crate::stream::PayloadSource;
 use anyhow::{Context, Result, anyhow};
 use brickwalk_convert::progress::Progress;
@@ -23,7 +24,11 @@ use std::time::{Duration, Instant};
 /// A scene that failed is opened again after so long.
 const AGAIN: Duration = Duration::from_secs(2);
 
+/// Nodes that are told of those found.
+const MOST_NODES: usize = 50;
+
 /// Tells news.
+#[derive(Clone)]
 pub struct Teller {
     /// Where to.
     pub sender: Sender<News>,
@@ -235,7 +240,8 @@ impl Worker {
         let Some(wish) = self.wish.clone() else { return Ok(Plan::Idle) };
         let settings = self.pace.of_moving(&wish.settings, self.scale.factor(), self.has_levels);
         let start = Instant::now();
-        self.with(&settings)?;
+        let halves = self.pace.halves(&wish.settings);
+        self.with(&settings)?.set_half_rate(halves);
         let set = start.elapsed();
         if let Some(ms) = self.picture(&wish, Stage::Moving, true)? {
             let all = ms + set.as_secs_f64() * 1e3;
@@ -248,7 +254,7 @@ impl Worker {
         let Some(wish) = self.wish.clone() else { return Ok(Plan::Idle) };
         let (samples, waits) = steps.next();
         let settings = self.pace.of_resting(&wish.settings, samples, waits);
-        self.with(&settings)?;
+        self.with(&settings)?.set_half_rate(false);
         let stage = if samples == wish.settings.samples() { Stage::Done } else { Stage::Refining };
         if self.picture(&wish, stage, false)?.is_none() {
             return Ok(Plan::Refine(steps));
@@ -268,6 +274,10 @@ impl Worker {
         if (of.camera, &of.settings) != (wish.camera, &wish.settings) || session.renderer().size != frame.size {
             return None;
         }
+        // Who answers is noted as a picture is made.
+        if wish.overlay == Overlay::Methods && session.answers().is_none() {
+            return None;
+        }
         let shown = shown(session, frame, &wish, &self.frozen, *taken).ok()?;
         self.last.as_mut()?.1 = wish;
         self.tell.tell(News::Shown(Arc::new(shown)));
@@ -279,6 +289,7 @@ impl Worker {
         let session = self.session.as_mut().context("no scene is open")?;
         let start = Instant::now();
         let mut gives = Gives { inbox: &self.inbox, is_patient };
+        session.note_answers(wish.overlay == Overlay::Methods);
         let Some(frame) = session.picture(&wish.camera, &mut gives)? else { return Ok(None) };
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let shown = shown(session, &frame, wish, &self.frozen, (stage, ms))?;
@@ -293,6 +304,9 @@ impl Worker {
             Ask::What { x, y, purpose } => self.what(x, y, purpose),
             Ask::Compare => self.compare(),
             Ask::Save(file) => self.save(&file),
+            Ask::Find(text) => self.find(&text),
+            Ask::Locate(node) => self.locate(node),
+            Ask::LoseDevice => self.lose_device(),
             Ask::Freeze(true) => self.freeze(),
             Ask::Freeze(false) => {
                 self.frozen.clear();
@@ -398,6 +412,36 @@ impl Worker {
         Ok(())
     }
 
+    fn find(&mut self, text: &str) -> Result<()> {
+        let session = self.session.as_mut().context("no scene is open")?;
+        let scene = session.renderer().scene.clone();
+        let (nodes, count) = find(&scene.resident().manifest, text, MOST_NODES);
+        self.tell.tell(News::Nodes(nodes, count));
+        Ok(())
+    }
+
+    /// Finds the bounds of a node in a thread of its own, as all of a scene may be read for it.
+    fn locate(&mut self, node: Named) -> Result<()> {
+        let session = self.session.as_mut().context("no scene is open")?;
+        let (scene, tell) = (session.renderer().scene.clone(), self.tell.clone());
+        let work = move || {
+            tell.tell(match extent(&scene, &node.ids) {
+                Ok(bounds) => News::Located(node, bounds),
+                Err(error) => News::Failed(format!("{}: {error}", node.name)),
+            });
+        };
+        std::thread::Builder::new().name("locate".into()).spawn(work)?;
+        Ok(())
+    }
+
+    fn lose_device(&mut self) -> Result<()> {
+        let session = self.session.as_mut().context("no scene is open")?;
+        session.renderer().executor.lose_device();
+        // What is shown is made anew.
+        self.plan = Plan::Move;
+        Ok(())
+    }
+
     fn freeze(&mut self) -> Result<()> {
         let (_, wish, _) = self.last.as_ref().context("there is no picture yet")?;
         let camera = wish.camera;
@@ -436,17 +480,23 @@ fn shown(
 ) -> Result<Shown> {
     static NUMBER: AtomicU64 = AtomicU64::new(1);
     let bricks = if wish.overlay.shows_bricks() { session.bricks_seen()? } else { Vec::new() };
+    let (scene, tile) = (session.renderer().scene.clone(), session.renderer().tile);
+    let walks = matches!(wish.overlay, Overlay::Queries | Overlay::Steps);
+    let steps = walks.then(|| steps(scene.resident(), &wish.camera, frame.size, tile, &frame.pixels.depth));
     let mut pixels = developed(&frame.pixels.radiance, frame.exposure_ev, frame.tone_map);
     let of = Pixels {
         size: frame.size,
-        tile: session.renderer().tile,
+        tile,
         states: &frame.pixels.state,
         depth: &frame.pixels.depth,
         normals: &frame.pixels.normal,
         bricks: &bricks,
         frozen,
+        steps: steps.as_ref(),
+        answers: session.answers().unwrap_or_default(),
     };
     wish.overlay.paint(&of, &mut pixels);
+    let legend = wish.overlay.legend(&of);
     let states = states(frame);
     Ok(Shown {
         number: NUMBER.fetch_add(1, Ordering::Relaxed),
@@ -460,6 +510,7 @@ fn shown(
         ms,
         records: frame.records.clone(),
         exposure_ev: frame.exposure_ev,
+        legend,
     })
 }
 

@@ -4,7 +4,7 @@ use super::panels;
 use super::recent::Recent;
 use crate::view::navigate::Thrust;
 use crate::view::studio::{Overlay, Stage};
-use crate::view::viewer::{Mode, Viewer};
+use crate::view::viewer::{Mode, NodeAct, Viewer};
 use egui::{Align2, Color32, Event, FontId, Key, PointerButton, Pos2, Rect, Response, Sense, Stroke, Ui, Vec2};
 use glam::DVec3;
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ pub struct Desk {
 }
 
 /// What a key does in the window, for the help.
-pub const KEYS: [(&str, &str); 18] = [
+pub const KEYS: [(&str, &str); 19] = [
     ("W A S D", "fly forward, left, back, right"),
     ("Q E", "fly down, up"),
     ("Shift", "faster"),
@@ -55,10 +55,11 @@ pub const KEYS: [(&str, &str); 18] = [
     ("double click", "go there"),
     ("M", "measuring mode"),
     ("X", "cut the scene open at what was clicked on, or make it whole"),
+    ("H I U", "hide what was clicked on; show it alone; show everything again"),
     ("O", "next overlay"),
     ("C", "leave the camera behind, to see its bricks from elsewhere"),
     ("Home, F", "first view; the whole scene"),
-    ("K, Space", "set a keyframe; play the path"),
+    ("K, R, Space", "set a keyframe; record a flight, or stop; play the path"),
     ("P", "screenshot"),
     ("Tab, F11", "hide the panel; full screen"),
     ("Escape", "leave a mode, close what is open"),
@@ -159,6 +160,17 @@ impl Desk {
         if pressed(Key::X) {
             viewer.clip();
         }
+        let node = viewer.found.as_ref().and_then(|found| found.node.clone());
+        if let Some(node) = &node {
+            for (key, act) in [(Key::H, NodeAct::Hide), (Key::I, NodeAct::Only)] {
+                if pressed(key) {
+                    viewer.act(act, node);
+                }
+            }
+        }
+        if pressed(Key::U) {
+            viewer.show_all();
+        }
         if pressed(Key::C) {
             viewer.freeze();
         }
@@ -170,6 +182,9 @@ impl Desk {
         }
         if pressed(Key::K) {
             viewer.add_keyframe();
+        }
+        if pressed(Key::R) {
+            viewer.record();
         }
         if pressed(Key::Space) {
             viewer.play();
@@ -191,7 +206,7 @@ impl Desk {
             viewer.mode = Mode::Tell;
         } else {
             viewer.measured.clear();
-            (viewer.found, viewer.overlay) = (None, Overlay::None);
+            (viewer.found, viewer.located, viewer.overlay) = (None, None, Overlay::None);
         }
     }
 
@@ -287,8 +302,20 @@ impl Desk {
                 }
             }
         }
+        if let Some(corners) = viewer.located_corners() {
+            let edge = Stroke::new(1.0, Color32::from_rgb(120, 220, 255));
+            let corners = corners.map(at);
+            for (a, b) in (0..8usize).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))).filter(|(a, b)| a != b) {
+                if let [Some(a), Some(b)] = [corners[a], corners[b]] {
+                    painter.line_segment([a, b], edge);
+                }
+            }
+        }
         if viewer.keyframes.len() > 1 && viewer.playing.is_none() {
             viewer.keyframes.iter().for_each(|key| dot(at(key.position.into()), Color32::LIGHT_GREEN));
+        }
+        if let Some(shown) = viewer.shown.as_ref().filter(|shown| !shown.legend.is_empty()) {
+            label(&painter, self.picture.center_bottom() - Vec2::new(0.0, 16.0), &shown.legend);
         }
         if viewer.mode == Mode::Measure {
             label(&painter, self.picture.center_top() + Vec2::new(0.0, 16.0), "measuring: click on two points");

@@ -145,6 +145,27 @@ fn a_session_with_keys_and_clicks() {
     until(&mut harness, "an answer", |viewer| viewer.found.is_some());
     harness.run_steps(2);
     assert!(harness.query_by_label_contains("triangle id").is_some());
+    // Its node is hidden, shown alone, shown again with all others, and gone to.
+    let node = harness.state().desk.viewer.found.as_ref().and_then(|found| found.node.clone()).expect("a node");
+    let whole = harness.state().desk.viewer.shown.clone().expect("a picture").pixels.clone();
+    let mut seen = vec![whole.clone()];
+    for key in [Key::H, Key::I] {
+        type_key(&mut harness, key);
+        until(&mut harness, "a picture of the others", |viewer| {
+            is_done(viewer) && viewer.shown.as_ref().is_some_and(|shown| shown.pixels != seen[seen.len() - 1])
+        });
+        seen.push(harness.state().desk.viewer.shown.clone().expect("a picture").pixels.clone());
+    }
+    assert!(seen[1] != seen[2] && harness.state().desk.viewer.settings.only == [node.pattern.clone()]);
+    type_key(&mut harness, Key::U);
+    until(&mut harness, "the whole scene again", |viewer| {
+        is_done(viewer) && viewer.shown.as_ref().is_some_and(|shown| shown.pixels == whole)
+    });
+    press(&mut harness, "Nodes");
+    press(&mut harness, "Go to node");
+    until(&mut harness, "a node", |viewer| viewer.located.is_some() && !viewer.is_moving_itself());
+    assert!(harness.state().desk.viewer.camera() != Some(home));
+    type_key(&mut harness, Key::Home);
     // From here to there.
     type_key(&mut harness, Key::M);
     assert_eq!(harness.state().desk.viewer.mode, Mode::Measure);
@@ -178,6 +199,17 @@ fn a_session_with_keys_and_clicks() {
     type_key(&mut harness, Key::Space);
     assert!(harness.state().desk.viewer.playing.is_some());
     until(&mut harness, "the end of the path", |viewer| viewer.playing.is_none());
+    // A flight that is recorded has keyframes in time; keyframes by hand come back after it.
+    let by_hand = harness.state().desk.viewer.keyframes.clone();
+    type_key(&mut harness, Key::R);
+    harness.key_down(Key::W);
+    harness.run_steps(60);
+    harness.key_up(Key::W);
+    type_key(&mut harness, Key::R);
+    let recorded = harness.state().desk.viewer.keyframes.clone();
+    assert!(recorded.len() > 2 && recorded[0].time == 0.0 && recorded.is_sorted_by(|a, b| a.time < b.time));
+    assert!(recorded[0].position != recorded[recorded.len() - 1].position);
+    harness.state_mut().desk.viewer.keyframes = by_hand;
     press(&mut harness, "Path");
     press(&mut harness, "Save");
     let path = folder.path().join("city-path.json");

@@ -1,7 +1,7 @@
 //! The thread that renders for a window: what is seen in the end is what `walk` writes, wishes are answered soon, and
 //! nothing that goes wrong ends it.
 
-use crate::common::{adapters, folder, levelled_city as city, names, succeed};
+use crate::common::{adapters, folder, levelled_city as city, names, software, succeed};
 use brickwalk::Settings;
 use brickwalk::metrics::load;
 use brickwalk::scene::Camera;
@@ -206,6 +206,21 @@ fn places_are_told_and_pictures_compared_and_saved() {
     let materials = &resident.resident().materials;
     assert_eq!(bytes_of(&material), bytes_of(&materials[number as usize]));
     assert!(found.of > 0 && found.lines().iter().any(|line| line.starts_with(&format!("material {number}:"))));
+    // Its node is found by name, and holds the point.
+    let node = found.node.clone().expect("a node");
+    studio.ask(Ask::Find(node.name.to_uppercase()));
+    let (nodes, count) = until(&studio, |news| match news {
+        News::Nodes(nodes, count) => Some((nodes, count)),
+        _ => None,
+    });
+    assert!(count >= nodes.len() && nodes.contains(&node), "{node:?} is not among {count}");
+    studio.ask(Ask::Locate(node.clone()));
+    let [min, max] = until(&studio, |news| match news {
+        News::Located(own, bounds) if own == node => Some(bounds),
+        _ => None,
+    })
+    .expect("triangles");
+    assert!(found.point.cmpge(min - 1e-3).all() && found.point.cmple(max + 1e-3).all());
     // Above the horizon there is nothing.
     studio.ask(Ask::What { x: 0.5, y: 0.01, purpose: Purpose::Measure });
     assert!(until(&studio, |news| match news {
@@ -262,6 +277,30 @@ fn overlays_show_what_the_engine_knows() {
             assert!(10 * red(&last) < red(&elsewhere), "{} and {}", red(&last), red(&elsewhere));
         }
     }
+}
+
+#[test]
+fn overlays_tell_who_answered_and_what_rays_visit() {
+    let folder = folder();
+    let scene = city(folder.path());
+    let common = "--size 96x54 --spp 1 --adapter cpu --effects primary,ao --ao-rays 1";
+    let shares = |options: &str| {
+        let asked = settings(&format!("{common} {options}"));
+        let (studio, opened) = open(&scene, &asked);
+        let (last, _) = rest(&studio, &Wish { overlay: Overlay::Methods, ..wish(opened.way.frame(0, 1), &asked) });
+        let is = |more: usize, less: usize| move |pixel: &&[u8; 3]| pixel[more] > pixel[less] + 30;
+        let count = |is: &dyn Fn(&&[u8; 3]) -> bool| last.pixels.iter().filter(|pixel| is(pixel)).count();
+        (count(&is(2, 0)), count(&is(0, 2)))
+    };
+    let ((traced, _), (_, answered)) = (shares(""), shares("--secondary ao=roma"));
+    assert!(traced > 1000 && answered > 1000, "{traced} pixels are blue, {answered} amber");
+    // Rays visit no more nodes than there are, and what sees nothing far away visits the fewest.
+    let asked = settings(common);
+    let (studio, opened) = open(&scene, &asked);
+    let (last, _) = rest(&studio, &Wish { overlay: Overlay::Steps, ..wish(opened.way.frame(0, 1), &asked) });
+    let most: u32 =
+        last.legend.split_whitespace().find_map(|word| word.parse().ok().filter(|&n| n > 0)).expect("a count");
+    assert!(most > 3 && (most as usize) < 4 * opened.bricks, "{}", last.legend);
 }
 
 #[test]
@@ -333,4 +372,31 @@ fn a_window_that_is_dragged_larger_keeps_its_scene() {
         assert_eq!(last.size, (width, height));
         assert!(last.is_exact());
     }
+}
+
+#[test]
+fn a_device_that_is_lost_comes_back() {
+    let Some(adapter) = software() else { return };
+    let folder = folder();
+    let scene = city(folder.path());
+    let mut asked = settings("--size 96x54 --spp 1 --cache 40%");
+    asked.set("adapter", &adapter).expect("an adapter");
+    let (studio, opened) = open(&scene, &asked);
+    let cameras: Vec<Camera> = (0..2).map(|at| opened.way.frame(at, 3)).collect();
+    let (first, _) = rest(&studio, &wish(cameras[0], &asked));
+    studio.ask(Ask::LoseDevice);
+    let text = until(&studio, |news| match news {
+        News::Failed(text) => Some(text),
+        _ => None,
+    });
+    assert!(!text.contains('\n') && !text.is_empty(), "{text}");
+    until(&studio, |news| matches!(news, News::Told(text) if text.contains("open again")).then_some(()));
+    // What was wished is shown again, and so is what is wished next.
+    let again = until(&studio, |news| match news {
+        News::Shown(shown) if shown.stage == Stage::Done => Some(shown),
+        _ => None,
+    });
+    assert!(again.pixels == first.pixels);
+    let (next, _) = rest(&studio, &wish(cameras[1], &asked));
+    assert!(next.pixels != first.pixels && next.is_exact());
 }

@@ -3,6 +3,7 @@
 mod conversion;
 mod light;
 mod look;
+mod nodes;
 mod over;
 mod paths;
 mod plots;
@@ -21,6 +22,8 @@ use egui::{CollapsingHeader, ScrollArea, TextureHandle, Ui};
 pub struct State {
     /// A path that is being typed.
     open: String,
+    /// The name of a node that is looked for.
+    node: String,
     /// The name of an environment's image.
     environment: String,
     /// The command that renders a path which was saved.
@@ -34,13 +37,14 @@ pub struct State {
 /// The panel at the side.
 pub fn side(desk: &mut Desk, ui: &mut Ui) {
     type Draw = fn(&mut Desk, &mut Ui);
-    let all: [(&str, bool, Draw); 7] = [
+    let all: [(&str, bool, Draw); 8] = [
         ("Scene", true, scene::show),
         ("View", true, look::view),
         ("Picture", true, look::picture),
         ("Light", false, light::show),
         ("What it does", true, plots::show),
         ("What is it?", true, scene::found),
+        ("Nodes", false, nodes::show),
         ("Path", false, paths::show),
     ];
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {

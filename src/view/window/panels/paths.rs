@@ -11,6 +11,10 @@ pub fn show(desk: &mut Desk, ui: &mut Ui) {
         if ui.button("Keyframe here").on_hover_text("K").clicked() {
             viewer.add_keyframe();
         }
+        let text = if viewer.recording.is_some() { "Stop recording" } else { "Record" };
+        if ui.button(text).on_hover_text("R: a keyframe every half second, in the place of this path").clicked() {
+            viewer.record();
+        }
         let text = if viewer.playing.is_some() { "Stop" } else { "Play" };
         if ui.add_enabled(!viewer.keyframes.is_empty(), egui::Button::new(text)).on_hover_text("Space").clicked() {
             viewer.play();

@@ -17,13 +17,6 @@ pub fn show(desk: &mut Desk, ui: &mut Ui) {
             ui.selectable_value(&mut viewer.overlay, overlay, overlay.name());
         }
     });
-    if viewer.overlay == Overlay::State {
-        ui.horizontal(|ui| {
-            for (name, [r, g, b]) in ["exact", "bounded", "unresolved"].into_iter().zip(crate::view::studio::STATES) {
-                ui.colored_label(Color32::from_rgb(r, g, b), name);
-            }
-        });
-    }
     let text = if viewer.frozen.is_some() { "Let the camera go (C)" } else { "Leave the camera behind (C)" };
     let hint = "Fly on and look at the bricks that the camera shows: green are its own, red are others.";
     if ui.button(text).on_hover_text(hint).clicked() {
@@ -44,6 +37,7 @@ pub fn show(desk: &mut Desk, ui: &mut Ui) {
         line(ui, "milliseconds a picture", format!("{:.0}", last.ms), |taken| taken.ms);
         line(ui, "loaded", human_bytes(last.bytes), |taken| taken.bytes as f64);
         line(ui, "exact pixels", format!("{:.1} %", 100.0 * last.exact), |taken| taken.exact);
+        line(ui, "cache hits", format!("{:.1} %", 100.0 * last.hits), |taken| taken.hits);
         line(ui, "round trips", last.round_trips.to_string(), |taken| taken.round_trips as f64);
     }
     let can = viewer.shown.is_some() && !viewer.is_comparing;

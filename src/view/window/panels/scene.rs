@@ -1,5 +1,6 @@
 //! Which scene is open, and what was clicked on.
 
+use super::nodes;
 use crate::settings::sizes::{human_bytes, human_count};
 use crate::view::viewer::Mode;
 use crate::view::window::desk::Desk;
@@ -49,6 +50,9 @@ pub fn found(desk: &mut Desk, ui: &mut Ui) {
             ui.add(Label::new(line).wrap());
         }),
         None => drop(ui.weak("click on something")),
+    }
+    if let Some(node) = viewer.found.as_ref().and_then(|found| found.node.clone()) {
+        nodes::acts(viewer, &node, ui);
     }
     let mut measures = viewer.mode == Mode::Measure;
     if ui.checkbox(&mut measures, "Measure (M)").changed() {
