@@ -29,6 +29,7 @@ mod levels;
 pub mod manifest;
 mod occupancy;
 pub mod pack;
+pub mod pattern;
 mod payload;
 mod place;
 mod reader;

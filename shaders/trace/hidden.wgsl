@@ -1,4 +1,5 @@
-// Which triangles are there for no ray. Kernels where none is hidden have a function in place of this file that says no.
+// Which triangles are there for no ray. Where none is hidden, kernels have a function in place of this file that says
+// no.
 
 // Global ids, ascending, at which hiding begins and ends in turns.
 @group(0) @binding(10) var<storage, read> hidden: array<u32>;

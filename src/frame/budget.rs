@@ -1,7 +1,7 @@
 //! Frames that may load so much only: which pixels show what they would with everything resident.
 
 use super::voxels::Voxels;
-use super::{Engine, Moved, Pixels};
+use super::{Engine, Moved, PixelState, Pixels};
 use crate::counters::Counters;
 use crate::kernels::FrameExecutor;
 use crate::kernels::layout::{GBUFFER_COARSER, GBuffer};
@@ -9,30 +9,6 @@ use crate::scene::Camera;
 use crate::schedule::cut::{self, Cut};
 use crate::schedule::{BrickStates, ExecutorError, Pass, Step, Tracer, attributes};
 use bricks::Resident;
-
-/// What a pixel shows: that of its worst ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum PixelState {
-    /// What it shows with everything resident.
-    #[default]
-    Exact = 0,
-    /// Something is missing, and a level of detail stands in for it, within the level's bound.
-    Bounded = 1,
-    /// Something is missing that nothing stands in for, or a texture is coarser than it should be.
-    Unresolved = 2,
-}
-
-impl PixelState {
-    /// Of a ray ([`crate::schedule::Report::states`]).
-    fn of_ray(state: u32) -> Self {
-        match state {
-            0 => Self::Exact,
-            1 => Self::Bounded,
-            _ => Self::Unresolved,
-        }
-    }
-}
 
 /// What frames with a budget keep.
 pub struct Budgeted {

@@ -98,7 +98,7 @@ mod tests {
         let before = vec![[0.25, 0.25, 0.25, 1.0]; width * height];
         let full: Vec<f32> = each().map(|(_, color, light)| 0.25 + color[0] * light).collect();
         let mut after = before.clone();
-        for pixel in (0..width * height).filter(|pixel| (pixel % width | pixel / width) & 1 == 0) {
+        for pixel in (0..width * height).filter(|pixel| ((pixel % width) | (pixel / width)) & 1 == 0) {
             after[pixel] = [full[pixel], full[pixel], full[pixel], 1.0];
         }
         spread(width, &pixels, &before, &mut after);

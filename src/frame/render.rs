@@ -5,7 +5,8 @@ use super::correct::correct;
 use super::engine::RenderSettings;
 use super::half_rate;
 use super::{
-    Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState, camera_view,
+    Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState, Pixels,
+    camera_view,
 };
 use crate::counters::{Counters, Record};
 use crate::kernels::Lod;
@@ -64,33 +65,6 @@ impl<'a> Passes<'a> {
     fn advance(&mut self) -> Result<(), RenderError> {
         self.done += 1;
         if self.watch.passes(self.done, self.about) { Ok(()) } else { Err(RenderError::Interrupted) }
-    }
-}
-
-/// What a frame shows, row by row from the top.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pixels {
-    /// Linear Rec. 709 radiance, the mean of the samples.
-    pub radiance: Vec<[f32; 3]>,
-    /// Distance along the ray through the pixel's centre, world units; infinite on a miss. Empty without AOVs.
-    pub depth: Vec<f32>,
-    /// Geometric unit normal toward the camera, world space; zero on a miss. Empty without AOVs.
-    pub normal: Vec<[f32; 3]>,
-    /// Global triangle id, 4294967295 on a miss. Empty without AOVs.
-    pub id: Vec<u32>,
-    /// Linear base colour; zero on a miss. Empty without AOVs.
-    pub albedo: Vec<[f32; 3]>,
-    /// Whether what the pixel shows is exact. Empty where frames have no budget.
-    pub state: Vec<PixelState>,
-}
-
-impl Pixels {
-    /// How many pixels have a value that is no number: radiance, normals and colours are finite, depths at most
-    /// infinite.
-    pub fn not_finite(&self) -> u64 {
-        let count = |values: &[[f32; 3]]| values.iter().filter(|v| !v.iter().all(|x| x.is_finite())).count();
-        let depths = self.depth.iter().filter(|d| d.is_nan() || **d == f32::NEG_INFINITY).count();
-        (count(&self.radiance) + count(&self.normal) + count(&self.albedo) + depths) as u64
     }
 }
 
@@ -485,34 +459,4 @@ fn depth(ray: &Ray, hit: &Hit, unit: f64) -> f32 {
     }
     let length = ray.direction.iter().map(|&d| f64::from(d) * f64::from(d)).sum::<f64>().sqrt();
     (f64::from(hit.t) * length * unit) as f32
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_nan_anywhere_is_counted() {
-        let sound = Pixels {
-            radiance: vec![[1.0; 3]; 2],
-            depth: vec![f32::INFINITY, 2.0],
-            normal: vec![[0.0; 3]; 2],
-            id: vec![1, 2],
-            albedo: vec![[0.5; 3]; 2],
-            state: Vec::new(),
-        };
-        assert_eq!(sound.not_finite(), 0);
-        let spoil: [fn(&mut Pixels); 5] = [
-            |p| p.radiance[1][2] = f32::NAN,
-            |p| p.radiance[0][0] = f32::INFINITY,
-            |p| p.depth[0] = f32::NAN,
-            |p| p.normal[1][0] = f32::NAN,
-            |p| p.albedo[0][1] = f32::NEG_INFINITY,
-        ];
-        for spoil in spoil {
-            let mut pixels = sound.clone();
-            spoil(&mut pixels);
-            assert_eq!(pixels.not_finite(), 1);
-        }
-    }
 }

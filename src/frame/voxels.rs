@@ -1,8 +1,7 @@
 //! What stands in for bricks that are missing where a scene has no levels of detail: the cells that their triangles
 //! touch, which are always resident, in the mean colour of what was seen of them.
 
-use super::PixelState;
-use super::render::Pixels;
+use super::{PixelState, Pixels};
 use crate::kernels::FrameExecutor;
 use crate::kernels::layout::{Hit, NONE, Surface};
 use crate::scene::Camera;

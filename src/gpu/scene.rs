@@ -133,8 +133,8 @@ impl SceneBuffers {
     }
 }
 
-/// Ids at which hiding begins and ends. A buffer has an element at least: where nothing is hidden an id that no triangle
-/// has.
+/// Ids at which hiding begins and ends. A buffer has an element at least: where nothing is hidden an id that no
+/// triangle has.
 fn hidden_buffer(gpu: &Gpu, bounds: &[u32]) -> wgpu::Buffer {
     let bounds = if bounds.is_empty() { &[NONE] } else { bounds };
     let bytes: &[u8] = bytemuck::cast_slice(bounds);

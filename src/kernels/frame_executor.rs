@@ -69,7 +69,8 @@ pub trait FrameExecutor: Executor {
     /// A brick that cannot be read; more nodes than the device holds, with how much is needed.
     fn make_binary(&mut self) -> Result<(), ExecutorError>;
 
-    /// Loses the device, as drivers do when they fail: what is asked of it from now on fails. The processor is not lost.
+    /// Loses the device, as drivers do when they fail: what is asked of it from now on fails. The processor is not
+    /// lost.
     fn lose_device(&mut self);
 
     /// What holds for submissions from now on.

@@ -118,8 +118,8 @@ impl Session {
         Ok(Some(Frame { number: 0, size, pixels, records, checkpoints: Vec::new(), exposure_ev: stops, tone_map }))
     }
 
-    /// Traces the secondary rays of one pixel in four from now on, and spreads what they bring, in pictures of one sample
-    /// with AOVs; or all of them.
+    /// Traces the secondary rays of one pixel in four from now on, and spreads what they bring, in pictures of one
+    /// sample with AOVs; or all of them.
     pub fn set_half_rate(&mut self, is_half: bool) {
         self.renderer.engine.settings.half_rate = is_half;
     }

@@ -1,7 +1,7 @@
 //! The nodes of a scene, by name.
 
+use bricks::pattern::names;
 use bricks::{Manifest, Provenance};
-use brickwalk_convert::pattern::names;
 use std::ops::Range;
 
 /// A node that has triangles.

@@ -3,9 +3,10 @@
 
 pub mod build;
 pub mod import;
-pub mod pattern;
 pub mod progress;
 #[cfg(test)]
 #[path = "../../../tests/skip.rs"]
 mod skip;
 pub mod source;
+
+pub use bricks::pattern;
