@@ -21,6 +21,8 @@ use std::time::{Duration, Instant};
 
 /// Messages are shown for so long.
 const MESSAGE: Duration = Duration::from_secs(8);
+/// Most pixels of a picture in a window, as many as a screen of 4K has and more; of larger ones pictures are scaled up.
+const MOST_PIXELS: f64 = 9e6;
 /// Pictures that plots go back.
 const HISTORY: usize = 240;
 /// Seconds from one keyframe to the next while a flight is recorded.
@@ -330,7 +332,8 @@ impl Viewer {
 
     /// Tells the studio what is wished now, if that is something else than before; pictures have such a size.
     pub fn wish(&mut self, size: (u32, u32)) {
-        self.settings.size = ImageSize { width: size.0.max(1), height: size.1.max(1) };
+        let (width, height) = within(size, MOST_PIXELS);
+        self.settings.size = ImageSize { width, height };
         let Some(camera) = self.camera() else { return };
         let wish = Wish { camera, settings: self.settings.clone(), overlay: self.overlay };
         if self.wished.as_ref() != Some(&wish) {
@@ -557,6 +560,15 @@ fn hits(shown: &Shown) -> f64 {
     (1.0 - loaded / needed.max(1.0)).max(0.0)
 }
 
+/// The size of pictures of a window that is so wide and so high: no more than `most` pixels, of the same shape.
+pub fn within((width, height): (u32, u32), most: f64) -> (u32, u32) {
+    let (width, height) = (f64::from(width.max(1)), f64::from(height.max(1)));
+    let factor = (most / (width * height)).sqrt().min(1.0);
+    // A side that is a pixel leaves the other one too long.
+    let of = |side: f64| (side * factor).floor().clamp(1.0, most.sqrt() * 4.0) as u32;
+    (of(width), of(height))
+}
+
 /// A file in `folder` that does not exist: `stem.ending`, or `stem-2.ending` and so on.
 fn free_name(folder: &Path, stem: &str, ending: &str) -> PathBuf {
     let name = |number: u32| match number {
@@ -564,4 +576,23 @@ fn free_name(folder: &Path, stem: &str, ending: &str) -> PathBuf {
         number => folder.join(format!("{stem}-{number}.{ending}")),
     };
     (1..).map(name).find(|file| !file.exists()).unwrap_or_else(|| name(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_bounded() {
+        let most = 4e6;
+        let size = |width: u32, height: u32| within((width, height), most);
+        assert_eq!((size(1280, 720), size(0, 0)), ((1280, 720), (1, 1)));
+        let (width, height) = size(7680, 4320);
+        assert!(f64::from(width) * f64::from(height) <= most);
+        assert!((f64::from(width) / f64::from(height) - 16.0 / 9.0).abs() < 0.01);
+        for (width, height) in [(u32::MAX, u32::MAX), (u32::MAX, 1), (1, u32::MAX)] {
+            let (width, height) = size(width, height);
+            assert!(f64::from(width) * f64::from(height) <= most);
+        }
+    }
 }

@@ -2,12 +2,12 @@
 
 use super::Options;
 use super::encode::encoded;
-use super::told::{Told, number, set, size};
+use super::told::{MOST_PIXELS, Told, number, set};
 use crate::settings::Group;
 use crate::settings::sizes::human_count;
 use crate::view::navigate::Thrust;
 use crate::view::studio::{Converter, Overlay, Shown, Stage};
-use crate::view::viewer::{Mode, Viewer};
+use crate::view::viewer::{Mode, Viewer, within};
 use anyhow::Result;
 use axum::extract::ws::{Message, WebSocket};
 use glam::DVec3;
@@ -119,7 +119,7 @@ impl Guest {
         let viewer = &mut self.viewer;
         match told {
             Told::Taken => self.sent = None,
-            Told::Size { width, height } => self.size = size(width, height),
+            Told::Size { width, height } => self.size = within((width, height), MOST_PIXELS),
             Told::Thrust { forward, right, up, fast } => {
                 let [forward, right, up] = [forward, right, up].map(|x| number(x, 1.0));
                 self.thrust = Thrust { forward, right, up, is_fast: fast };

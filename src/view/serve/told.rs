@@ -29,16 +29,7 @@ const OPEN: [&str; 17] = [
 /// Most samples a pixel that a page may ask for.
 const MOST_SAMPLES: u32 = 4096;
 /// Most pixels of a picture of a page: some 2 GB of rays and what shading keeps, where bounces are on.
-const MOST_PIXELS: f64 = 4e6;
-
-/// The size of the pictures of a page that is so wide and so high: no larger than a page may have, of the same shape.
-pub fn size(width: u32, height: u32) -> (u32, u32) {
-    let (width, height) = (f64::from(width.max(1)), f64::from(height.max(1)));
-    let factor = (MOST_PIXELS / (width * height)).sqrt().min(1.0);
-    // A side that is a pixel leaves the other one too long.
-    let of = |side: f64| (side * factor).floor().clamp(1.0, MOST_PIXELS.sqrt() * 4.0) as u32;
-    (of(width), of(height))
-}
+pub const MOST_PIXELS: f64 = 4e6;
 
 /// The settings that a page may change, by their keys.
 pub fn open() -> &'static [&'static str] {
@@ -219,18 +210,6 @@ mod tests {
         set(&mut settings, "spp", "999999").unwrap();
         assert_eq!(settings.spp, MOST_SAMPLES);
         assert_eq!((number(f64::NAN, 1.0), number(9.0, 1.0), number(-9.0, 1.0)), (0.0, 1.0, -1.0));
-    }
-
-    #[test]
-    fn pictures_of_a_page_are_bounded() {
-        assert_eq!((size(1280, 720), size(0, 0)), ((1280, 720), (1, 1)));
-        let (width, height) = size(7680, 4320);
-        assert!(f64::from(width) * f64::from(height) <= MOST_PIXELS);
-        assert!((f64::from(width) / f64::from(height) - 16.0 / 9.0).abs() < 0.01);
-        for (width, height) in [(u32::MAX, u32::MAX), (u32::MAX, 1), (1, u32::MAX)] {
-            let (width, height) = size(width, height);
-            assert!(f64::from(width) * f64::from(height) <= MOST_PIXELS);
-        }
     }
 
     #[test]
