@@ -2,7 +2,7 @@
 //! normal: joint bilateral upsampling (Kopf, Cohen, Lischinski and Uyttendaele 2007) of light without the surfaces'
 //! colours. It takes out most of the noise of one sample.
 
-use super::{PixelState, Pixels};
+use super::Pixels;
 use rayon::prelude::*;
 
 /// How many pixels with rays of their own count on each side, beyond those next to a pixel.
@@ -66,16 +66,23 @@ pub fn spread(width: usize, pixels: &Pixels, before: &[[f32; 4]], after: &mut [[
     });
 }
 
-/// Notes that no light is that of a pixel's own rays alone.
-pub fn note_states(pixels: &mut Pixels) {
-    for (state, _) in pixels.state.iter_mut().zip(&pixels.depth).filter(|(_, depth)| depth.is_finite()) {
-        *state = (*state).max(PixelState::Bounded);
-    }
+/// Has each pixel that shows something be no more exact than those whose light it shows.
+pub fn note_states(width: usize, pixels: &mut Pixels) {
+    let (states, depth) = (std::mem::take(&mut pixels.state), &pixels.depth);
+    let height = states.len() / width;
+    let worst = |pixel: usize| {
+        let (x, y) = (pixel % width, pixel / width);
+        let near = around(y, height).flat_map(|row| around(x, width).map(move |column| row * width + column));
+        let lenders = near.filter(|&near| depth[near].is_finite() && depth[pixel].is_finite());
+        lenders.fold(states[pixel], |worst, near| worst.max(states[near]))
+    };
+    pixels.state = (0..states.len()).into_par_iter().map(worst).collect();
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::PixelState;
 
     /// A wall of two colours, left of it a nearer one, and right of it nothing; lit by 0.5, the nearer one by 2.
     #[test]
@@ -105,8 +112,11 @@ mod tests {
         for (pixel, (own, full)) in after.iter().zip(&full).enumerate() {
             assert!((own[0] / full - 1.0).abs() < 0.02, "pixel {pixel}: {} and {full}", own[0]);
         }
-        note_states(&mut pixels);
-        // What shows nothing needs no light.
-        assert_eq!(pixels.state.iter().filter(|&&state| state == PixelState::Exact).count(), 2 * height);
+        // A pixel with rays of its own lends what it is not: to those around, and not to what shows nothing.
+        pixels.state[2 * width + 4] = PixelState::Bounded;
+        note_states(width, &mut pixels);
+        let is_bounded = |pixel: usize| pixels.state[pixel] == PixelState::Bounded;
+        assert!((0..width * height).filter(|&pixel| is_bounded(pixel)).all(|pixel| pixel % width < 7));
+        assert!(is_bounded(2 * width + 3) && is_bounded(width + 5) && !is_bounded(0));
     }
 }

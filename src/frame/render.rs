@@ -152,7 +152,7 @@ impl Renderer {
         engine.moved = Moved::default();
         engine.end_budget(camera, &mut output.pixels)?;
         if engine.halves() {
-            half_rate::note_states(&mut output.pixels);
+            half_rate::note_states(width, &mut output.pixels);
         }
         // Kernels count light that is not finite and leave it out; this finds what came about in any other way.
         if let Some(primary) = output.records.iter_mut().find(|record| record.pass == "primary") {

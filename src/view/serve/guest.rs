@@ -224,6 +224,10 @@ impl Guest {
             let names: Vec<&str> = nodes.iter().map(|node| node.name.as_str()).collect();
             json!({"names": names, "count": count})
         });
+        let located = viewer.located.as_ref().map(|(node, [min, max])| {
+            let size = (*max - *min).to_array();
+            json!({"name": node.name, "size": size})
+        });
         let conversion = viewer.conversion().map(|own| {
             let (phase, done, all) = own.so_far;
             json!({"phase": phase, "done": done, "all": all})
@@ -240,7 +244,7 @@ impl Guest {
             "found": viewer.found.as_ref().map(|found| found.lines()),
             "has_node": viewer.found.as_ref().is_some_and(|found| found.node.is_some()),
             "nodes": nodes,
-            "located": viewer.located.as_ref().map(|(node, [min, max])| json!({"name": node.name, "size": (*max - *min).to_array()})),
+            "located": located,
             "left_out": [&viewer.settings.hide, &viewer.settings.only],
             "measuring": viewer.mode == Mode::Measure,
             "measured": viewer.measure(),

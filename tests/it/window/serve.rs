@@ -182,6 +182,18 @@ fn pictures_follow_what_a_page_tells() {
     guest.state_that(|state| state["settings"]["effects"] == "primary");
     guest.tell(json!({"do": "click", "at": [0.5, 0.45], "double": false}));
     guest.state_that(|state| state["found"].as_array().is_some_and(|lines| !lines.is_empty()));
+    // Nodes: found, left out, shown again, gone to; a number that none has is said.
+    guest.tell(json!({"do": "find", "text": "block"}));
+    guest.state_that(|state| state["nodes"]["count"].as_u64().is_some_and(|count| count > 0));
+    guest.tell(json!({"do": "node", "act": "hide", "number": null}));
+    guest.tell(json!({"do": "node", "act": "only", "number": 0}));
+    guest.state_that(|state| state["left_out"][1].as_array().is_some_and(|only| only.len() == 1));
+    guest.tell(json!({"do": "show_all"}));
+    guest.state_that(|state| state["left_out"] == json!([[], []]));
+    guest.tell(json!({"do": "node", "act": "go", "number": 0}));
+    guest.state_that(|state| state["located"]["size"][0].as_f64().is_some_and(|size| size > 0.0));
+    guest.tell(json!({"do": "node", "act": "hide", "number": 1_000_000}));
+    guest.state_that(|state| state["messages"].to_string().contains("no such node"));
     guest.tell(json!({"do": "keyframe"}));
     guest.state_that(|state| state["keyframes"] == 1);
     // What is wrong is said, and changes nothing.
