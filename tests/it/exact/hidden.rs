@@ -8,7 +8,7 @@ use glam::DVec3;
 use std::path::Path;
 
 /// Triangles of a node.
-const EACH: usize = 700;
+const EACH: usize = 300;
 
 /// A number in 0..1.
 fn random(state: &mut u64) -> f64 {
@@ -80,8 +80,8 @@ fn rays_meet_what_brute_force_meets_of_the_nodes_that_are_left() {
         ("--only left", Box::new(of(0))),
         ("--hide bolt", Box::new(move |number| number < 2 * EACH)),
         // A node whose name another one has, too.
-        ("--hide #1500", Box::new(move |number| !of(2)(number))),
-        ("--only left,b* --hide #2100", Box::new(move |number| of(0)(number) || of(2)(number))),
+        ("--hide #700", Box::new(move |number| !of(2)(number))),
+        ("--only left,b* --hide #1000", Box::new(move |number| of(0)(number) || of(2)(number))),
     ];
     let mut hits = Vec::new();
     for adapter in adapters() {
@@ -154,7 +154,7 @@ fn neither_cache_nor_schedule_nor_device_changes_what_is_left() {
     let folder = folder();
     let (_, text) = shapes();
     let scene = converted(folder.path(), &text, "--brick-triangles 100");
-    let common = "--size 96x54 --spp 2 --effects primary,shadow,ao,diffuse,glossy --hide left,#1500";
+    let common = "--size 96x54 --spp 2 --effects primary,shadow,ao,diffuse,glossy --hide left,#700";
     let picture = |options: &str, adapter: &str| {
         let mut settings = settings(&format!("{common} {options}"));
         settings.set("adapter", adapter).expect("an adapter");
