@@ -312,3 +312,23 @@ pub fn frames(output: &Path) -> Vec<(String, Vec<u8>)> {
     files.sort();
     files
 }
+
+/// Corners of a box that is 4 wide and 3 high, on the ground, as vertices of an OBJ file.
+pub fn box_corners() -> String {
+    (0..8).map(|i| format!("v {} {} {}\n", (i & 1) * 4 - 2, (i >> 1 & 1) * 3, (i >> 2) * 4 - 2)).collect()
+}
+
+/// The mean radiance of the floor of such a box, seen from within, under a sun overhead that is all the light there is.
+pub fn light_on_floor(folder: &Path, scene: &Path, options: &str) -> f64 {
+    let path = folder.join("down.json");
+    let down =
+        r#"{"fov_y_degrees": 20, "up": [0,0,1], "keyframes": [{"time": 0, "position": [0,2,0], "target": [0,0,0]}]}"#;
+    std::fs::write(&path, down).expect("a path");
+    let light = "--effects primary,shadow --sun 0,1,0 --sun-angle 0 --sun-intensity 3 --sky-intensity 0 \
+                 --environment off --size 32x32 --spp 1";
+    let options = format!("{light} --path {} {options}", path.display());
+    let mut session = brickwalk::Session::open(scene, &settings(&options)).expect("a session");
+    let camera = session.path().frame(0, 1);
+    let frame = session.picture(&camera, &mut ()).expect("a frame").expect("a frame");
+    frame.pixels.radiance.iter().map(|c| f64::from(c[1])).sum::<f64>() / 1024.0
+}

@@ -1,7 +1,7 @@
 //! Scenes that are cut at a plane: rays meet what given rays with the same ends meet, nothing beyond the plane is met
 //! by any ray, and neither cache nor device changes a byte.
 
-use crate::common::{adapters, city, folder, settings, succeed};
+use crate::common::{adapters, box_corners, city, folder, light_on_floor, settings, succeed};
 use brickwalk::kernels::layout::NONE;
 use brickwalk::session::{Ray, Session};
 use brickwalk::settings::Group as _;
@@ -80,8 +80,7 @@ fn camera_rays_meet_what_given_rays_of_that_range_meet() {
 fn light_comes_into_a_box_that_is_cut_open() {
     let folder = folder();
     // A closed box, 4 wide and 3 high; the camera in it looks down, the sun stands overhead. And its floor alone.
-    let corners: String =
-        (0..8).map(|i| format!("v {} {} {}\n", (i & 1) * 4 - 2, (i >> 1 & 1) * 3, (i >> 2) * 4 - 2)).collect();
+    let corners = box_corners();
     std::fs::write(folder.path().join("box.mtl"), "newmtl white\nKd 1 1 1\n").expect("materials");
     let floor = "f 1 5 6 2\n";
     let converted = |name: &str, faces: &str| {
@@ -92,21 +91,7 @@ fn light_comes_into_a_box_that_is_cut_open() {
     };
     let closed = converted("closed", &format!("{floor}f 1 2 4 3\nf 5 7 8 6\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"));
     let alone = converted("alone", floor);
-    let path = folder.path().join("down.json");
-    std::fs::write(
-        &path,
-        r#"{"fov_y_degrees": 20, "up": [0,0,1], "keyframes": [{"time": 0, "position": [0,2,0], "target": [0,0,0]}]}"#,
-    )
-    .expect("a path");
-    let light = "--effects primary,shadow --sun 0,1,0 --sun-angle 0 --sun-intensity 3 --sky-intensity 0 \
-                 --environment off --size 32x32 --spp 1";
-    let mean = |scene: &Path, options: &str| {
-        let options = format!("{light} --path {} {options}", path.display());
-        let mut session = Session::open(scene, &settings(&options)).expect("a session");
-        let camera = session.path().frame(0, 1);
-        let frame = session.picture(&camera, &mut ()).expect("a frame").expect("a frame");
-        frame.pixels.radiance.iter().map(|c| f64::from(c[1])).sum::<f64>() / 1024.0
-    };
+    let mean = |scene: &Path, options: &str| light_on_floor(folder.path(), scene, options);
     assert_eq!(mean(&closed, ""), 0.0);
     let (open, truth) = (mean(&closed, "--clip 0,2.5,0,0,1,0"), mean(&alone, ""));
     assert!(truth > 0.1 && (open / truth - 1.0).abs() < 1e-6, "{open} and {truth}");

@@ -1,7 +1,7 @@
 //! Nodes that are left out: rays meet what f64 brute force over the other triangles meets, light comes in where a roof
 //! is hidden, and neither cache nor device changes a byte.
 
-use crate::common::{adapters, converted, folder, settings};
+use crate::common::{adapters, box_corners, converted, folder, light_on_floor, settings};
 use brickwalk::session::{Ray, Session, extent, find};
 use brickwalk::settings::Group as _;
 use glam::DVec3;
@@ -120,22 +120,9 @@ fn rays_meet_what_brute_force_meets_of_the_nodes_that_are_left() {
 #[test]
 fn light_comes_in_where_a_roof_is_hidden() {
     let folder = folder();
-    let corners: String =
-        (0..8).map(|i| format!("v {} {} {}\n", (i & 1) * 4 - 2, (i >> 1 & 1) * 3, (i >> 2) * 4 - 2)).collect();
+    let corners = box_corners();
     let shape = format!("{corners}o floor\nf 1 5 6 2\no walls\nf 1 2 4 3\nf 5 7 8 6\nf 1 3 7 5\nf 2 6 8 4\n");
-    let path = folder.path().join("down.json");
-    let down =
-        r#"{"fov_y_degrees": 20, "up": [0,0,1], "keyframes": [{"time": 0, "position": [0,2,0], "target": [0,0,0]}]}"#;
-    std::fs::write(&path, down).expect("a path");
-    let light = "--effects primary,shadow --sun 0,1,0 --sun-angle 0 --sun-intensity 3 --sky-intensity 0 \
-                 --environment off --size 32x32 --spp 1";
-    let mean = |scene: &Path, options: &str| {
-        let options = format!("{light} --path {} {options}", path.display());
-        let mut session = Session::open(scene, &settings(&options)).expect("a session");
-        let camera = session.path().frame(0, 1);
-        let frame = session.picture(&camera, &mut ()).expect("a frame").expect("a frame");
-        frame.pixels.radiance.iter().map(|c| f64::from(c[1])).sum::<f64>() / 1024.0
-    };
+    let mean = |scene: &Path, options: &str| light_on_floor(folder.path(), scene, options);
     let [open, closed] = ["open", "closed"].map(|name| {
         let place = folder.path().join(name);
         std::fs::create_dir(&place).expect("a folder");

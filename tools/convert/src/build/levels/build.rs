@@ -106,6 +106,7 @@ impl LevelWriter<'_> {
         });
         rayon::scope(|scope| go_on(scope, &line, &maker));
         let line = line.into_inner().unwrap_or_else(PoisonError::into_inner);
+        // Children come before their parents in a plan, so that one can always be begun.
         assert!(line.error.is_some() || line.planned.is_empty() && line.begun.is_empty(), "all levels are written");
         line.error.map_or(Ok(()), Err)
     }
