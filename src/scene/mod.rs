@@ -1,5 +1,6 @@
 //! What a frame looks at and from where: cameras and camera paths, in f64 world space.
 
+pub mod brick_walk;
 pub mod camera;
 pub mod framing;
 mod keyframes;

@@ -14,6 +14,36 @@ pub struct TopWalk<'a> {
     exact_bricks: u32,
 }
 
+/// A ray and where it ends: from an origin that it shares with others, such as a camera's.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight {
+    /// In which direction, of any length.
+    pub direction: DVec3,
+    /// Parameter of its end, its hit's.
+    pub end: f64,
+}
+
+/// What the rays of a tile meet of the top level: pairs of the tile with its nodes, as fronts have them that begin at
+/// the root and are not pulled up (CHC+RT, sections 4.2 and 4.3).
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TileFront {
+    /// Nodes that are leaves and that a ray enters before it ends: the visible front.
+    pub visible: Vec<u32>,
+    /// Nodes that no ray enters, where one enters the node above: the invisible front.
+    pub invisible: Vec<u32>,
+    /// How many nodes each ray enters.
+    pub entered: Vec<u32>,
+}
+
+/// Those of `rays`, by their numbers, that enter a box before they end.
+pub fn entering(bounds: [DVec3; 2], origin: DVec3, rays: &[Sight], numbers: &[u32]) -> Vec<u32> {
+    let enters = |&&number: &&u32| {
+        let Sight { direction, end } = rays[number as usize];
+        crossing(bounds, origin, direction.recip(), [0.0, end]).is_some()
+    };
+    numbers.iter().filter(enters).copied().collect()
+}
+
 /// The parameters at which a ray enters and leaves a box, within a range; `None`: it passes it by.
 pub fn crossing([min, max]: [DVec3; 2], origin: DVec3, inverse: DVec3, [start, end]: [f64; 2]) -> Option<[f64; 2]> {
     let (mut near, mut far) = (start, end);
@@ -81,6 +111,40 @@ impl<'a> TopWalk<'a> {
             };
         }
         visited
+    }
+
+    /// What rays from `origin` meet, levels of detail not among it.
+    pub fn front(&self, origin: DVec3, rays: &[Sight]) -> TileFront {
+        let mut front = TileFront { entered: vec![0; rays.len()], ..TileFront::default() };
+        let all: Vec<u32> = (0..rays.len() as u32).collect();
+        let mut stack = if self.resident.top2.is_empty() { Vec::new() } else { vec![(0u32, all)] };
+        while let Some((number, above)) = stack.pop() {
+            let node = &self.resident.top2[number as usize];
+            let is_leaf = node.right == TOP_LEAF;
+            if is_leaf && self.resident.leaves[node.left as usize].brick >= self.exact_bricks {
+                continue;
+            }
+            let within = entering(world_box(self.resident, [node.min, node.max]), origin, rays, &above);
+            within.iter().for_each(|&ray| front.entered[ray as usize] += 1);
+            match (within.is_empty(), is_leaf) {
+                (true, _) => front.invisible.push(number),
+                (false, true) => front.visible.push(number),
+                (false, false) => stack.extend([(node.right, within.clone()), (node.left, within)]),
+            }
+        }
+        front
+    }
+
+    /// The leaf that a node of the top level is; `None`: it is none.
+    pub fn leaf(&self, node: u32) -> Option<&'a Leaf> {
+        let node = &self.resident.top2[node as usize];
+        (node.right == TOP_LEAF).then(|| &self.resident.leaves[node.left as usize])
+    }
+
+    /// The bounds of a node, world units.
+    pub fn bounds(&self, node: u32) -> [DVec3; 2] {
+        let node = &self.resident.top2[node as usize];
+        world_box(self.resident, [node.min, node.max])
     }
 }
 

@@ -143,6 +143,37 @@ impl Bands {
     }
 }
 
+/// Refuses pictures of `settings`, rendered at once in the place of those of `before`, that memory does not hold.
+/// `is_on_host`: rays and what shading keeps lie there, too.
+///
+/// # Errors
+/// How much they take, how much there is, and the largest size that it is enough for.
+pub fn check_whole(settings: &Settings, before: &Settings, is_on_host: bool) -> Result<()> {
+    check_within(settings, before, is_on_host, cpu::available_memory)
+}
+
+fn check_within(
+    settings: &Settings,
+    before: &Settings,
+    is_on_host: bool,
+    available: impl FnOnce() -> Option<u64>,
+) -> Result<()> {
+    let of = |settings: &Settings| {
+        let PictureBytes { device, host, .. } = PictureBytes::of(settings);
+        let pixels = u64::from(settings.size.width) * u64::from(settings.size.height);
+        let a_pixel = host + if is_on_host { device } else { 0 };
+        (pixels * a_pixel, a_pixel)
+    };
+    let ((wanted, whole), (held, _)) = (of(settings), of(before));
+    // Most pictures are no larger than those before.
+    let Some(free) = (wanted > held).then(available).flatten() else { return Ok(()) };
+    if wanted <= held + free {
+        return Ok(());
+    }
+    let available = Some(held + free);
+    Pool { what: "memory", available, whole, joined: 0, band: 0, has_cache: false }.refuse(settings, [whole, 0], "")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,5 +260,25 @@ mod tests {
             let larger = crate::settings::ImageSize { width: size.width + 40, height: size.height + 40 };
             assert!(has(&Settings { size: larger, ..settings }).is_err(), "{named} is not the largest");
         }
+    }
+
+    #[test]
+    fn what_takes_the_place_of_another_picture_must_fit() {
+        let of = |options: &str| Settings::from_options(options).unwrap();
+        let (small, large) = (of("--size 640x360"), of("--size 16384x16384"));
+        let error = check_within(&large, &small, true, || Some(8 << 30)).unwrap_err().to_string();
+        assert!(error.starts_with("--size 16384x16384: pictures take") && error.contains("give at most --size"), "{error}");
+        // What it says is enough is enough.
+        let at_most = error.rsplit("--size ").next().unwrap();
+        check_within(&of(&format!("--size {at_most}")), &small, true, || Some(8 << 30)).unwrap();
+        check_within(&large, &small, true, || Some(1 << 40)).unwrap();
+        check_within(&large, &small, true, || None).unwrap();
+        // What is no larger is not asked about, and what is held already is there.
+        check_within(&small, &large, true, || panic!("asked")).unwrap();
+        check_within(&of("--size 641x360"), &small, true, || Some(1 << 20)).unwrap();
+        // Of a device with memory of its own, the host has the smaller part.
+        let middle = of("--size 4096x4096");
+        let free = || Some(3 << 30);
+        assert!(check_within(&middle, &small, false, free).is_ok() && check_within(&middle, &small, true, free).is_err());
     }
 }

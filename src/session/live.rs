@@ -2,6 +2,7 @@
 //! A picture is that of a walk whose only frame it is, so that what is seen in the end is what `walk` writes.
 
 use super::Session;
+use super::bands;
 use super::hidden;
 use super::lighting::lighting;
 use super::open::Frame;
@@ -53,7 +54,7 @@ impl Session {
     /// stay as they are, and so does what is set when a session is opened ([`Settings::needs_opening`]).
     ///
     /// # Errors
-    /// Settings that do not go together; an environment that cannot be read; a picture that the device does not hold.
+    /// Settings that do not go together; an environment that cannot be read; a picture that memory does not hold.
     /// The session then keeps those it had.
     pub fn set(&mut self, settings: &Settings) -> Result<()> {
         if *settings == self.given {
@@ -61,6 +62,7 @@ impl Session {
         }
         settings.check()?;
         let suited = settings.suited(&self.renderer.scene.resident().manifest);
+        bands::check_whole(&suited, &self.settings, self.renderer.executor.device().backend == "cpu")?;
         let lighting = match self.settings.lights_otherwise(&suited) {
             true => Some(lighting(&suited, &self.renderer.scene, &self.file)?),
             false => None,

@@ -92,6 +92,7 @@ mod secondary {
 mod window {
     mod browser;
     mod display;
+    mod overlays;
     mod panels;
     mod serve;
     mod studio;

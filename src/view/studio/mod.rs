@@ -4,6 +4,7 @@
 //!
 //! Nobody waits for it: wishes and questions go into an inbox, news come out of a channel.
 
+mod boxes;
 mod inbox;
 mod inspect;
 mod overlay;

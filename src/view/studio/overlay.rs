@@ -1,7 +1,9 @@
 //! What is painted over a picture: what the engine did for each pixel.
 
+use super::boxes::Boxes;
 use super::steps::Steps;
 use crate::frame::{Answered, PixelState};
+use crate::scene::Camera;
 use crate::settings::names;
 use std::collections::HashSet;
 
@@ -26,7 +28,10 @@ names! {
         Tiles = "tiles",
         /// How many bricks the rays of each tile enter: its visible query pairs.
         Queries = "queries",
-        /// How many nodes of the top level each pixel's ray visits.
+        /// The front of the tile in the middle, or of the camera that was left behind: boxes of nodes that its rays
+        /// enter, and of those that none enters.
+        Fronts = "fronts",
+        /// How many nodes each pixel's ray visits, of the top level and of bricks in the cache.
         Steps = "steps",
         /// Who answered the secondary rays of each pixel: tracing, or a method.
         Methods = "methods",
@@ -52,8 +57,12 @@ pub struct Pixels<'a> {
     pub bricks: &'a [Option<(u32, bool)>],
     /// The bricks of the camera that was left behind.
     pub frozen: &'a HashSet<u32>,
-    /// What rays meet of the top level; `None`: not known.
+    /// The camera.
+    pub camera: &'a Camera,
+    /// What rays meet of the trees; `None`: not known.
     pub steps: Option<&'a Steps>,
+    /// The front that [`Overlay::Fronts`] shows; `None`: none.
+    pub front: Option<&'a Boxes>,
     /// Who answered secondary rays; empty: not known.
     pub answers: &'a [Answered],
 }
@@ -106,7 +115,10 @@ impl Overlay {
             Self::Queries => {
                 format!("black: 0, white: {} bricks that rays of a tile enter", most(|steps| &steps.bricks))
             }
-            Self::Steps => format!("black: 0, white: {} nodes of the top level", most(|steps| &steps.nodes)),
+            Self::Fronts => pixels.front.map_or(String::new(), Boxes::legend),
+            Self::Steps => {
+                format!("black: 0, white: {} nodes, of the top level and of bricks", most(|steps| &steps.nodes))
+            }
             Self::Methods => "blue: secondary rays were traced, amber: a method answered them".into(),
         }
     }
@@ -121,6 +133,10 @@ impl Overlay {
         if self == Self::None {
             return;
         }
+        if let Some(front) = pixels.front.filter(|_| self == Self::Fronts) {
+            front.paint(pixels.camera, pixels.size, pixels.depth, picture);
+            return;
+        }
         let counts: Option<&[u32]> = pixels.steps.map(|steps| match self {
             Self::Queries => &steps.bricks[..],
             _ => &steps.nodes[..],
@@ -129,7 +145,7 @@ impl Overlay {
         let greatest = pixels.depth.iter().copied().filter(|depth| depth.is_finite()).fold(0.0, f32::max);
         for (index, shown) in picture.iter_mut().enumerate() {
             let own = match self {
-                Self::None => None,
+                Self::None | Self::Fronts => None,
                 Self::State => Some(STATES[pixels.states.get(index).copied().unwrap_or_default() as usize]),
                 Self::Bricks => pixels.bricks.get(index).copied().flatten().map(|(brick, _)| color_of(brick)),
                 Self::Residency => {
@@ -179,6 +195,7 @@ impl Overlay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     #[test]
     fn each_overlay_shows_what_it_is_about() {
@@ -190,7 +207,9 @@ mod tests {
             normals: &[[0.0, 1.0, 0.0]; 4],
             bricks: &[Some((3, true)), Some((3, true)), None, Some((4, false))],
             frozen: &HashSet::from([4]),
+            camera: &Camera { position: DVec3::ZERO, target: DVec3::NEG_Z, up: DVec3::Y, fov_y: 1.0 },
             steps: Some(&Steps { nodes: vec![0, 5, 10, 10], bricks: vec![3, 3, 1, 1] }),
+            front: Some(&Boxes { tile: Some(([0, 0], 1)), ..Boxes::default() }),
             answers: &[(1, 0), (0, 2), (0, 0), (1, 1)].map(|(traced, by_method)| Answered { traced, by_method }),
         };
         let shown = |overlay: Overlay| {
@@ -215,6 +234,8 @@ mod tests {
         assert!(Overlay::Steps.legend(&pixels).contains("white: 10 nodes"));
         let queries = shown(Overlay::Queries);
         assert!(queries[0] == [255; 3] && queries[0] == queries[1] && queries[2] == queries[3]);
+        let fronts = shown(Overlay::Fronts);
+        assert!(fronts[0] != [100; 3] && fronts[1..] == [[100; 3]; 3]);
         let methods = shown(Overlay::Methods);
         assert!(methods[0] != [100; 3] && methods[1] != methods[0] && methods[2] == [100; 3]);
         assert!(methods[3] != methods[0] && methods[3] != methods[1]);

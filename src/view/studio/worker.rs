@@ -1,10 +1,11 @@
 //! The thread of a studio: one thing after the other, the latest wish first.
 
+use super::boxes::Boxes;
 use super::inbox::{Inbox, Turn};
 use super::inspect::{compared, found};
 use super::overlay::Pixels;
 use super::pace::{Refinement, Scale};
-use super::steps::steps;
+use super::steps::{Sights, steps};
 use super::{Ask, Converter, News, Overlay, Pace, Purpose, Scene, Shown, Stage, Wake, Wish};
 use crate::frame::{FrameWatch, PixelState};
 use crate::output::png;
@@ -62,6 +63,15 @@ impl Watch for Gives<'_> {
     }
 }
 
+/// What a camera that was left behind shows.
+#[derive(Default)]
+struct Left {
+    /// Its bricks.
+    bricks: HashSet<u32>,
+    /// The front of the tile in the middle of its picture; `None`: no camera was left.
+    front: Option<Boxes>,
+}
+
 /// What is next if nothing new comes.
 enum Plan {
     /// Nothing.
@@ -114,8 +124,8 @@ pub struct Worker {
     has_levels: bool,
     /// The last picture that was told, what was wished, and how it came about.
     last: Option<(Frame, Wish, (Stage, f64))>,
-    /// Bricks that [`Overlay::Frozen`] shows.
-    frozen: HashSet<u32>,
+    /// What [`Overlay::Frozen`] and [`Overlay::Fronts`] show of a camera that was left behind.
+    left: Left,
     /// The failure that was told last.
     failure: String,
 }
@@ -136,7 +146,7 @@ impl Worker {
             scale: Scale::new(),
             has_levels: false,
             last: None,
-            frozen: HashSet::new(),
+            left: Left::default(),
             failure: String::new(),
         }
     }
@@ -278,7 +288,7 @@ impl Worker {
         if wish.overlay == Overlay::Methods && session.answers().is_none() {
             return None;
         }
-        let shown = shown(session, frame, &wish, &self.frozen, *taken).ok()?;
+        let shown = shown(session, frame, &wish, &self.left, *taken).ok()?;
         self.last.as_mut()?.1 = wish;
         self.tell.tell(News::Shown(Arc::new(shown)));
         Some(())
@@ -292,7 +302,7 @@ impl Worker {
         session.note_answers(wish.overlay == Overlay::Methods);
         let Some(frame) = session.picture(&wish.camera, &mut gives)? else { return Ok(None) };
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        let shown = shown(session, &frame, wish, &self.frozen, (stage, ms))?;
+        let shown = shown(session, &frame, wish, &self.left, (stage, ms))?;
         self.last = Some((frame, wish.clone(), (stage, ms)));
         self.tell.tell(News::Shown(Arc::new(shown)));
         Ok(Some(ms))
@@ -309,7 +319,7 @@ impl Worker {
             Ask::LoseDevice => self.lose_device(),
             Ask::Freeze(true) => self.freeze(),
             Ask::Freeze(false) => {
-                self.frozen.clear();
+                self.left = Left::default();
                 Ok(())
             }
         };
@@ -365,7 +375,7 @@ impl Worker {
                     return;
                 }
                 (self.wish, self.last, self.plan) = (None, None, Plan::Idle);
-                self.frozen.clear();
+                self.left = Left::default();
                 self.scale = Scale::new();
                 self.tell.tell(News::Opened(Box::new(scene)));
                 for warning in warnings {
@@ -443,18 +453,22 @@ impl Worker {
     }
 
     fn freeze(&mut self) -> Result<()> {
-        let (_, wish, _) = self.last.as_ref().context("there is no picture yet")?;
+        let (frame, wish, _) = self.last.as_ref().context("there is no picture yet")?;
         let camera = wish.camera;
         let session = self.session.as_mut().context("no scene is open")?;
-        self.frozen = session.bricks_seen()?.into_iter().flatten().map(|(brick, _)| brick).collect();
-        self.tell.tell(News::Frozen(camera, self.frozen.len()));
+        let bricks: HashSet<u32> = session.bricks_seen()?.into_iter().flatten().map(|(brick, _)| brick).collect();
+        let tile = session.renderer().tile;
+        let sights = Sights { camera: &camera, size: frame.size, tile, depth: &frame.pixels.depth };
+        let front = Boxes { tile: None, ..Boxes::of_middle(session.renderer().scene.resident(), &sights) };
+        self.tell.tell(News::Frozen(camera, bricks.len()));
+        self.left = Left { bricks, front: Some(front) };
         Ok(())
     }
 
     fn save(&mut self, file: &Path) -> Result<()> {
         let (frame, wish, taken) = self.last.as_ref().context("there is no picture to save")?;
         let session = self.session.as_mut().context("no scene is open")?;
-        let shown = shown(session, frame, wish, &self.frozen, *taken)?;
+        let shown = shown(session, frame, wish, &self.left, *taken)?;
         png::write(file, shown.size.0, shown.size.1, &shown.pixels)?;
         self.tell.tell(News::Saved(file.into()));
         Ok(())
@@ -475,14 +489,19 @@ fn shown(
     session: &mut Session,
     frame: &Frame,
     wish: &Wish,
-    frozen: &HashSet<u32>,
+    left: &Left,
     (stage, ms): (Stage, f64),
 ) -> Result<Shown> {
     static NUMBER: AtomicU64 = AtomicU64::new(1);
     let bricks = if wish.overlay.shows_bricks() { session.bricks_seen()? } else { Vec::new() };
     let (scene, tile) = (session.renderer().scene.clone(), session.renderer().tile);
+    let sights = Sights { camera: &wish.camera, size: frame.size, tile, depth: &frame.pixels.depth };
+    let cached = &session.renderer().cache.states;
+    let is_counted = |brick: u32| wish.overlay == Overlay::Steps && cached.geometry(brick as usize).is_some();
     let walks = matches!(wish.overlay, Overlay::Queries | Overlay::Steps);
-    let steps = walks.then(|| steps(scene.resident(), &wish.camera, frame.size, tile, &frame.pixels.depth));
+    let steps = walks.then(|| steps(&scene, &is_counted, &sights)).transpose()?;
+    let own = (wish.overlay == Overlay::Fronts && left.front.is_none())
+        .then(|| Boxes::of_middle(scene.resident(), &sights));
     let mut pixels = developed(&frame.pixels.radiance, frame.exposure_ev, frame.tone_map);
     let of = Pixels {
         size: frame.size,
@@ -491,8 +510,10 @@ fn shown(
         depth: &frame.pixels.depth,
         normals: &frame.pixels.normal,
         bricks: &bricks,
-        frozen,
+        frozen: &left.bricks,
+        camera: &wish.camera,
         steps: steps.as_ref(),
+        front: left.front.as_ref().or(own.as_ref()),
         answers: session.answers().unwrap_or_default(),
     };
     wish.overlay.paint(&of, &mut pixels);

@@ -15,12 +15,13 @@ use std::time::{Duration, Instant};
 /// Nothing here takes longer.
 const MOST: Duration = Duration::from_secs(120);
 
-fn settings(options: &str) -> Settings {
+/// Settings of these options.
+pub fn settings(options: &str) -> Settings {
     Settings::from_options(options).expect("options")
 }
 
 /// A studio, and the scene that it has opened.
-fn open(scene: &Path, settings: &Settings) -> (Studio, Scene) {
+pub fn open(scene: &Path, settings: &Settings) -> (Studio, Scene) {
     let converter: Converter = Arc::new(|path, _| Ok(path.into()));
     let studio = Studio::start(settings, Pace::default(), converter, Arc::new(|| ())).expect("a thread");
     studio.ask(Ask::Open(scene.into()));
@@ -33,7 +34,7 @@ fn open(scene: &Path, settings: &Settings) -> (Studio, Scene) {
 }
 
 /// Waits for news.
-fn until<T>(studio: &Studio, mut wanted: impl FnMut(News) -> Option<T>) -> T {
+pub fn until<T>(studio: &Studio, mut wanted: impl FnMut(News) -> Option<T>) -> T {
     let start = Instant::now();
     loop {
         match studio.news() {
@@ -49,7 +50,7 @@ fn until<T>(studio: &Studio, mut wanted: impl FnMut(News) -> Option<T>) -> T {
 }
 
 /// The picture of a camera once it rests, and those before it.
-fn rest(studio: &Studio, wish: &Wish) -> (Arc<Shown>, Vec<Arc<Shown>>) {
+pub fn rest(studio: &Studio, wish: &Wish) -> (Arc<Shown>, Vec<Arc<Shown>>) {
     studio.wish(wish.clone());
     let mut before = Vec::new();
     let last = until(studio, |news| match news {
@@ -92,7 +93,8 @@ fn bytes_of(material: &bricks::Material) -> &[u8] {
     bytemuck::bytes_of(material)
 }
 
-fn wish(camera: Camera, settings: &Settings) -> Wish {
+/// A wish without an overlay.
+pub fn wish(camera: Camera, settings: &Settings) -> Wish {
     Wish { camera, settings: settings.clone(), overlay: Overlay::None }
 }
 
@@ -248,59 +250,6 @@ fn places_are_told_and_pictures_compared_and_saved() {
     rest(&studio, &wish(camera, &asked));
     let comparison = compared(&studio);
     assert!(comparison.flip > 1e-3 && comparison.rmse > 0.0 && comparison.map.iter().any(|&pixel| pixel != [0; 3]));
-}
-
-#[test]
-fn overlays_show_what_the_engine_knows() {
-    let folder = folder();
-    let scene = city(folder.path());
-    let asked = settings("--size 96x54 --spp 1 --adapter cpu --cache 30%");
-    let (studio, opened) = open(&scene, &asked);
-    let camera = opened.way.frame(0, 1);
-    let (plain, _) = rest(&studio, &wish(camera, &asked));
-    let mut seen = vec![plain.pixels.clone()];
-    studio.ask(Ask::Freeze(true));
-    let (from, bricks) = until(&studio, |news| match news {
-        News::Frozen(from, bricks) => Some((from, bricks)),
-        _ => None,
-    });
-    assert!(from == camera && bricks > 1 && bricks < opened.bricks);
-    for &overlay in Overlay::ALL.iter().filter(|&&overlay| overlay != Overlay::None) {
-        let (last, _) = rest(&studio, &Wish { overlay, ..wish(camera, &asked) });
-        assert!(!seen.contains(&last.pixels) || overlay == Overlay::Frozen, "{overlay} shows nothing");
-        seen.push(last.pixels.clone());
-        if overlay == Overlay::Frozen {
-            // From where it was left every brick is its own; from elsewhere others are seen, too.
-            let is_red = |pixel: &&[u8; 3]| pixel[0] > 40 + pixel[1];
-            let red = |shown: &Shown| shown.pixels.iter().filter(is_red).count();
-            let (elsewhere, _) = rest(&studio, &Wish { overlay, ..wish(opened.way.frame(9, 10), &asked) });
-            assert!(10 * red(&last) < red(&elsewhere), "{} and {}", red(&last), red(&elsewhere));
-        }
-    }
-}
-
-#[test]
-fn overlays_tell_who_answered_and_what_rays_visit() {
-    let folder = folder();
-    let scene = city(folder.path());
-    let common = "--size 96x54 --spp 1 --adapter cpu --effects primary,ao --ao-rays 1";
-    let shares = |options: &str| {
-        let asked = settings(&format!("{common} {options}"));
-        let (studio, opened) = open(&scene, &asked);
-        let (last, _) = rest(&studio, &Wish { overlay: Overlay::Methods, ..wish(opened.way.frame(0, 1), &asked) });
-        let is = |more: usize, less: usize| move |pixel: &&[u8; 3]| pixel[more] > pixel[less] + 30;
-        let count = |is: &dyn Fn(&&[u8; 3]) -> bool| last.pixels.iter().filter(|pixel| is(pixel)).count();
-        (count(&is(2, 0)), count(&is(0, 2)))
-    };
-    let ((traced, _), (_, answered)) = (shares(""), shares("--secondary ao=roma"));
-    assert!(traced > 1000 && answered > 1000, "{traced} pixels are blue, {answered} amber");
-    // Rays visit no more nodes than there are, and what sees nothing far away visits the fewest.
-    let asked = settings(common);
-    let (studio, opened) = open(&scene, &asked);
-    let (last, _) = rest(&studio, &Wish { overlay: Overlay::Steps, ..wish(opened.way.frame(0, 1), &asked) });
-    let most: u32 =
-        last.legend.split_whitespace().find_map(|word| word.parse().ok().filter(|&n| n > 0)).expect("a count");
-    assert!(most > 3 && (most as usize) < 4 * opened.bricks, "{}", last.legend);
 }
 
 #[test]
