@@ -8,7 +8,7 @@ use brickwalk::Settings;
 use brickwalk::gpu::device::Gpu;
 use brickwalk::schedule::Load;
 use brickwalk::session::opened::{Opened, open_scene};
-use brickwalk::settings::{CacheSize, ImageSize};
+use brickwalk::settings::{CacheSize, HostCacheSize, ImageSize};
 use brickwalk::stream::{Item, PayloadSource, Slot};
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use std::path::PathBuf;
@@ -61,6 +61,7 @@ fn streaming(c: &mut Criterion) {
     mapped.unmap();
 
     for (name, host_cache) in [("file", 0), ("host cache", 4 << 30)] {
+        let host_cache = HostCacheSize::Bytes(host_cache);
         let size = ImageSize { width: 64, height: 64 };
         let settings = Settings { cache: CacheSize::Percent(100.0), host_cache, size, ..Settings::exact() };
         let mut session = Opened::open(file.clone(), &path, &settings).expect("a session");

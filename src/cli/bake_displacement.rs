@@ -8,7 +8,7 @@ use crate::secondary::displacement::{Bench, Shape};
 use crate::session::trace::for_rays;
 use crate::session::{Opened, Settings, open_scene};
 use crate::settings::sizes::{counted, human_bytes, human_count};
-use crate::settings::{Adapter, CacheSize, names};
+use crate::settings::{Adapter, CacheSize, HostCacheSize, names};
 use crate::stream::PayloadSource;
 use anyhow::Result;
 use bricks::{DISPLACEMENT_BY_CPU, DISPLACEMENT_BY_GPU};
@@ -67,7 +67,7 @@ pub fn add(path: &Path, output: &Path, making: &Making, memory: u64, adapter: &A
     let settings = for_rays(&Settings {
         adapter: adapter.clone(),
         cache: CacheSize::Percent(share.min(100.0)),
-        host_cache: memory / 4,
+        host_cache: HostCacheSize::Bytes(memory / 4),
         ..Settings::exact()
     });
     let mut opened = Opened::open(Arc::clone(&scene), path, &settings)?;

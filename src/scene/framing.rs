@@ -103,8 +103,8 @@ fn fitted(boxes: &[[DVec3; 2]], centre: DVec3, forward: DVec3, fov_y_degrees: f6
     forward * away + right * middle(0) + up * middle(1)
 }
 
-/// Where along an axis a camera stands, `depth` into the picture, that sees the corners as far on one side of its middle
-/// as on the other; `start` is near that.
+/// Where along an axis a camera stands, `depth` into the picture, that sees the corners as far on one side of its
+/// middle as on the other; `start` is near that.
 fn middle(corners: &[[f64; 3]], axis: usize, depth: f64, start: f64) -> f64 {
     let mut at = start;
     for _ in 0..STEPS {

@@ -12,6 +12,9 @@ pub const BATCH_BRICKS: usize = 8;
 /// Most bytes loaded at once: they take as much memory on their way to the device.
 const BATCH_BYTES: u64 = 64 << 20;
 
+/// Groups of bricks that do not fit into a full cache, after which no others are tried.
+const MOST_REFUSED: u32 = 4;
+
 /// What a frame may still load.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowance {
@@ -180,15 +183,16 @@ impl Cache {
         Ok(taken)
     }
 
-    /// Loads `items`, the most urgent first, as far as they fit beside each other and beside `kept`, and as the frame's
-    /// allowance goes. What is resident of them stays. Returns whether anything was loaded.
+    /// Loads `groups` of items that are of use together only, the most urgent first, as far as the frame's allowance
+    /// goes. One that does not fit whole beside `kept` and those before it is left out: its parts would put out others
+    /// for nothing, frame after frame. Returns whether anything was loaded.
     ///
     /// # Errors
     /// As of [`Self::load`].
     pub fn load_within(
         &mut self,
         executor: &mut dyn Executor,
-        items: &[Item],
+        groups: &[Vec<Item>],
         kept: &[Item],
         stats: &mut Counters,
     ) -> Result<bool, ExecutorError> {
@@ -196,36 +200,54 @@ impl Cache {
         for &item in kept {
             self.residency.pin(item);
         }
-        let mut rest = items;
-        let mut has_loaded = false;
-        while let (Some(allowance), false) = (self.allowance, rest.is_empty()) {
-            let left = allowance.left();
-            // What is resident of the batch must not make room for the rest of it.
-            for &item in rest.iter().take(2 * BATCH_BRICKS) {
+        let (mut has_loaded, mut refused) = (false, 0);
+        for group in groups {
+            let Some(left) = self.allowance.map(|allowance| allowance.left()) else { break };
+            if !self.has_room(group) {
+                refused += 1;
+                if refused == MOST_REFUSED {
+                    break;
+                }
+                continue;
+            }
+            for &item in group {
                 self.residency.pin(item);
             }
-            // What each and all before it in the batch add to what is resident.
-            let sums: Vec<u64> = (rest.iter().take(2 * BATCH_BRICKS))
-                .scan(0, |sum, &item| {
-                    let is_resident = self.residency.slot(item).is_some();
-                    *sum += if is_resident { 0 } else { self.residency.bytes(item) };
-                    Some(*sum)
-                })
-                .take_while(|&sum| sum <= left)
-                .collect();
-            let count = match sums.len() {
-                0 => 0,
-                most => self.load_beside(executor, &rest[..most], most, stats)?,
+            // What each and all before it in the group add to what is resident.
+            let add = |sum: &mut u64, &item: &Item| {
+                *sum += if self.residency.slot(item).is_some() { 0 } else { self.residency.bytes(item) };
+                Some(*sum)
             };
-            let bytes = count.checked_sub(1).map_or(0, |last| sums[last]);
+            let sums: Vec<u64> = group.iter().scan(0, add).take_while(|&sum| sum <= left).collect();
+            let mut taken = 0;
+            while taken < sums.len() {
+                let count = self.load_beside(executor, &group[taken..sums.len()], usize::MAX, stats)?;
+                if count == 0 {
+                    break;
+                }
+                taken += count;
+            }
+            let bytes = taken.checked_sub(1).map_or(0, |last| sums[last]);
             self.spend(bytes);
             has_loaded |= bytes > 0;
-            rest = &rest[count..];
-            if count < sums.len() || count == 0 {
+            if taken < group.len() {
                 break;
             }
         }
         Ok(has_loaded)
+    }
+
+    /// Whether all of `group` can be resident beside what is pinned.
+    fn has_room(&self, group: &[Item]) -> bool {
+        let mut missing = group.iter().filter(|&&item| self.residency.slot(item).is_none()).peekable();
+        if missing.peek().is_none() {
+            return true;
+        }
+        let mut trial = self.residency.clone();
+        for &item in group {
+            trial.pin(item);
+        }
+        missing.all(|&item| trial.insert(item).is_ok() && trial.pin(item))
     }
 
     /// Takes bytes that have been loaded off the frame's allowance.

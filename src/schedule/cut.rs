@@ -129,8 +129,8 @@ impl Cut {
     }
 
     /// What to load, the most urgent first, and what of that is resident already: bricks that nothing stands in for,
-    /// roots, and the children of what rays asked for.
-    fn wanted(&self, cache: &Cache) -> Vec<Item> {
+    /// roots, and the children of each level that rays asked for, which are of use together.
+    fn wanted(&self, cache: &Cache) -> Vec<Vec<Item>> {
         let mut by_rays: Vec<(u64, u32)> = self.asked.iter().map(|(&brick, &rays)| (rays, brick)).collect();
         by_rays.sort_unstable_by_key(|&(rays, brick)| (Reverse(rays), brick));
         let missing = by_rays.iter().map(|&(_, brick)| brick).filter(|&brick| !is_ready(cache, brick));
@@ -140,14 +140,14 @@ impl Cut {
             bytes += both(brick).map(|item| cache.residency.bytes(item)).iter().sum::<u64>();
             bytes <= most
         });
-        let children = by_rays.iter().flat_map(|&(_, brick)| self.children[brick as usize].iter().copied());
+        let children = by_rays.iter().map(|&(_, brick)| self.children[brick as usize].clone());
+        let alone: Vec<u32> = missing.chain(roots).collect();
         let mut is_listed = vec![false; self.children.len()];
-        missing
-            .chain(roots)
-            .chain(children)
-            .filter(|&brick| !std::mem::replace(&mut is_listed[brick as usize], true))
-            .flat_map(both)
-            .collect()
+        let mut items = |group: Vec<u32>| {
+            let is_new = |&brick: &u32| !std::mem::replace(&mut is_listed[brick as usize], true);
+            group.into_iter().filter(is_new).flat_map(both).collect::<Vec<Item>>()
+        };
+        alone.into_iter().map(|brick| vec![brick]).chain(children).map(&mut items).collect()
     }
 
     /// The bricks that stay: roots that are ready, what was used, and what stands above it.

@@ -267,7 +267,10 @@ mod tests {
         let of = |options: &str| Settings::from_options(options).unwrap();
         let (small, large) = (of("--size 640x360"), of("--size 16384x16384"));
         let error = check_within(&large, &small, true, || Some(8 << 30)).unwrap_err().to_string();
-        assert!(error.starts_with("--size 16384x16384: pictures take") && error.contains("give at most --size"), "{error}");
+        assert!(
+            error.starts_with("--size 16384x16384: pictures take") && error.contains("give at most --size"),
+            "{error}"
+        );
         // What it says is enough is enough.
         let at_most = error.rsplit("--size ").next().unwrap();
         check_within(&of(&format!("--size {at_most}")), &small, true, || Some(8 << 30)).unwrap();
@@ -279,6 +282,8 @@ mod tests {
         // Of a device with memory of its own, the host has the smaller part.
         let middle = of("--size 4096x4096");
         let free = || Some(3 << 30);
-        assert!(check_within(&middle, &small, false, free).is_ok() && check_within(&middle, &small, true, free).is_err());
+        assert!(
+            check_within(&middle, &small, false, free).is_ok() && check_within(&middle, &small, true, free).is_err()
+        );
     }
 }

@@ -3,6 +3,7 @@
 use super::bands::Bands;
 use super::device::Device;
 use super::hidden;
+use crate::cpu::available_memory;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::output::atomic;
 use crate::schedule::ExecutorError;
@@ -199,19 +200,20 @@ impl Opened {
             keep: Keep::default(),
         };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();
+        let host_bytes = settings.host_cache.bytes(available_memory());
         info!(
             "cache: {} of {} of bricks and tiles, {policy}, in {}; host cache {}",
             human_bytes(budget),
             human_bytes(sizes.sum()),
             counted(page_sizes.len() as u64, "page"),
-            human_bytes(settings.host_cache)
+            human_bytes(host_bytes)
         );
         info!("schedule: {schedule}");
         if rows < settings.size.height {
             let bands = settings.size.height.div_ceil(rows);
             info!("pictures: {} of {rows} rows", counted(bands.into(), "band"));
         }
-        let host = HostCache::new(settings.host_cache);
+        let host = HostCache::new(host_bytes);
         let threads = settings.worker_count();
         let needs = Needs { scene: scene.clone(), host, threads, page_sizes: &page_sizes, setup };
         let mut executor = make(needs).with_context(|| format!("{name}"))?;

@@ -10,8 +10,8 @@ use crate::secondary::df;
 use crate::secondary::{EffectMethods, Method, displacement, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
-    Adapter, CacheSize, Direction, EffectList, Entry, Environment, FrameBudget, Group, ImageSize, Length, Plane,
-    Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
+    Adapter, CacheSize, Direction, EffectList, Entry, Environment, FrameBudget, Group, HostCacheSize, ImageSize,
+    Length, Plane, Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
 };
 use std::path::PathBuf;
 
@@ -158,8 +158,9 @@ settings! {
         /// the two largest bricks. `auto`: all of them, if three quarters of the device's memory hold them, or half of
         /// what is available on the processor.
         cache: CacheSize = CacheSize::Auto, "--cache SIZE|P%|auto", Rule::Any, "", Cache, Common;
-        /// Host memory for verified bricks; 0 keeps none.
-        host_cache: u64 = 1 << 30, "--host-cache SIZE", Rule::Bytes(0), "bytes", Cache, Expert;
+        /// Host memory for verified bricks: a size, or auto; 0 keeps none. `auto`: 1 GiB, or an eighth of the memory
+        /// that is available where that is less.
+        host_cache: HostCacheSize = HostCacheSize::Auto, "--host-cache SIZE|auto", Rule::Any, "", Cache, Expert;
         /// What a frame loads at most: a size, as 8M, or what arrives in so many milliseconds, as 50. Levels of detail
         /// that are resident stand in for other bricks, coarser levels of textures for other tiles. What most rays ask
         /// for comes first, so that while the camera rests frames become exact. Records count pixels that are, and

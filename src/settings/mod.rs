@@ -20,7 +20,7 @@ mod types;
 pub mod value;
 
 pub use group::{Entry, Field, Group, Heading, Level, SettingsError};
-pub use sizes::{CacheSize, FrameBudget, ImageSize};
+pub use sizes::{CacheSize, FrameBudget, HostCacheSize, ImageSize};
 pub use types::{
     Adapter, Direction, Effect, EffectList, Environment, Length, Plane, Policy, Rectangle, Schedule, Turn,
 };

@@ -189,6 +189,46 @@ impl fmt::Display for CacheSize {
     }
 }
 
+/// The host memory for verified bricks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HostCacheSize {
+    /// 1 GiB, or an eighth of what is available where that is less.
+    Auto,
+    /// Bytes; 0: none.
+    Bytes(u64),
+}
+
+impl HostCacheSize {
+    /// Its bytes where so many are `available`, if that is known.
+    pub fn bytes(self, available: Option<u64>) -> u64 {
+        match self {
+            Self::Auto => available.map_or(1 << 30, |bytes| (bytes / 8).min(1 << 30)),
+            Self::Bytes(bytes) => bytes,
+        }
+    }
+}
+
+impl FromStr for HostCacheSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "0" => Ok(Self::Bytes(0)),
+            _ => size_bytes(text).map(Self::Bytes),
+        }
+    }
+}
+
+impl fmt::Display for HostCacheSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Bytes(bytes) => write!(f, "{bytes}"),
+        }
+    }
+}
+
 /// What a frame may load: bytes, or as much as arrives in so many milliseconds from its begin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FrameBudget {

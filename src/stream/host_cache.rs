@@ -61,6 +61,11 @@ impl HostCache {
         Arc::new(Self { budget_bytes, inner: Mutex::new(inner) })
     }
 
+    /// Most bytes that it holds.
+    pub fn budget_bytes(&self) -> u64 {
+        self.budget_bytes
+    }
+
     /// Every change below is complete before anything can panic, so a poisoned lock guards a sound state.
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)

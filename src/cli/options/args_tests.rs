@@ -1,7 +1,7 @@
 use crate::cli::options::args::*;
 use crate::cli::output::Usage;
 use crate::schedule::Optimisation;
-use crate::settings::{Direction, EffectList, Level, Schedule};
+use crate::settings::{Direction, EffectList, HostCacheSize, Level, Schedule};
 use crate::stream::Policy;
 use brickwalk_convert::build::LatticeStep;
 use brickwalk_scenes::Kind;
@@ -49,7 +49,7 @@ fn options_arrive() {
         frames: 3,
         size: ImageSize { width: 64, height: 32 },
         cache: CacheSize::Bytes(12 << 20),
-        host_cache: 2 << 30,
+        host_cache: HostCacheSize::Bytes(2 << 30),
         schedule: Schedule::Plain,
         effects: EffectList::PRIMARY,
         spp: 4,

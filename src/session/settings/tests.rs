@@ -1,6 +1,6 @@
 use super::*;
 use crate::settings::page::options_page;
-use crate::settings::{Effect, Level, Plain, file};
+use crate::settings::{Effect, HostCacheSize, Level, Plain, file};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ fn defaults_are_the_documented_ones() {
     assert_eq!((s.frames, s.size), (30, ImageSize { width: 1280, height: 720 }));
     assert_eq!(s.effects.to_string(), "primary,shadow");
     assert_eq!((s.spp, s.seed, s.tile), (1, 0, 64));
-    assert_eq!((s.cache, s.host_cache), (CacheSize::Auto, 1 << 30));
+    assert_eq!((s.cache, s.host_cache), (CacheSize::Auto, HostCacheSize::Auto));
     assert_eq!((s.secondary, s.schedule, s.fronts), (crate::secondary::EffectMethods::EXACT, Schedule::Auto, false));
     assert_eq!((s.query_threshold, s.evict), (0, crate::stream::Policy::RoundRobin));
     assert_eq!((s.sun, s.sun_angle, s.sun_intensity()), (Direction([0.4, 0.8, 0.45]), 0.53, 2.4));
@@ -123,7 +123,7 @@ fn files_are_natural_to_write() {
         rotation: Turn::FULL,
         exposure: crate::picture::Exposure::Fixed(-1.5),
         fronts: true,
-        host_cache: 2 << 30,
+        host_cache: HostCacheSize::Bytes(2 << 30),
         dvf: crate::secondary::dvf::Options { cells: crate::secondary::dvf::Cells::Longest(40), ..Default::default() },
         roma: crate::secondary::roma::Options { error: None, ..Default::default() },
         ..Settings::default()

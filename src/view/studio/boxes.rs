@@ -78,7 +78,8 @@ impl Canvas<'_> {
     }
 
     fn bounds(&mut self, [min, max]: &[DVec3; 2], color: [u8; 3]) {
-        let corner = |i: usize| DVec3::from_array(std::array::from_fn(|k| if i >> k & 1 == 0 { min[k] } else { max[k] }));
+        let corner =
+            |i: usize| DVec3::from_array(std::array::from_fn(|k| if i >> k & 1 == 0 { min[k] } else { max[k] }));
         let near = NEAR * (0.5 * (*min + *max) - self.camera.position).length();
         for (a, b) in (0..8usize).flat_map(|a| [1, 2, 4].map(|bit| (a, a | bit))).filter(|(a, b)| a != b) {
             self.edge(corner(a), corner(b), near, color);

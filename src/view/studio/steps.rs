@@ -71,7 +71,8 @@ pub struct Steps {
     pub bricks: Vec<u32>,
 }
 
-/// What `sights` meet of a scene. Of bricks that `is_resident` says so of nodes are counted: they are read from the file.
+/// What `sights` meet of a scene. Nodes are counted of bricks that `is_resident` says so of: those are read from the
+/// file.
 ///
 /// # Errors
 /// A brick that cannot be read.
@@ -113,4 +114,3 @@ pub fn steps(scene: &SceneFile, is_resident: &(dyn Fn(u32) -> bool + Sync), sigh
     seen.par_iter().try_for_each(count)?;
     Ok(Steps { nodes: nodes.into_iter().map(AtomicU32::into_inner).collect(), bricks })
 }
-

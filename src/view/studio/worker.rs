@@ -485,13 +485,7 @@ fn states(frame: &Frame) -> [u64; 3] {
 }
 
 /// `frame` as it is shown, with the overlay that is wished.
-fn shown(
-    session: &mut Session,
-    frame: &Frame,
-    wish: &Wish,
-    left: &Left,
-    (stage, ms): (Stage, f64),
-) -> Result<Shown> {
+fn shown(session: &mut Session, frame: &Frame, wish: &Wish, left: &Left, (stage, ms): (Stage, f64)) -> Result<Shown> {
     static NUMBER: AtomicU64 = AtomicU64::new(1);
     let bricks = if wish.overlay.shows_bricks() { session.bricks_seen()? } else { Vec::new() };
     let (scene, tile) = (session.renderer().scene.clone(), session.renderer().tile);
@@ -500,8 +494,8 @@ fn shown(
     let is_counted = |brick: u32| wish.overlay == Overlay::Steps && cached.geometry(brick as usize).is_some();
     let walks = matches!(wish.overlay, Overlay::Queries | Overlay::Steps);
     let steps = walks.then(|| steps(&scene, &is_counted, &sights)).transpose()?;
-    let own = (wish.overlay == Overlay::Fronts && left.front.is_none())
-        .then(|| Boxes::of_middle(scene.resident(), &sights));
+    let own =
+        (wish.overlay == Overlay::Fronts && left.front.is_none()).then(|| Boxes::of_middle(scene.resident(), &sights));
     let mut pixels = developed(&frame.pixels.radiance, frame.exposure_ev, frame.tone_map);
     let of = Pixels {
         size: frame.size,

@@ -2,13 +2,13 @@
 
 use super::studio::{open, rest, settings, until, wish};
 use crate::common::{city, folder, levelled_city};
+use bricks::{Corners, NODE_WIDTH, Node, Payload, SceneFile};
 use brickwalk::scene::CameraPath;
 use brickwalk::scene::brick_walk::BrickWalk;
 use brickwalk::scene::placement::leaf_box;
 use brickwalk::scene::top_walk::{Sight, TopWalk};
 use brickwalk::session::{Session, open_scene};
 use brickwalk::view::studio::{Ask, News, Overlay, Shown, Wish};
-use bricks::{Corners, NODE_WIDTH, Node, Payload, SceneFile};
 use glam::DVec3;
 
 #[test]
@@ -162,7 +162,8 @@ fn fronts_and_steps_are_those_of_brute_force() {
         assert!(above.iter().all(|&count| count == 1));
         let mut visible: Vec<u32> = front.visible.iter().map(|&node| resident.top2[node as usize].left).collect();
         visible.sort_unstable();
-        let met = |ray: &Sight, leaf: u32| meets(leaf_box(resident, &resident.leaves[leaf as usize]), camera.position, ray);
+        let met =
+            |ray: &Sight, leaf: u32| meets(leaf_box(resident, &resident.leaves[leaf as usize]), camera.position, ray);
         let leaves = 0..resident.leaves.len() as u32;
         let expected: Vec<u32> = leaves.filter(|&leaf| rays.iter().any(|ray| met(ray, leaf))).collect();
         assert_eq!(visible, expected);
