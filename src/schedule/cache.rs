@@ -140,7 +140,7 @@ impl Cache {
         stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         self.begin_batch();
-        self.load_beside(executor, items, most, stats)
+        self.load_beside(executor, items, (most, u64::MAX), stats)
     }
 
     /// Loads all of `items`, at most so many at a time; a cache that does not hold them all keeps the last.
@@ -174,7 +174,7 @@ impl Cache {
         self.begin_batch();
         let mut taken = 0;
         while taken < items.len() {
-            let count = self.load_beside(executor, &items[taken..], usize::MAX, stats)?;
+            let count = self.load_beside(executor, &items[taken..], (usize::MAX, u64::MAX), stats)?;
             if count == 0 {
                 break;
             }
@@ -200,54 +200,57 @@ impl Cache {
         for &item in kept {
             self.residency.pin(item);
         }
-        let (mut has_loaded, mut refused) = (false, 0);
+        let (mut loaded, mut refused) = (0, 0);
+        let (mut batch, mut trial) = (Vec::new(), None);
         for group in groups {
-            let Some(left) = self.allowance.map(|allowance| allowance.left()) else { break };
-            if !self.has_room(group) {
+            let trial_of_batch = trial.get_or_insert_with(|| self.residency.clone());
+            // What is resident of a group must not make room for the rest of it.
+            let (resident, missing): (Vec<Item>, Vec<Item>) =
+                group.iter().partition(|&&item| trial_of_batch.slot(item).is_some());
+            let in_order = [resident, missing].concat();
+            let has_room = in_order.iter().all(|&item| trial_of_batch.insert(item).is_ok() && trial_of_batch.pin(item));
+            if has_room {
+                batch.extend(in_order);
+            } else {
                 refused += 1;
-                if refused == MOST_REFUSED {
-                    break;
+            }
+            if !has_room || batch.len() >= 2 * BATCH_BRICKS {
+                trial = None;
+                if !self.load_batch(executor, &std::mem::take(&mut batch), &mut loaded, stats)? {
+                    return Ok(loaded > 0);
                 }
-                continue;
             }
-            for &item in group {
-                self.residency.pin(item);
-            }
-            // What each and all before it in the group add to what is resident.
-            let add = |sum: &mut u64, &item: &Item| {
-                *sum += if self.residency.slot(item).is_some() { 0 } else { self.residency.bytes(item) };
-                Some(*sum)
-            };
-            let sums: Vec<u64> = group.iter().scan(0, add).take_while(|&sum| sum <= left).collect();
-            let mut taken = 0;
-            while taken < sums.len() {
-                let count = self.load_beside(executor, &group[taken..sums.len()], usize::MAX, stats)?;
-                if count == 0 {
-                    break;
-                }
-                taken += count;
-            }
-            let bytes = taken.checked_sub(1).map_or(0, |last| sums[last]);
-            self.spend(bytes);
-            has_loaded |= bytes > 0;
-            if taken < group.len() {
+            if refused == MOST_REFUSED {
                 break;
             }
         }
-        Ok(has_loaded)
+        self.load_batch(executor, &batch, &mut loaded, stats)?;
+        Ok(loaded > 0)
     }
 
-    /// Whether all of `group` can be resident beside what is pinned.
-    fn has_room(&self, group: &[Item]) -> bool {
-        let mut missing = group.iter().filter(|&&item| self.residency.slot(item).is_none()).peekable();
-        if missing.peek().is_none() {
-            return true;
+    /// Loads what is missing of `items`, as far as the frame's allowance goes, and adds its bytes to `loaded`. Returns
+    /// whether that was all of it.
+    fn load_batch(
+        &mut self,
+        executor: &mut dyn Executor,
+        items: &[Item],
+        loaded: &mut u64,
+        stats: &mut Counters,
+    ) -> Result<bool, ExecutorError> {
+        let before = self.residency.counters().total().loaded_bytes;
+        let mut taken = 0;
+        while taken < items.len() {
+            let left = self.allowance.map_or(0, |allowance| allowance.left());
+            let so_far = self.residency.counters().total().loaded_bytes;
+            let count = self.load_beside(executor, &items[taken..], (usize::MAX, left), stats)?;
+            self.spend(self.residency.counters().total().loaded_bytes - so_far);
+            if count == 0 {
+                break;
+            }
+            taken += count;
         }
-        let mut trial = self.residency.clone();
-        for &item in group {
-            trial.pin(item);
-        }
-        missing.all(|&item| trial.insert(item).is_ok() && trial.pin(item))
+        *loaded += self.residency.counters().total().loaded_bytes - before;
+        Ok(taken == items.len())
     }
 
     /// Takes bytes that have been loaded off the frame's allowance.
@@ -264,12 +267,12 @@ impl Cache {
         }
     }
 
-    /// [`Self::load`] beside what the batch has loaded; none where no more fit.
+    /// [`Self::load`] beside what the batch has loaded: so many items and bytes at most, none where no more fit.
     fn load_beside(
         &mut self,
         executor: &mut dyn Executor,
         items: &[Item],
-        most: usize,
+        (most, most_bytes): (usize, u64),
         stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         let start = Instant::now();
@@ -278,7 +281,7 @@ impl Cache {
         for &item in items.iter().take(most) {
             let is_resident = self.residency.slot(item).is_some();
             bytes += if is_resident { 0 } else { self.residency.bytes(item) };
-            if bytes > BATCH_BYTES && taken > 0 {
+            if bytes > most_bytes || bytes > BATCH_BYTES && taken > 0 {
                 break;
             }
             let Ok(placed) = self.residency.insert(item) else { break };
