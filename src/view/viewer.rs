@@ -123,6 +123,10 @@ pub struct Viewer {
     pub history: VecDeque<Taken>,
     /// The last wish.
     wished: Option<Wish>,
+    /// What is opened once it is known how large pictures are.
+    to_open: Option<PathBuf>,
+    /// Whether that is known.
+    is_sized: bool,
 }
 
 impl Viewer {
@@ -154,12 +158,23 @@ impl Viewer {
             messages: VecDeque::new(),
             history: VecDeque::new(),
             wished: None,
+            to_open: None,
+            is_sized: false,
         })
     }
 
-    /// Opens a scene file, or a model, which is converted first.
+    /// Opens a scene file, or a model, which is converted first. The first view of it fits the pictures, so it waits
+    /// for the first [`Self::wish`].
     pub fn open(&mut self, path: &Path) {
-        self.studio.ask(Ask::Open(path.into()));
+        self.to_open = Some(path.into());
+        self.ask_to_open();
+    }
+
+    fn ask_to_open(&mut self) {
+        if let Some(path) = self.to_open.take_if(|_| self.is_sized) {
+            self.studio.ask(Ask::Size(self.settings.size));
+            self.studio.ask(Ask::Open(path));
+        }
     }
 
     /// What is being converted, and how far that is.
@@ -334,6 +349,8 @@ impl Viewer {
     pub fn wish(&mut self, size: (u32, u32)) {
         let (width, height) = within(size, MOST_PIXELS);
         self.settings.size = ImageSize { width, height };
+        self.is_sized = true;
+        self.ask_to_open();
         let Some(camera) = self.camera() else { return };
         let wish = Wish { camera, settings: self.settings.clone(), overlay: self.overlay };
         if self.wished.as_ref() != Some(&wish) {

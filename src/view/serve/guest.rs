@@ -18,6 +18,8 @@ use tokio::sync::Notify;
 
 /// A camera that moves moves so often.
 const EVERY: Duration = Duration::from_millis(16);
+/// A page that has not said within so long how large it is has the usual size.
+const HELLO: Duration = Duration::from_millis(500);
 /// A page that has not taken a picture for so long has gone.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -59,8 +61,9 @@ pub async fn receive(mut socket: WebSocket, options: &Options, converter: Conver
 }
 
 async fn serve(socket: &mut WebSocket, guest: &mut Guest, news: &Notify, ends: &Notify) -> Result<()> {
+    let mut first = Some(HELLO);
     loop {
-        let every = if guest.is_moving() { EVERY } else { PATIENCE };
+        let every = first.take().unwrap_or(if guest.is_moving() { EVERY } else { PATIENCE });
         let mut told = None;
         tokio::select! {
             message = socket.recv() => match message {

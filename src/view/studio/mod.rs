@@ -21,6 +21,7 @@ use crate::frame::PixelState;
 use crate::scene::Camera;
 use crate::scene::path::CameraPath;
 use crate::session::{Named, Settings};
+use crate::settings::ImageSize;
 use anyhow::Result;
 use brickwalk_convert::progress::Progress;
 use glam::DVec3;
@@ -46,6 +47,8 @@ pub struct Wish {
 pub enum Ask {
     /// Open a scene file or a model, which is converted first.
     Open(PathBuf),
+    /// Scenes that are opened from now on are first seen in pictures of this size.
+    Size(ImageSize),
     /// What is seen at this place, a share of the picture's width and height?
     What {
         /// From the left.

@@ -311,6 +311,10 @@ impl Worker {
     fn answer(&mut self, ask: Ask) {
         let answered = match ask {
             Ask::Open(path) => self.convert(path),
+            Ask::Size(size) => {
+                self.settings.size = size;
+                Ok(())
+            }
             Ask::What { x, y, purpose } => self.what(x, y, purpose),
             Ask::Compare => self.compare(),
             Ask::Save(file) => self.save(&file),

@@ -309,6 +309,42 @@ fn what_goes_wrong_is_told_and_survived() {
 }
 
 #[test]
+fn a_first_view_fits_the_pictures() {
+    let folder = folder();
+    let scene = city(folder.path());
+    let asked = settings("--size 160x90 --spp 1 --adapter cpu");
+    // Whether something is seen at the border of a picture.
+    let touches = |shown: &Shown| {
+        let (width, height) = (shown.size.0 as usize, shown.size.1 as usize);
+        let is_border = |i: &usize| {
+            let (x, y) = (i % width, i / width);
+            x == 0 || y == 0 || x + 1 == width || y + 1 == height
+        };
+        (0..width * height).filter(is_border).any(|i| shown.depth[i].is_finite())
+    };
+    let mut cameras = Vec::new();
+    for (width, height) in [(160, 90), (64, 112)] {
+        let (studio, _) = open(&scene, &asked);
+        let size = ImageSize { width, height };
+        studio.ask(Ask::Size(size));
+        studio.ask(Ask::Open(scene.clone()));
+        let opened = until(&studio, |news| match news {
+            News::Opened(scene) => Some(*scene),
+            _ => None,
+        });
+        let own = Settings { size, ..asked.clone() };
+        cameras.push(opened.way.frame(0, 1));
+        let (last, _) = rest(&studio, &wish(cameras[cameras.len() - 1], &own));
+        assert!(last.size == (width, height) && !touches(&last), "{width}x{height}");
+        assert!(last.depth.iter().filter(|depth| depth.is_finite()).count() > last.depth.len() / 20);
+        // The control: in a high picture the view of a wide one is cut.
+        if cameras.len() == 2 {
+            assert!(touches(&rest(&studio, &wish(cameras[0], &own)).0));
+        }
+    }
+}
+
+#[test]
 fn a_window_that_is_dragged_larger_keeps_its_scene() {
     let folder = folder();
     let scene = city(folder.path());
