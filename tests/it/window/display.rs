@@ -23,7 +23,8 @@ fn display() -> Option<(Ends, String)> {
         return None;
     }
     let mut server = Command::new("Xvfb")
-        .args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp"])
+        // Else it starts anew whenever its last client leaves, and one that comes then is turned away.
+        .args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp", "-noreset"])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
@@ -47,9 +48,13 @@ impl Hand<'_> {
         output
     }
 
-    /// The window with this title, once it is there.
-    fn window(&self, title: &str) -> String {
+    /// The window of `child` with this title, once it is there.
+    fn window(&self, title: &str, child: &mut Child) -> String {
         wait("a window", || {
+            if let Some(status) = child.try_wait().expect("a status") {
+                let said = child.stderr.take().map(std::io::read_to_string);
+                panic!("no window: {status}, {said:?}");
+            }
             let output = Command::new("xdotool")
                 .env("DISPLAY", self.display)
                 .args(["search", "--name", title])
@@ -92,7 +97,7 @@ fn a_person_flies_clicks_and_quits() {
             .spawn()
             .expect("the command starts");
         let mut child = Ends(child);
-        let id = hand.window("^brickwalk: city");
+        let id = hand.window("^brickwalk: city", &mut child.0);
         hand.run(&format!("windowfocus {id}"));
         hand.run(&format!("mousemove --window {id} 500 200"));
         // The first picture, from where the scene is opened.
