@@ -3,8 +3,6 @@
 
 pub mod adapters;
 pub mod bake_displacement;
-#[cfg(feature = "lab")]
-pub mod bench;
 pub mod cached;
 pub mod compare;
 pub mod convert;
@@ -12,6 +10,8 @@ pub mod demo;
 pub mod info;
 pub mod instances;
 pub mod interrupt;
+#[cfg(feature = "lab")]
+pub mod lab;
 pub mod levels;
 pub mod man;
 pub mod memory;
@@ -93,12 +93,14 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),
         #[cfg(feature = "lab")]
-        Command::Bench(args) => bench::run(args),
+        Command::Bench(args) => lab::bench::run(args),
+        #[cfg(feature = "lab")]
+        Command::Study(args) => lab::study::run(args),
         Command::Adapters(args) => adapters::run(args),
         Command::Completions(args) => man::completions(args),
         Command::Man(args) => man::run(args),
         #[cfg(feature = "lab")]
-        Command::Selftest(args) => bench::test(args),
+        Command::Selftest(args) => lab::bench::test(args),
     }
 }
 

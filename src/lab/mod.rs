@@ -5,3 +5,4 @@ pub mod console;
 #[cfg(test)]
 mod lockstep;
 pub mod selftest;
+pub mod study;

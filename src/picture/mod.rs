@@ -5,5 +5,6 @@ pub mod denoise;
 pub mod exposure;
 pub mod tone_map;
 
+pub use color::{error_heat, heat};
 pub use exposure::{Exposure, MOST_STOPS, Meter};
 pub use tone_map::ToneMap;

@@ -20,7 +20,7 @@ mod settings;
 mod sight;
 pub mod summary;
 pub mod trace;
-mod viewpoint;
+pub mod viewpoint;
 
 pub use crate::output::npy::{Hit, Ray};
 pub use extent::extent;

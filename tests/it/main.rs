@@ -106,4 +106,5 @@ mod lab {
     mod bench_lod;
     mod optimisations;
     mod selftest;
+    mod study;
 }

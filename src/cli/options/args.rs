@@ -9,7 +9,9 @@ use super::scene_kind::{SceneKind, scene_help};
 use super::units::UNITS;
 use crate::cli::bake_displacement::Subjects;
 #[cfg(feature = "lab")]
-use crate::cli::bench::{BenchArgs, TestArgs};
+use crate::cli::lab::bench::{BenchArgs, TestArgs};
+#[cfg(feature = "lab")]
+use crate::cli::lab::study::StudyCommand;
 use crate::cli::output::{Usage, Verbosity};
 use crate::session::Settings;
 use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
@@ -69,6 +71,9 @@ pub enum Command {
     /// Run benchmarks: the experiments of the papers
     #[cfg(feature = "lab")]
     Bench(BenchArgs),
+    /// Measure error against run time in a scene: which setting to use, and what does not pay
+    #[cfg(feature = "lab")]
+    Study(StudyCommand),
     /// List the devices that can render
     Adapters(AdaptersArgs),
     /// Test this machine's device: exactness and numerical stability

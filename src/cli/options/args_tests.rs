@@ -294,6 +294,7 @@ fn help_explains_units_and_defaults() {
         "scene",
         "selftest",
         "serve",
+        "study",
         "trace",
         "verify",
         "view",

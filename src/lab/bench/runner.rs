@@ -87,7 +87,7 @@ impl<'a> Runner<'a> {
         match self.ended {
             Ended::Finished => Ok(()),
             Ended::OutOfTime if self.measured == 0 => {
-                self.console.show("Out of time before a measurement was done; give more --minutes.\n")
+                self.console.show("Out of time before a measurement was done; allow more minutes.\n")
             }
             Ended::OutOfTime => self.console.show("Out of time: the same command goes on where this one stopped.\n"),
             Ended::Interrupted => {
@@ -130,7 +130,7 @@ mod tests {
             rows.all().len()
         };
         assert_eq!(run(console.within(Some(0.0))), 0);
-        assert!(shown.take().contains("give more --minutes"));
+        assert!(shown.take().contains("allow more minutes"));
         assert_eq!(run(console.within(Some(0.002))), 1);
         assert!(shown.take().contains("goes on where this one stopped"));
         assert_eq!(run(console), 3);

@@ -296,6 +296,7 @@ fn sheet(args: &SelftestArgs, sweeps: &[Sweep]) -> Sheet {
         reading: READING.into(),
         tables: vec![table(sweep)],
         plots: plots(sweep),
+        ..Section::default()
     };
     Sheet {
         kicker: "brickwalk · selftest --errors".into(),

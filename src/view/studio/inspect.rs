@@ -1,7 +1,7 @@
 //! What a person asks of a picture: what is there, and how far it is from the exact one.
 
-use super::overlay::heat;
 use crate::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr, pixel_errors};
+use crate::picture::error_heat;
 use crate::scene::Camera;
 use crate::session::{Frame, Hit, Named, Origin, Ray, Session, developed, provenance};
 use anyhow::Result;
@@ -111,7 +111,6 @@ pub fn compared(shown: &Frame, exact: &Frame, ms: f64) -> Result<Comparison> {
     let map = flip_ldr(&a, &b, PIXELS_PER_DEGREE)?;
     let [a, b] = [shown, exact].map(|frame| Image { width, height, rgb: frame.pixels.radiance.clone() });
     let errors = pixel_errors(&a, &b)?;
-    // Small errors are those that one looks for.
-    let colours = map.errors.iter().map(|&error| heat(if error.is_nan() { 1.0 } else { error.max(0.0).sqrt() }));
+    let colours = map.errors.iter().map(|&error| error_heat(error));
     Ok(Comparison { flip: map.mean(), rmse: errors.rmse, size: exact.size, map: colours.collect(), ms })
 }

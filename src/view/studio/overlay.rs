@@ -3,6 +3,7 @@
 use super::boxes::Boxes;
 use super::steps::Steps;
 use crate::frame::{Answered, PixelState};
+use crate::picture::heat;
 use crate::scene::Camera;
 use crate::settings::names;
 use std::collections::HashSet;
@@ -76,15 +77,6 @@ pub const STATES: [[u8; 3]; 3] = [[60, 170, 90], [235, 170, 40], [215, 60, 60]];
 /// The greatest count, at least 1.
 fn most_of(counts: &[u32]) -> f32 {
     counts.iter().copied().max().unwrap_or(0).max(1) as f32
-}
-
-/// A colour of a share in 0..=1: black, then violet, red, yellow, white.
-pub fn heat(share: f32) -> [u8; 3] {
-    const STOPS: [[f32; 3]; 5] =
-        [[0.0, 0.0, 0.0], [80.0, 20.0, 110.0], [200.0, 50.0, 50.0], [250.0, 190.0, 60.0], [255.0; 3]];
-    let at = share.clamp(0.0, 1.0) * 4.0;
-    let k = (at as usize).min(3);
-    std::array::from_fn(|c| (STOPS[k][c] + (STOPS[k + 1][c] - STOPS[k][c]) * (at - k as f32)) as u8)
 }
 
 /// A colour for a number, far from those of its neighbours.

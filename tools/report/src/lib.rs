@@ -21,6 +21,7 @@ mod ink;
 mod page;
 mod plots;
 mod replay;
+mod scatter;
 mod sheet;
 mod tables;
 mod walk;
@@ -28,7 +29,8 @@ mod walk;
 pub use chart::Unit;
 pub use error::ReportError;
 pub use field::Field;
-pub use sheet::{Graph, GraphShape, Line, Section, Sheet, Table, Value, write_sheet};
+pub use scatter::{Point, Scatter};
+pub use sheet::{Graph, GraphShape, Line, Section, Sheet, Shown, Table, Value, write_sheet};
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

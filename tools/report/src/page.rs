@@ -181,17 +181,23 @@ fn frames(walk: &Walk, gallery: &Gallery) -> Markup {
     }
 }
 
-fn figure(picture: &Picture, ms: Option<f64>) -> Markup {
-    let png = picture.png.as_deref().unwrap_or_default();
+/// A picture that a click enlarges.
+pub(crate) fn enlarged(png: &[u8], name: &str) -> Markup {
     let size = dimensions(png);
     let source = format!("data:image/png;base64,{}", format::base64(png));
     html! {
+        label {
+            input type="checkbox" aria-label={ "enlarge " (name) };
+            img src=(PreEscaped(source)) alt=(name) width=[size.map(|s| s.0)] height=[size.map(|s| s.1)];
+        }
+    }
+}
+
+fn figure(picture: &Picture, ms: Option<f64>) -> Markup {
+    let png = picture.png.as_deref().unwrap_or_default();
+    html! {
         figure {
-            label {
-                input type="checkbox" aria-label={ "enlarge frame " (picture.frame) };
-                img src=(PreEscaped(source)) alt={ "frame " (picture.frame) }
-                    width=[size.map(|s| s.0)] height=[size.map(|s| s.1)];
-            }
+            (enlarged(png, &format!("frame {}", picture.frame)))
             figcaption {
                 a href={ "frames/" (picture.name) } { "frame " (picture.frame) }
                 @if let Some(ms) = ms { " · " (format::number(ms)) " ms" }

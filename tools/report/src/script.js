@@ -56,6 +56,25 @@ for (const figure of document.querySelectorAll("figure.plot")) {
     if (step) { event.preventDefault(); show(at < 0 ? 0 : at + step); } else if (event.key === "Escape") hide();
   });
 }
+// Points: the words of the one that is pointed at, or that has the focus.
+for (const svg of document.querySelectorAll("svg.scatter")) {
+  const figure = svg.closest("figure"), box = document.createElement("div");
+  box.className = "tip words";
+  box.setAttribute("role", "status");
+  figure.append(box);
+  const hide = () => figure.classList.remove("pointed");
+  const show = event => {
+    const words = event.target.dataset && event.target.dataset.words;
+    if (!words) return hide();
+    box.textContent = words;
+    figure.classList.add("pointed");
+    const at = event.target.getBoundingClientRect(), outer = figure.getBoundingClientRect();
+    box.style.left = Math.max(0, Math.min(at.left - outer.left, outer.width - box.offsetWidth)) + "px";
+    box.style.top = at.bottom - outer.top + 6 + "px";
+  };
+  for (const name of ["pointerover", "pointerdown", "focusin"]) svg.addEventListener(name, show);
+  for (const name of ["pointerleave", "focusout"]) svg.addEventListener(name, hide);
+}
 // Tables: a click on a head sorts by its column, a second one the other way; a button saves CSV.
 const number = text => {
   const found = text.replace(/,/g, "").match(/^[-+]?\d*\.?\d+(e[-+]?\d+)?/i);

@@ -4,6 +4,7 @@
 use crate::chart::{Across, Chart, Drawing, Series, Shape, Unit};
 use crate::csv::quoted;
 use crate::ink::{INKS, LABEL_HEX};
+use crate::scatter::Scatter;
 use crate::walk::Statistics;
 use crate::{ReportError, format, page};
 use maud::{Markup, html};
@@ -36,6 +37,17 @@ pub struct Section {
     pub tables: Vec<Table>,
     /// Plots.
     pub plots: Vec<Graph>,
+    /// Pictures.
+    pub pictures: Vec<Shown>,
+}
+
+/// A picture with what is below it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shown {
+    /// What it shows.
+    pub caption: String,
+    /// A PNG file.
+    pub png: Vec<u8>,
 }
 
 /// A table.
@@ -202,6 +214,8 @@ pub enum GraphShape {
         /// Names and points, by ascending first coordinate, not negative.
         lines: Vec<Line>,
     },
+    /// Points on logarithmic axes.
+    Points(Scatter),
     /// A bar each, of parts that stand beside one another.
     Bars {
         /// The unit of their lengths.
@@ -235,8 +249,11 @@ fn section(section: &Section) -> Result<Markup, ReportError> {
         section {
             h2 { (section.title) }
             @if !section.reading.is_empty() { p.reading { (section.reading) } }
-            @for table in &section.tables { (table.html()) }
             @if !plots.is_empty() { div.plots { @for plot in plots.into_iter().flatten() { (plot) } } }
+            @if !section.pictures.is_empty() { div.gallery { @for shown in &section.pictures {
+                figure { (page::enlarged(&shown.png, &shown.caption)) figcaption { (shown.caption) } }
+            } } }
+            @for table in &section.tables { (table.html()) }
         }
     })
 }
@@ -266,6 +283,7 @@ fn graph(graph: &Graph) -> Result<Option<Markup>, ReportError> {
             let median = |values| Statistics::of(values).map(|s| chart.unit.show(s.median));
             Ok(Some(page::drawn(&chart, &graph.title, &graph.reading, None, median)?))
         }
+        GraphShape::Points(scatter) => Ok(scatter.figure(&graph.title, &graph.reading)),
         GraphShape::Bars { unit, parts, bars } => {
             let drawn = bars.iter().any(|(_, lengths)| lengths.iter().sum::<f64>() > 0.0);
             Ok(drawn.then(|| bar_figure(graph, *unit, parts, bars)))

@@ -1,6 +1,6 @@
 //! Tables of measurements: every entry lies under its head, in a page as in plain text.
 
-use brickwalk_report::{Section, Sheet, Table, Value, write_sheet};
+use brickwalk_report::{Section, Sheet, Shown, Table, Value, write_sheet};
 
 fn table() -> Table {
     let row = |way: &str, ms: f64, paper: Option<f64>| vec![way.into(), Value::Number(ms), Value::number(paper)];
@@ -29,7 +29,9 @@ fn columns_of_markdown_are_aligned_in_the_text() {
 #[test]
 fn heads_lie_over_their_cells_and_names_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
-    let section = Section { title: "Times".into(), tables: vec![table()], ..Section::default() };
+    let picture = Shown { caption: "exact <4 rays>".into(), png: b"no picture".to_vec() };
+    let pictures = vec![picture];
+    let section = Section { title: "Times".into(), tables: vec![table()], pictures, ..Section::default() };
     let sheet = Sheet {
         kicker: "bench".into(),
         title: "Times".into(),
@@ -42,4 +44,5 @@ fn heads_lie_over_their_cells_and_names_in_one_line() {
     assert!(html.contains("<th class=\"name\">way</th><th>generation, ms</th><th>paper</th>"), "{html}");
     assert!(html.contains("<td class=\"name\">exact</td><td>"), "{html}");
     assert!(!html.contains("min-width:0"), "names are not squeezed");
+    assert!(html.contains("base64,bm8gcGljdHVyZQ==") && html.contains("exact &lt;4 rays&gt;"), "{html}");
 }

@@ -1,8 +1,8 @@
 //! `brickwalk bench` and `brickwalk selftest`: what the laboratory does.
 
-use super::interrupt;
-use super::options::group_args::{GroupArgs, Of, View};
-use super::options::units::UNITS;
+use crate::cli::interrupt;
+use crate::cli::options::group_args::{GroupArgs, Of, View};
+use crate::cli::options::units::UNITS;
 use crate::cli::output::{Usage, print};
 use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
 use crate::lab::bench::displacement::args::DisplacementBenchArgs;
@@ -118,7 +118,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
 }
 
 /// What the laboratory talks to: standard output, and Ctrl-C.
-fn console() -> Console<'static> {
+pub fn console() -> Console<'static> {
     Console { show: &print, stop: interrupt::flag(), job: &interrupt::job, until: None }
 }
 

@@ -1,0 +1,4 @@
+//! Commands of the laboratory.
+
+pub mod bench;
+pub mod study;
