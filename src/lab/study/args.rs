@@ -45,7 +45,7 @@ settings! {
         size: Option<ImageSize> = None, "--size WxH", Rule::Any, "pixels", Camera, Common;
         /// Samples of the pictures that others are compared with. [default: 64; with --quick 16]
         samples: Option<u32> = None, "--samples N", Rule::Whole(1, 65_536), "", Quality, Common;
-        /// Turns in which every setting makes a picture; times are medians. [default: 5; with --quick 2]
+        /// Turns in which every setting makes a picture; times are medians. [default: 3; with --quick 2]
         repeat: Option<u32> = None, "--repeat N", REPETITIONS, "", Measurement, Common;
         /// What renders, as `walk --adapter` has it.
         adapter: Adapter = Adapter::Auto, "--adapter NAME", Rule::Any, "", Device, Common;
@@ -85,7 +85,7 @@ impl StudyArgs {
             views: self.views.unwrap_or(or(2, 1)),
             size: self.size.unwrap_or(ImageSize { width, height }),
             samples: self.samples.unwrap_or(or(64, 16)),
-            repeat: self.repeat.unwrap_or(or(5, 2)),
+            repeat: self.repeat.unwrap_or(or(3, 2)),
         }
     }
 }

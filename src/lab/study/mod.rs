@@ -25,6 +25,7 @@ use plan::{Has, Job, USUAL, Way};
 use row::{Measured, Row, Turns};
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use view::{Fields, Party, Place, View};
 
@@ -107,11 +108,10 @@ fn measure(
 ) -> Result<Vec<Row>> {
     let (scale, Named { scene, files, adapter }) = (place.scale, named);
     let mut view = View::open(place, job)?;
-    if !converged.contains_key(&(job.effect, job.view)) {
+    if let Entry::Vacant(entry) = converged.entry((job.effect, job.view)) {
         // By other rays than those of the pictures.
         let mut party = view.party(job, &Way::new("exact", USUAL, ""), fields)?;
-        let picture = view.picture(&mut party, scale.samples, 1, false)?;
-        converged.insert((job.effect, job.view), picture.image);
+        entry.insert(view.picture(&mut party, scale.samples, 1, false)?.image);
     }
     let mut parties = job.ways.iter().map(|way| view.party(job, way, fields)).collect::<Result<Vec<_>>>()?;
     // In turns: a drift of the machine meets all ways alike. What the first turn of warm ones brings in is not counted.

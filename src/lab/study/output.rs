@@ -277,7 +277,7 @@ fn sources(group: &Group) -> Option<Table> {
     let caption = "One source of error at a time, by the same rays. A share below 0: with less of it the error grew, \
                    because another source had hidden behind it.";
     (!switched.is_empty())
-        .then(|| table(&format!("{effect}-{cache}-{state}-sources"), caption, switched.into_iter(), &columns))
+        .then(|| table(&format!("{effect}-{cache}-{state}-sources"), caption, switched, &columns))
 }
 
 /// The same method with nothing switched, of a row with less of a source.

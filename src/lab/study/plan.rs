@@ -233,25 +233,33 @@ impl Job {
     }
 }
 
-/// All jobs, those that say most first: all effects with everything resident, then with the smallest cache, empty; then
-/// the rest.
-pub fn jobs(scale: &Scale, ways: impl Fn(Effect) -> Vec<Way> + Copy) -> Vec<Job> {
+/// All jobs, those that say most first: of the first view all effects with everything resident, then with the smallest
+/// cache, empty; then the rest.
+pub fn jobs(scale: &Scale, ways: impl Fn(Effect) -> Vec<Way>) -> Vec<Job> {
     let mut caches = scale.caches.clone();
     caches.sort_unstable_by(|a, b| b.cmp(a));
     caches.dedup();
     let smallest = caches.last().copied().unwrap_or(100);
-    let mut states: Vec<(u32, bool)> = caches.iter().flat_map(|&cache| [(cache, false), (cache, true)]).collect();
-    states.sort_by_key(|&(cache, is_cold)| match (cache, is_cold) {
-        (100, false) => 0,
-        (cache, true) if cache == smallest => 1,
+    let mut all = Vec::new();
+    for &cache in &caches {
+        for is_cold in [false, true] {
+            for view in 0..scale.views {
+                all.extend(scale.effects.iter().map(|&effect| Job {
+                    effect,
+                    view,
+                    cache,
+                    is_cold,
+                    ways: ways(effect),
+                }));
+            }
+        }
+    }
+    all.sort_by_key(|job| match (job.view, job.cache, job.is_cold) {
+        (0, 100, false) => 0,
+        (0, cache, true) if cache == smallest => 1,
         _ => 2,
     });
-    let of = |(cache, is_cold): (u32, bool)| {
-        (0..scale.views).flat_map(move |view| {
-            scale.effects.iter().map(move |&effect| Job { effect, view, cache, is_cold, ways: ways(effect) })
-        })
-    };
-    states.into_iter().flat_map(of).collect()
+    all
 }
 
 #[cfg(test)]
@@ -325,9 +333,9 @@ mod tests {
         keys.sort();
         keys.dedup();
         assert_eq!(keys.len(), count);
-        let effects = scale.effects.len() * scale.views as usize;
+        let effects = scale.effects.len();
         assert!(jobs[..effects].iter().all(|job| job.cache == 100 && !job.is_cold));
         assert!(jobs[effects..2 * effects].iter().all(|job| job.cache == 5 && job.is_cold));
-        assert_eq!(jobs.len(), effects * 10);
+        assert_eq!(jobs.len(), effects * scale.views as usize * 10);
     }
 }

@@ -3,7 +3,7 @@
 use super::args::{Effect, Scale};
 use super::plan::{Job, Way, base, rays};
 use crate::counters::Record;
-use crate::frame::{Methods, Renderer};
+use crate::frame::{FrameWatch, Methods, RenderError, Renderer};
 use crate::lab::bench::scenes::empty_cache;
 use crate::lab::console::{Console, Stopped};
 use crate::metrics::Image;
@@ -173,7 +173,8 @@ impl<'a> View<'a> {
     /// # Errors
     /// A brick that cannot be read; the device's; pixels that are not finite; the run is to come to an end.
     pub fn picture(&mut self, party: &mut Party, samples: u32, seed: u64, is_cold: bool) -> Result<Picture> {
-        self.place.console.go_on()?;
+        let console = self.place.console;
+        console.go_on()?;
         let (number, camera, file) = (self.number, self.camera, self.place.file);
         let settings = Settings { spp: party.settings.spp * samples, seed, ..party.settings.clone() };
         let renderer = self.side(&settings)?;
@@ -188,8 +189,11 @@ impl<'a> View<'a> {
         renderer.executor.tuning().threshold = scaled_threshold(settings.query_threshold, renderer.tile);
         std::mem::swap(&mut renderer.methods, &mut party.methods);
         let start = Instant::now();
-        let output = renderer.frame(number, &camera);
+        let output = renderer.frame_watched(number, &camera, &[], &mut UntilStopped(console));
         std::mem::swap(&mut renderer.methods, &mut party.methods);
+        if matches!(output, Err(RenderError::Interrupted)) {
+            return Err(Stopped.into());
+        }
         let mut output = output.with_context(|| file.display().to_string())?;
         party.resolve.frame(&mut output);
         let seconds = start.elapsed().as_secs_f64();
@@ -199,6 +203,15 @@ impl<'a> View<'a> {
         let (width, height) = (renderer.size.0 as usize, renderer.size.1 as usize);
         let image = Image { width, height, rgb: output.pixels.radiance };
         Ok(Picture { image, seconds, records: output.records })
+    }
+}
+
+/// Pictures end early where the run should come to an end.
+struct UntilStopped<'a>(Console<'a>);
+
+impl FrameWatch for UntilStopped<'_> {
+    fn passes(&mut self, _: u32, _: u32) -> bool {
+        !self.0.is_stopped()
     }
 }
 

@@ -9,7 +9,7 @@ use maud::{Markup, html};
 const WIDTH: f64 = 440.0;
 const HEIGHT: f64 = 300.0;
 /// Margins in user units: left, top, right, bottom.
-const MARGINS: [f64; 4] = [52.0, 10.0, 12.0, 40.0];
+const MARGINS: [f64; 4] = [52.0, 10.0, 20.0, 40.0];
 
 /// A point.
 #[derive(Clone, Debug, PartialEq)]
