@@ -276,8 +276,7 @@ fn sources(group: &Group) -> Option<Table> {
     let state = if *cold { "cold" } else { "warm" };
     let caption = "One source of error at a time, by the same rays. A share below 0: with less of it the error grew, \
                    because another source had hidden behind it.";
-    (!switched.is_empty())
-        .then(|| table(&format!("{effect}-{cache}-{state}-sources"), caption, switched, &columns))
+    (!switched.is_empty()).then(|| table(&format!("{effect}-{cache}-{state}-sources"), caption, switched, &columns))
 }
 
 /// The same method with nothing switched, of a row with less of a source.
