@@ -17,7 +17,8 @@ pub fn are_of(job: &Job, scale: &Scale) -> bool {
     job.view == 0 && !job.is_cold && scale.caches.iter().max() == Some(&job.cache)
 }
 
-/// Of each method the row that is nearest to the exact picture of the same rays, of those with as many rays as any has.
+/// Of each method the row that is nearest to the exact picture of the same rays, of those with as many rays as all
+/// methods have.
 fn best<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<&'a Row> {
     let mut methods: Vec<&str> = Vec::new();
     for row in rows.clone() {
