@@ -53,8 +53,8 @@ struct TileList {         // where a tile's entries lie in the lists
 }
 
 struct Entry {            // An entry of a tile's list.
-    leaf: u32,            // of the top-level tree
-    near: f32,            // no ray of the tile enters the leaf's box before this distance
+    node: u32,            // of the binary top-level tree, a leaf
+    near: f32,            // no ray of the tile enters the node's box before this distance
 }
 
 struct Pair {             // A query pair: a rectangle of rays and nodes of the binary top-level tree.

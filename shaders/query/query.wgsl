@@ -42,7 +42,7 @@ fn main(
     for (var next = entry.first; next < entry.first + entry.selected; next++) {
         let position = selection[next];
         let listed = list[position];
-        let leaf = listed.leaf;
+        let leaf = top2[listed.node].left;
         if occluded {
             if surfaces[index].leaf == leaf {
                 atomicAdd(&pair_demand[position].rays, 1u);
@@ -50,7 +50,7 @@ fn main(
             }
             continue;
         }
-        if listed.near > limit || !takes(cone, leaf) {
+        if listed.near > limit || !takes(cone, leaf) || !may_meet(world, listed.node, limit) {
             continue;
         }
         enter_leaf(&r, world, leaf);

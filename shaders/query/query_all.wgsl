@@ -128,7 +128,7 @@ fn main(
         if stack[depth].near > limit {
             continue;
         }
-        let at = 5u * stack[depth].leaf;
+        let at = 5u * stack[depth].node;
         let n0 = top8[at];
         let n1 = top8[at + 1u];
         let e = entered(world, n0, n1, top8[at + 2u], top8[at + 3u], top8[at + 4u],

@@ -10,23 +10,6 @@
 #include "trace/levels.wgsl"
 #include "trace/leaf.wgsl"
 
-// Whether the ray enters a box of the top level in its range, padded as in node_hits.
-fn enters(ray: FramedRay, node: u32, t_max: f32) -> bool {
-    let lo = top2[node].min;
-    let hi = top2[node].max;
-    let reach = max(abs(lo - ray.origin), abs(hi - ray.origin));
-    let m = max(reach.x, max(reach.y, reach.z));
-    let o = abs(ray.origin);
-    let delta = vec3<f32>(64.0 * UNIT * m + params.instance_pad * (m + max(o.x, max(o.y, o.z))))
-        + 8.0 * UNIT * max(abs(lo), abs(hi));
-    let a = (lo - delta - ray.origin) * ray.frame.inv;
-    let b = (hi + delta - ray.origin) * ray.frame.inv;
-    let near = min(a, b);
-    let far = max(a, b);
-    return max(max(near.x, near.y), max(near.z, ray.t_min)) <= min(min(far.x, far.y), min(far.z, t_max));
-}
-
-
 const MOST_NODES: u32 = 16u;
 const OWN: u32 = 1u;      // the ray enters the node's own box
 const SEEN: u32 = 2u;     // and what the query asks for

@@ -17,7 +17,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let count = atomicExchange(&pair_demand[position].rays, 0u);
         let nearest = atomicExchange(&pair_demand[position].nearest, 0xffffffffu);
         if count > 0u {
-            let brick = leaves[list[position].leaf].brick;
+            let brick = leaves[top2[list[position].node].left].brick;
             atomicAdd(&demand[brick].rays, count);
             atomicMin(&demand[brick].nearest, nearest);
             visible += 1u;

@@ -18,7 +18,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var last = 0u;
     let end = select(entry.first + entry.count, entry.first, entry.from_root != 0u);
     for (var i = entry.first; i < end; i++) {
-        let leaf = list[i].leaf;
+        let leaf = top2[list[i].node].left;
         let state = slots[leaves[leaf].brick].state;
         if (state & params.select_mask) == params.select_want && !is_culled(tile, leaf) {
             selection[entry.first + selected] = i;

@@ -18,17 +18,17 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     // Until the first query an entry's demand has room for its key.
     for (var i = entry.first; i < entry.first + entry.count; i++) {
         var listed = list[i];
-        var key = listed.leaf;
+        let node = listed.node;
+        let leaf = top2[node].left;
+        var key = leaf;
         if NEAR {
-            let node = listed.leaf;
-            let near = tile_meets_box(bounds, top2[node].min, top2[node].max, params.instance_pad).near;
-            listed = Entry(top2[node].left, near);
-            key = bitcast<u32>(distance_to(bounds, node, near));
+            listed.near = tile_meets_box(bounds, top2[node].min, top2[node].max, params.instance_pad).near;
+            key = bitcast<u32>(distance_to(bounds, node, listed.near));
         }
         var at = i;
         while at > entry.first {
             let before = atomicLoad(&pair_demand[at - 1u].nearest);
-            if before < key || (before == key && list[at - 1u].leaf < listed.leaf) {
+            if before < key || (before == key && top2[list[at - 1u].node].left < leaf) {
                 break;
             }
             list[at] = list[at - 1u];

@@ -39,7 +39,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                 if n.right == NONE {
                     if tile_may_take(bounds, n.left) {
                         if WRITE {
-                            list[entry.first + found] = Entry(n.left, near);
+                            list[entry.first + found] = Entry(node, near);
                             pair_demand_clear(entry.first + found);
                         }
                         found += 1u;
@@ -78,7 +78,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                     break;
                 }
                 depth -= 1u;
-                node = stack[depth].leaf;
+                node = stack[depth].node;
                 near = stack[depth].near;
             }
         } else {

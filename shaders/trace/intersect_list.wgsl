@@ -58,8 +58,8 @@ fn main(
                     }
                     let listed = list[selection[next]];
                     next += 1u;
-                    let leaf = listed.leaf;
-                    if listed.near > best.t || !takes(cone, leaf) {
+                    let leaf = top2[listed.node].left;
+                    if listed.near > best.t || !takes(cone, leaf) || !may_meet(world, listed.node, best.t) {
                         continue;
                     }
                     enter_leaf(&r, world, leaf);

@@ -14,6 +14,29 @@ struct BrickRay {
     flags: u32,               // BRICK_* bits
 }
 
+// Whether the ray enters a box of the binary top level in its range, padded as in node_hits.
+fn enters(ray: FramedRay, node: u32, t_max: f32) -> bool {
+    let lo = top2[node].min;
+    let hi = top2[node].max;
+    let reach = max(abs(lo - ray.origin), abs(hi - ray.origin));
+    let m = max(reach.x, max(reach.y, reach.z));
+    let o = abs(ray.origin);
+    let delta = vec3<f32>(64.0 * UNIT * m + params.instance_pad * (m + max(o.x, max(o.y, o.z))))
+        + 8.0 * UNIT * max(abs(lo), abs(hi));
+    let a = (lo - delta - ray.origin) * ray.frame.inv;
+    let b = (hi + delta - ray.origin) * ray.frame.inv;
+    let near = min(a, b);
+    let far = max(a, b);
+    return max(max(near.x, near.y), max(near.z, ray.t_min)) <= min(min(far.x, far.y), min(far.z, t_max));
+}
+
+// Whether the ray may meet the brick of a leaf node. To transform a ray costs more than to ask first whether it enters
+// the box.
+fn may_meet(ray: FramedRay, node: u32, t_max: f32) -> bool {
+    let instance = leaves[top2[node].left].instance;
+    return (instances[instance].flags & INSTANCE_IDENTITY) != 0u || enters(ray, node, t_max);
+}
+
 fn row_direction(row: vec4<f32>, d: vec3<f32>) -> f32 {
     return barrier(barrier(barrier(row.x * d.x) + barrier(row.y * d.y)) + barrier(row.z * d.z));
 }

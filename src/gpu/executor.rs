@@ -513,7 +513,7 @@ impl FrameExecutor for GpuExecutor {
 impl Executor for GpuExecutor {
     fn set_lists(&mut self, lists: &[Vec<u32>]) -> Result<(), ExecutorError> {
         let entries: Vec<layout::Entry> =
-            lists.iter().flatten().map(|&leaf| layout::Entry { leaf, near: 0.0 }).collect();
+            lists.iter().flatten().map(|&node| layout::Entry { node, near: 0.0 }).collect();
         if entries.len() > self.buffers.tiles.capacity as usize {
             self.grow_lists(u32::try_from(entries.len()).unwrap_or(u32::MAX))?;
         }

@@ -67,13 +67,13 @@ impl TileLists {
     pub fn set(&mut self, lists: &[Vec<u32>]) {
         let mut first = 0;
         self.lists.clear();
-        for leaves in lists {
-            let count = leaves.len() as u32;
+        for nodes in lists {
+            let count = nodes.len() as u32;
             self.lists.push(TileList { first, count, ..TileList::default() });
             first += count;
         }
-        for (entry, &leaf) in self.list.iter_mut().zip(lists.iter().flatten()) {
-            *entry = Entry { leaf, near: 0.0 };
+        for (entry, &node) in self.list.iter_mut().zip(lists.iter().flatten()) {
+            *entry = Entry { node, near: 0.0 };
         }
         self.pair_demand.iter_mut().for_each(|demand| *demand = Demand::default());
     }

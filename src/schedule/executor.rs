@@ -36,8 +36,8 @@ pub trait Executor {
     /// A payload that cannot be read or whose checksum fails, by its brick.
     fn load(&mut self, loads: &[Load]) -> Result<(), ExecutorError>;
 
-    /// Sets the tiles' lists of leaves, near first, in place of [`Step::Lists`](super::Step::Lists); one list a tile,
-    /// row by row.
+    /// Sets the tiles' lists, leaf nodes of the binary top level, in place of [`Step::Lists`](super::Step::Lists); one
+    /// list a tile, row by row.
     ///
     /// # Errors
     /// Lists beyond what the device holds.

@@ -239,10 +239,10 @@ impl Found<'_, '_> {
         let mut lists = vec![Vec::new(); tree.tiles()];
         for &index in pairs {
             let pair = tree.pair(index);
-            let leaf = self.setup.resident.top2[pair.node as usize].left;
-            lists[tree.tile_index(pair.square)].push(if near { pair.node } else { leaf });
+            lists[tree.tile_index(pair.square)].push(pair.node);
         }
-        lists.iter_mut().for_each(|list| list.sort_unstable());
+        let leaf = |&node: &u32| self.setup.resident.top2[node as usize].left;
+        lists.iter_mut().for_each(|list| list.sort_unstable_by_key(leaf));
         self.t.executor.set_lists(&lists)?;
         if near {
             self.steps.push(Step::SortNodesNear);

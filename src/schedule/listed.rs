@@ -3,7 +3,8 @@
 use super::{ExecutorError, Step, Tracer};
 use crate::stream::Item;
 
-/// Traces the rays of a pass, after the steps in `first` have made them, against `lists`, the leaves of each tile.
+/// Traces the rays of a pass, after the steps in `first` have made them, against `lists`, leaf nodes of the
+/// binary top level for each tile.
 /// Their bricks are `bricks`, which are loaded a few at a time.
 ///
 /// # Errors

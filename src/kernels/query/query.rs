@@ -2,7 +2,7 @@
 //! enter a child box of the brick's root at or before their present hit, and where the nearest does.
 
 use crate::kernels::bound::{Bound, entry_bits};
-use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT, Surface};
+use crate::kernels::layout::{Hit, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT, Surface};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
@@ -51,16 +51,17 @@ impl PacketKernel for Query<'_> {
         for next in entry.first..entry.first + entry.selected {
             let position = lists.selection[next as usize] as usize;
             let listed = lists.list[position];
+            let leaf = bound.leaf_of(&listed);
             // Their distances are their limits.
-            let mut rays = packet.taking(bound, listed.leaf, packet.reaching(isa, listed.near));
+            let rays = packet.taking(bound, leaf, packet.reaching(isa, listed.near));
+            let mut rays = packet.meeting(bound, listed.node, rays);
             if rays == 0 {
                 continue;
             }
-            let brick = bound.brick_of(listed.leaf);
+            let brick = bound.brick_of(leaf);
             let root = &scene.roots[brick];
-            let instance = scene.leaves[listed.leaf as usize].instance;
-            if scene.instances[instance as usize].flags & INSTANCE_IDENTITY != 0 {
-                r.enter_leaf(scene, &any, listed.leaf);
+            if bound.is_world(listed.node) {
+                r.enter_leaf(scene, &any, leaf);
                 let place = Place::new(r.offset_high, r.offset_low, 0.0);
                 let mut entered = [0; 8];
                 packet.open(isa, root, &place, rays, &mut entered);
@@ -73,7 +74,7 @@ impl PacketKernel for Query<'_> {
             while rays != 0 {
                 let i = rays.trailing_zeros() as usize;
                 rays &= rays - 1;
-                r.enter_leaf(scene, &packet.ray(i), listed.leaf);
+                r.enter_leaf(scene, &packet.ray(i), leaf);
                 let limit = &mut packet.t.0[i];
                 let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, *limit);
                 let (entered, near) = entered_children(&boxes, root);
@@ -125,14 +126,14 @@ fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
     for next in entry.first..entry.first + entry.selected {
         let position = lists.selection[next as usize] as usize;
         let listed = lists.list[position];
-        let leaf = listed.leaf;
+        let leaf = bound.leaf_of(&listed);
         if occluded {
             if slot.surface.leaf == leaf {
                 lists.pair_demand[position].add(1, 0);
             }
             continue;
         }
-        if listed.near > hit.t || !bound.takes(&cone, leaf) {
+        if listed.near > hit.t || !bound.takes(&cone, leaf) || !bound.may_meet(&world, listed.node, hit.t) {
             continue;
         }
         r.enter_leaf(bound.scene, &world, leaf);

@@ -9,24 +9,8 @@ use crate::kernels::rays::{RaySet, is_traced};
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::{Cone, spread_of};
-use crate::kernels::trace::node::{FramedRay, UNIT, framed_ray, node_hits, traversal_mask};
-use crate::kernels::vector::{each, least, most, most3};
+use crate::kernels::trace::node::{FramedRay, framed_ray, node_hits, traversal_mask};
 use rayon::prelude::*;
-
-/// Whether the ray enters a box of the top level in its range, padded as in `node_hits`.
-fn enters(bound: &Bound, ray: &FramedRay, node: u32, t_max: f32) -> bool {
-    let n = &bound.scene.top2[node as usize];
-    let (lo, hi) = (n.min, n.max);
-    let m = most3(each(|k| most((lo[k] - ray.origin[k]).abs(), (hi[k] - ray.origin[k]).abs())));
-    let o = most3(ray.origin.map(f32::abs));
-    let all = 64.0 * UNIT * m + bound.params.instance_pad * (m + o);
-    let delta = each(|k| all + 8.0 * UNIT * most(lo[k].abs(), hi[k].abs()));
-    let a = each(|k| (lo[k] - delta[k] - ray.origin[k]) * ray.frame.inv[k]);
-    let b = each(|k| (hi[k] + delta[k] - ray.origin[k]) * ray.frame.inv[k]);
-    let near = each(|k| least(a[k], b[k]));
-    let far = each(|k| most(a[k], b[k]));
-    most(most(near[0], near[1]), most(near[2], ray.t_min)) <= least(least(far[0], far[1]), least(far[2], t_max))
-}
 
 /// What a ray sees of a node.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -40,7 +24,7 @@ enum Look {
 }
 
 fn look(bound: &Bound, world: &FramedRay, cone: &Cone, index: u32, t_max: f32) -> Look {
-    if !enters(bound, world, index, t_max) || bound.is_stood_for(cone, index) {
+    if !bound.enters(world, index, t_max) || bound.is_stood_for(cone, index) {
         return Look::Nothing;
     }
     let seen = |seen: bool| if seen { Look::Seen } else { Look::Own };
@@ -52,7 +36,7 @@ fn look(bound: &Bound, world: &FramedRay, cone: &Cone, index: u32, t_max: f32) -
         return Look::Seen;
     }
     if node.right != NONE {
-        return seen(enters(bound, world, node.left, t_max) || enters(bound, world, node.right, t_max));
+        return seen(bound.enters(world, node.left, t_max) || bound.enters(world, node.right, t_max));
     }
     let mut r = BrickRay::outside(world);
     r.enter_leaf(bound.scene, world, node.left);

@@ -62,11 +62,12 @@ pub fn tile_select<const INTERSECT: bool>(bound: &Bound, tiles: &mut TileLists) 
         let (mut departures, mut last) = (0, 0);
         let count = if entry.from_root != 0 { 0 } else { entry.count };
         for i in entry.first..entry.first + count {
-            let Entry { leaf, near } = list[i as usize];
+            let listed = &list[i as usize];
+            let leaf = bound.leaf_of(listed);
             if bound.is_selected(bound.brick_of(leaf)) && !pair_counts.is_culled(bound, tile, leaf) {
                 selection[selected as usize] = i;
                 selected += 1;
-                *nearest = least(*nearest, near);
+                *nearest = least(*nearest, listed.near);
                 departures += u32::from(leaf < last);
                 last = leaf;
             }
@@ -86,23 +87,22 @@ pub fn tile_select<const INTERSECT: bool>(bound: &Bound, tiles: &mut TileLists) 
     });
 }
 
-/// Sorts each tile's list of leaves: by number, or (`NEAR`), from a list of leaf nodes of the binary top level, near to
-/// far.
+/// Sorts each tile's list by the numbers of the leaves, or (`NEAR`) near to far.
 pub fn tile_sort<const NEAR: bool>(bound: &Bound, tiles: &mut TileLists) {
     let TileLists { bounds, lists, list, .. } = tiles;
     let places = of_tiles(lists, list);
     bounds.par_iter().zip(places).for_each(|(bounds, list)| {
         let keyed = |listed: &Entry| {
+            let node = &bound.scene.top2[listed.node as usize];
             if !NEAR {
-                return (listed.leaf, *listed);
+                return (node.left, node.left, *listed);
             }
-            let node = &bound.scene.top2[listed.leaf as usize];
             let near = tile_meets_box(bounds, node.min, node.max, bound.params.instance_pad).near;
-            (distance_to(bounds, node, near).to_bits(), Entry { leaf: node.left, near })
+            (distance_to(bounds, node, near).to_bits(), node.left, Entry { near, ..*listed })
         };
-        let mut sorted: Vec<(u32, Entry)> = list.iter().map(keyed).collect();
-        sorted.sort_unstable_by_key(|(key, entry)| (*key, entry.leaf));
-        for (place, (_, entry)) in list.iter_mut().zip(sorted) {
+        let mut sorted: Vec<(u32, u32, Entry)> = list.iter().map(keyed).collect();
+        sorted.sort_unstable_by_key(|(key, leaf, _)| (*key, *leaf));
+        for (place, (_, _, entry)) in list.iter_mut().zip(sorted) {
             *place = entry;
         }
     });
@@ -123,7 +123,7 @@ pub fn query_reduce(bound: &Bound, tiles: &TileLists) {
             let position = tiles.selection[i as usize] as usize;
             let pair = tiles.pair_demand[position].take();
             if pair.rays > 0 {
-                bound.demand[bound.brick_of(tiles.list[position].leaf)].add(pair.rays, pair.nearest);
+                bound.demand[bound.brick_of(bound.leaf_of(&tiles.list[position]))].add(pair.rays, pair.nearest);
                 visible += 1;
             }
         }

@@ -74,7 +74,7 @@ fn walk(bound: &Bound, bounds: &TileBounds, tally: &mut Tally, mut list: impl Fn
     loop {
         let n = &top2[node as usize];
         if n.right == NONE {
-            if bound.tile_may_take(bounds, n.left) && !list(Entry { leaf: n.left, near }) {
+            if bound.tile_may_take(bounds, n.left) && !list(Entry { node, near }) {
                 break;
             }
         } else {
@@ -90,11 +90,11 @@ fn walk(bound: &Bound, bounds: &TileBounds, tally: &mut Tally, mut list: impl Fn
                     tally.add(COUNTER_STACK_OVERFLOW, 1);
                     break;
                 }
-                let (left, right) = (Entry { leaf: n.left, near: l.near }, Entry { leaf: n.right, near: r.near });
+                let (left, right) = (Entry { node: n.left, near: l.near }, Entry { node: n.right, near: r.near });
                 let (first, second) = if swap { (right, left) } else { (left, right) };
                 stack[depth] = second;
                 depth += 1;
-                (node, near) = (first.leaf, first.near);
+                (node, near) = (first.node, first.near);
                 continue;
             }
             if l.hit || r.hit {
@@ -106,7 +106,7 @@ fn walk(bound: &Bound, bounds: &TileBounds, tally: &mut Tally, mut list: impl Fn
             break;
         }
         depth -= 1;
-        (node, near) = (stack[depth].leaf, stack[depth].near);
+        (node, near) = (stack[depth].node, stack[depth].near);
     }
     walked
 }

@@ -50,9 +50,11 @@ impl PacketKernel for IntersectList<'_> {
         for position in next..end {
             let listed = self.listed(position);
             let rays = packets.packet.reaching(isa, listed.near) & !packets.packet.done;
-            let rays = packets.packet.taking(bound, listed.leaf, rays);
+            let leaf = bound.leaf_of(&listed);
+            let rays = packets.packet.taking(bound, leaf, rays);
+            let rays = packets.packet.meeting(bound, listed.node, rays);
             if rays != 0 {
-                packets.walk_leaf(isa, bound, scratch, listed.leaf, rays, bound.has(PARAM_ANY_HIT));
+                packets.walk_leaf(isa, bound, scratch, leaf, rays, bound.has(PARAM_ANY_HIT));
             }
         }
     }

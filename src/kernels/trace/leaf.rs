@@ -1,12 +1,12 @@
 //! A ray at a leaf of the top level, transformed into the frame of the leaf's instance: twin of
 //! `shaders/trace/leaf.wgsl`.
 
-use super::node::{FramedRay, framed_ray};
+use super::node::{FramedRay, UNIT, framed_ray};
 use crate::kernels::bound::{Bound, Scene};
-use crate::kernels::layout::INSTANCE_IDENTITY;
+use crate::kernels::layout::{Entry, INSTANCE_IDENTITY};
 use crate::kernels::payloads::BrickView;
 use crate::kernels::simd::isa::Lanes;
-use crate::kernels::vector::Vec3;
+use crate::kernels::vector::{Vec3, each, least, most, most3};
 use crate::math::exact::barrier;
 
 /// What numbers are drawn from where rays pass through triangles at random, beside ray and triangle.
@@ -103,5 +103,44 @@ impl<'a> BrickRay<'a> {
             self.ray = framed_ray(rows_point(rows, world.origin), rows_direction(rows, world.direction), world.t_min);
         }
         self.lanes = Lanes::new(&self.ray, self.offset_high, self.offset_low);
+    }
+}
+
+impl Bound<'_> {
+    /// Whether the ray enters a box of the binary top level in its range, padded as in `node_hits`.
+    #[inline(always)]
+    pub fn enters(&self, ray: &FramedRay, node: u32, t_max: f32) -> bool {
+        let n = &self.scene.top2[node as usize];
+        let (lo, hi) = (n.min, n.max);
+        let m = most3(each(|k| most((lo[k] - ray.origin[k]).abs(), (hi[k] - ray.origin[k]).abs())));
+        let o = most3(ray.origin.map(f32::abs));
+        let all = 64.0 * UNIT * m + self.params.instance_pad * (m + o);
+        let delta = each(|k| all + 8.0 * UNIT * most(lo[k].abs(), hi[k].abs()));
+        let a = each(|k| (lo[k] - delta[k] - ray.origin[k]) * ray.frame.inv[k]);
+        let b = each(|k| (hi[k] + delta[k] - ray.origin[k]) * ray.frame.inv[k]);
+        let near = each(|k| least(a[k], b[k]));
+        let far = each(|k| most(a[k], b[k]));
+        most(most(near[0], near[1]), most(near[2], ray.t_min)) <= least(least(far[0], far[1]), least(far[2], t_max))
+    }
+
+    /// The leaf of the top level that an entry of a list stands for.
+    #[inline(always)]
+    pub fn leaf_of(&self, entry: &Entry) -> u32 {
+        self.scene.top2[entry.node as usize].left
+    }
+
+    /// Whether the rays of a leaf node are those of the world: no instance transforms them.
+    #[inline(always)]
+    pub fn is_world(&self, node: u32) -> bool {
+        let leaf = self.scene.top2[node as usize].left;
+        let instance = self.scene.leaves[leaf as usize].instance;
+        self.scene.instances[instance as usize].flags & INSTANCE_IDENTITY != 0
+    }
+
+    /// Whether the ray may meet the brick of a leaf node. To transform a ray costs more than to ask first whether it
+    /// enters the box.
+    #[inline(always)]
+    pub fn may_meet(&self, ray: &FramedRay, node: u32, t_max: f32) -> bool {
+        self.is_world(node) || self.enters(ray, node, t_max)
     }
 }

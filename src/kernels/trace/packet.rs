@@ -362,6 +362,21 @@ impl Packet {
         if !bound.has_levels() { rays } else { self.whose_cones(bound, rays, |cone| bound.takes(cone, leaf)) }
     }
 
+    /// Of `rays` those that may meet the brick of a leaf node.
+    #[inline(always)]
+    pub fn meeting(&self, bound: &Bound, node: u32, rays: u64) -> u64 {
+        if bound.is_world(node) {
+            return rays;
+        }
+        let (mut left, mut met) = (rays, 0);
+        while left != 0 {
+            let i = left.trailing_zeros() as usize % RAYS;
+            left &= left - 1;
+            met |= u64::from(bound.enters(&self.ray(i), node, self.t.0[i])) << i;
+        }
+        met
+    }
+
     /// Of `rays` those for which no level stands for all below a node of the wide top level.
     #[inline(always)]
     pub fn left_by_levels(&self, bound: &Bound, node: u32, rays: u64) -> u64 {

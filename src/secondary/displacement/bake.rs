@@ -13,7 +13,7 @@ use crate::kernels::{Directions, FrameExecutor, View};
 use crate::scene::placement::affine;
 use crate::schedule::cache::Cache;
 use crate::schedule::{ExecutorError, Pass, Step, Tracer, Tracing, listed};
-use bricks::{Resident, SceneFile};
+use bricks::{Resident, SceneFile, TOP_LEAF, TopNode2};
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -109,8 +109,10 @@ impl Run {
 struct Placed {
     frame: Frame,
     world_from_object: DAffine3,
-    /// Leaves of the top level that are its bricks, as of its first instance that is a similarity.
-    leaves: Vec<u32>,
+    /// Leaf nodes of the binary top level that are its bricks, as of its first instance that is a similarity.
+    nodes: Vec<u32>,
+    /// Its bricks.
+    bricks: Vec<u32>,
 }
 
 impl Placed {
@@ -122,9 +124,12 @@ impl Placed {
         let instance = resident.leaves.iter().find(|leaf| is_of(leaf) && is_even(leaf)).map_or(0, |leaf| leaf.instance);
         let world_from_object = affine(&resident.instances[instance as usize].world_from_object);
         let center = world_from_object.transform_point3(job.ball.center);
-        let own = |&(_, leaf): &(u32, &bricks::Leaf)| leaf.instance == instance && is_of(leaf);
-        let leaves = (0..).zip(&resident.leaves).filter(own).map(|(number, _)| number).collect();
-        Self { frame: Frame::near(resident, center), world_from_object, leaves }
+        let own = |(number, node): (u32, &TopNode2)| {
+            let leaf = (node.right == TOP_LEAF).then(|| &resident.leaves[node.left as usize])?;
+            (leaf.instance == instance && is_of(leaf)).then_some((number, leaf.brick))
+        };
+        let (nodes, bricks) = (0..).zip(&resident.top2).filter_map(own).unzip();
+        Self { frame: Frame::near(resident, center), world_from_object, nodes, bricks }
     }
 }
 
@@ -145,9 +150,9 @@ fn trace(
         let placed = &placed[run.job];
         let ray = |at: usize| placed.ray(ray_of(&jobs[run.job], run.first + at as u64, direction).0);
         rays.par_extend((0..run.count).into_par_iter().map(ray));
-        lists.extend((0..run.tiles(bench.tile)).map(|_| placed.leaves.clone()));
+        lists.extend((0..run.tiles(bench.tile)).map(|_| placed.nodes.clone()));
         rays.resize(lists.len() * bench.tile, none);
-        bricks.extend(placed.leaves.iter().map(|&leaf| bench.scene.resident().leaves[leaf as usize].brick));
+        bricks.extend(&placed.bricks);
     }
     lists.resize(bench.most / bench.tile, Vec::new());
     bricks.sort_unstable();
