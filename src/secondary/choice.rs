@@ -13,8 +13,10 @@ names! {
         Exact = "exact",
         /// By occupancy maps, those that these can answer.
         Roma = "roma",
-        /// By occupancy maps where these find them free, else by tracing them.
+        /// By what the rates of this device and measured errors say.
         Auto = "auto",
+        /// By occupancy maps where these find them free, else by tracing them.
+        Sift = "sift",
         /// By distance fields, those that occupancy maps can answer: a baseline.
         #[cfg(feature = "lab")]
         Df = "df",
@@ -50,7 +52,9 @@ impl EffectMethods {
     /// A method for the effects that it suits: rays to the sun are among them where they are asked for alone, because
     /// the error of maps, a few cells, is wider than a shadow's edge.
     pub fn of(method: Method) -> Self {
-        Self { shadow: Method::Exact, ..Self::every(method) }
+        let all = Self::every(method);
+        // `auto` keeps to an error.
+        if method == Method::Auto { all } else { Self { shadow: Method::Exact, ..all } }
     }
 
     /// A method for all effects that it can answer.
@@ -71,7 +75,18 @@ impl EffectMethods {
 
     /// Whether maps of what is occupied answer rays of some effect.
     pub fn has_maps(self) -> bool {
-        self.list().iter().any(|(_, method)| !matches!(method, Method::Exact | Method::Dvf | Method::Displacement))
+        let others = [Method::Exact, Method::Auto, Method::Dvf, Method::Displacement];
+        self.list().iter().any(|(_, method)| !others.contains(method))
+    }
+
+    /// With one method in place of another where that can answer the rays.
+    pub fn with(mut self, one: Method, other: Method) -> Self {
+        for (effect, method) in self.list() {
+            if method == one {
+                *self.method(effect) = if can_answer(other, effect) { other } else { Method::Exact };
+            }
+        }
+        self
     }
 
     /// Effects and their methods.
@@ -93,7 +108,7 @@ impl EffectMethods {
 /// Whether a method can answer the rays of an effect.
 fn can_answer(method: Method, effect: &str) -> bool {
     match method.name() {
-        "exact" | "displacement" => true,
+        "exact" | "auto" | "displacement" => true,
         "roma" => effect != "environment",
         "dvf" => effect == "environment",
         _ => matches!(effect, "ao" | "shadow"),
@@ -156,12 +171,13 @@ mod tests {
             "displacement",
             "ao=roma",
             "shadow=df",
-            "ao=roma,shadow=auto,environment=dvf",
+            "sift",
+            "ao=roma,shadow=sift,environment=dvf",
         ] {
             assert_eq!(text.parse::<EffectMethods>().unwrap().to_string(), text);
         }
         let read = |text: &str| text.parse::<EffectMethods>().unwrap();
-        assert_eq!(read("ao=auto").to_string(), "auto");
+        assert_eq!(read("ao=sift").to_string(), "sift");
         assert_eq!(read("roma, ao = exact").to_string(), "diffuse=roma");
         assert_eq!(read("roma,shadow=roma"), EffectMethods::every(Method::Roma));
     }
@@ -169,7 +185,8 @@ mod tests {
     #[test]
     fn the_sun_is_traced_unless_its_method_is_named() {
         for &method in Method::ALL {
-            assert_eq!(EffectMethods::of(method).shadow, Method::Exact);
+            let of_the_sun = if method == Method::Auto { method } else { Method::Exact };
+            assert_eq!(EffectMethods::of(method).shadow, of_the_sun);
             assert!(EffectMethods::of(method).has(method), "{method} answers something");
         }
         let chosen: EffectMethods = "roma".parse().unwrap();
@@ -181,9 +198,9 @@ mod tests {
     fn what_no_method_answers_is_refused() {
         for (text, says) in [
             ("glow=roma", "known: ao, diffuse, shadow, environment"),
-            ("ao=dvf", "dvf does not answer rays of ao; known: exact, roma, auto, df, displacement"),
-            ("environment=roma", "known: exact, dvf, displacement"),
-            ("diffuse=auto", "known: exact, roma, displacement"),
+            ("ao=dvf", "dvf does not answer rays of ao; known: exact, roma, auto, sift, df, displacement"),
+            ("environment=roma", "known: exact, auto, dvf, displacement"),
+            ("diffuse=sift", "known: exact, roma, auto, displacement"),
             ("ao=luck", "known: exact"),
             ("ao=roma,df", "EFFECT=df"),
         ] {

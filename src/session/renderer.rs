@@ -63,7 +63,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
 pub fn methods(settings: &Settings, resident: &Resident) -> Methods {
     let mut methods = Methods::default();
     let (roma, chosen) = (&settings.roma, settings.secondary);
-    if chosen.has(Method::Roma) || chosen.has(Method::Auto) {
+    if chosen.has(Method::Roma) || chosen.has(Method::Sift) {
         methods.set(Roma::new(roma.settings(settings.rsm.settings(), chosen), roma.bom));
     }
     #[cfg(feature = "lab")]

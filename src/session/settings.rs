@@ -332,8 +332,8 @@ impl Settings {
     pub fn without_effect(&self) -> Vec<String> {
         let effects = self.effects;
         let chosen = self.secondary;
-        let by_maps = |method| matches!(method, Method::Roma | Method::Auto);
-        let maps = chosen.has(Method::Roma) || chosen.has(Method::Auto);
+        let by_maps = |method| matches!(method, Method::Roma | Method::Sift);
+        let maps = chosen.has(Method::Roma) || chosen.has(Method::Sift);
         let fields = chosen.list().iter().any(|(_, method)| method.name() == "df");
         let lit = self.environment.is_some();
         let needs: [(&str, bool, &str); 25] = [
@@ -350,11 +350,11 @@ impl Settings {
             ("lod_blend", self.lod > 0.0, "--lod above 0"),
             ("progressive", self.samples() > BATCH_SAMPLES, "--spp above 64"),
             ("roma.bom", maps || fields, "--secondary roma, auto or df"),
-            ("roma.k", by_maps(chosen.ao), "--secondary ao=roma or ao=auto"),
-            ("roma.shadow_k", by_maps(chosen.shadow), "--secondary shadow=roma or shadow=auto"),
+            ("roma.k", by_maps(chosen.ao), "--secondary ao=roma or ao=sift"),
+            ("roma.shadow_k", by_maps(chosen.shadow), "--secondary shadow=roma or shadow=sift"),
             ("roma.diffuse_k", by_maps(chosen.diffuse), "--secondary diffuse=roma"),
-            ("roma.one_in", chosen.ao == Method::Auto, "--secondary ao=auto"),
-            ("roma.error", chosen.has(Method::Auto), "--secondary auto"),
+            ("roma.one_in", chosen.ao == Method::Sift, "--secondary ao=sift"),
+            ("roma.error", chosen.has(Method::Sift), "--secondary sift"),
             ("roma.", maps, "--secondary roma or auto"),
             ("rsm.", chosen.diffuse == Method::Roma, "--secondary diffuse=roma"),
             ("df.", fields, "--secondary df"),

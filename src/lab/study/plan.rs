@@ -81,8 +81,8 @@ pub fn ways(effect: Effect, has: Has, is_quick: bool) -> Vec<Way> {
         ways.push(Way::new("roma", 1, format!("--secondary {name}=roma --denoise")));
     }
     if has.occupancy && matches!(effect, Effect::Ao | Effect::Shadow) {
-        ways.extend([2, 5, 10].map(|percent| usual("auto", format!("--secondary {name}=auto --auto-error {percent}"))));
-        ways.push(usual("auto", format!("--secondary {name}=auto --auto-one-in 4")));
+        ways.extend([2, 5, 10].map(|percent| usual("sift", format!("--secondary {name}=sift --auto-error {percent}"))));
+        ways.push(usual("sift", format!("--secondary {name}=sift --auto-one-in 4")));
         ways.extend(
             thinned(&[32, 64, 128])
                 .into_iter()
@@ -320,7 +320,7 @@ mod tests {
     fn a_scene_without_data_is_measured_without_what_needs_it() {
         for &effect in Effect::ALL {
             let found: BTreeSet<&str> = ways(effect, Has::default(), false).iter().map(|way| way.method).collect();
-            assert!(!found.iter().any(|method| ["roma", "auto", "df", "displacement", "levels"].contains(method)));
+            assert!(!found.iter().any(|method| ["roma", "sift", "df", "displacement", "levels"].contains(method)));
         }
     }
 

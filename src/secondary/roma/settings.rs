@@ -1,4 +1,4 @@
-//! Options of `--secondary roma` and `auto`.
+//! Options of `--secondary roma` and `sift`.
 
 use super::{CLOSED, Grid, MOST_ONE_IN, MOST_STEPS, Role, RomaPass, RomaSettings, THIN};
 use crate::secondary::occupancy::Source;
@@ -51,11 +51,11 @@ settings! {
         /// With --secondary roma: columns that an unsnapped ray passes before it takes its map's direction.
         /// `rays_capped` counts rays that did.
         steps: u32 = 8, "--roma-steps N", Rule::Whole(1, MOST_STEPS as u64), "columns", Methods, Expert;
-        /// With --secondary auto: maps answer rays of `ao`, and one in N is traced, too, and corrects the mean; or off.
+        /// With --secondary sift: maps answer rays of `ao`, and one in N is traced, too, and corrects the mean; or off.
         /// The mean is that of exact rays; more take less time and are noisier. Blocks of 64 pixels go together, which
         /// shows in few rays without --rotation full, --denoise or --taa. `off`: --auto-error says which are traced.
         one_in: Option<u32> = None, "--auto-one-in N|off", Rule::Whole(2, MOST_ONE_IN as u64), "", Methods, Expert;
-        /// With --secondary auto: how many of a hundred rays of `ao` or `shadow` maps may answer wrongly; or off. Rays
+        /// With --secondary sift: how many of a hundred rays of `ao` or `shadow` maps may answer wrongly; or off. Rays
         /// that maps do not find free are traced as far as that takes, which one ray in 16 measures. `off`: they are
         /// traced to their ends, and nothing is measured.
         error: Option<f64> = Some(2.0), "--auto-error PERCENT|off", Rule::Real(0.1, 50.0), "percent", Methods, Usual;
@@ -63,14 +63,14 @@ settings! {
 }
 
 impl Options {
-    /// How rays are answered; where `chosen` has `auto`, exact ones are traced as far as `error` or `one_in` have it.
+    /// How rays are answered; where `chosen` has `sift`, exact ones are traced as far as `error` or `one_in` have it.
     pub fn settings(&self, rsm: RsmSettings, chosen: EffectMethods) -> RomaSettings {
         let most_wrong = self.error.map(|percent| (1e4 * percent).round() as u32);
         let pass = |method, k, is_unsnapped, one_in: Option<u32>, stride| {
             let role = match (method, one_in) {
                 (Method::Roma, _) => Role::Answer,
-                (Method::Auto, Some(one_in)) => Role::Correct(one_in),
-                (Method::Auto, None) => Role::Sift { most_wrong },
+                (Method::Sift, Some(one_in)) => Role::Correct(one_in),
+                (Method::Sift, None) => Role::Sift { most_wrong },
                 _ => return None,
             };
             let is_sifted = matches!(role, Role::Sift { .. });

@@ -223,7 +223,7 @@ fn settings_without_effect_are_named() {
     assert!(line.contains("ao or diffuse") && line.contains("shadow=roma"), "{line}");
     assert!(named("--effects shadow --secondary shadow=roma --roma-shadow-k 4").is_empty());
     assert!(named("--effects ao,diffuse --secondary ao=roma").is_empty());
-    assert_eq!(named("--effects shadow,diffuse --secondary ao=auto,diffuse=roma"), Vec::<String>::new());
+    assert_eq!(named("--effects shadow,diffuse --secondary ao=sift,diffuse=roma"), Vec::<String>::new());
     assert!(named("").is_empty() && named("--quality exact").is_empty());
 }
 

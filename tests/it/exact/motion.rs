@@ -168,7 +168,7 @@ fn lamps_and_maps_move_along() {
         "",
         "--secondary ao=roma,diffuse=roma,shadow=roma --roma-size 64",
         "--secondary ao=df,shadow=df --df-size 64",
-        "--secondary ao=auto,shadow=auto --auto-error off --roma-size 64",
+        "--secondary ao=sift,shadow=sift --auto-error off --roma-size 64",
     ] {
         let options = format!("{base} {options}");
         let (found, truth) = (walked(&scenes, &options), still(&scenes, &options));

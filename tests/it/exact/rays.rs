@@ -75,7 +75,7 @@ fn every_ray_is_traced_or_answered_once() {
     let modes: &[(&str, Option<DvfUse>)] = &[
         (ROMA, None),
         ("--secondary ao=df,shadow=df --cache 20% --df-size 32", None),
-        ("--secondary ao=auto,shadow=auto --roma-size 64 --cache 20% --auto-one-in 4", None),
+        ("--secondary ao=sift,shadow=sift --roma-size 64 --cache 20% --auto-one-in 4", None),
         ("--cache 20%", Some(labels)),
         ("--cache 20% --spp 2", Some(DvfUse { paper: true, ..labels })),
         ("--schedule demand --cache 20%", None),
@@ -86,8 +86,8 @@ fn every_ray_is_traced_or_answered_once() {
             "--secondary ao=roma,diffuse=roma,shadow=roma --roma-size 64 --roma-k 4 --cache 100% --roma-unsnapped all",
             None,
         ),
-        ("--secondary ao=auto,shadow=auto --roma-size 64 --cache 20% --auto-error off", None),
-        ("--secondary ao=auto,shadow=auto --roma-size 64 --cache 20% --auto-error 50", None),
+        ("--secondary ao=sift,shadow=sift --roma-size 64 --cache 20% --auto-error off", None),
+        ("--secondary ao=sift,shadow=sift --roma-size 64 --cache 20% --auto-error 50", None),
         ("--schedule plain --cache 100%", Some(DvfUse { doubt: true, ..labels })),
     ];
     for adapter in adapters() {
@@ -131,7 +131,7 @@ fn every_ray_is_traced_or_answered_once() {
                 _ if options.contains("ao=roma") || options.contains("ao=df") => {
                     assert!(of_ao == 0 && ao > 0, "{what}")
                 }
-                _ if options.contains("ao=auto") => assert!(of_ao > 0 && ao > 0, "{what}"),
+                _ if options.contains("ao=sift") => assert!(of_ao > 0 && ao > 0, "{what}"),
                 _ => assert!(ao == 0 && (environment > 0) == how.is_some(), "{what}"),
             }
             if let Some(one_in) = options.contains("one-in 4").then_some(4) {
@@ -159,7 +159,7 @@ fn counts_are_those_of_the_rays_themselves() {
     let scene = city(folder.path(), "20K", "512");
     let camera = CameraPath::read(&scene.with_extension("near.json")).expect("a path").frame(0, 1);
     for adapter in adapters() {
-        for secondary in ["exact", "shadow=roma", "shadow=df", "shadow=auto --auto-error off"] {
+        for secondary in ["exact", "shadow=roma", "shadow=df", "shadow=sift --auto-error off"] {
             let cells = "--roma-size 64 --df-size 32";
             let options = format!("--effects shadow --secondary {secondary} --cache 100% {cells}");
             let mut renderer = renderer(&scene, &adapter, &options);

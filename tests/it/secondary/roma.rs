@@ -208,11 +208,11 @@ fn rays_that_maps_find_free_are_not_traced() {
     let folder = folder();
     let scene = scene(folder.path(), true);
     let of = |options: &str| openness(folder.path(), true, &format!("--spp 16 {options}"));
-    let (exact, roma, auto) = (of(""), of("--secondary roma"), of("--secondary auto --auto-error off"));
+    let (exact, roma, auto) = (of(""), of("--secondary roma"), of("--secondary sift --auto-error off"));
     let (error_of_maps, error) = (apart(&roma, &exact), apart(&auto, &exact));
     println!("maps alone {error_of_maps:.4}, all in doubt traced {error:.4}");
     assert!(error < 0.5 * error_of_maps, "{error} is not half of {error_of_maps}");
-    let [all, doubt] = ["", "--secondary auto --auto-error off"].map(|options| rays_of_ao(&scene, options));
+    let [all, doubt] = ["", "--secondary sift --auto-error off"].map(|options| rays_of_ao(&scene, options));
     assert_eq!(all, (SIZE * SIZE * 16) as u64);
     let share = doubt as f64 / all as f64;
     println!("traced: {share:.3}");
@@ -234,7 +234,7 @@ fn traced_rays_correct_what_maps_get_wrong() {
     println!("maps alone: bias {bias_of_maps:.5}, error {error_of_maps:.4}");
     let mut before = 0.0;
     for one_in in [2, 4, 16] {
-        let (bias, error) = measured(&format!("--secondary auto --auto-one-in {one_in}"));
+        let (bias, error) = measured(&format!("--secondary sift --auto-one-in {one_in}"));
         println!("one in {one_in}: bias {bias:.5}, error {error:.4}");
         // Control: maps alone are too dark or too bright.
         assert!(bias < 0.2 * bias_of_maps, "one in {one_in}");
@@ -243,7 +243,7 @@ fn traced_rays_correct_what_maps_get_wrong() {
         assert!(error > before, "one in {one_in}: {error}");
         before = error;
         let all = (SIZE * SIZE * 16) as f64;
-        let traced = rays_of_ao(&scene, &format!("--secondary auto --auto-one-in {one_in}")) as f64;
+        let traced = rays_of_ao(&scene, &format!("--secondary sift --auto-one-in {one_in}")) as f64;
         assert!((traced / all * f64::from(one_in) - 1.0).abs() < 0.05, "one in {one_in}: {traced} of {all}");
     }
 }
@@ -263,7 +263,7 @@ fn maps_answer_what_measured_errors_allow() {
     let ([_, alone], _) = walk("--secondary roma --roma-unsnapped all --roma-steps 64 --roma-samples 4");
     let mut before = f64::INFINITY;
     for (percent, least_trust) in [(50.0, Trust::Beyond(0)), (2.0, Trust::Beyond(32)), (0.1, Trust::Nothing)] {
-        let options = format!("--secondary auto --auto-error {percent}");
+        let options = format!("--secondary sift --auto-error {percent}");
         let ([_, output], measured) = walk(&options);
         let trust = measured.trust((1e4 * percent) as u32);
         let wrong = measured.share_wrong(trust);
@@ -399,11 +399,11 @@ fn it_is_the_same_whatever_the_threads_and_the_cache() {
     for (options, threads) in [("--cache 100%", "3"), ("--cache 20%", "2"), ("--cache 30% --schedule demand", "2")] {
         assert!(picture(options, threads) == one, "{options}, {threads} threads");
     }
-    let hybrid = picture("--cache 100% --secondary ao=auto,shadow=auto", "1");
-    assert!(hybrid != one && picture("--cache 20% --secondary ao=auto,shadow=auto --schedule demand", "3") == hybrid);
-    let corrected = picture("--cache 100% --secondary ao=auto,shadow=auto --auto-one-in 3", "1");
+    let hybrid = picture("--cache 100% --secondary ao=sift,shadow=sift", "1");
+    assert!(hybrid != one && picture("--cache 20% --secondary ao=sift,shadow=sift --schedule demand", "3") == hybrid);
+    let corrected = picture("--cache 100% --secondary ao=sift,shadow=sift --auto-one-in 3", "1");
     assert!(corrected != one && corrected != hybrid);
-    assert!(picture("--cache 20% --secondary ao=auto,shadow=auto --auto-one-in 3 --schedule demand", "3") == corrected);
+    assert!(picture("--cache 20% --secondary ao=sift,shadow=sift --auto-one-in 3 --schedule demand", "3") == corrected);
     for other in ["--seed 1", "--roma-k 8", "--roma-size 32", "--roma-samples 1", "--roma-unsnapped all"] {
         assert!(picture(&format!("--cache 100% {other}"), "2") != one, "{other} must show");
     }

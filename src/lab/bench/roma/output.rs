@@ -181,7 +181,7 @@ const ERRORS: &str = "Errors against exact pictures: converged, and with one sam
                       distance field with as many cells, which takes as much memory with K = 4; in the paper it is \
                       below 1 for ambient occlusion in every scene. Figure 5: errors are means over six frames along \
                       the path, and the field has 128 cells. Cells: length of rays, in cells of bricks; maps know \
-                      nothing of rays shorter than three, and `--secondary auto` traces them. Whole: all of the \
+                      nothing of rays shorter than three, and `--secondary sift` traces them. Whole: all of the \
                       effect, with making maps.";
 
 fn errors<'a>(stage: Stage) -> Vec<Column<Measurement<'a>>> {

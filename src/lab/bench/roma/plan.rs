@@ -74,9 +74,9 @@ impl fmt::Display for Way {
             Self::Roma { k, size, is_unsnapped } => {
                 write!(f, "roma {size} K={k}{}", if *is_unsnapped { " unsnapped" } else { "" })
             }
-            Self::Sifted => f.write_str("auto, in doubt traced"),
-            Self::Corrected { one_in } => write!(f, "auto, one in {one_in}"),
-            Self::Bounded { percent } => write!(f, "auto, {percent} % wrong"),
+            Self::Sifted => f.write_str("sift, in doubt traced"),
+            Self::Corrected { one_in } => write!(f, "sift, one in {one_in}"),
+            Self::Bounded { percent } => write!(f, "sift, {percent} % wrong"),
             Self::Field { size } => write!(f, "df {size}"),
         }
     }
@@ -89,7 +89,7 @@ impl Way {
         settings.secondary = EffectMethods::every(match self {
             Self::Exact => Method::Exact,
             Self::Roma { .. } => Method::Roma,
-            Self::Sifted | Self::Corrected { .. } | Self::Bounded { .. } => Method::Auto,
+            Self::Sifted | Self::Corrected { .. } | Self::Bounded { .. } => Method::Sift,
             Self::Field { .. } => Method::Df,
         });
         match *self {

@@ -417,7 +417,7 @@ fn twins_agree_with_their_kernels() {
         Variant { schedule: Schedule::Demand, ..selecting(4.0, true) },
         Variant { list_most: 2, threshold: 2, ..selecting(4.0, false) },
         Variant { fronts: true, ..selecting(4.0, true) },
-        Variant { method: Method::Auto, ..selecting(4.0, false) },
+        Variant { method: Method::Sift, ..selecting(4.0, false) },
         // Levels stand in for what is missing.
         Variant { budget: Some(20_000), everything_fits: true, ..selecting(0.0, false) },
         Variant { budget: Some(40_000), ..selecting(2.0, false) },
